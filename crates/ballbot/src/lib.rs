@@ -1,0 +1,2 @@
+//! The ballbot plant.
+#![no_std]
