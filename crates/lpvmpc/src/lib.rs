@@ -1,6 +1,29 @@
 //! Model predictive control for linear parameter-varying (LPV) models.
 #![no_std]
+#![allow(
+    clippy::neg_cmp_op_on_partial_ord,
+    reason = "a comparison with a number that is not one must take the failing branch"
+)]
 
+mod active_set;
+mod controller;
+mod kkt;
 mod model;
+mod ocp;
+mod predictor;
+pub mod riccati;
+mod rows;
+mod solution;
+mod solver;
+mod working_set;
 
+pub use controller::{
+    Controller, ControllerError, ControllerSettings, Reference, Scheduling, TerminalIngredient,
+    Weights,
+};
+pub use kkt::{KktResidual, kkt_residual};
 pub use model::{LpvModel, Scalar};
+pub use ocp::{Bounds, Ocp, Penalty, Softness, Stage, Terminal};
+pub use predictor::Rk4;
+pub use solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
+pub use solver::{SolverSettings, WarmStart, Workspace, cost};

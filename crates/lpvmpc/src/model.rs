@@ -20,10 +20,7 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
     fn scheduling(&self, x: &SVector<T, NX>) -> SVector<T, NS>;
 
     /// The continuous-time pair A (`NX` x `NX`, per second) and B (`NX` x `NU`) at `scheduling`.
-    fn matrices(
-        &self,
-        scheduling: &SVector<T, NS>,
-    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>);
+    fn matrices(&self, scheduling: &SVector<T, NS>) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>);
 
     /// x_dot = f(x, u) = A(sigma(x)) x + B(sigma(x)) u, in state units per second.
     ///

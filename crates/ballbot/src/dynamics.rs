@@ -1,0 +1,71 @@
+//! The equations of motion M(q) q_ddot + C(q, q_dot) + D(q_dot) + G(q) = B~ tau (eq. (1)),
+//! with q = (phi, theta).
+
+use crate::parameters::Ballbot;
+use lpvmpc::Scalar;
+use nalgebra::{Matrix2, Vector2, Vector4, convert};
+
+impl<T: Scalar> Ballbot<T> {
+    /// Mass matrix M(q), 2 x 2, m^2 (eq. (2)).
+    pub fn mass(&self, theta: T) -> Matrix2<T> {
+        let coupling = self.coupling(theta.cos());
+        Matrix2::new(self.b1, -coupling, -coupling, self.b3)
+    }
+
+    /// Centrifugal term C(q, q_dot), m^2/s^2.
+    pub fn coriolis(&self, theta: T, theta_dot: T) -> Vector2<T> {
+        let Self { geometry, .. } = self;
+        let arm = geometry.centre_of_mass * geometry.ball_radius;
+        Vector2::new(-arm * theta.sin() * theta_dot * theta_dot, T::zero())
+    }
+
+    /// Friction term D(q_dot), m^2/s^2.
+    pub fn friction(&self, phi_dot: T) -> Vector2<T> {
+        Vector2::new(self.b4 * phi_dot, T::zero())
+    }
+
+    /// Gravity term G(q), m^2/s^2.
+    pub fn gravity(&self, theta: T) -> Vector2<T> {
+        let Self { geometry, .. } = self;
+        Vector2::new(
+            T::zero(),
+            -geometry.centre_of_mass * geometry.gravity * theta.sin(),
+        )
+    }
+
+    /// Input vector B~.
+    pub fn input(&self) -> Vector2<T> {
+        Vector2::new(self.gear(), -self.gear())
+    }
+
+    /// x_dot = f(x, u) of the nonlinear plant (eq. (3)): `x` = (phi, theta, phi_dot,
+    /// theta_dot) in rad and rad/s, `torque` in N m.
+    pub fn f(&self, x: &Vector4<T>, torque: T) -> Vector4<T> {
+        let (theta, phi_dot, theta_dot) = (x[1], x[2], x[3]);
+        let (sin_theta, cos_theta) = theta.sin_cos();
+        let Self { geometry, .. } = self;
+        let arm = geometry.centre_of_mass * geometry.ball_radius;
+        let coupling = self.coupling(cos_theta);
+        // B~ tau - C - D - G
+        let force_phi =
+            self.gear() * torque + arm * sin_theta * theta_dot * theta_dot - self.b4 * phi_dot;
+        let force_theta =
+            geometry.centre_of_mass * geometry.gravity * sin_theta - self.gear() * torque;
+        let inverse = T::one() / self.determinant(coupling);
+        Vector4::new(
+            phi_dot,
+            theta_dot,
+            (self.b3 * force_phi + coupling * force_theta) * inverse,
+            (coupling * force_phi + self.b1 * force_theta) * inverse,
+        )
+    }
+
+    /// Kinetic plus potential energy per unit of body mass, m^2/s^2. Constant without friction
+    /// and torque.
+    pub fn energy(&self, x: &Vector4<T>) -> T {
+        let rates = Vector2::new(x[2], x[3]);
+        let kinetic = rates.dot(&(self.mass(x[1]) * rates)) * convert::<f64, T>(0.5);
+        let Self { geometry, .. } = self;
+        kinetic + geometry.centre_of_mass * geometry.gravity * x[1].cos()
+    }
+}

@@ -1,0 +1,297 @@
+//! From bounds to rows: which bound is violated most, and what it looks like in terms of the
+//! normalised deviations v. Rows are formed only when they are violated.
+
+use crate::model::Scalar;
+use crate::ocp::{Bounds, Ocp, Penalty, Softness};
+use crate::riccati::StageFactor;
+use crate::solution::{ActiveRow, BoundId, Part, Quantity, Side};
+use crate::working_set::Row;
+use nalgebra::{SVector, convert};
+
+/// A trajectory of the problem: x_1.. and u_0..
+pub(crate) struct Trajectory<'a, T, const NX: usize, const NU: usize, const N: usize> {
+    pub x: &'a [SVector<T, NX>; N],
+    pub u: &'a [SVector<T, NU>; N],
+}
+
+/// A bound's value beside its limit.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate<T> {
+    pub bound: BoundId,
+    pub part: Part,
+    pub soft: Option<Penalty<T>>,
+    /// Distance inside the bound; negative outside.
+    pub slack: T,
+    /// `-slack` in units of the bound's own size.
+    pub violation: T,
+}
+
+/// The size against which a violation is measured: the larger finite limit, or 1.
+fn size_of_bound<T: Scalar>(lower: T, upper: T) -> T {
+    let magnitude = |limit: T| {
+        if limit.is_finite() {
+            limit.abs()
+        } else {
+            T::zero()
+        }
+    };
+    let size = magnitude(lower).max(magnitude(upper));
+    if size > T::zero() { size } else { T::one() }
+}
+
+/// Offers every violated side of `bounds` at `value` to `visit`. NaN counts as violated.
+fn violated_sides<T: Scalar, const K: usize>(
+    bounds: &Bounds<T, K>,
+    soft: &Softness<T, K>,
+    value: &SVector<T, K>,
+    stage: usize,
+    quantity: fn(usize) -> Quantity,
+    visit: &mut impl FnMut(Candidate<T>),
+) {
+    let sides = bounds.lower.iter().zip(bounds.upper.iter());
+    for (index, ((v, soft), (lower, upper))) in value.iter().zip(soft.iter()).zip(sides).enumerate()
+    {
+        if *v >= *lower && *v <= *upper {
+            continue;
+        }
+        for (side, slack) in [(Side::Lower, *v - *lower), (Side::Upper, *upper - *v)] {
+            if slack >= T::zero() {
+                continue;
+            }
+            visit(Candidate {
+                bound: BoundId {
+                    stage,
+                    quantity: quantity(index),
+                    side,
+                },
+                part: Part::Hard,
+                soft: *soft,
+                slack,
+                violation: -slack / size_of_bound(*lower, *upper),
+            });
+        }
+    }
+}
+
+/// Offers every violated bound of the problem on the trajectory to `visit`.
+pub(crate) fn violated_bounds<
+    T: Scalar,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const NG: usize,
+>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    trajectory: &Trajectory<'_, T, NX, NU, N>,
+    visit: &mut impl FnMut(Candidate<T>),
+) {
+    let n = ocp.length();
+    let mut x = &ocp.x0;
+    let steps = trajectory.x.iter().zip(trajectory.u.iter());
+    for (i, (stage, (x_next, u))) in ocp.stages.iter().zip(steps).enumerate().take(n) {
+        if i > 0 {
+            violated_sides(&stage.x, &stage.soft_x, x, i, Quantity::State, visit);
+        }
+        violated_sides(&stage.u, &[None; NU], u, i, Quantity::Input, visit);
+        if NG > 0 {
+            let value = stage.row_x * x + stage.row_u * u;
+            violated_sides(
+                &stage.rows,
+                &stage.soft_rows,
+                &value,
+                i,
+                Quantity::Row,
+                visit,
+            );
+        }
+        x = x_next;
+    }
+    violated_sides(
+        &ocp.terminal.x,
+        &ocp.terminal.soft_x,
+        x,
+        n,
+        Quantity::State,
+        visit,
+    );
+    if NG > 0 {
+        let value = ocp.terminal.row_x * x;
+        violated_sides(
+            &ocp.terminal.rows,
+            &ocp.terminal.soft_rows,
+            &value,
+            n,
+            Quantity::Row,
+            visit,
+        );
+    }
+}
+
+/// The bound's normal: d(value)/dx and d(value)/du at its stage.
+pub(crate) fn normal<
+    T: Scalar,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const NG: usize,
+>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    bound: &BoundId,
+) -> (SVector<T, NX>, SVector<T, NU>) {
+    let terminal = bound.stage >= ocp.length();
+    match (bound.quantity, ocp.stages.get(bound.stage)) {
+        (Quantity::State(j), _) => (unit(j), SVector::zeros()),
+        (Quantity::Input(j), _) => (SVector::zeros(), unit(j)),
+        (Quantity::Row(j), Some(stage)) if !terminal => (
+            component_row(&stage.row_x, j),
+            component_row(&stage.row_u, j),
+        ),
+        (Quantity::Row(j), _) => (component_row(&ocp.terminal.row_x, j), SVector::zeros()),
+    }
+}
+
+fn unit<T: Scalar, const K: usize>(j: usize) -> SVector<T, K> {
+    SVector::from_fn(|i, _| if i == j { T::one() } else { T::zero() })
+}
+
+fn component_row<T: Scalar, const R: usize, const C: usize>(
+    m: &nalgebra::SMatrix<T, R, C>,
+    j: usize,
+) -> SVector<T, C> {
+    m.row_iter()
+        .nth(j)
+        .map_or_else(SVector::zeros, |row| row.transpose())
+}
+
+/// The bound's slack on the trajectory; for an equality, value - target.
+pub(crate) fn slack<
+    T: Scalar,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const NG: usize,
+>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    trajectory: &Trajectory<'_, T, NX, NU, N>,
+    bound: &BoundId,
+) -> T {
+    let n = ocp.length();
+    let x = match bound.stage.checked_sub(1) {
+        Some(before) => trajectory.x.get(before).unwrap_or(&ocp.x0),
+        None => &ocp.x0,
+    };
+    let u = trajectory.u.get(bound.stage);
+    let (normal_x, normal_u) = normal(ocp, bound);
+    let value = normal_x.dot(x) + u.map_or(T::zero(), |u| normal_u.dot(u));
+    let stage = if bound.stage < n {
+        ocp.stages.get(bound.stage)
+    } else {
+        None
+    };
+    let (lower, upper) = match (bound.quantity, stage) {
+        (Quantity::State(j), Some(stage)) => limits(&stage.x, j),
+        (Quantity::State(j), None) => limits(&ocp.terminal.x, j),
+        (Quantity::Input(j), Some(stage)) => limits(&stage.u, j),
+        (Quantity::Row(j), Some(stage)) => limits(&stage.rows, j),
+        (Quantity::Row(j), None) => limits(&ocp.terminal.rows, j),
+        (Quantity::Input(_), None) => (value, value),
+    };
+    match (bound.side, bound.quantity) {
+        (Side::Lower, _) => value - lower,
+        (Side::Upper, _) => upper - value,
+        (Side::Equality, Quantity::State(j)) => {
+            let target = ocp.terminal.equality.as_ref();
+            value
+                - target
+                    .and_then(|target| target.get(j))
+                    .copied()
+                    .unwrap_or(value)
+        }
+        (Side::Equality, _) => T::zero(),
+    }
+}
+
+fn limits<T: Scalar, const K: usize>(bounds: &Bounds<T, K>, j: usize) -> (T, T) {
+    match (bounds.lower.get(j), bounds.upper.get(j)) {
+        (Some(lower), Some(upper)) => (*lower, *upper),
+        _ => (T::zero(), T::zero()),
+    }
+}
+
+/// Writes the row of `bound` to `row`: one backward pass through the closed loop.
+pub(crate) fn form_row<
+    T: Scalar,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const NG: usize,
+>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    factors: &[StageFactor<T, NX, NU>; N],
+    bound: BoundId,
+    part: Part,
+    soft: Option<Penalty<T>>,
+    row: &mut Row<T, NU, N>,
+) {
+    let (normal_x, normal_u) = normal(ocp, &bound);
+    let sign = match bound.side {
+        Side::Upper => -T::one(),
+        Side::Lower | Side::Equality => T::one(),
+    };
+    let mut costate = normal_x * sign;
+    row.alpha = [SVector::zeros(); N];
+    row.support = bound.stage.min(N);
+    if let (Some(factor), Some(alpha)) = (factors.get(bound.stage), row.alpha.get_mut(bound.stage))
+        && bound.stage < ocp.length()
+    {
+        *alpha = factor.inverse_factor * normal_u * sign;
+        costate += factor.gain.tr_mul(&normal_u) * sign;
+        row.support += 1;
+    }
+    let before = factors.iter().zip(row.alpha.iter_mut()).take(bound.stage);
+    for (factor, alpha) in before.rev() {
+        *alpha = factor.input.tr_mul(&costate);
+        costate = factor.closed_loop.tr_mul(&costate);
+    }
+    let infinity: T = convert(f64::INFINITY);
+    (row.cap, row.compliance) = match (part, soft) {
+        (Part::Linear, Some(penalty)) => (penalty.linear, T::zero()),
+        (Part::Quadratic, Some(penalty)) => (infinity, T::one() / penalty.quadratic),
+        _ => (infinity, T::zero()),
+    };
+    row.equality = bound.side == Side::Equality;
+    row.mirrored = false;
+    row.active = ActiveRow {
+        bound,
+        part,
+        multiplier: T::zero(),
+        exceeded: false,
+    };
+}
+
+/// The price of exceeding `bound`, if it is soft.
+pub(crate) fn soft_price<
+    T: Scalar,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const NG: usize,
+>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    bound: &BoundId,
+) -> Option<Penalty<T>> {
+    let stage = if bound.stage < ocp.length() {
+        ocp.stages.get(bound.stage)
+    } else {
+        None
+    };
+    match (bound.quantity, stage) {
+        (Quantity::State(j), Some(stage)) => stage.soft_x.get(j),
+        (Quantity::State(j), None) => ocp.terminal.soft_x.get(j),
+        (Quantity::Row(j), Some(stage)) => stage.soft_rows.get(j),
+        (Quantity::Row(j), None) => ocp.terminal.soft_rows.get(j),
+        (Quantity::Input(_), _) => None,
+    }
+    .copied()
+    .flatten()
+}

@@ -1,0 +1,233 @@
+//! The answer of the solver: inputs, predicted states, active bounds with their multipliers,
+//! and a status that says what the answer is worth.
+
+use crate::model::Scalar;
+use core::fmt;
+use nalgebra::SVector;
+
+/// What a bound acts on; the number counts components from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// State component.
+    State(usize),
+    /// Input component.
+    Input(usize),
+    /// General row.
+    Row(usize),
+}
+
+/// Which side of a bound.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// value >= lower
+    Lower,
+    /// value <= upper
+    Upper,
+    /// value = target (a component of the terminal equality)
+    Equality,
+}
+
+/// One bound of the problem.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BoundId {
+    /// Stage, from 0 to the horizon (the terminal state).
+    pub stage: usize,
+    /// What is bounded.
+    pub quantity: Quantity,
+    /// Which side.
+    pub side: Side,
+}
+
+impl fmt::Display for BoundId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let side = match self.side {
+            Side::Lower => "lower bound",
+            Side::Upper => "upper bound",
+            Side::Equality => "terminal equality",
+        };
+        let (name, index) = match self.quantity {
+            Quantity::State(index) => ("state", index),
+            Quantity::Input(index) => ("input", index),
+            Quantity::Row(index) => ("general row", index),
+        };
+        write!(f, "{side} of {name} {index} at stage {}", self.stage)
+    }
+}
+
+/// Which part of a bound's price a row stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The bound itself: multiplier from 0 to infinity (any sign for an equality).
+    Hard,
+    /// The linear part of a soft bound: multiplier from 0 to the linear price.
+    Linear,
+    /// The quadratic part of a soft bound: multiplier = quadratic price * excess.
+    Quadratic,
+}
+
+/// An active bound with its multiplier.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ActiveRow<T> {
+    /// The bound.
+    pub bound: BoundId,
+    /// Which part of it.
+    pub part: Part,
+    /// Lagrange multiplier, >= 0 in the direction that keeps the bound (any sign for an
+    /// equality, where it multiplies x - target), in cost per unit of the quantity.
+    pub multiplier: T,
+    /// The multiplier rests at the linear price: the soft bound is exceeded.
+    pub exceeded: bool,
+}
+
+impl<T: Scalar> ActiveRow<T> {
+    /// Filler for unused places.
+    pub(crate) fn empty() -> Self {
+        Self {
+            bound: BoundId {
+                stage: 0,
+                quantity: Quantity::State(0),
+                side: Side::Lower,
+            },
+            part: Part::Hard,
+            multiplier: T::zero(),
+            exceeded: false,
+        }
+    }
+}
+
+/// The active bounds, at most `M`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ActiveSet<T, const M: usize> {
+    rows: [ActiveRow<T>; M],
+    len: usize,
+}
+
+impl<T: Scalar, const M: usize> ActiveSet<T, M> {
+    /// An empty set.
+    pub fn new() -> Self {
+        Self {
+            rows: [ActiveRow::empty(); M],
+            len: 0,
+        }
+    }
+
+    /// The active rows, in no particular order.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = &ActiveRow<T>> {
+        self.rows.iter().take(self.len)
+    }
+
+    /// How many rows are active.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether no row is active.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Forgets all rows, so that the next solve starts cold.
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// Adds a row; `false` if the set is full.
+    pub(crate) fn push(&mut self, row: ActiveRow<T>) -> bool {
+        match self.rows.get_mut(self.len) {
+            Some(place) => {
+                *place = row;
+                self.len += 1;
+                true
+            }
+            None => false,
+        }
+    }
+}
+
+impl<T: Scalar, const M: usize> Default for ActiveSet<T, M> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// What the answer is worth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Status<T> {
+    /// The inputs are optimal and every bound holds.
+    Solved,
+    /// No input satisfies all hard bounds; this bound conflicts with the rest.
+    Infeasible(BoundId),
+    /// The cap on changes of the active set ended the search.
+    ChangeCap,
+    /// More bounds are active at once than the workspace has places for.
+    WorkingSetFull,
+    /// R + B'PB is not positive definite at this stage: the offending pivot.
+    NumericalFailure {
+        /// Stage of the failing factorisation.
+        stage: usize,
+        /// The pivot that should be positive.
+        pivot: T,
+    },
+    /// The problem contains a number that is not finite (or overflowed).
+    NotFinite,
+}
+
+impl<T: Scalar> Status<T> {
+    /// Whether the inputs are optimal.
+    pub fn is_solved(&self) -> bool {
+        matches!(self, Self::Solved)
+    }
+}
+
+impl<T: fmt::Display> fmt::Display for Status<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Solved => write!(f, "solved"),
+            Self::Infeasible(bound) => write!(f, "infeasible: {bound} cannot be met"),
+            Self::ChangeCap => write!(f, "cap on active-set changes reached"),
+            Self::WorkingSetFull => write!(f, "more active bounds than the workspace holds"),
+            Self::NumericalFailure { stage, pivot } => write!(
+                f,
+                "R + B'PB not positive definite at stage {stage} (pivot {pivot})"
+            ),
+            Self::NotFinite => write!(f, "a number of the problem is not finite"),
+        }
+    }
+}
+
+/// Inputs, predicted states and status of one solve.
+///
+/// Whatever the status, the inputs are finite and within the input bounds; unless it is
+/// [`Status::Solved`] they are a fallback, not an optimum.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solution<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
+    /// u_0 to u_{N-1}.
+    pub u: [SVector<T, NU>; N],
+    /// x_1 to x_N, predicted by the problem's linear dynamics.
+    pub x: [SVector<T, NX>; N],
+    /// Optimal value of the problem's cost, with the factor 1/2 of [`crate::Stage`] and the
+    /// price of exceeded soft bounds.
+    pub cost: T,
+    /// What the answer is worth.
+    pub status: Status<T>,
+    /// Bounds that hold with equality, or are exceeded at a price. It is also the warm start
+    /// of the next solve.
+    pub active: ActiveSet<T, M>,
+    /// Changes of the active set that were made.
+    pub changes: usize,
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize> Default
+    for Solution<T, NX, NU, N, M>
+{
+    fn default() -> Self {
+        Self {
+            u: [SVector::zeros(); N],
+            x: [SVector::zeros(); N],
+            cost: T::zero(),
+            status: Status::Solved,
+            active: ActiveSet::new(),
+            changes: 0,
+        }
+    }
+}

@@ -1,0 +1,304 @@
+//! The quadratic program of one sample: Riccati factorisation, rollout, and, where a bound is
+//! violated, the dual active-set method on the cached factor.
+
+use crate::active_set::DualActiveSet;
+use crate::model::Scalar;
+use crate::ocp::{Bounds, Ocp, Penalty, Softness};
+use crate::riccati::{CostToGo, StageFactor};
+use crate::rows::Trajectory;
+use crate::solution::{Solution, Status};
+use nalgebra::{SVector, convert};
+
+/// Settings of the solver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolverSettings<T> {
+    /// A bound may be violated by this much, relative to its own size. Default: eps^(2/3) of
+    /// the number type, 4e-11 for `f64` and 2e-5 for `f32`.
+    pub tolerance: T,
+    /// The search ends after this many changes of the active set. Default: 500.
+    pub max_changes: usize,
+    /// What the active set of the previous solution is used for. Default: shifted.
+    pub warm_start: WarmStart,
+}
+
+/// Where the search for the active set begins. It changes the time, never the answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WarmStart {
+    /// From nothing.
+    Cold,
+    /// From the previous active set, at the same stages.
+    Same,
+    /// From the previous active set, one stage earlier: the horizon has moved on.
+    Shifted,
+}
+
+impl<T: Scalar> Default for SolverSettings<T> {
+    fn default() -> Self {
+        Self {
+            tolerance: T::default_epsilon().powf(convert(2.0 / 3.0)),
+            max_changes: 500,
+            warm_start: WarmStart::Shifted,
+        }
+    }
+}
+
+/// Memory of the solver: `NX` states, `NU` inputs, at most `N` stages and `M` simultaneously
+/// active bounds. Nothing in it outlives a solve; one workspace serves any number of problems.
+///
+/// `M = N * NU` always suffices without soft bounds, plus `NX` with a terminal equality.
+#[derive(Clone, Debug)]
+pub struct Workspace<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
+    factors: [StageFactor<T, NX, NU>; N],
+    dual: DualActiveSet<T, NU, N, M>,
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
+    Workspace<T, NX, NU, N, M>
+{
+    /// An empty workspace.
+    pub fn new() -> Self {
+        const { assert!(N > 0, "a horizon has at least one stage") };
+        Self {
+            factors: [StageFactor::zeros(); N],
+            dual: DualActiveSet::new(),
+        }
+    }
+
+    /// Solves `ocp`. `solution` is the answer and, on entry, the warm start.
+    ///
+    /// Always ends, after at most `settings.max_changes` changes of the active set, and always
+    /// leaves finite inputs within the input bounds; what they are worth is in
+    /// `solution.status`.
+    pub fn solve<const NG: usize>(
+        &mut self,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+        settings: &SolverSettings<T>,
+        solution: &mut Solution<T, NX, NU, N, M>,
+    ) {
+        let outcome = self.search(ocp, settings, solution);
+        solution.changes = self.dual.changes;
+        solution.status = match outcome {
+            Ok(()) => Status::Solved,
+            Err(status) => {
+                fall_back(ocp, solution);
+                status
+            }
+        };
+    }
+
+    fn search<const NG: usize>(
+        &mut self,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+        settings: &SolverSettings<T>,
+        solution: &mut Solution<T, NX, NU, N, M>,
+    ) -> Result<(), Status<T>> {
+        self.dual.reset(settings.tolerance, settings.max_changes);
+        self.factorize(ocp)?;
+        self.roll_out(ocp, solution)?;
+        if ocp.terminal.equality.is_some() {
+            let x_n = terminal_state(ocp, solution);
+            self.dual
+                .impose_terminal_equality(ocp, &self.factors, &x_n)?;
+            self.roll_out(ocp, solution)?;
+        }
+        self.warm_start(ocp, settings, solution)?;
+
+        let mut polished = false;
+        loop {
+            match self.dual.most_violated(ocp, &trajectory(solution)) {
+                Some(violated) => self.dual.satisfy(ocp, &self.factors, &violated)?,
+                None if polished || !self.dual.polish(ocp, &trajectory(solution)) => break,
+                None => polished = true,
+            }
+            self.roll_out(ocp, solution)?;
+        }
+        solution.cost = cost(ocp, solution);
+        if !solution.cost.is_finite() {
+            return Err(Status::NotFinite);
+        }
+        if !self.dual.report(&mut solution.active) {
+            return Err(Status::WorkingSetFull);
+        }
+        Ok(())
+    }
+
+    /// Backward: the factor of every stage.
+    fn factorize<const NG: usize>(&mut self, ocp: &Ocp<T, NX, NU, N, NG>) -> Result<(), Status<T>> {
+        let mut behind = CostToGo {
+            quadratic: ocp.terminal.p,
+            linear: ocp.terminal.linear_x,
+        };
+        let stages = ocp.stages.iter().zip(self.factors.iter_mut());
+        for (stage, (data, factor)) in stages.enumerate().take(ocp.length()).rev() {
+            let (new, front) =
+                StageFactor::new(data, &behind).map_err(|bad| Status::NumericalFailure {
+                    stage,
+                    pivot: bad.0,
+                })?;
+            *factor = new;
+            behind = front;
+        }
+        Ok(())
+    }
+
+    /// Forward: the trajectory of the current normalised deviations.
+    fn roll_out<const NG: usize>(
+        &self,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+        solution: &mut Solution<T, NX, NU, N, M>,
+    ) -> Result<(), Status<T>> {
+        let mut x = ocp.x0;
+        let policy = self.factors.iter().zip(self.dual.v.iter());
+        let places = solution.u.iter_mut().zip(solution.x.iter_mut());
+        for ((factor, v), (u, x_next)) in policy.zip(places).take(ocp.length()) {
+            *u = factor.policy(&x, v);
+            x = factor.next(&x, v);
+            *x_next = x;
+        }
+        // A number that is not finite anywhere spreads to the last state or its input.
+        let finite = solution.u.iter().take(ocp.length()).all(is_finite) && is_finite(&x);
+        if finite {
+            Ok(())
+        } else {
+            Err(Status::NotFinite)
+        }
+    }
+
+    fn warm_start<const NG: usize>(
+        &mut self,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+        settings: &SolverSettings<T>,
+        solution: &mut Solution<T, NX, NU, N, M>,
+    ) -> Result<(), Status<T>> {
+        let shift = match settings.warm_start {
+            WarmStart::Cold => return Ok(()),
+            WarmStart::Same => 0,
+            WarmStart::Shifted => 1,
+        };
+        let needed = !solution.active.is_empty()
+            && self
+                .dual
+                .most_violated(ocp, &trajectory(solution))
+                .is_some();
+        if needed {
+            let trajectory = trajectory(solution);
+            self.dual
+                .warm_start(ocp, &self.factors, &trajectory, &solution.active, shift);
+            self.roll_out(ocp, solution)?;
+        }
+        Ok(())
+    }
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize> Default
+    for Workspace<T, NX, NU, N, M>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+fn trajectory<T, const NX: usize, const NU: usize, const N: usize, const M: usize>(
+    solution: &Solution<T, NX, NU, N, M>,
+) -> Trajectory<'_, T, NX, NU, N> {
+    Trajectory {
+        x: &solution.x,
+        u: &solution.u,
+    }
+}
+
+fn terminal_state<
+    T: Scalar,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const M: usize,
+    const NG: usize,
+>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    solution: &Solution<T, NX, NU, N, M>,
+) -> SVector<T, NX> {
+    let last = solution.x.get(ocp.length() - 1);
+    last.copied().unwrap_or(ocp.x0)
+}
+
+fn is_finite<T: Scalar, const K: usize>(v: &SVector<T, K>) -> bool {
+    v.iter().all(|entry| entry.is_finite())
+}
+
+/// After a failure: the last inputs moved into their bounds, and the states they lead to.
+fn fall_back<
+    T: Scalar,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const M: usize,
+    const NG: usize,
+>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    solution: &mut Solution<T, NX, NU, N, M>,
+) {
+    let mut x = ocp.x0;
+    let places = solution.u.iter_mut().zip(solution.x.iter_mut());
+    for (stage, (u, x_next)) in ocp.stages.iter().zip(places).take(ocp.length()) {
+        *u = stage.u.project(u);
+        x = stage.a * x + stage.b * *u + stage.c;
+        *x_next = x;
+    }
+    solution.active.clear();
+    solution.cost = cost(ocp, solution);
+}
+
+/// The problem's cost at the solution's inputs and states (with the factor 1/2 of [`Ocp`]'s
+/// stages), including the price of exceeded soft bounds.
+pub fn cost<
+    T: Scalar,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const M: usize,
+    const NG: usize,
+>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    solution: &Solution<T, NX, NU, N, M>,
+) -> T {
+    let half: T = convert(0.5);
+    let mut total = T::zero();
+    let mut x = &ocp.x0;
+    let steps = solution.u.iter().zip(solution.x.iter());
+    for (i, (stage, (u, x_next))) in ocp.stages.iter().zip(steps).enumerate().take(ocp.length()) {
+        total += (stage.q * x * half + stage.linear_x).dot(x);
+        total += (stage.s * x + stage.r * u * half + stage.linear_u).dot(u);
+        if i > 0 {
+            total += price(&stage.soft_x, x, &stage.x);
+        }
+        if NG > 0 {
+            let value = stage.row_x * x + stage.row_u * u;
+            total += price(&stage.soft_rows, &value, &stage.rows);
+        }
+        x = x_next;
+    }
+    let end = &ocp.terminal;
+    total += (end.p * x * half + end.linear_x).dot(x) + price(&end.soft_x, x, &end.x);
+    if NG > 0 {
+        total += price(&end.soft_rows, &(end.row_x * x), &end.rows);
+    }
+    total
+}
+
+/// The price of the soft bounds that `value` exceeds.
+fn price<T: Scalar, const K: usize>(
+    soft: &Softness<T, K>,
+    value: &SVector<T, K>,
+    bounds: &Bounds<T, K>,
+) -> T {
+    let sides = bounds.lower.iter().zip(bounds.upper.iter());
+    let mut total = T::zero();
+    for ((soft, v), (lower, upper)) in soft.iter().zip(value.iter()).zip(sides) {
+        if let Some(Penalty { linear, quadratic }) = soft {
+            let excess = (*lower - *v).max(*v - *upper).max(T::zero());
+            total += (*linear + *quadratic * excess * convert(0.5)) * excess;
+        }
+    }
+    total
+}
