@@ -1,0 +1,43 @@
+//! The built-in scenarios: the paper's, to the letter.
+
+/// A built-in scenario.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Builtin {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// The commented TOML file.
+    pub text: &'static str,
+}
+
+macro_rules! builtin {
+    ($name:literal) => {
+        Builtin {
+            name: $name,
+            text: include_str!(concat!("builtin/", $name, ".toml")),
+        }
+    };
+}
+
+/// All built-in scenarios.
+pub const ALL: [Builtin; 6] = [
+    builtin!("two-setpoints"),
+    builtin!("two-setpoints-linear"),
+    builtin!("lissajous"),
+    builtin!("single-setpoint"),
+    builtin!("single-setpoint-terminal"),
+    builtin!("tight-bounds"),
+];
+
+/// The built-in scenario with this name.
+pub fn find(name: &str) -> Option<Builtin> {
+    ALL.into_iter().find(|builtin| builtin.name == name)
+}
+
+/// The built-in scenario whose name is most like `name`, if any is alike at all.
+pub fn nearest(name: &str) -> Option<&'static str> {
+    ALL.iter()
+        .map(|builtin| (strsim::jaro_winkler(builtin.name, name), builtin.name))
+        .filter(|(likeness, _)| *likeness > 0.7)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, name)| name)
+}

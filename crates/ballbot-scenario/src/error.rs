@@ -1,0 +1,86 @@
+//! What can be wrong with a scenario, said to a person.
+
+use std::io;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// A scenario that cannot be run.
+#[derive(Debug, Error)]
+pub enum ScenarioError {
+    /// Neither a built-in scenario nor a file.
+    #[error(
+        "unknown scenario `{name}`: it is neither a built-in scenario ({}) nor a file{}",
+        builtin.join(", "),
+        nearest.map_or(String::new(), |nearest| format!("; did you mean `{nearest}`?"))
+    )]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The built-in scenario with the most similar name.
+        nearest: Option<&'static str>,
+        /// All built-in scenarios.
+        builtin: Vec<&'static str>,
+    },
+    /// A file cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The text is not TOML, or not a scenario: unknown key, wrong type, missing key.
+    #[error("{origin} is not a valid scenario:\n{message}")]
+    Syntax {
+        /// File or name.
+        origin: String,
+        /// Line, column and what was expected.
+        message: String,
+    },
+    /// A value that makes no sense.
+    #[error("{key} = {value}: {expected}")]
+    Value {
+        /// The key, with the tables it stands in.
+        key: String,
+        /// What was given.
+        value: String,
+        /// What would be right.
+        expected: String,
+    },
+    /// A reference file that makes no sense.
+    #[error("reference file {}{}: {problem}", path.display(), line.map_or(String::new(), |line| format!(", line {line}")))]
+    ReferenceFile {
+        /// The file.
+        path: PathBuf,
+        /// The line, where the problem has one.
+        line: Option<u64>,
+        /// What is wrong, and what would be right.
+        problem: String,
+    },
+    /// The terminal cost cannot be computed.
+    #[error("controller.terminal: no Riccati solution: {0}")]
+    Riccati(#[from] lpvmpc_design::RiccatiError),
+    /// The sampling time is too long for the predictor.
+    #[error("controller.t_s and controller.predictor: {0}")]
+    PredictorStep(#[from] lpvmpc_design::Rk4StepError),
+    /// The equations of motion have no solution at some tilt within the bounds.
+    #[error("parameters: {0}")]
+    Parameters(String),
+    /// The controller refuses its settings.
+    #[error("controller: {0}")]
+    Controller(#[from] lpvmpc::ControllerError),
+}
+
+impl ScenarioError {
+    pub(crate) fn value(
+        key: impl Into<String>,
+        value: impl ToString,
+        expected: impl Into<String>,
+    ) -> Self {
+        Self::Value {
+            key: key.into(),
+            value: value.to_string(),
+            expected: expected.into(),
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! Ballbot experiments as TOML files: parameters, controller, bounds, reference, simulated
+//! plant, and the run itself.
+//!
+//! ```
+//! use ballbot_scenario::{Scenario, Surroundings};
+//! use std::{path::Path, time::Duration};
+//!
+//! # fn main() -> Result<(), ballbot_scenario::ScenarioError> {
+//! let mut scenario = Scenario::load("single-setpoint")?;
+//! scenario.controller.horizon = 30;
+//! let prepared = scenario.prepare(Path::new("."))?;
+//! let trajectories = prepared.run(&Surroundings {
+//!     clock: &|| Duration::ZERO,
+//!     progress: &|_| (),
+//! })?;
+//! let end = trajectories[0].final_state;
+//! assert!((end[0] - std::f64::consts::PI).abs() < 0.05, "phi has reached pi: {end}");
+//! # Ok(())
+//! # }
+//! ```
+#![allow(
+    clippy::neg_cmp_op_on_partial_ord,
+    reason = "a comparison with a number that is not one must take the failing branch"
+)]
+
+pub mod builtin;
+mod error;
+mod prepare;
+mod reference;
+mod run;
+mod schema;
+
+pub use error::ScenarioError;
+pub use prepare::{Plane, Prepared};
+pub use reference::PhiReference;
+pub use run::{LONGEST_HORIZON, Surroundings};
+pub use schema::{
+    BoundsTable, ControllerTable, CsvTable, IntegrationTable, LinearModelTable, LissajousTable,
+    ModelKind, ParameterTable, PointTable, PredictorTable, ReferenceTable, Scenario, SineTable,
+    StateTable, TerminalTable,
+};

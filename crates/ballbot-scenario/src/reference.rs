@@ -1,0 +1,326 @@
+//! What phi has to follow, ready to be asked at any time.
+
+use crate::error::ScenarioError;
+use crate::schema::{CsvTable, LissajousTable, PointTable, ReferenceTable, SineTable};
+use ballbot::Geometry;
+use std::path::Path;
+
+/// phi_ref(t) of one plane, rad.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PhiReference {
+    /// Steps: each set point holds from its time on, the first one from the beginning.
+    Steps(Vec<PointTable>),
+    /// A sine wave.
+    Sine(SineTable),
+    /// Minimum-jerk moves between points; the ends hold.
+    MinimumJerk(Vec<PointTable>),
+    /// Straight lines between points; the ends hold.
+    Interpolated(Vec<PointTable>),
+}
+
+/// A set point takes effect at the sample that lies within this much of its time, s.
+const SAME_TIME: f64 = 1e-9;
+
+impl PhiReference {
+    /// phi_ref at the time `t` (s), rad.
+    pub fn at(&self, t: f64) -> f64 {
+        match self {
+            Self::Steps(points) => {
+                let reached = points.iter().rev().find(|p| p.time_s <= t + SAME_TIME);
+                reached.or(points.first()).map_or(0.0, |p| p.phi_rad)
+            }
+            Self::Sine(sine) => {
+                let angle = sine.angular_frequency_rad_s * t + sine.phase_rad;
+                sine.offset_rad + sine.amplitude_rad * angle.sin()
+            }
+            Self::MinimumJerk(points) => between(points, t, minimum_jerk),
+            Self::Interpolated(points) => between(points, t, |fraction| fraction),
+        }
+    }
+}
+
+/// The position polynomial of least jerk from rest to rest, on [0, 1] (Flash and Hogan 1985).
+fn minimum_jerk(s: f64) -> f64 {
+    s * s * s * (10.0 + s * (6.0 * s - 15.0))
+}
+
+fn between(points: &[PointTable], t: f64, shape: impl Fn(f64) -> f64) -> f64 {
+    let after = points.partition_point(|p| p.time_s <= t);
+    match (
+        after.checked_sub(1).and_then(|i| points.get(i)),
+        points.get(after),
+    ) {
+        (Some(from), Some(to)) => {
+            let fraction = (t - from.time_s) / (to.time_s - from.time_s);
+            from.phi_rad + (to.phi_rad - from.phi_rad) * shape(fraction)
+        }
+        (Some(end), None) | (None, Some(end)) => end.phi_rad,
+        (None, None) => 0.0,
+    }
+}
+
+/// The references of one plane or two.
+pub(crate) fn resolve(
+    table: &ReferenceTable,
+    geometry: &Geometry<f64>,
+    duration: f64,
+    directory: &Path,
+) -> Result<Vec<PhiReference>, ScenarioError> {
+    match table {
+        ReferenceTable::Lissajous(curve) => lissajous(curve, geometry),
+        ReferenceTable::Planes { x, y } => Ok(vec![
+            one_plane(x, "reference.planes.x", duration, directory)?,
+            one_plane(y, "reference.planes.y", duration, directory)?,
+        ]),
+        single => Ok(vec![one_plane(single, "reference", duration, directory)?]),
+    }
+}
+
+fn one_plane(
+    table: &ReferenceTable,
+    key: &str,
+    duration: f64,
+    directory: &Path,
+) -> Result<PhiReference, ScenarioError> {
+    match table {
+        ReferenceTable::SetPoints { points } => {
+            check_points(points, &format!("{key}.set_points.points"))?;
+            Ok(PhiReference::Steps(points.clone()))
+        }
+        ReferenceTable::MinimumJerk { points } => {
+            check_points(points, &format!("{key}.minimum_jerk.points"))?;
+            Ok(PhiReference::MinimumJerk(points.clone()))
+        }
+        ReferenceTable::Sine(sine) => {
+            for (name, value) in [
+                ("amplitude_rad", sine.amplitude_rad),
+                ("angular_frequency_rad_s", sine.angular_frequency_rad_s),
+                ("phase_rad", sine.phase_rad),
+                ("offset_rad", sine.offset_rad),
+            ] {
+                finite(&format!("{key}.sine.{name}"), value)?;
+            }
+            Ok(PhiReference::Sine(*sine))
+        }
+        ReferenceTable::Csv(file) => {
+            Ok(PhiReference::Interpolated(read(file, duration, directory)?))
+        }
+        ReferenceTable::Lissajous(_) | ReferenceTable::Planes { .. } => Err(ScenarioError::value(
+            key,
+            "a reference of two planes",
+            "one plane takes set_points, sine, minimum_jerk or csv",
+        )),
+    }
+}
+
+fn lissajous(
+    curve: &LissajousTable,
+    geometry: &Geometry<f64>,
+) -> Result<Vec<PhiReference>, ScenarioError> {
+    let axes = [
+        (
+            "x",
+            curve.amplitude_x_m,
+            curve.angular_frequency_x_rad_s,
+            curve.phase_x_rad,
+        ),
+        (
+            "y",
+            curve.amplitude_y_m,
+            curve.angular_frequency_y_rad_s,
+            curve.phase_y_rad,
+        ),
+    ];
+    let mut planes = Vec::with_capacity(axes.len());
+    for (axis, amplitude, frequency, phase) in axes {
+        finite(
+            &format!("reference.lissajous.amplitude_{axis}_m"),
+            amplitude,
+        )?;
+        finite(
+            &format!("reference.lissajous.angular_frequency_{axis}_rad_s"),
+            frequency,
+        )?;
+        finite(&format!("reference.lissajous.phase_{axis}_rad"), phase)?;
+        planes.push(PhiReference::Sine(SineTable {
+            amplitude_rad: geometry.ball_angle(amplitude),
+            angular_frequency_rad_s: frequency,
+            phase_rad: phase,
+            offset_rad: 0.0,
+        }));
+    }
+    Ok(planes)
+}
+
+pub(crate) fn finite(key: &str, value: f64) -> Result<(), ScenarioError> {
+    if value.is_finite() {
+        Ok(())
+    } else {
+        Err(ScenarioError::value(
+            key,
+            value,
+            "it must be a finite number",
+        ))
+    }
+}
+
+fn check_points(points: &[PointTable], key: &str) -> Result<(), ScenarioError> {
+    if points.is_empty() {
+        return Err(ScenarioError::value(
+            key,
+            "[]",
+            "at least one point is needed",
+        ));
+    }
+    for (i, point) in points.iter().enumerate() {
+        finite(&format!("{key}[{i}].time_s"), point.time_s)?;
+        finite(&format!("{key}[{i}].phi_rad"), point.phi_rad)?;
+        if i > 0 && point.time_s <= points[i - 1].time_s {
+            return Err(ScenarioError::value(
+                format!("{key}[{i}].time_s"),
+                point.time_s,
+                format!(
+                    "times must increase; the point before is at {} s",
+                    points[i - 1].time_s
+                ),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Reads a reference file, refusing gaps rather than guessing what was meant.
+fn read(
+    table: &CsvTable,
+    duration: f64,
+    directory: &Path,
+) -> Result<Vec<PointTable>, ScenarioError> {
+    let path = directory.join(&table.path);
+    let file = std::fs::read(&path).map_err(|source| ScenarioError::Read {
+        path: path.clone(),
+        source,
+    })?;
+    let problem = |line: Option<u64>, problem: String| ScenarioError::ReferenceFile {
+        path: path.clone(),
+        line,
+        problem,
+    };
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_reader(file.as_slice());
+    let headers = reader
+        .headers()
+        .map_err(|error| problem(Some(1), error.to_string()))?
+        .clone();
+    let column = |name: &str| {
+        headers
+            .iter()
+            .position(|header| header == name)
+            .ok_or_else(|| {
+                let present = headers.iter().collect::<Vec<_>>().join(", ");
+                problem(
+                    Some(1),
+                    format!("there is no column `{name}`; the columns are: {present}"),
+                )
+            })
+    };
+    let (time_column, phi_column) = (column(&table.time_column)?, column(&table.phi_column)?);
+
+    let mut points = Vec::new();
+    let mut lines = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|error| {
+            problem(error.position().map(csv::Position::line), error.to_string())
+        })?;
+        let line = record.position().map(csv::Position::line);
+        let number = |column: usize, name: &str| {
+            let text = record.get(column).unwrap_or("");
+            match text.parse::<f64>() {
+                Ok(value) if value.is_finite() => Ok(value),
+                _ if text.is_empty() => Err(problem(line, format!("`{name}` is missing"))),
+                _ => Err(problem(
+                    line,
+                    format!("`{name}` is `{text}`, which is not a finite number"),
+                )),
+            }
+        };
+        points.push(PointTable {
+            time_s: number(time_column, &table.time_column)?,
+            phi_rad: number(phi_column, &table.phi_column)?,
+        });
+        lines.push(line);
+    }
+    check_grid(&points, &lines, duration, &path)?;
+    Ok(points)
+}
+
+/// An interval this many times the median one is a gap.
+const GAP: f64 = 3.0;
+
+/// Times increase without a gap and cover the run.
+fn check_grid(
+    points: &[PointTable],
+    lines: &[Option<u64>],
+    duration: f64,
+    path: &Path,
+) -> Result<(), ScenarioError> {
+    let problem = |line: Option<u64>, problem: String| ScenarioError::ReferenceFile {
+        path: path.to_owned(),
+        line,
+        problem,
+    };
+    let (Some(first), Some(last)) = (points.first(), points.last()) else {
+        return Err(problem(
+            None,
+            "there are no rows below the header".to_owned(),
+        ));
+    };
+    let intervals = points
+        .windows(2)
+        .map(|pair| pair[1].time_s - pair[0].time_s);
+    let mut sorted: Vec<f64> = intervals.clone().collect();
+    sorted.sort_by(f64::total_cmp);
+    let median = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    for (i, interval) in intervals.enumerate() {
+        let line = lines.get(i + 1).copied().flatten();
+        let time = points[i].time_s;
+        if interval <= 0.0 {
+            return Err(problem(
+                line,
+                format!(
+                    "time does not increase: {} s after {time} s",
+                    time + interval
+                ),
+            ));
+        }
+        if interval > GAP * median {
+            return Err(problem(
+                line,
+                format!(
+                    "a gap of {interval:.6} s after {time} s, where rows are {median:.6} s apart; \
+                     fill it in"
+                ),
+            ));
+        }
+    }
+    if first.time_s > SAME_TIME {
+        return Err(problem(
+            lines.first().copied().flatten(),
+            format!(
+                "it begins at {} s; it must begin at 0 s or before",
+                first.time_s
+            ),
+        ));
+    }
+    if last.time_s < duration - SAME_TIME && points.len() > 1 {
+        return Err(problem(
+            lines.last().copied().flatten(),
+            format!(
+                "it ends at {} s, before the run does (duration_s = {duration})",
+                last.time_s
+            ),
+        ));
+    }
+    Ok(())
+}

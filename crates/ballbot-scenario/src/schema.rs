@@ -1,0 +1,310 @@
+//! The scenario file: what a user writes, key by key. Meaning and checks are in `check`.
+
+use serde::{Deserialize, Serialize};
+
+/// A closed-loop experiment, as written in a TOML file. Units are part of the key names.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// One line for figures and lists.
+    pub title: String,
+    /// Length of the run, s.
+    pub duration_s: f64,
+    /// The robot: the plant and the controller's model.
+    pub parameters: ParameterTable,
+    /// The controller.
+    pub controller: ControllerTable,
+    /// Bounds of the controller's problem.
+    pub bounds: BoundsTable,
+    /// State at time zero (of both planes, unless `initial_state_y` is given).
+    #[serde(default)]
+    pub initial_state: StateTable,
+    /// State of the y plane at time zero, for scenarios with two planes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub initial_state_y: Option<StateTable>,
+    /// What phi has to follow.
+    pub reference: ReferenceTable,
+    /// Tolerances of the simulated plant.
+    #[serde(default)]
+    pub integration: IntegrationTable,
+}
+
+/// Parameters b and geometry of a ballbot; see [`ballbot::Ballbot`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ParameterTable {
+    /// b1, m^2.
+    pub b1_m2: f64,
+    /// b2, m^2.
+    pub b2_m2: f64,
+    /// b3, m^2.
+    pub b3_m2: f64,
+    /// b4, m^2/s.
+    pub b4_m2_s: f64,
+    /// l, m.
+    pub centre_of_mass_m: f64,
+    /// r_b, m.
+    pub ball_radius_m: f64,
+    /// r_w, m.
+    pub wheel_radius_m: f64,
+    /// g, m/s^2.
+    pub gravity_m_s2: f64,
+    /// Angle of the wheels' contact points from the top of the ball, degrees.
+    #[serde(default = "paper_zenith_angle")]
+    pub zenith_angle_deg: f64,
+}
+
+fn paper_zenith_angle() -> f64 {
+    45.0
+}
+
+/// Linear model p of the robot; see [`ballbot::LinearParameters`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LinearModelTable {
+    /// p1, 1/s^2.
+    pub p1: f64,
+    /// p2, 1/s.
+    pub p2: f64,
+    /// p3, rad/(s^2 N m).
+    pub p3: f64,
+    /// p4, 1/s^2.
+    pub p4: f64,
+    /// p5, 1/s.
+    pub p5: f64,
+    /// p6, rad/(s^2 N m).
+    pub p6: f64,
+}
+
+/// The controller's settings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ControllerTable {
+    /// Which model predicts.
+    pub model: ModelKind,
+    /// Sampling time, s.
+    pub t_s: f64,
+    /// Prediction horizon N, samples.
+    pub horizon: usize,
+    /// Diagonal of Q, for (phi, theta, phi_dot, theta_dot).
+    pub q: [f64; 4],
+    /// R, 1/(N m)^2.
+    pub r: f64,
+    /// The end of the horizon.
+    #[serde(default)]
+    pub terminal: TerminalTable,
+    /// The discrete-time predictor; chosen from the fastest pole when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub predictor: Option<PredictorTable>,
+}
+
+/// Which model predicts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ModelKind {
+    /// The LPV model with the scheduling of the previous plan.
+    Lpv,
+    /// The LPV model with the scheduling held at the upright equilibrium.
+    Linear,
+}
+
+/// The end of the horizon.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum TerminalTable {
+    /// Nothing.
+    None,
+    /// x_N = x_ref.
+    Equality,
+    /// ||x_N - x_ref||_P^2 with P from the discrete Riccati equation of the predictor at the
+    /// upright equilibrium: the cost of the LQR from there on.
+    #[default]
+    DiscreteRiccati,
+    /// P from the continuous Riccati equation, as the paper does. It is about t_s times the
+    /// discrete one, so it counts about 1/t_s times too little.
+    ContinuousRiccati {
+        /// The linear model it is computed for; the linearised plant when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        linear_model: Option<LinearModelTable>,
+    },
+    /// A given P.
+    Cost {
+        /// Symmetric positive semidefinite, 4 x 4.
+        p: [[f64; 4]; 4],
+    },
+}
+
+/// The predictor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum PredictorTable {
+    /// Runge-Kutta of order four with the scheduling frozen over the sample.
+    Rk4 {
+        /// Steps per sample.
+        substeps: usize,
+    },
+}
+
+/// Bounds [lower, upper]; `-inf` and `inf` where there is none.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoundsTable {
+    /// Ball angle, rad.
+    #[serde(default = "unbounded")]
+    pub phi_rad: [f64; 2],
+    /// Tilt, rad.
+    #[serde(default = "unbounded")]
+    pub theta_rad: [f64; 2],
+    /// Ball speed, rad/s.
+    #[serde(default = "unbounded")]
+    pub phi_dot_rad_s: [f64; 2],
+    /// Tilt rate, rad/s.
+    #[serde(default = "unbounded")]
+    pub theta_dot_rad_s: [f64; 2],
+    /// Torque of the virtual wheel, N m.
+    pub torque_nm: [f64; 2],
+}
+
+fn unbounded() -> [f64; 2] {
+    [f64::NEG_INFINITY, f64::INFINITY]
+}
+
+/// A state of one plane.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StateTable {
+    /// Ball angle, rad.
+    #[serde(default)]
+    pub phi_rad: f64,
+    /// Tilt, rad.
+    #[serde(default)]
+    pub theta_rad: f64,
+    /// Ball speed, rad/s.
+    #[serde(default)]
+    pub phi_dot_rad_s: f64,
+    /// Tilt rate, rad/s.
+    #[serde(default)]
+    pub theta_dot_rad_s: f64,
+}
+
+/// What phi has to follow, in one plane or in two.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum ReferenceTable {
+    /// Steps between set points.
+    SetPoints {
+        /// In order of time; the first one holds from the beginning.
+        points: Vec<PointTable>,
+    },
+    /// A sine wave.
+    Sine(SineTable),
+    /// Minimum-jerk moves from point to point.
+    MinimumJerk {
+        /// In order of time; at rest at each of them.
+        points: Vec<PointTable>,
+    },
+    /// A file.
+    Csv(CsvTable),
+    /// Two planes: X = amplitude sin(omega t) in each.
+    Lissajous(LissajousTable),
+    /// Two planes, each with a reference of its own.
+    Planes {
+        /// The x plane.
+        x: Box<ReferenceTable>,
+        /// The y plane.
+        y: Box<ReferenceTable>,
+    },
+}
+
+/// Where phi is to be at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PointTable {
+    /// Time, s.
+    pub time_s: f64,
+    /// Ball angle, rad.
+    pub phi_rad: f64,
+}
+
+/// phi = offset + amplitude sin(omega t + phase).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SineTable {
+    /// Amplitude, rad.
+    pub amplitude_rad: f64,
+    /// Angular frequency omega, rad/s.
+    pub angular_frequency_rad_s: f64,
+    /// Phase at time zero, rad.
+    #[serde(default)]
+    pub phase_rad: f64,
+    /// Mean value, rad.
+    #[serde(default)]
+    pub offset_rad: f64,
+}
+
+/// A reference file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CsvTable {
+    /// CSV file with a header, relative to the scenario file.
+    pub path: String,
+    /// Column of the time, s.
+    #[serde(default = "default_time_column")]
+    pub time_column: String,
+    /// Column of phi, rad.
+    #[serde(default = "default_phi_column")]
+    pub phi_column: String,
+}
+
+fn default_time_column() -> String {
+    "t_s".to_owned()
+}
+
+fn default_phi_column() -> String {
+    "phi_ref_rad".to_owned()
+}
+
+/// A Lissajous curve in the plane of the floor.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LissajousTable {
+    /// Amplitude along x, m.
+    pub amplitude_x_m: f64,
+    /// Amplitude along y, m.
+    pub amplitude_y_m: f64,
+    /// Angular frequency along x, rad/s.
+    pub angular_frequency_x_rad_s: f64,
+    /// Angular frequency along y, rad/s.
+    pub angular_frequency_y_rad_s: f64,
+    /// Phase of x at time zero, rad.
+    #[serde(default)]
+    pub phase_x_rad: f64,
+    /// Phase of y at time zero, rad.
+    #[serde(default)]
+    pub phase_y_rad: f64,
+}
+
+/// Tolerances of the simulated plant.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct IntegrationTable {
+    /// Relative tolerance.
+    #[serde(default = "default_tolerance")]
+    pub relative_tolerance: f64,
+    /// Absolute tolerance, in rad and rad/s.
+    #[serde(default = "default_tolerance")]
+    pub absolute_tolerance: f64,
+}
+
+fn default_tolerance() -> f64 {
+    1e-9
+}
+
+impl Default for IntegrationTable {
+    fn default() -> Self {
+        Self {
+            relative_tolerance: default_tolerance(),
+            absolute_tolerance: default_tolerance(),
+        }
+    }
+}

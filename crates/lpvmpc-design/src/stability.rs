@@ -1,0 +1,7 @@
+//! Checks of stability: of a fixed gain over a scheduling box, and of an integration step.
+
+mod frozen;
+mod rk4_step;
+
+pub use frozen::{FrozenError, FrozenStability, SchedulingGrid, frozen_stability};
+pub use rk4_step::{Rk4Step, Rk4StepError, check_rk4_step};

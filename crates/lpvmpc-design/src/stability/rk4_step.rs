@@ -1,0 +1,136 @@
+//! Whether a Runge-Kutta step is short enough for the poles it has to follow.
+
+use nalgebra::{Complex, DMatrix};
+use thiserror::Error;
+
+use crate::matrix_check::MatrixError;
+use crate::modes::poles;
+
+/// A step of the classical fourth-order Runge-Kutta method that every decaying pole allows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rk4Step {
+    /// The length of one step: sampling time / substeps, s.
+    pub step: f64,
+    /// The longest step that the decaying poles allow, s; infinite if no pole decays.
+    pub longest_step: f64,
+    /// The fewest substeps of the sampling time that are stable.
+    pub fewest_substeps: usize,
+}
+
+/// A step that is too long, or not a step.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum Rk4StepError {
+    /// The state matrix is not square, not finite, or has no eigenvalues.
+    #[error(transparent)]
+    Matrix(#[from] MatrixError),
+    /// The sampling time is not a positive, finite number.
+    #[error("the sampling time is {value} s: it must be finite and > 0")]
+    SampleTime {
+        /// The sampling time, s.
+        value: f64,
+    },
+    /// No substeps.
+    #[error("the number of substeps is 0: it must be at least 1")]
+    NoSubsteps,
+    /// A mode that decays in the plant grows in the predictor.
+    #[error(
+        "the Runge-Kutta step of {step} s (sampling time {sample_time} s in {substeps} substeps) \
+         is too long for the pole {pole} 1/s: this decaying mode is multiplied by \
+         {amplification:.4} in each step, allowed is 1. The longest stable step is \
+         {longest_step:.6} s: take at least {fewest_substeps} substeps"
+    )]
+    TooLong {
+        /// Sampling time, s.
+        sample_time: f64,
+        /// Substeps asked for.
+        substeps: usize,
+        /// Length of one step, s.
+        step: f64,
+        /// The pole that bears the shortest step, 1/s.
+        pole: Complex<f64>,
+        /// |R(step * pole)|.
+        amplification: f64,
+        /// The longest stable step, s.
+        longest_step: f64,
+        /// The fewest substeps of the sampling time that are stable.
+        fewest_substeps: usize,
+    },
+}
+
+/// Checks that `substeps` classical Runge-Kutta steps in `sample_time` (s) keep every decaying
+/// mode of x_dot = A x decaying.
+///
+/// One step of length h multiplies the mode of a pole lambda (1/s) by R(h lambda),
+/// R(z) = 1 + z + z^2/2 + z^3/6 + z^4/24; for each pole with negative real part |R| <= 1 is
+/// required. Poles with real part >= 0 belong to modes that do not decay in the plant either and
+/// set no limit. A stable step is not yet an accurate one: near the limit the fastest mode decays
+/// far too slowly, at -2.785 on the real axis not at all.
+///
+/// # Errors
+/// [`Rk4StepError::TooLong`] with the pole, the step, its limit and the substeps that would do;
+/// or an argument is out of range.
+pub fn check_rk4_step(
+    a: &DMatrix<f64>,
+    sample_time: f64,
+    substeps: usize,
+) -> Result<Rk4Step, Rk4StepError> {
+    if !(sample_time.is_finite() && sample_time > 0.0) {
+        return Err(Rk4StepError::SampleTime { value: sample_time });
+    }
+    if substeps == 0 {
+        return Err(Rk4StepError::NoSubsteps);
+    }
+    let step = sample_time / substeps as f64;
+    let tightest = poles(a)?
+        .into_iter()
+        .filter(|pole| pole.re < 0.0)
+        .map(|pole| (pole, longest_step(pole)))
+        .min_by(|x, y| x.1.total_cmp(&y.1));
+    let Some((pole, longest_step)) = tightest else {
+        return Ok(Rk4Step {
+            step,
+            longest_step: f64::INFINITY,
+            fewest_substeps: 1,
+        });
+    };
+    let fewest_substeps = (sample_time / longest_step).ceil() as usize;
+    if step > longest_step {
+        return Err(Rk4StepError::TooLong {
+            sample_time,
+            substeps,
+            step,
+            pole,
+            amplification: amplification(pole * step),
+            longest_step,
+            fewest_substeps,
+        });
+    }
+    Ok(Rk4Step {
+        step,
+        longest_step,
+        fewest_substeps,
+    })
+}
+
+/// |R(z)|.
+fn amplification(z: Complex<f64>) -> f64 {
+    ((((z / 24.0 + 1.0 / 6.0) * z + 0.5) * z + 1.0) * z + 1.0).norm()
+}
+
+/// The longest h with |R(h pole)| <= 1 for a pole with negative real part.
+///
+/// From zero into the left half plane every ray leaves the stability region once, and the region
+/// ends before |z| = 4, so bisection finds the limit.
+fn longest_step(pole: Complex<f64>) -> f64 {
+    let direction = pole / pole.norm();
+    let (mut stable, mut unstable) = (0.0, 4.0);
+    while unstable - stable > f64::EPSILON * unstable {
+        let middle = 0.5 * (stable + unstable);
+        if amplification(direction * middle) <= 1.0 {
+            stable = middle;
+        } else {
+            unstable = middle;
+        }
+    }
+    stable / pole.norm()
+}
