@@ -1,5 +1,6 @@
 //! What can be wrong with a scenario, said to a person.
 
+use crate::builtin;
 use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -72,6 +73,15 @@ pub enum ScenarioError {
 }
 
 impl ScenarioError {
+    /// No built-in scenario has this name.
+    pub fn unknown(name: &str) -> Self {
+        Self::Unknown {
+            name: name.to_owned(),
+            nearest: builtin::nearest(name),
+            builtin: builtin::ALL.iter().map(|builtin| builtin.name).collect(),
+        }
+    }
+
     pub(crate) fn value(
         key: impl Into<String>,
         value: impl ToString,

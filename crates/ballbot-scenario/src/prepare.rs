@@ -63,11 +63,7 @@ impl Scenario {
         let path = Path::new(name_or_path);
         let looks_like_a_path = path.extension().is_some() || path.components().count() > 1;
         if !path.exists() && !looks_like_a_path {
-            return Err(ScenarioError::Unknown {
-                name: name_or_path.to_owned(),
-                nearest: builtin::nearest(name_or_path),
-                builtin: builtin::ALL.iter().map(|builtin| builtin.name).collect(),
-            });
+            return Err(ScenarioError::unknown(name_or_path));
         }
         let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Read {
             path: path.to_owned(),

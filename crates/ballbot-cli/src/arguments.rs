@@ -1,0 +1,69 @@
+//! The command line.
+
+use crate::commands::{
+    bench::BenchArguments, completions::CompletionsArguments, linearize::LinearizeArguments,
+    lqr::LqrArguments, refine::RefineArguments, reproduce::ReproduceArguments,
+    scenario::ScenarioArguments, simulate::SimulateArguments,
+};
+use clap::{Parser, Subcommand};
+
+/// Predictive control of a ballbot, a robot that balances on one ball.
+#[derive(Debug, Parser)]
+#[command(
+    name = "ballbot",
+    version,
+    after_help = "\
+Examples:
+  ballbot reproduce                   the paper, with a report
+  ballbot simulate two-setpoints      one closed loop
+  ballbot refine                      the paper's parameters b from its linear model p
+  ballbot lqr --ts 0.05 --substeps 4  a gain and its terminal cost
+  ballbot help lqr                    options and examples of one command
+
+Exit codes: 0 done, 1 no result (the message says why), 2 the command line is not understood."
+)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Reproduce the paper: every figure, every table, published beside computed
+    Reproduce(ReproduceArguments),
+    /// Run a closed loop and record it
+    Simulate(SimulateArguments),
+    /// Time the controller on this machine
+    Bench(BenchArguments),
+    /// List or show the built-in scenarios
+    Scenario(ScenarioArguments),
+    /// Find the nonlinear model's parameters b from a linear model's parameters p
+    Refine(RefineArguments),
+    /// Show the linear model: A, B, poles, controllability
+    Linearize(LinearizeArguments),
+    /// Design a linear-quadratic regulator u = -K x and check it at frozen scheduling
+    Lqr(LqrArguments),
+    /// Print the completions for a shell
+    Completions(CompletionsArguments),
+}
+
+/// A finite number.
+pub fn finite(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        Ok(value) => Err(format!("{value} is not a finite number")),
+        Err(_) => Err(format!("`{text}` is not a number")),
+    }
+}
+
+/// A finite number above zero.
+pub fn positive(text: &str) -> Result<f64, String> {
+    let value = finite(text)?;
+    if value > 0.0 {
+        Ok(value)
+    } else {
+        Err(format!("{value} is not positive"))
+    }
+}

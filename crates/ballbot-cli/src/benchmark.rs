@@ -1,0 +1,150 @@
+//! How long the controller takes on this machine.
+//!
+//! Every sample of a closed loop is repeated from the same memory of the past, and the shortest
+//! time counts, so that what else the machine does is left out; the statistics are over the
+//! samples of the sequence.
+
+use crate::commands::CommandError;
+use ballbot::Ballbot;
+use ballbot_scenario::{Prepared, Scenario, ScenarioError};
+use lpvmpc::{Controller, Reference, Solution, Workspace};
+use lpvmpc_sim::advance;
+use nalgebra::Vector4;
+use serde::Serialize;
+use std::hint::black_box;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// The closed loops that are timed.
+pub const SEQUENCES: [&str; 4] = [
+    "two-setpoints",
+    "lissajous",
+    "single-setpoint-terminal",
+    "tight-bounds",
+];
+
+/// The horizon of those scenarios.
+const N: usize = 20;
+/// A torque bound per stage, and the four rows of a terminal equality.
+const M: usize = N + 4;
+/// Repetitions of each sample.
+const PASSES: usize = 30;
+
+type Control = Controller<Ballbot<f64>, f64, 4, 1, 2, N, M>;
+
+/// Statistics of a time over a sequence, in microseconds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Times {
+    /// Half of the samples take no longer.
+    pub median: f64,
+    /// 99 % of the samples take no longer.
+    pub p99: f64,
+    /// No sample takes longer.
+    pub max: f64,
+}
+
+/// The times of one sequence.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SequenceTimes {
+    /// The scenario.
+    pub name: &'static str,
+    /// The quadratic program alone.
+    pub qp_us: Times,
+    /// The whole step: scheduling, predictor, quadratic program, rollout.
+    pub step_us: Times,
+    /// Most bounds active in one sample (components of a terminal equality included).
+    pub max_active: usize,
+}
+
+impl Times {
+    fn new(mut times: Vec<f64>) -> Self {
+        times.sort_by(f64::total_cmp);
+        let at = |fraction: f64| {
+            let index = (fraction * times.len() as f64).ceil() as usize;
+            times.get(index.saturating_sub(1)).copied().unwrap_or(0.0)
+        };
+        Self {
+            median: at(0.5),
+            p99: at(0.99),
+            max: at(1.0),
+        }
+    }
+}
+
+/// Times one built-in scenario.
+///
+/// # Errors
+/// The controller refuses its settings or the plant cannot be integrated.
+pub fn time(name: &'static str) -> Result<SequenceTimes, CommandError> {
+    let prepared = Scenario::load(name)?.prepare(Path::new("."))?;
+    let mut record = Record::default();
+    for plane in 0..prepared.planes.len() {
+        time_plane(&prepared, plane, &mut record)?;
+    }
+    Ok(SequenceTimes {
+        name,
+        qp_us: Times::new(record.qp),
+        step_us: Times::new(record.step),
+        max_active: record.max_active,
+    })
+}
+
+#[derive(Default)]
+struct Record {
+    qp: Vec<f64>,
+    step: Vec<f64>,
+    max_active: usize,
+}
+
+fn time_plane(prepared: &Prepared, plane: usize, record: &mut Record) -> Result<(), CommandError> {
+    let plane = &prepared.planes[plane];
+    let t_s = prepared.settings.t_s;
+    let mut workspace = Box::new(Workspace::<f64, 4, 1, N, M>::new());
+    let mut controller =
+        Control::new(prepared.ballbot, prepared.settings).map_err(ScenarioError::from)?;
+    let mut x = plane.initial_state;
+    for k in 0..prepared.samples {
+        let at = |i: usize| plane.state_reference((k + i) as f64 * t_s);
+        let reference = Reference {
+            stages: std::array::from_fn(at),
+            terminal: at(N),
+        };
+        let before = controller.clone();
+        let step = shortest(|| {
+            controller.clone_from(&before);
+            let start = Instant::now();
+            black_box(controller.step(black_box(&x), &reference, &mut workspace));
+            start.elapsed()
+        });
+        let qp = shortest(|| {
+            let mut solution: Solution<f64, 4, 1, N, M> = before.solution().clone();
+            let settings = &controller.settings().solver;
+            let start = Instant::now();
+            workspace.solve(black_box(controller.ocp()), settings, &mut solution);
+            let elapsed = start.elapsed();
+            black_box(&solution);
+            elapsed
+        });
+        record.step.push(step);
+        record.qp.push(qp);
+        record.max_active = record.max_active.max(controller.solution().active.len());
+        x = next(prepared, &x, &controller)?;
+    }
+    Ok(())
+}
+
+fn next(
+    prepared: &Prepared,
+    x: &Vector4<f64>,
+    controller: &Control,
+) -> Result<Vector4<f64>, CommandError> {
+    let u = controller.solution().u[0];
+    let t_s = prepared.settings.t_s;
+    Ok(advance(&prepared.ballbot, x, &u, t_s, prepared.tolerances)?)
+}
+
+/// The shortest of [`PASSES`] repetitions, in microseconds.
+fn shortest(mut repetition: impl FnMut() -> Duration) -> f64 {
+    let times = (0..PASSES).map(|_| repetition());
+    times.min().unwrap_or_default().as_secs_f64() * 1e6
+}

@@ -1,0 +1,80 @@
+//! One module per command: its arguments, and what it prints.
+
+pub mod bench;
+pub mod completions;
+pub mod linearize;
+pub mod lqr;
+pub mod model;
+pub mod refine;
+pub mod reproduce;
+pub mod scenario;
+pub mod simulate;
+
+use crate::figures::FigureError;
+use crate::input::InputError;
+use crate::output::FileError;
+use crate::refinement::RefinementError;
+use crate::regulator::RegulatorError;
+use ballbot_scenario::ScenarioError;
+use lpvmpc_design::MatrixError;
+use lpvmpc_sim::PlantError;
+use std::path::PathBuf;
+
+/// Why a command has no result. The message says what is wrong, where, and what would be right.
+#[derive(Debug, thiserror::Error)]
+pub enum CommandError {
+    /// Options that do not go together.
+    #[error("{0}")]
+    Usage(String),
+    /// A file that was handed in.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// A file that was to be written.
+    #[error(transparent)]
+    Output(#[from] FileError),
+    /// The parameters b.
+    #[error(transparent)]
+    Refinement(#[from] RefinementError),
+    /// The regulator.
+    #[error(transparent)]
+    Regulator(#[from] RegulatorError),
+    /// The linear model.
+    #[error("the linear model: {0}")]
+    LinearModel(#[from] MatrixError),
+    /// A scenario that cannot be run.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The plant cannot be integrated.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// A figure that cannot be drawn.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+    /// A run that ended before its time.
+    #[error(
+        "the run ended early, {ending}\nat phi = {:.4} rad, theta = {:.4} rad, phi_dot = {:.4} \
+         rad/s, theta_dot = {:.4} rad/s\nwhat was recorded until then is in {}",
+        state[0], state[1], state[2], state[3], folder.display()
+    )]
+    EndedEarly {
+        /// When and why.
+        ending: String,
+        /// The state then.
+        state: [f64; 4],
+        /// Where the recorded part is.
+        folder: PathBuf,
+    },
+    /// Published numbers that were not reproduced.
+    #[error(
+        "{differing} of the published statements do not agree:\n{table}\nsee {}",
+        report.display()
+    )]
+    Disagreement {
+        /// The whole table.
+        table: String,
+        /// How many.
+        differing: usize,
+        /// The report.
+        report: PathBuf,
+    },
+}

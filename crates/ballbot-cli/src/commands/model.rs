@@ -1,0 +1,69 @@
+//! Which robot, and which of its linear models.
+
+use super::CommandError;
+use crate::input;
+use crate::linear_model::LinearModel;
+use ballbot::{Ballbot, LinearParameters};
+use clap::{Args, ValueEnum};
+use lpvmpc::LpvModel;
+use nalgebra::Vector2;
+use std::path::PathBuf;
+
+/// The robot and its linear model.
+#[derive(Debug, Args)]
+pub struct ModelArguments {
+    /// The linear model
+    #[arg(long, value_enum, default_value_t = ModelChoice::B)]
+    pub model: ModelChoice,
+    /// TOML file with a `[parameters]` table, such as a scenario [default: the paper's b*]
+    #[arg(long, value_name = "FILE.toml")]
+    pub parameters: Option<PathBuf>,
+}
+
+/// Where the linear model comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ModelChoice {
+    /// The nonlinear model with parameters b, upright
+    B,
+    /// The paper's identified linear model with parameters p (p6 negative)
+    P,
+}
+
+impl ModelChoice {
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::B => "b",
+            Self::P => "p",
+        }
+    }
+
+    /// In words.
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::B => "model b (nonlinear model, upright)",
+            Self::P => "model p (identified linear model of the paper)",
+        }
+    }
+}
+
+impl ModelArguments {
+    /// The nonlinear model.
+    ///
+    /// # Errors
+    /// The file cannot be read or makes no sense.
+    pub fn ballbot(&self) -> Result<Ballbot<f64>, CommandError> {
+        match &self.parameters {
+            Some(path) => Ok(input::read_parameters(path)?),
+            None => Ok(Ballbot::paper()),
+        }
+    }
+
+    /// The linear model that was chosen, at the upright equilibrium of `ballbot`.
+    pub fn upright(&self, ballbot: &Ballbot<f64>) -> LinearModel {
+        match self.model {
+            ModelChoice::B => LinearModel::from(ballbot.matrices(&Vector2::zeros())),
+            ModelChoice::P => LinearModel::from(LinearParameters::paper().matrices()),
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! `ballbot reproduce`: the paper, in one command.
+
+use super::CommandError;
+use super::simulate::PNG_SCALE;
+use crate::output;
+use crate::recording;
+use crate::reproduction::claims::{self, Claim};
+use crate::reproduction::drawings::Drawing;
+use crate::reproduction::tables::Sheet;
+use crate::reproduction::{Reproduction, report};
+use clap::Args;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `ballbot reproduce`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  ballbot reproduce
+  ballbot reproduce --out results
+
+Writes report.html (one self-contained file), every figure as SVG and PNG, every table and
+trajectory as CSV, and summary.json. Exits with 0 only if every published number agrees with the
+computed one within its stated tolerance.")]
+pub struct ReproduceArguments {
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/reproduction")]
+    pub out: PathBuf,
+}
+
+/// Computes, writes, and compares.
+///
+/// # Errors
+/// A file cannot be written, or a published number does not agree.
+pub fn run(arguments: &ReproduceArguments) -> Result<String, CommandError> {
+    let reproduction = Reproduction::compute()?;
+    let claims = reproduction.claims();
+    let sheets = reproduction.sheets(&claims);
+    let drawings = reproduction.drawings();
+    write(&arguments.out, &reproduction, &claims, &sheets, &drawings)?;
+
+    let table = claims::table(&claims);
+    let differing = claims.iter().filter(|claim| !claim.agrees()).count();
+    let place = arguments.out.join("report.html");
+    if differing == 0 {
+        Ok(format!(
+            "{table}\nall {} agree; see {}\n",
+            claims.len(),
+            place.display()
+        ))
+    } else {
+        Err(CommandError::Disagreement {
+            table,
+            differing,
+            report: place,
+        })
+    }
+}
+
+fn write(
+    folder: &Path,
+    reproduction: &Reproduction,
+    claims: &[Claim],
+    sheets: &[Sheet],
+    drawings: &[Drawing],
+) -> Result<(), CommandError> {
+    let machine = machine();
+    let mut files: Vec<(PathBuf, Vec<u8>)> = Vec::new();
+    for drawing in drawings {
+        let path = folder.join("figures").join(drawing.name);
+        files.push((
+            path.with_extension("svg"),
+            drawing.figure.svg()?.into_bytes(),
+        ));
+        files.push((path.with_extension("png"), drawing.figure.png(PNG_SCALE)?));
+    }
+    for sheet in sheets {
+        let path = folder.join("tables").join(sheet.name).with_extension("csv");
+        files.push((path, sheet.csv().into_bytes()));
+    }
+    for run in reproduction.runs.all() {
+        let planes: &[&str] = if run.trajectories.len() == 1 {
+            &[""]
+        } else {
+            &["-x", "-y"]
+        };
+        for (plane, trajectory) in planes.iter().zip(&run.trajectories) {
+            let name = format!("{}{plane}.csv", run.name);
+            let text = recording::trajectory_csv(trajectory);
+            files.push((folder.join("trajectories").join(name), text.into_bytes()));
+        }
+    }
+    let summary = summary(reproduction, claims, &machine);
+    files.push((
+        folder.join("summary.json"),
+        format!("{summary:#}\n").into_bytes(),
+    ));
+    let report = report::html(reproduction, claims, sheets, drawings, &machine)?;
+    files.push((folder.join("report.html"), report.into_bytes()));
+    let files: Vec<(&Path, &[u8])> = files
+        .iter()
+        .map(|(path, content)| (path.as_path(), content.as_slice()))
+        .collect();
+    output::write_files(&files)?;
+    Ok(())
+}
+
+fn summary(reproduction: &Reproduction, claims: &[Claim], machine: &str) -> serde_json::Value {
+    let b = &reproduction.refinement.ballbot;
+    let claims: Vec<serde_json::Value> = claims
+        .iter()
+        .map(|claim| {
+            json!({
+                "place": claim.place,
+                "quantity": claim.quantity,
+                "published": claim.published,
+                "computed": claim.computed,
+                "difference": claim.difference(),
+                "agrees": claim.agrees(),
+            })
+        })
+        .collect();
+    let runs: serde_json::Map<String, serde_json::Value> = reproduction
+        .runs
+        .all()
+        .into_iter()
+        .map(|run| (run.name.to_owned(), json!(run.metrics)))
+        .collect();
+    json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "machine": machine,
+        "claims": claims,
+        "b": { "b1_m2": b.b1, "b2_m2": b.b2, "b3_m2": b.b3, "b4_m2_s": b.b4 },
+        "residual": reproduction.refinement.damped.residual_norm,
+        "physical": reproduction.refinement.consistency.is_physical(),
+        "physical_verdict": reproduction.refinement.consistency.to_string(),
+        "runs": runs,
+    })
+}
+
+/// The processor's name where the system tells it, else the architecture.
+fn machine() -> String {
+    let information = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = information
+        .lines()
+        .find_map(|line| line.strip_prefix("model name"));
+    let name = model
+        .and_then(|line| line.split_once(':'))
+        .map(|(_, name)| name.trim());
+    let system = format!("{} {}", std::env::consts::OS, std::env::consts::ARCH);
+    match name {
+        Some(name) if !name.is_empty() => format!("{name} ({system})"),
+        _ => system,
+    }
+}

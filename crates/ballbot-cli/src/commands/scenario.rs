@@ -1,0 +1,50 @@
+//! `ballbot scenario`.
+
+use super::CommandError;
+use crate::table::Table;
+use ballbot_scenario::{Scenario, ScenarioError, builtin};
+use clap::{Args, Subcommand};
+
+/// Arguments of `ballbot scenario`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  ballbot scenario list
+  ballbot scenario show two-setpoints > my.toml   a file to edit
+  ballbot simulate my.toml                        and to run")]
+pub struct ScenarioArguments {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// List the built-in scenarios
+    List,
+    /// Print a built-in scenario as commented TOML
+    Show {
+        /// Its name
+        name: String,
+    },
+}
+
+/// Lists or shows.
+///
+/// # Errors
+/// An unknown name.
+pub fn run(arguments: &ScenarioArguments) -> Result<String, CommandError> {
+    match &arguments.action {
+        Action::List => {
+            let mut table = Table::new(["name", "title"]);
+            for builtin in builtin::ALL {
+                let scenario = Scenario::parse(builtin.text, builtin.name)?;
+                table.row([builtin.name.to_owned(), scenario.title]);
+            }
+            Ok(table.to_string())
+        }
+        Action::Show { name } => match builtin::find(name) {
+            Some(builtin) => Ok(builtin.text.to_owned()),
+            None => Err(ScenarioError::unknown(name).into()),
+        },
+    }
+}

@@ -1,0 +1,195 @@
+//! `ballbot simulate`.
+
+use super::CommandError;
+use crate::figures::Role;
+use crate::output;
+use crate::pictures::{self, Shown};
+use crate::progress::Progress;
+use crate::recording::{self, Columns, Metrics};
+use crate::table::Table;
+use ballbot_scenario::{Prepared, Scenario, Surroundings};
+use clap::Args;
+use lpvmpc_sim::{Ending, Trajectory};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Arguments of `ballbot simulate`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  ballbot simulate two-setpoints
+  ballbot simulate lissajous --out results
+  ballbot simulate my.toml               a file made by `ballbot scenario show NAME`
+
+Writes trajectory.csv (for two planes trajectory_x.csv, trajectory_y.csv and motors.csv) and a
+figure as SVG and PNG. A run that ends early keeps what it recorded, and exits with 1.")]
+pub struct SimulateArguments {
+    /// A built-in scenario or a TOML file
+    pub scenario: String,
+    /// Folder for the results [default: out/SCENARIO]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// Runs a scenario and writes its results.
+///
+/// # Errors
+/// The scenario is not valid, a file cannot be written, or the run ended early.
+pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
+    let scenario = Scenario::load(&arguments.scenario)?;
+    let file = Path::new(&arguments.scenario);
+    let prepared = scenario.prepare(file.parent().unwrap_or(Path::new(".")))?;
+    let name = file.file_stem().unwrap_or(file.as_os_str());
+    let folder = match &arguments.out {
+        Some(folder) => folder.clone(),
+        None => Path::new("out").join(name),
+    };
+    let trajectories = record(&prepared)?;
+    write(&folder, &prepared, &trajectories)?;
+
+    let summary = summary(&prepared, &trajectories, &folder);
+    let early = trajectories
+        .iter()
+        .find(|run| run.ending != Ending::Complete);
+    match early {
+        None => Ok(summary),
+        Some(run) => Err(CommandError::EndedEarly {
+            ending: recording::ending_in_words(&run.ending),
+            state: run.final_state.into(),
+            folder,
+        }),
+    }
+}
+
+/// Runs a scenario with a progress bar.
+///
+/// # Errors
+/// The controller refuses its settings.
+pub fn record(prepared: &Prepared) -> Result<Vec<Trajectory<4, 1>>, CommandError> {
+    let progress = Progress::new("simulating", prepared.total_samples());
+    let start = Instant::now();
+    let surroundings = Surroundings {
+        clock: &|| start.elapsed(),
+        progress: &|done| progress.set(done),
+    };
+    Ok(prepared.run(&surroundings)?)
+}
+
+/// The names of the planes' files.
+fn file_names(planes: usize) -> &'static [&'static str] {
+    match planes {
+        1 => &["trajectory.csv"],
+        _ => &["trajectory_x.csv", "trajectory_y.csv"],
+    }
+}
+
+fn write(
+    folder: &Path,
+    prepared: &Prepared,
+    trajectories: &[Trajectory<4, 1>],
+) -> Result<(), CommandError> {
+    let mut files: Vec<(PathBuf, Vec<u8>)> = file_names(trajectories.len())
+        .iter()
+        .zip(trajectories)
+        .map(|(name, run)| {
+            (
+                folder.join(name),
+                recording::trajectory_csv(run).into_bytes(),
+            )
+        })
+        .collect();
+    let mut figures = Vec::new();
+    let columns: Vec<Columns> = trajectories.iter().map(Columns::from).collect();
+    let shown = |columns| Shown {
+        label: "ballbot",
+        role: Role::Lpv,
+        columns,
+    };
+    match columns.as_slice() {
+        [x, y] => {
+            let torques = prepared.motor_torques(trajectories);
+            let motors = recording::motors_csv(&trajectories[0], &torques);
+            files.push((folder.join("motors.csv"), motors.into_bytes()));
+            let planes = [shown(x), shown(y)];
+            figures.push((
+                "figure",
+                pictures::both_planes(&prepared.title, prepared, planes),
+            ));
+            figures.push(("path", pictures::path(&prepared.title, prepared, [x, y])));
+            figures.push(("motors", pictures::motors("Motor torques", x, &torques)));
+        }
+        runs => {
+            let shown: Vec<Shown<'_>> = runs.iter().map(shown).collect();
+            figures.push((
+                "figure",
+                pictures::one_plane(&prepared.title, prepared, &shown),
+            ));
+        }
+    }
+    for (name, figure) in figures {
+        files.push((
+            folder.join(format!("{name}.svg")),
+            figure.svg()?.into_bytes(),
+        ));
+        files.push((folder.join(format!("{name}.png")), figure.png(PNG_SCALE)?));
+    }
+    let files: Vec<(&Path, &[u8])> = files
+        .iter()
+        .map(|(path, content)| (path.as_path(), content.as_slice()))
+        .collect();
+    output::write_files(&files)?;
+    Ok(())
+}
+
+/// Pixels of a PNG per unit of the figure's size.
+pub const PNG_SCALE: f64 = 2.0;
+
+/// A line of the summary: its name, and the metric as text.
+type Line = (&'static str, fn(&Metrics) -> String);
+
+fn summary(prepared: &Prepared, trajectories: &[Trajectory<4, 1>], folder: &Path) -> String {
+    let planes: &[&str] = if trajectories.len() == 1 {
+        &["value"]
+    } else {
+        &["x plane", "y plane"]
+    };
+    let mut table = Table::new(std::iter::once("").chain(planes.iter().copied()));
+    let metrics: Vec<Metrics> = prepared
+        .planes
+        .iter()
+        .zip(trajectories)
+        .map(|(plane, run)| Metrics::new(prepared, plane, run))
+        .collect();
+    let rows: [Line; 8] = [
+        ("largest tilt [rad]", |m| {
+            format!("{:.4}", m.largest_tilt_rad)
+        }),
+        ("largest torque [N m]", |m| {
+            format!("{:.4}", m.largest_torque_nm)
+        }),
+        ("tracking error, rms [rad]", |m| {
+            format!("{:.4}", m.rms_error_rad)
+        }),
+        ("tracking error, largest [rad]", |m| {
+            format!("{:.4}", m.largest_error_rad)
+        }),
+        ("samples outside the bounds", |m| m.violations.to_string()),
+        ("most active bounds", |m| m.most_active_bounds.to_string()),
+        ("time per step, mean [us]", |m| {
+            format!("{:.1}", m.mean_step_us)
+        }),
+        ("time per step, longest [us]", |m| {
+            format!("{:.1}", m.longest_step_us)
+        }),
+    ];
+    for (name, value) in rows {
+        table.row(std::iter::once(name.to_owned()).chain(metrics.iter().map(value)));
+    }
+    format!(
+        "{}: {} samples of {} s\n{table}written to {}\n",
+        prepared.title,
+        prepared.samples,
+        prepared.settings.t_s,
+        folder.display()
+    )
+}

@@ -1,0 +1,38 @@
+//! The parts of the program `ballbot`.
+
+pub mod arguments;
+pub mod benchmark;
+pub mod commands;
+pub mod figures;
+pub mod input;
+pub mod json;
+pub mod linear_model;
+pub mod output;
+pub mod pictures;
+pub mod progress;
+pub mod recording;
+pub mod refinement;
+pub mod refinement_file;
+pub mod regulator;
+pub mod reproduction;
+pub mod table;
+
+use arguments::{Arguments, Command};
+use commands::CommandError;
+
+/// Does what the command line asks for and returns the text for standard output.
+///
+/// # Errors
+/// What kept the command from its result, for a person to read.
+pub fn run(arguments: Arguments) -> Result<String, CommandError> {
+    match arguments.command {
+        Command::Reproduce(arguments) => commands::reproduce::run(&arguments),
+        Command::Simulate(arguments) => commands::simulate::run(&arguments),
+        Command::Bench(arguments) => commands::bench::run(&arguments),
+        Command::Scenario(arguments) => commands::scenario::run(&arguments),
+        Command::Refine(arguments) => commands::refine::run(&arguments),
+        Command::Linearize(arguments) => commands::linearize::run(&arguments),
+        Command::Lqr(arguments) => commands::lqr::run(&arguments),
+        Command::Completions(arguments) => commands::completions::run(&arguments),
+    }
+}

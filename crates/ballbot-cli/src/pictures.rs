@@ -1,0 +1,116 @@
+//! The figures of recorded runs.
+
+use crate::figures::{
+    Band, Figure, Limits, PathRun, PlaneRun, Reference, Role, closed_loop, motor_torques,
+    path_in_plane, two_planes,
+};
+use crate::recording::Columns;
+use ballbot_scenario::{PhiReference, Prepared};
+use nalgebra::Vector3;
+
+/// A recorded run with its name and colour in a figure.
+#[derive(Clone, Copy, Debug)]
+pub struct Shown<'a> {
+    /// Name in the legend.
+    pub label: &'a str,
+    /// Colour.
+    pub role: Role,
+    /// The run.
+    pub columns: &'a Columns,
+}
+
+impl<'a> Shown<'a> {
+    fn run(self) -> PlaneRun<'a> {
+        PlaneRun {
+            label: self.label,
+            role: self.role,
+            time: &self.columns.time,
+            states: &self.columns.states,
+            torque: &self.columns.torque,
+            cost: &self.columns.cost,
+        }
+    }
+}
+
+/// The bounds of the controller's problem, as the figures shade them.
+pub fn limits(prepared: &Prepared) -> Limits {
+    let (x, u) = (&prepared.settings.x, &prepared.settings.u);
+    Limits {
+        states: std::array::from_fn(|i| Band {
+            lower: x.lower[i],
+            upper: x.upper[i],
+        }),
+        torque: Band {
+            lower: u.lower[0],
+            upper: u.upper[0],
+        },
+    }
+}
+
+fn reference<'a>(columns: &'a Columns, kind: &PhiReference) -> Reference<'a> {
+    Reference {
+        time: &columns.time,
+        phi: &columns.phi_reference,
+        held: matches!(kind, PhiReference::Steps(_)),
+    }
+}
+
+/// Six panels of runs of one plane with a common reference.
+pub fn one_plane(title: &str, prepared: &Prepared, shown: &[Shown<'_>]) -> Figure {
+    let runs: Vec<PlaneRun<'_>> = shown.iter().map(|shown| shown.run()).collect();
+    let followed = shown.first().zip(prepared.planes.first());
+    let reference = followed.map(|(shown, plane)| reference(shown.columns, &plane.reference));
+    closed_loop(title, &runs, reference, Some(limits(prepared)))
+}
+
+/// Time series of both planes.
+pub fn both_planes(title: &str, prepared: &Prepared, planes: [Shown<'_>; 2]) -> Figure {
+    let references = match prepared.planes.as_slice() {
+        [x, y] => Some([
+            reference(planes[0].columns, &x.reference),
+            reference(planes[1].columns, &y.reference),
+        ]),
+        _ => None,
+    };
+    two_planes(
+        title,
+        planes.map(Shown::run),
+        references,
+        Some(limits(prepared)),
+    )
+}
+
+/// The path on the floor with its reference.
+pub fn path(title: &str, prepared: &Prepared, planes: [&Columns; 2]) -> Figure {
+    let geometry = &prepared.ballbot.geometry;
+    let metres = |phi: f64| geometry.position(phi);
+    let positions = planes.map(|plane| {
+        plane
+            .states
+            .iter()
+            .map(|x| metres(x[0]))
+            .collect::<Vec<_>>()
+    });
+    let references = planes.map(|plane| {
+        plane
+            .phi_reference
+            .iter()
+            .map(|phi| metres(*phi))
+            .collect::<Vec<_>>()
+    });
+    let run = PathRun {
+        label: "ballbot",
+        role: Role::Lpv,
+        x: &positions[0],
+        y: &positions[1],
+    };
+    path_in_plane(title, &[run], Some((&references[0], &references[1])))
+}
+
+/// The three motors' torques.
+pub fn motors(title: &str, columns: &Columns, torques: &[Vector3<f64>]) -> Figure {
+    let of = |i: usize| torques.iter().map(|torque| torque[i]).collect::<Vec<_>>();
+    let (first, second, third) = (of(0), of(1), of(2));
+    let time = columns.time.get(..=torques.len()).unwrap_or(&columns.time);
+    motor_torques(title, time, [&first, &second, &third], None)
+}

@@ -1,0 +1,209 @@
+//! Recorded runs as files and arrays.
+
+use ballbot_scenario::{Plane, Prepared};
+use lpvmpc_sim::{Ending, Trajectory};
+use nalgebra::Vector3;
+
+/// The columns of `trajectory.csv`.
+pub const COLUMNS: [&str; 10] = [
+    "t_s",
+    "phi_rad",
+    "theta_rad",
+    "phi_dot_rad_s",
+    "theta_dot_rad_s",
+    "torque_nm",
+    "phi_ref_rad",
+    "cost",
+    "status",
+    "step_us",
+];
+
+/// `trajectory.csv`: one row per sample, the state at the sample and the torque held after it;
+/// a last row with the final state and no torque. After a run that ended early, the last row's
+/// status says why.
+pub fn trajectory_csv(trajectory: &Trajectory<4, 1>) -> String {
+    let mut text = COLUMNS.join(",") + "\n";
+    for sample in &trajectory.samples {
+        let x = &sample.x;
+        let step_us = sample.step_time.as_secs_f64() * 1e6;
+        text += &format!(
+            "{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{},{step_us:.3}\n",
+            sample.t,
+            x[0],
+            x[1],
+            x[2],
+            x[3],
+            sample.u[0],
+            sample.x_ref[0],
+            sample.cost,
+            sample.status
+        );
+    }
+    let x = &trajectory.final_state;
+    let status = match &trajectory.ending {
+        Ending::Complete => String::new(),
+        // Commas would be columns.
+        other => ending_in_words(other).replace(',', ";"),
+    };
+    text += &format!(
+        "{:?},{:?},{:?},{:?},{:?},,{:?},,{status},\n",
+        trajectory.final_time, x[0], x[1], x[2], x[3], trajectory.final_reference[0]
+    );
+    text
+}
+
+/// Why a run ended, with its time.
+pub fn ending_in_words(ending: &Ending) -> String {
+    match ending {
+        Ending::Complete => "complete".to_owned(),
+        Ending::NoPlan { t, status } => format!("no plan at t = {t:.3} s: {}", named(status)),
+        Ending::PlantFailed { t, error } => format!("at t = {t:.3} s: {error}"),
+    }
+}
+
+/// The solver's status with the ballbot's names.
+fn named(status: &lpvmpc::Status<f64>) -> String {
+    const STATES: [&str; 4] = ["phi", "theta", "phi_dot", "theta_dot"];
+    let mut text = status.to_string();
+    for (index, name) in STATES.iter().enumerate() {
+        text = text.replace(&format!("state {index}"), name);
+    }
+    text.replace("input 0", "the torque")
+}
+
+/// `motors.csv`: the three motors' torques, held from each sample to the next.
+pub fn motors_csv(trajectory: &Trajectory<4, 1>, torques: &[Vector3<f64>]) -> String {
+    let mut text = "t_s,motor_1_nm,motor_2_nm,motor_3_nm\n".to_owned();
+    for (sample, torque) in trajectory.samples.iter().zip(torques) {
+        let [first, second, third] = [torque[0], torque[1], torque[2]];
+        text += &format!("{:?},{first:?},{second:?},{third:?}\n", sample.t);
+    }
+    text
+}
+
+/// A trajectory as the arrays that figures take.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Columns {
+    /// Times, the final one included, s.
+    pub time: Vec<f64>,
+    /// States at those times.
+    pub states: Vec<[f64; 4]>,
+    /// Torque held after each of them but the last, N m.
+    pub torque: Vec<f64>,
+    /// Cost J of each plan.
+    pub cost: Vec<f64>,
+    /// phi_ref at those times, rad.
+    pub phi_reference: Vec<f64>,
+}
+
+impl From<&Trajectory<4, 1>> for Columns {
+    fn from(trajectory: &Trajectory<4, 1>) -> Self {
+        let samples = &trajectory.samples;
+        let times = samples.iter().map(|sample| sample.t);
+        let references = samples.iter().map(|sample| sample.x_ref[0]);
+        Self {
+            time: times.chain([trajectory.final_time]).collect(),
+            states: trajectory.states().map(|x| (*x).into()).collect(),
+            torque: samples.iter().map(|sample| sample.u[0]).collect(),
+            cost: samples.iter().map(|sample| sample.cost).collect(),
+            phi_reference: references.chain([trajectory.final_reference[0]]).collect(),
+        }
+    }
+}
+
+/// What one plane's run amounts to.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Metrics {
+    /// Samples at which a torque was applied.
+    pub samples: usize,
+    /// Largest |theta|, rad.
+    pub largest_tilt_rad: f64,
+    /// Largest |phi_dot|, rad/s.
+    pub largest_phi_dot_rad_s: f64,
+    /// Largest |theta_dot|, rad/s.
+    pub largest_theta_dot_rad_s: f64,
+    /// Largest |torque|, N m.
+    pub largest_torque_nm: f64,
+    /// Root mean square of phi - phi_ref over the samples, rad.
+    pub rms_error_rad: f64,
+    /// Largest |phi - phi_ref|, rad.
+    pub largest_error_rad: f64,
+    /// Samples at which the plant's state was outside its bounds.
+    pub violations: usize,
+    /// Most bounds active in one plan.
+    pub most_active_bounds: usize,
+    /// Closed-loop cost: the sum of ||x - x_ref||_Q^2 + ||u||_R^2 over the run.
+    pub closed_loop_cost: f64,
+    /// Mean time per step, microseconds.
+    pub mean_step_us: f64,
+    /// Its standard deviation, microseconds.
+    pub deviation_step_us: f64,
+    /// Longest step, microseconds.
+    pub longest_step_us: f64,
+}
+
+/// A state may lie outside a bound by this much, relative, before it counts as a violation: the
+/// accuracy of the solver and of the plant's integration.
+const OUTSIDE: f64 = 1e-6;
+
+impl Metrics {
+    /// The metrics of one plane.
+    pub fn new(prepared: &Prepared, plane: &Plane, trajectory: &Trajectory<4, 1>) -> Self {
+        let largest = |index: usize| {
+            let values = trajectory.states().map(|x| x[index].abs());
+            values.fold(0.0, f64::max)
+        };
+        let t_s = prepared.settings.t_s;
+        let errors: Vec<f64> = trajectory
+            .states()
+            .enumerate()
+            .map(|(k, x)| x[0] - plane.reference.at(k as f64 * t_s))
+            .collect();
+        let squares: f64 = errors.iter().map(|error| error * error).sum();
+        let bounds = &prepared.settings.x;
+        let outside = trajectory.states().filter(|x| !bounds.contains(x, OUTSIDE));
+        let weights = &prepared.settings.weights;
+        let cost = trajectory.samples.iter().map(|sample| {
+            let error = sample.x - sample.x_ref;
+            error.dot(&(weights.q * error)) + weights.r[0] * sample.u[0] * sample.u[0]
+        });
+        let samples = &trajectory.samples;
+        let torques = samples.iter().map(|sample| sample.u[0].abs());
+        let active = samples.iter().map(|sample| sample.active_bounds);
+        let times: Vec<f64> = samples
+            .iter()
+            .map(|sample| sample.step_time.as_secs_f64() * 1e6)
+            .collect();
+        let (mean, deviation) = mean_and_deviation(&times);
+        Self {
+            samples: samples.len(),
+            largest_tilt_rad: largest(1),
+            largest_phi_dot_rad_s: largest(2),
+            largest_theta_dot_rad_s: largest(3),
+            largest_torque_nm: torques.fold(0.0, f64::max),
+            rms_error_rad: (squares / errors.len() as f64).sqrt(),
+            largest_error_rad: errors.iter().fold(0.0, |most, error| most.max(error.abs())),
+            violations: outside.count(),
+            most_active_bounds: active.max().unwrap_or(0),
+            closed_loop_cost: cost.sum(),
+            mean_step_us: mean,
+            deviation_step_us: deviation,
+            longest_step_us: times.into_iter().fold(0.0, f64::max),
+        }
+    }
+}
+
+/// Mean and standard deviation; zero for no values.
+pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    if values.is_empty() {
+        return (0.0, 0.0);
+    }
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let variance = values
+        .iter()
+        .map(|value| (value - mean).powi(2))
+        .sum::<f64>()
+        / count;
+    (mean, variance.sqrt())
+}

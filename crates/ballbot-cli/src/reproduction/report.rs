@@ -1,0 +1,185 @@
+//! The report: one self-contained HTML file.
+
+use super::Reproduction;
+use super::claims::Claim;
+use super::drawings::Drawing;
+use super::tables::Sheet;
+use crate::figures::FigureError;
+use ballbot::{Ballbot, LinearParameters};
+
+/// The report's text.
+///
+/// # Errors
+/// A figure cannot be drawn.
+pub fn html(
+    reproduction: &Reproduction,
+    claims: &[Claim],
+    sheets: &[Sheet],
+    drawings: &[Drawing],
+    machine: &str,
+) -> Result<String, FigureError> {
+    let agreeing = claims.iter().filter(|claim| claim.agrees()).count();
+    let mut figures = String::new();
+    for drawing in drawings {
+        figures += &format!(
+            "<figure id=\"{}\">{}<figcaption>{}</figcaption></figure>\n",
+            drawing.name,
+            drawing.figure.svg()?,
+            escape(&drawing.caption)
+        );
+    }
+    let (claims_sheet, others) = match sheets.split_first() {
+        Some((first, others)) => (table(first), others),
+        None => (String::new(), sheets),
+    };
+    let tables: String = others
+        .iter()
+        .map(|sheet| format!("<h3>{}</h3>\n{}", escape(sheet.title), table(sheet)))
+        .collect();
+    Ok(format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>The ballbot paper, reproduced</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
+         <main>\n<h1>The ballbot paper, reproduced</h1>\n\
+         <p>D. S. Karachalios and H. S. Abbas, <cite>Parameter Refinement of a Ballbot and \
+         Predictive Control for Reference Tracking with Linear Parameter-Varying Embedding</cite>. \
+         Every number below was computed by this program; <strong>{agreeing} of {} published \
+         statements agree</strong> within their stated tolerance. Times were taken on {} with {}.\
+         </p>\n\
+         <h2>Published and computed</h2>\n{claims_sheet}\n\
+         <h2>Figures</h2>\n{figures}\n\
+         <h2>Tables</h2>\n{tables}\n\
+         <h2>Differences from the paper</h2>\n{}\n\
+         <h2>What b* means physically</h2>\n{}\n\
+         </main>\n</body>\n</html>\n",
+        claims.len(),
+        escape(machine),
+        concat!("ballbot ", env!("CARGO_PKG_VERSION")),
+        differences(reproduction),
+        verdict(reproduction),
+    ))
+}
+
+const STYLE: &str = "
+:root { color-scheme: light; }
+body { margin: 0; font: 16px/1.5 system-ui, sans-serif; color: #1b1f24; background: #fff; }
+main { max-width: 60rem; margin: 0 auto; padding: 1.5rem 1rem 4rem; }
+h1 { font-size: 1.9rem; line-height: 1.2; } h2 { margin-top: 2.5rem; border-bottom: 1px solid #d0d7de; }
+figure { margin: 2rem 0; } figure svg { width: 100%; height: auto; }
+figcaption { font-size: .92rem; color: #444c56; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .88rem; font-variant-numeric: tabular-nums; }
+th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #e4e8ec; white-space: nowrap; }
+th:first-child, td:first-child { text-align: left; white-space: normal; }
+th { border-bottom: 2px solid #8c959f; }
+.differs { color: #b3261e; font-weight: 600; } .agrees { color: #1a7f37; }
+pre { white-space: pre-wrap; background: #f6f8fa; padding: .8rem 1rem; border-radius: 6px; }
+";
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+}
+
+fn table(sheet: &Sheet) -> String {
+    let line = |cells: &[String], tag: &str| {
+        let cells = cells.iter().map(|cell| {
+            let class = match cell.as_str() {
+                "agrees" => " class=\"agrees\"",
+                "DIFFERS" => " class=\"differs\"",
+                _ => "",
+            };
+            format!("<{tag}{class}>{}</{tag}>", escape(cell))
+        });
+        format!("<tr>{}</tr>\n", cells.collect::<String>())
+    };
+    let rows: String = sheet.rows.iter().map(|row| line(row, "td")).collect();
+    format!(
+        "<div class=\"scroll\"><table>\n<thead>{}</thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n",
+        line(&sheet.headers, "th")
+    )
+}
+
+/// The paper's slips, and what is done instead.
+fn differences(reproduction: &Reproduction) -> String {
+    let (negative, positive) = reproduction.residual_at_printed_b;
+    let [regulator, _] = &reproduction.regulators;
+    let upright = Ballbot::<f64>::paper().linear_parameters();
+    let p = LinearParameters::<f64>::paper();
+    let (phi, theta) = reproduction.terminal_gap;
+    let items = [
+        format!(
+            "<strong>Sign of p6.</strong> The Table of p prints p6 = +{:.4}. With it the residual \
+             at the printed b* is {positive:.2}; with p6 = {:.4} it is {negative:.5}, and the least-squares \
+             optimum has the printed digits. A positive torque lowers the tilt, as the text of \
+             scenario 1 says, only if B41 is negative; here it is {:.1}. The negative sign is used.",
+            -p.p6, p.p6, upright.p6
+        ),
+        "<strong>B31.</strong> The Table of elements has an unbalanced bracket. From \
+         M<sup>-1</sup>B&#771; it is r_b (b3 - (b2 - l r_b cos theta)) / (r_w d)."
+            .to_owned(),
+        "<strong>sinc.</strong> It is sin(x)/x, 1 at 0; with the other convention, sin(pi x)/(pi x), \
+         A32 and A42 would not be those of the equations of motion."
+            .to_owned(),
+        format!(
+            "<strong>Newton step.</strong> The Jacobian of six equations in four unknowns has no \
+             inverse; the step is the Gauss-Newton step (pseudo-inverse). The paper gives no \
+             starting point; from b0 = (0.0025, 0.06, 0.14, -0.07) it takes {} steps. It diverges \
+             from other points, so the result given to users comes from a damped method \
+             (Levenberg-Marquardt), which ends at the same b.",
+            reproduction.refinement.gauss_newton.steps()
+        ),
+        "<strong>sigma.</strong> The footnote multiplies a row vector by a matrix of the wrong \
+         shape; sigma picks (theta, theta_dot)."
+            .to_owned(),
+        format!(
+            "<strong>Terminal cost.</strong> P is the solution of the <em>continuous</em> Riccati \
+             equation (diagonal {}), used in a sum over samples. The discrete equation's P is about \
+             1/t_s = 20 times as large, so the end of the horizon counts 20 times too little. The \
+             built-in scenarios do as the paper does; other scenarios default to the discrete P.",
+            diagonal(&regulator.lqr.p)
+        ),
+        "<strong>Predictor.</strong> The fastest pole of the model is -51.8 1/s, so one Runge-Kutta \
+         step of 0.05 s has h lambda = -2.59, next to the method's stability limit of -2.785: the \
+         sampled pole is 0.743, the exact one 0.075. The built-in scenarios do as the paper does; \
+         without a [controller.predictor] table the number of steps follows from the fastest pole, \
+         and a step that is too long is refused."
+            .to_owned(),
+        format!(
+            "<strong>Guarantees.</strong> The proof that the paper leans on needs the terminal \
+             equality to hold for the nonlinear model. It holds for the predictor with frozen \
+             scheduling only: at the first sample of scenario 3 the nonlinear model ends {phi:.2} rad \
+             in phi and {theta:.2} rad in theta away from the set point that the plan reaches. The \
+             closed loop converges all the same, but that is an observation, not the theorem. \
+             Likewise A - BK being Hurwitz at every frozen scheduling (largest real part {:.3} 1/s \
+             over the grid) does not prove stability while the scheduling moves.",
+            regulator.frozen.largest_real_part
+        ),
+        "<strong>Times.</strong> The paper times single quadratic programs in MATLAB with YALMIP on \
+         an Intel i7-8650U; the times here are of this program's whole step on another machine. \
+         They show that the method is fit for real time, not which machine is faster."
+            .to_owned(),
+    ];
+    let items: String = items
+        .iter()
+        .map(|item| format!("<li>{item}</li>\n"))
+        .collect();
+    format!("<ol>\n{items}</ol>")
+}
+
+fn diagonal(p: &nalgebra::DMatrix<f64>) -> String {
+    let entries = p.diagonal();
+    let entries = entries.iter().map(|entry| format!("{entry:.2}"));
+    entries.collect::<Vec<_>>().join(", ")
+}
+
+fn verdict(reproduction: &Reproduction) -> String {
+    format!(
+        "<p>The check of the refined parameters against mechanics, over the tilt range of the \
+         constraints, says:</p>\n<pre>{}</pre>\n<p>The closed loops above are still what the paper \
+         computes: det M has no zero in that range, so the model is well defined, and controller \
+         and plant share it.</p>",
+        escape(&reproduction.refinement.consistency.to_string())
+    )
+}

@@ -1,0 +1,124 @@
+//! The paper's closed loops.
+
+use crate::commands::CommandError;
+use crate::commands::simulate::record;
+use crate::recording::{Columns, Metrics};
+use ballbot_scenario::{Prepared, Scenario, ScenarioError};
+use lpvmpc::{Controller, Reference, Workspace};
+use lpvmpc_sim::Trajectory;
+use std::path::Path;
+
+/// One built-in scenario, run.
+#[derive(Debug)]
+pub struct Run {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// Its settings.
+    pub prepared: Prepared,
+    /// One trajectory per plane.
+    pub trajectories: Vec<Trajectory<4, 1>>,
+    /// The same as arrays.
+    pub columns: Vec<Columns>,
+    /// One per plane.
+    pub metrics: Vec<Metrics>,
+}
+
+/// The runs of the paper.
+#[derive(Debug)]
+pub struct Runs {
+    /// Scenario 1.
+    pub two_setpoints: Run,
+    /// Scenario 1 with the linear model.
+    pub two_setpoints_linear: Run,
+    /// Scenario 2.
+    pub lissajous: Run,
+    /// Scenario 3 without guarantees.
+    pub terminal_cost: Run,
+    /// Scenario 3.
+    pub terminal_equality: Run,
+}
+
+impl Runs {
+    /// Runs all of them.
+    ///
+    /// # Errors
+    /// A scenario is not valid.
+    pub fn compute() -> Result<Self, CommandError> {
+        Ok(Self {
+            two_setpoints: Run::compute("two-setpoints")?,
+            two_setpoints_linear: Run::compute("two-setpoints-linear")?,
+            lissajous: Run::compute("lissajous")?,
+            terminal_cost: Run::compute("single-setpoint")?,
+            terminal_equality: Run::compute("single-setpoint-terminal")?,
+        })
+    }
+
+    /// All runs, in the order of the paper.
+    pub fn all(&self) -> [&Run; 5] {
+        [
+            &self.two_setpoints,
+            &self.two_setpoints_linear,
+            &self.lissajous,
+            &self.terminal_cost,
+            &self.terminal_equality,
+        ]
+    }
+}
+
+impl Run {
+    fn compute(name: &'static str) -> Result<Self, CommandError> {
+        let prepared = Scenario::load(name)?.prepare(Path::new("."))?;
+        let trajectories = record(&prepared)?;
+        let metrics = prepared
+            .planes
+            .iter()
+            .zip(&trajectories)
+            .map(|(plane, run)| Metrics::new(&prepared, plane, run))
+            .collect();
+        Ok(Self {
+            name,
+            columns: trajectories.iter().map(Columns::from).collect(),
+            prepared,
+            trajectories,
+            metrics,
+        })
+    }
+
+    /// phi of the first plane at the sample nearest to `t` s, rad.
+    pub fn phi_at(&self, t: f64) -> f64 {
+        let index = (t / self.prepared.settings.t_s).round() as usize;
+        let states = &self.columns[0].states;
+        states[index.min(states.len() - 1)][0]
+    }
+
+    /// The first time at which phi of the first plane is within `band` of `target`, s.
+    pub fn reaches(&self, target: f64, band: f64) -> f64 {
+        let Columns { time, states, .. } = &self.columns[0];
+        let near = states.iter().position(|x| (x[0] - target).abs() <= band);
+        near.map_or(f64::INFINITY, |index| time[index])
+    }
+
+    /// |x_N predicted - x_N reached by the nonlinear model| at the first sample, for
+    /// (phi, theta).
+    ///
+    /// # Errors
+    /// The controller refuses its settings.
+    pub fn first_terminal_gap(&self) -> Result<(f64, f64), CommandError> {
+        const N: usize = 20;
+        let Prepared {
+            ballbot,
+            settings,
+            planes,
+            ..
+        } = &self.prepared;
+        let mut controller = Controller::<_, f64, 4, 1, 2, N, { N + 4 }>::new(*ballbot, *settings)
+            .map_err(ScenarioError::from)?;
+        let mut workspace = Workspace::new();
+        let reference = Reference::constant(planes[0].state_reference(0.0));
+        controller.step(&planes[0].initial_state, &reference, &mut workspace);
+        let predicted = controller.solution().x[N - 1];
+        let reached = controller.rollout()[N - 1];
+        let gap = (predicted - reached).abs();
+        Ok((gap[0], gap[1]))
+    }
+}

@@ -1,0 +1,171 @@
+//! `ballbot lqr`, against the independently computed gains.
+
+use crate::{assert_close, assert_says, failure, json, numbers, text};
+use serde_json::Value;
+
+fn diagonal(p: &Value) -> Vec<f64> {
+    (0..4).map(|i| p[i][i].as_f64().unwrap()).collect()
+}
+
+fn largest_real_part(result: &Value) -> f64 {
+    let pole = &result["frozen_stability"]["slowest_pole_1_s"];
+    pole["re"].as_f64().unwrap()
+}
+
+/// The regulator of the least-squares b rather than the printed one.
+fn of_refined(arguments: &[&str]) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("refined.toml");
+    let path = path.to_str().unwrap();
+    text(&["refine", "-o", path]);
+    let all = ["lqr", "--json", "--parameters", path].into_iter();
+    json(&all.chain(arguments.iter().copied()).collect::<Vec<_>>())
+}
+
+#[test]
+fn the_papers_regulator() {
+    let result = json(&["lqr", "--model", "p", "--continuous", "--json"]);
+    let k = [0.447_213_6, -6.195_773_12, 0.214_707_38, -1.301_027_18];
+    assert_close(&numbers(&result["k"]), &k, 1e-7);
+    let p = [101.04413437, 4138.85753321, 5.09377211, 173.2761357];
+    assert_close(&diagonal(&result["p"]), &p, 1e-9);
+    assert_eq!(result["frozen_stability"]["hurwitz"], true);
+    assert!((largest_real_part(&result) + 1.920).abs() < 5e-4);
+}
+
+#[test]
+fn the_other_weights_of_the_paper() {
+    let q = "1000,1,0.1,0.1";
+    let result = json(&["lqr", "--model", "p", "--continuous", "--q", q, "--json"]);
+    assert!((largest_real_part(&result) + 2.224).abs() < 5e-4);
+}
+
+#[test]
+fn the_continuous_regulator_of_b() {
+    let result = of_refined(&["--continuous"]);
+    assert_close(
+        &numbers(&result["k"]),
+        &[0.447_213_6, -4.2895, 0.146_60, -0.914_89],
+        5e-5,
+    );
+    assert_close(
+        &diagonal(&result["p"]),
+        &[100.532, 2038.975, 2.4703, 86.120],
+        2e-5,
+    );
+    assert!((largest_real_part(&result) + 1.475).abs() < 5e-4);
+}
+
+#[test]
+fn the_sampled_regulators_of_b() {
+    let one = of_refined(&[]);
+    assert_eq!(one["time"]["t_s"], 0.05);
+    assert_eq!(one["time"]["substeps"], 1);
+    assert_close(
+        &numbers(&one["k"]),
+        &[0.270_93, -2.866_49, 0.099_47, -0.621_05],
+        5e-5,
+    );
+    let p = [2088.308, 40_698.665, 46.097, 1701.123];
+    assert_close(&diagonal(&one["p"]), &p, 2e-5);
+    for pole in one["poles"].as_array().unwrap() {
+        let (re, im) = (pole["re"].as_f64().unwrap(), pole["im"].as_f64().unwrap());
+        assert!(re.hypot(im) < 1.0, "{pole}");
+    }
+    let four = of_refined(&["--substeps", "4"]);
+    let p = [2124.665, 41_717.763, 50.481, 1762.569];
+    assert_close(&diagonal(&four["p"]), &p, 2e-5);
+}
+
+#[test]
+fn the_report_for_the_screen() {
+    assert_says(
+        &text(&["lqr"]),
+        &[
+            "u = -K x",
+            "sampled every 0.05 s",
+            "stable up to 0.0537",
+            "0.2709",
+            "phi [rad]",
+            "Frozen loops",
+            "60 deg",
+            "360 deg/s",
+            "no proof",
+        ],
+    );
+    assert_says(
+        &text(&["lqr", "--continuous", "--model", "p"]),
+        &["continuous time", "-6.195773", "4138.858", "1/s"],
+    );
+}
+
+#[test]
+fn a_step_that_is_too_long_names_pole_and_step() {
+    let message = failure(&["lqr", "--ts", "0.06"], 1);
+    assert_says(&message, &["0.06 s", "-51.80", "at least 2 substeps"]);
+    text(&["lqr", "--ts", "0.06", "--substeps", "2"]);
+}
+
+#[test]
+fn a_gain_that_does_not_hold_the_robot_is_said_so() {
+    // The paper's gain on a rigid robot, which its model is not.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("robot.toml");
+    let path = path.to_str().unwrap();
+    let content = "[parameters]\nb1_m2 = 0.1\nb2_m2 = 0.03\nb3_m2 = 0.3\nb4_m2_s = 0.4\n\
+                   centre_of_mass_m = 0.4\nball_radius_m = 0.1\nwheel_radius_m = 0.05\n\
+                   gravity_m_s2 = 9.81\n";
+    std::fs::write(path, content).unwrap();
+    let arguments = ["lqr", "--model", "p", "--continuous", "--parameters", path];
+    assert_says(&text(&arguments), &["NOT stable"]);
+    let result = json(&[&arguments[..], &["--json"]].concat());
+    assert_eq!(result["frozen_stability"]["hurwitz"], false);
+    assert!(largest_real_part(&result) > 0.0);
+    // Its own gain holds it.
+    let own = text(&["lqr", "--continuous", "--parameters", path]);
+    assert!(!own.contains("NOT stable"), "{own}");
+}
+
+#[test]
+fn bad_arguments_are_refused() {
+    for (arguments, parts) in [
+        (
+            &["--q", "1,2,3"][..],
+            &["--q", "1,2,3", "3 weights", "4 states"][..],
+        ),
+        (&["--q", "1,2,3,x"], &["`x` is not a number"]),
+        (&["--q", "1,2,3,-4"], &["-4", "negative"]),
+        (&["--r", "0"], &["--r", "0 is not positive"]),
+        (&["--r=-1"], &["--r", "-1 is not positive"]),
+        (&["--ts", "nan"], &["--ts", "NaN", "finite"]),
+        (&["--substeps", "0"], &["--substeps", "0"]),
+        (&["--continuous", "--ts", "0.05"], &["--continuous", "--ts"]),
+    ] {
+        let arguments: Vec<&str> = ["lqr"]
+            .into_iter()
+            .chain(arguments.iter().copied())
+            .collect();
+        assert_says(&failure(&arguments, 2), parts);
+    }
+}
+
+#[test]
+fn costs_without_a_regulator_are_refused() {
+    // Nothing holds phi: its integrator is not seen by the cost.
+    let message = failure(&["lqr", "--q", "0,1,1,1"], 1);
+    assert_says(&message, &["no gain", "detectable"]);
+}
+
+#[test]
+fn parameters_without_motion_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("robot.toml");
+    let path = path.to_str().unwrap();
+    // b1 b3 = 9e-4: k = b2 - l r_b cos(theta) goes from 0.02 to 0.04 within 60 degrees.
+    let content = "[parameters]\nb1_m2 = 0.003\nb2_m2 = 0.06\nb3_m2 = 0.3\nb4_m2_s = 0.4\n\
+                   centre_of_mass_m = 0.4\nball_radius_m = 0.1\nwheel_radius_m = 0.05\n\
+                   gravity_m_s2 = 9.81\n";
+    std::fs::write(path, content).unwrap();
+    let message = failure(&["lqr", "--continuous", "--parameters", path], 1);
+    assert_says(&message, &["crosses zero", "det M"]);
+}

@@ -1,0 +1,71 @@
+//! The program `ballbot` as its users run it.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on must fail, in its support functions too"
+)]
+
+mod linearize;
+mod lqr;
+mod program;
+mod refine;
+
+use serde_json::Value;
+use std::process::{Command, Output};
+
+/// Runs the program to its end.
+fn ballbot(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_ballbot"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+/// Standard output of a run that succeeds.
+fn text(arguments: &[&str]) -> String {
+    let output = ballbot(arguments);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {message}");
+    assert!(message.is_empty(), "{arguments:?}: {message}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn json(arguments: &[&str]) -> Value {
+    serde_json::from_str(&text(arguments)).unwrap()
+}
+
+/// The message of a run that fails with the exit code `code` and prints no result.
+fn failure(arguments: &[&str], code: i32) -> String {
+    let output = ballbot(arguments);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
+    assert!(output.stdout.is_empty(), "{arguments:?} printed a result");
+    assert!(message.starts_with("error: "), "{arguments:?}: {message}");
+    assert!(!message.contains("panicked"), "{arguments:?}: {message}");
+    message
+}
+
+/// The message has all of these parts.
+fn assert_says(message: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(message.contains(part), "`{part}` is not in: {message}");
+    }
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    let entries = value.as_array().unwrap();
+    entries
+        .iter()
+        .map(|entry| entry.as_f64().unwrap())
+        .collect()
+}
+
+/// Each number within `relative` of the expected one.
+fn assert_close(found: &[f64], expected: &[f64], relative: f64) {
+    assert_eq!(found.len(), expected.len());
+    for (found, expected) in found.iter().zip(expected) {
+        assert!(
+            (found - expected).abs() <= relative * expected.abs(),
+            "{found} for {expected}"
+        );
+    }
+}
