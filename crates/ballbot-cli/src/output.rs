@@ -44,6 +44,10 @@ fn write_then_rename(files: &[(&Path, &[u8])], temporary: &[PathBuf]) -> Result<
         if let Some(directory) = path.parent() {
             fs::create_dir_all(directory).map_err(failed(path))?;
         }
+        if path.is_dir() {
+            // Found out when renaming, it would be too late for the files before it.
+            return Err(failed(path)(io::ErrorKind::IsADirectory.into()));
+        }
         fs::write(temporary, content).map_err(failed(path))?;
     }
     for ((path, _), temporary) in files.iter().zip(temporary) {
@@ -103,6 +107,20 @@ mod tests {
         assert!(error.to_string().contains("bad.svg"), "{error}");
         assert_eq!(fs::read_to_string(&good).unwrap(), "old");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn nothing_changes_when_a_directory_is_in_the_way() {
+        let folder = tempfile::tempdir().unwrap();
+        let good = folder.path().join("good.svg");
+        fs::write(&good, "old").unwrap();
+        let bad = folder.path().join("bad.svg");
+        fs::create_dir(&bad).unwrap();
+        // It was once found when renaming, after the files before it had been replaced.
+        let error = write_files(&[(&good, b"new"), (&bad, b"new")]).unwrap_err();
+        assert_eq!(error.path, bad);
+        assert_eq!(fs::read_to_string(&good).unwrap(), "old");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
     }
 
     #[test]

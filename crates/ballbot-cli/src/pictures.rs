@@ -80,24 +80,16 @@ pub fn both_planes(title: &str, prepared: &Prepared, planes: [Shown<'_>; 2]) -> 
     )
 }
 
-/// The path on the floor with its reference.
+/// The path on the floor with its reference, for as long as both planes were recorded.
 pub fn path(title: &str, prepared: &Prepared, planes: [&Columns; 2]) -> Figure {
     let geometry = &prepared.ballbot.geometry;
-    let metres = |phi: f64| geometry.position(phi);
-    let positions = planes.map(|plane| {
-        plane
-            .states
-            .iter()
-            .map(|x| metres(x[0]))
-            .collect::<Vec<_>>()
-    });
-    let references = planes.map(|plane| {
-        plane
-            .phi_reference
-            .iter()
-            .map(|phi| metres(*phi))
-            .collect::<Vec<_>>()
-    });
+    let [x, y] = planes.map(|plane| plane.states.len());
+    let metres = |phi: &mut dyn Iterator<Item = f64>| {
+        let positions = phi.take(x.min(y)).map(|phi| geometry.position(phi));
+        positions.collect::<Vec<_>>()
+    };
+    let positions = planes.map(|plane| metres(&mut plane.states.iter().map(|x| x[0])));
+    let references = planes.map(|plane| metres(&mut plane.phi_reference.iter().copied()));
     let run = PathRun {
         label: "ballbot",
         role: Role::Lpv,

@@ -29,8 +29,10 @@ pub struct Consistency<T> {
 }
 
 impl<T: Scalar> Ballbot<T> {
-    /// Checks the parameters against mechanics for |theta| <= `tilt` (rad, at most pi).
+    /// Checks the parameters against mechanics for |theta| <= `tilt` (rad). From pi on, and for
+    /// what is no number, that is the whole circle.
     pub fn consistency(&self, tilt: T) -> Consistency<T> {
+        let tilt = if tilt.abs() < T::pi() { tilt } else { T::pi() };
         // k grows with |theta|, so |k| is extreme at the ends of the range or at a zero of k.
         let upright = self.coupling(T::one());
         let tilted = self.coupling(tilt.cos());

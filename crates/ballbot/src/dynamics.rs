@@ -2,6 +2,7 @@
 //! with q = (phi, theta).
 
 use crate::parameters::Ballbot;
+use crate::trigonometry::sin_cos;
 use lpvmpc::Scalar;
 use nalgebra::{Matrix2, Vector2, Vector4, convert};
 
@@ -40,9 +41,11 @@ impl<T: Scalar> Ballbot<T> {
 
     /// x_dot = f(x, u) of the nonlinear plant (eq. (3)): `x` = (phi, theta, phi_dot,
     /// theta_dot) in rad and rad/s, `torque` in N m.
+    // Inlined, so that the stages of a Runge-Kutta step overlap in the processor.
+    #[inline(always)]
     pub fn f(&self, x: &Vector4<T>, torque: T) -> Vector4<T> {
         let (theta, phi_dot, theta_dot) = (x[1], x[2], x[3]);
-        let (sin_theta, cos_theta) = theta.sin_cos();
+        let (sin_theta, cos_theta) = sin_cos(theta);
         let Self { geometry, .. } = self;
         let arm = geometry.centre_of_mass * geometry.ball_radius;
         let coupling = self.coupling(cos_theta);

@@ -5,6 +5,7 @@
 //! M^-1 B~ gives. Its sinc(theta) is sin(theta)/theta.
 
 use crate::parameters::Ballbot;
+use crate::trigonometry::sin_cos;
 use lpvmpc::{LpvModel, Scalar};
 use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
 
@@ -14,9 +15,10 @@ impl<T: Scalar> LpvModel<T, 4, 1, 2> for Ballbot<T> {
         Vector2::new(x[1], x[3])
     }
 
+    #[inline]
     fn matrices(&self, scheduling: &Vector2<T>) -> (Matrix4<T>, Vector4<T>) {
         let (theta, theta_dot) = (scheduling[0], scheduling[1]);
-        let (sin_theta, cos_theta) = theta.sin_cos();
+        let (sin_theta, cos_theta) = sin_cos(theta);
         let Self {
             b1,
             b3,
@@ -43,6 +45,7 @@ impl<T: Scalar> LpvModel<T, 4, 1, 2> for Ballbot<T> {
         (a, b)
     }
 
+    #[inline(always)]
     fn derivative(&self, x: &Vector4<T>, u: &Vector1<T>) -> Vector4<T> {
         self.f(x, u[0])
     }

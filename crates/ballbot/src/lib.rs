@@ -3,8 +3,9 @@
 //!
 //! One plane of the robot has the state x = (phi, theta, phi_dot, theta_dot) in rad and rad/s
 //! (ball angle, body tilt) and the input u = tau, the virtual wheel's torque in N m. The ball
-//! moves by x = r_b phi. A positive torque accelerates the ball and the body towards negative
-//! phi and negative theta.
+//! moves by x = r_b phi. Upright, a positive torque accelerates the body towards negative theta. It
+//! accelerates the ball of a rigid robot towards positive phi, but towards negative phi with the
+//! paper's parameters b*, which belong to no rigid body.
 #![no_std]
 
 mod consistency;
@@ -12,6 +13,7 @@ mod dynamics;
 mod embedding;
 mod linear;
 mod parameters;
+mod trigonometry;
 mod wheels;
 
 pub use consistency::Consistency;

@@ -6,8 +6,8 @@ use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dopri5, System};
 use thiserror::Error;
 
-/// Tolerances of the adaptive integration: the local error of each step is kept below
-/// `absolute + relative * |x|`, per component.
+/// Tolerances of the adaptive integration: the local error of each step, every component of it
+/// divided by its `absolute + relative * |x|`, is kept below 1 in root mean square.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerances {
     /// Relative tolerance, from 1e-14 to 1.
@@ -30,8 +30,14 @@ pub enum PlantError {
         /// The absolute tolerance that was given.
         absolute: f64,
     },
-    /// The state, the input or the duration is not finite at the start.
-    #[error("the plant starts from a state, input or duration that is not finite")]
+    /// A duration that is not a number of seconds from zero on.
+    #[error("the duration is {duration} s; it must be finite and not negative")]
+    Duration {
+        /// The duration that was given, s.
+        duration: f64,
+    },
+    /// The state, the input or the rate of change is not finite at the start.
+    #[error("the plant starts from a state, input or rate of change that is not finite")]
     NotFinite,
     /// The integrator gave up, or the state left the numbers.
     #[error("the plant's motion cannot be integrated {after:.6} s into the sample: {reason}")]
@@ -106,9 +112,12 @@ where
     P: LpvModel<f64, NX, NU, NS>,
 {
     let Tolerances { relative, absolute } = tolerances.check()?;
+    if !(duration.is_finite() && duration >= 0.0) {
+        return Err(PlantError::Duration { duration });
+    }
     let start = model.derivative(x, u);
     let finite = |v: &SVector<f64, NX>| v.iter().all(|entry| entry.is_finite());
-    if !(finite(x) && finite(&start) && duration.is_finite() && duration >= 0.0) {
+    if !(finite(x) && finite(&start)) {
         return Err(PlantError::NotFinite);
     }
     if duration == 0.0 {
@@ -153,3 +162,67 @@ where
 const MOST_STEPS: u32 = 100_000;
 /// Steps between two looks at stiffness.
 const STIFFNESS_TEST: u32 = 1_000;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix1, Vector1};
+
+    /// Logistic growth, x_dot = (1 - x) x: nonlinear, with a known motion.
+    struct Growth;
+
+    impl LpvModel<f64, 1, 1, 1> for Growth {
+        fn scheduling(&self, x: &Vector1<f64>) -> Vector1<f64> {
+            *x
+        }
+
+        fn matrices(&self, size: &Vector1<f64>) -> (Matrix1<f64>, Matrix1<f64>) {
+            (Matrix1::new(1.0 - size[0]), Matrix1::zeros())
+        }
+    }
+
+    const DURATION: f64 = 4.0;
+
+    /// Distance from the exact motion after [`DURATION`], from 1/(1 + e).
+    fn error(tolerance: f64, longest_step: f64) -> f64 {
+        let tolerances = Tolerances {
+            relative: tolerance,
+            absolute: tolerance,
+        };
+        let exact = |t: f64| 1.0 / (1.0 + (1.0 - t).exp());
+        let (start, u) = (Vector1::new(exact(0.0)), Vector1::zeros());
+        let end = integrate(&Growth, &start, &u, DURATION, tolerances, longest_step).unwrap();
+        (end[0] - exact(DURATION)).abs()
+    }
+
+    /// The slope of the logarithms over the whole range.
+    fn slope(points: &[(f64, f64)]) -> f64 {
+        let (first, last) = (points[0], points[points.len() - 1]);
+        (last.1 / first.1).ln() / (last.0 / first.0).ln()
+    }
+
+    #[test]
+    fn order_five_in_the_step() {
+        // A tolerance that is never in the way: all steps but the first are the longest.
+        let points: Vec<(f64, f64)> = (5..=7)
+            .map(|halvings| DURATION / f64::from(1 << halvings))
+            .map(|step| (step, error(1.0, step)))
+            .collect();
+        let order = slope(&points);
+        assert!((order - 5.0).abs() < 0.15, "order {order}: {points:?}");
+    }
+
+    #[test]
+    fn error_follows_the_tolerance() {
+        let points: Vec<(f64, f64)> = (3..=12)
+            .map(|digits| 0.1_f64.powi(digits))
+            .map(|tolerance| (tolerance, error(tolerance, DURATION)))
+            .collect();
+        // The local error of a step is kept at the tolerance; there are a few dozen steps.
+        for (tolerance, error) in &points {
+            assert!(error < &(100.0 * tolerance), "{error:e} at {tolerance:e}");
+        }
+        let order = slope(&points);
+        assert!((order - 1.0).abs() < 0.15, "order {order}: {points:?}");
+    }
+}

@@ -52,11 +52,13 @@ pub enum CommandError {
     Figure(#[from] FigureError),
     /// A run that ended before its time.
     #[error(
-        "the run ended early, {ending}\nat phi = {:.4} rad, theta = {:.4} rad, phi_dot = {:.4} \
+        "the {what} ended early, {ending}\nat phi = {:.4} rad, theta = {:.4} rad, phi_dot = {:.4} \
          rad/s, theta_dot = {:.4} rad/s\nwhat was recorded until then is in {}",
         state[0], state[1], state[2], state[3], folder.display()
     )]
     EndedEarly {
+        /// The run, with its plane where there are two.
+        what: &'static str,
         /// When and why.
         ending: String,
         /// The state then.

@@ -1,7 +1,7 @@
 //! `ballbot simulate`.
 
 use super::CommandError;
-use crate::figures::Role;
+use crate::figures::{Figure, Role};
 use crate::output;
 use crate::pictures::{self, Shown};
 use crate::progress::Progress;
@@ -48,12 +48,18 @@ pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
     write(&folder, &prepared, &trajectories)?;
 
     let summary = summary(&prepared, &trajectories, &folder);
-    let early = trajectories
-        .iter()
-        .find(|run| run.ending != Ending::Complete);
+    let runs = match trajectories.len() {
+        1 => ["run", ""],
+        _ => ["run of the x plane", "run of the y plane"],
+    };
+    let early = runs
+        .into_iter()
+        .zip(&trajectories)
+        .find(|(_, run)| run.ending != Ending::Complete);
     match early {
         None => Ok(summary),
-        Some(run) => Err(CommandError::EndedEarly {
+        Some((what, run)) => Err(CommandError::EndedEarly {
+            what,
             ending: recording::ending_in_words(&run.ending),
             state: run.final_state.into(),
             folder,
@@ -98,35 +104,11 @@ fn write(
             )
         })
         .collect();
-    let mut figures = Vec::new();
-    let columns: Vec<Columns> = trajectories.iter().map(Columns::from).collect();
-    let shown = |columns| Shown {
-        label: "ballbot",
-        role: Role::Lpv,
-        columns,
-    };
-    match columns.as_slice() {
-        [x, y] => {
-            let torques = prepared.motor_torques(trajectories);
-            let motors = recording::motors_csv(&trajectories[0], &torques);
-            files.push((folder.join("motors.csv"), motors.into_bytes()));
-            let planes = [shown(x), shown(y)];
-            figures.push((
-                "figure",
-                pictures::both_planes(&prepared.title, prepared, planes),
-            ));
-            figures.push(("path", pictures::path(&prepared.title, prepared, [x, y])));
-            figures.push(("motors", pictures::motors("Motor torques", x, &torques)));
-        }
-        runs => {
-            let shown: Vec<Shown<'_>> = runs.iter().map(shown).collect();
-            figures.push((
-                "figure",
-                pictures::one_plane(&prepared.title, prepared, &shown),
-            ));
-        }
+    if let [x, _] = trajectories {
+        let motors = recording::motors_csv(x, &prepared.motor_torques(trajectories));
+        files.push((folder.join("motors.csv"), motors.into_bytes()));
     }
-    for (name, figure) in figures {
+    for (name, figure) in figures(prepared, trajectories) {
         files.push((
             folder.join(format!("{name}.svg")),
             figure.svg()?.into_bytes(),
@@ -139,6 +121,35 @@ fn write(
         .collect();
     output::write_files(&files)?;
     Ok(())
+}
+
+/// The figures with their names; none when a plane has no sample to draw.
+fn figures(prepared: &Prepared, trajectories: &[Trajectory<4, 1>]) -> Vec<(&'static str, Figure)> {
+    if trajectories.iter().any(|run| run.samples.is_empty()) {
+        return Vec::new();
+    }
+    let title = &prepared.title;
+    let columns: Vec<Columns> = trajectories.iter().map(Columns::from).collect();
+    let shown = |columns| Shown {
+        label: "ballbot",
+        role: Role::Lpv,
+        columns,
+    };
+    match columns.as_slice() {
+        [x, y] => {
+            let torques = prepared.motor_torques(trajectories);
+            let planes = [shown(x), shown(y)];
+            vec![
+                ("figure", pictures::both_planes(title, prepared, planes)),
+                ("path", pictures::path(title, prepared, [x, y])),
+                ("motors", pictures::motors("Motor torques", x, &torques)),
+            ]
+        }
+        runs => {
+            let shown: Vec<Shown<'_>> = runs.iter().map(shown).collect();
+            vec![("figure", pictures::one_plane(title, prepared, &shown))]
+        }
+    }
 }
 
 /// Pixels of a PNG per unit of the figure's size.

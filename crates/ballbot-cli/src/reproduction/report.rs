@@ -70,8 +70,8 @@ figcaption { font-size: .92rem; color: #444c56; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .88rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #e4e8ec; white-space: nowrap; }
-th:first-child, td:first-child { text-align: left; white-space: normal; }
-th { border-bottom: 2px solid #8c959f; }
+th:first-child, td:first-child { text-align: left; white-space: normal; min-width: 7rem; }
+th { border-bottom: 2px solid #8c959f; white-space: normal; vertical-align: bottom; }
 .differs { color: #b3261e; font-weight: 600; } .agrees { color: #1a7f37; }
 pre { white-space: pre-wrap; background: #f6f8fa; padding: .8rem 1rem; border-radius: 6px; }
 ";

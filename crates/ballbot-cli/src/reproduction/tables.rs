@@ -57,7 +57,8 @@ impl Sheet {
 type Line = (&'static str, f64, fn(&Metrics) -> f64);
 
 fn number(value: f64) -> String {
-    format!("{value:.6}")
+    // The sum turns a negative zero into zero.
+    format!("{:.6}", value + 0.0)
 }
 
 impl Reproduction {

@@ -1,0 +1,222 @@
+//! `ballbot simulate`: what it writes.
+
+use crate::recorded::{self, assert_figure};
+use crate::{assert_says, edited, files, succeed, with_section};
+use ballbot_scenario::{Scenario, builtin};
+use std::path::Path;
+
+/// The text of a built-in scenario, from the program.
+fn shown(name: &str) -> String {
+    succeed(Path::new("."), &["scenario", "show", name])
+}
+
+/// Runs the scenario in a folder of its own; the results are in `out/my`.
+fn simulate(text: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("my.toml"), text).unwrap();
+    succeed(folder.path(), &["simulate", "my.toml"]);
+    folder
+}
+
+#[test]
+fn every_built_in_scenario_runs_and_is_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    for builtin in builtin::ALL {
+        let name = builtin.name;
+        let scenario = Scenario::load(name).unwrap();
+        let summary = succeed(folder.path(), &["simulate", name]);
+        let out = format!("out/{name}");
+        assert_says(&summary, &[&scenario.title, "largest tilt [rad]", &out]);
+
+        let results = folder.path().join(&out);
+        let samples = (scenario.duration_s / 0.05).round() as usize;
+        let trajectories: &[&str] = if name == "lissajous" {
+            &["trajectory_x.csv", "trajectory_y.csv"]
+        } else {
+            &["trajectory.csv"]
+        };
+        for trajectory in trajectories {
+            let (rows, _) = recorded::complete(&results.join(trajectory), samples, 0.05);
+            let [lower, upper] = scenario.bounds.torque_nm;
+            for row in rows {
+                assert!((lower..=upper).contains(&row.torque), "{name}: {row:?}");
+            }
+        }
+        let figures: &[&str] = if name == "lissajous" {
+            &["figure", "motors", "path"]
+        } else {
+            &["figure"]
+        };
+        for figure in figures {
+            assert_figure(&results, figure);
+        }
+        let motors = if name == "lissajous" { 1 } else { 0 };
+        let expected = trajectories.len() + 2 * figures.len() + motors;
+        assert_eq!(files(&results).len(), expected, "{:?}", files(&results));
+    }
+}
+
+#[test]
+fn the_motors_follow_from_both_planes() {
+    let folder = tempfile::tempdir().unwrap();
+    succeed(folder.path(), &["simulate", "lissajous", "--out", "a/b"]);
+    let results = folder.path().join("a/b");
+    let samples = 1400;
+    let plane = |name: &str| recorded::complete(&results.join(name), samples, 0.05).0;
+    let (x, y) = (plane("trajectory_x.csv"), plane("trajectory_y.csv"));
+    let motors = recorded::motors(&results.join("motors.csv"));
+    assert_eq!(motors.len(), samples);
+    // Eq. (6) at 45 degrees without yaw: 1/cos(alpha) = sqrt(2).
+    let (third, side) = (2_f64.sqrt() / 3.0, 6_f64.sqrt() / 3.0);
+    for ((x, y), (t, motors)) in x.iter().zip(&y).zip(motors) {
+        assert_eq!([x.t, y.t], [t, t]);
+        let expected = [
+            2.0 * third * x.torque,
+            -third * x.torque + side * y.torque,
+            -third * x.torque - side * y.torque,
+        ];
+        for (found, expected) in motors.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-14, "{found} for {expected}");
+        }
+    }
+    // The planes follow the curve X = 0.12 * 2 pi sin(0.3 t), Y = 0.12 * 2 pi sin(0.4 t).
+    for (plane, omega) in [(&x, 0.3), (&y, 0.4)] {
+        for row in plane {
+            let expected = std::f64::consts::TAU * (omega * row.t).sin();
+            assert!((row.reference - expected).abs() < 1e-9, "{row:?}");
+        }
+        assert!(
+            plane[100..]
+                .iter()
+                .all(|row| (row.state[0] - row.reference).abs() < 0.1)
+        );
+    }
+}
+
+#[test]
+fn a_scenario_that_was_shown_runs_as_the_built_in_one() {
+    let folder = simulate(&shown("tight-bounds"));
+    succeed(folder.path(), &["simulate", "tight-bounds"]);
+    let read = |name: &str| {
+        let path = folder.path().join("out").join(name).join("trajectory.csv");
+        recorded::trajectory(&path)
+    };
+    assert_eq!(read("my"), read("tight-bounds"));
+}
+
+#[test]
+fn an_edited_scenario_runs_as_edited() {
+    let text = shown("two-setpoints");
+    let text = edited(&text, "horizon = 20", "horizon = 30");
+    let text = edited(&text, "q = [200.0, 1.0", "q = [1000.0, 10.0");
+    let text = edited(&text, "t_s = 0.05", "t_s = 0.04");
+    let text = edited(&text, "duration_s = 4.0", "duration_s = 6.0");
+    // Without a predictor the sub-steps are chosen.
+    let text = with_section(&text, "[controller.predictor.rk4]", "# The end", "");
+    let folder = simulate(&text);
+    let results = folder.path().join("out/my");
+    let (rows, end) = recorded::complete(&results.join("trajectory.csv"), 150, 0.04);
+    assert!(end.iter().all(|entry| entry.abs() < 1e-2), "{end:?}");
+    let farthest = rows.iter().map(|row| row.state[0]).fold(0.0, f64::max);
+    assert!((6.0..7.0).contains(&farthest), "{farthest}");
+    assert_figure(&results, "figure");
+}
+
+#[test]
+fn a_reference_from_a_file_is_followed() {
+    let folder = tempfile::tempdir().unwrap();
+    let inner = folder.path().join("inner");
+    std::fs::create_dir(&inner).unwrap();
+    let path = |t: f64| 3.0 * (1.0 - (0.8 * t).cos());
+    let lines = (0..=200).map(|k| f64::from(k) * 0.05);
+    let lines: String = lines.map(|t| format!("{t},{}\n", path(t))).collect();
+    std::fs::write(inner.join("path.csv"), format!("t_s,phi_ref_rad\n{lines}")).unwrap();
+    let text = with_section(
+        &edited(
+            &shown("two-setpoints"),
+            "duration_s = 4.0",
+            "duration_s = 10.0",
+        ),
+        "[reference.set_points]",
+        "# The simulated plant",
+        "[reference.csv]\npath = \"path.csv\"",
+    );
+    std::fs::write(inner.join("my.toml"), text).unwrap();
+    // The file is found beside the scenario, wherever the program is called from.
+    succeed(folder.path(), &["simulate", "inner/my.toml"]);
+    let results = folder.path().join("out/my");
+    let (rows, _) = recorded::complete(&results.join("trajectory.csv"), 200, 0.05);
+    for row in &rows {
+        assert!((row.reference - path(row.t)).abs() < 1e-9, "{row:?}");
+    }
+    for row in &rows[40..] {
+        assert!((row.state[0] - row.reference).abs() < 0.3, "{row:?}");
+    }
+}
+
+#[test]
+fn two_planes_with_references_of_their_own() {
+    let text = with_section(
+        &shown("two-setpoints"),
+        "[reference.set_points]",
+        "# The simulated plant",
+        "[reference.planes.x.minimum_jerk]\n\
+         points = [{ time_s = 0.5, phi_rad = 0.0 }, { time_s = 2.5, phi_rad = 4.0 }]\n\
+         [reference.planes.y.minimum_jerk]\n\
+         points = [{ time_s = 0.0, phi_rad = 1.0 }, { time_s = 3.0, phi_rad = -2.0 }]\n\
+         [initial_state_y]\nphi_rad = 1.0",
+    );
+    let folder = simulate(&text);
+    let results = folder.path().join("out/my");
+    for (name, (start, from), (stop, to)) in [
+        ("trajectory_x.csv", (0.5, 0.0), (2.5, 4.0)),
+        ("trajectory_y.csv", (0.0, 1.0), (3.0, -2.0)),
+    ] {
+        let (rows, end) = recorded::complete(&results.join(name), 80, 0.05);
+        assert_eq!(rows[0].state, [from, 0.0, 0.0, 0.0]);
+        assert!((end[0] - to).abs() < 0.05, "{name}: {end:?}");
+        for row in &rows {
+            // The quintic with neither speed nor acceleration at its ends.
+            let s = ((row.t - start) / (stop - start)).clamp(0.0, 1.0);
+            let share = s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
+            let expected = from + (to - from) * share;
+            assert!((row.reference - expected).abs() < 1e-12, "{name}: {row:?}");
+        }
+    }
+    assert_eq!(recorded::motors(&results.join("motors.csv")).len(), 80);
+    for figure in ["figure", "motors", "path"] {
+        assert_figure(&results, figure);
+    }
+}
+
+#[test]
+fn the_shortest_and_the_stillest_run_have_figures() {
+    let one_sample = edited(
+        &shown("single-setpoint"),
+        "duration_s = 4.0",
+        "duration_s = 0.01",
+    );
+    let folder = simulate(&one_sample);
+    recorded::complete(&folder.path().join("out/my/trajectory.csv"), 1, 0.05);
+    assert_figure(&folder.path().join("out/my"), "figure");
+
+    // All costs are zero, on a logarithmic axis.
+    let at_rest = with_section(
+        &shown("two-setpoints"),
+        "[reference.set_points]",
+        "# The simulated plant",
+        "[reference.set_points]\npoints = [{ time_s = 0.0, phi_rad = 0.0 }]",
+    );
+    let folder = simulate(&at_rest);
+    let (rows, _) = recorded::complete(&folder.path().join("out/my/trajectory.csv"), 80, 0.05);
+    assert!(rows.iter().all(|row| row.torque == 0.0 && row.cost == 0.0));
+    assert_figure(&folder.path().join("out/my"), "figure");
+}
+
+#[test]
+fn a_second_run_replaces_the_first() {
+    let folder = simulate(&shown("single-setpoint"));
+    let before = files(folder.path());
+    succeed(folder.path(), &["simulate", "my.toml"]);
+    assert_eq!(files(folder.path()), before);
+}

@@ -1,0 +1,105 @@
+//! The LPV embedding: equal to f everywhere, and the paper's Table of elements.
+
+use crate::robots;
+use ballbot::Ballbot;
+use fastrand::Rng;
+use lpvmpc::LpvModel;
+use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
+use std::f64::consts::{FRAC_PI_3, PI, TAU};
+
+fn assert_embeds(robot: &Ballbot<f64>, x: &Vector4<f64>, torque: f64) {
+    let (a, b) = robot.matrices(&robot.scheduling(x));
+    let found = a * x + b * torque;
+    let expected = robot.f(x, torque);
+    let scale = a.abs() * x.abs() + b.abs() * torque.abs();
+    for i in 0..4 {
+        assert!(
+            (found[i] - expected[i]).abs() <= 1e-12 * scale[i],
+            "{robot:?} at {x}, {torque} N m: {found} for {expected}"
+        );
+    }
+    assert_eq!(robot.derivative(x, &Vector1::new(torque)), expected);
+}
+
+#[test]
+fn the_embedding_is_exact() {
+    let mut rng = Rng::with_seed(4);
+    for _ in 0..100_000 {
+        let (x, torque) = (robots::state(&mut rng), robots::torque(&mut rng));
+        assert_embeds(&Ballbot::paper(), &x, torque);
+        assert_embeds(&robots::rigid(&mut rng), &x, torque);
+    }
+}
+
+#[test]
+fn the_embedding_is_exact_at_the_smallest_tilts() {
+    // sin(theta)/theta where theta is zero of either sign, denormal, or so small that its sine
+    // is itself.
+    for theta in [0.0, 5e-324, 1e-310, 1e-200, 1e-20, 1e-9, 1e-8, 1e-4, PI] {
+        for theta in [theta, -theta] {
+            let x = Vector4::new(0.0, theta, 3.0, -2.0);
+            assert_embeds(&Ballbot::paper(), &x, 0.3);
+        }
+    }
+}
+
+#[test]
+fn sinc_is_one_upright_and_zero_upside_down() {
+    let robot = Ballbot::<f64>::paper();
+    let element = |theta: f64| robot.matrices(&Vector2::new(theta, 0.0)).0[(3, 1)];
+    // A42 = b1 l g sinc(theta) / d; with sin(pi x)/(pi x) it would vanish at 1 rad.
+    assert!(element(1.0).abs() > 1.0);
+    assert!((element(PI) / element(0.0)).abs() < 1e-15);
+    for tiny in [-0.0, 5e-324, 1e-160, -1e-9] {
+        let ratio = element(tiny) / element(0.0);
+        assert!((ratio - 1.0).abs() <= 1e-15, "sinc({tiny:e}) = {ratio}");
+    }
+}
+
+/// The paper's table, written out again with its own symbols; B31 with the bracket closed
+/// before the division.
+#[rustfmt::skip]
+fn table_of_elements(robot: &Ballbot<f64>, theta: f64, theta_dot: f64) -> (Matrix4<f64>, Vector4<f64>) {
+    let Ballbot { b1, b2, b3, b4, geometry } = *robot;
+    let (l, r_b) = (geometry.centre_of_mass, geometry.ball_radius);
+    let (r_w, g) = (geometry.wheel_radius, geometry.gravity);
+    let (sin, cos) = (theta.sin(), theta.cos());
+    let sinc = sin / theta;
+    let d = b1 * b3 - (-b2 + l * r_b * cos).powi(2);
+    let a = Matrix4::new(
+        0.0, 0.0, 1.0, 0.0,
+        0.0, 0.0, 0.0, 1.0,
+        0.0, l * g * sinc * (b2 - l * r_b * cos) / d, -b3 * b4 / d, b3 * l * r_b * sin * theta_dot / d,
+        0.0, b1 * l * g * sinc / d, -b4 * (b2 - l * r_b * cos) / d, l * r_b * sin * theta_dot * (b2 - l * r_b * cos) / d,
+    );
+    let b31 = r_b * (b3 - (b2 - l * r_b * cos)) / (r_w * d);
+    let b41 = r_b * ((b2 - l * r_b * cos) - b1) / (r_w * d);
+    (a, Vector4::new(0.0, 0.0, b31, b41))
+}
+
+#[test]
+fn the_elements_are_those_of_the_papers_table() {
+    let robot = Ballbot::paper();
+    for theta in [-FRAC_PI_3, -0.5, 1e-3, 0.2, FRAC_PI_3] {
+        for theta_dot in [-TAU, 0.0, 1.3] {
+            let (a, b) = robot.matrices(&Vector2::new(theta, theta_dot));
+            let (a_table, b_table) = table_of_elements(&robot, theta, theta_dot);
+            for (found, expected) in a.iter().chain(&b).zip(a_table.iter().chain(&b_table)) {
+                assert!(
+                    (found - expected).abs() <= 1e-14 * expected.abs(),
+                    "{found} for {expected} at {theta}, {theta_dot}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_positive_torque_lowers_the_tilt_over_the_whole_range() {
+    // B41 < 0, as the prose of scenario 1 needs; the Table of p prints p6 positive.
+    for step in -100..=100 {
+        let theta = FRAC_PI_3 * f64::from(step) / 100.0;
+        let (_, b) = Ballbot::<f64>::paper().matrices(&Vector2::new(theta, 0.0));
+        assert!(b[3] < 0.0, "B41 = {} at {theta}", b[3]);
+    }
+}

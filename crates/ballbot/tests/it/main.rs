@@ -1,0 +1,14 @@
+//! The ballbot's model against the equations of motion, mechanics and the paper's numbers.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on must fail, in its support functions too"
+)]
+
+mod consistency;
+mod dynamics;
+mod embedding;
+mod linear;
+mod robots;
+mod single_precision;
+mod wheels;
