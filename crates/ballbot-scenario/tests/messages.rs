@@ -1,4 +1,9 @@
 //! Bad scenarios: each mistake gets a message with the place, the value and what is right.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test fails by panicking, in its helper functions too"
+)]
 
 use ballbot_scenario::{Scenario, ScenarioError, builtin};
 use std::path::{Path, PathBuf};

@@ -1,4 +1,9 @@
 //! The built-in scenarios against an independent program: `testdata/scenarios.json`.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test fails by panicking, in its helper functions too"
+)]
 
 use ballbot_scenario::{Scenario, Surroundings};
 use lpvmpc_sim::{Ending, Trajectory};

@@ -15,7 +15,7 @@ impl<T: Scalar> LpvModel<T, 4, 1, 2> for Ballbot<T> {
         Vector2::new(x[1], x[3])
     }
 
-    #[inline]
+    #[inline(always)]
     fn matrices(&self, scheduling: &Vector2<T>) -> (Matrix4<T>, Vector4<T>) {
         let (theta, theta_dot) = (scheduling[0], scheduling[1]);
         let (sin_theta, cos_theta) = sin_cos(theta);

@@ -11,7 +11,7 @@ use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
 use crate::rows::{self, Candidate, Trajectory};
 use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Status};
-use crate::working_set::{Direction, Row, WorkingSet};
+use crate::working_set::{Direction, Row, Terms, WorkingSet};
 use nalgebra::{SVector, convert};
 
 /// Scratch memory and state of the dual method.
@@ -19,17 +19,20 @@ use nalgebra::{SVector, convert};
 pub(crate) struct DualActiveSet<T, const NU: usize, const N: usize, const M: usize> {
     /// Normalised deviations of the current minimiser.
     pub v: [SVector<T, NU>; N],
-    working: WorkingSet<T, NU, N, M>,
-    /// Soft bounds whose multiplier rests at the linear price.
-    exceeded: ActiveSet<T, M>,
-    candidate: Row<T, NU, N>,
-    direction: Direction<T, NU, N, M>,
+    pub(crate) working: WorkingSet<T, NU, N, M>,
+    /// Rows whose multiplier stays where it is: exceeded soft bounds at their linear price, and
+    /// bounds that hold to rounding because other rows do.
+    pub(crate) resting: ActiveSet<T, M>,
+    pub(crate) candidate: Row<T, NU, N>,
+    pub(crate) direction: Direction<T, NU, N, M>,
     /// Relative violation that counts as none.
-    tolerance: T,
-    /// Tolerance that rounding may force, at most.
-    loosest: T,
+    pub(crate) tolerance: T,
+    /// Relative violation that counts as rounding where no step can remove it.
+    pub(crate) loosest: T,
     pub changes: usize,
     max_changes: usize,
+    /// Refinements that are left.
+    pub(crate) refinements: usize,
 }
 
 /// Why a step along the direction ends.
@@ -47,13 +50,14 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
         Self {
             v: [SVector::zeros(); N],
             working: WorkingSet::new(),
-            exceeded: ActiveSet::new(),
+            resting: ActiveSet::new(),
             candidate: Row::empty(),
             direction: Direction::zeros(),
             tolerance: T::zero(),
             loosest: T::zero(),
             changes: 0,
             max_changes: 0,
+            refinements: 0,
         }
     }
 
@@ -61,11 +65,12 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
     pub fn reset(&mut self, tolerance: T, max_changes: usize) {
         self.v = [SVector::zeros(); N];
         self.working.clear();
-        self.exceeded.clear();
+        self.resting.clear();
         self.tolerance = tolerance;
-        self.loosest = tolerance * convert(1e3);
+        self.loosest = tolerance.max(T::default_epsilon().sqrt());
         self.changes = 0;
         self.max_changes = max_changes;
+        self.refinements = 3;
     }
 
     /// The bound that is violated most, if any is.
@@ -77,24 +82,26 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
         let mut worst: Option<Candidate<T>> = None;
         let mut least = self.tolerance;
         rows::violated_bounds(ocp, trajectory, &mut |candidate| {
-            // Negated, so that a violation that is not a number counts.
-            if !(candidate.violation <= least)
+            // Negated, so that a violation that is not a number counts; it stays the worst.
+            if worst.is_none_or(|worst| worst.slack.is_finite())
+                && !(candidate.violation <= least)
                 && let Some(part) = self.free_part(&candidate)
             {
                 least = candidate.violation;
                 worst = Some(Candidate { part, ..candidate });
             }
         });
-        for row in self.exceeded.iter() {
+        for row in self.resting.iter().filter(|row| row.exceeded) {
             let slack = rows::slack(ocp, trajectory, &row.bound);
-            if slack > least {
-                least = slack;
+            let violation = slack / rows::size(ocp, &row.bound);
+            if violation > least {
+                least = violation;
                 worst = Some(Candidate {
                     bound: row.bound,
                     part: row.part,
                     soft: rows::soft_price(ocp, &row.bound),
                     slack,
-                    violation: slack,
+                    violation,
                 });
             }
         }
@@ -105,15 +112,14 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
     fn free_part(&self, candidate: &Candidate<T>) -> Option<Part> {
         let held = |part| {
             let same = |row: &ActiveRow<T>| row.bound == candidate.bound && row.part == part;
-            self.working.rows().iter().any(|row| same(&row.active))
-                || self.exceeded.iter().any(same)
+            self.working.rows().iter().any(|row| same(&row.active)) || self.resting.iter().any(same)
         };
         match candidate.soft {
             None => (!held(Part::Hard)).then_some(Part::Hard),
             Some(price) if price.linear > T::zero() && !held(Part::Linear) => Some(Part::Linear),
             Some(price) => {
                 let rests = price.linear <= T::zero()
-                    || self.exceeded.iter().any(|row| row.bound == candidate.bound);
+                    || self.resting.iter().any(|row| row.bound == candidate.bound);
                 (rests && price.quadratic > T::zero() && !held(Part::Quadratic))
                     .then_some(Part::Quadratic)
             }
@@ -179,11 +185,14 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
             slack = -slack;
         }
         loop {
-            if self.changes >= self.max_changes {
-                return Err(Status::ChangeCap);
-            }
-            self.changes += 1;
+            self.count_change()?;
             self.working.direction(&self.candidate, &mut self.direction);
+            if !self.direction.slope.is_finite() {
+                return Err(Status::NotFinite);
+            }
+            if self.is_rounding(slack) {
+                return self.rest(self.candidate.terms.reported());
+            }
             let Some((step, end)) = self.step_length(slack) else {
                 return self.accept_rounding_or_fail(violated, slack);
             };
@@ -199,55 +208,60 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
                     return Ok(());
                 }
                 StepEnd::Cap => {
-                    let row = self.candidate;
-                    return self.rest_at_cap(&row);
+                    let row = self.candidate.terms;
+                    return self.release(&row);
                 }
                 StepEnd::Blocked(position) => {
                     let row = self.working.remove(position);
-                    let at_cap =
-                        row.cap.is_finite() && row.active.multiplier > row.cap * convert(0.5);
-                    if at_cap {
-                        self.rest_at_cap(&row)?;
-                    } else if row.mirrored {
-                        self.rest_exceeded(&row)?;
-                    }
+                    self.release(&row)?;
                 }
             }
         }
     }
 
+    /// Whether a violation is no larger than what rounding makes of it: the candidate then
+    /// holds as well as the working rows that it depends on.
+    fn is_rounding(&self, slack: T) -> bool {
+        let squares = self.v.iter().map(|v| v.norm_squared());
+        let length = squares.fold(T::zero(), |sum, square| sum + square).sqrt();
+        -slack <= self.direction.noise * length
+    }
+
+    /// Counts one more change of the active set.
+    pub(crate) fn count_change(&mut self) -> Result<(), Status<T>> {
+        if self.changes >= self.max_changes {
+            return Err(Status::ChangeCap);
+        }
+        self.changes += 1;
+        Ok(())
+    }
+
     /// A mirrored row has the opposite slack, and its multiplier counts down from the cap.
     fn take_back_exceeded(&mut self, violated: &Candidate<T>) {
-        let mut others = ActiveSet::new();
-        for row in self.exceeded.iter() {
-            if row.bound != violated.bound || row.part != violated.part {
-                others.push(*row);
-            }
-        }
-        self.exceeded = others;
-        self.candidate.mirrored = true;
+        self.resting
+            .retain(|row| row.bound != violated.bound || row.part != violated.part);
+        self.candidate.terms.mirrored = true;
         for alpha in &mut self.candidate.alpha {
             *alpha = -*alpha;
         }
     }
 
-    /// A multiplier has reached its linear price: an exceeded bound, or, seen in the mirror,
-    /// a bound that is no longer active.
-    fn rest_at_cap(&mut self, row: &Row<T, NU, N>) -> Result<(), Status<T>> {
-        if row.mirrored {
-            Ok(())
-        } else {
-            self.rest_exceeded(row)
+    /// A row leaves at one end of its multiplier's interval. At the linear price, which in the
+    /// mirror is the other end, it stays an exceeded bound.
+    pub(crate) fn release(&mut self, row: &Terms<T>) -> Result<(), Status<T>> {
+        let at_cap = row.cap.is_finite() && row.active.multiplier > row.cap * convert(0.5);
+        if at_cap == row.mirrored {
+            return Ok(());
         }
-    }
-
-    fn rest_exceeded(&mut self, row: &Row<T, NU, N>) -> Result<(), Status<T>> {
-        let exceeded = ActiveRow {
+        self.rest(ActiveRow {
             multiplier: row.cap,
             exceeded: true,
             ..row.active
-        };
-        if self.exceeded.push(exceeded) {
+        })
+    }
+
+    fn rest(&mut self, row: ActiveRow<T>) -> Result<(), Status<T>> {
+        if self.resting.push(row) {
             Ok(())
         } else {
             Err(Status::WorkingSetFull)
@@ -265,8 +279,8 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
         if self.direction.slope > T::zero() {
             keep(-slack / self.direction.slope, StepEnd::Full);
         }
-        if self.candidate.cap.is_finite() {
-            let room = self.candidate.cap - self.candidate.active.multiplier;
+        if self.candidate.terms.cap.is_finite() {
+            let room = self.candidate.terms.cap - self.candidate.terms.active.multiplier;
             keep(room, StepEnd::Cap);
         }
         let rows = self.working.rows().iter().zip(self.direction.dual.iter());
@@ -293,8 +307,7 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
     ) -> Result<(), Status<T>> {
         let violation = violated.violation * (slack / violated.slack).abs();
         if violation <= self.loosest && violated.part == Part::Hard {
-            self.tolerance = self.tolerance.max(violation * convert(2.0));
-            Ok(())
+            self.rest(self.candidate.terms.reported())
         } else {
             Err(Status::Infeasible(violated.bound))
         }
@@ -306,119 +319,21 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
         for (row, rate) in self.working.rows_mut().iter_mut().zip(rates) {
             row.active.multiplier -= step * *rate;
         }
-        self.candidate.active.multiplier += step;
+        self.candidate.terms.active.multiplier += step;
         for (v, change) in self.v.iter_mut().zip(self.direction.primal.iter()) {
             *v += change * step;
         }
     }
 
-    /// Moves v so that the rows of the working set hold to rounding on the trajectory, which
-    /// belongs to the current v. Returns whether anything had to be moved.
-    pub fn polish<const NX: usize, const NG: usize>(
-        &mut self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
-        trajectory: &Trajectory<'_, T, NX, NU, N>,
-    ) -> bool {
-        let mut change = [T::zero(); M];
-        let mut largest = T::zero();
-        for (change, row) in change.iter_mut().zip(self.working.rows()) {
-            let sign = if row.mirrored { -T::one() } else { T::one() };
-            let slack = rows::slack(ocp, trajectory, &row.active.bound) * sign;
-            *change = -(slack + row.compliance * row.active.multiplier);
-            largest = largest.max(change.abs());
-        }
-        if !(largest > self.tolerance) {
-            return false;
-        }
-        self.working.solve_gram(&mut change);
-        self.shift_multipliers(&change);
-        true
+    /// The active rows, with multipliers in the bounds' own direction.
+    pub(crate) fn active(&self) -> impl Iterator<Item = ActiveRow<T>> {
+        let working = self.working.rows().iter().map(Terms::reported);
+        working.chain(self.resting.iter().copied())
     }
 
-    /// Starts from the rows that were active before, `shift` stages earlier. Rows whose
-    /// multiplier would have the wrong sign are dropped, so this never changes the result.
-    pub fn warm_start<const NX: usize, const NG: usize>(
-        &mut self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
-        factors: &[StageFactor<T, NX, NU>; N],
-        trajectory: &Trajectory<'_, T, NX, NU, N>,
-        before: &ActiveSet<T, M>,
-        shift: usize,
-    ) {
-        let equalities = self.working.len();
-        for row in before.iter() {
-            let hard = row.part == Part::Hard && row.bound.side != Side::Equality;
-            let Some(stage) = row.bound.stage.checked_sub(shift) else {
-                continue;
-            };
-            let given = stage == 0 && matches!(row.bound.quantity, Quantity::State(_));
-            if !hard || given || self.working.is_full() {
-                continue;
-            }
-            let bound = BoundId { stage, ..row.bound };
-            rows::form_row(ocp, factors, bound, Part::Hard, None, &mut self.candidate);
-            self.working.direction(&self.candidate, &mut self.direction);
-            if self.direction.slope > self.candidate.dot(&self.candidate.alpha) * convert(1e-6) {
-                self.working.append(&self.candidate, &self.direction);
-                self.changes += 1;
-            }
-        }
-        self.drop_negative_multipliers(ocp, trajectory, equalities);
-    }
-
-    /// Moves to the minimiser over the working set, without the rows (behind the first
-    /// `equalities`) whose multiplier would be negative there.
-    fn drop_negative_multipliers<const NX: usize, const NG: usize>(
-        &mut self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
-        trajectory: &Trajectory<'_, T, NX, NU, N>,
-        equalities: usize,
-    ) {
-        loop {
-            let mut change = [T::zero(); M];
-            for (change, row) in change.iter_mut().zip(self.working.rows()) {
-                *change = -rows::slack(ocp, trajectory, &row.active.bound);
-            }
-            self.working.solve_gram(&mut change);
-            let multipliers = self.working.rows().iter().zip(change.iter());
-            let negative = multipliers
-                .map(|(row, change)| row.active.multiplier + *change)
-                .enumerate()
-                .skip(equalities)
-                .filter(|(_, multiplier)| !(*multiplier >= T::zero()))
-                .reduce(|least, other| if other.1 < least.1 { other } else { least });
-            if let Some((position, _)) = negative {
-                self.working.remove(position);
-                self.changes += 1;
-                continue;
-            }
-            self.shift_multipliers(&change);
-            return;
-        }
-    }
-
-    /// Changes the working set's multipliers, and v with them.
-    fn shift_multipliers(&mut self, change: &[T; M]) {
-        let v = &mut self.v;
-        for (row, change) in self.working.rows_mut().iter_mut().zip(change.iter()) {
-            row.active.multiplier += *change;
-            row.add_to(v, *change);
-        }
-    }
-
-    /// Hands over the active rows, with multipliers in the bounds' own direction.
+    /// Hands over the active rows.
     pub fn report(&self, active: &mut ActiveSet<T, M>) -> bool {
         active.clear();
-        let working = self.working.rows().iter().map(|row| ActiveRow {
-            multiplier: if row.mirrored {
-                row.cap - row.active.multiplier
-            } else {
-                row.active.multiplier
-            },
-            ..row.active
-        });
-        working
-            .chain(self.exceeded.iter().copied())
-            .all(|row| active.push(row))
+        self.active().all(|row| active.push(row))
     }
 }

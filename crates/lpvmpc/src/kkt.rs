@@ -4,10 +4,12 @@ use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::rows::{self, Trajectory};
 use crate::solution::{ActiveRow, ActiveSet, Part, Side, Solution};
+use core::cmp::Ordering;
 use nalgebra::SVector;
 
 /// How far a solution is from satisfying the optimality conditions. All zero at the optimum;
-/// the problem is convex, so all zero is also sufficient.
+/// the problem is convex, so all zero is also sufficient. Where a number of the problem or the
+/// solution is not one (NaN), so is the residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KktResidual<T> {
     /// Largest entry of the Lagrangian's gradient in the inputs (the states are eliminated by
@@ -27,11 +29,28 @@ pub struct KktResidual<T> {
 impl<T: Scalar> KktResidual<T> {
     /// The largest of the four.
     pub fn largest(&self) -> T {
-        self.stationarity
-            .max(self.primal)
-            .max(self.dual)
-            .max(self.complementarity)
+        let parts = [
+            self.stationarity,
+            self.primal,
+            self.dual,
+            self.complementarity,
+        ];
+        parts.into_iter().fold(T::zero(), larger)
     }
+}
+
+/// The larger of two residuals; unlike `max`, NaN if one of them is.
+fn larger<T: Scalar>(a: T, b: T) -> T {
+    match a.partial_cmp(&b) {
+        Some(Ordering::Less) => b,
+        Some(_) => a,
+        None => a + b,
+    }
+}
+
+/// The largest magnitude of an entry; NaN if one is.
+fn magnitude<T: Scalar, const K: usize>(v: &SVector<T, K>) -> T {
+    v.iter().map(|entry| entry.abs()).fold(T::zero(), larger)
 }
 
 /// The residual of the optimality conditions of `ocp` at `solution`.
@@ -56,34 +75,8 @@ pub fn kkt_residual<
         stationarity: stationarity(ocp, &trajectory, &solution.active),
         primal: primal(ocp, &trajectory),
         dual,
-        complementarity: slackness.max(unpaid),
+        complementarity: larger(slackness, unpaid),
     }
-}
-
-/// The gradient that the active rows at `stage` add to the state and the input.
-fn row_gradient<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const M: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    active: &ActiveSet<T, M>,
-    stage: usize,
-) -> (SVector<T, NX>, SVector<T, NU>) {
-    let mut gradient = (SVector::zeros(), SVector::zeros());
-    for row in active.iter().filter(|row| row.bound.stage == stage) {
-        let (normal_x, normal_u) = rows::normal(ocp, &row.bound);
-        let factor = match row.bound.side {
-            Side::Upper => row.multiplier,
-            Side::Lower | Side::Equality => -row.multiplier,
-        };
-        gradient.0 += normal_x * factor;
-        gradient.1 += normal_u * factor;
-    }
-    gradient
 }
 
 fn stationarity<
@@ -102,7 +95,9 @@ fn stationarity<
     let mut largest_term = T::one();
     let mut largest = T::zero();
     let x_n = state(ocp, trajectory, n);
-    let mut costate = ocp.terminal.p * x_n + ocp.terminal.linear_x + row_gradient(ocp, active, n).0;
+    let mut costate = ocp.terminal.p * x_n
+        + ocp.terminal.linear_x
+        + rows::gradient(ocp, active.iter().copied(), n).0;
     for (i, (stage, u)) in ocp
         .stages
         .iter()
@@ -112,12 +107,13 @@ fn stationarity<
         .rev()
     {
         let x = state(ocp, trajectory, i);
-        let (rows_x, rows_u) = row_gradient(ocp, active, i);
+        let (rows_x, rows_u) = rows::gradient(ocp, active.iter().copied(), i);
         let through_dynamics = stage.b.tr_mul(&costate);
         let weights = stage.r * u + stage.s * x + stage.linear_u;
         let gradient = weights + through_dynamics + rows_u;
-        largest = largest.max(gradient.amax());
-        largest_term = largest_term.max(through_dynamics.amax()).max(rows_u.amax());
+        largest = larger(largest, magnitude(&gradient));
+        let terms = stage.b.abs().tr_mul(&costate.abs());
+        largest_term = largest_term.max(terms.amax()).max(rows_u.amax());
         costate =
             stage.q * x + stage.s.tr_mul(u) + stage.linear_x + stage.a.tr_mul(&costate) + rows_x;
     }
@@ -150,16 +146,23 @@ fn primal<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG:
     {
         let x_next = state(ocp, trajectory, i + 1);
         let defect = stage.a * state(ocp, trajectory, i) + stage.b * u + stage.c - x_next;
-        largest = largest.max(defect.amax() / x_next.amax().max(T::one()));
+        largest = larger(largest, magnitude(&defect) / x_next.amax().max(T::one()));
     }
     rows::violated_bounds(ocp, trajectory, &mut |candidate| {
         if candidate.soft.is_none() {
-            largest = largest.max(candidate.violation.min(-candidate.slack));
+            // Relative to the bound's size, but at least to 1.
+            let relative = if candidate.violation >= -candidate.slack {
+                -candidate.slack
+            } else {
+                candidate.violation
+            };
+            largest = larger(largest, relative);
         }
     });
     if let Some(target) = &ocp.terminal.equality {
         let x_n = state(ocp, trajectory, ocp.length());
-        largest = largest.max((x_n - target).amax() / target.amax().max(T::one()));
+        let missed = magnitude(&(x_n - target)) / target.amax().max(T::one());
+        largest = larger(largest, missed);
     }
     largest
 }
@@ -181,32 +184,45 @@ fn multipliers<
     let mut slackness = T::zero();
     let mut largest = T::one();
     for row in active.iter() {
-        let slack = rows::slack(ocp, trajectory, &row.bound);
-        let price = rows::soft_price(ocp, &row.bound);
-        largest = largest.max(row.multiplier.abs());
+        largest = larger(largest, row.multiplier.abs());
         if row.bound.side == Side::Equality {
             continue;
         }
-        outside = outside.max(-row.multiplier);
-        let defect = match (row.part, price) {
-            (Part::Quadratic, Some(price)) => {
-                let excess = (-slack).max(T::zero());
-                (row.multiplier - price.quadratic * excess).abs() / price.quadratic
-            }
-            (Part::Linear, Some(price)) => {
-                outside = outside.max(row.multiplier - price.linear);
-                if row.exceeded {
-                    outside = outside.max((row.multiplier - price.linear).abs());
-                    slack.max(T::zero())
-                } else {
-                    slack.abs()
-                }
-            }
-            _ => slack.abs(),
-        };
-        slackness = slackness.max(defect);
+        // A row that is listed twice acts with the sum.
+        let same = |other: &&ActiveRow<T>| other.bound == row.bound && other.part == row.part;
+        let rows = active.iter().filter(same);
+        let multiplier = rows.fold(T::zero(), |sum, other| sum + other.multiplier);
+        let slack = rows::slack(ocp, trajectory, &row.bound);
+        let (distance, defect) = conditions(row, multiplier, slack, ocp);
+        outside = larger(outside, larger(-row.multiplier, distance));
+        let size = rows::size(ocp, &row.bound).max(T::one());
+        slackness = larger(slackness, defect / size);
     }
     (outside / largest, slackness)
+}
+
+/// How far an active row's multiplier is above its largest value (or, if the bound is exceeded,
+/// from it), and its bound from where the row says it is.
+fn conditions<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+    row: &ActiveRow<T>,
+    multiplier: T,
+    slack: T,
+    ocp: &Ocp<T, NX, NU, N, NG>,
+) -> (T, T) {
+    let zero = T::zero();
+    let excess = if slack < zero { -slack } else { zero };
+    match (row.part, rows::soft_price(ocp, &row.bound)) {
+        (Part::Hard, None) => (zero, slack.abs()),
+        (Part::Linear, Some(price)) if row.exceeded => {
+            ((multiplier - price.linear).abs(), slack + excess)
+        }
+        (Part::Linear, Some(price)) => (multiplier - price.linear, slack.abs()),
+        (Part::Quadratic, Some(price)) if price.quadratic > zero => {
+            (zero, (multiplier / price.quadratic - excess).abs())
+        }
+        // A part that the bound does not have has no multiplier.
+        _ => (multiplier, zero),
+    }
 }
 
 /// The largest excess of a soft bound whose price is not in the active set.
@@ -234,7 +250,8 @@ fn unpaid_excess<
         let linear = paid(Part::Linear, price.linear <= T::zero());
         let quadratic = paid(Part::Quadratic, price.quadratic <= T::zero());
         if !(linear && quadratic) {
-            largest = largest.max(-candidate.slack);
+            let size = rows::size(ocp, &candidate.bound).max(T::one());
+            largest = larger(largest, -candidate.slack / size);
         }
     });
     largest

@@ -7,12 +7,14 @@
 
 mod active_set;
 mod controller;
+mod kernel;
 mod kkt;
 mod model;
 mod ocp;
 mod predictor;
 pub mod riccati;
 mod rows;
+mod settle;
 mod solution;
 mod solver;
 mod working_set;

@@ -48,6 +48,21 @@ impl<T: Scalar, const K: usize> Bounds<T, K> {
             .all(|(v, (lower, upper))| *v >= *lower - tolerance && *v <= *upper + tolerance)
     }
 
+    /// Whether every component of `value` lies within its bounds; false for NaN.
+    #[inline(always)]
+    pub(crate) fn hold_at(&self, value: &SVector<T, K>) -> bool {
+        let [lower, upper, value] =
+            [&self.lower, &self.upper, value].map(|vector| &vector.data.0[0]);
+        let sides = lower.iter().zip(upper);
+        // Without early exit, so that the comparisons need no branches.
+        value
+            .iter()
+            .zip(sides)
+            .fold(true, |hold, (v, (lower, upper))| {
+                hold & (*v >= *lower) & (*v <= *upper)
+            })
+    }
+
     /// `value` moved into the bounds; a component that is not finite becomes the admissible
     /// value nearest to zero.
     pub fn project(&self, value: &SVector<T, K>) -> SVector<T, K> {

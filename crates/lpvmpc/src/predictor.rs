@@ -4,6 +4,7 @@
 //! matrices (lines 2 to 8 of Algorithm 1); with the scheduling read off the state it is the
 //! nonlinear map of the rollout (eq. (5), step 4 of Algorithm 2).
 
+use crate::kernel::{add_product, product};
 use crate::model::{LpvModel, Scalar};
 use nalgebra::{SMatrix, SVector, convert};
 
@@ -18,9 +19,11 @@ impl Rk4 {
     /// x_{k+1} = A_d x_k + B_d u_k over one sample of `t_s` seconds, for the constant
     /// continuous-time pair (`a`, `b`).
     ///
-    /// With h = t_s / substeps and S = I + hA/2 (I + hA/3 (I + hA/4)), one step is
-    /// A_h = I + hA S, B_h = h S B: the Taylor polynomial of order four of the exact
-    /// zero-order-hold pair. Frozen scheduling over the whole sample is the paper's predictor.
+    /// With h = t_s / substeps and M = hA, one step is
+    /// A_h = I + M + M^2/2 + M^3/6 + M^4/24 and B_h = h (I + M/2 + M^2/6 + M^3/24) B: the
+    /// Taylor polynomials of order four of the exact zero-order-hold pair. Frozen scheduling
+    /// over the whole sample is the paper's predictor.
+    #[inline(always)]
     pub fn discretize<T: Scalar, const NX: usize, const NU: usize>(
         self,
         a: &SMatrix<T, NX, NX>,
@@ -28,19 +31,24 @@ impl Rk4 {
         t_s: T,
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
         let h = self.step_length(t_s);
-        let identity = SMatrix::<T, NX, NX>::identity();
-        let ah = a * h;
-        let third = identity + ah * convert::<f64, T>(0.25);
-        let second = identity + ah * third * convert::<f64, T>(1.0 / 3.0);
-        let series = identity + ah * second * convert::<f64, T>(0.5);
-        let a_step = identity + ah * series;
-        let b_step = series * b * h;
+        let [half, sixth, last] = [0.5, 1.0 / 6.0, 1.0 / 24.0].map(convert::<f64, T>);
+        let m = a * h;
+        let m2 = product(&m, &m);
+        let mut a_step = m + m2 * half;
+        for i in 0..NX {
+            a_step[(i, i)] += T::one();
+        }
+        add_product(&mut a_step, &m2, &(m * sixth + m2 * last));
+        let b = b * h;
+        let m_b = product(&m, &b);
+        let mut b_step = b + m_b * half;
+        add_product(&mut b_step, &m2, &(b * sixth + m_b * last));
 
         let mut a_d = a_step;
         let mut b_d = b_step;
         for _ in 1..self.substeps {
-            b_d = a_step * b_d + b_step;
-            a_d = a_step * a_d;
+            b_d = product(&a_step, &b_d) + b_step;
+            a_d = product(&a_step, &a_d);
         }
         (a_d, b_d)
     }

@@ -6,6 +6,7 @@
 //! v = L'(u - K x - k), the whole cost becomes `constant + sum |v_i|^2 / 2`: the horizon's
 //! Hessian is the identity, and a bound is a plain linear row in v.
 
+use crate::kernel::{add_product, product, transposed_product};
 use crate::model::Scalar;
 use crate::ocp::Stage;
 use nalgebra::{SMatrix, SVector, convert};
@@ -54,86 +55,123 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         }
     }
 
-    /// One backward step: the stage's factor, and the cost-to-go in front of the stage.
+    /// One backward step: takes the cost-to-go behind `stage` to the one in front of it, and
+    /// leaves the stage's factor in `self`.
     ///
     /// # Errors
     /// [`BadPivot`] if R + B'PB is not numerically positive definite.
-    pub fn new<const NG: usize>(
+    #[inline(always)]
+    pub fn eliminate<const NG: usize>(
+        &mut self,
         stage: &Stage<T, NX, NU, NG>,
-        behind: &CostToGo<T, NX>,
-    ) -> Result<(Self, CostToGo<T, NX>), BadPivot<T>> {
-        let (a, b) = (&stage.a, &stage.b);
-        let p_a = behind.quadratic * a;
-        let p_b = behind.quadratic * b;
-        let linear_next = behind.linear + behind.quadratic * stage.c;
+        cost_to_go: &mut CostToGo<T, NX>,
+    ) -> Result<(), BadPivot<T>> {
+        let Stage { a, b, c, .. } = stage;
+        let CostToGo { quadratic, linear } = cost_to_go;
+        let p_a = product(quadratic, a);
+        let p_b = product(quadratic, b);
+        let p_next = *linear + product(quadratic, c);
 
-        let inverse_factor = inverse_cholesky(&(stage.r + b.tr_mul(&p_b)))?;
-        let normalised_gain = inverse_factor * (stage.s + b.tr_mul(&p_a));
-        let normalised_feedforward = inverse_factor * (stage.linear_u + b.tr_mul(&linear_next));
-        let gain = -inverse_factor.tr_mul(&normalised_gain);
-        let feedforward = -inverse_factor.tr_mul(&normalised_feedforward);
+        // H u = -(G x + g) is the condition for the stage's minimum. P is symmetric, so
+        // B'P = (P B)'.
+        let hessian = stage.r + transposed_product(b, &p_b);
+        let g_x = stage.s + transposed_product(&p_b, a);
+        let g = stage.linear_u + transposed_product(b, &p_next);
+        let UnitFactor { inverse, pivots } = UnitFactor::new(&hessian)?;
+        let reciprocals = pivots.map(|pivot| T::one() / pivot);
+        let l_g_x = product(&inverse, &g_x);
+        let scaled_g_x = scaled_rows(&l_g_x, &reciprocals);
+        let scaled_g = scaled_rows(&product(&inverse, &g), &reciprocals);
+        self.gain = -transposed_product(&inverse, &scaled_g_x);
+        self.feedforward = -transposed_product(&inverse, &scaled_g);
 
-        let quadratic = stage.q + a.tr_mul(&p_a) - normalised_gain.tr_mul(&normalised_gain);
-        let front = CostToGo {
-            quadratic: (quadratic + quadratic.transpose()) * convert::<f64, T>(0.5),
-            linear: stage.linear_x + a.tr_mul(&linear_next)
-                - normalised_gain.tr_mul(&normalised_feedforward),
-        };
-        let factor = Self {
-            gain,
-            feedforward,
-            inverse_factor,
-            closed_loop: a + b * gain,
-            input: b * inverse_factor.transpose(),
-            drift: stage.c + b * feedforward,
-        };
-        Ok((factor, front))
+        // A'P(A + BK) + Q + S'K, and the same for the linear part.
+        *quadratic = symmetric(
+            &(stage.q + transposed_product(a, &p_a) - transposed_product(&l_g_x, &scaled_g_x)),
+        );
+        *linear =
+            stage.linear_x + transposed_product(a, &p_next) - transposed_product(&l_g_x, &scaled_g);
+
+        self.inverse_factor = scaled_rows(&inverse, &reciprocals.map(|d| d.sqrt()));
+        self.closed_loop = a + product(b, &self.gain);
+        self.input = product(b, &self.inverse_factor.transpose());
+        self.drift = c + product(b, &self.feedforward);
+        Ok(())
     }
 
     /// The input at the state `x` with the normalised deviation `v`.
+    #[inline(always)]
     pub fn policy(&self, x: &SVector<T, NX>, v: &SVector<T, NU>) -> SVector<T, NU> {
-        self.gain * x + self.feedforward + self.inverse_factor.tr_mul(v)
+        let mut u = self.feedforward;
+        add_product(&mut u, &self.gain, x);
+        u += transposed_product(&self.inverse_factor, v);
+        u
     }
 
     /// The next state under the policy.
+    #[inline(always)]
     pub fn next(&self, x: &SVector<T, NX>, v: &SVector<T, NU>) -> SVector<T, NX> {
-        self.closed_loop * x + self.input * v + self.drift
+        let mut next = self.drift;
+        add_product(&mut next, &self.input, v);
+        add_product(&mut next, &self.closed_loop, x);
+        next
     }
 }
 
-/// L^-1 for the symmetric matrix `m` = L L' (its lower triangle is read).
-fn inverse_cholesky<T: Scalar, const K: usize>(
-    m: &SMatrix<T, K, K>,
-) -> Result<SMatrix<T, K, K>, BadPivot<T>> {
-    let mut l = *m;
-    let mut inverse = SMatrix::<T, K, K>::zeros();
-    for j in 0..K {
-        let mut pivot = l[(j, j)];
-        for k in 0..j {
-            pivot -= l[(j, k)] * l[(j, k)];
-        }
-        if !(pivot > T::zero() && pivot.is_finite()) {
-            return Err(BadPivot(pivot));
-        }
-        let reciprocal = T::one() / pivot.sqrt();
-        l[(j, j)] = pivot * reciprocal;
-        inverse[(j, j)] = reciprocal;
-        for i in j + 1..K {
-            let mut entry = l[(i, j)];
+#[inline(always)]
+/// The mean of `m` and its transpose: rounding would make the cost-to-go drift apart.
+fn symmetric<T: Scalar, const K: usize>(m: &SMatrix<T, K, K>) -> SMatrix<T, K, K> {
+    (m + m.transpose()) * convert::<f64, T>(0.5)
+}
+
+#[inline(always)]
+/// diag(`factors`) `m`
+fn scaled_rows<T: Scalar, const R: usize, const C: usize>(
+    m: &SMatrix<T, R, C>,
+    factors: &SVector<T, R>,
+) -> SMatrix<T, R, C> {
+    SMatrix::from_fn(|i, j| m[(i, j)] * factors[i])
+}
+
+/// L^-1 and D of the factorisation L D L' with unit lower triangular L.
+struct UnitFactor<T, const K: usize> {
+    inverse: SMatrix<T, K, K>,
+    pivots: SVector<T, K>,
+}
+
+impl<T: Scalar, const K: usize> UnitFactor<T, K> {
+    #[inline(always)]
+    /// Factorises the symmetric matrix `m`; its lower triangle is read.
+    fn new(m: &SMatrix<T, K, K>) -> Result<Self, BadPivot<T>> {
+        let mut l = *m;
+        let mut pivots = SVector::<T, K>::zeros();
+        for j in 0..K {
+            let mut pivot = l[(j, j)];
             for k in 0..j {
-                entry -= l[(i, k)] * l[(j, k)];
+                pivot -= l[(j, k)] * l[(j, k)] * pivots[k];
             }
-            l[(i, j)] = entry * reciprocal;
-        }
-    }
-    for j in 0..K {
-        for i in j + 1..K {
-            let mut entry = T::zero();
-            for k in j..i {
-                entry -= l[(i, k)] * inverse[(k, j)];
+            if !(pivot > T::zero() && pivot.is_finite()) {
+                return Err(BadPivot(pivot));
             }
-            inverse[(i, j)] = entry * inverse[(i, i)];
+            pivots[j] = pivot;
+            for i in j + 1..K {
+                let mut entry = l[(i, j)];
+                for k in 0..j {
+                    entry -= l[(i, k)] * l[(j, k)] * pivots[k];
+                }
+                l[(i, j)] = entry / pivot;
+            }
         }
+        let mut inverse = SMatrix::<T, K, K>::identity();
+        for j in 0..K {
+            for i in j + 1..K {
+                let mut entry = T::zero();
+                for k in j..i {
+                    entry -= l[(i, k)] * inverse[(k, j)];
+                }
+                inverse[(i, j)] = entry;
+            }
+        }
+        Ok(Self { inverse, pivots })
     }
-    Ok(inverse)
 }

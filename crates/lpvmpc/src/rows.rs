@@ -5,7 +5,7 @@ use crate::model::Scalar;
 use crate::ocp::{Bounds, Ocp, Penalty, Softness};
 use crate::riccati::StageFactor;
 use crate::solution::{ActiveRow, BoundId, Part, Quantity, Side};
-use crate::working_set::Row;
+use crate::working_set::{Row, Terms};
 use nalgebra::{SVector, convert};
 
 /// A trajectory of the problem: x_1.. and u_0..
@@ -48,6 +48,9 @@ fn violated_sides<T: Scalar, const K: usize>(
     quantity: fn(usize) -> Quantity,
     visit: &mut impl FnMut(Candidate<T>),
 ) {
+    if bounds.hold_at(value) {
+        return;
+    }
     let sides = bounds.lower.iter().zip(bounds.upper.iter());
     for (index, ((v, soft), (lower, upper))) in value.iter().zip(soft.iter()).zip(sides).enumerate()
     {
@@ -175,7 +178,6 @@ pub(crate) fn slack<
     trajectory: &Trajectory<'_, T, NX, NU, N>,
     bound: &BoundId,
 ) -> T {
-    let n = ocp.length();
     let x = match bound.stage.checked_sub(1) {
         Some(before) => trajectory.x.get(before).unwrap_or(&ocp.x0),
         None => &ocp.x0,
@@ -183,39 +185,61 @@ pub(crate) fn slack<
     let u = trajectory.u.get(bound.stage);
     let (normal_x, normal_u) = normal(ocp, bound);
     let value = normal_x.dot(x) + u.map_or(T::zero(), |u| normal_u.dot(u));
-    let stage = if bound.stage < n {
-        ocp.stages.get(bound.stage)
-    } else {
-        None
-    };
-    let (lower, upper) = match (bound.quantity, stage) {
-        (Quantity::State(j), Some(stage)) => limits(&stage.x, j),
-        (Quantity::State(j), None) => limits(&ocp.terminal.x, j),
-        (Quantity::Input(j), Some(stage)) => limits(&stage.u, j),
-        (Quantity::Row(j), Some(stage)) => limits(&stage.rows, j),
-        (Quantity::Row(j), None) => limits(&ocp.terminal.rows, j),
-        (Quantity::Input(_), None) => (value, value),
-    };
-    match (bound.side, bound.quantity) {
-        (Side::Lower, _) => value - lower,
-        (Side::Upper, _) => upper - value,
-        (Side::Equality, Quantity::State(j)) => {
-            let target = ocp.terminal.equality.as_ref();
-            value
-                - target
-                    .and_then(|target| target.get(j))
-                    .copied()
-                    .unwrap_or(value)
-        }
-        (Side::Equality, _) => T::zero(),
+    let (lower, upper) = limits(ocp, bound);
+    match bound.side {
+        Side::Lower | Side::Equality => value - lower,
+        Side::Upper => upper - value,
     }
 }
 
-fn limits<T: Scalar, const K: usize>(bounds: &Bounds<T, K>, j: usize) -> (T, T) {
-    match (bounds.lower.get(j), bounds.upper.get(j)) {
-        (Some(lower), Some(upper)) => (*lower, *upper),
-        _ => (T::zero(), T::zero()),
+/// The size against which a violation of `bound` is measured.
+pub(crate) fn size<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    bound: &BoundId,
+) -> T {
+    let (lower, upper) = limits(ocp, bound);
+    size_of_bound(lower, upper)
+}
+
+/// Lower and upper limit of the bounded quantity, both the target for an equality.
+fn limits<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    bound: &BoundId,
+) -> (T, T) {
+    if let (Side::Equality, Quantity::State(j), Some(target)) =
+        (bound.side, bound.quantity, &ocp.terminal.equality)
+    {
+        return component(target, target, j);
     }
+    let end = &ocp.terminal;
+    let stage = ocp
+        .stages
+        .get(bound.stage)
+        .filter(|_| bound.stage < ocp.length());
+    match (bound.quantity, stage) {
+        (Quantity::State(j), Some(stage)) => component(&stage.x.lower, &stage.x.upper, j),
+        (Quantity::State(j), None) => component(&end.x.lower, &end.x.upper, j),
+        (Quantity::Input(j), Some(stage)) => component(&stage.u.lower, &stage.u.upper, j),
+        (Quantity::Row(j), Some(stage)) => component(&stage.rows.lower, &stage.rows.upper, j),
+        (Quantity::Row(j), None) => component(&end.rows.lower, &end.rows.upper, j),
+        (Quantity::Input(_), None) => unlimited(),
+    }
+}
+
+fn component<T: Scalar, const K: usize>(
+    lower: &SVector<T, K>,
+    upper: &SVector<T, K>,
+    j: usize,
+) -> (T, T) {
+    match (lower.get(j), upper.get(j)) {
+        (Some(lower), Some(upper)) => (*lower, *upper),
+        _ => unlimited(),
+    }
+}
+
+fn unlimited<T: Scalar>() -> (T, T) {
+    let infinity: T = convert(f64::INFINITY);
+    (-infinity, infinity)
 }
 
 /// Writes the row of `bound` to `row`: one backward pass through the closed loop.
@@ -254,19 +278,71 @@ pub(crate) fn form_row<
         costate = factor.closed_loop.tr_mul(&costate);
     }
     let infinity: T = convert(f64::INFINITY);
-    (row.cap, row.compliance) = match (part, soft) {
+    let (cap, compliance) = match (part, soft) {
         (Part::Linear, Some(penalty)) => (penalty.linear, T::zero()),
         (Part::Quadratic, Some(penalty)) => (infinity, T::one() / penalty.quadratic),
         _ => (infinity, T::zero()),
     };
-    row.equality = bound.side == Side::Equality;
-    row.mirrored = false;
-    row.active = ActiveRow {
-        bound,
-        part,
-        multiplier: T::zero(),
-        exceeded: false,
+    row.terms = Terms {
+        cap,
+        compliance,
+        equality: bound.side == Side::Equality,
+        active: ActiveRow {
+            bound,
+            part,
+            ..ActiveRow::empty()
+        },
+        ..Terms::empty()
     };
+}
+
+/// The gradient that the rows `active` at `stage` add to the state and the input.
+pub(crate) fn gradient<
+    T: Scalar,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const NG: usize,
+>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    active: impl Iterator<Item = ActiveRow<T>>,
+    stage: usize,
+) -> (SVector<T, NX>, SVector<T, NU>) {
+    let mut gradient = (SVector::zeros(), SVector::zeros());
+    for row in active.filter(|row| row.bound.stage == stage) {
+        let (normal_x, normal_u) = normal(ocp, &row.bound);
+        let factor = match row.bound.side {
+            Side::Upper => row.multiplier,
+            Side::Lower | Side::Equality => -row.multiplier,
+        };
+        gradient.0 += normal_x * factor;
+        gradient.1 += normal_u * factor;
+    }
+    gradient
+}
+
+/// v -= sum of multiplier * alpha over the rows `active`, in one backward pass.
+pub(crate) fn subtract<
+    T: Scalar,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const NG: usize,
+    Active: Iterator<Item = ActiveRow<T>>,
+>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    factors: &[StageFactor<T, NX, NU>; N],
+    active: impl Fn() -> Active,
+    v: &mut [SVector<T, NU>; N],
+) {
+    let n = ocp.length();
+    let (mut costate, _) = gradient(ocp, active(), n);
+    let stages = factors.iter().zip(v.iter_mut()).enumerate().take(n);
+    for (i, (factor, v)) in stages.rev() {
+        let (rows_x, rows_u) = gradient(ocp, active(), i);
+        *v += factor.input.tr_mul(&costate) + factor.inverse_factor * rows_u;
+        costate = factor.closed_loop.tr_mul(&costate) + factor.gain.tr_mul(&rows_u) + rows_x;
+    }
 }
 
 /// The price of exceeding `bound`, if it is soft.

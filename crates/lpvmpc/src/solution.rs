@@ -131,6 +131,18 @@ impl<T: Scalar, const M: usize> ActiveSet<T, M> {
         self.len = 0;
     }
 
+    /// Keeps the rows that are `wanted`.
+    pub(crate) fn retain(&mut self, wanted: impl Fn(&ActiveRow<T>) -> bool) {
+        let mut kept = 0;
+        for place in 0..self.len {
+            if wanted(&self.rows[place]) {
+                self.rows[kept] = self.rows[place];
+                kept += 1;
+            }
+        }
+        self.len = kept;
+    }
+
     /// Adds a row; `false` if the set is full.
     pub(crate) fn push(&mut self, row: ActiveRow<T>) -> bool {
         match self.rows.get_mut(self.len) {

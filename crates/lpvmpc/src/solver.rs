@@ -103,15 +103,17 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         }
         self.warm_start(ocp, settings, solution)?;
 
-        let mut polished = false;
         loop {
-            match self.dual.most_violated(ocp, &trajectory(solution)) {
+            let trajectory = trajectory(solution);
+            match self.dual.most_violated(ocp, &trajectory) {
                 Some(violated) => self.dual.satisfy(ocp, &self.factors, &violated)?,
-                None if polished || !self.dual.polish(ocp, &trajectory(solution)) => break,
-                None => polished = true,
+                None if self.dual.refine(ocp, &self.factors, &trajectory)? => {}
+                None => break,
             }
             self.roll_out(ocp, solution)?;
         }
+        // What the tolerance or rounding lets through is no input for an actuator.
+        clip_inputs(ocp, solution);
         solution.cost = cost(ocp, solution);
         if !solution.cost.is_finite() {
             return Err(Status::NotFinite);
@@ -124,19 +126,15 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
 
     /// Backward: the factor of every stage.
     fn factorize<const NG: usize>(&mut self, ocp: &Ocp<T, NX, NU, N, NG>) -> Result<(), Status<T>> {
-        let mut behind = CostToGo {
+        let mut cost_to_go = CostToGo {
             quadratic: ocp.terminal.p,
             linear: ocp.terminal.linear_x,
         };
         let stages = ocp.stages.iter().zip(self.factors.iter_mut());
         for (stage, (data, factor)) in stages.enumerate().take(ocp.length()).rev() {
-            let (new, front) =
-                StageFactor::new(data, &behind).map_err(|bad| Status::NumericalFailure {
-                    stage,
-                    pivot: bad.0,
-                })?;
-            *factor = new;
-            behind = front;
+            factor
+                .eliminate(data, &mut cost_to_go)
+                .map_err(|bad| failed_pivot(stage, bad.0))?;
         }
         Ok(())
     }
@@ -183,7 +181,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         if needed {
             let trajectory = trajectory(solution);
             self.dual
-                .warm_start(ocp, &self.factors, &trajectory, &solution.active, shift);
+                .warm_start(ocp, &self.factors, &trajectory, &solution.active, shift)?;
             self.roll_out(ocp, solution)?;
         }
         Ok(())
@@ -226,6 +224,14 @@ fn is_finite<T: Scalar, const K: usize>(v: &SVector<T, K>) -> bool {
     v.iter().all(|entry| entry.is_finite())
 }
 
+fn failed_pivot<T: Scalar>(stage: usize, pivot: T) -> Status<T> {
+    if pivot.is_finite() {
+        Status::NumericalFailure { stage, pivot }
+    } else {
+        Status::NotFinite
+    }
+}
+
 /// After a failure: the last inputs moved into their bounds, and the states they lead to.
 fn fall_back<
     T: Scalar,
@@ -238,15 +244,37 @@ fn fall_back<
     ocp: &Ocp<T, NX, NU, N, NG>,
     solution: &mut Solution<T, NX, NU, N, M>,
 ) {
+    clip_inputs(ocp, solution);
     let mut x = ocp.x0;
-    let places = solution.u.iter_mut().zip(solution.x.iter_mut());
+    let places = solution.u.iter().zip(solution.x.iter_mut());
     for (stage, (u, x_next)) in ocp.stages.iter().zip(places).take(ocp.length()) {
-        *u = stage.u.project(u);
-        x = stage.a * x + stage.b * *u + stage.c;
+        x = stage.a * x + stage.b * u + stage.c;
         *x_next = x;
     }
     solution.active.clear();
     solution.cost = cost(ocp, solution);
+}
+
+/// Moves the inputs into their bounds.
+fn clip_inputs<
+    T: Scalar,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const M: usize,
+    const NG: usize,
+>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    solution: &mut Solution<T, NX, NU, N, M>,
+) {
+    for (stage, u) in ocp
+        .stages
+        .iter()
+        .zip(solution.u.iter_mut())
+        .take(ocp.length())
+    {
+        *u = stage.u.project(u);
+    }
 }
 
 /// The problem's cost at the solution's inputs and states (with the factor 1/2 of [`Ocp`]'s

@@ -1,11 +1,12 @@
-//! The rows that hold with equality, and the Cholesky factor of their Gram matrix.
+//! The rows that hold with equality, and an orthogonal factorisation of them.
 //!
 //! In the normalised deviations v the problem reads: minimise |v|^2 / 2 subject to
 //! alpha_j'v >= beta_j. Over a working set W the multipliers solve G lambda = beta with
-//! G = W W' + D, where D holds the compliance 1/quadratic of rows with a quadratic price. The
-//! factor L L' = G is grown and shrunk by one row at a time. It is used semi-normally
-//! (Bjorck, Numerical Methods for Least Squares Problems, ch. 6.6): where cancellation is
-//! strong, a correction step restores the accuracy of an orthogonal factorisation.
+//! G = W W' + D, where D holds the compliance 1/quadratic of rows with a quadratic price (the
+//! excess of such a row is one more deviation, of its own). The factorisation is
+//! [W sqrt(D)] = L [Q E] with orthonormal rows [Q E] and lower triangular L, so G = L L'. It
+//! grows by orthogonalising the new row twice, which is enough (Daniel, Gragg, Kaufman and
+//! Stewart 1976), and shrinks by rotations. E is never needed: it is L^-1 sqrt(D).
 
 use crate::model::Scalar;
 use crate::solution::ActiveRow;
@@ -18,6 +19,13 @@ pub(crate) struct Row<T, const NU: usize, const N: usize> {
     pub alpha: [SVector<T, NU>; N],
     /// Stages that the row depends on.
     pub support: usize,
+    /// What else is known of it.
+    pub terms: Terms<T>,
+}
+
+/// What is known of a row besides its normal.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Terms<T> {
     /// 1 / quadratic price for an elastic row, else 0.
     pub compliance: T,
     /// Largest multiplier: the linear price, or infinity.
@@ -27,8 +35,36 @@ pub(crate) struct Row<T, const NU: usize, const N: usize> {
     /// The row is the mirror image of an exceeded soft bound that is being taken back: its
     /// multiplier counts down from the cap.
     pub mirrored: bool,
+    /// Length of alpha, with the elastic part; set when the row joins the working set.
+    pub size: T,
     /// Which bound it is, and its multiplier in the row's own direction.
     pub active: ActiveRow<T>,
+}
+
+impl<T: Scalar> Terms<T> {
+    pub fn empty() -> Self {
+        Self {
+            compliance: T::zero(),
+            cap: T::zero(),
+            equality: false,
+            mirrored: false,
+            size: T::zero(),
+            active: ActiveRow::empty(),
+        }
+    }
+
+    /// The bound with its multiplier in its own direction.
+    pub fn reported(&self) -> ActiveRow<T> {
+        let multiplier = self.active.multiplier;
+        ActiveRow {
+            multiplier: if self.mirrored {
+                self.cap - multiplier
+            } else {
+                multiplier
+            },
+            ..self.active
+        }
+    }
 }
 
 impl<T: Scalar, const NU: usize, const N: usize> Row<T, NU, N> {
@@ -36,28 +72,13 @@ impl<T: Scalar, const NU: usize, const N: usize> Row<T, NU, N> {
         Self {
             alpha: [SVector::zeros(); N],
             support: 0,
-            compliance: T::zero(),
-            cap: T::zero(),
-            equality: false,
-            mirrored: false,
-            active: ActiveRow::empty(),
+            terms: Terms::empty(),
         }
     }
 
     /// alpha'v: the change of the slack that the deviations `v` make.
     pub fn dot(&self, v: &[SVector<T, NU>; N]) -> T {
-        self.alpha
-            .iter()
-            .zip(v.iter())
-            .take(self.support)
-            .fold(T::zero(), |sum, (a, b)| sum + a.dot(b))
-    }
-
-    /// v += factor * alpha
-    pub fn add_to(&self, v: &mut [SVector<T, NU>; N], factor: T) {
-        for (v, a) in v.iter_mut().zip(self.alpha.iter()).take(self.support) {
-            *v += a * factor;
-        }
+        dot(&self.alpha, v, self.support)
     }
 }
 
@@ -66,197 +87,279 @@ impl<T: Scalar, const NU: usize, const N: usize> Row<T, NU, N> {
 pub(crate) struct Direction<T, const NU: usize, const N: usize, const M: usize> {
     /// Change of v: the part of alpha that the working set does not span.
     pub primal: [SVector<T, NU>; N],
+    /// The part that it spans, in terms of the orthonormal rows.
+    coefficients: [T; M],
     /// Change of the working set's multipliers, with the opposite sign.
     pub dual: [T; M],
     /// Change of the candidate's slack, >= 0; 0 when the row depends on the working set.
     pub slope: T,
+    /// Length of `primal` that rounding alone can make: a row that is closer to the span of the
+    /// working set depends on it, up to a small relative change of the rows.
+    pub noise: T,
+    /// Length of alpha, with the elastic part.
+    size: T,
+    /// Stages that `primal` depends on.
+    support: usize,
 }
 
 impl<T: Scalar, const NU: usize, const N: usize, const M: usize> Direction<T, NU, N, M> {
     pub fn zeros() -> Self {
         Self {
             primal: [SVector::zeros(); N],
+            coefficients: [T::zero(); M],
             dual: [T::zero(); M],
             slope: T::zero(),
+            noise: T::zero(),
+            size: T::zero(),
+            support: 0,
         }
     }
 }
 
-/// Rows that hold with equality, with the factor of their Gram matrix.
+/// Rows that hold with equality, with their factorisation.
 #[derive(Clone, Debug)]
 pub(crate) struct WorkingSet<T, const NU: usize, const N: usize, const M: usize> {
-    rows: [Row<T, NU, N>; M],
+    rows: [Terms<T>; M],
+    /// L
     factor: [[T; M]; M],
+    /// Q
+    basis: [[SVector<T, NU>; N]; M],
+    /// Stages that any row depends on.
+    support: usize,
     len: usize,
 }
 
 impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, NU, N, M> {
     pub fn new() -> Self {
         Self {
-            rows: [Row::empty(); M],
+            rows: [Terms::empty(); M],
             factor: [[T::zero(); M]; M],
+            basis: [[SVector::zeros(); N]; M],
+            support: 0,
             len: 0,
         }
     }
 
     pub fn clear(&mut self) {
         self.len = 0;
-    }
-
-    pub fn len(&self) -> usize {
-        self.len
+        self.support = 0;
     }
 
     pub fn is_full(&self) -> bool {
         self.len >= M
     }
 
-    pub fn rows(&self) -> &[Row<T, NU, N>] {
+    pub fn rows(&self) -> &[Terms<T>] {
         self.rows.get(..self.len).unwrap_or(&[])
     }
 
-    pub fn rows_mut(&mut self) -> &mut [Row<T, NU, N>] {
+    pub fn rows_mut(&mut self) -> &mut [Terms<T>] {
         self.rows.get_mut(..self.len).unwrap_or(&mut [])
+    }
+
+    fn basis(&self) -> &[[SVector<T, NU>; N]] {
+        self.basis.get(..self.len).unwrap_or(&[])
     }
 
     /// The answer of the minimiser over the working set to the candidate `row`.
     pub fn direction(&self, row: &Row<T, NU, N>, direction: &mut Direction<T, NU, N, M>) {
-        let Direction {
-            primal,
-            dual,
-            slope,
-        } = direction;
-        *primal = row.alpha;
-        let size = row.dot(&row.alpha);
-        for (d, other) in dual.iter_mut().zip(self.rows()) {
-            *d = other.dot(&row.alpha);
+        direction.support = self.support.max(row.support);
+        direction.primal = row.alpha;
+        direction.coefficients = [T::zero(); M];
+        direction.dual = [T::zero(); M];
+        let compliance = row.terms.compliance;
+        let square = row.dot(&row.alpha) + compliance;
+        direction.size = square.sqrt();
+        direction.slope = square;
+        if self.len > 0 {
+            self.orthogonalize(compliance, direction);
+            let cancelled: T = convert(0.1);
+            if direction.slope < cancelled * square {
+                self.orthogonalize(compliance, direction);
+            }
         }
-        self.solve_gram(dual);
-        for (d, other) in dual.iter().zip(self.rows()) {
-            other.add_to(primal, -*d);
+        direction.noise = self.noise(direction);
+        let rounding = direction.noise * direction.noise;
+        if direction.slope <= rounding && rounding.is_finite() {
+            direction.slope = compliance;
         }
-        let cancelled: T = convert(0.1);
-        if self.len > 0 && square(primal) < cancelled * size {
-            self.correct(primal, dual);
-        }
-        let mut rest = square(primal);
-        for (d, other) in dual.iter().zip(self.rows()) {
-            rest += other.compliance * *d * *d;
-        }
-        // Beyond this angle to the span of the working set, rounding decides: take the row
-        // as dependent.
-        let dependent = T::default_epsilon() * convert(4.0) * size;
-        let rigid = if rest > dependent { rest } else { T::zero() };
-        *slope = rigid + row.compliance;
     }
 
-    /// One step of iterative refinement on G dual = W alpha, in terms of the residual vector.
-    fn correct(&self, primal: &mut [SVector<T, NU>; N], dual: &mut [T; M]) {
-        let mut correction = [T::zero(); M];
-        for ((c, d), other) in correction.iter_mut().zip(dual.iter()).zip(self.rows()) {
-            *c = other.dot(primal) - other.compliance * *d;
+    /// Removes from `direction.primal` what the orthonormal rows span of it.
+    fn orthogonalize(&self, compliance: T, direction: &mut Direction<T, NU, N, M>) {
+        let support = direction.support;
+        let Direction {
+            primal,
+            coefficients,
+            dual,
+            ..
+        } = direction;
+        let mut spanned = [T::zero(); M];
+        for ((s, d), row) in spanned.iter_mut().zip(dual.iter()).zip(self.rows()) {
+            *s = -row.compliance * *d;
         }
-        self.solve_gram(&mut correction);
-        for ((c, d), other) in correction.iter().zip(dual.iter_mut()).zip(self.rows()) {
-            *d += *c;
-            other.add_to(primal, -*c);
+        self.solve_lower(&mut spanned);
+        self.project(primal, &mut spanned);
+        for ((s, q), c) in spanned
+            .iter()
+            .zip(self.basis())
+            .zip(coefficients.iter_mut())
+        {
+            add(primal, q, -*s, support);
+            *c += *s;
         }
+        *dual = *coefficients;
+        self.solve_upper(dual);
+        direction.slope = dot(primal, primal, support) + compliance;
+        for (d, row) in dual.iter().zip(self.rows()) {
+            direction.slope += row.compliance * *d * *d;
+        }
+    }
+
+    fn noise(&self, direction: &Direction<T, NU, N, M>) -> T {
+        let rows = self.rows().iter().zip(direction.dual.iter());
+        let terms = rows.fold(direction.size, |sum, (row, d)| sum + d.abs() * row.size);
+        T::default_epsilon() * convert((16 * NU * direction.support) as f64) * terms
     }
 
     /// Adds `row`, whose `direction` is current. The set must not be full.
     pub fn append(&mut self, row: &Row<T, NU, N>, direction: &Direction<T, NU, N, M>) {
         let m = self.len;
-        // The new row of L is L^-1 W alpha = L' dual.
-        let mut entries = [T::zero(); M];
-        for (j, entry) in entries.iter_mut().enumerate().take(m) {
-            *entry = self
-                .factor
-                .iter()
-                .zip(direction.dual.iter())
-                .take(m)
-                .skip(j)
-                .fold(T::zero(), |sum, (l, d)| {
-                    sum + l.get(j).copied().unwrap_or(T::zero()) * *d
-                });
-        }
-        if let Some(place) = entries.get_mut(m) {
-            *place = direction.slope.sqrt();
-        }
-        if let (Some(l), Some(place)) = (self.factor.get_mut(m), self.rows.get_mut(m)) {
-            *l = entries;
-            *place = *row;
+        let length = direction.slope.sqrt();
+        let places = (
+            self.rows.get_mut(m),
+            self.factor.get_mut(m),
+            self.basis.get_mut(m),
+        );
+        if let (Some(terms), Some(l), Some(q)) = places {
+            *terms = Terms {
+                size: direction.size,
+                ..row.terms
+            };
+            *l = direction.coefficients;
+            if let Some(diagonal) = l.get_mut(m) {
+                *diagonal = length;
+            }
+            for (q, primal) in q.iter_mut().zip(direction.primal.iter()) {
+                *q = primal / length;
+            }
+            self.support = direction.support;
             self.len = m + 1;
         }
     }
 
     /// Removes the row at `position`.
-    pub fn remove(&mut self, position: usize) -> Row<T, NU, N> {
+    pub fn remove(&mut self, position: usize) -> Terms<T> {
         let Some(removed) = self.rows().get(position).copied() else {
-            return Row::empty();
+            return Terms::empty();
         };
-        let m = self.len;
-        for j in position + 1..m {
-            if let Some((before, from)) = pair_mut(&mut self.rows, j) {
-                *before = *from;
-            }
-            if let Some((before, from)) = pair_mut(&mut self.factor, j) {
-                *before = *from;
-            }
-        }
-        self.len = m - 1;
-        // Row k now reaches one column too far: rotate columns k and k + 1.
+        close_gap(&mut self.rows, position, self.len);
+        close_gap(&mut self.factor, position, self.len);
+        self.len -= 1;
+        // Row k of L now reaches one column too far.
         for k in position..self.len {
-            let (a, b) = self.entries(k, k);
-            let length = a.hypot(b);
-            if length == T::zero() {
-                continue;
-            }
-            let (c, s) = (a / length, b / length);
-            for row in self.factor.iter_mut().take(self.len).skip(k) {
-                if let Some([left, right]) = row.get_mut(k..k + 2) {
-                    (*left, *right) = (c * *left + s * *right, c * *right - s * *left);
-                }
-            }
+            self.rotate(k);
         }
         removed
     }
 
-    fn entries(&self, row: usize, column: usize) -> (T, T) {
-        match self.factor.get(row).and_then(|l| l.get(column..column + 2)) {
-            Some([a, b]) => (*a, *b),
-            _ => (T::one(), T::zero()),
+    /// Rotates columns `k` and `k` + 1 of L, and the same rows of Q, to clear entry (k, k + 1).
+    fn rotate(&mut self, k: usize) {
+        let diagonal = self.factor.get(k).and_then(|row| row.get(k..k + 2));
+        let Some([a, b]) = diagonal else {
+            return;
+        };
+        let length = a.hypot(*b);
+        if length == T::zero() {
+            return;
+        }
+        let (c, s) = (*a / length, *b / length);
+        for row in self.factor.iter_mut().take(self.len).skip(k) {
+            if let Some([left, right]) = row.get_mut(k..k + 2) {
+                (*left, *right) = (c * *left + s * *right, c * *right - s * *left);
+            }
+        }
+        if let Some([left, right]) = self.basis.get_mut(k..k + 2) {
+            for (left, right) in left.iter_mut().zip(right.iter_mut()).take(self.support) {
+                (*left, *right) = (*left * c + *right * s, *right * c - *left * s);
+            }
         }
     }
 
-    /// G^-1 in place on the first `len` entries.
-    pub fn solve_gram(&self, rhs: &mut [T; M]) {
-        for i in 0..self.len.min(M) {
-            let l = &self.factor[i];
-            let mut entry = rhs[i];
-            for k in 0..i {
-                entry -= l[k] * rhs[k];
-            }
-            rhs[i] = entry / l[i];
+    /// The shortest change of v that changes the working rows' slacks, elastic parts included,
+    /// by L `step`: v and the multipliers move by it.
+    pub fn shift(&mut self, step: &[T; M], v: &mut [SVector<T, NU>; N]) {
+        for (s, q) in step.iter().zip(self.basis()) {
+            add(v, q, *s, self.support);
         }
-        for i in (0..self.len.min(M)).rev() {
-            let entry = rhs[i] / self.factor[i][i];
-            rhs[i] = entry;
-            for k in 0..i {
-                rhs[k] -= self.factor[i][k] * entry;
+        let mut change = *step;
+        self.solve_upper(&mut change);
+        for (row, change) in self.rows_mut().iter_mut().zip(change.iter()) {
+            row.active.multiplier += *change;
+        }
+    }
+
+    /// step += Q `v`
+    pub fn project(&self, v: &[SVector<T, NU>; N], step: &mut [T; M]) {
+        for (s, q) in step.iter_mut().zip(self.basis()) {
+            *s += dot(q, v, self.support);
+        }
+    }
+
+    /// L^-1 in place on the first `len` entries.
+    pub fn solve_lower(&self, rhs: &mut [T; M]) {
+        for (i, l) in self.factor.iter().enumerate().take(self.len) {
+            if let (Some((before, [entry, ..])), Some(pivot)) =
+                (rhs.split_at_mut_checked(i), l.get(i))
+            {
+                let known = l.iter().zip(before.iter());
+                *entry = known.fold(*entry, |rest, (l, x)| rest - *l * *x) / *pivot;
+            }
+        }
+    }
+
+    /// L'^-1 in place on the first `len` entries.
+    pub fn solve_upper(&self, rhs: &mut [T; M]) {
+        for (i, l) in self.factor.iter().enumerate().take(self.len).rev() {
+            if let (Some((before, [entry, ..])), Some(pivot)) =
+                (rhs.split_at_mut_checked(i), l.get(i))
+            {
+                *entry /= *pivot;
+                for (x, l) in before.iter_mut().zip(l) {
+                    *x -= *l * *entry;
+                }
             }
         }
     }
 }
 
-/// |v|^2
-fn square<T: Scalar, const NU: usize, const N: usize>(v: &[SVector<T, NU>; N]) -> T {
-    v.iter().fold(T::zero(), |sum, v| sum + v.norm_squared())
+/// Moves the entries behind `position`, up to `len`, one place forward.
+fn close_gap<V>(entries: &mut [V], position: usize, len: usize) {
+    if let Some(tail) = entries.get_mut(position..len) {
+        for j in 1..tail.len() {
+            tail.swap(j - 1, j);
+        }
+    }
 }
 
-/// Places `j - 1` and `j`.
-fn pair_mut<V>(array: &mut [V], j: usize) -> Option<(&mut V, &mut V)> {
-    match array.get_mut(j.wrapping_sub(1)..=j) {
-        Some([before, from]) => Some((before, from)),
-        _ => None,
+/// a'b over the first `support` stages.
+fn dot<T: Scalar, const NU: usize, const N: usize>(
+    a: &[SVector<T, NU>; N],
+    b: &[SVector<T, NU>; N],
+    support: usize,
+) -> T {
+    let stages = a.iter().zip(b.iter()).take(support);
+    stages.fold(T::zero(), |sum, (a, b)| sum + a.dot(b))
+}
+
+/// v += factor * a over the first `support` stages.
+fn add<T: Scalar, const NU: usize, const N: usize>(
+    v: &mut [SVector<T, NU>; N],
+    a: &[SVector<T, NU>; N],
+    factor: T,
+    support: usize,
+) {
+    for (v, a) in v.iter_mut().zip(a.iter()).take(support) {
+        *v += a * factor;
     }
 }

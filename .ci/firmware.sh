@@ -1,0 +1,34 @@
+#!/usr/bin/env bash
+# Builds the firmware, runs it on two emulated boards (Cortex-M4F and M7), compares its torques
+# with the same controllers in f64 on this machine, and its cost with firmware/limits.toml.
+# Instructions, not cycles: the emulator has no pipeline and no flash wait states.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+target=thumbv7em-none-eabihf
+export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}
+images=$CARGO_TARGET_DIR/cross/$target/release
+cross=$PWD/.ci/cross-cargo.sh
+
+(
+    cd firmware
+    cargo fmt --check -p firmware -p no-panic
+    CARGO_TARGET_DIR=$CARGO_TARGET_DIR/cross "$cross" "$target" build --locked --release \
+        -p firmware --bins --examples
+)
+cargo build --locked --release -p ballbot-scenario --example firmware_check
+
+# Flash: code, constants and initial data. The host's `size` counts sections by their flags,
+# whatever the processor.
+flash=$(size --format=berkeley "$images/examples/timer" | awk 'NR == 2 { print $1 + $2 }')
+compiler=$("$cross" "$target" --version)
+output=$(mktemp)
+trap 'rm -f "$output"' EXIT
+for board in mps2-an386 mps2-an500; do
+    printf '\n%s\n' "$board"
+    if ! BOARD=$board firmware/run-qemu.sh "$images/measure" >"$output"; then
+        tail -3 "$output"
+        exit 1
+    fi
+    "$CARGO_TARGET_DIR/release/examples/firmware_check" \
+        firmware/limits.toml "$compiler" "$flash" "$output"
+done

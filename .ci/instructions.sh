@@ -1,0 +1,60 @@
+#!/usr/bin/env bash
+# Counts the instructions of single controller steps on this machine (f64, release build) under
+# valgrind, and fails when a count grows by more than 5 % over .ci/instructions.txt. The counts do
+# not depend on load or clock, but on the compiler: with another one they are shown, not compared.
+# `instructions.sh --write` takes the counts as the new ones.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+file=.ci/instructions.txt
+export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}
+cargo build --locked --release -p ballbot-scenario --example count_steps
+directory=$(mktemp -d)
+trap 'rm -rf "$directory"' EXIT
+
+# The counts of all steps of a scenario, one per line. Callgrind writes a file per call of the
+# function `counted_step`. Without environment, whose size would move the stack.
+counts() {
+    rm -f "$directory"/*
+    if ! env -i PATH=/usr/bin:/bin valgrind --tool=callgrind --toggle-collect='*counted_step*' \
+        --dump-after='count_steps::counted_step' --callgrind-out-file="$directory/out" \
+        "$CARGO_TARGET_DIR/release/examples/count_steps" "$@" >"$directory/log" 2>&1; then
+        cat "$directory/log" >&2
+        exit 1
+    fi
+    cat "$directory"/out.* | sed -n 's/^totals: //p' | sort -n
+}
+
+measure() {
+    # Without active bounds all steps but the first are alike: the last one is the most.
+    counts lissajous 20 | awk 'END { print "no_active_bound", $1 }'
+    counts tight-bounds 80 | awk 'END { print "tight_bounds_worst", $1 }'
+}
+
+compiler=$(rustc --version)
+now=$(measure)
+if [[ ${1:-} == --write ]]; then
+    {
+        echo "# Instructions of one controller step (f64, one plane, horizon 20) on x86-64, checked by"
+        echo "# instructions.sh; written by instructions.sh --write with"
+        echo "# compiler: $compiler"
+        echo "$now"
+    } >"$file"
+fi
+last_compiler=$(sed -n 's/^# compiler: //p' "$file")
+if [[ $compiler != "$last_compiler" ]]; then
+    echo "instructions: NOT COMPARED: counted last time with $last_compiler, now with $compiler"
+    echo "$now"
+    exit 0
+fi
+awk '
+    /^#/ { next }
+    NR == FNR { last[$1] = $2; next }
+    !($1 in last) { print "instructions: no last count of " $1; failed = 1; next }
+    {
+        change = 100 * ($2 / last[$1] - 1)
+        printf "instructions: %-20s %8d  last time %8d  %+.1f %%\n", $1, $2, last[$1], change
+        if (change > 5) { print "instructions: FAILED, more than 5 % more"; failed = 1 }
+        if (change < -5) print "instructions: less; take it over with .ci/instructions.sh --write"
+    }
+    END { exit failed }
+' "$file" - <<<"$now"

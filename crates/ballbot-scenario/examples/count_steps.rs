@@ -1,0 +1,53 @@
+//! Steps the controller through the first samples of a scenario's first plane, for
+//! `.ci/instructions.sh` to count the instructions of each step.
+//!
+//! ```sh
+//! count_steps tight-bounds 80
+//! ```
+
+use ballbot::Ballbot;
+use ballbot_scenario::{Scenario, Surroundings};
+use lpvmpc::{Controller, Reference, Workspace};
+use nalgebra::Vector4;
+use std::hint::black_box;
+use std::{env, error::Error, path::Path, time::Duration};
+
+const N: usize = 20;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    let [name, samples] = arguments.as_slice() else {
+        return Err("usage: count_steps SCENARIO SAMPLES".into());
+    };
+    let mut prepared = Scenario::load(name)?.prepare(Path::new("."))?;
+    prepared.samples = samples.parse()?;
+    prepared.planes.truncate(1);
+    let trajectories = prepared.run(&Surroundings {
+        clock: &|| Duration::ZERO,
+        progress: &|_| (),
+    })?;
+    let mut controller = Box::new(Controller::new(prepared.ballbot, prepared.settings)?);
+    let mut workspace = Box::new(Workspace::new());
+    for (plane, trajectory) in prepared.planes.iter().zip(&trajectories) {
+        for (k, sample) in trajectory.samples.iter().enumerate() {
+            let at = |i: usize| plane.state_reference((k + i) as f64 * prepared.settings.t_s);
+            let reference = Reference {
+                stages: std::array::from_fn(at),
+                terminal: at(N),
+            };
+            counted_step(&mut controller, &sample.x, &reference, &mut workspace);
+        }
+    }
+    Ok(())
+}
+
+/// The counter finds it by its name.
+#[inline(never)]
+fn counted_step(
+    controller: &mut Controller<Ballbot<f64>, f64, 4, 1, 2, N, N>,
+    x: &Vector4<f64>,
+    reference: &Reference<f64, 4, N>,
+    workspace: &mut Workspace<f64, 4, 1, N, N>,
+) {
+    black_box(controller.step(black_box(x), reference, workspace));
+}

@@ -1,0 +1,141 @@
+//! Writes what the firmware embeds: a scenario's settings, its first samples in closed loop, and
+//! its references, rounded to `f32`, as Rust source.
+//!
+//! ```sh
+//! cargo run --release -p ballbot-scenario --example firmware_record -- lissajous 40 \
+//!     > firmware/src/recorded/lissajous.rs
+//! cargo run --release -p ballbot-scenario --example firmware_record -- tight-bounds 80 \
+//!     > firmware/src/recorded/tight_bounds.rs
+//! ```
+
+use ballbot::{Ballbot, Geometry};
+use ballbot_scenario::{Plane, Prepared, Scenario, Surroundings};
+use lpvmpc::TerminalIngredient;
+use lpvmpc_sim::Trajectory;
+use std::error::Error;
+use std::fmt::Write;
+use std::{env, path::Path, time::Duration};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    let [name, samples] = arguments.as_slice() else {
+        return Err("usage: firmware_record SCENARIO SAMPLES".into());
+    };
+    let scenario = Scenario::load(name)?;
+    let mut prepared = scenario.prepare(Path::new("."))?;
+    prepared.samples = samples.parse()?;
+    let trajectories = prepared.run(&Surroundings {
+        clock: &|| Duration::ZERO,
+        progress: &|_| (),
+    })?;
+    let mut text = format!(
+        "//! The scenario `{name}` and its first {samples} samples in closed loop.\n\
+         //! Written by `firmware_record {name} {samples}`, an example of `ballbot-scenario`.\n\n\
+         use crate::recording::{{Plane, Recording}};\n\
+         use ballbot::{{Ballbot, Geometry}};\n\n\
+         /// The recording.\n\
+         pub const RECORDING: Recording = Recording {{\n    name: {name:?},\n"
+    );
+    write_robot(&mut text, &prepared.ballbot)?;
+    let zenith_angle = scenario.parameters.zenith_angle_deg.to_radians();
+    writeln!(text, "    zenith_angle: {},", literal(zenith_angle))?;
+    write_settings(&mut text, &prepared)?;
+    writeln!(text, "    planes: &[")?;
+    for (plane, trajectory) in prepared.planes.iter().zip(&trajectories) {
+        write_plane(&mut text, &prepared, plane, trajectory)?;
+    }
+    writeln!(text, "    ],\n}};")?;
+    print!("{text}");
+    Ok(())
+}
+
+fn write_robot(text: &mut String, robot: &Ballbot<f64>) -> std::fmt::Result {
+    let Geometry {
+        centre_of_mass,
+        ball_radius,
+        wheel_radius,
+        gravity,
+    } = robot.geometry;
+    let fields = |text: &mut String, indent: &str, fields: &[(&str, f64)]| {
+        fields
+            .iter()
+            .try_for_each(|(name, value)| writeln!(text, "{indent}{name}: {},", literal(*value)))
+    };
+    writeln!(text, "    ballbot: Ballbot {{")?;
+    let b = [
+        ("b1", robot.b1),
+        ("b2", robot.b2),
+        ("b3", robot.b3),
+        ("b4", robot.b4),
+    ];
+    fields(text, "        ", &b)?;
+    writeln!(text, "        geometry: Geometry {{")?;
+    let lengths = [
+        ("centre_of_mass", centre_of_mass),
+        ("ball_radius", ball_radius),
+        ("wheel_radius", wheel_radius),
+        ("gravity", gravity),
+    ];
+    fields(text, "            ", &lengths)?;
+    writeln!(text, "        }},\n    }},")
+}
+
+fn write_settings(text: &mut String, prepared: &Prepared) -> Result<(), Box<dyn Error>> {
+    let settings = &prepared.settings;
+    let TerminalIngredient::Cost(p) = settings.terminal else {
+        return Err("the firmware takes a terminal cost, not an equality".into());
+    };
+    writeln!(text, "    t_s: {},", literal(settings.t_s))?;
+    writeln!(text, "    horizon: {},", settings.horizon)?;
+    writeln!(text, "    substeps: {},", settings.predictor.substeps)?;
+    writeln!(text, "    q: {},", list(&settings.weights.q.diagonal()))?;
+    writeln!(text, "    r: {},", literal(settings.weights.r[0]))?;
+    writeln!(text, "    p: [")?;
+    for column in p.column_iter() {
+        writeln!(text, "        {},", list(&column))?;
+    }
+    writeln!(text, "    ],")?;
+    writeln!(text, "    state_lower: {},", list(&settings.x.lower))?;
+    writeln!(text, "    state_upper: {},", list(&settings.x.upper))?;
+    let torque = [settings.u.lower[0], settings.u.upper[0]];
+    writeln!(text, "    torque: {},", list(&torque))?;
+    Ok(())
+}
+
+fn write_plane(
+    text: &mut String,
+    prepared: &Prepared,
+    plane: &Plane,
+    trajectory: &Trajectory<4, 1>,
+) -> Result<(), Box<dyn Error>> {
+    if trajectory.samples.len() < prepared.samples {
+        return Err(format!("the run ended early: {:?}", trajectory.ending).into());
+    }
+    writeln!(text, "        Plane {{\n            states: &[")?;
+    for sample in &trajectory.samples {
+        writeln!(text, "                {},", list(&sample.x))?;
+    }
+    writeln!(text, "            ],\n            phi_ref: &[")?;
+    for k in 0..prepared.samples + prepared.settings.horizon {
+        let phi_ref = plane.reference.at(k as f64 * prepared.settings.t_s);
+        writeln!(text, "                {},", literal(phi_ref))?;
+    }
+    writeln!(text, "            ],\n        }},")?;
+    Ok(())
+}
+
+fn list<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> String {
+    let literals: Vec<String> = numbers.into_iter().copied().map(literal).collect();
+    format!("[{}]", literals.join(", "))
+}
+
+fn literal(number: f64) -> String {
+    let rounded = number as f32;
+    if rounded.is_finite() {
+        format!("{rounded:?}")
+    } else if rounded > 0.0 {
+        "f32::INFINITY".to_owned()
+    } else {
+        "f32::NEG_INFINITY".to_owned()
+    }
+}

@@ -1,0 +1,193 @@
+//! Moving to the minimiser over a given working set: the warm start, and the refinement after
+//! the search.
+
+use crate::active_set::DualActiveSet;
+use crate::model::Scalar;
+use crate::ocp::Ocp;
+use crate::riccati::StageFactor;
+use crate::rows::{self, Trajectory};
+use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Status};
+use crate::working_set::Terms;
+use nalgebra::{SVector, convert};
+
+impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T, NU, N, M> {
+    /// Starts from the rows that were active before, `shift` stages earlier. Rows whose
+    /// multiplier would have the wrong sign are dropped, so this never changes the result.
+    pub fn warm_start<const NX: usize, const NG: usize>(
+        &mut self,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+        factors: &[StageFactor<T, NX, NU>; N],
+        trajectory: &Trajectory<'_, T, NX, NU, N>,
+        before: &ActiveSet<T, M>,
+        shift: usize,
+    ) -> Result<(), Status<T>> {
+        for row in before.iter() {
+            let hard = row.part == Part::Hard && row.bound.side != Side::Equality;
+            let Some(stage) = row.bound.stage.checked_sub(shift) else {
+                continue;
+            };
+            // The state at stage 0 is given, the input at the end does not exist.
+            let free = match row.bound.quantity {
+                Quantity::State(_) => stage > 0 && stage <= ocp.length(),
+                Quantity::Input(_) => stage < ocp.length(),
+                Quantity::Row(_) => stage <= ocp.length(),
+            };
+            if !hard || !free || self.working.is_full() {
+                continue;
+            }
+            let bound = BoundId { stage, ..row.bound };
+            // The bound may have gone, or become soft, since.
+            let slack = rows::slack(ocp, trajectory, &bound);
+            if !slack.is_finite() || rows::soft_price(ocp, &bound).is_some() {
+                continue;
+            }
+            rows::form_row(ocp, factors, bound, Part::Hard, None, &mut self.candidate);
+            self.working.direction(&self.candidate, &mut self.direction);
+            if self.direction.slope > self.candidate.dot(&self.candidate.alpha) * convert(1e-6) {
+                self.count_change()?;
+                self.working.append(&self.candidate, &self.direction);
+            }
+        }
+        self.settle(ocp, factors, trajectory)
+    }
+
+    /// After the last violated bound: removes what rounding has left in the optimality
+    /// conditions. Returns whether anything was moved.
+    ///
+    /// Where a bound cannot be met because v has become so large that its rounding is larger
+    /// than the bound, the bound is in conflict with the rest as far as the numbers can tell.
+    pub fn refine<const NX: usize, const NG: usize>(
+        &mut self,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+        factors: &[StageFactor<T, NX, NU>; N],
+        trajectory: &Trajectory<'_, T, NX, NU, N>,
+    ) -> Result<bool, Status<T>> {
+        if self.active().next().is_none() {
+            return Ok(false);
+        }
+        let (defect, bound) = self.worst_defect(ocp, trajectory);
+        let largest = self.v.iter().fold(T::zero(), |m, v| m.max(v.amax()));
+        let unexplained = self.unexplained(ocp, factors);
+        let rest = unexplained.iter().fold(T::zero(), |m, v| m.max(v.amax()));
+        if defect <= self.tolerance && rest <= self.tolerance * largest {
+            return Ok(false);
+        }
+        if self.refinements > 0 {
+            self.refinements -= 1;
+            self.forget_idle();
+            self.settle(ocp, factors, trajectory)?;
+            return Ok(true);
+        }
+        if defect <= self.loosest {
+            Ok(false)
+        } else {
+            Err(Status::Infeasible(bound))
+        }
+    }
+
+    /// The active bound that is farthest from holding, relative to its size.
+    fn worst_defect<const NX: usize, const NG: usize>(
+        &self,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+        trajectory: &Trajectory<'_, T, NX, NU, N>,
+    ) -> (T, BoundId) {
+        let working = self.working.rows().iter().map(|row| {
+            let defect = defect(ocp, trajectory, row).abs();
+            (defect, row.active.bound)
+        });
+        let resting = self.resting.iter().filter(|row| !row.exceeded).map(|row| {
+            let slack = rows::slack(ocp, trajectory, &row.bound);
+            let idle = row.multiplier == T::zero() && slack > T::zero();
+            (if idle { T::zero() } else { slack.abs() }, row.bound)
+        });
+        let mut worst = (T::zero(), ActiveRow::<T>::empty().bound);
+        for (defect, bound) in working.chain(resting) {
+            let relative = defect / rows::size(ocp, &bound);
+            // Negated, so that a defect that is not a number counts.
+            if !(relative <= worst.0) {
+                worst = (relative, bound);
+            }
+        }
+        worst
+    }
+
+    /// Forgets the resting rows without multiplier.
+    fn forget_idle(&mut self) {
+        self.resting.retain(|row| row.multiplier != T::zero());
+    }
+
+    /// Moves to the minimiser over the working set, without the rows whose multiplier would
+    /// leave its interval there. `trajectory` belongs to the current v.
+    fn settle<const NX: usize, const NG: usize>(
+        &mut self,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+        factors: &[StageFactor<T, NX, NU>; N],
+        trajectory: &Trajectory<'_, T, NX, NU, N>,
+    ) -> Result<(), Status<T>> {
+        loop {
+            let unexplained = self.unexplained(ocp, factors);
+            let mut step = [T::zero(); M];
+            for (step, row) in step.iter_mut().zip(self.working.rows()) {
+                *step = -defect(ocp, trajectory, row);
+            }
+            self.working.solve_lower(&mut step);
+            self.working.project(&unexplained, &mut step);
+            let mut multipliers = step;
+            self.working.solve_upper(&mut multipliers);
+            for (multiplier, row) in multipliers.iter_mut().zip(self.working.rows()) {
+                *multiplier += row.active.multiplier;
+            }
+            let Some(position) = self.farthest_outside(&multipliers) else {
+                for (v, rest) in self.v.iter_mut().zip(unexplained.iter()) {
+                    *v -= rest;
+                }
+                self.working.shift(&step, &mut self.v);
+                return Ok(());
+            };
+            self.count_change()?;
+            let mut row = self.working.remove(position);
+            if let Some(multiplier) = multipliers.get(position) {
+                row.active.multiplier = *multiplier;
+            }
+            self.release(&row)?;
+        }
+    }
+
+    /// The working row whose multiplier is farthest outside its interval.
+    fn farthest_outside(&self, multipliers: &[T; M]) -> Option<usize> {
+        let mut farthest = None;
+        let mut distance = T::zero();
+        for (position, (row, multiplier)) in self.working.rows().iter().zip(multipliers).enumerate()
+        {
+            let outside = (-*multiplier).max(*multiplier - row.cap);
+            // Negated, so that a multiplier that is not a number counts.
+            if !row.equality && !(outside <= distance) {
+                distance = outside;
+                farthest = Some(position);
+            }
+        }
+        farthest
+    }
+
+    /// v - sum of multiplier * alpha over the active rows: zero but for rounding.
+    fn unexplained<const NX: usize, const NG: usize>(
+        &self,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+        factors: &[StageFactor<T, NX, NU>; N],
+    ) -> [SVector<T, NU>; N] {
+        let mut rest = self.v;
+        rows::subtract(ocp, factors, || self.active(), &mut rest);
+        rest
+    }
+}
+
+/// What is missing for `row` to hold with equality on the trajectory.
+fn defect<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    trajectory: &Trajectory<'_, T, NX, NU, N>,
+    row: &Terms<T>,
+) -> T {
+    let slack = rows::slack(ocp, trajectory, &row.active.bound);
+    let own = if row.mirrored { -slack } else { slack };
+    own + row.compliance * row.active.multiplier
+}
