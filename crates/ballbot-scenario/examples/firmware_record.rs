@@ -88,11 +88,15 @@ fn write_settings(text: &mut String, prepared: &Prepared) -> Result<(), Box<dyn 
     writeln!(text, "    t_s: {},", literal(settings.t_s))?;
     writeln!(text, "    horizon: {},", settings.horizon)?;
     writeln!(text, "    substeps: {},", settings.predictor.substeps)?;
-    writeln!(text, "    q: {},", list(&settings.weights.q.diagonal()))?;
+    writeln!(
+        text,
+        "    q: {},",
+        list(settings.weights.q.diagonal().iter())
+    )?;
     writeln!(text, "    r: {},", literal(settings.weights.r[0]))?;
     writeln!(text, "    p: [")?;
     for column in p.column_iter() {
-        writeln!(text, "        {},", list(&column))?;
+        writeln!(text, "        {},", list(column.iter()))?;
     }
     writeln!(text, "    ],")?;
     writeln!(text, "    state_lower: {},", list(&settings.x.lower))?;

@@ -146,6 +146,9 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
             // `reached` belongs to v = 0; the rows before have moved v since.
             let moved = self.candidate.dot(&self.v);
             let slack = *reached - *target + moved;
+            if !slack.is_finite() {
+                return Err(Status::NotFinite);
+            }
             self.working.direction(&self.candidate, &mut self.direction);
             if self.direction.slope > T::zero() {
                 if self.working.is_full() {

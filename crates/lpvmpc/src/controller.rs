@@ -85,6 +85,8 @@ pub enum ControllerError {
     },
     /// The constant scheduling contains a number that is not finite.
     HeldScheduling,
+    /// The solver's tolerance is not a positive number.
+    Tolerance,
 }
 
 impl fmt::Display for ControllerError {
@@ -115,6 +117,7 @@ impl fmt::Display for ControllerError {
                 "the lower bound of {quantity} {component} must not exceed its upper bound"
             ),
             Self::HeldScheduling => write!(f, "the held scheduling must be finite"),
+            Self::Tolerance => write!(f, "the solver's tolerance must be a positive number"),
         }
     }
 }
@@ -226,7 +229,7 @@ where
     /// Forgets the past: the next step starts as the first one did.
     pub fn reset(&mut self) {
         self.initialised = false;
-        self.solution.active.clear();
+        self.solution = Solution::default();
     }
 
     /// The plan of the last step.
@@ -340,6 +343,10 @@ fn check<T: Scalar, const NX: usize, const NU: usize, const NS: usize>(
     if settings.predictor.substeps == 0 {
         return Err(ControllerError::Substeps);
     }
+    let tolerance = settings.solver.tolerance;
+    if !(tolerance > T::zero() && tolerance.is_finite()) {
+        return Err(ControllerError::Tolerance);
+    }
     check_weight(&settings.weights.q, "Q", T::default_epsilon())?;
     check_weight(&settings.weights.r, "R", T::zero())?;
     if let TerminalIngredient::Cost(p) = &settings.terminal {
@@ -364,7 +371,8 @@ fn check_weight<T: Scalar, const K: usize>(
     let size = weight.amax();
     let asymmetry = (weight - weight.transpose()).amax();
     let rounding: T = convert::<f64, T>(1e3) * T::default_epsilon() * size;
-    if !(size.is_finite() && asymmetry <= rounding) {
+    let finite = weight.iter().all(|entry| entry.is_finite());
+    if !(finite && asymmetry <= rounding) {
         return Err(ControllerError::WeightEntries(name));
     }
     // Semidefinite up to rounding: a tiny multiple of the identity makes it definite.

@@ -13,7 +13,9 @@ use nalgebra::{SVector, convert};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolverSettings<T> {
     /// A bound may be violated by this much, relative to its own size. Default: eps^(2/3) of
-    /// the number type, 4e-11 for `f64` and 2e-5 for `f32`.
+    /// the number type, 4e-11 for `f64` and 2e-5 for `f32`. Where bounds depend on each other
+    /// so strongly that rounding decides, sqrt(eps) is let through (1.5e-8 and 3.5e-4); an
+    /// input is within its bounds to the last bit all the same.
     pub tolerance: T,
     /// The search ends after this many changes of the active set. Default: 500.
     pub max_changes: usize,

@@ -1,0 +1,49 @@
+//! What the tests of the solver share: problems, other solvers, and figures over many problems.
+
+pub mod census;
+pub mod clarabel;
+pub mod least_distance;
+pub mod problems;
+pub mod rng;
+
+use lpvmpc::{Ocp, Solution, SolverSettings, Status, WarmStart, Workspace};
+
+/// `work` on a thread with a stack large enough for the longest horizons.
+pub fn on_large_stack<R: Send + 'static>(work: impl FnOnce() -> R + Send + 'static) -> R {
+    let thread = std::thread::Builder::new().stack_size(256 << 20);
+    match thread.spawn(work).unwrap().join() {
+        Ok(result) => result,
+        Err(panic) => std::panic::resume_unwind(panic),
+    }
+}
+
+/// Settings without a past, and with room for any number of changes that ends.
+pub fn cold() -> SolverSettings<f64> {
+    SolverSettings {
+        warm_start: WarmStart::Cold,
+        max_changes: 20_000,
+        ..SolverSettings::default()
+    }
+}
+
+/// The answer to `ocp` from a cold start.
+pub fn solve<const NX: usize, const NU: usize, const N: usize, const M: usize, const NG: usize>(
+    ocp: &Ocp<f64, NX, NU, N, NG>,
+) -> Solution<f64, NX, NU, N, M> {
+    let mut workspace = Box::new(Workspace::new());
+    let mut solution = Solution::default();
+    workspace.solve(ocp, &cold(), &mut solution);
+    solution
+}
+
+/// The kind of a status, without its details.
+pub fn kind<T>(status: &Status<T>) -> &'static str {
+    match status {
+        Status::Solved => "solved",
+        Status::Infeasible(_) => "infeasible",
+        Status::ChangeCap => "change cap",
+        Status::WorkingSetFull => "working set full",
+        Status::NumericalFailure { .. } => "numerical failure",
+        Status::NotFinite => "not finite",
+    }
+}
