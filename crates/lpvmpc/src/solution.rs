@@ -135,8 +135,9 @@ impl<T: Scalar, const M: usize> ActiveSet<T, M> {
     pub(crate) fn retain(&mut self, wanted: impl Fn(&ActiveRow<T>) -> bool) {
         let mut kept = 0;
         for place in 0..self.len {
-            if wanted(&self.rows[place]) {
-                self.rows[kept] = self.rows[place];
+            let row = self.rows.get(place).copied();
+            if let (Some(row), Some(free)) = (row.filter(&wanted), self.rows.get_mut(kept)) {
+                *free = row;
                 kept += 1;
             }
         }

@@ -269,7 +269,7 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, N
         let Some([a, b]) = diagonal else {
             return;
         };
-        let length = a.hypot(*b);
+        let length = (*a * *a + *b * *b).sqrt();
         if length == T::zero() {
             return;
         }
@@ -335,10 +335,13 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, N
 
 /// Moves the entries behind `position`, up to `len`, one place forward.
 fn close_gap<V>(entries: &mut [V], position: usize, len: usize) {
-    if let Some(tail) = entries.get_mut(position..len) {
-        for j in 1..tail.len() {
-            tail.swap(j - 1, j);
-        }
+    let mut places = entries.iter_mut().take(len).skip(position);
+    let Some(mut free) = places.next() else {
+        return;
+    };
+    for place in places {
+        core::mem::swap(free, place);
+        free = place;
     }
 }
 
