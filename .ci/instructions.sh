@@ -4,6 +4,7 @@
 # not depend on load or clock, but on the compiler: with another one they are shown, not compared.
 # `instructions.sh --write` takes the counts as the new ones.
 set -euo pipefail
+shopt -s inherit_errexit
 cd "$(dirname "$0")/.."
 file=.ci/instructions.txt
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}

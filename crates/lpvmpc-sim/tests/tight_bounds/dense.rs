@@ -179,6 +179,9 @@ impl Dense {
     }
 }
 
+/// A minimiser, with the active rows and their multipliers.
+type Minimiser = (DVector<f64>, Vec<(usize, f64)>);
+
 /// Minimise |z|^2 / 2 with w'z >= limit for every row of length 1; the first are equalities.
 struct LeastDistance {
     rows: Vec<(DVector<f64>, f64)>,
@@ -187,7 +190,7 @@ struct LeastDistance {
 
 impl LeastDistance {
     /// The minimiser, with the active rows and their multipliers; `None` if there is none.
-    fn solve(&self) -> Option<(DVector<f64>, Vec<(usize, f64)>)> {
+    fn solve(&self) -> Option<Minimiser> {
         let mut active: Vec<usize> = (0..self.equalities).collect();
         for _ in 0..10 * self.rows.len() {
             let (z, multipliers) = self.minimise_over(&active);

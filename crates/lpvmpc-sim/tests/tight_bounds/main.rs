@@ -4,6 +4,8 @@
 //! The second route's answers are not believed either: their optimality conditions are checked
 //! first.
 #![allow(
+    clippy::expect_used,
+    clippy::panic,
     clippy::unwrap_used,
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
@@ -13,8 +15,8 @@ mod dense;
 use ballbot::{Ballbot, limits};
 use dense::{Dense, Optimum};
 use lpvmpc::{
-    BoundId, Bounds, Controller, ControllerSettings, Ocp, Quantity, Reference, Rk4, Scheduling,
-    Side, Solution, SolverSettings, Status, TerminalIngredient, Weights, Workspace,
+    BoundId, Bounds, Controller, ControllerSettings, Ocp, Reference, Rk4, Scheduling, Solution,
+    SolverSettings, Status, TerminalIngredient, Weights, Workspace,
 };
 use lpvmpc_sim::{Tolerances, advance};
 use nalgebra::{Matrix1, Matrix4, Vector1, Vector4};

@@ -10,8 +10,10 @@ type Scalar1 = Ocp<f64, 1, 1, 3>;
 
 /// x+ = x + u, three stages from x = 1, everything weighted with 1.
 fn integrator() -> Scalar1 {
-    let mut ocp = Scalar1::default();
-    ocp.x0 = Vector1::new(1.0);
+    let mut ocp = Scalar1 {
+        x0: Vector1::new(1.0),
+        ..Scalar1::default()
+    };
     for stage in &mut ocp.stages {
         (stage.a, stage.b, stage.q) = (Matrix1::new(1.0), Matrix1::new(1.0), Matrix1::new(1.0));
     }
@@ -46,7 +48,8 @@ fn warm_start_from_a_bound_that_has_become_soft() {
     );
 }
 
-/// A bound that was active and is absent now made the warm start calculate with infinities.
+/// A bound that was active and is absent now made the warm start calculate with infinities
+/// (and lose its other rows).
 #[test]
 fn warm_start_from_a_bound_that_has_gone() {
     let mut ocp = integrator();
@@ -64,7 +67,6 @@ fn warm_start_from_a_bound_that_has_gone() {
     ocp.stages[0].u.lower[0] = f64::NEG_INFINITY;
     workspace.solve(&ocp, &same, &mut solution);
     assert!(kkt_residual(&ocp, &solution).largest() < 1e-12);
-    // Of the rows of before at least one is still of use: fewer changes than from nothing.
     let reference: Solution<f64, 1, 1, 3, 6> = solve(&ocp);
     assert!((solution.cost - reference.cost).abs() < 1e-12);
 }
@@ -143,7 +145,6 @@ fn infinite_target_is_not_finite() {
 #[test]
 fn overflow_is_not_infeasibility() {
     let mut ocp = Ocp::<f64, 1, 1, 3, 1>::default();
-    ocp.x0 = Vector1::new(1.0);
     ocp.stages[0].row_u[0] = 1e200;
     ocp.stages[0].rows.lower[0] = 1.0;
     let solution: Solution<f64, 1, 1, 3, 6> = solve(&ocp);

@@ -184,9 +184,11 @@ fn settings() -> DefaultSettings<f64> {
 pub fn solve<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
     ocp: &Ocp<f64, NX, NU, N, NG>,
 ) -> Verdict {
-    let mut program = Program::default();
     // Variables: u_0, x_1, u_1, x_2, ...
-    program.linear = vec![0.0; ocp.horizon * (NX + NU)];
+    let mut program = Program {
+        linear: vec![0.0; ocp.horizon * (NX + NU)],
+        ..Program::default()
+    };
     let mut x: [Expression; NX] = std::array::from_fn(|j| Expression {
         terms: Vec::new(),
         constant: ocp.x0[j],

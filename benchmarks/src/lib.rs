@@ -1,0 +1,14 @@
+//! The solver of `lpvmpc` beside published solvers, on the same quadratic programs.
+//!
+//! [`closed_loop`] and [`synthetic`] make sequences of problems, [`contenders`] solve them, and
+//! [`comparison`] checks every answer before it takes the time.
+
+pub mod closed_loop;
+pub mod comparison;
+mod condensed;
+pub mod contenders;
+mod error;
+mod sparse;
+pub mod synthetic;
+
+pub use error::BenchmarkError;

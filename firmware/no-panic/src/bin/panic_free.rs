@@ -1,0 +1,38 @@
+//! Steps controllers of the ballbot on inputs that the compiler knows nothing about, in `f32` and
+//! in `f64`, and maps the torques to the motors: this image must link.
+#![no_std]
+#![no_main]
+
+use ballbot::{Ballbot, Wheels};
+use core::hint::black_box;
+use lpvmpc::{Controller, Reference, Scalar, Workspace};
+use nalgebra::{Vector3, Vector4};
+use no_panic as _;
+
+const N: usize = 20;
+const M: usize = 24;
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    loop {
+        step::<f32>();
+        step::<f64>();
+    }
+}
+
+/// One step of a controller that is never built: what matters is the code, not a run.
+#[inline(never)]
+fn step<T: Scalar>() {
+    let controller: Option<&mut Controller<Ballbot<T>, T, 4, 1, 2, N, M>> = black_box(None);
+    let workspace: Option<&mut Workspace<T, 4, 1, N, M>> = black_box(None);
+    let inputs: Option<&(Vector4<T>, Reference<T, 4, N>)> = black_box(None);
+    let wheels: Option<&Wheels<T>> = black_box(None);
+    if let (Some(controller), Some(workspace)) = (controller, workspace)
+        && let (Some((x, reference)), Some(wheels)) = (inputs, wheels)
+    {
+        let plan = controller.step(x, reference, workspace);
+        let torque = plan.u[0][0];
+        black_box(plan);
+        black_box(wheels.motors(&Vector3::new(torque, torque, T::zero())));
+    }
+}

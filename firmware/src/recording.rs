@@ -1,0 +1,94 @@
+//! A scenario's settings, states and references, as they stand in the flash.
+
+use crate::{N, Reference};
+use ballbot::Ballbot;
+use lpvmpc::{
+    Bounds, ControllerSettings, Rk4, Scheduling, SolverSettings, TerminalIngredient, Weights,
+};
+use nalgebra::{Matrix1, Matrix4, Vector1, Vector4};
+
+/// A scenario and what happened in it.
+#[derive(Clone, Copy, Debug)]
+pub struct Recording {
+    /// The scenario's name.
+    pub name: &'static str,
+    /// The robot, which is also the prediction model.
+    pub ballbot: Ballbot<f32>,
+    /// Angle of the wheels' contact points from the top of the ball, rad.
+    pub zenith_angle: f32,
+    /// Sampling time, s.
+    pub t_s: f32,
+    /// Prediction horizon, samples.
+    pub horizon: usize,
+    /// Runge-Kutta steps per sample.
+    pub substeps: usize,
+    /// Diagonal of the state weight Q.
+    pub q: [f32; 4],
+    /// Weight R of the torque.
+    pub r: f32,
+    /// Terminal weight P, symmetric.
+    pub p: [[f32; 4]; 4],
+    /// Lower bounds of (phi, theta, phi_dot, theta_dot), rad and rad/s.
+    pub state_lower: [f32; 4],
+    /// Upper bounds of (phi, theta, phi_dot, theta_dot), rad and rad/s.
+    pub state_upper: [f32; 4],
+    /// Lower and upper bound of the torque, N m.
+    pub torque: [f32; 2],
+    /// One plane, or x and y.
+    pub planes: &'static [Plane],
+}
+
+/// What happened in one plane.
+#[derive(Clone, Copy, Debug)]
+pub struct Plane {
+    /// State (phi, theta, phi_dot, theta_dot) at every sample, rad and rad/s.
+    pub states: &'static [[f32; 4]],
+    /// phi_ref at every sample, and on to the end of the last sample's horizon, rad.
+    pub phi_ref: &'static [f32],
+}
+
+impl Recording {
+    /// The scenario's controller settings, rounded to `f32`.
+    pub fn settings(&self) -> ControllerSettings<f32, 4, 1, 2> {
+        let [lower, upper] = self.torque.map(Vector1::new);
+        ControllerSettings {
+            t_s: self.t_s,
+            horizon: self.horizon,
+            predictor: Rk4 {
+                substeps: self.substeps,
+            },
+            weights: Weights {
+                q: Matrix4::from_diagonal(&Vector4::from(self.q)),
+                r: Matrix1::new(self.r),
+            },
+            terminal: TerminalIngredient::Cost(Matrix4::from(self.p)),
+            x: Bounds {
+                lower: Vector4::from(self.state_lower),
+                upper: Vector4::from(self.state_upper),
+            },
+            u: Bounds { lower, upper },
+            scheduling: Scheduling::Predicted,
+            solver: SolverSettings::default(),
+        }
+    }
+
+    /// Samples that were recorded.
+    pub fn samples(&self) -> usize {
+        self.planes.first().map_or(0, |plane| plane.states.len())
+    }
+}
+
+impl Plane {
+    /// The reference over the horizon that begins at sample `k`: phi_ref and rest. Beyond the
+    /// recording it is zero.
+    pub fn reference(&self, k: usize) -> Reference {
+        let at = |i: usize| {
+            let phi_ref = self.phi_ref.get(k + i).copied().unwrap_or(0.0);
+            Vector4::new(phi_ref, 0.0, 0.0, 0.0)
+        };
+        Reference {
+            stages: core::array::from_fn(at),
+            terminal: at(N),
+        }
+    }
+}
