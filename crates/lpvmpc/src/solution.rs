@@ -73,7 +73,8 @@ pub struct ActiveRow<T> {
     /// Which part of it.
     pub part: Part,
     /// Lagrange multiplier, >= 0 in the direction that keeps the bound (any sign for an
-    /// equality, where it multiplies x - target), in cost per unit of the quantity.
+    /// equality, where the Lagrangian is cost - multiplier * (x - target)), in cost per unit of
+    /// the quantity.
     pub multiplier: T,
     /// The multiplier rests at the linear price: the soft bound is exceeded.
     pub exceeded: bool,

@@ -116,18 +116,9 @@ fn compare<const NX: usize, const NU: usize, const N: usize, const M: usize, con
             let error = (solution.cost - primal).abs() / primal.abs().max(1.0);
             findings.cost_error.add(error);
             if error > SAME_COST {
-                // Clarabel meets the constraints to 1e-10 only, which the multipliers turn
-                // into cost.
-                let multipliers = solution.active.iter().map(|row| row.multiplier.abs());
-                let explained = clarabel::FEASIBILITY * multipliers.sum::<f64>();
-                assert!(
-                    (solution.cost - primal).abs() <= 10.0 * explained,
-                    "{place}: {} against {primal}, explained {explained:.1e}",
-                    solution.cost
-                );
-                findings
-                    .verdicts
-                    .add("cost within clarabel's own tolerance only");
+                findings.verdicts.add(LOOSE_COST);
+                let settled = third_opinion(ocp, solution, place, findings);
+                assert!(settled || explained(solution, primal), "{place}: {primal}");
             }
         }
         Verdict::Infeasible if !solved => findings.verdicts.add("infeasible for both"),
@@ -146,7 +137,16 @@ fn compare<const NX: usize, const NU: usize, const N: usize, const M: usize, con
     }
 }
 
-/// The dense route, where it applies.
+/// Clarabel meets the constraints to its tolerance only, which the multipliers turn into cost.
+fn explained<const NX: usize, const NU: usize, const N: usize, const M: usize>(
+    solution: &Solution<f64, NX, NU, N, M>,
+    primal: f64,
+) -> bool {
+    let multipliers = solution.active.iter().map(|row| row.multiplier.abs());
+    (solution.cost - primal).abs() <= 10.0 * clarabel::FEASIBILITY * multipliers.sum::<f64>()
+}
+
+/// The dense route, which must agree; `false` where it does not apply.
 fn third_opinion<
     const NX: usize,
     const NU: usize,
@@ -158,10 +158,10 @@ fn third_opinion<
     solution: &Solution<f64, NX, NU, N, M>,
     place: &str,
     findings: &mut Findings,
-) {
+) -> bool {
     let small = ocp.length() * NU <= 40;
     let Some(dense) = condense(ocp).filter(|_| small) else {
-        return;
+        return false;
     };
     let optimum = dense.solve();
     assert_eq!(optimum.is_some(), solution.status.is_solved(), "{place}");
@@ -175,6 +175,7 @@ fn third_opinion<
         );
     }
     findings.verdicts.add("settled by the dense route");
+    true
 }
 
 /// `solution` with other inputs, and the states that they lead to.
