@@ -52,7 +52,7 @@ impl Recording {
             };
             let controller = &mut recording.controller;
             let u = controller.step(&x, &reference, &mut workspace).u[0];
-            recording.problems.push(controller.ocp().clone());
+            recording.problems.push(workspace.ocp().clone());
             recording.samples.push((x, reference));
             x = advance(&ballbot, &x, &u, settings.t_s, prepared.tolerances)?;
         }

@@ -2,7 +2,7 @@
 
 use crate::BenchmarkError;
 use crate::comparison::Contender;
-use lpvmpc::{Ocp, Solution, SolverSettings, Workspace};
+use lpvmpc::{Ocp, Solution, Solver, SolverSettings};
 use nalgebra::SVector;
 
 /// Our solver. The first problem of a sequence is solved cold, each other one as the settings
@@ -10,7 +10,7 @@ use nalgebra::SVector;
 pub struct Own<'a, const NX: usize, const NU: usize, const N: usize, const M: usize> {
     problems: &'a [Ocp<f64, NX, NU, N>],
     settings: SolverSettings<f64>,
-    workspace: Box<Workspace<f64, NX, NU, N, M>>,
+    solver: Box<Solver<f64, NX, NU, N, M>>,
     solution: Box<Solution<f64, NX, NU, N, M>>,
 }
 
@@ -20,7 +20,7 @@ impl<'a, const NX: usize, const NU: usize, const N: usize, const M: usize> Own<'
         Self {
             problems,
             settings,
-            workspace: Box::new(Workspace::new()),
+            solver: Box::new(Solver::new()),
             solution: Box::new(Solution::default()),
         }
     }
@@ -53,8 +53,7 @@ impl<const NX: usize, const NU: usize, const N: usize, const M: usize> Contender
             self.solution.active.clear();
         }
         let ocp = &self.problems[problem];
-        self.workspace
-            .solve(ocp, &self.settings, &mut self.solution);
+        self.solver.solve(ocp, &self.settings, &mut self.solution);
         if self.solution.status.is_solved() {
             Ok(self.solution.u[0])
         } else {

@@ -7,7 +7,7 @@
 use crate::commands::CommandError;
 use ballbot::Ballbot;
 use ballbot_scenario::{Prepared, Scenario, ScenarioError};
-use lpvmpc::{Controller, Reference, Solution, Workspace};
+use lpvmpc::{Controller, Reference, Solution, Solver, Workspace};
 use lpvmpc_sim::advance;
 use nalgebra::Vector4;
 use serde::Serialize;
@@ -100,6 +100,7 @@ fn time_plane(prepared: &Prepared, plane: usize, record: &mut Record) -> Result<
     let plane = &prepared.planes[plane];
     let t_s = prepared.settings.t_s;
     let mut workspace = Box::new(Workspace::<f64, 4, 1, N, M>::new());
+    let mut solver = Box::new(Solver::new());
     let mut controller =
         Control::new(prepared.ballbot, prepared.settings).map_err(ScenarioError::from)?;
     let mut x = plane.initial_state;
@@ -120,7 +121,7 @@ fn time_plane(prepared: &Prepared, plane: usize, record: &mut Record) -> Result<
             let mut solution: Solution<f64, 4, 1, N, M> = before.solution().clone();
             let settings = &controller.settings().solver;
             let start = Instant::now();
-            workspace.solve(black_box(controller.ocp()), settings, &mut solution);
+            solver.solve(black_box(workspace.ocp()), settings, &mut solution);
             let elapsed = start.elapsed();
             black_box(&solution);
             elapsed

@@ -146,7 +146,7 @@ where
             x,
             u,
             x_ref: reference.stages[0],
-            cost: controller.tracking_cost(&reference),
+            cost: controller.tracking_cost(&x, &reference),
             status,
             active_bounds,
             step_time,

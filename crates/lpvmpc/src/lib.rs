@@ -14,18 +14,17 @@ mod ocp;
 mod predictor;
 pub mod riccati;
 mod rows;
+mod settings;
 mod settle;
 mod solution;
 mod solver;
 mod working_set;
 
-pub use controller::{
-    Controller, ControllerError, ControllerSettings, Reference, Scheduling, TerminalIngredient,
-    Weights,
-};
+pub use controller::{Controller, Reference, Workspace};
 pub use kkt::{KktResidual, kkt_residual};
 pub use model::{LpvModel, Scalar};
 pub use ocp::{Bounds, Ocp, Penalty, Softness, Stage, Terminal};
 pub use predictor::Rk4;
+pub use settings::{ControllerError, ControllerSettings, Scheduling, TerminalIngredient, Weights};
 pub use solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
-pub use solver::{SolverSettings, WarmStart, Workspace, cost};
+pub use solver::{Solver, SolverSettings, WarmStart, cost};

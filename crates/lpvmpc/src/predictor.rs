@@ -30,22 +30,11 @@ impl Rk4 {
         b: &SMatrix<T, NX, NU>,
         t_s: T,
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-        let h = self.step_length(t_s);
-        let [half, sixth, last] = [0.5, 1.0 / 6.0, 1.0 / 24.0].map(convert::<f64, T>);
-        let m = a * h;
-        let m2 = product(&m, &m);
-        let mut a_step = m + m2 * half;
-        for i in 0..NX {
-            a_step[(i, i)] += T::one();
+        let (a_step, b_step) = taylor_step(a, b, self.step_length(t_s));
+        if self.substeps == 1 {
+            return (a_step, b_step);
         }
-        add_product(&mut a_step, &m2, &(m * sixth + m2 * last));
-        let b = b * h;
-        let m_b = product(&m, &b);
-        let mut b_step = b + m_b * half;
-        add_product(&mut b_step, &m2, &(b * sixth + m_b * last));
-
-        let mut a_d = a_step;
-        let mut b_d = b_step;
+        let (mut a_d, mut b_d) = (a_step, b_step);
         for _ in 1..self.substeps {
             b_d = product(&a_step, &b_d) + b_step;
             a_d = product(&a_step, &a_d);
@@ -83,4 +72,26 @@ impl Rk4 {
     fn step_length<T: Scalar>(self, t_s: T) -> T {
         t_s / convert::<f64, T>(self.substeps as f64)
     }
+}
+
+/// One step of length `h` seconds for a constant pair: the Taylor polynomials of order four.
+#[inline(always)]
+fn taylor_step<T: Scalar, const NX: usize, const NU: usize>(
+    a: &SMatrix<T, NX, NX>,
+    b: &SMatrix<T, NX, NU>,
+    h: T,
+) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+    let [half, sixth, last] = [0.5, 1.0 / 6.0, 1.0 / 24.0].map(convert::<f64, T>);
+    let m = a * h;
+    let m2 = product(&m, &m);
+    let mut a_step = m + m2 * half;
+    for i in 0..NX {
+        a_step[(i, i)] += T::one();
+    }
+    add_product(&mut a_step, &m2, &(m * sixth + m2 * last));
+    let b = b * h;
+    let m_b = product(&m, &b);
+    let mut b_step = b + m_b * half;
+    add_product(&mut b_step, &m2, &(b * sixth + m_b * last));
+    (a_step, b_step)
 }

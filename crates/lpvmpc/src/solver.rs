@@ -44,20 +44,21 @@ impl<T: Scalar> Default for SolverSettings<T> {
     }
 }
 
-/// Memory of the solver: `NX` states, `NU` inputs, at most `N` stages and `M` simultaneously
-/// active bounds. Nothing in it outlives a solve; one workspace serves any number of problems.
+/// The solver with its memory: `NX` states, `NU` inputs, at most `N` stages and `M`
+/// simultaneously active bounds. Nothing in it outlives a solve; one solver serves any number of
+/// problems.
 ///
 /// `M = N * NU` always suffices without soft bounds, plus `NX` with a terminal equality.
 #[derive(Clone, Debug)]
-pub struct Workspace<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
+pub struct Solver<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
     factors: [StageFactor<T, NX, NU>; N],
     dual: DualActiveSet<T, NU, N, M>,
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
-    Workspace<T, NX, NU, N, M>
+    Solver<T, NX, NU, N, M>
 {
-    /// An empty workspace.
+    /// A solver that has solved nothing yet.
     pub fn new() -> Self {
         const { assert!(N > 0, "a horizon has at least one stage") };
         Self {
@@ -71,6 +72,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
     /// Always ends, after at most `settings.max_changes` changes of the active set, and always
     /// leaves finite inputs within the input bounds; what they are worth is in
     /// `solution.status`.
+    #[inline(never)]
     pub fn solve<const NG: usize>(
         &mut self,
         ocp: &Ocp<T, NX, NU, N, NG>,
@@ -191,7 +193,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize> Default
-    for Workspace<T, NX, NU, N, M>
+    for Solver<T, NX, NU, N, M>
 {
     fn default() -> Self {
         Self::new()

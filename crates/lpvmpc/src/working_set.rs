@@ -219,7 +219,7 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, N
     fn noise(&self, direction: &Direction<T, NU, N, M>) -> T {
         let rows = self.rows().iter().zip(direction.dual.iter());
         let terms = rows.fold(direction.size, |sum, (row, d)| sum + d.abs() * row.size);
-        T::default_epsilon() * convert((16 * NU * direction.support) as f64) * terms
+        T::default_epsilon() * convert(8.0) * terms
     }
 
     /// Adds `row`, whose `direction` is current. The set must not be full.

@@ -83,7 +83,7 @@ fn compare(mut controller: Loop, phi_ref: fn(usize) -> f64) -> Comparison {
             terminal: at(N),
         };
         let plan = controller.step(&x, &reference, &mut workspace).clone();
-        let dense = Dense::condense(controller.ocp());
+        let dense = Dense::condense(workspace.ocp());
         let Some(optimum) = dense.solve() else {
             let told = matches!(plan.status, Status::Infeasible(_));
             assert!(told, "sample {k}: {}", plan.status);

@@ -6,8 +6,7 @@ use crate::support::problems::{Family, problem};
 use crate::support::rng::Rng;
 use crate::support::{kind, on_large_stack};
 use lpvmpc::{
-    Bounds, Ocp, Penalty, Solution, SolverSettings, Status, WarmStart, Workspace, cost,
-    kkt_residual,
+    Bounds, Ocp, Penalty, Solution, Solver, SolverSettings, Status, WarmStart, cost, kkt_residual,
 };
 use nalgebra::SMatrix;
 
@@ -121,7 +120,7 @@ fn check(ocp: &Problem, settings: &SolverSettings<f64>, solution: &Solution<f64,
 fn nonsense_in_the_problem() {
     on_large_stack(|| {
         let mut statuses = Counts::default();
-        let mut workspace = Workspace::new();
+        let mut solver = Solver::new();
         let mut solution = Solution::default();
         for k in 0..150_000 {
             let mut rng = Rng::new(k);
@@ -137,7 +136,7 @@ fn nonsense_in_the_problem() {
                 ..SolverSettings::default()
             };
             // The previous solution, of an unrelated problem, is the warm start.
-            workspace.solve(&ocp, &settings, &mut solution);
+            solver.solve(&ocp, &settings, &mut solution);
             check(&ocp, &settings, &solution);
             if solution.status.is_solved() && largest < 1e100 {
                 // Neither is NaN hidden in the answer, nor far from the optimum.
@@ -162,7 +161,7 @@ fn nonsense_in_the_problem() {
 /// Every number from the same bag: nothing of the problem's structure is left.
 #[test]
 fn nothing_but_nonsense() {
-    let mut workspace = Workspace::new();
+    let mut solver = Solver::new();
     let mut solution = Solution::default();
     for k in 0..30_000 {
         let mut rng = Rng::new(k);
@@ -178,7 +177,7 @@ fn nothing_but_nonsense() {
             max_changes: 200,
             warm_start: WarmStart::Same,
         };
-        workspace.solve(&ocp, &settings, &mut solution);
+        solver.solve(&ocp, &settings, &mut solution);
         check(&ocp, &settings, &solution);
     }
 }
@@ -186,7 +185,7 @@ fn nothing_but_nonsense() {
 /// One NaN in a number that matters is never answered with "solved".
 #[test]
 fn one_number_that_is_none() {
-    let mut workspace = Workspace::new();
+    let mut solver = Solver::new();
     for k in 0..20_000 {
         let mut rng = Rng::new(k);
         let mut ocp = problem::<NX, NU, N, NG>(&mut rng, Family::Tight, N);
@@ -208,7 +207,7 @@ fn one_number_that_is_none() {
             _ => ocp.x0[row] = f64::NAN,
         }
         let mut solution = Solution::<f64, NX, NU, N, M>::default();
-        workspace.solve(&ocp, &SolverSettings::default(), &mut solution);
+        solver.solve(&ocp, &SolverSettings::default(), &mut solution);
         assert_eq!(solution.status, Status::NotFinite, "{k}");
     }
 }

@@ -3,7 +3,7 @@
 use crate::support::problems::{Family, problem};
 use crate::support::rng::Rng;
 use crate::support::{cold, kind, solve};
-use lpvmpc::{Ocp, Penalty, Solution, SolverSettings, Status, WarmStart, Workspace, kkt_residual};
+use lpvmpc::{Ocp, Penalty, Solution, Solver, SolverSettings, Status, WarmStart, kkt_residual};
 use nalgebra::{Matrix1, Vector1};
 
 type Scalar1 = Ocp<f64, 1, 1, 3>;
@@ -27,19 +27,19 @@ fn integrator() -> Scalar1 {
 fn warm_start_from_a_bound_that_has_become_soft() {
     let mut ocp = integrator();
     ocp.stages[1].x.lower[0] = 0.9;
-    let mut workspace = Workspace::<f64, 1, 1, 3, 6>::new();
+    let mut solver = Solver::<f64, 1, 1, 3, 6>::new();
     let mut solution = Solution::default();
     let same = SolverSettings {
         warm_start: WarmStart::Same,
         ..SolverSettings::default()
     };
-    workspace.solve(&ocp, &same, &mut solution);
+    solver.solve(&ocp, &same, &mut solution);
     assert_eq!(solution.active.len(), 1);
     ocp.stages[1].soft_x[0] = Some(Penalty {
         linear: 0.01,
         quadratic: 0.0,
     });
-    workspace.solve(&ocp, &same, &mut solution);
+    solver.solve(&ocp, &same, &mut solution);
     let reference: Solution<f64, 1, 1, 3, 6> = solve(&ocp);
     assert!((solution.cost - reference.cost).abs() < 1e-12);
     assert!(
@@ -56,16 +56,16 @@ fn warm_start_from_a_bound_that_has_gone() {
     for stage in &mut ocp.stages {
         (stage.u.lower[0], stage.x.lower[0]) = (-0.2, 0.5);
     }
-    let mut workspace = Workspace::<f64, 1, 1, 3, 6>::new();
+    let mut solver = Solver::<f64, 1, 1, 3, 6>::new();
     let mut solution = Solution::default();
     let same = SolverSettings {
         warm_start: WarmStart::Same,
         ..SolverSettings::default()
     };
-    workspace.solve(&ocp, &same, &mut solution);
+    solver.solve(&ocp, &same, &mut solution);
     assert!(solution.active.len() >= 2);
     ocp.stages[0].u.lower[0] = f64::NEG_INFINITY;
-    workspace.solve(&ocp, &same, &mut solution);
+    solver.solve(&ocp, &same, &mut solution);
     assert!(kkt_residual(&ocp, &solution).largest() < 1e-12);
     let reference: Solution<f64, 1, 1, 3, 6> = solve(&ocp);
     assert!((solution.cost - reference.cost).abs() < 1e-12);
@@ -79,15 +79,15 @@ fn warm_start_from_a_longer_horizon() {
         let mut rng = Rng::new(seed);
         let mut ocp = problem::<3, 1, 12, 0>(&mut rng, Family::Arbitrary, 12);
         ocp.horizon = 12;
-        let mut workspace = Box::new(Workspace::<f64, 3, 1, 12, 60>::new());
+        let mut solver = Box::new(Solver::<f64, 3, 1, 12, 60>::new());
         let mut solution = Solution::default();
         let same = SolverSettings {
             warm_start: WarmStart::Same,
             ..cold()
         };
-        workspace.solve(&ocp, &same, &mut solution);
+        solver.solve(&ocp, &same, &mut solution);
         ocp.horizon = 5;
-        workspace.solve(&ocp, &same, &mut solution);
+        solver.solve(&ocp, &same, &mut solution);
         let reference: Solution<f64, 3, 1, 12, 60> = solve(&ocp);
         assert_eq!(kind(&solution.status), kind(&reference.status), "{seed}");
         if reference.status.is_solved() {
@@ -162,7 +162,7 @@ fn cap_on_changes_holds_for_the_warm_start_too() {
         max_changes: 3,
         ..cold()
     };
-    Workspace::new().solve(&ocp, &settings, &mut solution);
+    Solver::new().solve(&ocp, &settings, &mut solution);
     assert_eq!(
         (kind(&solution.status), solution.changes),
         ("change cap", 3)

@@ -4,7 +4,7 @@ use crate::support::problems::{Family, problem};
 use crate::support::rng::Rng;
 use crate::support::{cold, kind};
 use lpvmpc::{
-    Bounds, Ocp, Penalty, Side, Solution, SolverSettings, WarmStart, Workspace, kkt_residual,
+    Bounds, Ocp, Penalty, Side, Solution, Solver, SolverSettings, WarmStart, kkt_residual,
 };
 use proptest::prelude::*;
 
@@ -27,9 +27,9 @@ fn answer(ocp: &Problem, start: WarmStart, before: &Answer) -> Answer {
         warm_start: start,
         ..cold()
     };
-    let mut workspace = Box::new(Workspace::new());
+    let mut solver = Box::new(Solver::new());
     let mut solution = before.clone();
-    workspace.solve(ocp, &settings, &mut solution);
+    solver.solve(ocp, &settings, &mut solution);
     solution
 }
 

@@ -3,23 +3,21 @@
 //!
 //! Stated accuracy, relative to the largest input of the plan: 1e-6 for half of the problems
 //! and 1e-4 for 99 % of them; 1e-3 for 99 % where the bounds leave a channel of a thousandth of
-//! the quantities' size, of which up to 7 % are called infeasible. Units that differ by 1e4
-//! change none of this. No infeasible problem is called solved. Run with `--nocapture` for the
-//! figures.
+//! the quantities' size. Units that differ by 1e4 change none of this. Up to 1 % of the feasible
+//! problems are called infeasible. With a terminal equality beside tight bounds: 1e-5 for half
+//! and 1e-2 for 95 %, and up to 3 % are called infeasible. No problem that is infeasible by more
+//! than rounding is called solved. Run with `--nocapture` for the figures.
 
 use crate::support::census::{Counts, Distribution};
 use crate::support::problems::{Family, problem};
 use crate::support::rng::Rng;
 use crate::support::{kind, on_large_stack, solve};
 use lpvmpc::{
-    Bounds, Ocp, Penalty, Scalar, Softness, Solution, SolverSettings, Stage, Terminal, WarmStart,
-    Workspace, kkt_residual,
+    Bounds, Ocp, Penalty, Scalar, Softness, Solution, Solver, SolverSettings, Stage, Terminal,
+    WarmStart, kkt_residual,
 };
 use nalgebra::SMatrix;
 
-const NX: usize = 4;
-const NU: usize = 1;
-const N: usize = 20;
 const M: usize = 200;
 
 /// A problem in another number type.
@@ -46,7 +44,10 @@ impl<A: Scalar, B: Scalar> Into<'_, A, B> {
         })
     }
 
-    fn stage(&self, stage: &Stage<A, NX, NU>) -> Stage<B, NX, NU> {
+    fn stage<const NX: usize, const NU: usize, const NG: usize>(
+        &self,
+        stage: &Stage<A, NX, NU, NG>,
+    ) -> Stage<B, NX, NU, NG> {
         Stage {
             a: self.matrix(&stage.a),
             b: self.matrix(&stage.b),
@@ -59,11 +60,17 @@ impl<A: Scalar, B: Scalar> Into<'_, A, B> {
             x: self.bounds(&stage.x),
             u: self.bounds(&stage.u),
             soft_x: self.prices(&stage.soft_x),
-            ..Stage::new()
+            row_x: self.matrix(&stage.row_x),
+            row_u: self.matrix(&stage.row_u),
+            rows: self.bounds(&stage.rows),
+            soft_rows: self.prices(&stage.soft_rows),
         }
     }
 
-    fn problem(&self, ocp: &Ocp<A, NX, NU, N>) -> Ocp<B, NX, NU, N> {
+    fn problem<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+        &self,
+        ocp: &Ocp<A, NX, NU, N, NG>,
+    ) -> Ocp<B, NX, NU, N, NG> {
         let end = &ocp.terminal;
         Ocp {
             x0: self.matrix(&ocp.x0),
@@ -74,20 +81,24 @@ impl<A: Scalar, B: Scalar> Into<'_, A, B> {
                 x: self.bounds(&end.x),
                 soft_x: self.prices(&end.soft_x),
                 equality: end.equality.as_ref().map(|target| self.matrix(target)),
-                ..Terminal::default()
+                row_x: self.matrix(&end.row_x),
+                rows: self.bounds(&end.rows),
+                soft_rows: self.prices(&end.soft_rows),
             },
             horizon: ocp.horizon,
         }
     }
 }
 
-fn solve_single(ocp: &Ocp<f32, NX, NU, N>) -> Solution<f32, NX, NU, N, M> {
+fn solve_single<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+    ocp: &Ocp<f32, NX, NU, N, NG>,
+) -> Solution<f32, NX, NU, N, M> {
     let settings = SolverSettings {
         warm_start: WarmStart::Cold,
         ..SolverSettings::default()
     };
     let mut solution = Solution::default();
-    Workspace::new().solve(ocp, &settings, &mut solution);
+    Solver::new().solve(ocp, &settings, &mut solution);
     solution
 }
 
@@ -102,14 +113,16 @@ struct Findings {
 
 const COUNT: u64 = 1000;
 
-fn measure(family: Family) -> Findings {
+fn measure<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+    family: Family,
+) -> Findings {
     let mut findings = Findings {
         verdicts: Counts::default(),
         inputs: Distribution::default(),
         residual: Distribution::default(),
     };
     for k in 0..COUNT {
-        let exact = problem::<NX, NU, N, 0>(&mut Rng::new(k), family, N);
+        let exact = problem::<NX, NU, N, NG>(&mut Rng::new(k), family, N);
         let single = Into(&|x: f64| x as f32).problem(&exact);
         let double = Into(&|x: f32| f64::from(x)).problem(&single);
         let reference: Solution<f64, NX, NU, N, M> = solve(&double);
@@ -125,7 +138,7 @@ fn measure(family: Family) -> Findings {
             findings.residual.add(f64::from(residual));
         }
     }
-    println!("f32 {family:?}: {}", findings.verdicts);
+    println!("f32 {NX} {NU} {N} {family:?}: {}", findings.verdicts);
     println!("    inputs   {}", findings.inputs);
     println!("    residual {}", findings.residual);
     findings
@@ -139,15 +152,28 @@ impl Findings {
     }
 }
 
+/// The ballbot's size.
+fn single_input(family: Family) -> Findings {
+    measure::<4, 1, 20, 0>(family)
+}
+
+/// Twice as many bounds on the same states.
+fn two_inputs(family: Family) -> Findings {
+    measure::<4, 2, 10, 2>(family)
+}
+
+const SIZES: [fn(Family) -> Findings; 2] = [single_input, two_inputs];
+
 #[test]
 fn bounds_with_room() {
     on_large_stack(|| {
-        for family in [
+        let families = [
             Family::Loose,
             Family::SoftLinear,
             Family::SoftBoth,
             Family::Arbitrary,
-        ] {
+        ];
+        for (measure, family) in SIZES.iter().flat_map(|size| families.map(|f| (size, f))) {
             let findings = measure(family);
             assert!(findings.same_verdict() >= 0.99);
             assert!(findings.inputs.quantile(0.5) <= 1e-6);
@@ -157,12 +183,15 @@ fn bounds_with_room() {
     });
 }
 
+/// With several inputs, one in fifty of these was called infeasible: rows that share most of
+/// their support counted as dependent.
 #[test]
 fn feasible_sets_a_thousandth_wide() {
     on_large_stack(|| {
-        for family in [Family::Tight, Family::BadlyScaled] {
+        let families = [Family::Tight, Family::BadlyScaled];
+        for (measure, family) in SIZES.iter().flat_map(|size| families.map(|f| (size, f))) {
             let findings = measure(family);
-            assert!(findings.same_verdict() >= 0.93);
+            assert!(findings.same_verdict() >= 0.99);
             assert!(findings.inputs.quantile(0.5) <= 1e-6);
             assert!(findings.inputs.quantile(0.99) <= 1e-3);
             assert!(findings.residual.quantile(0.99) <= 1e-3);
@@ -170,10 +199,28 @@ fn feasible_sets_a_thousandth_wide() {
     });
 }
 
+/// A bounded input must reach a given state of an arbitrary, often unstable model: rounding the
+/// problem to `f32` alone makes one in seven infeasible, and it decides about the others, too.
+#[test]
+fn a_terminal_state_with_little_room() {
+    on_large_stack(|| {
+        for measure in SIZES {
+            let findings = measure(Family::TerminalEquality);
+            let feasible = findings.verdicts.of("solved -> solved");
+            let refused = findings.verdicts.of("solved -> infeasible");
+            assert!(33 * refused <= refused + feasible);
+            assert!(findings.inputs.quantile(0.5) <= 1e-5);
+            assert!(findings.inputs.quantile(0.95) <= 1e-2);
+        }
+    });
+}
+
 #[test]
 fn nothing_infeasible_is_solved() {
     on_large_stack(|| {
-        let findings = measure(Family::Infeasible);
-        assert!(findings.same_verdict() == 1.0, "{}", findings.verdicts);
+        for measure in SIZES {
+            let findings = measure(Family::Infeasible);
+            assert!(findings.same_verdict() == 1.0, "{}", findings.verdicts);
+        }
     });
 }

@@ -1,7 +1,7 @@
 //! A whole horizon without bounds against the dense system of its optimality conditions.
 
 use crate::rng::Rng;
-use lpvmpc::{Ocp, Solution, SolverSettings, Stage, Status, Workspace};
+use lpvmpc::{Ocp, Solution, Solver, SolverSettings, Stage, Status};
 use nalgebra::{DMatrix, DVector};
 
 /// A horizon of `horizon` stages that differ in everything.
@@ -105,11 +105,11 @@ fn matches_the_dense_solution<const NX: usize, const NU: usize, const N: usize>(
     rng: &mut Rng,
     horizon: usize,
 ) {
-    let mut workspace = Workspace::<f64, NX, NU, N, 1>::new();
+    let mut solver = Solver::<f64, NX, NU, N, 1>::new();
     let mut solution = Solution::default();
     for _ in 0..10 {
         let ocp = random_ocp::<NX, NU, N>(rng, horizon);
-        workspace.solve(&ocp, &SolverSettings::default(), &mut solution);
+        solver.solve(&ocp, &SolverSettings::default(), &mut solution);
         assert_eq!(solution.status, Status::Solved);
         assert_eq!(solution.changes, 0);
         let (z, cost, condition) = Dense::new(&ocp).solve();

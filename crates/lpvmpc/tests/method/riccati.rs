@@ -2,7 +2,7 @@
 
 use crate::rng::Rng;
 use lpvmpc::riccati::{BadPivot, CostToGo, StageFactor};
-use lpvmpc::{Ocp, Solution, SolverSettings, Stage, Status, Workspace};
+use lpvmpc::{Ocp, Solution, Solver, SolverSettings, Stage, Status};
 use nalgebra::{Matrix1, Matrix2, SMatrix, SVector, Vector1};
 
 /// A stage and the cost-to-go behind it.
@@ -271,7 +271,7 @@ fn the_solver_names_stage_and_pivot() {
     // P is 0 behind stage 2, so its R is the pivot.
     ocp.stages[2].r = Matrix1::new(-0.25);
     let mut solution = Solution::<f64, 1, 1, 5, 1>::default();
-    Workspace::new().solve(&ocp, &SolverSettings::default(), &mut solution);
+    Solver::new().solve(&ocp, &SolverSettings::default(), &mut solution);
     let expected = Status::NumericalFailure {
         stage: 2,
         pivot: -0.25,

@@ -6,7 +6,7 @@ pub mod least_distance;
 pub mod problems;
 pub mod rng;
 
-use lpvmpc::{Ocp, Solution, SolverSettings, Status, WarmStart, Workspace};
+use lpvmpc::{Ocp, Solution, Solver, SolverSettings, Status, WarmStart};
 
 /// `work` on a thread with a stack large enough for the longest horizons.
 pub fn on_large_stack<R: Send + 'static>(work: impl FnOnce() -> R + Send + 'static) -> R {
@@ -30,9 +30,9 @@ pub fn cold() -> SolverSettings<f64> {
 pub fn solve<const NX: usize, const NU: usize, const N: usize, const M: usize, const NG: usize>(
     ocp: &Ocp<f64, NX, NU, N, NG>,
 ) -> Solution<f64, NX, NU, N, M> {
-    let mut workspace = Box::new(Workspace::new());
+    let mut solver = Box::new(Solver::new());
     let mut solution = Solution::default();
-    workspace.solve(ocp, &cold(), &mut solution);
+    solver.solve(ocp, &cold(), &mut solution);
     solution
 }
 

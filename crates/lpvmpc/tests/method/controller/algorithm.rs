@@ -19,11 +19,12 @@ fn plant_moves(x: &Vector4<f64>, u: &Vector1<f64>) -> Vector4<f64> {
 /// Asserts that the program's matrices are those of the scheduling `window`.
 fn assert_window<const N: usize, const M: usize>(
     controller: &Sized<N, M>,
+    workspace: &Memory<N, M>,
     window: &[Vector2<f64>],
 ) {
     let plant = CartPole::laboratory();
     let t_s = controller.settings().t_s;
-    for (stage, scheduling) in controller.ocp().stages.iter().zip(window) {
+    for (stage, scheduling) in workspace.ocp().stages.iter().zip(window) {
         let (a, b) = plant.matrices(scheduling);
         let (a, b) = controller.settings().predictor.discretize(&a, &b, t_s);
         // The rollouts agree to rounding, and so do the matrices.
@@ -48,8 +49,8 @@ fn the_scheduling_is_that_of_the_last_rollout_one_stage_on() {
         let reference = moving_reference(k);
         let plan = controller.step(&x, &reference, &mut workspace).clone();
         assert_eq!(plan.status, Status::Solved);
-        assert_eq!(controller.ocp().x0, x);
-        assert_window(&controller, &window);
+        assert_eq!(workspace.ocp().x0, x);
+        assert_window(&controller, &workspace, &window);
 
         let mut state = x;
         for (i, u) in plan.u.iter().enumerate() {
@@ -75,7 +76,7 @@ fn held_scheduling_stays() {
     let mut x = tilted();
     for k in 0..10 {
         let u = controller.step(&x, &moving_reference(k), &mut workspace).u[0];
-        assert_window(&controller, &[held; N]);
+        assert_window(&controller, &workspace, &[held; N]);
         x = plant_moves(&x, &u);
     }
 }
@@ -93,7 +94,7 @@ fn the_plan_is_the_optimum_of_the_program() {
         let plan = controller
             .step(&x, &moving_reference(k), &mut workspace)
             .clone();
-        let residual = kkt_residual(controller.ocp(), &plan);
+        let residual = kkt_residual(workspace.ocp(), &plan);
         // Relative to the largest term; the solver's own tolerance is 4e-11.
         assert!(residual.largest() <= 1e-9, "sample {k}: {residual:?}");
         most_active = most_active.max(plan.active.len());
@@ -124,7 +125,7 @@ fn the_tracking_cost_is_twice_the_programs_plus_the_constant() {
                 TerminalIngredient::Equality => 0.0,
             };
             let constant = stages.sum::<f64>() + end;
-            let found = controller.tracking_cost(&reference);
+            let found = controller.tracking_cost(&x, &reference);
             let expected = 2.0 * plan.cost + constant;
             // The terms cancel where the tracking is good: rounding is relative to the constant.
             assert!(
@@ -213,7 +214,10 @@ fn a_short_horizon_is_that_of_a_smaller_controller() {
         assert_eq!(found.active, expected.active);
         assert_eq!(found.changes, expected.changes);
         assert_eq!(long.rollout(), short.rollout());
-        assert_eq!(long.tracking_cost(&padded), short.tracking_cost(&reference));
+        assert_eq!(
+            long.tracking_cost(&x, &padded),
+            short.tracking_cost(&x, &reference)
+        );
         x = plant_moves(&x, &expected.u[0]);
     }
 }

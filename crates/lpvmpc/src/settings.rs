@@ -1,0 +1,201 @@
+//! What defines a controller besides its model, and what can be wrong with it.
+
+use crate::model::Scalar;
+use crate::ocp::Bounds;
+use crate::predictor::Rk4;
+use crate::solver::SolverSettings;
+use core::fmt;
+use nalgebra::{Cholesky, Const, SMatrix, SVector, convert};
+
+/// Weights of the cost sum ||x - x_ref||_Q^2 + ||u||_R^2 (eq. (7) of the paper).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weights<T, const NX: usize, const NU: usize> {
+    /// Q, `NX` x `NX`, symmetric positive semidefinite.
+    pub q: SMatrix<T, NX, NX>,
+    /// R, `NU` x `NU`, symmetric positive definite.
+    pub r: SMatrix<T, NU, NU>,
+}
+
+/// What stands at the end of the horizon.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TerminalIngredient<T, const NX: usize> {
+    /// The cost ||x_N - x_ref||_P^2 with P symmetric positive semidefinite.
+    Cost(SMatrix<T, NX, NX>),
+    /// x_N = x_ref, without terminal cost (eq. (9) of the paper).
+    Equality,
+}
+
+/// Where the predictor's scheduling comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Scheduling<T, const NS: usize> {
+    /// From the nonlinear rollout of the previous plan (Algorithm 2): LPV MPC.
+    Predicted,
+    /// Constant: linear MPC, the paper's comparison, with the scheduling of the equilibrium.
+    Held(SVector<T, NS>),
+}
+
+/// Everything that defines a controller besides its model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ControllerSettings<T, const NX: usize, const NU: usize, const NS: usize> {
+    /// Sampling time in seconds.
+    pub t_s: T,
+    /// Prediction horizon in samples, from 1 to the controller's `N`.
+    pub horizon: usize,
+    /// The discrete-time predictor.
+    pub predictor: Rk4,
+    /// Stage weights.
+    pub weights: Weights<T, NX, NU>,
+    /// Terminal ingredient.
+    pub terminal: TerminalIngredient<T, NX>,
+    /// State bounds, at the stages 1 to N.
+    pub x: Bounds<T, NX>,
+    /// Input bounds, at the stages 0 to N - 1.
+    pub u: Bounds<T, NU>,
+    /// Where the scheduling comes from.
+    pub scheduling: Scheduling<T, NS>,
+    /// Settings of the solver.
+    pub solver: SolverSettings<T>,
+}
+
+/// A mistake in the [`ControllerSettings`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ControllerError {
+    /// The sampling time is not a positive number.
+    SamplingTime,
+    /// The horizon is not between 1 and the largest that the controller is made for.
+    Horizon {
+        /// What was asked for.
+        given: usize,
+        /// The largest possible.
+        largest: usize,
+    },
+    /// The predictor needs at least one sub-step.
+    Substeps,
+    /// A weight contains a number that is not finite, or is not symmetric: its name.
+    WeightEntries(&'static str),
+    /// A weight is not positive definite (R) or semidefinite (Q, P): its name.
+    WeightSign(&'static str),
+    /// A lower bound above its upper bound, or not a number: the quantity and its component.
+    Bounds {
+        /// "state" or "input".
+        quantity: &'static str,
+        /// Component, from 0.
+        component: usize,
+    },
+    /// The constant scheduling contains a number that is not finite.
+    HeldScheduling,
+    /// The solver's tolerance is not a positive number.
+    Tolerance,
+}
+
+impl fmt::Display for ControllerError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::SamplingTime => {
+                write!(f, "the sampling time must be a positive number of seconds")
+            }
+            Self::Horizon { given, largest } => {
+                write!(
+                    f,
+                    "the horizon is {given}; it must be from 1 to {largest} samples"
+                )
+            }
+            Self::Substeps => write!(f, "the predictor needs at least one sub-step per sample"),
+            Self::WeightEntries(name) => {
+                write!(f, "the weight {name} must be symmetric with finite entries")
+            }
+            Self::WeightSign("R") => write!(f, "the weight R must be positive definite"),
+            Self::WeightSign(name) => {
+                write!(f, "the weight {name} must be positive semidefinite")
+            }
+            Self::Bounds {
+                quantity,
+                component,
+            } => write!(
+                f,
+                "the lower bound of {quantity} {component} must not exceed its upper bound"
+            ),
+            Self::HeldScheduling => write!(f, "the held scheduling must be finite"),
+            Self::Tolerance => write!(f, "the solver's tolerance must be a positive number"),
+        }
+    }
+}
+
+impl core::error::Error for ControllerError {}
+
+/// The first setting that makes no sense for a controller of at most `largest` samples.
+pub(crate) fn check<T: Scalar, const NX: usize, const NU: usize, const NS: usize>(
+    settings: &ControllerSettings<T, NX, NU, NS>,
+    largest: usize,
+) -> Result<(), ControllerError> {
+    if !(settings.t_s > T::zero() && settings.t_s.is_finite()) {
+        return Err(ControllerError::SamplingTime);
+    }
+    if settings.horizon == 0 || settings.horizon > largest {
+        return Err(ControllerError::Horizon {
+            given: settings.horizon,
+            largest,
+        });
+    }
+    if settings.predictor.substeps == 0 {
+        return Err(ControllerError::Substeps);
+    }
+    let tolerance = settings.solver.tolerance;
+    if !(tolerance > T::zero() && tolerance.is_finite()) {
+        return Err(ControllerError::Tolerance);
+    }
+    check_weight(&settings.weights.q, "Q", T::default_epsilon())?;
+    check_weight(&settings.weights.r, "R", T::zero())?;
+    if let TerminalIngredient::Cost(p) = &settings.terminal {
+        check_weight(p, "P", T::default_epsilon())?;
+    }
+    check_bounds(&settings.x, "state")?;
+    check_bounds(&settings.u, "input")?;
+    match settings.scheduling {
+        Scheduling::Held(held) if !held.iter().all(|entry| entry.is_finite()) => {
+            Err(ControllerError::HeldScheduling)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Symmetric, finite, and positive definite after adding `shift` times its size.
+fn check_weight<T: Scalar, const K: usize>(
+    weight: &SMatrix<T, K, K>,
+    name: &'static str,
+    shift: T,
+) -> Result<(), ControllerError> {
+    let size = weight.amax();
+    let asymmetry = (weight - weight.transpose()).amax();
+    let rounding: T = convert::<f64, T>(1e3) * T::default_epsilon() * size;
+    let finite = weight.iter().all(|entry| entry.is_finite());
+    if !(finite && asymmetry <= rounding) {
+        return Err(ControllerError::WeightEntries(name));
+    }
+    // Semidefinite up to rounding: a tiny multiple of the identity makes it definite.
+    let scale = if size > T::zero() { size } else { T::one() };
+    let lifted =
+        weight + SMatrix::identity() * (shift * scale * convert::<f64, T>(10.0 * K as f64));
+    match Cholesky::<T, Const<K>>::new(lifted) {
+        Some(_) => Ok(()),
+        None => Err(ControllerError::WeightSign(name)),
+    }
+}
+
+fn check_bounds<T: Scalar, const K: usize>(
+    bounds: &Bounds<T, K>,
+    quantity: &'static str,
+) -> Result<(), ControllerError> {
+    let infinity: T = convert(f64::INFINITY);
+    let sides = bounds.lower.iter().zip(bounds.upper.iter());
+    for (component, (lower, upper)) in sides.enumerate() {
+        // Negated, so that a bound that is not a number fails.
+        if !(*lower <= *upper && *lower < infinity && *upper > -infinity) {
+            return Err(ControllerError::Bounds {
+                quantity,
+                component,
+            });
+        }
+    }
+    Ok(())
+}
