@@ -9,7 +9,8 @@ use nalgebra::{Matrix3, Vector3, convert};
 /// torques are (tau_1, tau_2, tau_3) in N m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wheels<T> {
-    zenith_angle: T,
+    /// Sine and cosine of the zenith angle.
+    sin_cos: (T, T),
 }
 
 /// The zenith angle is not strictly between 0 and pi/2, where the torque map has an inverse.
@@ -36,7 +37,9 @@ impl<T: Scalar> Wheels<T> {
     /// [`BadZenithAngle`] outside the open interval from 0 to pi/2.
     pub fn new(zenith_angle: T) -> Result<Self, BadZenithAngle<T>> {
         if zenith_angle > T::zero() && zenith_angle < T::frac_pi_2() {
-            Ok(Self { zenith_angle })
+            Ok(Self {
+                sin_cos: zenith_angle.sin_cos(),
+            })
         } else {
             Err(BadZenithAngle(zenith_angle))
         }
@@ -45,7 +48,7 @@ impl<T: Scalar> Wheels<T> {
     /// The paper's robot: pi/4.
     pub fn paper() -> Self {
         Self {
-            zenith_angle: T::frac_pi_4(),
+            sin_cos: T::frac_pi_4().sin_cos(),
         }
     }
 
@@ -56,7 +59,7 @@ impl<T: Scalar> Wheels<T> {
 
     /// The virtual torques that the motors' torques amount to.
     pub fn virtual_torques(&self, motors: &Vector3<T>) -> Vector3<T> {
-        let (sin, cos) = self.zenith_angle.sin_cos();
+        let (sin, cos) = self.sin_cos;
         let half: T = convert(0.5);
         let root = half * convert::<f64, T>(3.0).sqrt();
         #[rustfmt::skip]
@@ -70,7 +73,7 @@ impl<T: Scalar> Wheels<T> {
 
     /// The torque map of eq. (6), 3 x 3.
     pub fn matrix(&self) -> Matrix3<T> {
-        let (sin, cos) = self.zenith_angle.sin_cos();
+        let (sin, cos) = self.sin_cos;
         let third: T = convert(1.0 / 3.0);
         let tilt = third / cos;
         let side = tilt * convert::<f64, T>(3.0).sqrt();

@@ -2,7 +2,7 @@
 
 use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
-use crate::ocp::{Bounds, Ocp};
+use crate::ocp::{Ocp, Stage};
 use crate::settings::{
     ControllerError, ControllerSettings, Scheduling, TerminalIngredient, Weights, check,
 };
@@ -37,14 +37,8 @@ impl<T: Scalar, const NX: usize, const N: usize> Reference<T, NX, N> {
 #[derive(Clone, Debug)]
 pub struct Workspace<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
     ocp: Ocp<T, NX, NU, N>,
-    /// What of the program does not change from sample to sample, as it stands in `ocp`.
-    constant: Option<Constant<T, NX, NU>>,
     solver: Solver<T, NX, NU, N, M>,
 }
-
-/// Weights, state bounds and input bounds of all stages.
-type Constant<T, const NX: usize, const NU: usize> =
-    (Weights<T, NX, NU>, Bounds<T, NX>, Bounds<T, NU>);
 
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
     Workspace<T, NX, NU, N, M>
@@ -53,7 +47,6 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
     pub fn new() -> Self {
         Self {
             ocp: Ocp::default(),
-            constant: None,
             solver: Solver::new(),
         }
     }
@@ -63,18 +56,21 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         &self.ocp
     }
 
-    /// Writes weights and bounds into the program, unless they stand there already.
+    /// Writes weights and bounds into the program, unless they stand there already: they are
+    /// the same at all stages.
     fn pose<const NS: usize>(&mut self, settings: &ControllerSettings<T, NX, NU, NS>) {
-        let constant = (settings.weights, settings.x, settings.u);
-        if self.constant.as_ref() != Some(&constant) {
+        let ControllerSettings { weights, x, u, .. } = settings;
+        let same = |stage: &Stage<T, NX, NU>| {
+            stage.q == weights.q && stage.r == weights.r && stage.x == *x && stage.u == *u
+        };
+        if !self.ocp.stages.first().is_some_and(same) {
             for stage in &mut self.ocp.stages {
-                stage.q = settings.weights.q;
-                stage.r = settings.weights.r;
-                stage.x = settings.x;
-                stage.u = settings.u;
+                stage.q = weights.q;
+                stage.r = weights.r;
+                stage.x = *x;
+                stage.u = *u;
             }
-            self.ocp.terminal.x = settings.x;
-            self.constant = Some(constant);
+            self.ocp.terminal.x = *x;
         }
     }
 }

@@ -10,9 +10,9 @@ use nalgebra::{SMatrix, SVector, convert};
 /// then holds whenever it can (Nocedal and Wright, Numerical Optimization, ch. 17.2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Penalty<T> {
-    /// Cost per unit of excess, >= 0.
+    /// Cost per unit of excess, >= 0 and finite.
     pub linear: T,
-    /// Curvature of the cost of the excess, >= 0.
+    /// Curvature of the cost of the excess, >= 0 and finite.
     pub quadratic: T,
 }
 

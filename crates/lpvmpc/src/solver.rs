@@ -12,8 +12,9 @@ use nalgebra::{SVector, convert};
 /// Settings of the solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolverSettings<T> {
-    /// A bound may be violated by this much, relative to its own size. Default: eps^(2/3) of
-    /// the number type, 4e-11 for `f64` and 2e-5 for `f32`. Where bounds depend on each other
+    /// A bound may be violated by this much, relative to its own size. Default, also in place of
+    /// what is no positive number: eps^(2/3) of the number type, 4e-11 for `f64` and 2e-5 for
+    /// `f32`. Where bounds depend on each other
     /// so strongly that rounding decides, sqrt(eps) is let through (1.5e-8 and 3.5e-4); an
     /// input is within its bounds to the last bit all the same.
     pub tolerance: T,
@@ -34,10 +35,14 @@ pub enum WarmStart {
     Shifted,
 }
 
+fn default_tolerance<T: Scalar>() -> T {
+    T::default_epsilon().powf(convert(2.0 / 3.0))
+}
+
 impl<T: Scalar> Default for SolverSettings<T> {
     fn default() -> Self {
         Self {
-            tolerance: T::default_epsilon().powf(convert(2.0 / 3.0)),
+            tolerance: default_tolerance(),
             max_changes: 500,
             warm_start: WarmStart::Shifted,
         }
@@ -96,7 +101,11 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU, N, M>,
     ) -> Result<(), Status<T>> {
-        self.dual.reset(settings.tolerance, settings.max_changes);
+        let tolerance = Some(settings.tolerance).filter(|t| *t > T::zero() && t.is_finite());
+        self.dual.reset(
+            tolerance.unwrap_or_else(default_tolerance),
+            settings.max_changes,
+        );
         self.factorize(ocp)?;
         self.roll_out(ocp, solution)?;
         if ocp.terminal.equality.is_some() {

@@ -276,3 +276,37 @@ fn single_precision_is_close_to_double() {
         x = plant_moves(&x, &u);
     }
 }
+
+/// One workspace for two controllers with other weights, bounds, ends and horizons leaves no
+/// trace of the one in the plan of the other.
+#[test]
+fn controllers_that_share_a_workspace_do_not_see_each_other() {
+    const N: usize = 12;
+    let other = ControllerSettings {
+        horizon: N - 4,
+        weights: Weights {
+            q: settings(N).weights.q * 3.0,
+            r: settings(N).weights.r * 0.5,
+        },
+        terminal: TerminalIngredient::Equality,
+        u: Bounds {
+            lower: Vector1::new(-50.0),
+            upper: Vector1::new(60.0),
+        },
+        ..settings(N)
+    };
+    let mut alone: [Sized<N, { N + 4 }>; 2] = [controller(settings(N)), controller(other)];
+    let mut together = alone.clone();
+    let mut own = [Memory::new(), Memory::new()];
+    let mut shared = Memory::new();
+    let x = Vector4::new(0.05, 0.02, 0.3, 0.0);
+    for k in 0..4 {
+        let reference = moving_reference(k);
+        for (i, memory) in own.iter_mut().enumerate() {
+            let expected = alone[i].step(&x, &reference, memory);
+            let found = together[i].step(&x, &reference, &mut shared);
+            assert_eq!(found, expected, "controller {i}, sample {k}");
+            assert!(found.status.is_solved());
+        }
+    }
+}
