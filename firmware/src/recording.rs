@@ -3,7 +3,8 @@
 use crate::{N, Reference};
 use ballbot::Ballbot;
 use lpvmpc::{
-    Bounds, ControllerSettings, Rk4, Scheduling, SolverSettings, TerminalIngredient, Weights,
+    Bounds, ControllerSettings, Iterations, Predictor, Rk4, Scheduling, SolverSettings,
+    TerminalIngredient, Weights,
 };
 use nalgebra::{Matrix1, Matrix4, Vector1, Vector4};
 
@@ -54,9 +55,9 @@ impl Recording {
         ControllerSettings {
             t_s: self.t_s,
             horizon: self.horizon,
-            predictor: Rk4 {
+            predictor: Predictor::FrozenRk4(Rk4 {
                 substeps: self.substeps,
-            },
+            }),
             weights: Weights {
                 q: Matrix4::from_diagonal(&Vector4::from(self.q)),
                 r: Matrix1::new(self.r),
@@ -68,6 +69,7 @@ impl Recording {
             },
             u: Bounds { lower, upper },
             scheduling: Scheduling::Predicted,
+            iterations: Iterations::Fixed(1),
             solver: SolverSettings::default(),
         }
     }

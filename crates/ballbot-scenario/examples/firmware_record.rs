@@ -87,7 +87,7 @@ fn write_settings(text: &mut String, prepared: &Prepared) -> Result<(), Box<dyn 
     };
     writeln!(text, "    t_s: {},", literal(settings.t_s))?;
     writeln!(text, "    horizon: {},", settings.horizon)?;
-    writeln!(text, "    substeps: {},", settings.predictor.substeps)?;
+    writeln!(text, "    substeps: {},", settings.predictor.rk4().substeps)?;
     writeln!(
         text,
         "    q: {},",

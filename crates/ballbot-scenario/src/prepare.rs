@@ -9,8 +9,8 @@ use crate::schema::{
 use crate::{builtin, run::LONGEST_HORIZON};
 use ballbot::{Ballbot, Geometry, LinearParameters, Wheels};
 use lpvmpc::{
-    Bounds, ControllerSettings, LpvModel, Rk4, Scheduling, SolverSettings, TerminalIngredient,
-    Weights,
+    Bounds, ControllerSettings, Iterations, LpvModel, Predictor, Rk4, Scheduling, SolverSettings,
+    TerminalIngredient, Weights,
 };
 use lpvmpc_sim::Tolerances;
 use nalgebra::{DMatrix, Matrix1, Matrix4, Vector1, Vector2, Vector4};
@@ -340,21 +340,31 @@ impl ControllerTable {
             x,
             u,
             scheduling,
+            iterations: Iterations::Fixed(1),
             solver: SolverSettings::default(),
         })
     }
 
-    fn predictor(&self, upright: &Matrix4<f64>) -> Result<Rk4, ScenarioError> {
+    fn predictor(&self, upright: &Matrix4<f64>) -> Result<Predictor, ScenarioError> {
         let a = dynamic(upright);
-        let substeps = match self.predictor {
-            Some(PredictorTable::Rk4 { substeps: 0 }) => {
+        let default = PredictorTable::StageConsistent { substeps: None };
+        let table = self.predictor.unwrap_or(default);
+        let (kind, given, key): (fn(Rk4) -> Predictor, _, _) = match table {
+            PredictorTable::Rk4 { substeps } => (Predictor::FrozenRk4, Some(substeps), "rk4"),
+            PredictorTable::Exact { substeps } => (Predictor::FrozenExact, substeps, "exact"),
+            PredictorTable::StageConsistent { substeps } => {
+                (Predictor::StageConsistent, substeps, "stage_consistent")
+            }
+        };
+        let substeps = match given {
+            Some(0) => {
                 return Err(ScenarioError::value(
-                    "controller.predictor.rk4.substeps",
+                    format!("controller.predictor.{key}.substeps"),
                     0,
                     "at least one step per sample is needed",
                 ));
             }
-            Some(PredictorTable::Rk4 { substeps }) => substeps,
+            Some(substeps) => substeps,
             None => {
                 let poles = lpvmpc_design::poles(&a).map_err(|error| {
                     ScenarioError::value("parameters", "(all)", error.to_string())
@@ -364,14 +374,14 @@ impl ControllerTable {
             }
         };
         lpvmpc_design::check_rk4_step(&a, self.t_s, substeps)?;
-        Ok(Rk4 { substeps })
+        Ok(kind(Rk4 { substeps }))
     }
 
     fn terminal(
         &self,
         (a, b): (Matrix4<f64>, Vector4<f64>),
         weights: &Weights<f64, 4, 1>,
-        predictor: Rk4,
+        predictor: Predictor,
     ) -> Result<TerminalIngredient<f64, 4>, ScenarioError> {
         let q = dynamic(&weights.q);
         let r = DMatrix::from_element(1, 1, weights.r[0]);

@@ -93,7 +93,7 @@ pub struct ControllerTable {
     /// The end of the horizon.
     #[serde(default)]
     pub terminal: TerminalTable,
-    /// The discrete-time predictor; chosen from the fastest pole when absent.
+    /// The discrete-time predictor; stage-consistent when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predictor: Option<PredictorTable>,
 }
@@ -138,10 +138,23 @@ pub enum TerminalTable {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum PredictorTable {
-    /// Runge-Kutta of order four with the scheduling frozen over the sample.
+    /// The paper's: Runge-Kutta of order four with the scheduling frozen over the sample.
     Rk4 {
         /// Steps per sample.
         substeps: usize,
+    },
+    /// The matrix exponential, with the scheduling frozen over the sample.
+    Exact {
+        /// Runge-Kutta steps per sample of the nonlinear rollout; chosen from the fastest pole
+        /// when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        substeps: Option<usize>,
+    },
+    /// Runge-Kutta of order four with the scheduling of every stage of every step.
+    StageConsistent {
+        /// Steps per sample; chosen from the fastest pole when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        substeps: Option<usize>,
     },
 }
 

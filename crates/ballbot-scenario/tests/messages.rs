@@ -148,7 +148,7 @@ fn sampling_time_too_long_for_the_predictor() {
     scenario.controller.t_s = 0.06;
     scenario.controller.predictor = None;
     let prepared = scenario.prepare(Path::new(".")).expect("valid");
-    assert!(prepared.settings.predictor.substeps > 1);
+    assert!(prepared.settings.predictor.rk4().substeps > 1);
 }
 
 #[test]

@@ -6,8 +6,8 @@
 
 use ballbot::{Ballbot, limits};
 use lpvmpc::{
-    Bounds, Controller, ControllerSettings, LpvModel, Quantity, Rk4, Scheduling, Side,
-    SolverSettings, Status, TerminalIngredient, Weights, Workspace,
+    Bounds, Controller, ControllerSettings, Iterations, LpvModel, Predictor, Quantity, Rk4,
+    Scheduling, Side, SolverSettings, Status, TerminalIngredient, Weights, Workspace,
 };
 use lpvmpc_sim::{Ending, Experiment, PlantError, Tolerances, Trajectory, run};
 use nalgebra::{Matrix1, Matrix2, Matrix4, Vector1, Vector2, Vector4};
@@ -67,7 +67,7 @@ fn run_mass<P: LpvModel<f64, 2, 1, 1>>(
     let settings = ControllerSettings {
         t_s: T_S,
         horizon: 10,
-        predictor: Rk4 { substeps: 1 },
+        predictor: Predictor::FrozenRk4(Rk4 { substeps: 1 }),
         weights: Weights {
             q: Matrix2::from_diagonal(&Vector2::new(1.0, 0.1)),
             r: Matrix1::new(0.01),
@@ -82,6 +82,7 @@ fn run_mass<P: LpvModel<f64, 2, 1, 1>>(
             upper: Vector1::new(2.0),
         },
         scheduling: Scheduling::Predicted,
+        iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),
     };
     let mut controller = Controller::<_, f64, 2, 1, 1, 10, 20>::new(Mass, settings).unwrap();
@@ -303,7 +304,7 @@ fn ballbot_controller() -> Controller<Ballbot<f64>, f64, 4, 1, 2, 20, 24> {
     let settings = ControllerSettings {
         t_s: 0.05,
         horizon: 20,
-        predictor: Rk4 { substeps: 2 },
+        predictor: Predictor::FrozenRk4(Rk4 { substeps: 2 }),
         weights: Weights {
             q: Matrix4::from_diagonal(&Vector4::new(200.0, 1.0, 0.1, 0.1)),
             r: Matrix1::new(1000.0),
@@ -320,6 +321,7 @@ fn ballbot_controller() -> Controller<Ballbot<f64>, f64, 4, 1, 2, 20, 24> {
             upper: Vector1::new(0.5),
         },
         scheduling: Scheduling::Predicted,
+        iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),
     };
     Controller::new(Ballbot::paper(), settings).unwrap()

@@ -3,11 +3,12 @@
 use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Ocp, Stage};
+use crate::relaxation::Relaxation;
 use crate::settings::{
     ControllerError, ControllerSettings, Scheduling, TerminalIngredient, Weights, check,
 };
 use crate::solution::Solution;
-use crate::solver::Solver;
+use crate::solver::{Solver, SolverSettings, WarmStart};
 use nalgebra::{SMatrix, SVector};
 
 /// The state reference along the horizon, in state units.
@@ -104,6 +105,8 @@ pub struct Controller<
     /// stages 0 to N - 1 are expected to be.
     rollout: [SVector<T, NX>; N],
     initialised: bool,
+    /// Quadratic programs that the last step solved.
+    problems: usize,
     solution: Solution<T, NX, NU, N, M>,
 }
 
@@ -127,6 +130,7 @@ where
             settings,
             rollout: [SVector::zeros(); N],
             initialised: false,
+            problems: 0,
             solution: Solution::default(),
         })
     }
@@ -148,6 +152,7 @@ where
         self.track(reference, ocp);
         solver.solve(ocp, &self.settings.solver, &mut self.solution);
         self.roll_out(x);
+        self.iterate(x, workspace);
         &self.solution
     }
 
@@ -160,6 +165,18 @@ where
     /// The plan of the last step.
     pub fn solution(&self) -> &Solution<T, NX, NU, N, M> {
         &self.solution
+    }
+
+    /// How many quadratic programs the last step solved.
+    pub fn problems(&self) -> usize {
+        self.problems
+    }
+
+    /// Rolled-out minus predicted state at the end of the last plan's horizon, in state units:
+    /// how far the nonlinear model ends from where the quadratic program expects it.
+    pub fn gap(&self) -> SVector<T, NX> {
+        let end = self.settings.horizon - 1;
+        self.rollout[end] - self.solution.x[end]
     }
 
     /// The settings.
@@ -193,10 +210,11 @@ where
         }
     }
 
-    /// Algorithm 2, step 1: without a past, the whole window has the scheduling of `x`.
+    /// Algorithm 2, step 1: without a past, the plant is expected to stay at `x`.
     fn initialise_scheduling(&mut self, x: &SVector<T, NX>) {
         if !self.initialised {
             self.rollout = [*x; N];
+            self.solution.u = [SVector::zeros(); N];
         }
     }
 
@@ -205,22 +223,73 @@ where
     // Not inlined, so that each loop has the registers for itself: a tenth of the step's time.
     #[inline(never)]
     fn predict(&self, x: &SVector<T, NX>, ocp: &mut Ocp<T, NX, NU, N>) {
-        let ControllerSettings {
-            t_s,
-            predictor,
-            scheduling,
-            ..
-        } = &self.settings;
         ocp.horizon = self.settings.horizon;
         ocp.x0 = *x;
-        let window = ocp.stages.iter_mut().zip(&self.rollout);
-        for (stage, x) in window.take(self.settings.horizon) {
-            let scheduling = match scheduling {
-                Scheduling::Predicted => self.model.scheduling(x),
-                Scheduling::Held(held) => *held,
-            };
-            let (a, b) = self.model.matrices(&scheduling);
-            (stage.a, stage.b) = predictor.discretize(&a, &b, *t_s);
+        // The window's inputs are the last plan's from the second on; the last one is repeated.
+        let inputs = self.solution.u.iter().take(self.settings.horizon);
+        let inputs = inputs.clone().skip(1).chain(inputs.last());
+        let window = self.rollout.iter().zip(inputs);
+        for (stage, (x, u)) in ocp.stages.iter_mut().zip(window) {
+            self.linearize(x, u, stage);
+        }
+    }
+
+    #[inline(always)]
+    fn linearize(&self, x: &SVector<T, NX>, u: &SVector<T, NU>, stage: &mut Stage<T, NX, NU>) {
+        let ControllerSettings { t_s, predictor, .. } = &self.settings;
+        (stage.a, stage.b) = match &self.settings.scheduling {
+            Scheduling::Predicted => predictor.linearize(&self.model, x, u, *t_s),
+            Scheduling::Held(held) => {
+                let (a, b) = self.model.matrices(held);
+                predictor.discretize(&a, &b, *t_s)
+            }
+        };
+    }
+
+    /// The further quadratic programs of the sample, each along the relaxed plan of the one
+    /// before. The plan is the last program's.
+    fn iterate(&mut self, x: &SVector<T, NX>, workspace: &mut Workspace<T, NX, NU, N, M>) {
+        self.problems = 1;
+        let most = self.settings.iterations.most();
+        if most == 1 || !self.solution.status.is_solved() {
+            return;
+        }
+        let Workspace { ocp, solver } = workspace;
+        let settings = SolverSettings {
+            warm_start: WarmStart::Same,
+            ..self.settings.solver
+        };
+        let mut relaxation = Relaxation::new();
+        let mut inputs = self.solution.u;
+        while self.problems < most {
+            self.predict_again(x, &inputs, ocp);
+            solver.solve(ocp, &settings, &mut self.solution);
+            self.problems += 1;
+            let change = relaxation.advance(&mut inputs, &self.solution.u);
+            let largest = inputs.iter().fold(T::zero(), |m, u| m.max(u.amax()));
+            if change <= self.settings.iterations.tolerance() * largest
+                || !self.solution.status.is_solved()
+            {
+                break;
+            }
+            let plan = core::mem::replace(&mut self.solution.u, inputs);
+            self.roll_out(x);
+            self.solution.u = plan;
+        }
+        self.roll_out(x);
+    }
+
+    /// The predictor's matrices along the rollout of `inputs` from `x`, which is the last one.
+    fn predict_again(
+        &self,
+        x: &SVector<T, NX>,
+        inputs: &[SVector<T, NU>; N],
+        ocp: &mut Ocp<T, NX, NU, N>,
+    ) {
+        let states = core::iter::once(x).chain(&self.rollout);
+        let window = states.zip(inputs).take(self.settings.horizon);
+        for (stage, (x, u)) in ocp.stages.iter_mut().zip(window) {
+            self.linearize(x, u, stage);
         }
     }
 
@@ -249,7 +318,7 @@ where
         let mut state = *x;
         let places = self.rollout.iter_mut().zip(&self.solution.u);
         for (place, u) in places.take(self.settings.horizon) {
-            state = predictor.advance(&self.model, &state, u, *t_s);
+            state = predictor.rk4().advance(&self.model, &state, u, *t_s);
             *place = state;
         }
         // A rollout that left the numbers is no past to build on.

@@ -12,6 +12,7 @@ mod kkt;
 mod model;
 mod ocp;
 mod predictor;
+mod relaxation;
 pub mod riccati;
 mod rows;
 mod settings;
@@ -24,7 +25,9 @@ pub use controller::{Controller, Reference, Workspace};
 pub use kkt::{KktResidual, kkt_residual};
 pub use model::{LpvModel, Scalar};
 pub use ocp::{Bounds, Ocp, Penalty, Softness, Stage, Terminal};
-pub use predictor::Rk4;
-pub use settings::{ControllerError, ControllerSettings, Scheduling, TerminalIngredient, Weights};
+pub use predictor::{Predictor, Rk4};
+pub use settings::{
+    ControllerError, ControllerSettings, Iterations, Scheduling, TerminalIngredient, Weights,
+};
 pub use solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
 pub use solver::{Solver, SolverSettings, WarmStart, cost};

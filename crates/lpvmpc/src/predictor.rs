@@ -1,12 +1,75 @@
-//! The discrete-time predictor: classical Runge-Kutta of order four under zero-order hold.
+//! The discrete-time predictor under zero-order hold: from the continuous-time LPV model to
+//! x_{k+1} = A_d x_k + B_d u_k.
 //!
-//! The same method in two forms. With the scheduling given it is linear and becomes a pair of
+//! Along the scheduling of an expected trajectory the model is linear and becomes a pair of
 //! matrices (lines 2 to 8 of Algorithm 1); with the scheduling read off the state it is the
 //! nonlinear map of the rollout (eq. (5), step 4 of Algorithm 2).
 
 use crate::kernel::{add_product, product};
 use crate::model::{LpvModel, Scalar};
 use nalgebra::{SMatrix, SVector, convert};
+
+/// How a sample of the model becomes a pair of matrices. Each kind carries the Runge-Kutta steps
+/// of the nonlinear rollout.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Predictor {
+    /// The paper's: Runge-Kutta steps with the scheduling frozen at the sample's beginning. The
+    /// prediction differs from the rollout of the same inputs as far as the scheduling moves
+    /// within a sample, however often the problem is solved again.
+    FrozenRk4(Rk4),
+    /// The exact pair (matrix exponential) of the scheduling frozen at the sample's beginning.
+    FrozenExact(Rk4),
+    /// Runge-Kutta steps with the scheduling that the expected trajectory has at every stage of
+    /// every step: for the expected input the pair reproduces the nonlinear rollout to rounding,
+    /// so that a plan which repeats itself *is* its rollout.
+    StageConsistent(Rk4),
+}
+
+impl Predictor {
+    /// The Runge-Kutta steps of the nonlinear rollout.
+    pub fn rk4(self) -> Rk4 {
+        match self {
+            Self::FrozenRk4(rk4) | Self::FrozenExact(rk4) | Self::StageConsistent(rk4) => rk4,
+        }
+    }
+
+    /// (A_d, B_d) over a sample of `t_s` seconds that is expected to begin at `x` with the input
+    /// `u`.
+    #[inline(always)]
+    pub fn linearize<T, P, const NX: usize, const NU: usize, const NS: usize>(
+        self,
+        model: &P,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+        t_s: T,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>)
+    where
+        T: Scalar,
+        P: LpvModel<T, NX, NU, NS>,
+    {
+        match self {
+            Self::FrozenRk4(_) | Self::FrozenExact(_) => {
+                let (a, b) = model.matrices(&model.scheduling(x));
+                self.discretize(&a, &b, t_s)
+            }
+            Self::StageConsistent(rk4) => rk4.linearize(model, x, u, t_s),
+        }
+    }
+
+    /// (A_d, B_d) over a sample of `t_s` seconds, for the constant continuous-time pair.
+    #[inline(always)]
+    pub fn discretize<T: Scalar, const NX: usize, const NU: usize>(
+        self,
+        a: &SMatrix<T, NX, NX>,
+        b: &SMatrix<T, NX, NU>,
+        t_s: T,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+        match self {
+            Self::FrozenRk4(rk4) | Self::StageConsistent(rk4) => rk4.discretize(a, b, t_s),
+            Self::FrozenExact(_) => exact_hold(a, b, t_s),
+        }
+    }
+}
 
 /// Classical Runge-Kutta method of order four with `substeps` equal steps per sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +99,48 @@ impl Rk4 {
         }
         let (mut a_d, mut b_d) = (a_step, b_step);
         for _ in 1..self.substeps {
+            b_d = product(&a_step, &b_d) + b_step;
+            a_d = product(&a_step, &a_d);
+        }
+        (a_d, b_d)
+    }
+
+    /// A_d x + B_d u = [`Rk4::advance`] at the given `x` and `u`: the steps' matrices with the
+    /// scheduling that the nonlinear steps have at each of their stages.
+    ///
+    /// With A_j, B_j at the scheduling of stage j, the stages' slopes are K_j x + L_j u:
+    /// K_1 = A_1, L_1 = B_1, K_2 = A_2 (I + h/2 K_1), L_2 = B_2 + h/2 A_2 L_1, and so on.
+    // Not inlined, so that the frozen kinds keep the registers.
+    #[inline(never)]
+    pub fn linearize<T, P, const NX: usize, const NU: usize, const NS: usize>(
+        self,
+        model: &P,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+        t_s: T,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>)
+    where
+        T: Scalar,
+        P: LpvModel<T, NX, NU, NS>,
+    {
+        let h = self.step_length(t_s);
+        let [half, third, sixth] =
+            [0.5, 1.0 / 3.0, 1.0 / 6.0].map(|part| h * convert::<f64, T>(part));
+        let (mut a_d, mut b_d) = (SMatrix::identity(), SMatrix::zeros());
+        let mut x = *x;
+        for _ in 0..self.substeps {
+            let (mut a_step, mut b_step) = (SMatrix::identity(), SMatrix::zeros());
+            let (mut k, mut l) = (SMatrix::zeros(), SMatrix::zeros());
+            let mut slope = SVector::zeros();
+            let zero = T::zero();
+            for (reach, weight) in [(zero, sixth), (half, third), (half, third), (h, sixth)] {
+                let (a, b) = model.matrices(&model.scheduling(&(x + slope * reach)));
+                (k, l) = (a + product(&a, &(k * reach)), b + product(&a, &(l * reach)));
+                slope = k * x + l * u;
+                a_step += k * weight;
+                b_step += l * weight;
+            }
+            x = a_step * x + b_step * u;
             b_d = product(&a_step, &b_d) + b_step;
             a_d = product(&a_step, &a_d);
         }
@@ -94,4 +199,38 @@ fn taylor_step<T: Scalar, const NX: usize, const NU: usize>(
     let mut b_step = b + m_b * half;
     add_product(&mut b_step, &m2, &(b * sixth + m_b * last));
     (a_step, b_step)
+}
+
+/// The matrix exponential's pair: Taylor polynomials of degree 14 for a step so short that what
+/// is left out is below rounding, doubled until the step is `t_s` (Moler and Van Loan, Nineteen
+/// dubious ways to compute the exponential of a matrix, 2003, method 3).
+// Not inlined, so that the other kinds keep the registers.
+#[inline(never)]
+fn exact_hold<T: Scalar, const NX: usize, const NU: usize>(
+    a: &SMatrix<T, NX, NX>,
+    b: &SMatrix<T, NX, NU>,
+    t_s: T,
+) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+    const DEGREE: u32 = 14;
+    const MOST_DOUBLINGS: usize = 64;
+    let half: T = convert(0.5);
+    let mut h = t_s;
+    let mut doublings = 0;
+    while a.norm() * h > half && doublings < MOST_DOUBLINGS {
+        h *= half;
+        doublings += 1;
+    }
+    let m = a * h;
+    let mut a_d = SMatrix::identity();
+    let mut b_d = *b;
+    for k in (1..=DEGREE).rev() {
+        a_d = SMatrix::identity() + product(&m, &a_d) / convert::<f64, T>(f64::from(k));
+        b_d = b + product(&m, &b_d) / convert::<f64, T>(f64::from(k + 1));
+    }
+    b_d *= h;
+    for _ in 0..doublings {
+        b_d += product(&a_d, &b_d);
+        a_d = product(&a_d, &a_d);
+    }
+    (a_d, b_d)
 }

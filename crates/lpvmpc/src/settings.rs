@@ -2,7 +2,7 @@
 
 use crate::model::Scalar;
 use crate::ocp::Bounds;
-use crate::predictor::Rk4;
+use crate::predictor::Predictor;
 use crate::solver::SolverSettings;
 use core::fmt;
 use nalgebra::{Cholesky, Const, SMatrix, SVector, convert};
@@ -34,6 +34,46 @@ pub enum Scheduling<T, const NS: usize> {
     Held(SVector<T, NS>),
 }
 
+/// How many quadratic programs a sample gets. Each one is built along the plan of the one
+/// before; the first, along the last sample's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Iterations<T> {
+    /// So many, at least 1; the paper takes 1.
+    Fixed(usize),
+    /// Until the plan repeats itself.
+    UntilConverged {
+        /// No input changes by more than this, relative to the largest input of the plan.
+        tolerance: T,
+        /// At most so many, at least 1.
+        most: usize,
+    },
+}
+
+impl<T: Scalar> Iterations<T> {
+    /// The largest number.
+    pub(crate) fn most(&self) -> usize {
+        match self {
+            Self::Fixed(most) | Self::UntilConverged { most, .. } => *most,
+        }
+    }
+
+    /// The tolerance; without one, no change is small enough.
+    pub(crate) fn tolerance(&self) -> T {
+        match self {
+            Self::Fixed(_) => -T::one(),
+            Self::UntilConverged { tolerance, .. } => *tolerance,
+        }
+    }
+
+    fn make_sense(&self) -> bool {
+        let tolerance = match self {
+            Self::Fixed(_) => T::one(),
+            Self::UntilConverged { tolerance, .. } => *tolerance,
+        };
+        self.most() > 0 && tolerance > T::zero() && tolerance.is_finite()
+    }
+}
+
 /// Everything that defines a controller besides its model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControllerSettings<T, const NX: usize, const NU: usize, const NS: usize> {
@@ -42,7 +82,7 @@ pub struct ControllerSettings<T, const NX: usize, const NU: usize, const NS: usi
     /// Prediction horizon in samples, from 1 to the controller's `N`.
     pub horizon: usize,
     /// The discrete-time predictor.
-    pub predictor: Rk4,
+    pub predictor: Predictor,
     /// Stage weights.
     pub weights: Weights<T, NX, NU>,
     /// Terminal ingredient.
@@ -53,6 +93,8 @@ pub struct ControllerSettings<T, const NX: usize, const NU: usize, const NS: usi
     pub u: Bounds<T, NU>,
     /// Where the scheduling comes from.
     pub scheduling: Scheduling<T, NS>,
+    /// Quadratic programs per sample.
+    pub iterations: Iterations<T>,
     /// Settings of the solver.
     pub solver: SolverSettings<T>,
 }
@@ -84,6 +126,9 @@ pub enum ControllerError {
     },
     /// The constant scheduling contains a number that is not finite.
     HeldScheduling,
+    /// No quadratic program per sample, or a tolerance of the iteration that is not a positive
+    /// number.
+    Iterations,
     /// The solver's tolerance is not a positive number.
     Tolerance,
 }
@@ -116,6 +161,11 @@ impl fmt::Display for ControllerError {
                 "the lower bound of {quantity} {component} must not exceed its upper bound"
             ),
             Self::HeldScheduling => write!(f, "the held scheduling must be finite"),
+            Self::Iterations => write!(
+                f,
+                "a sample needs at least one quadratic program, and their tolerance must be a \
+                 positive number"
+            ),
             Self::Tolerance => write!(f, "the solver's tolerance must be a positive number"),
         }
     }
@@ -137,12 +187,15 @@ pub(crate) fn check<T: Scalar, const NX: usize, const NU: usize, const NS: usize
             largest,
         });
     }
-    if settings.predictor.substeps == 0 {
+    if settings.predictor.rk4().substeps == 0 {
         return Err(ControllerError::Substeps);
     }
     let tolerance = settings.solver.tolerance;
     if !(tolerance > T::zero() && tolerance.is_finite()) {
         return Err(ControllerError::Tolerance);
+    }
+    if !settings.iterations.make_sense() {
+        return Err(ControllerError::Iterations);
     }
     check_weight(&settings.weights.q, "Q", T::default_epsilon())?;
     check_weight(&settings.weights.r, "R", T::zero())?;

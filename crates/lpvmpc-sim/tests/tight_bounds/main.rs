@@ -15,8 +15,8 @@ mod dense;
 use ballbot::{Ballbot, limits};
 use dense::{Dense, Optimum};
 use lpvmpc::{
-    BoundId, Bounds, Controller, ControllerSettings, Ocp, Reference, Rk4, Scheduling, Solution,
-    SolverSettings, Status, TerminalIngredient, Weights, Workspace,
+    BoundId, Bounds, Controller, ControllerSettings, Iterations, Ocp, Predictor, Reference, Rk4,
+    Scheduling, Solution, SolverSettings, Status, TerminalIngredient, Weights, Workspace,
 };
 use lpvmpc_sim::{Tolerances, advance};
 use nalgebra::{Matrix1, Matrix4, Vector1, Vector4};
@@ -147,7 +147,7 @@ fn controller(x: [f64; 3], u: f64, terminal: TerminalIngredient<f64, NX>) -> Loo
     let settings = ControllerSettings {
         t_s: T_S,
         horizon: N,
-        predictor: Rk4 { substeps: 1 },
+        predictor: Predictor::FrozenRk4(Rk4 { substeps: 1 }),
         weights: Weights {
             q: Matrix4::from_diagonal(&Vector4::new(200.0, 1.0, 0.1, 0.1)),
             r: Matrix1::new(1000.0),
@@ -162,6 +162,7 @@ fn controller(x: [f64; 3], u: f64, terminal: TerminalIngredient<f64, NX>) -> Loo
             upper: u,
         },
         scheduling: Scheduling::Predicted,
+        iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),
     };
     Controller::new(Ballbot::paper(), settings).unwrap()

@@ -3,8 +3,8 @@
 use crate::plant::CartPole;
 use lpvmpc::riccati::{BadPivot, CostToGo, StageFactor};
 use lpvmpc::{
-    Bounds, Controller, ControllerSettings, LpvModel, Rk4, Scheduling, SolverSettings, Stage,
-    TerminalIngredient, Weights,
+    Bounds, Controller, ControllerSettings, Iterations, LpvModel, Predictor, Rk4, Scheduling,
+    SolverSettings, Stage, TerminalIngredient, Weights,
 };
 use nalgebra::{Matrix1, Matrix4, Vector1, Vector2, Vector4};
 
@@ -29,7 +29,7 @@ pub fn settings(
     scheduling: Scheduling<f64, 2>,
 ) -> Result<ControllerSettings<f64, 4, 1, 2>, BadPivot<f64>> {
     let t_s = 0.05;
-    let predictor = Rk4 { substeps: 2 };
+    let predictor = Predictor::FrozenRk4(Rk4 { substeps: 2 });
     let weights = Weights {
         q: Matrix4::from_diagonal(&Vector4::new(10.0, 10.0, 0.1, 0.1)),
         r: Matrix1::new(0.01),
@@ -51,6 +51,7 @@ pub fn settings(
             upper: Vector1::new(FORCE),
         },
         scheduling,
+        iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),
     })
 }

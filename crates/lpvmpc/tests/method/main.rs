@@ -11,6 +11,7 @@ mod cart_pole;
 mod controller;
 mod horizon;
 mod predictor;
+mod predictor_kinds;
 mod riccati;
 
 #[path = "../../examples/cart_pole/closed_loop.rs"]

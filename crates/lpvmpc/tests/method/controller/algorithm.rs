@@ -6,8 +6,8 @@ use crate::cart_pole::textbook;
 use crate::plant::CartPole;
 use crate::runge_kutta::integrate;
 use lpvmpc::{
-    Bounds, Controller, ControllerSettings, LpvModel, Reference, Rk4, Scheduling, SolverSettings,
-    Status, TerminalIngredient, Weights, Workspace, kkt_residual,
+    Bounds, Controller, ControllerSettings, Iterations, LpvModel, Reference, Rk4, Scheduling,
+    SolverSettings, Status, TerminalIngredient, Weights, Workspace, kkt_residual,
 };
 use nalgebra::{Vector1, Vector2, Vector4};
 
@@ -40,7 +40,7 @@ fn the_scheduling_is_that_of_the_last_rollout_one_stage_on() {
     const N: usize = 15;
     let plant = CartPole::laboratory();
     let settings = settings(N);
-    let substeps = settings.predictor.substeps;
+    let substeps = settings.predictor.rk4().substeps;
     let mut controller: Sized<N, N> = controller(settings);
     let mut workspace = Memory::new();
     let mut x = tilted();
@@ -245,6 +245,7 @@ fn single(settings: &ControllerSettings<f64, 4, 1, 2>) -> ControllerSettings<f32
             upper: settings.u.upper.cast(),
         },
         scheduling: Scheduling::Predicted,
+        iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),
     }
 }

@@ -3,8 +3,8 @@
 use super::{Memory, Sized, settings, tilted};
 use crate::plant::CartPole;
 use lpvmpc::{
-    Bounds, Controller, ControllerError, ControllerSettings, Reference, Rk4, Scheduling, Status,
-    TerminalIngredient,
+    Bounds, Controller, ControllerError, ControllerSettings, Predictor, Reference, Rk4, Scheduling,
+    Status, TerminalIngredient,
 };
 use nalgebra::{Matrix1, Matrix4, SVector, Vector1, Vector2, Vector4};
 
@@ -48,7 +48,7 @@ fn horizon() {
 
 #[test]
 fn sub_steps() {
-    let change = |s: &mut Settings| s.predictor = Rk4 { substeps: 0 };
+    let change = |s: &mut Settings| s.predictor = Predictor::FrozenRk4(Rk4 { substeps: 0 });
     assert_refused(change, ControllerError::Substeps, &["sub-step"]);
 }
 

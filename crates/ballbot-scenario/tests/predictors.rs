@@ -1,0 +1,134 @@
+//! Prediction and nonlinear rollout: how far they are apart, and the iteration that closes the
+//! gap, on the ballbot with the paper's terminal equality (scenario 3).
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
+
+use ballbot::Ballbot;
+use ballbot_scenario::{Prepared, Scenario};
+use lpvmpc::{
+    Bounds, Controller, ControllerSettings, Iterations, Predictor, Reference, Rk4, Solution,
+    TerminalIngredient, Workspace, kkt_residual,
+};
+use nalgebra::Vector4;
+use std::path::Path;
+
+const N: usize = 20;
+/// Torque and state bounds that may be active at once, and the four rows of the equality.
+const M: usize = 64;
+const FINE: Rk4 = Rk4 { substeps: 2 };
+
+type Loop = Controller<Ballbot<f64>, f64, 4, 1, 2, N, M>;
+
+fn scenario_3() -> Prepared {
+    let scenario = Scenario::load("single-setpoint-terminal").unwrap();
+    scenario.prepare(Path::new(".")).unwrap()
+}
+
+/// Scenario 3's settings with another predictor; phi without bounds, for far set points.
+fn settings(predictor: Predictor, most: usize) -> ControllerSettings<f64, 4, 1, 2> {
+    let mut settings = ControllerSettings {
+        predictor,
+        iterations: Iterations::UntilConverged {
+            tolerance: 1e-10,
+            most,
+        },
+        ..scenario_3().settings
+    };
+    settings.x.lower[0] = f64::NEG_INFINITY;
+    settings.x.upper[0] = f64::INFINITY;
+    settings
+}
+
+/// The first plan from rest towards `phi` rad.
+fn plan(settings: ControllerSettings<f64, 4, 1, 2>, phi: f64) -> (Loop, Solution<f64, 4, 1, N, M>) {
+    let mut controller = Loop::new(Ballbot::paper(), settings).unwrap();
+    let target = Reference::constant(Vector4::new(phi, 0.0, 0.0, 0.0));
+    let mut workspace = Box::new(Workspace::new());
+    let solution = controller
+        .step(&Vector4::zeros(), &target, &mut workspace)
+        .clone();
+    if solution.status.is_solved() {
+        let residual = kkt_residual(workspace.ocp(), &solution);
+        assert!(residual.largest() < 1e-8, "{residual:?}");
+    }
+    (controller, solution)
+}
+
+/// The paper's predictor ends 0.97 rad and 0.37 rad beside the nonlinear model at the first
+/// sample of scenario 3, and hundreds of milliradians beside it however often it is repeated.
+#[test]
+fn the_frozen_predictor_keeps_its_gap() {
+    let frozen = Predictor::FrozenRk4(Rk4 { substeps: 1 });
+    let (once, _) = plan(settings(frozen, 1), std::f64::consts::PI);
+    let gap = once.gap().abs();
+    assert!((gap[0] - 0.97).abs() < 0.005, "{gap}");
+    assert!((gap[1] - 0.37).abs() < 0.005, "{gap}");
+    let (often, _) = plan(settings(frozen, 100), std::f64::consts::PI);
+    assert!(often.gap().amax() > 0.2, "{}", often.gap());
+}
+
+/// The fixed point of the stage-consistent predictor is the nonlinear rollout, so the terminal
+/// equality holds for the nonlinear model; every stage agrees, not only the last.
+#[test]
+fn the_stage_consistent_fixed_point_is_the_rollout() {
+    for phi in [1.0, 2.0, std::f64::consts::PI] {
+        let (controller, solution) = plan(settings(Predictor::StageConsistent(FINE), 60), phi);
+        assert!(solution.status.is_solved());
+        assert!(controller.problems() < 60, "not converged at {phi} rad");
+        for (predicted, reached) in solution.x.iter().zip(controller.rollout()) {
+            assert!((predicted - reached).amax() < 1e-8);
+        }
+        let reached = controller.rollout()[N - 1];
+        assert!((reached - Vector4::new(phi, 0.0, 0.0, 0.0)).amax() < 1e-8);
+    }
+}
+
+/// The iteration contracts, and the faster the smaller the move.
+#[test]
+fn smaller_moves_need_fewer_iterations() {
+    let problems = |phi: f64| {
+        let stage_consistent = settings(Predictor::StageConsistent(FINE), 60);
+        plan(stage_consistent, phi).0.problems()
+    };
+    let counts = [0.01, 0.1, 1.0, 2.0, 3.0].map(problems);
+    assert!(counts.is_sorted(), "{counts:?}");
+    assert!(counts[0] <= 4 && counts[4] >= 3 * counts[0], "{counts:?}");
+}
+
+/// Full steps oscillate and grow from a move of 4 rad on (note: 40 programs at pi, none suffice
+/// at 4 rad); the relaxed ones converge, at 8 rad for a robot whose torque is not bounded.
+#[test]
+fn far_set_points_converge() {
+    for (phi, bounded) in [(4.0, true), (6.0, true), (8.0, false)] {
+        let mut far = settings(Predictor::StageConsistent(FINE), 400);
+        far.iterations = Iterations::UntilConverged {
+            tolerance: 1e-8,
+            most: 400,
+        };
+        if !bounded {
+            (far.x, far.u) = (Bounds::none(), Bounds::none());
+        }
+        let (controller, solution) = plan(far, phi);
+        assert!(solution.status.is_solved(), "{phi}: {}", solution.status);
+        println!("{phi} rad: {} programs", controller.problems());
+        assert!(controller.problems() < 400, "not converged at {phi} rad");
+        assert!(controller.gap().amax() < 1e-6, "{}", controller.gap());
+    }
+}
+
+/// Without an end to reach, one program per sample closes the gap while the robot moves.
+#[test]
+fn one_program_per_sample_closes_the_gap_along_the_loop() {
+    let design = scenario_3();
+    let mut settings = settings(Predictor::StageConsistent(FINE), 1);
+    settings.terminal = TerminalIngredient::Equality;
+    let mut controller = Loop::new(design.ballbot, settings).unwrap();
+    let mut workspace = Box::new(Workspace::new());
+    let target = Reference::constant(Vector4::new(1.0, 0.0, 0.0, 0.0));
+    let mut x = Vector4::zeros();
+    for _ in 0..30 {
+        let u = controller.step(&x, &target, &mut workspace).u[0];
+        x = FINE.advance(&design.ballbot, &x, &u, settings.t_s);
+    }
+    assert!(controller.gap().amax() < 1e-6, "{}", controller.gap());
+    assert!((x[0] - 1.0).abs() < 1e-3, "{x}");
+}
