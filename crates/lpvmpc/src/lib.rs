@@ -7,6 +7,7 @@
 
 mod active_set;
 mod controller;
+mod guarded;
 mod kernel;
 mod kkt;
 mod model;
@@ -22,6 +23,10 @@ mod solver;
 mod working_set;
 
 pub use controller::{Controller, Reference, Workspace};
+pub use guarded::{
+    Decision, GuardedController, GuardedError, GuardedIterations, GuardedSettings, GuardedStep,
+    GuardedWorkspace, TerminalSet,
+};
 pub use kkt::{KktResidual, kkt_residual};
 pub use model::{LpvModel, Scalar};
 pub use ocp::{Bounds, Ocp, Penalty, Softness, Stage, Terminal};

@@ -213,7 +213,7 @@ pub(crate) fn check<T: Scalar, const NX: usize, const NU: usize, const NS: usize
 }
 
 /// Symmetric, finite, and positive definite after adding `shift` times its size.
-fn check_weight<T: Scalar, const K: usize>(
+pub(crate) fn check_weight<T: Scalar, const K: usize>(
     weight: &SMatrix<T, K, K>,
     name: &'static str,
     shift: T,
@@ -235,7 +235,7 @@ fn check_weight<T: Scalar, const K: usize>(
     }
 }
 
-fn check_bounds<T: Scalar, const K: usize>(
+pub(crate) fn check_bounds<T: Scalar, const K: usize>(
     bounds: &Bounds<T, K>,
     quantity: &'static str,
 ) -> Result<(), ControllerError> {

@@ -1,0 +1,172 @@
+//! What defines a guarded controller besides its model.
+
+use crate::model::{LpvModel, Scalar};
+use crate::ocp::Bounds;
+use crate::predictor::Rk4;
+use crate::settings::ControllerError;
+use crate::settings::{Weights, check_bounds, check_weight};
+use crate::solver::SolverSettings;
+use core::fmt;
+use nalgebra::{SMatrix, SVector};
+
+/// A terminal law with a set that it keeps: for every state with (x - z d)'P (x - z d) <= level,
+/// u = -K (x - z d) held for one sample stays within all bounds, leads into the set again, and
+/// lowers the terminal cost by at least the stage cost. Whether it does is for a certificate to
+/// say (`ballbot certify`); the controller takes it at its word.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TerminalSet<T, const NX: usize, const NU: usize> {
+    /// K, `NU` x `NX`, for u = -K (x - z d).
+    pub gain: SMatrix<T, NU, NX>,
+    /// P, `NX` x `NX`, symmetric positive definite, in the unit of the cost.
+    pub p: SMatrix<T, NX, NX>,
+    /// Largest terminal cost in the set, > 0.
+    pub level: T,
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize> TerminalSet<T, NX, NU> {
+    /// The largest |z| for which z `direction` lies in the set.
+    pub(super) fn extent(&self, direction: &SVector<T, NX>) -> T {
+        (self.level / (self.p * direction).dot(direction)).sqrt()
+    }
+}
+
+/// Quadratic programs per sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GuardedIterations {
+    /// With a plan that works at hand, at least 1.
+    pub known: usize,
+    /// Without one (at the start, after a push), at least 1.
+    pub unknown: usize,
+}
+
+/// Everything that defines a guarded controller besides its model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GuardedSettings<T, const NX: usize, const NU: usize> {
+    /// Sampling time in seconds.
+    pub t_s: T,
+    /// Runge-Kutta steps of prediction and rollout.
+    pub rk4: Rk4,
+    /// Stage weights.
+    pub weights: Weights<T, NX, NU>,
+    /// Terminal law and set.
+    pub terminal: TerminalSet<T, NX, NU>,
+    /// State bounds, at the stages 1 to N.
+    pub x: Bounds<T, NX>,
+    /// Input bounds.
+    pub u: Bounds<T, NU>,
+    /// d, with A(scheduling) d = 0: every state z d, without input, is an equilibrium.
+    pub direction: SVector<T, NX>,
+    /// The admissible set points z, [lower, upper]; infinite where there is no bound. The
+    /// terminal set around each of them must lie within the state bounds.
+    pub set_points: [T; 2],
+    /// Cost of (z - wanted)^2, > 0. Large against the stage weights, so that the set point
+    /// moves on as fast as the bounds allow.
+    pub offset_weight: T,
+    /// Part of the bounds' width that plans keep away from them, so that rounding and the
+    /// integration error of the prediction do not cost the guarantee; 1e-3, say.
+    pub margin: T,
+    /// Quadratic programs per sample.
+    pub iterations: GuardedIterations,
+    /// Linear price of soft state bounds, per width of the bound; quadratic is as much.
+    pub soft_price: T,
+    /// Settings of the solver.
+    pub solver: SolverSettings<T>,
+}
+
+/// A mistake in the [`GuardedSettings`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum GuardedError {
+    /// A mistake that a controller without guard would have, too.
+    Controller(ControllerError),
+    /// This number must be positive and finite.
+    NotPositive(&'static str),
+    /// The gain contains a number that is not finite.
+    Gain,
+    /// The direction is zero, not finite, or no direction of equilibria: A d is not zero.
+    Direction,
+    /// The lower set point is above the upper one, or one is not a number.
+    SetPoints,
+    /// At least one quadratic program per sample is needed.
+    Iterations,
+}
+
+impl fmt::Display for GuardedError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Controller(error) => error.fmt(f),
+            Self::NotPositive(name) => write!(f, "{name} must be a positive number"),
+            Self::Gain => write!(f, "the gain of the terminal law must be finite"),
+            Self::Direction => write!(
+                f,
+                "the direction of the set points must be a finite, nonzero d with A d = 0"
+            ),
+            Self::SetPoints => {
+                write!(f, "the lower set point must not exceed the upper one")
+            }
+            Self::Iterations => write!(f, "a sample needs at least one quadratic program"),
+        }
+    }
+}
+
+impl core::error::Error for GuardedError {}
+
+impl From<ControllerError> for GuardedError {
+    fn from(error: ControllerError) -> Self {
+        Self::Controller(error)
+    }
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
+    pub(super) fn check<P, const NS: usize>(&self, model: &P) -> Result<(), GuardedError>
+    where
+        P: LpvModel<T, NX, NU, NS>,
+    {
+        let positive = [
+            (self.t_s, "the sampling time in seconds"),
+            (self.terminal.level, "the level of the terminal set"),
+            (self.offset_weight, "the offset weight"),
+            (self.margin, "the margin"),
+            (self.soft_price, "the price of soft bounds"),
+            (self.solver.tolerance, "the solver's tolerance"),
+        ];
+        for (value, name) in positive {
+            if !(value > T::zero() && value.is_finite()) {
+                return Err(GuardedError::NotPositive(name));
+            }
+        }
+        if self.rk4.substeps == 0 {
+            return Err(ControllerError::Substeps.into());
+        }
+        check_weight(&self.weights.q, "Q", T::default_epsilon())?;
+        check_weight(&self.weights.r, "R", T::zero())?;
+        check_weight(&self.terminal.p, "P", T::zero())?;
+        check_bounds(&self.x, "state")?;
+        check_bounds(&self.u, "input")?;
+        if !self.terminal.gain.iter().all(|entry| entry.is_finite()) {
+            return Err(GuardedError::Gain);
+        }
+        let [lower, upper] = self.set_points;
+        if !(lower <= upper) {
+            return Err(GuardedError::SetPoints);
+        }
+        if self.iterations.known == 0 || self.iterations.unknown == 0 {
+            return Err(GuardedError::Iterations);
+        }
+        self.check_direction(model)
+    }
+
+    fn check_direction<P, const NS: usize>(&self, model: &P) -> Result<(), GuardedError>
+    where
+        P: LpvModel<T, NX, NU, NS>,
+    {
+        let d = &self.direction;
+        let (a, _) = model.matrices(&model.scheduling(d));
+        let rest = (a * d).amax();
+        let rounding = a.amax() * d.amax() * T::default_epsilon();
+        // Negated, so that a number that is not one fails.
+        if !(d.amax() > T::zero() && d.amax().is_finite() && rest <= rounding) {
+            return Err(GuardedError::Direction);
+        }
+        Ok(())
+    }
+}
