@@ -1,0 +1,271 @@
+//! The guarded loop: what it promises, and what it does where it can promise nothing.
+
+use crate::plant::CartPole;
+use crate::regulator;
+use crate::rng::Rng;
+use lpvmpc::riccati::{CostToGo, StageFactor};
+use lpvmpc::{
+    Bounds, Decision, GuardedController, GuardedError, GuardedIterations, GuardedSettings,
+    GuardedStep, GuardedWorkspace, LpvModel, Rk4, Scheduling, SolverSettings, Stage, TerminalSet,
+};
+use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
+
+const N: usize = 20;
+const RK4: Rk4 = Rk4 { substeps: 2 };
+type Guarded = GuardedController<CartPole<f64>, f64, 4, 1, 2, N, 5, { N + 2 }>;
+type Memory = GuardedWorkspace<f64, 1, 5, { N + 2 }, 200>;
+type Settings = GuardedSettings<f64, 4, 1>;
+
+fn plant() -> CartPole<f64> {
+    CartPole::laboratory()
+}
+
+fn moves(x: &Vector4<f64>, u: &Vector1<f64>) -> Vector4<f64> {
+    RK4.advance(&plant(), x, u, 0.05)
+}
+
+/// The regulator's weights and force; tilt within 0.6 rad, speed within 4 m/s; the LQR as
+/// terminal law with one and a half times its cost, so that the decrease has a margin.
+fn settings() -> Settings {
+    let base = regulator::settings(&plant(), f64::INFINITY, Scheduling::Predicted).unwrap();
+    let (a, b) = plant().matrices(&Vector2::zeros());
+    let (a, b) = RK4.discretize(&a, &b, base.t_s);
+    let p: Matrix4<f64> = regulator::terminal_weight(&a, &b, &base.weights).unwrap();
+    let stage: Stage<f64, 4, 1> = Stage {
+        a,
+        b,
+        q: base.weights.q,
+        r: base.weights.r,
+        ..Stage::new()
+    };
+    let mut factor = StageFactor::zeros();
+    let mut cost_to_go = CostToGo {
+        quadratic: p,
+        linear: Vector4::zeros(),
+    };
+    factor.eliminate(&stage, &mut cost_to_go).unwrap();
+    let limit = Vector4::new(f64::INFINITY, 0.6, 4.0, f64::INFINITY);
+    Settings {
+        t_s: base.t_s,
+        rk4: RK4,
+        weights: base.weights,
+        terminal: TerminalSet {
+            gain: -factor.gain,
+            p: p * 1.5,
+            level: 5.0,
+        },
+        x: Bounds {
+            lower: -limit,
+            upper: limit,
+        },
+        u: base.u,
+        direction: Vector4::new(1.0, 0.0, 0.0, 0.0),
+        set_points: [-50.0, 50.0],
+        offset_weight: 1e3,
+        margin: 1e-3,
+        iterations: GuardedIterations {
+            known: 1,
+            unknown: 30,
+        },
+        soft_price: 1e4,
+        solver: SolverSettings::default(),
+    }
+}
+
+fn guarded(settings: Settings) -> Guarded {
+    Guarded::new(plant(), settings).unwrap()
+}
+
+/// A state of the terminal set around 0, from the middle to the edge.
+fn in_terminal_set(rng: &mut Rng) -> Vector4<f64> {
+    let terminal = settings().terminal;
+    let towards = rng.matrix::<4, 1>();
+    let value = (terminal.p * towards).dot(&towards);
+    towards * (terminal.level / value).sqrt() * rng.uniform(0.0, 1.0).powf(0.25)
+}
+
+/// What the other tests rest on, by sampling: the terminal law keeps set and bounds, and the
+/// terminal cost decreases by the stage cost.
+#[test]
+fn the_terminal_set_is_one() {
+    let settings = settings();
+    let TerminalSet { gain, p, .. } = settings.terminal;
+    let mut rng = Rng::new(21);
+    for _ in 0..20_000 {
+        let x = in_terminal_set(&mut rng);
+        let u = -(gain * x);
+        let next = moves(&x, &u);
+        let stage = (settings.weights.q * x).dot(&x) + (settings.weights.r * u).dot(&u);
+        assert!((p * next).dot(&next) <= (p * x).dot(&x) - stage);
+        assert!(settings.u.contains(&u, 0.0) && settings.x.contains(&x, 0.0));
+    }
+}
+
+/// Asserts what every step promises, whatever happens.
+fn assert_safe(step: &GuardedStep<f64, 4, 1>) {
+    assert!(step.u[0].is_finite());
+    assert!(settings().u.contains(&step.u, 0.0));
+}
+
+/// Jumps of the wanted position up to 100 m, some beyond the admissible ones, at random times,
+/// from random states: a plan at every sample, bounds kept, cost falling between the jumps, and
+/// the nearest admissible position in the end.
+fn jump_about(settings: Settings, seed: u64, decisions: &mut [usize; 5]) {
+    let mut rng = Rng::new(seed);
+    let mut controller = guarded(settings);
+    let mut memory = Memory::new();
+    let mut x = in_terminal_set(&mut rng);
+    for _ in 0..4 {
+        let wanted = rng.uniform(-100.0, 100.0);
+        let mut last = f64::INFINITY;
+        for _ in 0..rng.index(200) {
+            let step = controller.step(&x, wanted, &mut memory);
+            assert_safe(&step);
+            assert!(step.decision.is_guaranteed(), "{step:?}");
+            decisions[step.decision as usize] += 1;
+            // Rounding of a cost whose parts are as large as the offset's.
+            assert!(step.cost <= last + 1e-12 * last, "{} {last}", step.cost);
+            last = step.cost;
+            x = moves(&x, &step.u);
+            assert!(settings.x.contains(&x, 0.0), "{x}");
+        }
+    }
+}
+
+#[test]
+fn far_jumps_are_never_infeasible() {
+    let mut decisions = [0; 5];
+    for seed in 0..20 {
+        jump_about(settings(), seed, &mut decisions);
+    }
+    let [new, candidate, ..] = decisions;
+    assert!(new > 10 * candidate, "{decisions:?}");
+}
+
+/// The promise does not rest on the solver: one that gives up in most samples, one that is sloppy.
+#[test]
+fn a_bad_solver_costs_time_and_nothing_else() {
+    let mut decisions = [0; 5];
+    for seed in 0..10 {
+        let mut bad = settings();
+        bad.solver.max_changes = 2;
+        bad.solver.tolerance = 1e-2;
+        jump_about(bad, seed, &mut decisions);
+    }
+    assert!(
+        decisions[Decision::Candidate as usize] > 100,
+        "{decisions:?}"
+    );
+}
+
+#[test]
+fn the_nearest_admissible_position_is_reached() {
+    for (wanted, reached) in [(3.0, 3.0), (-70.0, -50.0), (f64::INFINITY, 0.0)] {
+        let mut controller = guarded(settings());
+        let mut memory = Memory::new();
+        let mut x = Vector4::zeros();
+        for _ in 0..1200 {
+            let step = controller.step(&x, wanted, &mut memory);
+            x = moves(&x, &step.u);
+        }
+        assert!((x[0] - reached).abs() < 1e-2, "{wanted}: {x}");
+    }
+}
+
+/// The applied plan is the nonlinear rollout: what it promised is what happens.
+#[test]
+fn the_plan_happens() {
+    let mut controller = guarded(settings());
+    let mut memory = Memory::new();
+    let mut x = Vector4::zeros();
+    for _ in 0..60 {
+        let step = controller.step(&x, 20.0, &mut memory);
+        let promised = controller.rollout().unwrap()[0];
+        x = moves(&x, &step.u);
+        assert!((x - promised).norm() <= 1e-12 * (1.0 + x.norm()));
+    }
+}
+
+/// A push beyond the bounds: soft bounds bring the pole back into what is guaranteed.
+#[test]
+fn after_a_push_the_bounds_are_soft_until_they_hold_again() {
+    let mut controller = guarded(settings());
+    let mut memory = Memory::new();
+    let mut x = Vector4::zeros();
+    let mut seen = [0; 5];
+    for k in 0..400 {
+        if k == 20 {
+            x += Vector4::new(0.0, 0.65, 0.0, 0.0);
+        }
+        let step = controller.step(&x, 0.0, &mut memory);
+        assert_safe(&step);
+        seen[step.decision as usize] += 1;
+        x = moves(&x, &step.u);
+    }
+    assert!(seen[Decision::SoftBounds as usize] > 0, "{seen:?}");
+    assert!(seen[Decision::NewPlan as usize] > 300, "{seen:?}");
+    assert!(x.norm() < 1e-2, "{x}");
+}
+
+/// Measurements and wishes that are no numbers: a safe input, and business as usual afterwards.
+#[test]
+fn nonsense_is_survived() {
+    let mut controller = guarded(settings());
+    let mut memory = Memory::new();
+    let mut x = Vector4::new(0.1, 0.05, 0.0, 0.0);
+    for k in 0..100 {
+        let measured = match k {
+            10 => x * f64::NAN,
+            11 => x * f64::INFINITY,
+            12 => x * 1e200,
+            _ => x,
+        };
+        let wanted = if k == 20 { f64::NAN } else { 0.0 };
+        let step = controller.step(&measured, wanted, &mut memory);
+        assert_safe(&step);
+        if measured.amax() > 1e100 || measured.iter().any(|entry| entry.is_nan()) {
+            assert!(!step.decision.is_guaranteed());
+        }
+        x = moves(&x, &step.u);
+    }
+    assert!(x.norm() < 1e-2, "{x}");
+}
+
+#[test]
+fn settings_that_make_no_sense_are_refused() {
+    let refused = |change: fn(&mut Settings)| {
+        let mut changed = settings();
+        change(&mut changed);
+        Guarded::new(plant(), changed).err().unwrap()
+    };
+    let not_positive = [
+        refused(|s| s.t_s = 0.0),
+        refused(|s| s.terminal.level = f64::NAN),
+        refused(|s| s.offset_weight = -1.0),
+        refused(|s| s.margin = 0.0),
+        refused(|s| s.soft_price = f64::INFINITY),
+    ];
+    for error in not_positive {
+        assert!(matches!(error, GuardedError::NotPositive(_)), "{error}");
+    }
+    assert_eq!(
+        refused(|s| s.terminal.gain[0] = f64::NAN),
+        GuardedError::Gain
+    );
+    assert_eq!(
+        refused(|s| s.set_points = [1.0, -1.0]),
+        GuardedError::SetPoints
+    );
+    assert_eq!(
+        refused(|s| s.iterations.known = 0),
+        GuardedError::Iterations
+    );
+    // The tilt is no direction of equilibria.
+    let tilted = refused(|s| s.direction = Vector4::new(0.0, 1.0, 0.0, 0.0));
+    assert_eq!(tilted, GuardedError::Direction);
+    assert!(matches!(
+        refused(|s| s.x.lower[1] = 2.0),
+        GuardedError::Controller(_)
+    ));
+    assert!(tilted.to_string().contains("A d = 0"));
+}
