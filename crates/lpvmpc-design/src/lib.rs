@@ -52,6 +52,7 @@ mod matrix_check;
 mod modes;
 mod riccati;
 mod stability;
+mod terminal;
 
 pub use discretize::{DiscretizeError, zero_order_hold};
 pub use least_squares::{
@@ -66,4 +67,8 @@ pub use riccati::{LqProblem, RiccatiError, RiccatiSolution, solve_care, solve_da
 pub use stability::{
     FrozenError, FrozenStability, Rk4Step, Rk4StepError, SchedulingGrid, check_rk4_step,
     frozen_stability,
+};
+pub use terminal::{
+    Certificate, DocumentError, QuadraticClaim, Record, SynthesisError, TerminalClaim,
+    TerminalIngredients, TerminalProblem, synthesize_terminal,
 };

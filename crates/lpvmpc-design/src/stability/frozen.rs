@@ -97,6 +97,11 @@ impl<const NS: usize> SchedulingGrid<NS> {
         (0..self.point_count()).map(|number| self.point(number))
     }
 
+    /// The middle of the box.
+    pub fn middle(&self) -> SVector<f64, NS> {
+        (self.lower + self.upper) * 0.5
+    }
+
     fn point(&self, number: usize) -> SVector<f64, NS> {
         let mut rest = number;
         SVector::from_fn(|index, _| {

@@ -1,0 +1,290 @@
+//! A terminal gain and cost for a whole set of schedulings, by linear matrix inequalities.
+
+use super::lmi::{AffineMatrix, LmiFailure, maximise_log_det};
+use crate::discretize::{DiscretizeError, zero_order_hold};
+use crate::lqr::lqr_discrete;
+use crate::matrix_check::{MatrixError, check_finite};
+use crate::riccati::RiccatiError;
+use crate::stability::SchedulingGrid;
+use lpvmpc::LpvModel;
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use thiserror::Error;
+
+/// What terminal ingredients are asked of the plant x_dot = A(s) x + B(s) u, sampled at t_s.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TerminalProblem<const NX: usize, const NU: usize> {
+    /// Sampling time, s.
+    pub t_s: f64,
+    /// Q of the stage cost x'Qx + u'Ru, positive semidefinite.
+    pub q: SMatrix<f64, NX, NX>,
+    /// R of the stage cost, positive definite.
+    pub r: SMatrix<f64, NU, NU>,
+    /// |x_i| <= `state_limits[i]` in the set, state units; infinite for none.
+    pub state_limits: SVector<f64, NX>,
+    /// |u_i| <= `input_limits[i]` under the terminal law, input units.
+    pub input_limits: SVector<f64, NU>,
+    /// eta in V(x+) <= (1 - eta) V(x) - x'Qx - u'Ru, from 0 to 1: what is asked beyond the
+    /// stage cost, because the inequality is imposed at frozen schedulings of a grid, and has
+    /// to hold between its points and while the scheduling moves.
+    pub contraction: f64,
+    /// The level a of the terminal set x'Px <= a, in units of the cost. The larger, the larger
+    /// the set, and the larger P against the cost of the unconstrained regulator.
+    pub level: f64,
+}
+
+/// The terminal law u = **-K** x, the terminal cost x'Px and the terminal set x'Px <= level.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TerminalIngredients<const NX: usize, const NU: usize> {
+    /// K, for u = **-K** x.
+    pub k: SMatrix<f64, NU, NX>,
+    /// P, symmetric positive definite: an upper bound of the cost from x on is x'Px.
+    pub p: SMatrix<f64, NX, NX>,
+    /// The set is x'Px <= level.
+    pub level: f64,
+    /// No other solution of the same problem has a larger log det (P/level)^-1 by more than this
+    /// (in the scaled unknowns; the set's volume is the square root of the determinant).
+    pub log_det_gap: f64,
+}
+
+/// There are no terminal ingredients.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum SynthesisError {
+    /// A number of the problem is out of range.
+    #[error("{name} = {value}: it must be {expected}")]
+    Value {
+        /// The field.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// A matrix of the problem or of the model is not what it must be.
+    #[error(transparent)]
+    Matrix(#[from] MatrixError),
+    /// The model cannot be sampled.
+    #[error(transparent)]
+    Discretize(#[from] DiscretizeError),
+    /// The regulator at the middle of the grid, which scales the unknowns, does not exist.
+    #[error("the regulator at the middle of the scheduling set: {0}")]
+    Middle(#[from] RiccatiError),
+    /// The inequalities have no common solution.
+    #[error(
+        "no common K and P decrease the cost at all {points} grid points: the scaled \
+         inequalities miss by {missing:.1e}; a smaller scheduling set, a larger level or a \
+         smaller contraction may have one"
+    )]
+    Infeasible {
+        /// Grid points.
+        points: usize,
+        /// What is missing to a solution of the scaled inequalities.
+        missing: f64,
+    },
+    /// Newton's method failed on the scaled problem.
+    #[error("the search for K and P did not converge")]
+    NotConverged,
+}
+
+/// The terminal law, cost and set of largest volume that satisfy, with u = -K x and P > 0,
+///
+/// ```text
+/// (A_d - B_d K)' P (A_d - B_d K) <= (1 - eta) P - Q - K'RK     at every point of `grid`
+/// |x_i| <= state_limits_i,  |K_i x| <= input_limits_i          wherever x'Px <= level
+/// ```
+///
+/// with A_d and B_d sampled exactly at frozen scheduling. In Y = level P^-1 and L = K Y these are
+/// linear matrix inequalities (Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities
+/// in System and Control Theory, 1994). This is a design, not a proof: neither the values between
+/// the points nor the motion of the scheduling within a sample is looked at.
+///
+/// # Errors
+/// Numbers out of range, a model that cannot be sampled, or no solution.
+pub fn synthesize_terminal<M, const NX: usize, const NU: usize, const NS: usize>(
+    model: &M,
+    grid: &SchedulingGrid<NS>,
+    problem: &TerminalProblem<NX, NU>,
+) -> Result<TerminalIngredients<NX, NU>, SynthesisError>
+where
+    M: LpvModel<f64, NX, NU, NS>,
+{
+    problem.check()?;
+    let sampled = |scheduling: &SVector<f64, NS>| {
+        let (a, b) = model.matrices(scheduling);
+        zero_order_hold(&dynamic(&a), &dynamic(&b), problem.t_s)
+    };
+    let pairs = grid
+        .points()
+        .map(|point| sampled(&point))
+        .collect::<Result<Vec<_>, _>>()?;
+    let scaling = problem.scaling(&sampled(&grid.middle())?)?;
+    let blocks = problem.blocks(&scaling, &pairs);
+    let maximum = maximise_log_det(&blocks, unknowns(NX, NU)).map_err(|failure| match failure {
+        LmiFailure::Infeasible { missing } => SynthesisError::Infeasible {
+            points: pairs.len(),
+            missing,
+        },
+        LmiFailure::NotConverged => SynthesisError::NotConverged,
+    })?;
+    let (y, l) = split(&maximum.v, NX, NU);
+    let y_inverse = y.cholesky().ok_or(SynthesisError::NotConverged)?.inverse();
+    let x_inverse = DMatrix::from_diagonal(&scaling.x.map(f64::recip));
+    let k = DMatrix::from_diagonal(&scaling.u) * l * &y_inverse * &x_inverse;
+    let p = &x_inverse * y_inverse * &x_inverse * problem.level;
+    let p = SMatrix::from_fn(|i, j| 0.5 * (p[(i, j)] + p[(j, i)]));
+    Ok(TerminalIngredients {
+        k: SMatrix::from_fn(|i, j| k[(i, j)]),
+        p,
+        level: problem.level,
+        log_det_gap: maximum.gap,
+    })
+}
+
+/// Units in which the set and the inputs are about 1.
+struct Scaling {
+    x: DVector<f64>,
+    u: DVector<f64>,
+}
+
+impl<const NX: usize, const NU: usize> TerminalProblem<NX, NU> {
+    fn check(&self) -> Result<(), SynthesisError> {
+        let refuse = |name, value, expected| {
+            Err(SynthesisError::Value {
+                name,
+                value,
+                expected,
+            })
+        };
+        if !(self.level > 0.0 && self.level.is_finite()) {
+            return refuse("level", self.level, "positive");
+        }
+        if !(self.contraction >= 0.0 && self.contraction < 1.0) {
+            return refuse("contraction", self.contraction, "from 0 to below 1");
+        }
+        for limit in self.state_limits.iter() {
+            if limit.is_nan() || *limit <= 0.0 {
+                return refuse("state_limits", *limit, "positive, or infinite for none");
+            }
+        }
+        for limit in self.input_limits.iter() {
+            if !(*limit > 0.0 && limit.is_finite()) {
+                return refuse("input_limits", *limit, "positive and finite");
+            }
+        }
+        check_finite("Q", &dynamic(&self.q))?;
+        check_finite("R", &dynamic(&self.r))?;
+        Ok(())
+    }
+
+    /// From the limits, and the semi-axes of the regulator's set where there is no limit.
+    fn scaling(&self, (a, b): &(DMatrix<f64>, DMatrix<f64>)) -> Result<Scaling, SynthesisError> {
+        let lqr = lqr_discrete(a, b, &dynamic(&self.q), &dynamic(&self.r))?;
+        let inverse = lqr
+            .p
+            .cholesky()
+            .ok_or(SynthesisError::NotConverged)?
+            .inverse();
+        let semi_axis = |i| (self.level * inverse[(i, i)]).sqrt();
+        Ok(Scaling {
+            x: DVector::from_fn(NX, |i, _| self.state_limits[i].min(semi_axis(i))),
+            u: DVector::from_column_slice(self.input_limits.as_slice()),
+        })
+    }
+
+    /// Y itself, then the decrease at each pair, then the limits; all in scaled units.
+    fn blocks(
+        &self,
+        scaling: &Scaling,
+        pairs: &[(DMatrix<f64>, DMatrix<f64>)],
+    ) -> Vec<AffineMatrix> {
+        let x = DMatrix::from_diagonal(&scaling.x);
+        let u = DMatrix::from_diagonal(&scaling.u);
+        let x_inverse = DMatrix::from_diagonal(&scaling.x.map(f64::recip));
+        let cost = 1.0 / self.level.sqrt();
+        let q_root = square_root(&dynamic(&self.q)) * &x * cost;
+        let r_root = square_root(&dynamic(&self.r)) * &u * cost;
+        let mut blocks = vec![block(NX, NU, |y, _| y.clone())];
+        for (a, b) in pairs {
+            let (a, b) = (&x_inverse * a * &x, &x_inverse * b * &u);
+            blocks.push(block(NX, NU, |y, l| {
+                let lower = [&a * y - &b * l, &q_root * y, &r_root * l];
+                decrease(y, (1.0 - self.contraction).sqrt(), lower)
+            }));
+        }
+        for i in (0..NX).filter(|i| self.state_limits[*i].is_finite()) {
+            let square = (self.state_limits[i] / scaling.x[i]).powi(2);
+            blocks.push(block(NX, NU, |y, _| {
+                DMatrix::from_element(1, 1, square - y[(i, i)])
+            }));
+        }
+        for i in 0..NU {
+            blocks.push(block(NX, NU, |y, l| {
+                let mut bound = DMatrix::identity(NX + 1, NX + 1);
+                bound.view_mut((1, 1), (NX, NX)).copy_from(y);
+                bound.view_mut((0, 1), (1, NX)).copy_from(&l.row(i));
+                block
+                    .view_mut((1, 0), (NX, 1))
+                    .copy_from(&l.row(i).transpose());
+                bound
+            }));
+        }
+        blocks
+    }
+}
+
+/// [ (1 - eta) Y  *  *  * ; A Y - B L  Y  0  0 ; Q^1/2 Y  0  I  0 ; R^1/2 L  0  0  I ].
+fn decrease(y: &DMatrix<f64>, root: f64, lower: [DMatrix<f64>; 3]) -> DMatrix<f64> {
+    let n = y.nrows();
+    let rows = n + lower.iter().map(DMatrix::nrows).sum::<usize>();
+    let mut block = DMatrix::identity(rows, rows);
+    block
+        .view_mut((0, 0), (n, n))
+        .copy_from(&(y * (root * root)));
+    block.view_mut((n, n), (n, n)).copy_from(y);
+    let mut at = n;
+    for part in lower {
+        block.view_mut((at, 0), part.shape()).copy_from(&part);
+        block
+            .view_mut((0, at), (n, part.nrows()))
+            .copy_from(&part.transpose());
+        at += part.nrows();
+    }
+    block
+}
+
+/// A block that is affine in Y and L.
+fn block(
+    nx: usize,
+    nu: usize,
+    f: impl Fn(&DMatrix<f64>, &DMatrix<f64>) -> DMatrix<f64>,
+) -> AffineMatrix {
+    AffineMatrix::of(unknowns(nx, nu), |v| {
+        let (y, l) = split(v, nx, nu);
+        f(&y, &l)
+    })
+}
+
+/// Entries of a symmetric Y and of L.
+fn unknowns(nx: usize, nu: usize) -> usize {
+    nx * (nx + 1) / 2 + nu * nx
+}
+
+fn split(v: &DVector<f64>, nx: usize, nu: usize) -> (DMatrix<f64>, DMatrix<f64>) {
+    let y = DMatrix::from_fn(nx, nx, |i, j| {
+        let (low, high) = (i.min(j), i.max(j));
+        v[high * (high + 1) / 2 + low]
+    });
+    let first = nx * (nx + 1) / 2;
+    let l = DMatrix::from_fn(nu, nx, |i, j| v[first + i * nx + j]);
+    (y, l)
+}
+
+/// S symmetric with S S = M, for a symmetric positive semidefinite M.
+fn square_root(m: &DMatrix<f64>) -> DMatrix<f64> {
+    let eigen = m.clone().symmetric_eigen();
+    let roots = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+    &eigen.eigenvectors * DMatrix::from_diagonal(&roots) * eigen.eigenvectors.transpose()
+}
+
+fn dynamic<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) -> DMatrix<f64> {
+    DMatrix::from_column_slice(R, C, m.as_slice())
+}
