@@ -24,12 +24,14 @@
 )]
 
 pub mod builtin;
+mod certificate;
 mod error;
 mod prepare;
 mod reference;
 mod run;
 mod schema;
 
+pub use certificate::{RobotTable, TerminalCertificate};
 pub use error::ScenarioError;
 pub use prepare::{Plane, Prepared};
 pub use reference::PhiReference;

@@ -4,10 +4,62 @@
 //! The table prints B31 with an unbalanced bracket; here it is r_b (b3 - k) / (r_w d), as
 //! M^-1 B~ gives. Its sinc(theta) is sin(theta)/theta.
 
-use crate::parameters::Ballbot;
+use crate::parameters::{Ballbot, Field};
 use crate::trigonometry::sin_cos;
 use lpvmpc::{LpvModel, Scalar};
 use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
+
+/// The scheduling (theta, theta_dot), as the embedding's formulas need it.
+#[derive(Clone, Copy, Debug)]
+pub struct Tilt<T> {
+    /// sin(theta).
+    pub sin: T,
+    /// cos(theta).
+    pub cos: T,
+    /// sin(theta)/theta.
+    pub sinc: T,
+    /// theta_dot, rad/s.
+    pub rate: T,
+    /// The number 1.
+    pub one: T,
+}
+
+/// The accelerations phi_ddot (first row) and theta_ddot (second row), rad/s^2.
+#[derive(Clone, Copy, Debug)]
+pub struct Accelerations<T> {
+    /// Per theta, phi_dot and theta_dot: the columns of A that are not fixed by kinematics.
+    pub a: [[T; 3]; 2],
+    /// Per torque, 1/(N m).
+    pub b: [T; 2],
+}
+
+impl<T: Field> Ballbot<T> {
+    /// The embedding's rows of the accelerations, on numbers or on sets of numbers.
+    #[inline(always)]
+    pub fn accelerations(&self, tilt: Tilt<T>) -> Accelerations<T> {
+        let Self {
+            b1,
+            b3,
+            b4,
+            geometry,
+            ..
+        } = *self;
+        let k = self.coupling(tilt.cos);
+        let inverse = tilt.one / self.determinant(k);
+        let gravity = geometry.centre_of_mass * geometry.gravity * tilt.sinc * inverse;
+        let centrifugal =
+            geometry.centre_of_mass * geometry.ball_radius * tilt.sin * tilt.rate * inverse;
+        let friction = -b4 * inverse;
+        let torque = self.gear() * inverse;
+        Accelerations {
+            a: [
+                [gravity * k, friction * b3, centrifugal * b3],
+                [gravity * b1, friction * k, centrifugal * k],
+            ],
+            b: [torque * (b3 - k), torque * (k - b1)],
+        }
+    }
+}
 
 impl<T: Scalar> LpvModel<T, 4, 1, 2> for Ballbot<T> {
     /// sigma(x) = (theta, theta_dot), rad and rad/s.
@@ -18,31 +70,23 @@ impl<T: Scalar> LpvModel<T, 4, 1, 2> for Ballbot<T> {
     #[inline(always)]
     fn matrices(&self, scheduling: &Vector2<T>) -> (Matrix4<T>, Vector4<T>) {
         let (theta, theta_dot) = (scheduling[0], scheduling[1]);
-        let (sin_theta, cos_theta) = sin_cos(theta);
-        let Self {
-            b1,
-            b3,
-            b4,
-            geometry,
-            ..
-        } = *self;
-        let k = self.coupling(cos_theta);
-        let inverse = T::one() / self.determinant(k);
-        let gravity = geometry.centre_of_mass * geometry.gravity * sinc(theta, sin_theta) * inverse;
-        let centrifugal =
-            geometry.centre_of_mass * geometry.ball_radius * sin_theta * theta_dot * inverse;
-        let friction = -b4 * inverse;
-        let torque = self.gear() * inverse;
+        let (sin, cos) = sin_cos(theta);
         let (zero, one) = (T::zero(), T::one());
+        let Accelerations { a: [phi, body], b } = self.accelerations(Tilt {
+            sin,
+            cos,
+            sinc: sinc(theta, sin),
+            rate: theta_dot,
+            one,
+        });
         #[rustfmt::skip]
         let a = Matrix4::new(
-            zero, zero,         one,           zero,
-            zero, zero,         zero,          one,
-            zero, gravity * k,  friction * b3, centrifugal * b3,
-            zero, gravity * b1, friction * k,  centrifugal * k,
+            zero, zero,    one,     zero,
+            zero, zero,    zero,    one,
+            zero, phi[0],  phi[1],  phi[2],
+            zero, body[0], body[1], body[2],
         );
-        let b = Vector4::new(zero, zero, torque * (b3 - k), torque * (k - b1));
-        (a, b)
+        (a, Vector4::new(zero, zero, b[0], b[1]))
     }
 
     #[inline(always)]

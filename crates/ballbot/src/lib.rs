@@ -17,5 +17,6 @@ mod trigonometry;
 mod wheels;
 
 pub use consistency::Consistency;
-pub use parameters::{Ballbot, Geometry, LinearParameters, limits};
+pub use embedding::{Accelerations, Tilt};
+pub use parameters::{Ballbot, Field, Geometry, LinearParameters, limits};
 pub use wheels::{BadZenithAngle, Wheels};

@@ -3,6 +3,7 @@
 //! The paper is D. S. Karachalios and H. S. Abbas, "Parameter Refinement of a Ballbot and
 //! Predictive Control for Reference Tracking with Linear Parameter-Varying Embedding".
 
+use core::ops::{Add, Div, Mul, Neg, Sub};
 use lpvmpc::Scalar;
 use nalgebra::convert;
 
@@ -71,7 +72,29 @@ impl<T: Scalar> Ballbot<T> {
             geometry: Geometry::paper(),
         }
     }
+}
 
+/// What the equations of motion ask of their numbers.
+pub trait Field:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+}
+impl<T> Field for T where
+    T: Copy
+        + Add<Output = T>
+        + Sub<Output = T>
+        + Mul<Output = T>
+        + Div<Output = T>
+        + Neg<Output = T>
+{
+}
+
+impl<T: Field> Ballbot<T> {
     /// k(theta) = b2 - l r_b cos(theta), m^2: minus the off-diagonal entry of M.
     pub(crate) fn coupling(&self, cos_theta: T) -> T {
         self.b2 - self.geometry.centre_of_mass * self.geometry.ball_radius * cos_theta

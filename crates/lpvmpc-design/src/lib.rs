@@ -45,6 +45,7 @@
 //! ```
 
 mod discretize;
+mod enclosure;
 mod least_squares;
 mod linearize;
 mod lqr;
@@ -55,6 +56,9 @@ mod stability;
 mod terminal;
 
 pub use discretize::{DiscretizeError, zero_order_hold};
+pub use enclosure::{
+    Affine, AnalyticModel, Arithmetic, Elementary, FlowError, Interval, SampleEnclosure, SampledLaw,
+};
 pub use least_squares::{
     Evaluated, Fit, Iteration, LeastSquaresError, LeastSquaresSettings, RankDeficiency,
     ResidualModel, Termination, gauss_newton, levenberg_marquardt,
@@ -69,6 +73,7 @@ pub use stability::{
     frozen_stability,
 };
 pub use terminal::{
-    Certificate, DocumentError, QuadraticClaim, Record, SynthesisError, TerminalClaim,
-    TerminalIngredients, TerminalProblem, synthesize_terminal,
+    Certificate, CertificateProblem, CertifyError, ClaimError, DocumentError, MOST_BOXES, Proof,
+    QuadraticClaim, Record, SynthesisError, TerminalClaim, TerminalIngredients, TerminalProblem,
+    certify_terminal, synthesize_terminal,
 };

@@ -80,7 +80,7 @@ pub struct QuadraticClaim<const NX: usize> {
 }
 
 /// What the proof took when the file was written.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
     /// Boxes of initial states on which the decrease was proved.

@@ -221,7 +221,7 @@ impl<const NX: usize, const NU: usize> TerminalProblem<NX, NU> {
                 let mut bound = DMatrix::identity(NX + 1, NX + 1);
                 bound.view_mut((1, 1), (NX, NX)).copy_from(y);
                 bound.view_mut((0, 1), (1, NX)).copy_from(&l.row(i));
-                block
+                bound
                     .view_mut((1, 0), (NX, 1))
                     .copy_from(&l.row(i).transpose());
                 bound

@@ -1,0 +1,101 @@
+//! Matrix inequalities against P, in coordinates in which P is nearly the identity.
+
+use crate::enclosure::{Arithmetic, Frame, Interval, is_positive_definite, product};
+use nalgebra::{DMatrix, SMatrix, SVector};
+
+/// Rows of a square matrix whose entries are known up to intervals.
+pub(super) type Square<const N: usize> = [[Interval; N]; N];
+
+/// Coordinates y, x = T y, in which x'Px is nearly |y|^2: T from a Cholesky factorisation in
+/// rounded numbers.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Normaliser<const NX: usize> {
+    pub frame: Frame<NX>,
+    p: Square<NX>,
+    /// (1 - UNIT_SLACK) |y|^2 <= x'Px <= (1 + UNIT_SLACK) |y|^2.
+    pub unit: Interval,
+}
+
+/// More than rounding makes of the identity.
+const UNIT_SLACK: f64 = 1e-9;
+
+impl<const NX: usize> Normaliser<NX> {
+    /// `None` if P is not symmetric to the bit, or was not shown to be positive definite.
+    pub fn of(p: &SMatrix<f64, NX, NX>) -> Option<Self> {
+        if *p != p.transpose() {
+            return None;
+        }
+        let factor = DMatrix::from_column_slice(NX, NX, p.as_slice()).cholesky()?;
+        let t = factor.l().transpose().try_inverse()?;
+        // Upper triangular.
+        let entry = |i: usize, j: usize| if i <= j { t[(i, j)] } else { 0.0 };
+        if t.iter().any(|entry| !entry.is_finite()) || (0..NX).any(|i| entry(i, i) == 0.0) {
+            return None;
+        }
+        let t: Square<NX> = from_fn(|i, j| Interval::point(entry(i, j)));
+        let normaliser = Self {
+            frame: Frame {
+                t,
+                inverse: triangular_inverse(&t),
+            },
+            p: from_fn(|i, j| Interval::point(p[(i, j)])),
+            unit: Interval::new(1.0 - UNIT_SLACK, 1.0 + UNIT_SLACK),
+        };
+        let unit = normaliser.congruent(&normaliser.p);
+        let above = minus_identity(&unit, Interval::point(normaliser.unit.lower));
+        let below = minus_identity(
+            &unit.map(|row| row.map(|x| -x)),
+            Interval::point(-normaliser.unit.upper),
+        );
+        let near = is_positive_definite(&above) && is_positive_definite(&below);
+        near.then_some(normaliser)
+    }
+
+    /// T'MT of a symmetric M: positive definite if and only if M is.
+    pub fn congruent(&self, m: &Square<NX>) -> Square<NX> {
+        product(&transposed(&self.frame.t), &product(m, &self.frame.t))
+    }
+
+    /// Roughly T y.
+    pub fn state(&self, y: &SVector<f64, NX>) -> SVector<f64, NX> {
+        SMatrix::<f64, NX, NX>::from_fn(|i, j| self.frame.t[i][j].middle()) * y
+    }
+
+    pub fn p(&self) -> &Square<NX> {
+        &self.p
+    }
+}
+
+/// By back substitution.
+fn triangular_inverse<const N: usize>(t: &Square<N>) -> Square<N> {
+    let mut inverse = [[Interval::point(0.0); N]; N];
+    for j in 0..N {
+        for i in (0..=j).rev() {
+            let unit = Interval::point(if i == j { 1.0 } else { 0.0 });
+            let sum = (i + 1..=j).fold(unit, |sum, k| sum - t[i][k] * inverse[k][j]);
+            inverse[i][j] = sum * t[i][i].reciprocal();
+        }
+    }
+    inverse
+}
+
+/// All the 2^D corners of the box -1 <= z <= 1, as signs.
+pub(super) fn corners<const D: usize>() -> impl Iterator<Item = [f64; D]> {
+    (0..1_usize << D)
+        .map(|corner| std::array::from_fn(|i| if corner >> i & 1 == 1 { 1.0 } else { -1.0 }))
+}
+
+/// M - shift I.
+pub(super) fn minus_identity<const N: usize>(m: &Square<N>, shift: Interval) -> Square<N> {
+    from_fn(|i, j| if i == j { m[i][j] - shift } else { m[i][j] })
+}
+
+pub(super) fn from_fn<T, const R: usize, const C: usize>(
+    mut f: impl FnMut(usize, usize) -> T,
+) -> [[T; C]; R] {
+    std::array::from_fn(|i| std::array::from_fn(|j| f(i, j)))
+}
+
+pub(super) fn transposed<T: Copy, const R: usize, const C: usize>(m: &[[T; C]; R]) -> [[T; R]; C] {
+    from_fn(|i, j| m[j][i])
+}

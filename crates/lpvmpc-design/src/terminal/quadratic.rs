@@ -1,0 +1,120 @@
+//! Quadratic stability: one P for a scheduling that moves anyhow within a box.
+
+use super::cover::{Cell, Covered, Finding, Uncovered, cover};
+use super::lmi::{AffineMatrix, maximise_log_det};
+use super::normalised::{Normaliser, corners, from_fn, minus_identity, transposed};
+use crate::enclosure::{
+    Affine, AffineMap, AnalyticModel, Arithmetic, Interval, is_positive_definite, product,
+    smallest_eigenvalue,
+};
+use crate::stability::SchedulingGrid;
+use lpvmpc::LpvModel;
+use nalgebra::{DMatrix, SMatrix, SVector};
+
+/// Rates of decay that are tried, 1/s.
+const RATES: [f64; 8] = [4.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02];
+
+/// A common P with (A - BK)'P + P(A - BK) <= -2 rate P at the points of `grid`, for the largest
+/// of a few rates that has one; `None` if none has. `scale` settles the unknowns' units.
+pub(super) fn synthesize<M, const NX: usize, const NU: usize, const NS: usize>(
+    model: &M,
+    grid: &SchedulingGrid<NS>,
+    k: &SMatrix<f64, NU, NX>,
+    scale: &SVector<f64, NX>,
+) -> Option<(SMatrix<f64, NX, NX>, f64)>
+where
+    M: LpvModel<f64, NX, NU, NS>,
+{
+    let loops: Vec<DMatrix<f64>> = grid
+        .points()
+        .map(|point| {
+            let (a, b) = model.matrices(&point);
+            let closed = a - b * k;
+            DMatrix::from_fn(NX, NX, |i, j| closed[(i, j)] * scale[j] / scale[i])
+        })
+        .collect();
+    RATES.into_iter().find_map(|rate| {
+        let unknowns = NX * (NX + 1) / 2;
+        let of = |v: &nalgebra::DVector<f64>| {
+            DMatrix::from_fn(NX, NX, |i, j| v[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)])
+        };
+        let mut blocks = vec![
+            AffineMatrix::of(unknowns, of),
+            AffineMatrix::of(unknowns, |v| DMatrix::identity(NX, NX) - of(v)),
+        ];
+        blocks.extend(loops.iter().map(|closed| {
+            AffineMatrix::of(unknowns, |v| {
+                let p = of(v);
+                -(closed.transpose() * &p + &p * closed) - &p * (2.0 * rate)
+            })
+        }));
+        let p = of(&maximise_log_det(&blocks, unknowns).ok()?.v);
+        let entry = |i: usize, j: usize| 0.5 * (p[(i, j)] + p[(j, i)]) / (scale[i] * scale[j]);
+        Some((SMatrix::from_fn(entry), rate))
+    })
+}
+
+/// Proves (A - BK)'P + P(A - BK) < -2 rate P for every scheduling |s_i| <= `limits[i]`.
+pub(super) fn prove<M, const NX: usize, const NU: usize, const NS: usize>(
+    model: &M,
+    k: &SMatrix<f64, NU, NX>,
+    normaliser: &Normaliser<NX>,
+    rate: f64,
+    limits: &SVector<f64, NS>,
+) -> Result<Covered, Uncovered<NS>>
+where
+    M: AnalyticModel<NX, NU, NS>,
+{
+    const MOST_CELLS: usize = 100_000;
+    let whole = Cell {
+        centre: SVector::zeros(),
+        half_widths: *limits,
+    };
+    let examine = |cell: &Cell<NS>| {
+        let decay = decay(model, k, normaliser, rate, cell);
+        let shift = Interval::point(decay.error);
+        let at = |corner: &[f64; NS]| minus_identity(&decay.at(corner), shift);
+        if corners().all(|corner| is_positive_definite(&at(&corner))) {
+            let spare = corners().map(|corner| smallest_eigenvalue(&at(&corner)));
+            return Finding::Holds {
+                spare: spare.fold(f64::INFINITY, f64::min),
+            };
+        }
+        let highest = smallest_eigenvalue(&decay.at(&[0.0; NS])) + decay.error;
+        if highest < 0.0 {
+            return Finding::Fails { excess: -highest };
+        }
+        let weight = |i: usize| decay.weight(i);
+        let across = (0..NS).max_by(|a, b| weight(*a).total_cmp(&weight(*b)));
+        Finding::Open {
+            across: across.unwrap_or(0),
+        }
+    };
+    cover(whole, MOST_CELLS, examine, &|_| ())
+}
+
+/// -T'((A - BK)'P + P(A - BK) + 2 rate P)T over a cell of schedulings.
+fn decay<M, const NX: usize, const NU: usize, const NS: usize>(
+    model: &M,
+    k: &SMatrix<f64, NU, NX>,
+    normaliser: &Normaliser<NX>,
+    rate: f64,
+    cell: &Cell<NS>,
+) -> AffineMap<NX, NX, NS>
+where
+    M: AnalyticModel<NX, NU, NS>,
+{
+    let symbol = |i: usize| Affine::symbol(cell.centre[i], cell.half_widths[i], i);
+    let (a, b) = model.matrices(&std::array::from_fn(symbol));
+    let minus_k: [[Affine<NS>; NX]; NU] = from_fn(|i, j| Affine::constant(-k[(i, j)]));
+    let input = product(&b, &minus_k);
+    let closed: [[Affine<NS>; NX]; NX] = from_fn(|i, j| a[i][j] + input[i][j]);
+    let p: [[Affine<NS>; NX]; NX] = from_fn(|i, j| Affine::from(normaliser.p()[i][j]));
+    let t: [[Affine<NS>; NX]; NX] = from_fn(|i, j| Affine::from(normaliser.frame.t[i][j]));
+    let half = product(&transposed(&t), &product(&p, &product(&closed, &t)));
+    let unit = product(&transposed(&t), &product(&p, &t));
+    let twice = Affine::constant(2.0 * rate);
+    AffineMap::of(&from_fn(|i, j| {
+        -(half[i][j] + half[j][i]) - twice * unit[i][j]
+    }))
+}
