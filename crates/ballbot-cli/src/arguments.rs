@@ -1,9 +1,10 @@
 //! The command line.
 
 use crate::commands::{
-    bench::BenchArguments, completions::CompletionsArguments, linearize::LinearizeArguments,
-    lqr::LqrArguments, refine::RefineArguments, reproduce::ReproduceArguments,
-    scenario::ScenarioArguments, simulate::SimulateArguments,
+    bench::BenchArguments, certify::CertifyArguments, completions::CompletionsArguments,
+    linearize::LinearizeArguments, lqr::LqrArguments, refine::RefineArguments,
+    reproduce::ReproduceArguments, scenario::ScenarioArguments, simulate::SimulateArguments,
+    verify::VerifyArguments,
 };
 use clap::{Parser, Subcommand};
 
@@ -45,6 +46,10 @@ pub enum Command {
     Linearize(LinearizeArguments),
     /// Design a linear-quadratic regulator u = -K x and check it at frozen scheduling
     Lqr(LqrArguments),
+    /// Find a terminal set and prove what holds in it
+    Certify(CertifyArguments),
+    /// Prove the claims of a certificate again
+    Verify(VerifyArguments),
     /// Print the completions for a shell
     Completions(CompletionsArguments),
 }

@@ -2,6 +2,7 @@
 
 pub mod arguments;
 pub mod benchmark;
+pub mod certificate_page;
 pub mod commands;
 pub mod figures;
 pub mod input;
@@ -33,6 +34,8 @@ pub fn run(arguments: Arguments) -> Result<String, CommandError> {
         Command::Refine(arguments) => commands::refine::run(&arguments),
         Command::Linearize(arguments) => commands::linearize::run(&arguments),
         Command::Lqr(arguments) => commands::lqr::run(&arguments),
+        Command::Certify(arguments) => commands::certify::run(&arguments),
+        Command::Verify(arguments) => commands::verify::run(&arguments),
         Command::Completions(arguments) => commands::completions::run(&arguments),
     }
 }

@@ -18,6 +18,11 @@ macro_rules! builtin {
     };
 }
 
+/// The certificate of a terminal set of the robot of the built-in scenarios, as JSON for
+/// [`crate::TerminalCertificate`]: written by `ballbot certify --size 0.125`, checked by
+/// `ballbot verify`.
+pub const TERMINAL_CERTIFICATE: &str = include_str!("builtin/terminal-certificate.json");
+
 /// All built-in scenarios.
 pub const ALL: [Builtin; 6] = [
     builtin!("two-setpoints"),

@@ -8,6 +8,7 @@
 //! | a gain and a terminal cost | [`lqr_continuous`], [`lqr_discrete`], [`solve_care`], [`solve_dare`] |
 //! | exact sampling of a frozen model | [`zero_order_hold`] |
 //! | is the gain stable at each scheduling? | [`frozen_stability`] |
+//! | a terminal set, and the proof that it is one | [`certify_terminal`], [`Certificate::prove`] |
 //! | is the integration step short enough? | [`check_rk4_step`] |
 //!
 //! Gains are for u = **-K** x throughout. All quantities are in SI units, poles in 1/s.
@@ -57,7 +58,8 @@ mod terminal;
 
 pub use discretize::{DiscretizeError, zero_order_hold};
 pub use enclosure::{
-    Affine, AnalyticModel, Arithmetic, Elementary, FlowError, Interval, SampleEnclosure, SampledLaw,
+    Affine, AffineMap, AnalyticModel, Arithmetic, Elementary, FlowError, Frame, Interval,
+    SampleEnclosure, SampledLaw,
 };
 pub use least_squares::{
     Evaluated, Fit, Iteration, LeastSquaresError, LeastSquaresSettings, RankDeficiency,

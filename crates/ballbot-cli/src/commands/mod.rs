@@ -1,6 +1,7 @@
 //! One module per command: its arguments, and what it prints.
 
 pub mod bench;
+pub mod certify;
 pub mod completions;
 pub mod linearize;
 pub mod lqr;
@@ -9,6 +10,7 @@ pub mod refine;
 pub mod reproduce;
 pub mod scenario;
 pub mod simulate;
+pub mod verify;
 
 use crate::figures::FigureError;
 use crate::input::InputError;
@@ -16,7 +18,7 @@ use crate::output::FileError;
 use crate::refinement::RefinementError;
 use crate::regulator::RegulatorError;
 use ballbot_scenario::ScenarioError;
-use lpvmpc_design::MatrixError;
+use lpvmpc_design::{CertifyError, ClaimError, DocumentError, MatrixError};
 use lpvmpc_sim::PlantError;
 use std::path::PathBuf;
 
@@ -50,6 +52,15 @@ pub enum CommandError {
     /// A figure that cannot be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),
+    /// No set could be certified.
+    #[error("no certificate: {0}")]
+    Certify(#[from] CertifyError),
+    /// A claim of a certificate does not hold.
+    #[error("the certificate does not hold: {0}")]
+    Claim(#[from] ClaimError),
+    /// A certificate that cannot be read, or was changed.
+    #[error(transparent)]
+    Certificate(#[from] DocumentError),
     /// A run that ended before its time.
     #[error(
         "the {what} ended early, {ending}\nat phi = {:.4} rad, theta = {:.4} rad, phi_dot = {:.4} \

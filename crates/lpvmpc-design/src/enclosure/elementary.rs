@@ -170,7 +170,7 @@ fn sinc_coefficient(n: usize, x: Interval) -> Interval {
         .fold(Interval::point(0.0), |sum, coefficient| {
             sum * square + *coefficient
         });
-    let sum = if n % 2 == 0 { even } else { even * x };
+    let sum = if n.is_multiple_of(2) { even } else { even * x };
     let largest = Interval::point(x.magnitude());
     let power = (0..=highest(n)).fold(Interval::point(1.0), |power, _| power * largest);
     let rest = (power * TABLES.rest[n]).upper;
@@ -180,11 +180,11 @@ fn sinc_coefficient(n: usize, x: Interval) -> Interval {
 
 /// The coefficient of x^(n % 2): (-1)^k binomial(2k, n) / (2k+1)! with 2k = n or n + 1.
 fn lowest_coefficient(n: usize) -> Interval {
-    let (k, binomial) = if n % 2 == 0 {
+    let (k, binomial) = if n.is_multiple_of(2) {
         (n / 2, 1.0)
     } else {
         (n.div_ceil(2), (n + 1) as f64)
     };
     let size = Interval::point(binomial) * reciprocal_factorial(2 * k + 1);
-    if k % 2 == 0 { size } else { -size }
+    if k.is_multiple_of(2) { size } else { -size }
 }

@@ -217,8 +217,8 @@ impl<M, const NX: usize, const NU: usize> Step<'_, M, NX, NU> {
             if guess.iter().zip(&image).all(inside) {
                 return Ok(image);
             }
-            let wider = Interval::new(-INFLATION, INFLATION);
-            let widened = |x: &Interval| *x + wider * (*x - *x);
+            let widened =
+                |x: &Interval| Interval::around(x.middle(), (1.0 + INFLATION) * x.radius());
             guess = image
                 .iter()
                 .map(|column| column.each_ref().map(widened))

@@ -91,8 +91,7 @@ impl Interval {
     }
 }
 
-/// The next number below a rounded result; an exact zero stays, which keeps sparse matrices
-/// sparse and the arithmetic out of the slow range of subnormal numbers.
+/// The next number below a rounded result.
 fn down(rounded: f64) -> f64 {
     rounded.next_down()
 }
@@ -105,6 +104,8 @@ impl Add for Interval {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
+        // An exact zero keeps sparse matrices sparse, and the arithmetic out of the slow range of
+        // subnormal numbers.
         let zero = Self::point(0.0);
         if self == zero {
             return other;

@@ -11,8 +11,7 @@ pub(crate) fn is_positive_definite<const N: usize>(matrix: &[[Interval; N]; N]) 
     // L D L' without square roots; `rest` is the Schur complement.
     let mut rest = *matrix;
     for pivot in 0..N {
-        // Negated, so that an unknown fails.
-        if !(rest[pivot][pivot].lower > 0.0) {
+        if rest[pivot][pivot].lower <= 0.0 {
             return false;
         }
         let inverse = rest[pivot][pivot].reciprocal();

@@ -74,6 +74,10 @@ impl<T: Arithmetic> Sub for Series<T> {
 impl<T: Arithmetic> Mul for Series<T> {
     type Output = Self;
 
+    #[allow(
+        clippy::suspicious_arithmetic_impl,
+        reason = "a product of series is a sum of products"
+    )]
     fn mul(self, other: Self) -> Self {
         let known = self.known.min(other.known);
         let length = (self.length + other.length).saturating_sub(1);

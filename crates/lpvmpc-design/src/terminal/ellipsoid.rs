@@ -38,6 +38,9 @@ impl<const NX: usize> Ellipsoid<NX> {
     /// could not be proved.
     pub fn bound(&self, row: &SVector<f64, NX>) -> f64 {
         const MARGIN: f64 = 1.0 + 1e-9;
+        if row.amax() == 0.0 {
+            return 0.0;
+        }
         let bound = self.reach(row) * MARGIN;
         if self.keeps(row, bound) {
             bound

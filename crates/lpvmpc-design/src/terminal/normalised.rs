@@ -69,12 +69,13 @@ impl<const NX: usize> Normaliser<NX> {
 /// By back substitution.
 fn triangular_inverse<const N: usize>(t: &Square<N>) -> Square<N> {
     let mut inverse = [[Interval::point(0.0); N]; N];
-    for j in 0..N {
-        for i in (0..=j).rev() {
+    for i in (0..N).rev() {
+        let row = from_fn::<_, 1, N>(|_, j| {
             let unit = Interval::point(if i == j { 1.0 } else { 0.0 });
-            let sum = (i + 1..=j).fold(unit, |sum, k| sum - t[i][k] * inverse[k][j]);
-            inverse[i][j] = sum * t[i][i].reciprocal();
-        }
+            let sum = (i + 1..N).fold(unit, |sum, k| sum - t[i][k] * inverse[k][j]);
+            sum * t[i][i].reciprocal()
+        });
+        inverse[i] = row[0];
     }
     inverse
 }

@@ -1,8 +1,10 @@
 //! The design tools against the paper's numbers, certified data and second routes.
 
 mod paper;
+mod pendulum;
 
 mod ballbot_parameters;
+mod enclosure;
 mod frozen_stability;
 mod least_squares_failures;
 mod linearize;
@@ -10,3 +12,4 @@ mod lqr;
 mod nist;
 mod riccati;
 mod rk4_step;
+mod terminal;

@@ -1,0 +1,211 @@
+//! `ballbot certify`.
+
+use super::CommandError;
+use crate::arguments::positive;
+use crate::certificate_page;
+use crate::output;
+use crate::progress::Progress;
+use crate::table::{Table, number};
+use ballbot_scenario::{Prepared, RobotTable, Scenario, TerminalCertificate};
+use clap::Args;
+use lpvmpc::Bounds;
+use lpvmpc_design::{CertificateProblem, CertifyError, Proof, TerminalProblem, certify_terminal};
+use nalgebra::{SVector, Vector2, Vector4};
+use std::path::{Path, PathBuf};
+
+/// Arguments of `ballbot certify`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  ballbot certify                          the largest set of the scenario two-setpoints
+  ballbot certify my.toml --size 0.1       a tenth of the tilt's and the tilt rate's bounds
+  ballbot verify out/certificate/certificate.json
+
+Finds K, P and the set x'Px <= level, and proves for the sampled nonlinear robot that the law
+u = -K x, held over each sample, keeps the state in the set, within all bounds, and decreases the
+cost. Writes certificate.json and a page with the set (certificate.html).")]
+pub struct CertifyArguments {
+    /// A built-in scenario or a TOML file: robot, sampling time, weights and bounds
+    #[arg(default_value = "two-setpoints")]
+    pub scenario: String,
+    /// Share of the bounds of tilt and tilt rate that the set may use; searched for if not given
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub size: Option<f64>,
+    /// Level of the set x'Px <= LEVEL, in units of the cost
+    #[arg(long, default_value = "2000", value_parser = positive)]
+    pub level: f64,
+    /// Share of the cost by which the design decreases it beyond the stage cost; more makes the
+    /// proof shorter and P larger
+    #[arg(long, default_value = "0.15", value_parser = share)]
+    pub contraction: f64,
+    /// Boxes of states that one proof may look at
+    #[arg(long, default_value = "40000")]
+    pub boxes: usize,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/certificate")]
+    pub out: PathBuf,
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let value = positive(text)?;
+    if value <= 1.0 {
+        Ok(value)
+    } else {
+        Err(format!("{value} is not a share, from 0 to 1"))
+    }
+}
+
+/// Halvings of the search for the size: it ends within a thirty-second of the bounds.
+const HALVINGS: usize = 5;
+
+type Certified = (TerminalCertificate, Proof<4>);
+
+/// Designs, proves and writes.
+///
+/// # Errors
+/// The scenario is not valid, no set could be proved, or a file cannot be written.
+pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
+    let scenario = Scenario::load(&arguments.scenario)?;
+    let file = Path::new(&arguments.scenario);
+    let prepared = scenario.prepare(file.parent().unwrap_or(Path::new(".")))?;
+    let (certificate, proof) = match arguments.size {
+        Some(size) => certify(arguments, &prepared, size)?,
+        None => search(arguments, &prepared)?,
+    };
+    let json = certificate.to_json()?;
+    let page = certificate_page::html(&prepared.title, &certificate, &proof)?;
+    let paths = ["certificate.json", "certificate.html"].map(|name| arguments.out.join(name));
+    output::write_files(&[(&paths[0], json.as_bytes()), (&paths[1], page.as_bytes())])?;
+    Ok(format!(
+        "{}\nwrote {} and {}\n",
+        summary(&certificate, &proof),
+        paths[0].display(),
+        paths[1].display()
+    ))
+}
+
+/// The largest size that can be certified, by bisection.
+fn search(arguments: &CertifyArguments, prepared: &Prepared) -> Result<Certified, CommandError> {
+    let (mut low, mut high) = (0.0, 1.0);
+    let mut best = None;
+    let mut last = None;
+    for _ in 0..HALVINGS {
+        let size = 0.5 * (low + high);
+        match certify(arguments, prepared, size) {
+            Ok(found) => {
+                low = size;
+                best = Some(found);
+            }
+            Err(error) => {
+                high = size;
+                last = Some(error);
+            }
+        }
+    }
+    match (best, last) {
+        (Some(found), _) => Ok(found),
+        (None, Some(error)) => Err(error.into()),
+        (None, None) => Err(CommandError::Usage("no size was tried".to_owned())),
+    }
+}
+
+fn certify(
+    arguments: &CertifyArguments,
+    prepared: &Prepared,
+    size: f64,
+) -> Result<Certified, CertifyError> {
+    let settings = &prepared.settings;
+    let state_limits = symmetric(&settings.x);
+    let [theta, theta_dot] = [1, 3].map(|i| size * state_limits[i]);
+    let problem = CertificateProblem {
+        terminal: TerminalProblem {
+            t_s: settings.t_s,
+            q: settings.weights.q,
+            r: settings.weights.r,
+            state_limits: Vector4::new(state_limits[0], theta, state_limits[2], theta_dot),
+            input_limits: symmetric(&settings.u),
+            contraction: arguments.contraction,
+            level: arguments.level,
+        },
+        state_limits,
+        scheduling_limits: Vector2::new(theta, theta_dot),
+        written_by: format!("ballbot {}", env!("CARGO_PKG_VERSION")),
+    };
+    let progress = Progress::new("proving", STEPS);
+    let robot = RobotTable::from(&prepared.ballbot);
+    certify_terminal(
+        (&prepared.ballbot, robot),
+        &problem,
+        arguments.boxes,
+        &|done| {
+            progress.set((done * STEPS as f64) as usize);
+        },
+    )
+}
+
+/// Steps of the progress bar of a proof.
+pub(super) const STEPS: usize = 1000;
+
+/// The limit of |value| that the bounds leave on both sides.
+fn symmetric<const N: usize>(bounds: &Bounds<f64, N>) -> SVector<f64, N> {
+    SVector::from_fn(|i, _| bounds.upper[i].min(-bounds.lower[i]))
+}
+
+/// What is proved, in words and numbers.
+pub(super) fn summary(certificate: &TerminalCertificate, proof: &Proof<4>) -> String {
+    let TerminalCertificate {
+        t_s,
+        scheduling_limits,
+        terminal,
+        continuous,
+        ..
+    } = certificate;
+    let names = [
+        "phi [rad]",
+        "theta [rad]",
+        "phi_dot [rad/s]",
+        "theta_dot [rad/s]",
+    ];
+    let semi_axes = semi_axes(certificate);
+    let k = nalgebra::DMatrix::from_row_slice(1, 4, terminal.k.as_slice());
+    let reach =
+        nalgebra::DMatrix::from_fn(
+            2,
+            4,
+            |i, j| {
+                if i == 0 { semi_axes[j] } else { proof.reach[j] }
+            },
+        );
+    format!(
+        "Proved for the nonlinear robot under u = -K x, held over {t_s} s, for every x with x'Px <= {}:\n  \
+         x'Px decreases per sample by the stage cost and {} of itself, at least\n  \
+         all bounds hold, those of the states also between samples\n\
+         Proved in continuous time, |theta| <= {} deg, |theta_dot| <= {} rad/s, however they move:\n  \
+         A - BK is quadratically stable with the rate {} 1/s\n\n\
+         Gain for u = -K x\n{}\n{}\n\
+         {} boxes of states, {} of schedulings\n",
+        number(terminal.level),
+        number(terminal.contraction),
+        number(scheduling_limits[0].to_degrees()),
+        number(scheduling_limits[1]),
+        number(continuous.rate_1_s),
+        Table::of_matrix(names, &["K"], &k),
+        Table::of_matrix(
+            names,
+            &["at samples, at most", "between samples, below"],
+            &reach
+        ),
+        proof.boxes,
+        proof.scheduling_boxes,
+    )
+}
+
+/// The largest |x_i| in the set.
+pub fn semi_axes(certificate: &TerminalCertificate) -> [f64; 4] {
+    let inverse = certificate.terminal.p.try_inverse();
+    std::array::from_fn(|i| {
+        inverse.map_or(f64::NAN, |inverse| {
+            (certificate.terminal.level * inverse[(i, i)]).sqrt()
+        })
+    })
+}
