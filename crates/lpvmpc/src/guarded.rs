@@ -266,7 +266,7 @@ where
             self.pose(x, wanted, &along, &mut workspace.ocp);
             self.solve(workspace, WarmStart::Shifted);
             if !workspace.solution.status.is_solved() {
-                self.reach *= convert(0.5);
+                self.scale_reach(0.5);
                 break;
             }
             let (u, set_point) = program::answer(&workspace.solution);
@@ -279,7 +279,7 @@ where
             // The trust region grows when its edge was reached and the whole step held.
             let half: T = convert(0.5);
             let at_edge = (set_point - along.set_point).abs() > self.reach * half;
-            self.reach *= convert(match found {
+            self.scale_reach(match found {
                 Some((_, fraction)) if fraction == 1.0 && at_edge => 2.0,
                 Some(_) => 1.0,
                 None => 0.5,
@@ -304,6 +304,14 @@ where
             }
         }
         improved
+    }
+
+    /// Not below a thousandth of the terminal set: a smaller trust region would never be seen to
+    /// hold, and so never grow again.
+    fn scale_reach(&mut self, factor: f64) {
+        let extent = self.settings.terminal.extent(&self.settings.direction);
+        let least = extent * convert(1e-3);
+        self.reach = (self.reach * convert(factor)).max(least);
     }
 
     /// Outside of what is guaranteed: soft bounds, then the saturated terminal law.
