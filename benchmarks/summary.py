@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Criterion's estimates as Markdown: median microseconds per quadratic program, and in brackets
-the ratio to lpvmpc.
+"""Criterion's samples as Markdown: microseconds per quadratic program in the shortest sample, and
+in brackets the ratio to lpvmpc. What else a machine does only adds to a time, so the shortest of
+the samples is the steadiest figure; each is long enough to average over many solves.
 
     summary.py [--baseline NAME] [--update README.md]
 
@@ -22,11 +23,13 @@ OURS = "lpvmpc"
 
 def measurements(directory, baseline):
     """{family: {sequence: {contender: microseconds}}}, in the order in which they were taken."""
-    found = directory.glob(f"*/*/{baseline}/estimates.json")
+    found = directory.glob(f"*/*/{baseline}/sample.json")
     families = {}
     for path in sorted(found, key=lambda path: path.stat().st_mtime_ns):
         about = json.loads(path.with_name("benchmark.json").read_text())
-        nanoseconds = json.loads(path.read_text())["median"]["point_estimate"]
+        samples = json.loads(path.read_text())
+        pairs = zip(samples["times"], samples["iters"])
+        nanoseconds = min(time / iterations for time, iterations in pairs)
         family, sequence = about["group_id"].split("/", 1)
         times = families.setdefault(family, {}).setdefault(sequence, {})
         times[about["function_id"]] = nanoseconds / 1e3 / about["throughput"]["Elements"]
