@@ -9,6 +9,7 @@
 #![no_std]
 
 mod consistency;
+mod disturbed;
 mod dynamics;
 mod embedding;
 mod linear;
@@ -17,5 +18,6 @@ mod trigonometry;
 mod wheels;
 
 pub use consistency::Consistency;
+pub use disturbed::Disturbed;
 pub use parameters::{Ballbot, Geometry, LinearParameters, limits};
 pub use wheels::{BadZenithAngle, Wheels};
