@@ -29,15 +29,20 @@ mod prepare;
 mod reference;
 mod run;
 mod schema;
+mod world;
 
 pub use error::ScenarioError;
 pub use prepare::{Plane, Prepared};
 pub use reference::PhiReference;
-pub use run::{LONGEST_HORIZON, Surroundings};
+pub use run::{LONGEST_HORIZON, PlaneLoop, Surroundings};
 pub use schema::{
     BoundsTable, ControllerTable, CsvTable, IntegrationTable, LinearModelTable, LissajousTable,
     ModelKind, ParameterTable, PointTable, PredictorTable, ReferenceTable, Scenario, SineTable,
     StateTable, TerminalTable,
+};
+pub use world::{
+    ActuatorTable, AngleSensorTable, DelayTable, FloorTable, PlaneName, PlaneWorld, PushTable,
+    RateSensorTable, Robot, RobotTable, SensorsTable, WorldTable,
 };
 
 /// The code of the README, compiled and run with the tests.

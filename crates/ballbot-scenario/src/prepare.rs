@@ -6,6 +6,7 @@ use crate::schema::{
     BoundsTable, ControllerTable, LinearModelTable, ModelKind, ParameterTable, PredictorTable,
     Scenario, StateTable, TerminalTable,
 };
+use crate::world::{PlaneName, PlaneWorld};
 use crate::{builtin, run::LONGEST_HORIZON};
 use ballbot::{Ballbot, Geometry, LinearParameters, Wheels};
 use lpvmpc::{
@@ -42,6 +43,8 @@ pub struct Plane {
     pub reference: PhiReference,
     /// State at time zero.
     pub initial_state: Vector4<f64>,
+    /// The world that it is simulated in.
+    pub world: PlaneWorld,
 }
 
 impl Plane {
@@ -120,13 +123,19 @@ impl Scenario {
             ballbot,
             wheels: self.parameters.wheels()?,
             settings,
-            planes: self.planes(references)?,
+            planes: self.planes(references, &ballbot, settings.t_s, tolerances)?,
             samples: samples as usize,
             tolerances,
         })
     }
 
-    fn planes(&self, references: Vec<PhiReference>) -> Result<Vec<Plane>, ScenarioError> {
+    fn planes(
+        &self,
+        references: Vec<PhiReference>,
+        ballbot: &Ballbot<f64>,
+        t_s: f64,
+        tolerances: Tolerances,
+    ) -> Result<Vec<Plane>, ScenarioError> {
         let first = self.initial_state.check("initial_state")?;
         let second = match self.initial_state_y {
             Some(_) if references.len() == 1 => {
@@ -139,21 +148,30 @@ impl Scenario {
             Some(state) => state.check("initial_state_y")?,
             None => first,
         };
-        let states = [first, second];
-        let planes = references.into_iter().zip(states);
-        Ok(planes
-            .map(|(reference, initial_state)| Plane {
-                reference,
-                initial_state,
+        let places = [(PlaneName::X, first), (PlaneName::Y, second)];
+        let planes = references.into_iter().zip(places);
+        planes
+            .map(|(reference, (name, initial_state))| {
+                let world = match &self.world {
+                    None => PlaneWorld::ideal(*ballbot, t_s, tolerances),
+                    Some(table) => table.prepare(name, ballbot, t_s, tolerances)?,
+                };
+                // What falls over must be integrable on its way to the floor.
+                check_motion(&world.robot.mechanics.ballbot, &self.bounds)?;
+                Ok(Plane {
+                    reference,
+                    initial_state,
+                    world,
+                })
             })
-            .collect())
+            .collect()
     }
 }
 
 /// A run of more samples would not fit in memory with its record.
 const MOST_SAMPLES: f64 = 1e7;
 
-fn positive(key: &str, value: f64) -> Result<f64, ScenarioError> {
+pub(crate) fn positive(key: &str, value: f64) -> Result<f64, ScenarioError> {
     if value > 0.0 && value.is_finite() {
         Ok(value)
     } else {

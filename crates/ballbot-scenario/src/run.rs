@@ -2,8 +2,9 @@
 
 use crate::error::ScenarioError;
 use crate::prepare::{Plane, Prepared};
+use crate::world::{PlaneWorld, Robot};
 use lpvmpc::{Controller, Workspace};
-use lpvmpc_sim::{Experiment, Trajectory};
+use lpvmpc_sim::{ClosedLoop, Course, Recording, Regulator, StateFeedback, Trajectory, World};
 use nalgebra::Vector3;
 use std::time::Duration;
 
@@ -17,6 +18,10 @@ pub struct Surroundings<'a> {
     /// Called with the number of samples done, over all planes.
     pub progress: &'a dyn Fn(usize),
 }
+
+/// The closed loop of one plane, whatever the horizon. The sensors are those of (phi, theta,
+/// phi_dot, theta_dot), the load that of [`ballbot::Disturbed::f`].
+pub type PlaneLoop = ClosedLoop<Box<dyn Regulator<4, 1, 4>>, Robot, 4, 1, 4, 2>;
 
 impl Prepared {
     /// Samples over all planes.
@@ -33,52 +38,66 @@ impl Prepared {
         &self,
         surroundings: &Surroundings<'_>,
     ) -> Result<Vec<Trajectory<4, 1>>, ScenarioError> {
-        let mut done = 0;
-        let mut trajectories = Vec::with_capacity(self.planes.len());
-        for plane in &self.planes {
-            let progress = |samples: usize| (surroundings.progress)(done + samples);
-            // Up to 4 rows of a terminal equality come on top of one row per input.
-            let trajectory = match self.settings.horizon {
-                ..=20 => self.run_plane::<20, 24>(plane, surroundings.clock, &progress),
-                21..=50 => self.run_plane::<50, 54>(plane, surroundings.clock, &progress),
-                51..=100 => self.run_plane::<100, 104>(plane, surroundings.clock, &progress),
-                _ => self.run_plane::<LONGEST_HORIZON, { LONGEST_HORIZON + 4 }>(
-                    plane,
-                    surroundings.clock,
-                    &progress,
-                ),
-            }?;
-            done += self.samples;
-            trajectories.push(trajectory);
-        }
-        Ok(trajectories)
+        let recordings = self.record(surroundings)?.into_iter();
+        Ok(recordings.map(|recording| recording.trajectory).collect())
     }
 
-    fn run_plane<const N: usize, const M: usize>(
+    /// [`run`](Self::run), with what the robot's sensors delivered.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn record(
         &self,
-        plane: &Plane,
-        clock: &dyn Fn() -> Duration,
-        progress: &dyn Fn(usize),
-    ) -> Result<Trajectory<4, 1>, ScenarioError> {
-        let mut workspace = Box::new(Workspace::<f64, 4, 1, N, M>::new());
-        let mut controller = Box::new(Controller::<_, f64, 4, 1, 2, N, M>::new(
+        surroundings: &Surroundings<'_>,
+    ) -> Result<Vec<Recording<4, 1, 4>>, ScenarioError> {
+        let mut recordings = Vec::with_capacity(self.planes.len());
+        for (done, plane) in self.planes.iter().enumerate() {
+            let course = Course {
+                samples: self.samples,
+                reference: &|t| plane.state_reference(t),
+                clock: surroundings.clock,
+                progress: &|samples| (surroundings.progress)(done * self.samples + samples),
+            };
+            let mut closed_loop = self.closed_loop(plane)?;
+            recordings.push(lpvmpc_sim::record(&mut closed_loop, &course));
+        }
+        Ok(recordings)
+    }
+
+    /// The closed loop of one plane at time zero, to be stepped sample by sample.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Controller`] if the controller refuses its settings.
+    pub fn closed_loop(&self, plane: &Plane) -> Result<PlaneLoop, ScenarioError> {
+        // Up to 4 rows of a terminal equality come on top of one row per input.
+        let regulator = match self.settings.horizon {
+            ..=20 => self.regulator::<20, 24>(),
+            21..=50 => self.regulator::<50, 54>(),
+            51..=100 => self.regulator::<100, 104>(),
+            _ => self.regulator::<LONGEST_HORIZON, { LONGEST_HORIZON + 4 }>(),
+        }?;
+        let PlaneWorld {
+            robot,
+            settings,
+            without_plan,
+            range,
+        } = plane.world.clone();
+        let world = World::new(robot, plane.initial_state, settings)?;
+        let mut closed_loop = ClosedLoop::new(regulator, world)?;
+        closed_loop.without_plan = without_plan;
+        closed_loop.range = range;
+        Ok(closed_loop)
+    }
+
+    fn regulator<const N: usize, const M: usize>(
+        &self,
+    ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
+        let workspace = Box::new(Workspace::<f64, 4, 1, N, M>::new());
+        let controller = Box::new(Controller::<_, f64, 4, 1, 2, N, M>::new(
             self.ballbot,
             self.settings,
         )?);
-        let experiment = Experiment {
-            initial_state: plane.initial_state,
-            samples: self.samples,
-            reference: &|t| plane.state_reference(t),
-            tolerances: self.tolerances,
-            clock,
-            progress,
-        };
-        Ok(lpvmpc_sim::run(
-            &mut controller,
-            &self.ballbot,
-            &experiment,
-            &mut workspace,
-        ))
+        Ok(Box::new(StateFeedback::new(controller, workspace)))
     }
 
     /// The motors' torques (tau_1, tau_2, tau_3) in N m at every sample that both planes have,

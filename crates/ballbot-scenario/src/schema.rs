@@ -1,5 +1,6 @@
 //! The scenario file: what a user writes, key by key. Meaning and checks are in `check`.
 
+use crate::world::WorldTable;
 use serde::{Deserialize, Serialize};
 
 /// A closed-loop experiment, as written in a TOML file. Units are part of the key names.
@@ -27,6 +28,9 @@ pub struct Scenario {
     /// Tolerances of the simulated plant.
     #[serde(default)]
     pub integration: IntegrationTable,
+    /// What is not ideal about the simulated world.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub world: Option<WorldTable>,
 }
 
 /// Parameters b and geometry of a ballbot; see [`ballbot::Ballbot`].

@@ -67,12 +67,11 @@ impl<T: Scalar> Disturbed<T> {
         let downhill = self.total_mass * geometry.ball_radius * self.slope.sin();
         // drive = downhill g on the ball, and l g sin(lean) on the body.
         let sin_lean = downhill / geometry.centre_of_mass;
-        if !(sin_lean.abs() <= T::one()) {
-            return None;
-        }
-        let zero = T::zero();
-        let theta = sin_lean.asin() - self.tilt_offset;
-        let torque = downhill * geometry.gravity / self.ballbot.gear();
-        Some((Vector4::new(phi, theta, zero, zero), torque))
+        let (zero, one) = (T::zero(), T::one());
+        (-one..=one).contains(&sin_lean).then(|| {
+            let theta = sin_lean.asin() - self.tilt_offset;
+            let torque = downhill * geometry.gravity / self.ballbot.gear();
+            (Vector4::new(phi, theta, zero, zero), torque)
+        })
     }
 }

@@ -47,6 +47,32 @@ pub trait Regulator<const NX: usize, const NU: usize, const NY: usize> {
     fn prediction(&self) -> Vec<SVector<f64, NX>>;
 }
 
+impl<R, const NX: usize, const NU: usize, const NY: usize> Regulator<NX, NU, NY> for Box<R>
+where
+    R: Regulator<NX, NU, NY> + ?Sized,
+{
+    fn t_s(&self) -> f64 {
+        (**self).t_s()
+    }
+
+    fn observe(&mut self, measurement: &Measurement<NY>) {
+        (**self).observe(measurement);
+    }
+
+    fn decide(
+        &mut self,
+        k: usize,
+        reference: &dyn Fn(f64) -> SVector<f64, NX>,
+        clock: &dyn Fn() -> Duration,
+    ) -> Decision<NX, NU> {
+        (**self).decide(k, reference, clock)
+    }
+
+    fn prediction(&self) -> Vec<SVector<f64, NX>> {
+        (**self).prediction()
+    }
+}
+
 /// The controller on the measured state itself. A reading that is missing keeps its last value
 /// (zero before the first). `K` and `W` hold a [`Controller`] and its [`Workspace`], by
 /// reference or in a box.
