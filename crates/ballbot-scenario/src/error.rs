@@ -70,6 +70,9 @@ pub enum ScenarioError {
     /// The simulated world refuses its settings.
     #[error("world: {0}")]
     World(#[from] lpvmpc_sim::WorldError),
+    /// The estimator refuses its settings.
+    #[error("controller.estimator: {0}")]
+    Estimator(#[from] lpvmpc::EstimatorError),
     /// The controller refuses its settings.
     #[error("controller: {0}")]
     Controller(#[from] lpvmpc::ControllerError),

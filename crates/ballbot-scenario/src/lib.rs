@@ -25,13 +25,21 @@
 
 pub mod builtin;
 mod error;
+mod feedback;
+mod feedback_table;
+mod output_feedback;
 mod prepare;
 mod reference;
 mod run;
 mod schema;
 mod world;
+mod world_table;
 
 pub use error::ScenarioError;
+pub use feedback::Feedback;
+pub use feedback_table::{
+    DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
+};
 pub use prepare::{Plane, Prepared};
 pub use reference::PhiReference;
 pub use run::{LONGEST_HORIZON, PlaneLoop, Surroundings};
@@ -40,9 +48,10 @@ pub use schema::{
     ModelKind, ParameterTable, PointTable, PredictorTable, ReferenceTable, Scenario, SineTable,
     StateTable, TerminalTable,
 };
-pub use world::{
-    ActuatorTable, AngleSensorTable, DelayTable, FloorTable, PlaneName, PlaneWorld, PushTable,
-    RateSensorTable, Robot, RobotTable, SensorsTable, WorldTable,
+pub use world::{PlaneWorld, Robot};
+pub use world_table::{
+    ActuatorTable, AngleSensorTable, DelayTable, FloorTable, PlaneName, PushTable, RateSensorTable,
+    RobotTable, SensorsTable, WorldTable,
 };
 
 /// The code of the README, compiled and run with the tests.

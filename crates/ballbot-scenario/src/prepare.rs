@@ -1,12 +1,14 @@
 //! From the scenario file to controller, plant and references: every check a person may need.
 
 use crate::error::ScenarioError;
+use crate::feedback::Feedback;
 use crate::reference::{self, PhiReference, finite};
 use crate::schema::{
     BoundsTable, ControllerTable, LinearModelTable, ModelKind, ParameterTable, PredictorTable,
     Scenario, StateTable, TerminalTable,
 };
-use crate::world::{PlaneName, PlaneWorld};
+use crate::world::PlaneWorld;
+use crate::world_table::PlaneName;
 use crate::{builtin, run::LONGEST_HORIZON};
 use ballbot::{Ballbot, Geometry, LinearParameters, Wheels};
 use lpvmpc::{
@@ -28,6 +30,8 @@ pub struct Prepared {
     pub wheels: Wheels<f64>,
     /// The controller's settings.
     pub settings: ControllerSettings<f64, 4, 1, 2>,
+    /// What stands around the controller.
+    pub feedback: Feedback,
     /// One plane, or x and y.
     pub planes: Vec<Plane>,
     /// Samples in the run.
@@ -94,7 +98,12 @@ impl Scenario {
     pub fn prepare(&self, directory: &Path) -> Result<Prepared, ScenarioError> {
         let duration = positive("duration_s", self.duration_s)?;
         let ballbot = self.parameters.ballbot()?;
+        let wheels = self.parameters.wheels()?;
         let bounds = self.bounds.check()?;
+        let bounds = match &self.controller.motors {
+            Some(motors) => (bounds.0, motors.within(&bounds.1, &wheels)?),
+            None => bounds,
+        };
         check_motion(&ballbot, &self.bounds)?;
         let settings = self.controller.settings(&ballbot, bounds)?;
         let samples = (duration / settings.t_s - 1e-9).ceil();
@@ -107,6 +116,16 @@ impl Scenario {
         }
         let references =
             reference::resolve(&self.reference, &ballbot.geometry, duration, directory)?;
+        let references = match &self.controller.shaping {
+            Some(table) => {
+                let limits = table.limits(&ballbot)?;
+                references
+                    .into_iter()
+                    .map(|plane| plane.shaped(limits))
+                    .collect()
+            }
+            None => references,
+        };
         let tolerances = Tolerances {
             relative: self.integration.relative_tolerance,
             absolute: self.integration.absolute_tolerance,
@@ -121,8 +140,9 @@ impl Scenario {
         Ok(Prepared {
             title: self.title.clone(),
             ballbot,
-            wheels: self.parameters.wheels()?,
+            wheels,
             settings,
+            feedback: Feedback::new(&self.controller, &ballbot, &settings)?,
             planes: self.planes(references, &ballbot, settings.t_s, tolerances)?,
             samples: samples as usize,
             tolerances,
@@ -426,6 +446,8 @@ impl ControllerTable {
 /// |step * fastest pole| that the predictor stays below when it is left to choose.
 const ACCURATE_STEP: f64 = 0.7;
 
-fn dynamic<const R: usize, const C: usize>(m: &nalgebra::SMatrix<f64, R, C>) -> DMatrix<f64> {
+pub(crate) fn dynamic<const R: usize, const C: usize>(
+    m: &nalgebra::SMatrix<f64, R, C>,
+) -> DMatrix<f64> {
     DMatrix::from_fn(R, C, |i, j| m[(i, j)])
 }

@@ -1,11 +1,13 @@
 //! The run itself: horizons are known at run time, the method's sizes at compile time.
 
 use crate::error::ScenarioError;
+use crate::feedback::longest_step;
+use crate::output_feedback::{Belief, Core, OutputFeedback};
 use crate::prepare::{Plane, Prepared};
 use crate::world::{PlaneWorld, Robot};
-use lpvmpc::{Controller, Workspace};
+use lpvmpc::{Controller, DelayLine, Estimator, RampedInput, Workspace};
 use lpvmpc_sim::{ClosedLoop, Course, Recording, Regulator, StateFeedback, Trajectory, World};
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector4};
 use std::time::Duration;
 
 /// The longest horizon that is compiled in, samples.
@@ -70,11 +72,19 @@ impl Prepared {
     /// [`ScenarioError::Controller`] if the controller refuses its settings.
     pub fn closed_loop(&self, plane: &Plane) -> Result<PlaneLoop, ScenarioError> {
         // Up to 4 rows of a terminal equality come on top of one row per input.
-        let regulator = match self.settings.horizon {
-            ..=20 => self.regulator::<20, 24>(),
-            21..=50 => self.regulator::<50, 54>(),
-            51..=100 => self.regulator::<100, 104>(),
-            _ => self.regulator::<LONGEST_HORIZON, { LONGEST_HORIZON + 4 }>(),
+        let period = plane.world.settings.period;
+        let regulator = match (self.settings.horizon, self.feedback.is_plain()) {
+            (..=20, true) => self.state_feedback::<20, 24>(),
+            (21..=50, true) => self.state_feedback::<50, 54>(),
+            (51..=100, true) => self.state_feedback::<100, 104>(),
+            (_, true) => self.state_feedback::<LONGEST_HORIZON, { LONGEST_HORIZON + 4 }>(),
+            // The torque's own bounds come on top where its rate is the input.
+            (..=20, false) => self.output_feedback::<20, 44>(period),
+            (21..=50, false) => self.output_feedback::<50, 104>(period),
+            (51..=100, false) => self.output_feedback::<100, 204>(period),
+            (_, false) => {
+                self.output_feedback::<LONGEST_HORIZON, { 2 * LONGEST_HORIZON + 4 }>(period)
+            }
         }?;
         let PlaneWorld {
             robot,
@@ -89,7 +99,7 @@ impl Prepared {
         Ok(closed_loop)
     }
 
-    fn regulator<const N: usize, const M: usize>(
+    fn state_feedback<const N: usize, const M: usize>(
         &self,
     ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
         let workspace = Box::new(Workspace::<f64, 4, 1, N, M>::new());
@@ -98,6 +108,46 @@ impl Prepared {
             self.settings,
         )?);
         Ok(Box::new(StateFeedback::new(controller, workspace)))
+    }
+
+    fn output_feedback<const N: usize, const M: usize>(
+        &self,
+        period: f64,
+    ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
+        let x = Vector4::zeros();
+        let belief = match self.feedback.estimator {
+            Some(settings) => {
+                let estimator = Estimator::new(self.ballbot, settings, x)?;
+                Belief::Estimated(Box::new(estimator))
+            }
+            None => Belief::Measured {
+                model: self.ballbot,
+                longest_step: longest_step(&self.ballbot)?,
+                x,
+            },
+        };
+        let core = match self.feedback.ramp {
+            Some(settings) => Core::Ramped {
+                controller: Box::new(Controller::new(RampedInput(self.ballbot), settings)?),
+                workspace: Box::new(Workspace::new()),
+                torque: 0.0,
+                rate: 0.0,
+            },
+            None => Core::Held {
+                controller: Box::new(Controller::new(self.ballbot, self.settings)?),
+                workspace: Box::new(Workspace::new()),
+            },
+        };
+        Ok(Box::new(OutputFeedback::<N, M> {
+            belief,
+            core,
+            delay: self.feedback.delay,
+            period,
+            preview: self.feedback.preview,
+            torque: self.settings.u,
+            line: DelayLine::default(),
+            time: 0.0,
+        }))
     }
 
     /// The motors' torques (tau_1, tau_2, tau_3) in N m at every sample that both planes have,

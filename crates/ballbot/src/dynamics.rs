@@ -68,6 +68,15 @@ impl<T: Scalar> Ballbot<T> {
         ]
     }
 
+    /// The ball's acceleration in rad/s^2 while the body keeps the tilt `theta` (rad), from rest
+    /// or without friction: the sum of both lines of eq. (1) with theta_ddot = 0.
+    pub fn acceleration_at_tilt(&self, theta: T) -> T {
+        let (sin_theta, cos_theta) = sin_cos(theta);
+        let Self { geometry, .. } = self;
+        let pull = geometry.centre_of_mass * geometry.gravity * sin_theta;
+        pull / (self.b1 - self.coupling(cos_theta))
+    }
+
     /// Kinetic plus potential energy per unit of body mass, m^2/s^2. Constant without friction
     /// and torque.
     pub fn energy(&self, x: &Vector4<T>) -> T {

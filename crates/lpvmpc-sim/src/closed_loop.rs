@@ -200,6 +200,9 @@ where
         for i in 0..self.per_sample {
             if i > 0 {
                 self.regulator.observe(self.world.measurement());
+                if let Some(u) = self.regulator.between() {
+                    self.world.command(u);
+                }
             }
             self.advance(log)?;
         }

@@ -43,6 +43,12 @@ pub trait Regulator<const NX: usize, const NU: usize, const NY: usize> {
         clock: &dyn Fn() -> Duration,
     ) -> Decision<NX, NU>;
 
+    /// The command at a sample of the sensors between two control samples, called after
+    /// [`observe`](Self::observe); `None` to hold the last one, as most do.
+    fn between(&mut self) -> Option<SVector<f64, NU>> {
+        None
+    }
+
     /// The states that the model reaches under the last plan, one per sample of the horizon.
     fn prediction(&self) -> Vec<SVector<f64, NX>>;
 }
@@ -66,6 +72,10 @@ where
         clock: &dyn Fn() -> Duration,
     ) -> Decision<NX, NU> {
         (**self).decide(k, reference, clock)
+    }
+
+    fn between(&mut self) -> Option<SVector<f64, NU>> {
+        (**self).between()
     }
 
     fn prediction(&self) -> Vec<SVector<f64, NX>> {

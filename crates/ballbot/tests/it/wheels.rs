@@ -70,3 +70,21 @@ fn bad_zenith_angles_are_refused() {
         }
     }
 }
+
+#[test]
+fn plane_limits_keep_every_motor_within_its_own_and_use_one_up() {
+    for zenith_angle in [0.5, 0.8, 1.2] {
+        let wheels = Wheels::new(zenith_angle).expect("within the open interval");
+        for yaw in [0.0, 0.3] {
+            let limit = wheels.plane_limit(1.0, yaw);
+            let mut most = 0.0_f64;
+            for corner in 0..8 {
+                let sign = |bit: u32| if corner & (1 << bit) == 0 { 1.0 } else { -1.0 };
+                let torques = Vector3::new(sign(0) * limit, sign(1) * limit, sign(2) * yaw);
+                most = most.max(wheels.motors(&torques).amax());
+            }
+            assert!((most - 1.0).abs() < 1e-12, "{most} of the motors' limit");
+        }
+        assert!(wheels.plane_limit(1.0, 10.0) < 0.0, "nothing is left");
+    }
+}
