@@ -257,8 +257,13 @@ where
             zd: a * zd + g * dd,
             dd,
         };
-        moved.zz += SMatrix::from_diagonal(&(settings.state_noise * duration));
-        moved.dd += SMatrix::from_diagonal(&(settings.disturbance_noise * duration));
+        let wandered = settings.spread(
+            &(settings.state_noise * duration),
+            &(settings.disturbance_noise * duration),
+        );
+        moved.zz += wandered.zz;
+        moved.zd += wandered.zd;
+        moved.dd += wandered.dd;
         self.z = self.predict(&self.z, u, duration);
         self.covariance = moved;
     }
@@ -374,12 +379,21 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NY: usize, const ND: usi
     }
 
     fn initial_covariance(&self) -> Covariance<T, NX, ND> {
+        self.spread(&self.initial_state, &self.initial_disturbance)
+    }
+
+    /// The covariance of (z, d) where x and d vary independently of each other. A disturbance
+    /// that wanders moves z = x + E_x d, and leaves the state x that the sensors see.
+    fn spread(
+        &self,
+        state: &SVector<T, NX>,
+        disturbance: &SVector<T, ND>,
+    ) -> Covariance<T, NX, ND> {
         let offset = &self.state_offset;
-        let dd = SMatrix::from_diagonal(&self.initial_disturbance);
-        // z = x + E_x d with x and d independent.
+        let dd = SMatrix::from_diagonal(disturbance);
         let zd = offset * dd;
         Covariance {
-            zz: SMatrix::from_diagonal(&self.initial_state) + zd * offset.transpose(),
+            zz: SMatrix::from_diagonal(state) + zd * offset.transpose(),
             zd,
             dd,
         }
