@@ -66,10 +66,14 @@ fn it_stands_a_push_and_follows_a_metre_within_20_mm() {
 
 #[test]
 fn it_follows_a_lissajous_curve_through_pushes_within_25_mm() {
-    let (prepared, recordings) = stands(&example("pushed-lissajous"));
-    for recording in &recordings {
-        let error = rms_mm(&prepared, recording, 0.0, 70.0);
-        assert!(error < 25.0, "{error} mm");
+    for seed in 0..3 {
+        let mut scenario = example("pushed-lissajous");
+        world(&mut scenario).seed = seed;
+        let (prepared, recordings) = stands(&scenario);
+        for recording in &recordings {
+            let error = rms_mm(&prepared, recording, 0.0, 70.0);
+            assert!(error < 25.0, "seed {seed}: {error} mm");
+        }
     }
 }
 
@@ -87,10 +91,10 @@ fn it_stands_with_every_parameter_wrong_by_20_percent() {
         };
         let (prepared, recordings) = stands(&scenario);
         let error = rms_mm(&prepared, &recordings[0], 6.0, 12.0);
-        println!("corner {corner:04b}: {error:.1} mm");
         let tilt = recordings[0].trajectory.states().map(|x| x[1].abs());
         assert!(tilt.fold(0.0, f64::max) < 0.7, "corner {corner:04b}");
-        assert!(error < 100.0, "corner {corner:04b}: {error} mm");
+        // It does not only keep from falling: it moves, and comes to rest at the set point.
+        assert!(error < 25.0, "corner {corner:04b}: {error} mm");
     }
 }
 
