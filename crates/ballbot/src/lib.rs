@@ -12,6 +12,7 @@ mod consistency;
 mod disturbed;
 mod dynamics;
 mod embedding;
+mod heading;
 mod linear;
 mod parameters;
 mod trigonometry;
@@ -19,5 +20,6 @@ mod wheels;
 
 pub use consistency::Consistency;
 pub use disturbed::Disturbed;
+pub use heading::Heading;
 pub use parameters::{Ballbot, Geometry, LinearParameters, limits};
 pub use wheels::{BadZenithAngle, Wheels};
