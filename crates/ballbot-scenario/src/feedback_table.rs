@@ -32,8 +32,8 @@ impl Default for EstimatorTable {
             phi_noise_rad: 1e-3,
             theta_noise_rad: 2e-3,
             theta_dot_noise_rad_s: 1e-2,
-            phi_dot_drift_rad_s: 1.0,
-            theta_dot_drift_rad_s: 0.5,
+            phi_dot_drift_rad_s: 0.5,
+            theta_dot_drift_rad_s: 0.3,
             disturbances: DisturbancesTable::default(),
             outlier_deviations: 6.0,
             outlier_patience: 2,
@@ -60,8 +60,8 @@ pub enum DisturbancesTable {
 impl Default for DisturbancesTable {
     fn default() -> Self {
         Self::TorqueAndTilt {
-            torque_drift_nm: 0.02,
-            tilt_drift_rad: 0.005,
+            torque_drift_nm: 0.01,
+            tilt_drift_rad: 0.002,
         }
     }
 }
