@@ -58,3 +58,8 @@ pub use world_table::{
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 struct Readme;
+
+/// The code of docs/robust-control.md.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/robust-control.md")]
+struct RobustControl;
