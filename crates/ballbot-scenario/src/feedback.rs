@@ -220,6 +220,7 @@ impl TorqueRateTable {
                 upper: Vector1::new(limit),
             },
             scheduling: plain.scheduling,
+            iterations: plain.iterations,
             solver: plain.solver,
         })
     }
