@@ -1,7 +1,7 @@
 //! Recorded runs as files and arrays.
 
 use ballbot_scenario::{Plane, Prepared};
-use lpvmpc_sim::{Ending, Trajectory};
+use lpvmpc_sim::{Ending, LogRow, Trajectory};
 use nalgebra::Vector3;
 
 /// The columns of `trajectory.csv`.
@@ -52,18 +52,48 @@ pub fn trajectory_csv(trajectory: &Trajectory<4, 1>) -> String {
     text
 }
 
+/// The log of one plane, as a robot would have written it: one row per sample of the sensors,
+/// with the torque commanded from there on and the mean torque of the drive until the next row.
+/// A missing reading is an empty cell; a row without any reading is left out.
+pub fn log_csv(log: &[LogRow<4, 1>]) -> String {
+    let mut text =
+        "t_s,phi_rad,theta_rad,theta_dot_rad_s,torque_commanded_nm,torque_applied_nm\n".to_owned();
+    let cell = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:?}"));
+    for row in log {
+        let [phi, theta, _, theta_dot] = row.measured;
+        if [phi, theta, theta_dot].iter().all(Option::is_none) {
+            continue;
+        }
+        text += &format!(
+            "{:?},{},{},{},{:?},{:?}\n",
+            row.t,
+            cell(phi),
+            cell(theta),
+            cell(theta_dot),
+            row.commanded[0],
+            row.applied[0]
+        );
+    }
+    text
+}
+
 /// Why a run ended, with its time.
 pub fn ending_in_words(ending: &Ending) -> String {
     match ending {
         Ending::Complete => "complete".to_owned(),
+        Ending::OutOfRange { t, component } => {
+            let state = STATES.get(*component).copied().unwrap_or("state");
+            format!("the robot has fallen: {state} left its range by t = {t:.3} s")
+        }
         Ending::NoPlan { t, status } => format!("no plan at t = {t:.3} s: {}", named(status)),
         Ending::PlantFailed { t, error } => format!("at t = {t:.3} s: {error}"),
     }
 }
 
+const STATES: [&str; 4] = ["phi", "theta", "phi_dot", "theta_dot"];
+
 /// The solver's status with the ballbot's names.
 fn named(status: &lpvmpc::Status<f64>) -> String {
-    const STATES: [&str; 4] = ["phi", "theta", "phi_dot", "theta_dot"];
     let mut text = status.to_string();
     for (index, name) in STATES.iter().enumerate() {
         text = text.replace(&format!("state {index}"), name);

@@ -67,6 +67,12 @@ pub enum ScenarioError {
     /// The equations of motion have no solution at some tilt within the bounds.
     #[error("parameters: {0}")]
     Parameters(String),
+    /// The simulated world refuses its settings.
+    #[error("world: {0}")]
+    World(#[from] lpvmpc_sim::WorldError),
+    /// The estimator refuses its settings.
+    #[error("controller.estimator: {0}")]
+    Estimator(#[from] lpvmpc::EstimatorError),
     /// The controller refuses its settings.
     #[error("controller: {0}")]
     Controller(#[from] lpvmpc::ControllerError),

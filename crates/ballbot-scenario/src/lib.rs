@@ -26,23 +26,42 @@
 pub mod builtin;
 mod certificate;
 mod error;
+mod feedback;
+mod feedback_table;
+mod output_feedback;
 mod prepare;
 mod reference;
 mod run;
 mod schema;
+mod world;
+mod world_table;
 
-pub use certificate::{RobotTable, TerminalCertificate};
+pub use certificate::{CertifiedRobot, TerminalCertificate};
 pub use error::ScenarioError;
+pub use feedback::Feedback;
+pub use feedback_table::{
+    DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
+};
 pub use prepare::{Plane, Prepared};
 pub use reference::PhiReference;
-pub use run::{LONGEST_HORIZON, Surroundings};
+pub use run::{LONGEST_HORIZON, PlaneLoop, Surroundings};
 pub use schema::{
     BoundsTable, ControllerTable, CsvTable, IntegrationTable, LinearModelTable, LissajousTable,
     ModelKind, ParameterTable, PointTable, PredictorTable, ReferenceTable, Scenario, SineTable,
     StateTable, TerminalTable,
+};
+pub use world::{PlaneWorld, Robot};
+pub use world_table::{
+    ActuatorTable, AngleSensorTable, DelayTable, FloorTable, PlaneName, PushTable, RateSensorTable,
+    RobotTable, SensorsTable, WorldTable,
 };
 
 /// The code of the README, compiled and run with the tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 struct Readme;
+
+/// The code of docs/robust-control.md.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/robust-control.md")]
+struct RobustControl;

@@ -1,11 +1,14 @@
 //! From the scenario file to controller, plant and references: every check a person may need.
 
 use crate::error::ScenarioError;
+use crate::feedback::Feedback;
 use crate::reference::{self, PhiReference, finite};
 use crate::schema::{
     BoundsTable, ControllerTable, LinearModelTable, ModelKind, ParameterTable, PredictorTable,
     Scenario, StateTable, TerminalTable,
 };
+use crate::world::PlaneWorld;
+use crate::world_table::PlaneName;
 use crate::{builtin, run::LONGEST_HORIZON};
 use ballbot::{Ballbot, Geometry, LinearParameters, Wheels};
 use lpvmpc::{
@@ -27,6 +30,8 @@ pub struct Prepared {
     pub wheels: Wheels<f64>,
     /// The controller's settings.
     pub settings: ControllerSettings<f64, 4, 1, 2>,
+    /// What stands around the controller.
+    pub feedback: Feedback,
     /// One plane, or x and y.
     pub planes: Vec<Plane>,
     /// Samples in the run.
@@ -42,6 +47,8 @@ pub struct Plane {
     pub reference: PhiReference,
     /// State at time zero.
     pub initial_state: Vector4<f64>,
+    /// The world that it is simulated in.
+    pub world: PlaneWorld,
 }
 
 impl Plane {
@@ -91,7 +98,12 @@ impl Scenario {
     pub fn prepare(&self, directory: &Path) -> Result<Prepared, ScenarioError> {
         let duration = positive("duration_s", self.duration_s)?;
         let ballbot = self.parameters.ballbot()?;
+        let wheels = self.parameters.wheels()?;
         let bounds = self.bounds.check()?;
+        let bounds = match &self.controller.motors {
+            Some(motors) => (bounds.0, motors.within(&bounds.1, &wheels)?),
+            None => bounds,
+        };
         check_motion(&ballbot, &self.bounds)?;
         let settings = self.controller.settings(&ballbot, bounds)?;
         let samples = (duration / settings.t_s - 1e-9).ceil();
@@ -104,6 +116,16 @@ impl Scenario {
         }
         let references =
             reference::resolve(&self.reference, &ballbot.geometry, duration, directory)?;
+        let references = match &self.controller.shaping {
+            Some(table) => {
+                let limits = table.limits(&ballbot)?;
+                references
+                    .into_iter()
+                    .map(|plane| plane.shaped(limits))
+                    .collect()
+            }
+            None => references,
+        };
         let tolerances = Tolerances {
             relative: self.integration.relative_tolerance,
             absolute: self.integration.absolute_tolerance,
@@ -118,15 +140,22 @@ impl Scenario {
         Ok(Prepared {
             title: self.title.clone(),
             ballbot,
-            wheels: self.parameters.wheels()?,
+            wheels,
             settings,
-            planes: self.planes(references)?,
+            feedback: Feedback::new(&self.controller, &ballbot, &settings)?,
+            planes: self.planes(references, &ballbot, settings.t_s, tolerances)?,
             samples: samples as usize,
             tolerances,
         })
     }
 
-    fn planes(&self, references: Vec<PhiReference>) -> Result<Vec<Plane>, ScenarioError> {
+    fn planes(
+        &self,
+        references: Vec<PhiReference>,
+        ballbot: &Ballbot<f64>,
+        t_s: f64,
+        tolerances: Tolerances,
+    ) -> Result<Vec<Plane>, ScenarioError> {
         let first = self.initial_state.check("initial_state")?;
         let second = match self.initial_state_y {
             Some(_) if references.len() == 1 => {
@@ -139,21 +168,30 @@ impl Scenario {
             Some(state) => state.check("initial_state_y")?,
             None => first,
         };
-        let states = [first, second];
-        let planes = references.into_iter().zip(states);
-        Ok(planes
-            .map(|(reference, initial_state)| Plane {
-                reference,
-                initial_state,
+        let places = [(PlaneName::X, first), (PlaneName::Y, second)];
+        let planes = references.into_iter().zip(places);
+        planes
+            .map(|(reference, (name, initial_state))| {
+                let world = match &self.world {
+                    None => PlaneWorld::ideal(*ballbot, t_s, tolerances),
+                    Some(table) => table.prepare(name, ballbot, t_s, tolerances)?,
+                };
+                // What falls over must be integrable on its way to the floor.
+                check_motion(&world.robot.mechanics.ballbot, &self.bounds)?;
+                Ok(Plane {
+                    reference,
+                    initial_state,
+                    world,
+                })
             })
-            .collect())
+            .collect()
     }
 }
 
 /// A run of more samples would not fit in memory with its record.
 const MOST_SAMPLES: f64 = 1e7;
 
-fn positive(key: &str, value: f64) -> Result<f64, ScenarioError> {
+pub(crate) fn positive(key: &str, value: f64) -> Result<f64, ScenarioError> {
     if value > 0.0 && value.is_finite() {
         Ok(value)
     } else {
@@ -408,6 +446,8 @@ impl ControllerTable {
 /// |step * fastest pole| that the predictor stays below when it is left to choose.
 const ACCURATE_STEP: f64 = 0.7;
 
-fn dynamic<const R: usize, const C: usize>(m: &nalgebra::SMatrix<f64, R, C>) -> DMatrix<f64> {
+pub(crate) fn dynamic<const R: usize, const C: usize>(
+    m: &nalgebra::SMatrix<f64, R, C>,
+) -> DMatrix<f64> {
     DMatrix::from_fn(R, C, |i, j| m[(i, j)])
 }

@@ -3,6 +3,7 @@
 use crate::error::ScenarioError;
 use crate::schema::{CsvTable, LissajousTable, PointTable, ReferenceTable, SineTable};
 use ballbot::Geometry;
+use lpvmpc::{MoveLimits, SmoothMove};
 use std::path::Path;
 
 /// phi_ref(t) of one plane, rad.
@@ -16,6 +17,8 @@ pub enum PhiReference {
     MinimumJerk(Vec<PointTable>),
     /// Straight lines between points; the ends hold.
     Interpolated(Vec<PointTable>),
+    /// Set points as smooth moves one after the other, each with the time of its beginning, s.
+    Moves(Vec<(f64, SmoothMove<f64>)>),
 }
 
 /// A set point takes effect at the sample that lies within this much of its time, s.
@@ -34,14 +37,49 @@ impl PhiReference {
                 sine.offset_rad + sine.amplitude_rad * angle.sin()
             }
             Self::MinimumJerk(points) => between(points, t, minimum_jerk),
+            Self::Moves(moves) => {
+                let begun = moves
+                    .iter()
+                    .rev()
+                    .find(|(begin, _)| *begin <= t + SAME_TIME);
+                match (begun, moves.first()) {
+                    (Some((begin, planned)), _) => planned.at(t - begin).position,
+                    (None, Some((_, first))) => first.from,
+                    (None, None) => 0.0,
+                }
+            }
             Self::Interpolated(points) => between(points, t, |fraction| fraction),
         }
     }
+
+    /// Steps become smooth moves within `limits`; other references stay what they are. A set
+    /// point that comes while a move is under way waits for its end.
+    pub(crate) fn shaped(self, limits: MoveLimits<f64>) -> Self {
+        let Self::Steps(points) = self else {
+            return self;
+        };
+        let Some(first) = points.first() else {
+            return Self::Steps(points);
+        };
+        let (mut from, mut free) = (first.phi_rad, first.time_s);
+        let moves = points.iter().map(|point| {
+            let planned = SmoothMove::within(from, point.phi_rad, limits);
+            let begin = point.time_s.max(free);
+            (from, free) = (point.phi_rad, begin + planned.duration);
+            (begin, planned)
+        });
+        Self::Moves(moves.collect())
+    }
 }
 
-/// The position polynomial of least jerk from rest to rest, on [0, 1] (Flash and Hogan 1985).
-fn minimum_jerk(s: f64) -> f64 {
-    s * s * s * (10.0 + s * (6.0 * s - 15.0))
+/// The position of the move from 0 to 1 in 1 s.
+fn minimum_jerk(fraction: f64) -> f64 {
+    let unit = SmoothMove {
+        from: 0.0,
+        to: 1.0,
+        duration: 1.0,
+    };
+    unit.at(fraction).position
 }
 
 fn between(points: &[PointTable], t: f64, shape: impl Fn(f64) -> f64) -> f64 {

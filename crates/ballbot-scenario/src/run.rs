@@ -1,10 +1,13 @@
 //! The run itself: horizons are known at run time, the method's sizes at compile time.
 
 use crate::error::ScenarioError;
+use crate::feedback::longest_step;
+use crate::output_feedback::{Belief, Core, OutputFeedback};
 use crate::prepare::{Plane, Prepared};
-use lpvmpc::{Controller, Workspace};
-use lpvmpc_sim::{Experiment, Trajectory};
-use nalgebra::Vector3;
+use crate::world::{PlaneWorld, Robot};
+use lpvmpc::{Controller, DelayLine, Estimator, RampedInput, Workspace};
+use lpvmpc_sim::{ClosedLoop, Course, Recording, Regulator, StateFeedback, Trajectory, World};
+use nalgebra::{Vector3, Vector4};
 use std::time::Duration;
 
 /// The longest horizon that is compiled in, samples.
@@ -17,6 +20,10 @@ pub struct Surroundings<'a> {
     /// Called with the number of samples done, over all planes.
     pub progress: &'a dyn Fn(usize),
 }
+
+/// The closed loop of one plane, whatever the horizon. The sensors are those of (phi, theta,
+/// phi_dot, theta_dot), the load that of [`ballbot::Disturbed::f`].
+pub type PlaneLoop = ClosedLoop<Box<dyn Regulator<4, 1, 4>>, Robot, 4, 1, 4, 2>;
 
 impl Prepared {
     /// Samples over all planes.
@@ -33,52 +40,114 @@ impl Prepared {
         &self,
         surroundings: &Surroundings<'_>,
     ) -> Result<Vec<Trajectory<4, 1>>, ScenarioError> {
-        let mut done = 0;
-        let mut trajectories = Vec::with_capacity(self.planes.len());
-        for plane in &self.planes {
-            let progress = |samples: usize| (surroundings.progress)(done + samples);
-            // Up to 4 rows of a terminal equality come on top of one row per input.
-            let trajectory = match self.settings.horizon {
-                ..=20 => self.run_plane::<20, 24>(plane, surroundings.clock, &progress),
-                21..=50 => self.run_plane::<50, 54>(plane, surroundings.clock, &progress),
-                51..=100 => self.run_plane::<100, 104>(plane, surroundings.clock, &progress),
-                _ => self.run_plane::<LONGEST_HORIZON, { LONGEST_HORIZON + 4 }>(
-                    plane,
-                    surroundings.clock,
-                    &progress,
-                ),
-            }?;
-            done += self.samples;
-            trajectories.push(trajectory);
-        }
-        Ok(trajectories)
+        let recordings = self.record(surroundings)?.into_iter();
+        Ok(recordings.map(|recording| recording.trajectory).collect())
     }
 
-    fn run_plane<const N: usize, const M: usize>(
+    /// [`run`](Self::run), with what the robot's sensors delivered.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn record(
         &self,
-        plane: &Plane,
-        clock: &dyn Fn() -> Duration,
-        progress: &dyn Fn(usize),
-    ) -> Result<Trajectory<4, 1>, ScenarioError> {
-        let mut workspace = Box::new(Workspace::<f64, 4, 1, N, M>::new());
-        let mut controller = Box::new(Controller::<_, f64, 4, 1, 2, N, M>::new(
+        surroundings: &Surroundings<'_>,
+    ) -> Result<Vec<Recording<4, 1, 4>>, ScenarioError> {
+        let mut recordings = Vec::with_capacity(self.planes.len());
+        for (done, plane) in self.planes.iter().enumerate() {
+            let course = Course {
+                samples: self.samples,
+                reference: &|t| plane.state_reference(t),
+                clock: surroundings.clock,
+                progress: &|samples| (surroundings.progress)(done * self.samples + samples),
+            };
+            let mut closed_loop = self.closed_loop(plane)?;
+            recordings.push(lpvmpc_sim::record(&mut closed_loop, &course));
+        }
+        Ok(recordings)
+    }
+
+    /// The closed loop of one plane at time zero, to be stepped sample by sample.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Controller`] if the controller refuses its settings.
+    pub fn closed_loop(&self, plane: &Plane) -> Result<PlaneLoop, ScenarioError> {
+        // Up to 4 rows of a terminal equality come on top of one row per input.
+        let period = plane.world.settings.period;
+        let regulator = match (self.settings.horizon, self.feedback.is_plain()) {
+            (..=20, true) => self.state_feedback::<20, 24>(),
+            (21..=50, true) => self.state_feedback::<50, 54>(),
+            (51..=100, true) => self.state_feedback::<100, 104>(),
+            (_, true) => self.state_feedback::<LONGEST_HORIZON, { LONGEST_HORIZON + 4 }>(),
+            // The torque's own bounds come on top where its rate is the input.
+            (..=20, false) => self.output_feedback::<20, 44>(period),
+            (21..=50, false) => self.output_feedback::<50, 104>(period),
+            (51..=100, false) => self.output_feedback::<100, 204>(period),
+            (_, false) => {
+                self.output_feedback::<LONGEST_HORIZON, { 2 * LONGEST_HORIZON + 4 }>(period)
+            }
+        }?;
+        let PlaneWorld {
+            robot,
+            settings,
+            without_plan,
+            range,
+        } = plane.world.clone();
+        let world = World::new(robot, plane.initial_state, settings)?;
+        let mut closed_loop = ClosedLoop::new(regulator, world)?;
+        closed_loop.without_plan = without_plan;
+        closed_loop.range = range;
+        Ok(closed_loop)
+    }
+
+    fn state_feedback<const N: usize, const M: usize>(
+        &self,
+    ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
+        let workspace = Box::new(Workspace::<f64, 4, 1, N, M>::new());
+        let controller = Box::new(Controller::<_, f64, 4, 1, 2, N, M>::new(
             self.ballbot,
             self.settings,
         )?);
-        let experiment = Experiment {
-            initial_state: plane.initial_state,
-            samples: self.samples,
-            reference: &|t| plane.state_reference(t),
-            tolerances: self.tolerances,
-            clock,
-            progress,
+        Ok(Box::new(StateFeedback::new(controller, workspace)))
+    }
+
+    fn output_feedback<const N: usize, const M: usize>(
+        &self,
+        period: f64,
+    ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
+        let x = Vector4::zeros();
+        let belief = match self.feedback.estimator {
+            Some(settings) => {
+                let estimator = Estimator::new(self.ballbot, settings, x)?;
+                Belief::Estimated(Box::new(estimator))
+            }
+            None => Belief::Measured {
+                model: self.ballbot,
+                longest_step: longest_step(&self.ballbot)?,
+                x,
+            },
         };
-        Ok(lpvmpc_sim::run(
-            &mut controller,
-            &self.ballbot,
-            &experiment,
-            &mut workspace,
-        ))
+        let core = match self.feedback.ramp {
+            Some(settings) => Core::Ramped {
+                controller: Box::new(Controller::new(RampedInput(self.ballbot), settings)?),
+                workspace: Box::new(Workspace::new()),
+                torque: 0.0,
+                rate: 0.0,
+            },
+            None => Core::Held {
+                controller: Box::new(Controller::new(self.ballbot, self.settings)?),
+                workspace: Box::new(Workspace::new()),
+            },
+        };
+        Ok(Box::new(OutputFeedback::<N, M> {
+            belief,
+            core,
+            delay: self.feedback.delay,
+            period,
+            preview: self.feedback.preview,
+            torque: self.settings.u,
+            line: DelayLine::default(),
+            time: 0.0,
+        }))
     }
 
     /// The motors' torques (tau_1, tau_2, tau_3) in N m at every sample that both planes have,

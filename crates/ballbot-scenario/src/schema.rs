@@ -1,5 +1,7 @@
 //! The scenario file: what a user writes, key by key. Meaning and checks are in `check`.
 
+use crate::feedback_table::{EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable};
+use crate::world_table::WorldTable;
 use serde::{Deserialize, Serialize};
 
 /// A closed-loop experiment, as written in a TOML file. Units are part of the key names.
@@ -27,6 +29,9 @@ pub struct Scenario {
     /// Tolerances of the simulated plant.
     #[serde(default)]
     pub integration: IntegrationTable,
+    /// What is not ideal about the simulated world.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub world: Option<WorldTable>,
 }
 
 /// Parameters b and geometry of a ballbot; see [`ballbot::Ballbot`].
@@ -96,6 +101,29 @@ pub struct ControllerTable {
     /// The discrete-time predictor; stage-consistent when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predictor: Option<PredictorTable>,
+    /// Whether the controller sees the reference before its time, over the whole horizon.
+    #[serde(default = "yes")]
+    pub preview: bool,
+    /// The state estimator.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub estimator: Option<EstimatorTable>,
+    /// Time from a measurement to the torque that answers it, as the controller knows it, s: it
+    /// decides for the state at which its torque will act.
+    #[serde(default)]
+    pub delay_s: f64,
+    /// Bound and cost of the torque's rate; the torque then moves in ramps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torque_rate: Option<TorqueRateTable>,
+    /// How set points become moves; steps without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shaping: Option<ShapingTable>,
+    /// The limits of the motors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motors: Option<MotorsTable>,
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// Which model predicts.

@@ -54,13 +54,27 @@ impl<T: Scalar> Ballbot<T> {
             self.gear() * torque + arm * sin_theta * theta_dot * theta_dot - self.b4 * phi_dot;
         let force_theta =
             geometry.centre_of_mass * geometry.gravity * sin_theta - self.gear() * torque;
+        let [phi_ddot, theta_ddot] = self.accelerations_under(coupling, force_phi, force_theta);
+        Vector4::new(phi_dot, theta_dot, phi_ddot, theta_ddot)
+    }
+
+    /// M^-1 (force_phi, force_theta) in rad/s^2, for generalised forces in m^2/s^2.
+    #[inline(always)]
+    pub(crate) fn accelerations_under(&self, coupling: T, force_phi: T, force_theta: T) -> [T; 2] {
         let inverse = T::one() / self.determinant(coupling);
-        Vector4::new(
-            phi_dot,
-            theta_dot,
+        [
             (self.b3 * force_phi + coupling * force_theta) * inverse,
             (coupling * force_phi + self.b1 * force_theta) * inverse,
-        )
+        ]
+    }
+
+    /// The ball's acceleration in rad/s^2 while the body keeps the tilt `theta` (rad), from rest
+    /// or without friction: the sum of both lines of eq. (1) with theta_ddot = 0.
+    pub fn acceleration_at_tilt(&self, theta: T) -> T {
+        let (sin_theta, cos_theta) = sin_cos(theta);
+        let Self { geometry, .. } = self;
+        let pull = geometry.centre_of_mass * geometry.gravity * sin_theta;
+        pull / (self.b1 - self.coupling(cos_theta))
     }
 
     /// Kinetic plus potential energy per unit of body mass, m^2/s^2. Constant without friction

@@ -9,14 +9,18 @@
 #![no_std]
 
 mod consistency;
+mod disturbed;
 mod dynamics;
 mod embedding;
+mod heading;
 mod linear;
 mod parameters;
 mod trigonometry;
 mod wheels;
 
 pub use consistency::Consistency;
+pub use disturbed::Disturbed;
 pub use embedding::{Accelerations, Tilt};
+pub use heading::Heading;
 pub use parameters::{Ballbot, Field, Geometry, LinearParameters, limits};
 pub use wheels::{BadZenithAngle, Wheels};

@@ -52,6 +52,7 @@ mod linearize;
 mod lqr;
 mod matrix_check;
 mod modes;
+mod offset_free;
 mod riccati;
 mod stability;
 mod terminal;
@@ -69,6 +70,7 @@ pub use linearize::{Linearization, LinearizeError, Variable, linearize};
 pub use lqr::{Lqr, lqr_continuous, lqr_discrete};
 pub use matrix_check::MatrixError;
 pub use modes::{controllability_rank, poles};
+pub use offset_free::{OffsetFreeError, check_offset_free};
 pub use riccati::{LqProblem, RiccatiError, RiccatiSolution, solve_care, solve_dare};
 pub use stability::{
     FrozenError, FrozenStability, Rk4Step, Rk4StepError, SchedulingGrid, check_rk4_step,

@@ -1,7 +1,9 @@
-//! Controller and plant together: Algorithm 2 around the continuous plant.
+//! Regulator and world together: Algorithm 2 around the continuous plant.
 
-use crate::plant::{self, PlantError, Tolerances};
-use lpvmpc::{BoundId, Controller, LpvModel, Reference, Status, Workspace};
+use crate::plant::{Plant, PlantError, Tolerances, Unloaded};
+use crate::regulator::{Regulator, StateFeedback};
+use crate::world::{World, WorldError};
+use lpvmpc::{BoundId, Bounds, Controller, LpvModel, Status, Workspace};
 use nalgebra::SVector;
 use std::time::Duration;
 
@@ -12,7 +14,9 @@ pub struct Sample<const NX: usize, const NU: usize> {
     pub t: f64,
     /// State at the sample.
     pub x: SVector<f64, NX>,
-    /// Input held from this sample to the next.
+    /// The state that the input was decided for: measured, estimated, or predicted.
+    pub estimate: SVector<f64, NX>,
+    /// Input that was commanded from this sample to the next.
     pub u: SVector<f64, NU>,
     /// State reference at the sample.
     pub x_ref: SVector<f64, NX>,
@@ -37,6 +41,13 @@ pub enum Ending {
         t: f64,
         /// What the solver said.
         status: Status<f64>,
+    },
+    /// The plant left the range in which its motion is followed: it fell, say.
+    OutOfRange {
+        /// Time at which it was found outside, s.
+        t: f64,
+        /// The component of the state, from 0.
+        component: usize,
     },
     /// The plant's motion could not be integrated from this time on.
     PlantFailed {
@@ -81,7 +92,209 @@ impl<const NX: usize, const NU: usize> Trajectory<NX, NU> {
     }
 }
 
-/// What a run needs besides controller and plant.
+/// What a regulated world does when the controller has no plan that keeps all bounds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WithoutPlan {
+    /// It ends, so that nothing is recorded that the method does not promise.
+    #[default]
+    End,
+    /// The input that comes with the answer is applied, finite and within its bounds; only a
+    /// state that is not finite ends the run.
+    Apply,
+}
+
+/// One row of a log: what a robot would have written down at a sample of its sensors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LogRow<const NY: usize, const NU: usize> {
+    /// Time of the measurement, s.
+    pub t: f64,
+    /// The readings; `None` where one is missing.
+    pub measured: [Option<f64>; NY],
+    /// The input commanded from here on.
+    pub commanded: SVector<f64, NU>,
+    /// The mean of the actuators' outputs from here to the next row, before friction.
+    pub applied: SVector<f64, NU>,
+}
+
+/// A world with a regulator in it, stepped sample by sample.
+#[derive(Debug)]
+pub struct ClosedLoop<R, P, const NX: usize, const NU: usize, const NY: usize, const NL: usize> {
+    /// What decides.
+    pub regulator: R,
+    /// What it decides about.
+    pub world: World<P, NX, NU, NY, NL>,
+    /// What happens without a plan.
+    pub without_plan: WithoutPlan,
+    /// The run ends when the plant's state is found outside.
+    pub range: Bounds<f64, NX>,
+    /// Samples of the sensors per control sample.
+    per_sample: usize,
+    /// Control samples done.
+    k: usize,
+}
+
+impl<R, P, const NX: usize, const NU: usize, const NY: usize, const NL: usize>
+    ClosedLoop<R, P, NX, NU, NY, NL>
+where
+    R: Regulator<NX, NU, NY>,
+    P: Plant<NX, NU, NL>,
+{
+    /// A regulator in a world at time zero. It ends without a plan, and has no range.
+    ///
+    /// # Errors
+    /// [`WorldError::Rates`] if the sampling time of the control is not a whole number of
+    /// periods of the sensors.
+    pub fn new(regulator: R, world: World<P, NX, NU, NY, NL>) -> Result<Self, WorldError> {
+        let (t_s, period) = (regulator.t_s(), world.period());
+        let per_sample = (t_s / period).round();
+        if !(per_sample >= 1.0 && (per_sample * period - t_s).abs() <= 1e-9 * t_s) {
+            return Err(WorldError::Rates { t_s, period });
+        }
+        Ok(Self {
+            per_sample: per_sample as usize,
+            ..Self::at_one_rate(regulator, world)
+        })
+    }
+
+    /// One sample of the sensors per control sample.
+    fn at_one_rate(regulator: R, world: World<P, NX, NU, NY, NL>) -> Self {
+        Self {
+            regulator,
+            world,
+            without_plan: WithoutPlan::End,
+            range: Bounds::none(),
+            per_sample: 1,
+            k: 0,
+        }
+    }
+
+    /// One control sample: observe, decide, command, and let the world move on to the next.
+    /// `log` gets a row for every sample of the sensors.
+    ///
+    /// # Errors
+    /// The [`Ending`], if the run ends here.
+    pub fn sample(
+        &mut self,
+        reference: &dyn Fn(f64) -> SVector<f64, NX>,
+        clock: &dyn Fn() -> Duration,
+        log: &mut dyn FnMut(LogRow<NY, NU>),
+    ) -> Result<Sample<NX, NU>, Ending> {
+        let (t, x) = (self.world.time(), *self.world.state());
+        let sides = self.range.lower.iter().zip(self.range.upper.iter());
+        // A state that is not a number is the regulator's to refuse.
+        let outside = |(value, (lower, upper)): (&f64, _)| value < lower || value > upper;
+        if let Some(component) = x.iter().zip(sides).position(outside) {
+            return Err(Ending::OutOfRange { t, component });
+        }
+        self.regulator.observe(self.world.measurement());
+        let decision = self.regulator.decide(self.k, reference, clock);
+        let status = decision.status;
+        let usable = match self.without_plan {
+            WithoutPlan::End => status.is_solved(),
+            WithoutPlan::Apply => status != Status::NotFinite,
+        };
+        if !usable {
+            return Err(Ending::NoPlan { t, status });
+        }
+        self.world.command(decision.u);
+        for i in 0..self.per_sample {
+            if i > 0 {
+                self.regulator.observe(self.world.measurement());
+                if let Some(u) = self.regulator.between() {
+                    self.world.command(u);
+                }
+            }
+            self.advance(log)?;
+        }
+        self.k += 1;
+        Ok(Sample {
+            t,
+            x,
+            estimate: decision.estimate,
+            u: decision.u,
+            x_ref: decision.x_ref,
+            cost: decision.cost,
+            status,
+            active_bounds: decision.active_bounds,
+            step_time: decision.step_time,
+        })
+    }
+
+    /// One sample of the sensors.
+    fn advance(&mut self, log: &mut dyn FnMut(LogRow<NY, NU>)) -> Result<(), Ending> {
+        let world = &mut self.world;
+        let measurement = *world.measurement();
+        let t = measurement.t;
+        let moved = world.advance();
+        moved.map_err(|error| Ending::PlantFailed { t, error })?;
+        log(LogRow {
+            t,
+            measured: measurement.values,
+            commanded: *world.commanded(),
+            applied: *world.applied(),
+        });
+        Ok(())
+    }
+}
+
+/// What a run needs besides regulator and world.
+pub struct Course<'a, const NX: usize> {
+    /// Number of control samples.
+    pub samples: usize,
+    /// State reference at a time in s; the controller sees it over its whole horizon.
+    pub reference: &'a dyn Fn(f64) -> SVector<f64, NX>,
+    /// A monotonic clock; used for [`Sample::step_time`] only.
+    pub clock: &'a dyn Fn() -> Duration,
+    /// Called after every control sample with the number of samples done.
+    pub progress: &'a dyn Fn(usize),
+}
+
+/// A run with what its sensors delivered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording<const NX: usize, const NU: usize, const NY: usize> {
+    /// What happened, sample by sample of the control.
+    pub trajectory: Trajectory<NX, NU>,
+    /// What a robot would have logged, sample by sample of its sensors.
+    pub log: Vec<LogRow<NY, NU>>,
+}
+
+/// Runs a closed loop from where it stands.
+///
+/// The run ends early, with what was recorded so far, when the loop ends;
+/// [`Trajectory::ending`] says why.
+pub fn record<R, P, const NX: usize, const NU: usize, const NY: usize, const NL: usize>(
+    closed_loop: &mut ClosedLoop<R, P, NX, NU, NY, NL>,
+    course: &Course<'_, NX>,
+) -> Recording<NX, NU, NY>
+where
+    R: Regulator<NX, NU, NY>,
+    P: Plant<NX, NU, NL>,
+{
+    let mut samples = Vec::with_capacity(course.samples);
+    let mut log = Vec::new();
+    let mut ending = Ending::Complete;
+    for k in 0..course.samples {
+        match closed_loop.sample(course.reference, course.clock, &mut |row| log.push(row)) {
+            Ok(sample) => samples.push(sample),
+            Err(early) => {
+                ending = early;
+                break;
+            }
+        }
+        (course.progress)(k + 1);
+    }
+    let final_time = closed_loop.world.time();
+    let trajectory = Trajectory {
+        samples,
+        final_time,
+        final_state: *closed_loop.world.state(),
+        final_reference: (course.reference)(final_time),
+        ending,
+    };
+    Recording { trajectory, log }
+}
+
+/// What a run in an ideal world needs besides controller and plant.
 pub struct Experiment<'a, const NX: usize> {
     /// State at time zero.
     pub initial_state: SVector<f64, NX>,
@@ -97,10 +310,8 @@ pub struct Experiment<'a, const NX: usize> {
     pub progress: &'a dyn Fn(usize),
 }
 
-/// Runs the closed loop: measure, step, hold the input for one sample.
-///
-/// The run ends early, with what was recorded so far, when the controller has no plan or the
-/// plant's motion cannot be integrated; [`Trajectory::ending`] says so.
+/// Runs the closed loop in an ideal world: measure the state, step, hold the input for one
+/// sample. It ends early as [`record`] says.
 pub fn run<
     C,
     P,
@@ -119,62 +330,18 @@ where
     C: LpvModel<f64, NX, NU, NS>,
     P: LpvModel<f64, NX, NU, NS>,
 {
-    let t_s = controller.settings().t_s;
-    let mut samples = Vec::with_capacity(experiment.samples);
-    let mut x = experiment.initial_state;
-    let mut ending = Ending::Complete;
-    for k in 0..experiment.samples {
-        let t = k as f64 * t_s;
-        let reference = preview(experiment, k, t_s, controller.settings().horizon);
-        let before = (experiment.clock)();
-        let plan = controller.step(&x, &reference, workspace);
-        let step_time = (experiment.clock)().saturating_sub(before);
-        let (u, status, active_bounds) = (plan.u[0], plan.status, plan.active.len());
-        if !status.is_solved() {
-            ending = Ending::NoPlan { t, status };
-            break;
-        }
-        let next = match plant::advance(plant, &x, &u, t_s, experiment.tolerances) {
-            Ok(next) => next,
-            Err(error) => {
-                ending = Ending::PlantFailed { t, error };
-                break;
-            }
-        };
-        samples.push(Sample {
-            t,
-            x,
-            u,
-            x_ref: reference.stages[0],
-            cost: controller.tracking_cost(&x, &reference),
-            status,
-            active_bounds,
-            step_time,
-        });
-        x = next;
-        (experiment.progress)(k + 1);
-    }
-    let final_time = samples.len() as f64 * t_s;
-    Trajectory {
-        samples,
-        final_time,
-        final_state: x,
-        final_reference: (experiment.reference)(final_time),
-        ending,
-    }
-}
-
-/// The reference over the horizon that begins at sample `k`.
-fn preview<const NX: usize, const N: usize>(
-    experiment: &Experiment<'_, NX>,
-    k: usize,
-    t_s: f64,
-    horizon: usize,
-) -> Reference<f64, NX, N> {
-    let at = |i: usize| (experiment.reference)((k + i) as f64 * t_s);
-    let mut reference = Reference::constant(at(horizon));
-    for (i, place) in reference.stages.iter_mut().enumerate().take(horizon) {
-        *place = at(i);
-    }
-    reference
+    let world = World::ideal(
+        Unloaded::<P, NS>(plant),
+        experiment.initial_state,
+        controller.settings().t_s,
+        experiment.tolerances,
+    );
+    let regulator = StateFeedback::new(controller, workspace);
+    let course = Course {
+        samples: experiment.samples,
+        reference: experiment.reference,
+        clock: experiment.clock,
+        progress: experiment.progress,
+    };
+    record(&mut ClosedLoop::at_one_rate(regulator, world), &course).trajectory
 }

@@ -1,8 +1,29 @@
 //! Simulated plants and closed loops: what a controller of [`lpvmpc`] meets before it meets a
-//! robot. No files, no clock of its own.
+//! robot. No files, no clock of its own, no randomness but from a seed.
+//!
+//! [`advance`] moves a plant under a held input. A [`World`] puts sensors, actuators, a delay
+//! and pushes around it. A [`ClosedLoop`] is a world with a [`Regulator`] in it, and [`run`]
+//! records one from beginning to end.
+#![allow(
+    clippy::neg_cmp_op_on_partial_ord,
+    reason = "a comparison with a number that is not one must take the failing branch"
+)]
 
+mod actuator;
 pub mod closed_loop;
+mod disturbance;
 pub mod plant;
+mod regulator;
+mod sensor;
+mod world;
 
-pub use closed_loop::{Ending, Experiment, Sample, Trajectory, run};
-pub use plant::{PlantError, Tolerances, advance};
+pub use actuator::{Actuator, CoulombFriction};
+pub use closed_loop::{
+    ClosedLoop, Course, Ending, Experiment, LogRow, Recording, Sample, Trajectory, WithoutPlan,
+    record, run,
+};
+pub use disturbance::Disturbance;
+pub use plant::{Plant, PlantError, Tolerances, Unloaded, advance};
+pub use regulator::{Decision, Regulator, StateFeedback};
+pub use sensor::{Measurement, Sensor};
+pub use world::{World, WorldError, WorldSettings};

@@ -64,18 +64,46 @@ impl Tolerances {
     }
 }
 
-struct Held<'a, P, const NX: usize, const NU: usize, const NS: usize> {
-    model: &'a P,
-    u: SVector<f64, NU>,
+/// A plant as the [`World`](crate::World) meets it: its motion under an input and a load.
+///
+/// `NX` states, `NU` inputs, `NL` components of the load. What a load is, is the plant's to
+/// say: a force, a torque, an unwanted inflow. x_dot must be affine in it.
+pub trait Plant<const NX: usize, const NU: usize, const NL: usize> {
+    /// x_dot = f(x, u, load), in state units per second.
+    fn derivative(
+        &self,
+        x: &SVector<f64, NX>,
+        u: &SVector<f64, NU>,
+        load: &SVector<f64, NL>,
+    ) -> SVector<f64, NX>;
 }
 
-impl<P, const NX: usize, const NU: usize, const NS: usize> System<f64, SVector<f64, NX>>
-    for Held<'_, P, NX, NU, NS>
+/// An LPV model as a plant that takes no load.
+#[derive(Clone, Copy, Debug)]
+pub struct Unloaded<'a, P, const NS: usize>(pub &'a P);
+
+impl<P, const NX: usize, const NU: usize, const NS: usize> Plant<NX, NU, 0> for Unloaded<'_, P, NS>
 where
     P: LpvModel<f64, NX, NU, NS>,
 {
-    fn system(&self, _t: f64, x: &SVector<f64, NX>, x_dot: &mut SVector<f64, NX>) {
-        *x_dot = self.model.derivative(x, &self.u);
+    fn derivative(
+        &self,
+        x: &SVector<f64, NX>,
+        u: &SVector<f64, NU>,
+        _load: &SVector<f64, 0>,
+    ) -> SVector<f64, NX> {
+        self.0.derivative(x, u)
+    }
+}
+
+struct Motion<F>(F);
+
+impl<F, const NX: usize> System<f64, SVector<f64, NX>> for Motion<F>
+where
+    F: Fn(f64, &SVector<f64, NX>) -> SVector<f64, NX>,
+{
+    fn system(&self, t: f64, x: &SVector<f64, NX>, x_dot: &mut SVector<f64, NX>) {
+        *x_dot = (self.0)(t, x);
     }
 }
 
@@ -96,26 +124,24 @@ pub fn advance<P, const NX: usize, const NU: usize, const NS: usize>(
 where
     P: LpvModel<f64, NX, NU, NS>,
 {
-    integrate(model, x, u, duration, tolerances, duration)
+    let motion = |_, x: &SVector<f64, NX>| model.derivative(x, u);
+    integrate(motion, x, duration, tolerances, duration)
 }
 
-/// [`advance`] with no step longer than `longest_step` seconds.
-fn integrate<P, const NX: usize, const NU: usize, const NS: usize>(
-    model: &P,
+/// The state `duration` seconds after `x` with x_dot = `motion`(seconds since the start, x), in
+/// steps of at most `longest_step` seconds.
+pub(crate) fn integrate<const NX: usize>(
+    motion: impl Fn(f64, &SVector<f64, NX>) -> SVector<f64, NX>,
     x: &SVector<f64, NX>,
-    u: &SVector<f64, NU>,
     duration: f64,
     tolerances: Tolerances,
     longest_step: f64,
-) -> Result<SVector<f64, NX>, PlantError>
-where
-    P: LpvModel<f64, NX, NU, NS>,
-{
+) -> Result<SVector<f64, NX>, PlantError> {
     let Tolerances { relative, absolute } = tolerances.check()?;
     if !(duration.is_finite() && duration >= 0.0) {
         return Err(PlantError::Duration { duration });
     }
-    let start = model.derivative(x, u);
+    let start = motion(0.0, x);
     let finite = |v: &SVector<f64, NX>| v.iter().all(|entry| entry.is_finite());
     if !(finite(x) && finite(&start)) {
         return Err(PlantError::NotFinite);
@@ -125,7 +151,7 @@ where
     }
     // Step-size controller of Hairer's DOPRI5: safety 0.9, beta 0.04, factors 0.2 to 10.
     let mut solver = Dopri5::from_param(
-        Held { model, u: *u },
+        Motion(motion),
         0.0,
         duration,
         duration,
@@ -191,7 +217,8 @@ mod tests {
         };
         let exact = |t: f64| 1.0 / (1.0 + (1.0 - t).exp());
         let (start, u) = (Vector1::new(exact(0.0)), Vector1::zeros());
-        let end = integrate(&Growth, &start, &u, DURATION, tolerances, longest_step).unwrap();
+        let motion = |_, x: &Vector1<f64>| Growth.derivative(x, &u);
+        let end = integrate(motion, &start, DURATION, tolerances, longest_step).unwrap();
         (end[0] - exact(DURATION)).abs()
     }
 

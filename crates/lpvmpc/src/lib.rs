@@ -7,22 +7,30 @@
 
 mod active_set;
 mod controller;
+mod delay;
+mod estimator;
 mod guarded;
 mod kernel;
 mod kkt;
 mod model;
 mod ocp;
 mod predictor;
+mod ramp;
 mod relaxation;
 pub mod riccati;
 mod rows;
 mod settings;
 mod settle;
+mod shaping;
 mod solution;
 mod solver;
 mod working_set;
 
 pub use controller::{Controller, Reference, Workspace};
+pub use delay::DelayLine;
+pub use estimator::{
+    Covariance, Estimator, EstimatorError, EstimatorSettings, Gate, Reading, Verdict,
+};
 pub use guarded::{
     Decision, GuardedController, GuardedError, GuardedIterations, GuardedSettings, GuardedStep,
     GuardedWorkspace, TerminalSet,
@@ -31,8 +39,10 @@ pub use kkt::{KktResidual, kkt_residual};
 pub use model::{LpvModel, Scalar};
 pub use ocp::{Bounds, Ocp, Penalty, Softness, Stage, Terminal};
 pub use predictor::{Predictor, Rk4};
+pub use ramp::RampedInput;
 pub use settings::{
     ControllerError, ControllerSettings, Iterations, Scheduling, TerminalIngredient, Weights,
 };
+pub use shaping::{Motion, MoveLimits, SmoothMove};
 pub use solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
 pub use solver::{Solver, SolverSettings, WarmStart, cost};

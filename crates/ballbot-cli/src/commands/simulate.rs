@@ -9,7 +9,7 @@ use crate::recording::{self, Columns, Metrics};
 use crate::table::Table;
 use ballbot_scenario::{Prepared, Scenario, Surroundings};
 use clap::Args;
-use lpvmpc_sim::{Ending, Trajectory};
+use lpvmpc_sim::{Ending, LogRow, Recording, Trajectory};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -22,13 +22,16 @@ Examples:
   ballbot simulate my.toml               a file made by `ballbot scenario show NAME`
 
 Writes trajectory.csv (for two planes trajectory_x.csv, trajectory_y.csv and motors.csv) and a
-figure as SVG and PNG. A run that ends early keeps what it recorded, and exits with 1.")]
+figure as SVG and PNG. --log adds what the sensors of `[world]` delivered. A run that ends early keeps what it recorded, and exits with 1.")]
 pub struct SimulateArguments {
     /// A built-in scenario or a TOML file
     pub scenario: String,
     /// Folder for the results [default: out/SCENARIO]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Write what the robot's sensors delivered, as CSV; for two planes FILE-x and FILE-y
+    #[arg(long, value_name = "FILE")]
+    pub log: Option<PathBuf>,
 }
 
 /// Runs a scenario and writes its results.
@@ -44,8 +47,14 @@ pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
         Some(folder) => folder.clone(),
         None => Path::new("out").join(name),
     };
-    let trajectories = record(&prepared)?;
+    let (trajectories, logs): (Vec<_>, Vec<_>) = record(&prepared)?
+        .into_iter()
+        .map(|recording| (recording.trajectory, recording.log))
+        .unzip();
     write(&folder, &prepared, &trajectories)?;
+    if let Some(path) = &arguments.log {
+        write_logs(path, &logs)?;
+    }
 
     let summary = summary(&prepared, &trajectories, &folder);
     let runs = match trajectories.len() {
@@ -71,14 +80,42 @@ pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
 ///
 /// # Errors
 /// The controller refuses its settings.
-pub fn record(prepared: &Prepared) -> Result<Vec<Trajectory<4, 1>>, CommandError> {
+pub fn record(prepared: &Prepared) -> Result<Vec<Recording<4, 1, 4>>, CommandError> {
     let progress = Progress::new("simulating", prepared.total_samples());
     let start = Instant::now();
     let surroundings = Surroundings {
         clock: &|| start.elapsed(),
         progress: &|done| progress.set(done),
     };
-    Ok(prepared.run(&surroundings)?)
+    Ok(prepared.record(&surroundings)?)
+}
+
+/// Writes one log per plane.
+fn write_logs(path: &Path, logs: &[Vec<LogRow<4, 1>>]) -> Result<(), CommandError> {
+    let paths = match logs.len() {
+        1 => vec![path.to_owned()],
+        _ => ["x", "y"].map(|plane| with_suffix(path, plane)).to_vec(),
+    };
+    let texts: Vec<String> = logs.iter().map(|log| recording::log_csv(log)).collect();
+    let files: Vec<(&Path, &[u8])> = paths
+        .iter()
+        .zip(&texts)
+        .map(|(path, text)| (path.as_path(), text.as_bytes()))
+        .collect();
+    output::write_files(&files)?;
+    Ok(())
+}
+
+/// `log.csv` and `x` make `log-x.csv`.
+fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push("-");
+    name.push(suffix);
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
 }
 
 /// The names of the planes' files.

@@ -68,7 +68,8 @@ impl Runs {
 impl Run {
     fn compute(name: &'static str) -> Result<Self, CommandError> {
         let prepared = Scenario::load(name)?.prepare(Path::new("."))?;
-        let trajectories = record(&prepared)?;
+        let recordings = record(&prepared)?.into_iter();
+        let trajectories: Vec<_> = recordings.map(|recording| recording.trajectory).collect();
         let metrics = prepared
             .planes
             .iter()

@@ -220,3 +220,49 @@ fn a_second_run_replaces_the_first() {
     succeed(folder.path(), &["simulate", "my.toml"]);
     assert_eq!(files(folder.path()), before);
 }
+
+#[test]
+fn the_log_has_what_the_sensors_delivered_one_file_per_plane() {
+    let folder = tempfile::tempdir().unwrap();
+    let world = "\n[world]\nsensor_period_s = 0.01\n[world.sensors.theta]\ndropout = 0.5\n";
+    let short = |name: &str| {
+        let text = shown(name);
+        let duration = text.lines().find(|line| line.starts_with("duration_s"));
+        text.replace(duration.unwrap(), "duration_s = 1.0") + world
+    };
+    std::fs::write(folder.path().join("one.toml"), short("two-setpoints")).unwrap();
+    std::fs::write(folder.path().join("two.toml"), short("lissajous")).unwrap();
+    succeed(folder.path(), &["simulate", "one.toml", "--log", "one.csv"]);
+    succeed(
+        folder.path(),
+        &["simulate", "two.toml", "--log", "logs/two.csv"],
+    );
+    for log in ["one.csv", "logs/two-x.csv", "logs/two-y.csv"] {
+        let text = std::fs::read_to_string(folder.path().join(log)).unwrap();
+        let mut lines = text.lines();
+        assert_eq!(
+            lines.next().unwrap(),
+            "t_s,phi_rad,theta_rad,theta_dot_rad_s,torque_commanded_nm,torque_applied_nm"
+        );
+        let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+        assert_eq!(rows.len(), 100, "{log}: 1 s at 100 Hz");
+        let missing = rows.iter().filter(|row| row[2].is_empty()).count();
+        assert!(
+            (20..80).contains(&missing),
+            "{log}: {missing} of 100 tilts are missing"
+        );
+        for (k, row) in rows.iter().enumerate() {
+            let t: f64 = row[0].parse().unwrap();
+            assert!((t - 0.01 * k as f64).abs() < 1e-9, "{log}: {row:?}");
+            assert!(row[1].parse::<f64>().unwrap().is_finite(), "{log}: {row:?}");
+            // Without delay and lag the drive delivers what it is told, but for the rounding of
+            // a mean.
+            let [told, applied] = [4, 5].map(|i| row[i].parse::<f64>().unwrap());
+            assert!(
+                (told - applied).abs() <= 1e-15 * told.abs().max(1.0),
+                "{log}: {row:?}"
+            );
+        }
+    }
+    assert!(!folder.path().join("logs/two.csv").exists());
+}

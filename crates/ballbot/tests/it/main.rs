@@ -6,6 +6,7 @@
 )]
 
 mod consistency;
+mod disturbed;
 mod dynamics;
 mod embedding;
 mod linear;

@@ -1,7 +1,7 @@
 //! The torque map of eq. (6).
 
-use ballbot::Wheels;
-use nalgebra::{Matrix3, Vector3};
+use ballbot::{Heading, Wheels};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 
 #[test]
@@ -69,4 +69,38 @@ fn bad_zenith_angles_are_refused() {
             assert!(words.contains(part), "`{part}` is not in: {words}");
         }
     }
+}
+
+#[test]
+fn plane_limits_keep_every_motor_within_its_own_in_every_heading_and_use_one_up() {
+    for zenith_angle in [0.5, 0.8, 1.2] {
+        let wheels = Wheels::new(zenith_angle).expect("within the open interval");
+        for yaw in [0.0, 0.3] {
+            let limit = wheels.plane_limit(1.0, yaw);
+            let mut most = 0.0_f64;
+            for (corner, step) in (0..4).flat_map(|corner| (0..720).map(move |step| (corner, step)))
+            {
+                let sign = |bit: u32| if corner & (1 << bit) == 0 { 1.0 } else { -1.0 };
+                let heading = Heading::new(f64::from(step) * PI / 360.0);
+                let planes = heading.to_robot(&Vector2::new(limit, sign(0) * limit));
+                let torques = Vector3::new(planes[0], planes[1], sign(1) * yaw);
+                most = most.max(wheels.motors(&torques).amax());
+            }
+            assert!((most - 1.0).abs() < 1e-12, "{most} of the motors' limit");
+        }
+        assert!(wheels.plane_limit(1.0, 10.0) < 0.0, "nothing is left");
+    }
+}
+
+#[test]
+fn a_heading_turns_and_turns_back() {
+    let heading = Heading::new(PI / 6.0);
+    // The robot's x axis, seen from the floor.
+    let ahead = heading.to_floor(&Vector2::x());
+    assert!(
+        (ahead - Vector2::new(0.75_f64.sqrt(), 0.5)).norm() < 1e-15,
+        "{ahead}"
+    );
+    let pair = Vector2::new(0.3, -1.7);
+    assert!((heading.to_robot(&heading.to_floor(&pair)) - pair).norm() < 1e-15);
 }

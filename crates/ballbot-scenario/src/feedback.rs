@@ -1,0 +1,271 @@
+//! What stands around the controller on a real robot, checked: estimator, delay, ramps.
+
+use crate::error::ScenarioError;
+use crate::feedback_table::{
+    DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
+};
+use crate::prepare::{dynamic, positive};
+use crate::schema::{ControllerTable, TerminalTable};
+use crate::world::not_negative;
+use ballbot::{Ballbot, Wheels};
+use lpvmpc::{
+    Bounds, ControllerSettings, EstimatorSettings, Gate, LpvModel, MoveLimits, RampedInput,
+    TerminalIngredient, Weights,
+};
+use nalgebra::{
+    Matrix1, Matrix1x2, Matrix3x4, Matrix4x2, Matrix5, SMatrix, Vector1, Vector2, Vector3, Vector4,
+    Vector5,
+};
+use std::f64::consts::FRAC_PI_2;
+
+/// What a controller has around it: nothing but a delay of zero, unless the scenario says more.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Feedback {
+    /// The estimator on (phi, theta, theta_dot), with the disturbances (torque N m, angle of
+    /// the tilt rad).
+    pub estimator: Option<EstimatorSettings<f64, 4, 1, 3, 2>>,
+    /// Time from a measurement to the torque that answers it, s.
+    pub delay: f64,
+    /// The controller of the plant whose input is the torque's rate.
+    pub ramp: Option<ControllerSettings<f64, 5, 1, 2>>,
+    /// Whether the controller sees the reference before its time.
+    pub preview: bool,
+}
+
+/// Longest Runge-Kutta step of estimator and delay compensation, as |step * fastest pole|.
+const ESTIMATOR_STEP: f64 = 0.5;
+
+impl Feedback {
+    /// Whether the controller stands alone: on the readings, at once, with preview.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.estimator.is_none() && self.delay == 0.0 && self.ramp.is_none() && self.preview
+    }
+
+    /// Checks what the scenario says about it. `settings` are those of the plain controller.
+    pub(crate) fn new(
+        table: &ControllerTable,
+        ballbot: &Ballbot<f64>,
+        settings: &ControllerSettings<f64, 4, 1, 2>,
+    ) -> Result<Self, ScenarioError> {
+        let estimator = table.estimator.as_ref();
+        let ramp = table.torque_rate.as_ref();
+        Ok(Self {
+            estimator: estimator
+                .map(|estimator| estimator.settings(ballbot))
+                .transpose()?,
+            delay: not_negative("controller.delay_s", table.delay_s)?,
+            ramp: ramp
+                .map(|ramp| ramp.settings(table.terminal, ballbot, settings))
+                .transpose()?,
+            preview: table.preview,
+        })
+    }
+}
+
+/// The longest step in s with which the estimator follows this robot.
+pub(crate) fn longest_step(ballbot: &Ballbot<f64>) -> Result<f64, ScenarioError> {
+    let (a, _) = ballbot.matrices(&Vector2::zeros());
+    let poles = lpvmpc_design::poles(&dynamic(&a))
+        .map_err(|error| ScenarioError::value("parameters", "(all)", error.to_string()))?;
+    let fastest = poles.iter().map(|pole| pole.norm()).fold(1.0, f64::max);
+    Ok(ESTIMATOR_STEP / fastest)
+}
+
+impl EstimatorTable {
+    fn settings(
+        &self,
+        ballbot: &Ballbot<f64>,
+    ) -> Result<EstimatorSettings<f64, 4, 1, 3, 2>, ScenarioError> {
+        let variance = |key: &str, deviation: f64| {
+            positive(&format!("controller.estimator.{key}"), deviation).map(|d| d * d)
+        };
+        let drift = |key: &str, deviation: f64| {
+            not_negative(&format!("controller.estimator.{key}"), deviation).map(|d| d * d)
+        };
+        let mut settings = EstimatorSettings {
+            longest_step: longest_step(ballbot)?,
+            #[rustfmt::skip]
+            c: Matrix3x4::new(
+                1.0, 0.0, 0.0, 0.0,
+                0.0, 1.0, 0.0, 0.0,
+                0.0, 0.0, 0.0, 1.0,
+            ),
+            state_offset: Matrix4x2::zeros(),
+            input_offset: Matrix1x2::zeros(),
+            state_noise: Vector4::new(
+                0.0,
+                0.0,
+                drift("phi_dot_drift_rad_s", self.phi_dot_drift_rad_s)?,
+                drift("theta_dot_drift_rad_s", self.theta_dot_drift_rad_s)?,
+            ),
+            disturbance_noise: Vector2::zeros(),
+            measurement_noise: Vector3::new(
+                variance("phi_noise_rad", self.phi_noise_rad)?,
+                variance("theta_noise_rad", self.theta_noise_rad)?,
+                variance("theta_dot_noise_rad_s", self.theta_dot_noise_rad_s)?,
+            ),
+            initial_state: Vector4::new(1.0, 0.1, 10.0, 1.0),
+            initial_disturbance: Vector2::zeros(),
+            gate: Gate {
+                deviations: self.outlier_deviations,
+                patience: self.outlier_patience,
+                oldest: f64::INFINITY,
+            },
+        };
+        if !(self.outlier_deviations > 0.0) {
+            return Err(ScenarioError::value(
+                "controller.estimator.outlier_deviations",
+                self.outlier_deviations,
+                "it must be positive; inf to believe every reading",
+            ));
+        }
+        if let DisturbancesTable::TorqueAndTilt {
+            torque_drift_nm,
+            tilt_drift_rad,
+        } = self.disturbances
+        {
+            let key = |name: &str| format!("disturbances.torque_and_tilt.{name}");
+            settings.input_offset[0] = 1.0;
+            settings.state_offset[(1, 1)] = 1.0;
+            settings.disturbance_noise = Vector2::new(
+                drift(&key("torque_drift_nm"), torque_drift_nm)?,
+                drift(&key("tilt_drift_rad"), tilt_drift_rad)?,
+            );
+            settings.initial_disturbance = INITIAL_DISTURBANCE;
+            check_offset_free(&settings, ballbot)?;
+        }
+        Ok(settings)
+    }
+}
+
+/// Variances at the start: 0.1 N m and 30 mrad.
+const INITIAL_DISTURBANCE: Vector2<f64> = Vector2::new(0.01, 0.0009);
+
+/// The disturbances must be told apart at rest.
+fn check_offset_free(
+    settings: &EstimatorSettings<f64, 4, 1, 3, 2>,
+    ballbot: &Ballbot<f64>,
+) -> Result<(), ScenarioError> {
+    // x_dot = A (x + E_x d) + B (u + E_u d).
+    let (a, b) = ballbot.matrices(&Vector2::zeros());
+    let b_d = a * settings.state_offset + b * settings.input_offset;
+    let [a, b_d] = [dynamic(&a), dynamic(&b_d)];
+    let [c, c_d] = [
+        dynamic(&settings.c),
+        dynamic(&SMatrix::<f64, 3, 2>::zeros()),
+    ];
+    lpvmpc_design::check_offset_free(&a, &b_d, &c, &c_d).map_err(|error| {
+        ScenarioError::value(
+            "controller.estimator.disturbances",
+            "torque_and_tilt",
+            error.to_string(),
+        )
+    })
+}
+
+impl TorqueRateTable {
+    /// The plain controller's settings with the torque as a fifth state.
+    fn settings(
+        &self,
+        terminal: TerminalTable,
+        ballbot: &Ballbot<f64>,
+        plain: &ControllerSettings<f64, 4, 1, 2>,
+    ) -> Result<ControllerSettings<f64, 5, 1, 2>, ScenarioError> {
+        let limit = self.limit_nm_s;
+        if !(limit > 0.0) {
+            return Err(ScenarioError::value(
+                "controller.torque_rate.limit_nm_s",
+                limit,
+                "it must be positive; inf for no limit",
+            ));
+        }
+        let join = |x: &Vector4<f64>, u: f64| Vector5::new(x[0], x[1], x[2], x[3], u);
+        let q = &plain.weights.q;
+        let weights = Weights {
+            q: Matrix5::from_diagonal(&join(&q.diagonal(), plain.weights.r[0])),
+            r: Matrix1::new(positive("controller.torque_rate.weight", self.weight)?),
+        };
+        let terminal = match terminal {
+            TerminalTable::None => TerminalIngredient::Cost(Matrix5::zeros()),
+            TerminalTable::Equality => TerminalIngredient::Equality,
+            TerminalTable::DiscreteRiccati => {
+                let model = RampedInput::<_, 4>(*ballbot);
+                let (a, b): (Matrix5<f64>, Vector5<f64>) = model.matrices(&Vector2::zeros());
+                let (a, b) = plain.predictor.discretize(&a, &b, plain.t_s);
+                let [a, b, q] = [dynamic(&a), dynamic(&b), dynamic(&weights.q)];
+                let lqr = lpvmpc_design::lqr_discrete(&a, &b, &q, &dynamic(&weights.r))?;
+                TerminalIngredient::Cost(Matrix5::from_fn(|i, j| lqr.p[(i, j)]))
+            }
+            TerminalTable::ContinuousRiccati { .. } | TerminalTable::Cost { .. } => {
+                return Err(ScenarioError::value(
+                    "controller.terminal",
+                    "a matrix for four states",
+                    "with controller.torque_rate the torque is a fifth state; take \
+                     \"discrete_riccati\", \"equality\" or \"none\"",
+                ));
+            }
+        };
+        Ok(ControllerSettings {
+            t_s: plain.t_s,
+            horizon: plain.horizon,
+            predictor: plain.predictor,
+            weights,
+            terminal,
+            x: Bounds {
+                lower: join(&plain.x.lower, plain.u.lower[0]),
+                upper: join(&plain.x.upper, plain.u.upper[0]),
+            },
+            u: Bounds {
+                lower: Vector1::new(-limit),
+                upper: Vector1::new(limit),
+            },
+            scheduling: plain.scheduling,
+            iterations: plain.iterations,
+            solver: plain.solver,
+        })
+    }
+}
+
+impl ShapingTable {
+    /// What the ball may be asked for.
+    pub(crate) fn limits(&self, ballbot: &Ballbot<f64>) -> Result<MoveLimits<f64>, ScenarioError> {
+        let tilt = self.tilt_rad;
+        if !(tilt > 0.0 && tilt < FRAC_PI_2) {
+            return Err(ScenarioError::value(
+                "controller.shaping.tilt_rad",
+                tilt,
+                "it must be between 0 and pi/2",
+            ));
+        }
+        Ok(MoveLimits {
+            speed: positive("controller.shaping.phi_dot_rad_s", self.phi_dot_rad_s)?,
+            acceleration: ballbot.acceleration_at_tilt(tilt).abs(),
+        })
+    }
+}
+
+impl MotorsTable {
+    /// The part of the torque's bounds that no motor objects to.
+    pub(crate) fn within(
+        &self,
+        torque: &Bounds<f64, 1>,
+        wheels: &Wheels<f64>,
+    ) -> Result<Bounds<f64, 1>, ScenarioError> {
+        let motor = positive("controller.motors.limit_nm", self.limit_nm)?;
+        let yaw = not_negative("controller.motors.yaw_reserve_nm", self.yaw_reserve_nm)?;
+        let limit = wheels.plane_limit(motor, yaw);
+        let within = Bounds {
+            lower: torque.lower.map(|lower| lower.max(-limit)),
+            upper: torque.upper.map(|upper| upper.min(limit)),
+        };
+        if limit > 0.0 && within.lower <= within.upper {
+            Ok(within)
+        } else {
+            Err(ScenarioError::value(
+                "controller.motors",
+                format!("limit_nm {motor}, yaw_reserve_nm {yaw}"),
+                "yaw and bounds.torque_nm leave no torque for the planes",
+            ))
+        }
+    }
+}

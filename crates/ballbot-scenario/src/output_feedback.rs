@@ -1,0 +1,264 @@
+//! The controller on a real robot: estimate, predict to the moment when the torque acts, decide.
+
+use ballbot::Ballbot;
+use lpvmpc::{
+    Bounds, Controller, DelayLine, Estimator, LpvModel, RampedInput, Reading, Reference, Rk4,
+    Solution, Workspace,
+};
+use lpvmpc_sim::{Decision, Measurement, Regulator};
+use nalgebra::{SVector, Vector1, Vector4};
+use std::time::Duration;
+
+/// Torques that can be on their way at once.
+const MOST_COMMANDS: usize = 256;
+
+/// One plane's controller with all that stands around it.
+pub(crate) struct OutputFeedback<const N: usize, const M: usize> {
+    pub(crate) belief: Belief,
+    pub(crate) core: Core<N, M>,
+    /// Time from a measurement to the torque that answers it, s.
+    pub(crate) delay: f64,
+    /// Time from one measurement to the next, s.
+    pub(crate) period: f64,
+    pub(crate) preview: bool,
+    pub(crate) torque: Bounds<f64, 1>,
+    pub(crate) line: DelayLine<f64, 1, MOST_COMMANDS>,
+    /// Time of the last measurement, s.
+    pub(crate) time: f64,
+}
+
+/// Where the state comes from.
+pub(crate) enum Belief {
+    /// From the readings themselves.
+    Measured {
+        model: Ballbot<f64>,
+        longest_step: f64,
+        x: Vector4<f64>,
+    },
+    /// From the filter.
+    Estimated(Box<Estimator<Ballbot<f64>, f64, 4, 1, 2, 3, 2>>),
+}
+
+/// The controller's model: torque, or rate of the torque.
+pub(crate) enum Core<const N: usize, const M: usize> {
+    Held {
+        controller: Box<Controller<Ballbot<f64>, f64, 4, 1, 2, N, M>>,
+        workspace: Box<Workspace<f64, 4, 1, N, M>>,
+    },
+    Ramped {
+        controller: Box<Controller<RampedInput<Ballbot<f64>, 4>, f64, 5, 1, 2, N, M>>,
+        workspace: Box<Workspace<f64, 5, 1, N, M>>,
+        /// The model's torque, N m, and its rate, N m/s.
+        torque: f64,
+        rate: f64,
+    },
+}
+
+impl Belief {
+    /// The state in the model's coordinates.
+    fn model_state(&self) -> Vector4<f64> {
+        match self {
+            Self::Measured { x, .. } => *x,
+            Self::Estimated(estimator) => *estimator.model_state(),
+        }
+    }
+
+    /// The torque that acts besides the commanded one, N m.
+    fn disturbance(&self) -> f64 {
+        match self {
+            Self::Measured { .. } => 0.0,
+            Self::Estimated(estimator) => estimator.input_disturbance()[0],
+        }
+    }
+
+    fn state(&self) -> Vector4<f64> {
+        match self {
+            Self::Measured { x, .. } => *x,
+            Self::Estimated(estimator) => estimator.state(),
+        }
+    }
+
+    fn predict(&self, z: &Vector4<f64>, u: &Vector1<f64>, duration: f64) -> Vector4<f64> {
+        match self {
+            Self::Measured {
+                model,
+                longest_step,
+                ..
+            } => {
+                let substeps = (duration / longest_step).ceil().max(1.0) as usize;
+                Rk4 { substeps }.advance(model, z, u, duration)
+            }
+            Self::Estimated(estimator) => estimator.predict(z, u, duration),
+        }
+    }
+
+    fn observe(
+        &mut self,
+        measurement: &Measurement<4>,
+        elapsed: f64,
+        line: &DelayLine<f64, 1, MOST_COMMANDS>,
+    ) {
+        match self {
+            Self::Measured { x, .. } => {
+                for (x, value) in x.iter_mut().zip(&measurement.values) {
+                    *x = value.unwrap_or(*x);
+                }
+            }
+            Self::Estimated(estimator) => {
+                line.for_each(elapsed, |duration, u| estimator.advance(u, duration));
+                let [phi, theta, _, theta_dot] = measurement.values;
+                let readings = [phi, theta, theta_dot].map(|value| value.map(Reading::fresh));
+                estimator.update(&readings);
+            }
+        }
+    }
+}
+
+/// What a plan says.
+struct Plan<const NX: usize> {
+    input: f64,
+    decision: Decision<4, 1>,
+}
+
+impl<const NX: usize> Plan<NX> {
+    /// One step of `controller`. The part of the state beyond the robot's is to be zero.
+    fn step<P, const N: usize, const M: usize>(
+        controller: &mut Controller<P, f64, NX, 1, 2, N, M>,
+        workspace: &mut Workspace<f64, NX, 1, N, M>,
+        x: &SVector<f64, NX>,
+        reference: &dyn Fn(usize) -> Vector4<f64>,
+        clock: &dyn Fn() -> Duration,
+    ) -> Self
+    where
+        P: LpvModel<f64, NX, 1, 2>,
+    {
+        let horizon = controller.settings().horizon;
+        let at = |i: usize| {
+            let robot = reference(i);
+            SVector::<f64, NX>::from_fn(|j, _| robot.get(j).copied().unwrap_or(0.0))
+        };
+        let mut window: Reference<f64, NX, N> = Reference::constant(at(horizon));
+        for (i, place) in window.stages.iter_mut().enumerate().take(horizon) {
+            *place = at(i);
+        }
+        let before = clock();
+        let plan: &Solution<f64, NX, 1, N, M> = controller.step(x, &window, workspace);
+        let step_time = clock().saturating_sub(before);
+        let (input, status, active_bounds) = (plan.u[0][0], plan.status, plan.active.len());
+        Self {
+            input,
+            decision: Decision {
+                u: Vector1::zeros(),
+                estimate: Vector4::zeros(),
+                x_ref: Vector4::zeros(),
+                cost: controller.tracking_cost(x, &window),
+                status,
+                active_bounds,
+                step_time,
+            },
+        }
+    }
+}
+
+impl<const N: usize, const M: usize> OutputFeedback<N, M> {
+    /// The state, in the model's coordinates, at which a torque decided now will act.
+    fn state_ahead(&self) -> Vector4<f64> {
+        let mut z = self.belief.model_state();
+        self.line.for_each(self.delay, |duration, u| {
+            z = self.belief.predict(&z, u, duration)
+        });
+        z
+    }
+
+    /// Takes the estimated torque off the model's, keeps the bounds, and sends it.
+    fn send(&mut self, model_torque: f64) -> Vector1<f64> {
+        let u = Vector1::new(model_torque - self.belief.disturbance());
+        let u = self.torque.project(&u);
+        self.line.command(u, self.delay);
+        u
+    }
+
+    /// The model's torque in the middle of the coming period, while it moves in a ramp.
+    fn next_of_ramp(&mut self) -> Option<f64> {
+        match &mut self.core {
+            Core::Held { .. } => None,
+            Core::Ramped { torque, rate, .. } => {
+                let step = *rate * self.period;
+                *torque += step;
+                Some(*torque - 0.5 * step)
+            }
+        }
+    }
+}
+
+impl<const N: usize, const M: usize> Regulator<4, 1, 4> for OutputFeedback<N, M> {
+    fn t_s(&self) -> f64 {
+        match &self.core {
+            Core::Held { controller, .. } => controller.settings().t_s,
+            Core::Ramped { controller, .. } => controller.settings().t_s,
+        }
+    }
+
+    fn observe(&mut self, measurement: &Measurement<4>) {
+        let elapsed = measurement.t - self.time;
+        self.belief.observe(measurement, elapsed, &self.line);
+        self.line.elapse(elapsed);
+        self.time = measurement.t;
+    }
+
+    fn decide(
+        &mut self,
+        k: usize,
+        reference: &dyn Fn(f64) -> Vector4<f64>,
+        clock: &dyn Fn() -> Duration,
+    ) -> Decision<4, 1> {
+        let (t_s, delay, preview) = (self.t_s(), self.delay, self.preview);
+        let ahead = |i: usize| match preview {
+            true => reference((k + i) as f64 * t_s + delay),
+            false => reference(k as f64 * t_s),
+        };
+        let z = self.state_ahead();
+        let (decision, first) = match &mut self.core {
+            Core::Held {
+                controller,
+                workspace,
+            } => {
+                let plan = Plan::step(controller, workspace, &z, &ahead, clock);
+                (plan.decision, Some(plan.input))
+            }
+            Core::Ramped {
+                controller,
+                workspace,
+                torque,
+                rate,
+            } => {
+                let joint = RampedInput::<Ballbot<f64>, 4>::join(&z, &Vector1::new(*torque));
+                let plan = Plan::<5>::step(controller, workspace, &joint, &ahead, clock);
+                *rate = plan.input;
+                (plan.decision, None)
+            }
+        };
+        let model_torque = first.or_else(|| self.next_of_ramp()).unwrap_or(0.0);
+        Decision {
+            u: self.send(model_torque),
+            estimate: self.belief.state(),
+            x_ref: reference(k as f64 * t_s),
+            ..decision
+        }
+    }
+
+    fn between(&mut self) -> Option<Vector1<f64>> {
+        let model_torque = self.next_of_ramp()?;
+        Some(self.send(model_torque))
+    }
+
+    fn prediction(&self) -> Vec<Vector4<f64>> {
+        match &self.core {
+            Core::Held { controller, .. } => controller.rollout().to_vec(),
+            Core::Ramped { controller, .. } => {
+                let robot = |joint: &SVector<f64, 5>| joint.fixed_rows::<4>(0).into_owned();
+                controller.rollout().iter().map(robot).collect()
+            }
+        }
+    }
+}

@@ -1,0 +1,355 @@
+//! The world that the robot is simulated in. Without `[world]` in the scenario it is ideal.
+
+use crate::error::ScenarioError;
+use crate::prepare::positive;
+use crate::reference::finite;
+use crate::world_table::{
+    ActuatorTable, AngleSensorTable, PlaneName, PushTable, RateSensorTable, SensorsTable,
+    WorldTable,
+};
+use ballbot::{Ballbot, Disturbed};
+use lpvmpc::Bounds;
+use lpvmpc_sim::{
+    Actuator, CoulombFriction, Disturbance, Plant, Sensor, Tolerances, WithoutPlan, WorldSettings,
+};
+use nalgebra::{Vector1, Vector2, Vector4};
+use std::f64::consts::FRAC_PI_2;
+
+/// The robot as the simulated world sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Robot {
+    /// Its mechanics.
+    pub mechanics: Disturbed<f64>,
+    /// A torque on top of what the drive delivers, N m.
+    pub torque_bias: f64,
+}
+
+impl Plant<4, 1, 2> for Robot {
+    /// The load is that of [`Disturbed::f`].
+    fn derivative(&self, x: &Vector4<f64>, u: &Vector1<f64>, load: &Vector2<f64>) -> Vector4<f64> {
+        self.mechanics.f(x, u[0] + self.torque_bias, load)
+    }
+}
+
+/// One plane's world, checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlaneWorld {
+    /// The robot.
+    pub robot: Robot,
+    /// Sensors, of (phi, theta, phi_dot, theta_dot) in this order, drive, delay and pushes.
+    pub settings: WorldSettings<4, 1, 4, 2>,
+    /// What happens without a plan.
+    pub without_plan: WithoutPlan,
+    /// Outside of it the robot has fallen.
+    pub range: Bounds<f64, 4>,
+}
+
+impl PlaneWorld {
+    /// A world without faults.
+    pub(crate) fn ideal(ballbot: Ballbot<f64>, t_s: f64, tolerances: Tolerances) -> Self {
+        Self {
+            robot: Robot {
+                mechanics: Disturbed::level(ballbot),
+                torque_bias: 0.0,
+            },
+            settings: WorldSettings::ideal(t_s, tolerances),
+            without_plan: WithoutPlan::End,
+            range: Bounds::none(),
+        }
+    }
+}
+
+/// Speed below which dry friction is rounded off, rad/s.
+const CREEP: f64 = 0.05;
+
+impl WorldTable {
+    /// The world of one plane; `ballbot` is the controller's model.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Value`] with the key.
+    pub(crate) fn prepare(
+        &self,
+        plane: PlaneName,
+        ballbot: &Ballbot<f64>,
+        t_s: f64,
+        tolerances: Tolerances,
+    ) -> Result<PlaneWorld, ScenarioError> {
+        let period = match self.sensor_period_s {
+            Some(period) => self.sensor_period(period, t_s)?,
+            None => t_s,
+        };
+        let mechanics = self.mechanics(plane, ballbot)?;
+        finite("world.actuator.bias_nm", self.actuator.bias_nm)?;
+        let mut range = Bounds::none();
+        range.lower[1] = -FRAC_PI_2;
+        range.upper[1] = FRAC_PI_2;
+        // Every plane and every run has noise of its own.
+        let seed = self.seed.wrapping_mul(2).wrapping_add(plane as u64);
+        Ok(PlaneWorld {
+            robot: Robot {
+                mechanics,
+                torque_bias: self.actuator.bias_nm,
+            },
+            settings: WorldSettings {
+                period,
+                sensors: self.sensors.check()?,
+                actuators: [self.actuator.check()?],
+                delay: not_negative("world.delay.computation_s", self.delay.computation_s)?
+                    + not_negative("world.delay.transport_s", self.delay.transport_s)?,
+                disturbances: self.pushes(plane)?,
+                seed,
+                tolerances,
+            },
+            without_plan: WithoutPlan::Apply,
+            range,
+        })
+    }
+
+    fn sensor_period(&self, period: f64, t_s: f64) -> Result<f64, ScenarioError> {
+        let key = "world.sensor_period_s";
+        let ratio = (t_s / positive(key, period)?).round();
+        if ratio >= 1.0 && (ratio * period - t_s).abs() <= 1e-6 * t_s {
+            Ok(t_s / ratio)
+        } else {
+            Err(ScenarioError::value(
+                key,
+                period,
+                format!("controller.t_s ({t_s} s) must be a whole number of sensor periods"),
+            ))
+        }
+    }
+
+    fn mechanics(
+        &self,
+        plane: PlaneName,
+        ballbot: &Ballbot<f64>,
+    ) -> Result<Disturbed<f64>, ScenarioError> {
+        let (robot, floor) = (&self.robot, &self.floor);
+        let factor = |name: &str, factor: f64| positive(&format!("world.robot.{name}"), factor);
+        let (axis, slope, offset) = match plane {
+            PlaneName::X => ("x", floor.slope_x_deg, robot.tilt_offset_x_rad),
+            PlaneName::Y => ("y", floor.slope_y_deg, robot.tilt_offset_y_rad),
+        };
+        for (key, angle, limit) in [
+            (format!("world.floor.slope_{axis}_deg"), slope, 45.0),
+            (format!("world.robot.tilt_offset_{axis}_rad"), offset, 0.5),
+        ] {
+            if !(angle.abs() <= limit) {
+                let expected = format!("it must be from -{limit} to {limit}");
+                return Err(ScenarioError::value(key, angle, expected));
+            }
+        }
+        let ratio = floor.total_mass_ratio;
+        if !(ratio >= 1.0 && ratio.is_finite()) {
+            return Err(ScenarioError::value(
+                "world.floor.total_mass_ratio",
+                ratio,
+                "body and ball together weigh at least as much as the body: 1 or more",
+            ));
+        }
+        let mut real = *ballbot;
+        real.b1 *= factor("b1_factor", robot.b1_factor)?;
+        real.b2 *= factor("b2_factor", robot.b2_factor)?;
+        real.b3 *= factor("b3_factor", robot.b3_factor)?;
+        real.b4 *= factor("b4_factor", robot.b4_factor)?;
+        real.geometry.centre_of_mass *=
+            factor("centre_of_mass_factor", robot.centre_of_mass_factor)?;
+        Ok(Disturbed {
+            ballbot: real,
+            slope: slope.to_radians(),
+            total_mass: ratio,
+            tilt_offset: offset,
+        })
+    }
+
+    fn pushes(&self, plane: PlaneName) -> Result<Vec<Disturbance<4, 2>>, ScenarioError> {
+        let mut pushes = Vec::new();
+        for (i, push) in self.pushes.iter().enumerate() {
+            let key = |name: &str| format!("world.pushes[{i}].{name}");
+            push.check(&key)?;
+            if push.plane() == plane {
+                pushes.push(push.disturbance());
+            }
+        }
+        Ok(pushes)
+    }
+}
+
+impl PushTable {
+    /// The plane that it acts in.
+    pub fn plane(&self) -> PlaneName {
+        match *self {
+            Self::Rates { plane, .. } | Self::Impulse { plane, .. } | Self::Force { plane, .. } => {
+                plane
+            }
+        }
+    }
+
+    fn check(&self, key: &dyn Fn(&str) -> String) -> Result<(), ScenarioError> {
+        match *self {
+            Self::Rates {
+                time_s,
+                phi_dot_rad_s,
+                theta_dot_rad_s,
+                ..
+            } => {
+                not_negative(&key("rates.time_s"), time_s)?;
+                finite(&key("rates.phi_dot_rad_s"), phi_dot_rad_s)?;
+                finite(&key("rates.theta_dot_rad_s"), theta_dot_rad_s)
+            }
+            Self::Impulse {
+                time_s,
+                momentum_m_s,
+                height_m,
+                ..
+            } => {
+                not_negative(&key("impulse.time_s"), time_s)?;
+                finite(&key("impulse.momentum_m_s"), momentum_m_s)?;
+                finite(&key("impulse.height_m"), height_m)
+            }
+            Self::Force {
+                from_s,
+                until_s,
+                force_m_s2,
+                height_m,
+                ..
+            } => {
+                not_negative(&key("force.from_s"), from_s)?;
+                finite(&key("force.force_m_s2"), force_m_s2)?;
+                finite(&key("force.height_m"), height_m)?;
+                if until_s >= from_s {
+                    Ok(())
+                } else {
+                    Err(ScenarioError::value(
+                        key("force.until_s"),
+                        until_s,
+                        format!("it must not be before from_s ({from_s} s); inf for ever"),
+                    ))
+                }
+            }
+        }
+    }
+
+    /// What it does to the plant of its plane.
+    pub fn disturbance(&self) -> Disturbance<4, 2> {
+        match *self {
+            Self::Rates {
+                time_s,
+                phi_dot_rad_s,
+                theta_dot_rad_s,
+                ..
+            } => Disturbance::Jump {
+                time: time_s,
+                change: Vector4::new(0.0, 0.0, phi_dot_rad_s, theta_dot_rad_s),
+            },
+            Self::Impulse {
+                time_s,
+                momentum_m_s,
+                height_m,
+                ..
+            } => Disturbance::Impulse {
+                time: time_s,
+                impulse: at_height(momentum_m_s, height_m),
+            },
+            Self::Force {
+                from_s,
+                until_s,
+                force_m_s2,
+                height_m,
+                ..
+            } => Disturbance::Load {
+                from: from_s,
+                until: until_s,
+                load: at_height(force_m_s2, height_m),
+            },
+        }
+    }
+}
+
+/// The load of a horizontal push at a height above the ball's centre, on the upright body.
+fn at_height(push: f64, height: f64) -> Vector2<f64> {
+    Vector2::new(push, push * height)
+}
+
+impl SensorsTable {
+    fn check(&self) -> Result<[Sensor<4>; 4], ScenarioError> {
+        let mut sensors = Sensor::ideal_states();
+        let rows = [
+            ("phi", self.phi.into(), "rad"),
+            ("theta", self.theta.into(), "rad"),
+            ("phi_dot", self.phi_dot, "rad_s"),
+            ("theta_dot", self.theta_dot, "rad_s"),
+        ];
+        for (sensor, (name, table, unit)) in sensors.iter_mut().zip(rows) {
+            let key = |quantity: &str| format!("world.sensors.{name}.{quantity}");
+            sensor.noise = not_negative(&key(&format!("noise_{unit}")), table.noise_rad_s)?;
+            finite(&key(&format!("bias_{unit}")), table.bias_rad_s)?;
+            sensor.bias = table.bias_rad_s;
+            sensor.resolution =
+                not_negative(&key(&format!("resolution_{unit}")), table.resolution_rad_s)?;
+            if !(0.0..=1.0).contains(&table.dropout) {
+                let expected = "it must be a probability, from 0 to 1";
+                return Err(ScenarioError::value(
+                    key("dropout"),
+                    table.dropout,
+                    expected,
+                ));
+            }
+            sensor.dropout = table.dropout;
+        }
+        Ok(sensors)
+    }
+}
+
+impl From<AngleSensorTable> for RateSensorTable {
+    /// The same numbers, in rad.
+    fn from(table: AngleSensorTable) -> Self {
+        Self {
+            noise_rad_s: table.noise_rad,
+            bias_rad_s: table.bias_rad,
+            resolution_rad_s: table.resolution_rad,
+            dropout: table.dropout,
+        }
+    }
+}
+
+impl ActuatorTable {
+    fn check(&self) -> Result<Actuator<4>, ScenarioError> {
+        let limit = self.limit_nm;
+        if !(limit > 0.0) {
+            let expected = "it must be positive; inf for no limit";
+            return Err(ScenarioError::value(
+                "world.actuator.limit_nm",
+                limit,
+                expected,
+            ));
+        }
+        let level = not_negative(
+            "world.actuator.coulomb_friction_nm",
+            self.coulomb_friction_nm,
+        )?;
+        Ok(Actuator {
+            limit,
+            dead_zone: not_negative("world.actuator.dead_zone_nm", self.dead_zone_nm)?,
+            lag: not_negative("world.actuator.lag_s", self.lag_s)?,
+            // The drive turns the ball against the body.
+            friction: (level > 0.0).then_some(CoulombFriction {
+                level,
+                speed: Vector4::new(0.0, 0.0, 1.0, -1.0),
+                creep: CREEP,
+            }),
+        })
+    }
+}
+
+pub(crate) fn not_negative(key: &str, value: f64) -> Result<f64, ScenarioError> {
+    if value >= 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        Err(ScenarioError::value(
+            key,
+            value,
+            "it must be finite and not negative",
+        ))
+    }
+}

@@ -1,0 +1,167 @@
+//! What decides in a closed loop: measurements in, commands out.
+
+use crate::sensor::Measurement;
+use lpvmpc::{Controller, LpvModel, Reference, Status, Workspace};
+use nalgebra::SVector;
+use std::ops::DerefMut;
+use std::time::Duration;
+
+/// What was decided at a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Decision<const NX: usize, const NU: usize> {
+    /// The command: finite and within its bounds, whatever the status.
+    pub u: SVector<f64, NU>,
+    /// The state that it was decided for.
+    pub estimate: SVector<f64, NX>,
+    /// State reference at the sample.
+    pub x_ref: SVector<f64, NX>,
+    /// The cost J of the plan (Algorithm 1, constant terms included).
+    pub cost: f64,
+    /// What the plan is worth.
+    pub status: Status<f64>,
+    /// Bounds that are active in the plan.
+    pub active_bounds: usize,
+    /// Time that the controller took, by the clock that was handed in.
+    pub step_time: Duration,
+}
+
+/// What stands between the sensors and the actuators.
+pub trait Regulator<const NX: usize, const NU: usize, const NY: usize> {
+    /// Time from one decision to the next, s.
+    fn t_s(&self) -> f64;
+
+    /// Takes in what the sensors deliver. Called at every sample of the sensors, in order; at a
+    /// control sample before [`decide`](Self::decide).
+    fn observe(&mut self, measurement: &Measurement<NY>);
+
+    /// The command from control sample `k` on. `reference` is the state reference at a time in
+    /// s, `clock` a monotonic clock.
+    fn decide(
+        &mut self,
+        k: usize,
+        reference: &dyn Fn(f64) -> SVector<f64, NX>,
+        clock: &dyn Fn() -> Duration,
+    ) -> Decision<NX, NU>;
+
+    /// The command at a sample of the sensors between two control samples, called after
+    /// [`observe`](Self::observe); `None` to hold the last one, as most do.
+    fn between(&mut self) -> Option<SVector<f64, NU>> {
+        None
+    }
+
+    /// The states that the model reaches under the last plan, one per sample of the horizon.
+    fn prediction(&self) -> Vec<SVector<f64, NX>>;
+}
+
+impl<R, const NX: usize, const NU: usize, const NY: usize> Regulator<NX, NU, NY> for Box<R>
+where
+    R: Regulator<NX, NU, NY> + ?Sized,
+{
+    fn t_s(&self) -> f64 {
+        (**self).t_s()
+    }
+
+    fn observe(&mut self, measurement: &Measurement<NY>) {
+        (**self).observe(measurement);
+    }
+
+    fn decide(
+        &mut self,
+        k: usize,
+        reference: &dyn Fn(f64) -> SVector<f64, NX>,
+        clock: &dyn Fn() -> Duration,
+    ) -> Decision<NX, NU> {
+        (**self).decide(k, reference, clock)
+    }
+
+    fn between(&mut self) -> Option<SVector<f64, NU>> {
+        (**self).between()
+    }
+
+    fn prediction(&self) -> Vec<SVector<f64, NX>> {
+        (**self).prediction()
+    }
+}
+
+/// The controller on the measured state itself. A reading that is missing keeps its last value
+/// (zero before the first). `K` and `W` hold a [`Controller`] and its [`Workspace`], by
+/// reference or in a box.
+#[derive(Debug)]
+pub struct StateFeedback<K, W, const NX: usize> {
+    controller: K,
+    workspace: W,
+    x: SVector<f64, NX>,
+}
+
+impl<K, W, const NX: usize> StateFeedback<K, W, NX> {
+    /// Puts a controller and its workspace together.
+    pub fn new(controller: K, workspace: W) -> Self {
+        Self {
+            controller,
+            workspace,
+            x: SVector::zeros(),
+        }
+    }
+}
+
+impl<K, W, C, const NX: usize, const NU: usize, const NS: usize, const N: usize, const M: usize>
+    Regulator<NX, NU, NX> for StateFeedback<K, W, NX>
+where
+    C: LpvModel<f64, NX, NU, NS>,
+    K: DerefMut<Target = Controller<C, f64, NX, NU, NS, N, M>>,
+    W: DerefMut<Target = Workspace<f64, NX, NU, N, M>>,
+{
+    fn t_s(&self) -> f64 {
+        self.controller.settings().t_s
+    }
+
+    fn observe(&mut self, measurement: &Measurement<NX>) {
+        for (x, value) in self.x.iter_mut().zip(&measurement.values) {
+            *x = value.unwrap_or(*x);
+        }
+    }
+
+    fn decide(
+        &mut self,
+        k: usize,
+        reference: &dyn Fn(f64) -> SVector<f64, NX>,
+        clock: &dyn Fn() -> Duration,
+    ) -> Decision<NX, NU> {
+        let settings = self.controller.settings();
+        let reference = preview(reference, k, settings.t_s, settings.horizon);
+        let before = clock();
+        let plan = self
+            .controller
+            .step(&self.x, &reference, &mut self.workspace);
+        let step_time = clock().saturating_sub(before);
+        let (u, status, active_bounds) = (plan.u[0], plan.status, plan.active.len());
+        Decision {
+            u,
+            estimate: self.x,
+            x_ref: reference.stages[0],
+            cost: self.controller.tracking_cost(&self.x, &reference),
+            status,
+            active_bounds,
+            step_time,
+        }
+    }
+
+    fn prediction(&self) -> Vec<SVector<f64, NX>> {
+        self.controller.rollout().to_vec()
+    }
+}
+
+/// The reference over the horizon that begins at sample `k`.
+fn preview<const NX: usize, const N: usize>(
+    reference: &dyn Fn(f64) -> SVector<f64, NX>,
+    k: usize,
+    t_s: f64,
+    horizon: usize,
+) -> Reference<f64, NX, N> {
+    let at = |i: usize| reference((k + i) as f64 * t_s);
+    let mut window = Reference::constant(at(horizon));
+    for (i, place) in window.stages.iter_mut().enumerate().take(horizon) {
+        *place = at(i);
+    }
+    window
+}

@@ -1,0 +1,375 @@
+//! The world as it is: a plant behind sensors, actuators and a delay, which is pushed.
+
+use crate::actuator::Actuator;
+use crate::disturbance::Disturbance;
+use crate::plant::{Plant, PlantError, Tolerances, integrate};
+use crate::sensor::{Channel, Measurement, Sensor};
+use nalgebra::SVector;
+use std::collections::VecDeque;
+use thiserror::Error;
+
+/// Everything about a [`World`] but its plant and its start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WorldSettings<const NX: usize, const NU: usize, const NY: usize, const NL: usize> {
+    /// Time from one sample of the sensors to the next, s.
+    pub period: f64,
+    /// The sensors.
+    pub sensors: [Sensor<NX>; NY],
+    /// The actuators, one per input.
+    pub actuators: [Actuator<NX>; NU],
+    /// Time from a command to its arrival at the actuators, s: computation and transport.
+    pub delay: f64,
+    /// What pushes the plant, in any order.
+    pub disturbances: Vec<Disturbance<NX, NL>>,
+    /// Seed of all noise: the same seed, the same run.
+    pub seed: u64,
+    /// Tolerances of the plant's integration.
+    pub tolerances: Tolerances,
+}
+
+/// A world that cannot be.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum WorldError {
+    /// A setting out of range.
+    #[error("{place}: the {quantity} is {value}; {expected}")]
+    Setting {
+        /// Sensor or actuator with its number, or the world itself.
+        place: String,
+        /// The quantity.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// A disturbance with numbers that make no sense: its place in the list, from 0.
+    #[error("disturbance {0}: its times must be in order, and all its numbers finite")]
+    Disturbance(usize),
+    /// The control samples at other times than the sensors.
+    #[error(
+        "the sampling time of the control is {t_s} s; it must be a whole number of periods of \
+         the sensors, {period} s"
+    )]
+    Rates {
+        /// Sampling time of the control, s.
+        t_s: f64,
+        /// Period of the sensors, s.
+        period: f64,
+    },
+    /// The tolerances are out of range.
+    #[error(transparent)]
+    Tolerances(#[from] PlantError),
+}
+
+impl<const NX: usize, const NU: usize, const NL: usize> WorldSettings<NX, NU, NX, NL> {
+    /// A world without any fault, in which all states are measured every `period` seconds.
+    pub fn ideal(period: f64, tolerances: Tolerances) -> Self {
+        Self {
+            period,
+            sensors: Sensor::ideal_states(),
+            actuators: [Actuator::default(); NU],
+            delay: 0.0,
+            disturbances: Vec::new(),
+            seed: 0,
+            tolerances,
+        }
+    }
+}
+
+impl<P, const NX: usize, const NU: usize, const NL: usize> World<P, NX, NU, NX, NL>
+where
+    P: Plant<NX, NU, NL>,
+{
+    /// `plant` in a world without any fault, in which all states are measured every `period`
+    /// seconds. What is wrong with the numbers, the first [`advance`](Self::advance) says.
+    pub fn ideal(plant: P, x: SVector<f64, NX>, period: f64, tolerances: Tolerances) -> Self {
+        Self::unchecked(plant, x, WorldSettings::ideal(period, tolerances))
+    }
+}
+
+impl<const NX: usize, const NU: usize, const NY: usize, const NL: usize>
+    WorldSettings<NX, NU, NY, NL>
+{
+    fn check(&self) -> Result<(), WorldError> {
+        let world = |quantity, value, expected| WorldError::Setting {
+            place: "world".to_owned(),
+            quantity,
+            value,
+            expected,
+        };
+        if !(self.period > 0.0 && self.period.is_finite()) {
+            return Err(world("period", self.period, "it must be positive"));
+        }
+        if !(self.delay >= 0.0 && self.delay.is_finite()) {
+            return Err(world(
+                "delay",
+                self.delay,
+                "it must be finite and not negative",
+            ));
+        }
+        let sensors = self.sensors.iter().map(Sensor::mistake);
+        let actuators = self.actuators.iter().map(Actuator::mistake);
+        let named = sensors
+            .enumerate()
+            .map(|(i, mistake)| (format!("sensor {i}"), mistake))
+            .chain(
+                actuators
+                    .enumerate()
+                    .map(|(i, mistake)| (format!("actuator {i}"), mistake)),
+            );
+        for (place, mistake) in named {
+            if let Some((quantity, value, expected)) = mistake {
+                return Err(WorldError::Setting {
+                    place,
+                    quantity,
+                    value,
+                    expected,
+                });
+            }
+        }
+        if let Some(place) = self.disturbances.iter().position(|push| !push.is_valid()) {
+            return Err(WorldError::Disturbance(place));
+        }
+        self.tolerances.check()?;
+        Ok(())
+    }
+}
+
+/// A plant behind sensors, actuators and a delay, stepped from outside:
+/// [`measurement`](Self::measurement), [`command`](Self::command), [`advance`](Self::advance).
+///
+/// Time moves by one period of the sensors per [`advance`](Self::advance). The plant's motion
+/// is integrated from event to event (a command arrives, a push begins), never across one.
+#[derive(Clone, Debug)]
+pub struct World<P, const NX: usize, const NU: usize, const NY: usize, const NL: usize> {
+    plant: P,
+    period: f64,
+    delay: f64,
+    tolerances: Tolerances,
+    actuators: [Actuator<NX>; NU],
+    channels: [Channel<NX>; NY],
+    pending: Vec<Disturbance<NX, NL>>,
+    steps: u64,
+    x: SVector<f64, NX>,
+    commanded: SVector<f64, NU>,
+    /// Commands on their way, with the time of their arrival.
+    travelling: VecDeque<(f64, SVector<f64, NU>)>,
+    arrived: SVector<f64, NU>,
+    output: SVector<f64, NU>,
+    mean_output: SVector<f64, NU>,
+    measurement: Measurement<NY>,
+}
+
+/// Events closer together than this are one, s.
+const SAME_TIME: f64 = 1e-9;
+
+impl<P, const NX: usize, const NU: usize, const NY: usize, const NL: usize> World<P, NX, NU, NY, NL>
+where
+    P: Plant<NX, NU, NL>,
+{
+    /// `plant` at the state `x` at time zero, without input, its first measurement taken.
+    ///
+    /// # Errors
+    /// [`WorldError`] names the setting that makes no sense.
+    pub fn new(
+        plant: P,
+        x: SVector<f64, NX>,
+        settings: WorldSettings<NX, NU, NY, NL>,
+    ) -> Result<Self, WorldError> {
+        settings.check()?;
+        Ok(Self::unchecked(plant, x, settings))
+    }
+
+    fn unchecked(plant: P, x: SVector<f64, NX>, settings: WorldSettings<NX, NU, NY, NL>) -> Self {
+        let channel = |i| Channel::new(settings.sensors[i], settings.seed, i);
+        let mut world = Self {
+            plant,
+            period: settings.period,
+            delay: settings.delay,
+            tolerances: settings.tolerances,
+            actuators: settings.actuators,
+            channels: std::array::from_fn(channel),
+            pending: settings.disturbances,
+            steps: 0,
+            x,
+            commanded: SVector::zeros(),
+            travelling: VecDeque::new(),
+            arrived: SVector::zeros(),
+            output: SVector::zeros(),
+            mean_output: SVector::zeros(),
+            measurement: Measurement {
+                t: 0.0,
+                values: [None; NY],
+            },
+        };
+        world.measure();
+        world
+    }
+
+    /// Time since the start, s.
+    pub fn time(&self) -> f64 {
+        self.steps as f64 * self.period
+    }
+
+    /// Time from one sample of the sensors to the next, s.
+    pub fn period(&self) -> f64 {
+        self.period
+    }
+
+    /// The true state, which no controller gets to see.
+    pub fn state(&self) -> &SVector<f64, NX> {
+        &self.x
+    }
+
+    /// The plant.
+    pub fn plant(&self) -> &P {
+        &self.plant
+    }
+
+    /// What the sensors deliver now.
+    pub fn measurement(&self) -> &Measurement<NY> {
+        &self.measurement
+    }
+
+    /// The last command, in input units.
+    pub fn commanded(&self) -> &SVector<f64, NU> {
+        &self.commanded
+    }
+
+    /// The mean of the actuators' outputs over the last period, before friction, in input
+    /// units: what a current sensor would show.
+    pub fn applied(&self) -> &SVector<f64, NU> {
+        &self.mean_output
+    }
+
+    /// Commands `u` from now on; it arrives after the delay.
+    pub fn command(&mut self, u: SVector<f64, NU>) {
+        self.commanded = u;
+        self.travelling.push_back((self.time() + self.delay, u));
+    }
+
+    /// Adds a push. One whose time has passed acts at once.
+    ///
+    /// # Errors
+    /// [`WorldError::Disturbance`] if its numbers make no sense.
+    pub fn disturb(&mut self, push: Disturbance<NX, NL>) -> Result<(), WorldError> {
+        if !push.is_valid() {
+            return Err(WorldError::Disturbance(self.pending.len()));
+        }
+        self.pending.push(push);
+        Ok(())
+    }
+
+    /// Moves on by one period, and measures.
+    ///
+    /// # Errors
+    /// [`PlantError`] if the motion cannot be integrated, or a command was not finite. The
+    /// state and the time then stay as they were.
+    pub fn advance(&mut self) -> Result<(), PlantError> {
+        let before = (self.x, self.output);
+        let moved = self.move_on();
+        if moved.is_err() {
+            (self.x, self.output) = before;
+        }
+        moved
+    }
+
+    fn move_on(&mut self) -> Result<(), PlantError> {
+        let start = self.time();
+        let mut since = 0.0;
+        let mut integral = SVector::zeros();
+        while since < self.period {
+            let load = self.take_effect(start + since);
+            let next = self.next_event(start + since) - start;
+            let end = if next < self.period - SAME_TIME {
+                next
+            } else {
+                self.period
+            };
+            integral += self.glide(end - since, &load)?;
+            since = end;
+        }
+        self.mean_output = integral / self.period;
+        self.steps += 1;
+        self.measure();
+        Ok(())
+    }
+
+    fn measure(&mut self) {
+        self.measurement.t = self.time();
+        for (value, channel) in self.measurement.values.iter_mut().zip(&mut self.channels) {
+            *value = channel.read(&self.x, self.steps);
+        }
+    }
+
+    /// Lets everything happen that is due at the time `now`, and returns the load from there.
+    fn take_effect(&mut self, now: f64) -> SVector<f64, NL> {
+        let due = now + SAME_TIME;
+        while let Some((_, u)) = self.travelling.pop_front_if(|(time, _)| *time <= due) {
+            self.arrived = u;
+        }
+        let (x, arrived, plant) = (&mut self.x, &self.arrived, &self.plant);
+        let mut total = SVector::zeros();
+        self.pending.retain(|push| match push {
+            Disturbance::Jump { time, change } if *time <= due => {
+                *x += change;
+                false
+            }
+            Disturbance::Impulse { time, impulse } if *time <= due => {
+                let without = plant.derivative(x, arrived, &SVector::zeros());
+                *x += plant.derivative(x, arrived, impulse) - without;
+                false
+            }
+            Disturbance::Load { from, until, load } if *from <= due => {
+                let lasting = *until > due;
+                if lasting {
+                    total += load;
+                }
+                lasting
+            }
+            _ => true,
+        });
+        total
+    }
+
+    /// The time of the first event after `now`, infinite if there is none.
+    fn next_event(&self, now: f64) -> f64 {
+        let arrivals = self.travelling.iter().map(|(time, _)| *time);
+        let pushes = self.pending.iter().flat_map(Disturbance::times);
+        arrivals
+            .chain(pushes)
+            .filter(|time| *time > now + SAME_TIME)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Moves the plant on by `duration` seconds without events, and returns the integral of the
+    /// actuators' outputs.
+    fn glide(
+        &mut self,
+        duration: f64,
+        load: &SVector<f64, NL>,
+    ) -> Result<SVector<f64, NU>, PlantError> {
+        let Self {
+            plant,
+            actuators,
+            output,
+            arrived,
+            ..
+        } = self;
+        let target = SVector::<f64, NU>::from_fn(|i, _| actuators[i].target(arrived[i]));
+        let at = |after: f64| {
+            SVector::<f64, NU>::from_fn(|i, _| actuators[i].output(output[i], target[i], after))
+        };
+        let motion = |after: f64, x: &SVector<f64, NX>| {
+            let drive = at(after);
+            let u = SVector::from_fn(|i, _| actuators[i].after_friction(drive[i], x));
+            plant.derivative(x, &u, load)
+        };
+        self.x = integrate(motion, &self.x, duration, self.tolerances, duration)?;
+        let end = at(duration);
+        let integral =
+            SVector::from_fn(|i, _| actuators[i].integral(output[i], target[i], duration));
+        self.output = end;
+        Ok(integral)
+    }
+}

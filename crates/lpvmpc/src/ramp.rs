@@ -1,0 +1,72 @@
+//! The rate of the input as the input: bounds and costs on how fast it may change.
+
+use crate::model::{LpvModel, Scalar};
+use nalgebra::{SMatrix, SVector};
+
+/// A plant of `NX` states and `NU` inputs whose inputs have become states: it is driven by
+/// their rates of change, so that a controller can bound and weigh them.
+///
+/// ```text
+/// d/dt (x, u) = (A(scheduling) x + B(scheduling) u, r)
+/// ```
+///
+/// State (x, u) with `NXU` = `NX` + `NU` components, input r in input units per second. What is
+/// to be applied from a sample on is the ramp u(t) = u + r (t - t_k), its value at the next
+/// sample at the latest. Bounds on u are state bounds, bounds on r input bounds, R stands in the
+/// last block of Q.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RampedInput<P, const NX: usize>(pub P);
+
+impl<P, const NX: usize> RampedInput<P, NX> {
+    /// (x, u) as one vector.
+    pub fn join<T: Scalar, const NU: usize, const NXU: usize>(
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> SVector<T, NXU> {
+        const { assert!(NXU == NX + NU, "NXU must be NX + NU") };
+        let mut joint = SVector::<T, NXU>::zeros();
+        for (place, value) in joint.iter_mut().zip(x.iter().chain(u.iter())) {
+            *place = *value;
+        }
+        joint
+    }
+
+    /// The vector (x, u) in its parts.
+    pub fn split<T: Scalar, const NU: usize, const NXU: usize>(
+        joint: &SVector<T, NXU>,
+    ) -> (SVector<T, NX>, SVector<T, NU>) {
+        const { assert!(NXU == NX + NU, "NXU must be NX + NU") };
+        (
+            SVector::from_iterator(joint.iter().copied().take(NX)),
+            SVector::from_iterator(joint.iter().copied().skip(NX)),
+        )
+    }
+}
+
+impl<P, T, const NX: usize, const NU: usize, const NS: usize, const NXU: usize>
+    LpvModel<T, NXU, NU, NS> for RampedInput<P, NX>
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS>,
+{
+    fn scheduling(&self, joint: &SVector<T, NXU>) -> SVector<T, NS> {
+        let (x, _) = Self::split::<T, NU, NXU>(joint);
+        self.0.scheduling(&x)
+    }
+
+    fn matrices(&self, scheduling: &SVector<T, NS>) -> (SMatrix<T, NXU, NXU>, SMatrix<T, NXU, NU>) {
+        let (a, b) = self.0.matrices(scheduling);
+        let joint_a = SMatrix::from_fn(|i, j| match (i < NX, j < NX) {
+            (true, true) => a[(i, j)],
+            (true, false) => b[(i, j - NX)],
+            (false, _) => T::zero(),
+        });
+        let integrate = |i: usize, j: usize| if i == NX + j { T::one() } else { T::zero() };
+        (joint_a, SMatrix::from_fn(integrate))
+    }
+
+    fn derivative(&self, joint: &SVector<T, NXU>, rate: &SVector<T, NU>) -> SVector<T, NXU> {
+        let (x, u) = Self::split::<T, NU, NXU>(joint);
+        Self::join(&self.0.derivative(&x, &u), rate)
+    }
+}

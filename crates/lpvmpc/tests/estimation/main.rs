@@ -1,0 +1,17 @@
+//! Estimator, delay line, ramped input and smooth moves.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on must fail, in its support functions too"
+)]
+
+mod delay;
+mod estimator;
+mod gate;
+mod pendulum;
+mod ramp;
+mod shaping;
+
+#[allow(dead_code, reason = "the tests of the solver use more of it")]
+#[path = "../it/support/rng.rs"]
+mod rng;
