@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 
 /// The certificate of a ballbot's terminal set: states (phi, theta, phi_dot, theta_dot), torque,
 /// scheduling (theta, theta_dot).
-pub type TerminalCertificate = Certificate<CertifiedRobot, 4, 1, 2>;
+pub type TerminalCertificate = Certificate<RobotTable, 4, 1, 2>;
 
 /// The parameters that the motion of one plane depends on; see [`ballbot::Ballbot`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct CertifiedRobot {
+pub struct RobotTable {
     /// b1, m^2.
     pub b1_m2: f64,
     /// b2, m^2.
@@ -30,7 +30,7 @@ pub struct CertifiedRobot {
     pub gravity_m_s2: f64,
 }
 
-impl From<&Ballbot<f64>> for CertifiedRobot {
+impl From<&Ballbot<f64>> for RobotTable {
     fn from(ballbot: &Ballbot<f64>) -> Self {
         let geometry = &ballbot.geometry;
         Self {
@@ -46,7 +46,7 @@ impl From<&Ballbot<f64>> for CertifiedRobot {
     }
 }
 
-impl CertifiedRobot {
+impl RobotTable {
     fn lift<T>(&self, constant: fn(f64) -> T) -> Ballbot<T> {
         Ballbot {
             b1: constant(self.b1_m2),
@@ -68,7 +68,7 @@ impl CertifiedRobot {
     }
 }
 
-impl AnalyticModel<4, 1, 2> for CertifiedRobot {
+impl AnalyticModel<4, 1, 2> for RobotTable {
     fn scheduling<T: Arithmetic>(&self, x: &[T; 4]) -> [T; 2] {
         [x[1], x[3]]
     }

@@ -36,7 +36,7 @@ mod schema;
 mod world;
 mod world_table;
 
-pub use certificate::{CertifiedRobot, TerminalCertificate};
+pub use certificate::{RobotTable, TerminalCertificate};
 pub use error::ScenarioError;
 pub use feedback::Feedback;
 pub use feedback_table::{
@@ -52,8 +52,8 @@ pub use schema::{
 };
 pub use world::{PlaneWorld, Robot};
 pub use world_table::{
-    ActuatorTable, AngleSensorTable, DelayTable, FloorTable, PlaneName, PushTable, RateSensorTable,
-    RobotTable, SensorsTable, WorldTable,
+    ActuatorTable, AngleSensorTable, DelayTable, DeviationsTable, FloorTable, PlaneName, PushTable,
+    RateSensorTable, SensorsTable, WorldTable,
 };
 
 /// The code of the README, compiled and run with the tests.

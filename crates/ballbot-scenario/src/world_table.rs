@@ -19,7 +19,7 @@ pub struct WorldTable {
     /// From the measurement to the torque.
     pub delay: DelayTable,
     /// How the robot differs from the controller's model.
-    pub robot: RobotTable,
+    pub robot: DeviationsTable,
     /// The floor.
     pub floor: FloorTable,
     /// What pushes the robot.
@@ -110,7 +110,7 @@ pub struct DelayTable {
 /// How the simulated robot differs from the controller's model. Factors multiply `[parameters]`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct RobotTable {
+pub struct DeviationsTable {
     /// Of b1.
     pub b1_factor: f64,
     /// Of b2.
@@ -127,7 +127,7 @@ pub struct RobotTable {
     pub tilt_offset_y_rad: f64,
 }
 
-impl Default for RobotTable {
+impl Default for DeviationsTable {
     fn default() -> Self {
         Self {
             b1_factor: 1.0,

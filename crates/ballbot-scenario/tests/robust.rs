@@ -6,7 +6,7 @@
 )]
 
 use ballbot_scenario::{
-    DisturbancesTable, MotorsTable, PlaneName, Prepared, PushTable, RobotTable, Scenario,
+    DeviationsTable, DisturbancesTable, MotorsTable, PlaneName, Prepared, PushTable, Scenario,
     SensorsTable, Surroundings, TorqueRateTable, WorldTable,
 };
 use lpvmpc_sim::{Ending, Recording};
@@ -81,12 +81,12 @@ fn it_stands_with_every_parameter_wrong_by_20_percent() {
     for corner in 0..16 {
         let factor = |bit: u32| if corner & (1 << bit) == 0 { 0.8 } else { 1.2 };
         let mut scenario = example("push-and-move");
-        world(&mut scenario).robot = RobotTable {
+        world(&mut scenario).robot = DeviationsTable {
             b1_factor: factor(0),
             b2_factor: factor(1),
             b3_factor: factor(2),
             b4_factor: factor(3),
-            ..RobotTable::default()
+            ..DeviationsTable::default()
         };
         let (prepared, recordings) = stands(&scenario);
         let error = rms_mm(&prepared, &recordings[0], 6.0, 12.0);
@@ -142,7 +142,7 @@ fn the_torque_moves_in_ramps_no_steeper_than_allowed() {
     scenario.controller.estimator = None;
     let world = world(&mut scenario);
     world.sensors = SensorsTable::default();
-    world.robot = RobotTable::default();
+    world.robot = DeviationsTable::default();
     let period = 0.005;
     let (prepared, recordings) = stands(&scenario);
     let log = &recordings[0].log;

@@ -4,7 +4,7 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
-use ballbot_scenario::{CertifiedRobot, Scenario, TerminalCertificate, builtin};
+use ballbot_scenario::{RobotTable, Scenario, TerminalCertificate, builtin};
 use lpvmpc::LpvModel;
 use lpvmpc_design::{
     AnalyticModel, CertificateProblem, Interval, MOST_BOXES, SchedulingGrid, TerminalProblem,
@@ -82,7 +82,7 @@ fn the_certificate_is_of_the_built_in_robot() {
         .unwrap()
         .prepare(Path::new("."))
         .unwrap();
-    assert_eq!(found.plant, CertifiedRobot::from(&prepared.ballbot));
+    assert_eq!(found.plant, RobotTable::from(&prepared.ballbot));
     assert_eq!(found.t_s, prepared.settings.t_s);
     assert_eq!(found.q, prepared.settings.weights.q);
     assert_eq!(found.r, prepared.settings.weights.r);

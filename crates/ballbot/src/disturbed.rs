@@ -56,7 +56,7 @@ impl<T: Scalar> Disturbed<T> {
                 + geometry.ball_radius * load[0];
         let force_theta = geometry.centre_of_mass * geometry.gravity * sin_lean - drive + load[1];
         let coupling = ballbot.coupling(cos_normal);
-        let [phi_ddot, theta_ddot] = ballbot.accelerations_under(coupling, force_phi, force_theta);
+        let [phi_ddot, theta_ddot] = ballbot.accelerate(coupling, force_phi, force_theta);
         Vector4::new(phi_dot, theta_dot, phi_ddot, theta_ddot)
     }
 

@@ -54,13 +54,13 @@ impl<T: Scalar> Ballbot<T> {
             self.gear() * torque + arm * sin_theta * theta_dot * theta_dot - self.b4 * phi_dot;
         let force_theta =
             geometry.centre_of_mass * geometry.gravity * sin_theta - self.gear() * torque;
-        let [phi_ddot, theta_ddot] = self.accelerations_under(coupling, force_phi, force_theta);
+        let [phi_ddot, theta_ddot] = self.accelerate(coupling, force_phi, force_theta);
         Vector4::new(phi_dot, theta_dot, phi_ddot, theta_ddot)
     }
 
     /// M^-1 (force_phi, force_theta) in rad/s^2, for generalised forces in m^2/s^2.
     #[inline(always)]
-    pub(crate) fn accelerations_under(&self, coupling: T, force_phi: T, force_theta: T) -> [T; 2] {
+    pub(crate) fn accelerate(&self, coupling: T, force_phi: T, force_theta: T) -> [T; 2] {
         let inverse = T::one() / self.determinant(coupling);
         [
             (self.b3 * force_phi + coupling * force_theta) * inverse,

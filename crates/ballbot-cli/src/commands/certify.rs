@@ -6,7 +6,7 @@ use crate::certificate_page;
 use crate::output;
 use crate::progress::Progress;
 use crate::table::{Table, number};
-use ballbot_scenario::{CertifiedRobot, Prepared, Scenario, TerminalCertificate};
+use ballbot_scenario::{Prepared, RobotTable, Scenario, TerminalCertificate};
 use clap::Args;
 use lpvmpc::Bounds;
 use lpvmpc_design::{CertificateProblem, CertifyError, Proof, TerminalProblem, certify_terminal};
@@ -132,7 +132,7 @@ fn certify(
         written_by: format!("ballbot {}", env!("CARGO_PKG_VERSION")),
     };
     let progress = Progress::new("proving", STEPS);
-    let robot = CertifiedRobot::from(&prepared.ballbot);
+    let robot = RobotTable::from(&prepared.ballbot);
     certify_terminal(
         (&prepared.ballbot, robot),
         &problem,
