@@ -5,4 +5,5 @@
 )]
 
 mod accuracy;
+mod chain;
 mod laboratory;

@@ -283,10 +283,9 @@ impl<'a, const NX: usize> Equations<'a, NX> {
         let gradient = gradient.select_rows(inside);
         // Scaled to a unit diagonal: the parameters' units are of no concern.
         // What nothing tells of is not moved.
-        let scale =
-            information
-                .diagonal()
-                .map(|entry| if entry > 0.0 { 1.0 / entry.sqrt() } else { 0.0 });
+        let scale = information
+            .diagonal()
+            .map(|entry| if entry > 0.0 { 1.0 / entry.sqrt() } else { 0.0 });
         let scaling = DMatrix::from_diagonal(&scale);
         let mut scaled = &scaling * information * &scaling;
         for i in 0..inside.len() {
