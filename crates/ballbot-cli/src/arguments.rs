@@ -5,6 +5,9 @@ use crate::commands::{
     linearize::LinearizeArguments, lqr::LqrArguments, refine::RefineArguments,
     reproduce::ReproduceArguments, scenario::ScenarioArguments, simulate::SimulateArguments,
     verify::VerifyArguments,
+    bench::BenchArguments, completions::CompletionsArguments, identify::IdentifyArguments,
+    linearize::LinearizeArguments, lqr::LqrArguments, refine::RefineArguments,
+    reproduce::ReproduceArguments, scenario::ScenarioArguments, simulate::SimulateArguments,
 };
 use clap::{Parser, Subcommand};
 
@@ -40,6 +43,8 @@ pub enum Command {
     Bench(BenchArguments),
     /// List or show the built-in scenarios
     Scenario(ScenarioArguments),
+    /// Find a robot's parameters, with error bars, from its logs
+    Identify(IdentifyArguments),
     /// Find the nonlinear model's parameters b from a linear model's parameters p
     Refine(RefineArguments),
     /// Show the linear model: A, B, poles, controllability

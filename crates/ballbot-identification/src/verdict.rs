@@ -216,7 +216,12 @@ impl Identification {
         for (i, one) in Parameter::ALL.into_iter().enumerate() {
             for other in Parameter::ALL.into_iter().skip(i + 1) {
                 let correlation = self.correlation(one, other);
-                if correlation.abs() > 0.98 {
+                let vague = |parameter: Parameter| {
+                    let value = self.estimate.values[parameter].abs();
+                    !(self.standard_deviation(parameter) <= WANTED * value)
+                };
+                // Two that are known well may be as correlated as they like.
+                if correlation.abs() > 0.98 && (vague(one) || vague(other)) {
                     verdicts.push(Verdict::Correlated {
                         one,
                         other,

@@ -32,15 +32,52 @@ pub fn identified(laboratory: &Laboratory, seed: u64, config: &str) -> Identific
 
 #[test]
 fn chain_look() {
-    for config in ["", "[parameters]\ndelay_s = { fixed = 0.0 }", "[parameters]\ntilt_offset_rad = { fixed = 0.0 }", "[parameters]\ndrive_friction_m2_s = { fixed = 0.0 }"] {
-    let clock = std::time::Instant::now();
-    let i = identified(&Laboratory { delay: 0.01, tilt_offset: 0.01, gyro_bias: 0.02, ..healthy() }, 3, config);
-    println!("==== {config}: {:?}", clock.elapsed());
-    for p in ballbot_identification::Parameter::ALL { println!("{:22} {:10.6} +- {:10.6}", p.key(), i.estimate.values[p], i.standard_deviation(p)); }
-    for (_, f) in &i.findings { for f in f { println!("finding: {f}"); } }
-    for v in i.verdicts() { println!("{:?}: {v}", v.weight()); }
-    for p in &i.poles { println!("pole {} +- {:?}", p.value, p.standard_deviation); }
-    for s in &i.structures { println!("{:?} fit {:.4} held {:.4} {:?}", s.structure, s.fitted_chi_square, s.validation.chi_square, s.validation.errors.map(|e| e[1])); }
-    println!("{:?}", i.validation);
+    for config in [
+        "",
+        "[parameters]\ndelay_s = { fixed = 0.0 }",
+        "[parameters]\ntilt_offset_rad = { fixed = 0.0 }",
+        "[parameters]\ndrive_friction_m2_s = { fixed = 0.0 }",
+    ] {
+        let clock = std::time::Instant::now();
+        let i = identified(
+            &Laboratory {
+                delay: 0.01,
+                tilt_offset: 0.01,
+                gyro_bias: 0.02,
+                ..healthy()
+            },
+            3,
+            config,
+        );
+        println!("==== {config}: {:?}", clock.elapsed());
+        for p in ballbot_identification::Parameter::ALL {
+            println!(
+                "{:22} {:10.6} +- {:10.6}",
+                p.key(),
+                i.estimate.values[p],
+                i.standard_deviation(p)
+            );
+        }
+        for (_, f) in &i.findings {
+            for f in f {
+                println!("finding: {f}");
+            }
+        }
+        for v in i.verdicts() {
+            println!("{:?}: {v}", v.weight());
+        }
+        for p in &i.poles {
+            println!("pole {} +- {:?}", p.value, p.standard_deviation);
+        }
+        for s in &i.structures {
+            println!(
+                "{:?} fit {:.4} held {:.4} {:?}",
+                s.structure,
+                s.fitted_chi_square,
+                s.validation.chi_square,
+                s.validation.errors.map(|e| e[1])
+            );
+        }
+        println!("{:?}", i.validation);
     }
 }

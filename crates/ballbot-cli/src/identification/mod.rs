@@ -1,0 +1,6 @@
+//! What `ballbot identify` shows of an identification: tables, figures, report, words.
+
+pub mod drawings;
+pub mod report;
+pub mod summary;
+pub mod tables;
