@@ -5,12 +5,13 @@ use crate::estimate::{Estimate, EstimateError, Progress, Task};
 use crate::log::{Finding, Log, Run};
 use crate::noise;
 use crate::parameter::{Choice, Parameter, Values};
-use crate::poles::{Pole, uncertain_poles};
+use crate::poles::{Pole, linear_model, uncertain_poles};
+use crate::published::{LinearRegression, regression};
 use crate::residuals::{OutputResidual, ScoreTest, SegmentResidual, score_tests, simulated, tests};
 use crate::segments::Split;
 use crate::structures::{Compared, compare};
 use crate::validation::{Validation, validate};
-use ballbot::{Ballbot, Consistency, Geometry, limits};
+use ballbot::{Ballbot, Consistency, Geometry, LinearParameters, limits};
 use lpvmpc_design::NORMAL_95;
 use nalgebra::{DMatrix, Vector3};
 
@@ -41,6 +42,8 @@ pub struct Identification {
     pub validation: Option<Validation>,
     /// Structures of friction compared on held-back data, if any were held back.
     pub structures: Vec<Compared>,
+    /// The published way to p, to compare with.
+    pub published: Option<LinearRegression>,
     /// Time that was fitted and time that was held back, s.
     pub times: (f64, f64),
 }
@@ -101,6 +104,7 @@ pub fn identify(
         poles: Vec::new(),
         validation,
         structures,
+        published: regression(&runs, task.ball_angle),
         times: (time(&split.fitted), time(&split.held_back)),
         estimate,
     };
@@ -165,7 +169,20 @@ impl Identification {
         self.ballbot().consistency(limits::THETA)
     }
 
-    /// The order of the residual's spread over the noise that the sensors have by themselves.
+    /// p of the fitted robot, its drive friction included.
+    pub fn linear_parameters(&self) -> Option<LinearParameters<f64>> {
+        let (a, b) = linear_model(&self.estimate.values, self.geometry)?;
+        Some(LinearParameters {
+            p1: a[(2, 1)],
+            p2: a[(2, 2)],
+            p3: b[2],
+            p4: a[(3, 1)],
+            p5: a[(3, 2)],
+            p6: b[3],
+        })
+    }
+
+    /// The residuals' spread over the noise that the sensors have by themselves.
     pub fn normalised_residual(&self) -> f64 {
         let squares = self.residuals.iter().map(|one| one.normalised().powi(2));
         (squares.sum::<f64>() / self.residuals.len().max(1) as f64).sqrt()

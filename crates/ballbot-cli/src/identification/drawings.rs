@@ -110,7 +110,7 @@ fn measured_outputs(identification: &Identification) -> impl Iterator<Item = usi
 fn residuals(identification: &Identification) -> Drawing {
     let segments = shown(identification);
     let panels = measured_outputs(identification).map(|output| {
-        let residual = series(&segments, "", Style::Markers, Role::Lpv, false, |s, row| {
+        let residual = series(&segments, "", line(), Role::Lpv, true, |s, row| {
             s.measured[row][output] - s.simulated[row][output]
         });
         let bound = NORMAL_95 * identification.floor[output];
@@ -151,7 +151,8 @@ fn correlations(identification: &Identification) -> Drawing {
         name: "correlations",
         caption: "Left: correlation of each residual with itself some rows before; right: with the \
                   torque. Between the lines lie 95 % of the values if there is none (for the torque, \
-                  which is not white, somewhat less)."
+                  which is not white, somewhat less). At lag 0 and to its left the torque answers to the \
+                  noise: that is the loop, and no fault of the model."
             .to_owned(),
         figure: figure("Correlations of the residuals", panels, 2, 760.0),
     }

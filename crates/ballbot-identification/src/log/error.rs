@@ -257,8 +257,10 @@ pub enum Suspicion {
     },
     /// No robot leans that far.
     LargeTilt {
-        /// Median of |theta - median|, rad.
-        spread: f64,
+        /// How many times it comes back from beyond the limit.
+        returns: usize,
+        /// The limit, rad from the middle.
+        limit: f64,
         /// The column.
         column: String,
     },
@@ -267,10 +269,14 @@ pub enum Suspicion {
 impl fmt::Display for Suspicion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::LargeTilt { spread, column } => write!(
+            Self::LargeTilt {
+                returns,
+                limit,
+                column,
+            } => write!(
                 f,
-                "half of the time `{column}` is more than {spread:.2} rad from its middle, and a \
-                 robot that leans so far falls: it seems to be in degrees"
+                "`{column}` goes more than {limit} rad from its middle and comes back {returns} \
+                 times, and a robot that leans so far falls: it seems to be in degrees"
             ),
             Self::TiltAgainstRate { slope, tilt, rate } => {
                 let degrees = 180.0 / std::f64::consts::PI;

@@ -1,7 +1,7 @@
 //! A robot in a loop, with the sensors of a real one. Its equations of motion are written down once
-//! more, from the mass matrix, and integrated in steps of 0.1 ms.
+//! more, from the mass matrix, and integrated in steps of 0.25 ms.
 
-use ballbot::{Ballbot, Geometry};
+use ballbot::{Ballbot, Geometry, LinearParameters};
 use ballbot_identification::log::{BallAngle, Run, Torque};
 use fastrand::Rng;
 use lpvmpc_design::{linearize, lqr_continuous};
@@ -99,14 +99,50 @@ impl Laboratory {
         x + (k1 + (k2 + k3) * 2.0 + k4) * (h / 6.0)
     }
 
-    /// u = -K x that holds the robot.
-    pub fn gain(&self) -> Vector4<f64> {
+    /// The paper's parameters, which belong to no rigid body, in a loop.
+    pub fn of_the_paper() -> Self {
+        Self {
+            plant: Ballbot::paper(),
+            drive_friction: 0.0,
+            torque_gain: 1.0,
+            amplitude: 0.1,
+            ..healthy()
+        }
+    }
+
+    fn linear(&self) -> (DMatrix<f64>, DMatrix<f64>) {
         let f = |x: &Vector4<f64>, u: &SVector<f64, 1>| self.f(x, u[0]);
         let upright = linearize(f, &Vector4::zeros(), &SVector::zeros()).unwrap();
         let a = DMatrix::from_column_slice(4, 4, upright.a.as_slice());
-        let b = DMatrix::from_column_slice(4, 1, upright.b.as_slice());
+        (a, DMatrix::from_column_slice(4, 1, upright.b.as_slice()))
+    }
+
+    /// The pole with the largest real part, 1/s.
+    pub fn unstable_pole(&self) -> f64 {
+        lpvmpc_design::poles(&self.linear().0)
+            .unwrap()
+            .last()
+            .unwrap()
+            .re
+    }
+
+    pub fn linear_parameters(&self) -> LinearParameters<f64> {
+        let (a, b) = self.linear();
+        LinearParameters {
+            p1: a[(2, 1)],
+            p2: a[(2, 2)],
+            p3: b[2],
+            p4: a[(3, 1)],
+            p5: a[(3, 2)],
+            p6: b[3],
+        }
+    }
+
+    /// u = -K x that holds the robot.
+    pub fn gain(&self) -> Vector4<f64> {
+        let (a, b) = self.linear();
         let q = DMatrix::from_diagonal(&nalgebra::dvector![2.0, 100.0, 1.0, 10.0]);
-        let r = DMatrix::from_element(1, 1, 1.0);
+        let r = DMatrix::from_element(1, 1, (10.0 * self.torque_gain).powi(2));
         let k = lqr_continuous(&a, &b, &q, &r).unwrap().k;
         Vector4::new(k[0], k[1], k[2], k[3])
     }
@@ -130,14 +166,21 @@ impl Laboratory {
     pub fn record(&self, seed: u64) -> Record {
         let mut rng = Rng::with_seed(seed);
         let excitation = self.excitation(&mut rng);
-        let gain = self.gain();
-        let (interval, fine) = (1.0 / self.rate, 1e-4);
-        let steps = (interval / fine).round() as usize;
         let rows = (self.duration * self.rate) as usize;
+        let torque: Vec<f64> = (0..rows)
+            .map(|row| excitation(row as f64 / self.rate))
+            .collect();
+        self.play(&torque, &self.gain(), &mut rng)
+    }
+
+    /// The robot under this torque, one value per row, added to that of the loop.
+    pub fn play(&self, excitation: &[f64], gain: &Vector4<f64>, rng: &mut Rng) -> Record {
+        let (interval, fine) = (1.0 / self.rate, 2.5e-4);
+        let steps = (interval / fine).round() as usize;
+        let rows = excitation.len();
         let late = (self.delay / fine).round() as usize;
         let mut waiting = std::collections::VecDeque::from(vec![0.0; late]);
         let mut x = Vector4::zeros();
-        let mut last_phi: Option<f64> = None;
         let mut record = Record {
             run: Run {
                 name: "simulated".to_owned(),
@@ -152,23 +195,22 @@ impl Laboratory {
         };
         for row in 0..rows {
             let time = row as f64 * interval;
-            let noise = self.noise.map(|sigma| sigma * normal(&mut rng));
+            let noise = self.noise.map(|sigma| sigma * normal(rng));
             let phi = match self.ball_angle {
                 BallAngle::Inertial => x[0],
                 BallAngle::RelativeToBody => x[0] - x[1],
             };
             let clean = Vector3::new(phi, x[1] + self.tilt_offset, x[3] + self.gyro_bias);
             let outputs = clean + noise;
-            // The loop has the measured values; the speed of the ball is filtered a little.
-            let speed = last_phi.map_or(x[2], |_| x[2]);
-            last_phi = Some(outputs[0]);
+            // The loop has the measured values, and the ball's speed from an observer.
+            let speed = x[2];
             let ball = if self.ball_angle == BallAngle::Inertial {
                 outputs[0]
             } else {
                 outputs[0] + outputs[1]
             };
             let measured = Vector4::new(ball, outputs[1], speed, outputs[2]);
-            let commanded = excitation(time) - gain.dot(&measured);
+            let commanded = excitation[row] - gain.dot(&measured);
             let torque = commanded.clamp(-self.limit, self.limit);
             record.run.time.push(time);
             record.run.outputs.push(outputs);

@@ -6,4 +6,6 @@
 
 mod accuracy;
 mod chain;
+mod excite;
 mod laboratory;
+mod malformed;

@@ -191,8 +191,12 @@ pub(super) fn stuck_or_stepped(
     }
 }
 
-/// Half of the rows beyond this distance from the middle: degrees, rad.
-const LARGE_SPREAD: f64 = 0.6;
+/// A robot that leans beyond [`FALLEN`] lies. One that comes back so many times is none: its tilt is
+/// in degrees.
+const RETURNS: usize = 2;
+
+/// An excursion of fewer rows is a spike.
+const SPIKE: usize = 3;
 
 /// Changes of the tilt are looked at over this time, s: long against the noise of the gyroscope,
 /// short against the time in which its bias matters.
@@ -208,12 +212,6 @@ pub(super) fn units(
     findings: &mut Vec<Finding>,
 ) -> Option<Suspicion> {
     let theta: Vec<f64> = run.outputs.iter().map(|row| row[1]).collect();
-    let middle = middle_of(&theta);
-    let mut distances: Vec<f64> = theta
-        .iter()
-        .map(|value| (value - middle).abs())
-        .filter(|distance| !distance.is_nan())
-        .collect();
     let slope = slope_of_tilt_over_rate(run);
     if let Some((slope, change)) = slope
         && !(0.7..=1.4).contains(&slope)
@@ -227,11 +225,28 @@ pub(super) fn units(
         }
         findings.push(Finding::TiltAgainstRate { slope });
     }
-    let spread = median(&mut distances);
-    (spread > LARGE_SPREAD).then(|| Suspicion::LargeTilt {
-        spread,
+    let returns = returns_from_beyond(&theta);
+    (returns >= RETURNS).then(|| Suspicion::LargeTilt {
+        returns,
+        limit: FALLEN,
         column: names.0[2].to_owned(),
     })
+}
+
+/// How many times the tilt goes beyond [`FALLEN`] for more than a spike, and comes back.
+fn returns_from_beyond(theta: &[f64]) -> usize {
+    let middle = middle_of(theta);
+    let (mut beyond, mut returns) = (0, 0);
+    for value in theta {
+        let distance = (value - middle).abs();
+        if distance > FALLEN {
+            beyond += 1;
+        } else if distance < 0.5 * FALLEN {
+            returns += usize::from(beyond >= SPIKE);
+            beyond = 0;
+        }
+    }
+    returns
 }
 
 /// Slope of the tilt's changes over the integrals of the rate, and the size of the changes, rad.
@@ -252,14 +267,18 @@ fn slope_of_tilt_over_rate(run: &Run) -> Option<(f64, f64)> {
             }
         }
     }
-    let count = pairs.len() as f64;
-    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
-    let (mean_integral, mean_change) = (mean(|pair| pair.0), mean(|pair| pair.1));
-    let (mut product, mut square, mut change) = (0.0, 0.0, 0.0);
-    for pair in &pairs {
-        product += (pair.0 - mean_integral) * (pair.1 - mean_change);
-        square += (pair.0 - mean_integral).powi(2);
-        change += (pair.1 - mean_change).powi(2);
-    }
-    (pairs.len() >= 4 && square > 0.0).then(|| (product / square, (change / count).sqrt()))
+    // Medians, because a fall or a spike must not decide about units.
+    let middle = |of: fn(&(f64, f64)) -> f64| median(&mut pairs.iter().map(of).collect::<Vec<_>>());
+    let (middle_integral, middle_change) = (middle(|pair| pair.0), middle(|pair| pair.1));
+    let sizes = pairs.iter().map(|pair| (pair.0 - middle_integral).abs());
+    let size = median(&mut sizes.collect::<Vec<_>>());
+    let changes = pairs.iter().map(|pair| (pair.1 - middle_change).abs());
+    let change = median(&mut changes.collect::<Vec<_>>());
+    let ratios = pairs
+        .iter()
+        .map(|pair| (pair.0 - middle_integral, pair.1 - middle_change))
+        .filter(|(integral, _)| integral.abs() >= size)
+        .map(|(integral, change)| change / integral);
+    let mut ratios: Vec<f64> = ratios.collect();
+    (pairs.len() >= 4 && size > 0.0).then(|| (median(&mut ratios), change))
 }
