@@ -8,6 +8,10 @@ use crate::commands::{
     bench::BenchArguments, completions::CompletionsArguments, identify::IdentifyArguments,
     linearize::LinearizeArguments, lqr::LqrArguments, refine::RefineArguments,
     reproduce::ReproduceArguments, scenario::ScenarioArguments, simulate::SimulateArguments,
+    bench::BenchArguments, completions::CompletionsArguments, excite::ExciteArguments,
+    identify::IdentifyArguments, linearize::LinearizeArguments, lqr::LqrArguments,
+    refine::RefineArguments, reproduce::ReproduceArguments, scenario::ScenarioArguments,
+    simulate::SimulateArguments,
 };
 use clap::{Parser, Subcommand};
 
@@ -43,6 +47,8 @@ pub enum Command {
     Bench(BenchArguments),
     /// List or show the built-in scenarios
     Scenario(ScenarioArguments),
+    /// Design a safe torque that tells a robot's parameters
+    Excite(ExciteArguments),
     /// Find a robot's parameters, with error bars, from its logs
     Identify(IdentifyArguments),
     /// Find the nonlinear model's parameters b from a linear model's parameters p

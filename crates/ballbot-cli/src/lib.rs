@@ -33,6 +33,7 @@ pub fn run(arguments: Arguments) -> Result<String, CommandError> {
         Command::Simulate(arguments) => commands::simulate::run(&arguments),
         Command::Bench(arguments) => commands::bench::run(&arguments),
         Command::Scenario(arguments) => commands::scenario::run(&arguments),
+        Command::Excite(arguments) => commands::excite::run(&arguments),
         Command::Identify(arguments) => commands::identify::run(&arguments),
         Command::Refine(arguments) => commands::refine::run(&arguments),
         Command::Linearize(arguments) => commands::linearize::run(&arguments),

@@ -50,6 +50,8 @@ pub struct Estimate {
     pub fit: ShootingFit<4>,
     /// Its segments.
     pub segments: Vec<Segment>,
+    /// Length of a segment, s; less than was asked for if the robot could not be simulated so long.
+    pub segment: f64,
 }
 
 /// What became of a parameter.
@@ -122,8 +124,23 @@ impl Task<'_> {
         progress: Progress<'_>,
     ) -> Result<Estimate, EstimateError> {
         let start = self.start(stretches, floor, progress)?;
-        let segments = segments(self.runs, stretches, self.segment, self.lead());
-        self.estimate_from(start, segments, floor, progress)
+        let mut length = self.segment;
+        loop {
+            let segments = segments(self.runs, stretches, length, self.lead());
+            let task = Task {
+                segment: length,
+                ..self.clone()
+            };
+            match task.estimate_from(start, segments, floor, progress) {
+                // A wrong model can be so unstable that a segment is too long for it.
+                Err(EstimateError::Shooting(ShootingError::NonFiniteStart { .. }))
+                    if length > COARSE =>
+                {
+                    length = (0.5 * length).max(COARSE);
+                }
+                result => return result,
+            }
+        }
     }
 
     /// Fits the robot to these segments from a start.
@@ -174,6 +191,7 @@ impl Task<'_> {
             noise,
             fit,
             segments: model.segments,
+            segment: self.segment,
         })
     }
 

@@ -22,6 +22,8 @@ pub struct Identification {
     pub geometry: Geometry<f64>,
     /// Whether mechanics was imposed.
     pub physical: bool,
+    /// Length of a segment that was asked for, s.
+    pub segment: f64,
     /// What was done with each parameter.
     pub choices: Values<Choice>,
     /// What is odd about each log.
@@ -38,9 +40,10 @@ pub struct Identification {
     pub scores: Vec<ScoreTest>,
     /// Poles at the upright position.
     pub poles: Vec<Pole>,
-    /// On held-back data, if any were held back.
-    pub validation: Option<Validation>,
-    /// Structures of friction compared on held-back data, if any were held back.
+    /// On held-back data, if any were held back; or why it could not be judged there.
+    pub validation: Option<Result<Validation, EstimateError>>,
+    /// Structures of friction compared on held-back data, those that could be fitted; empty if none
+    /// were held back.
     pub structures: Vec<Compared>,
     /// The published way to p, to compare with.
     pub published: Option<LinearRegression>,
@@ -77,6 +80,10 @@ pub fn identify(
     let floor = noise::floor(&runs);
     let split = Split::new(&runs, config.fit.held_back);
     let estimate = task.estimate(&split.fitted, floor, progress)?;
+    let task = Task {
+        segment: estimate.segment,
+        ..task
+    };
     let simulated = simulated(&task, &estimate);
     let residuals = tests(&simulated, estimate.noise, floor);
     let scores = score_tests(&task, &estimate);
@@ -84,8 +91,8 @@ pub fn identify(
         (None, Vec::new())
     } else {
         let (values, noise) = (&estimate.values, estimate.noise);
-        let validation = validate(&task, values, noise, &split.held_back)?;
-        let structures = compare(&task, &estimate, &split.held_back, progress)?;
+        let validation = validate(&task, values, noise, &split.held_back);
+        let structures = compare(&task, &estimate, &split.held_back, progress);
         (Some(validation), structures)
     };
     let time = |stretches: &[(usize, std::ops::Range<usize>)]| {
@@ -95,6 +102,7 @@ pub fn identify(
     let mut identification = Identification {
         geometry: task.geometry,
         physical: task.physical,
+        segment: config.fit.segment_s,
         choices,
         findings,
         floor,

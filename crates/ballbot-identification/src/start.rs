@@ -186,8 +186,8 @@ impl LinearFit {
         // The offset o enters as -p1 o and -p4 o.
         values[Parameter::TiltOffset] = -(p1 * c1 + p4 * c2) / (p1 * p1 + p4 * p4);
         let finite = values.0.iter().all(|value| value.is_finite());
-        let robot = finite && values[Parameter::TorqueGain] > 0.0 && determinant > 0.0 && b1 > 0.0;
-        robot.then_some(values)
+        // What mechanics forbids is brought within bounds by the fit, if they are wanted.
+        (finite && values[Parameter::TorqueGain] > 0.0).then_some(values)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Which friction does this robot have? Model structures compared on held-back data.
 
-use crate::estimate::{Estimate, EstimateError, Progress, Task};
+use crate::estimate::{Estimate, Progress, Task};
 use crate::parameter::{Choice, Parameter, Values};
 use crate::segments::spread;
 use crate::validation::{Validation, validate};
@@ -86,32 +86,31 @@ pub struct Compared {
 /// Segments of each fit; enough to tell structures apart.
 const SEGMENTS: usize = 60;
 
-/// Fits every structure, from the estimate on, and judges it on the stretches held back.
-///
-/// # Errors
-/// A structure cannot be fitted or judged.
+/// Fits every structure, from the estimate on, and judges it on the stretches held back. One that
+/// cannot be fitted or simulated there is left out: it is no rival.
 pub fn compare(
     task: &Task<'_>,
     estimate: &Estimate,
     held_back: &[(usize, Range<usize>)],
     progress: Progress<'_>,
-) -> Result<Vec<Compared>, EstimateError> {
+) -> Vec<Compared> {
     // One noise for all, so that their chi^2 can be compared.
     let noise: Vector3<f64> = estimate.noise;
     Structure::ALL
         .into_iter()
-        .map(|structure| {
+        .filter_map(|structure| {
             let task = Task {
                 choices: structure.choices(task.choices),
                 noise: [0, 1, 2].map(|output| Some(noise[output])),
                 ..task.clone()
             };
             let segments = spread(&estimate.segments, SEGMENTS);
-            let fitted = task.estimate_from(estimate.values, segments, noise, progress)?;
-            Ok(Compared {
+            let fitted = task.estimate_from(estimate.values, segments, noise, progress);
+            let fitted = fitted.ok()?;
+            Some(Compared {
                 structure,
                 fitted_chi_square: fitted.fit.chi_square / fitted.fit.degrees_of_freedom(),
-                validation: validate(&task, &fitted.values, noise, held_back)?,
+                validation: validate(&task, &fitted.values, noise, held_back).ok()?,
                 estimate: fitted,
             })
         })

@@ -24,6 +24,15 @@ pub enum Weight {
 pub enum Verdict {
     /// The iteration did not end at a minimum.
     NotConverged(ShootingTermination),
+    /// The segments had to be shorter than was asked for.
+    Shortened {
+        /// Asked for, s.
+        wanted: f64,
+        /// Used, s.
+        used: f64,
+    },
+    /// The held-back data could not be used.
+    NotJudged(String),
     /// The residual is about the noise of the sensors.
     ResidualIsNoise {
         /// Residual over noise.
@@ -161,6 +170,12 @@ impl Identification {
         if termination != ShootingTermination::Converged {
             verdicts.push(Verdict::NotConverged(termination));
         }
+        if self.estimate.segment < self.segment {
+            verdicts.push(Verdict::Shortened {
+                wanted: self.segment,
+                used: self.estimate.segment,
+            });
+        }
         let mut noise = true;
         for (output, residual) in OUTPUTS.into_iter().zip(&self.residuals) {
             if residual.normalised() > TOO_LARGE {
@@ -260,8 +275,10 @@ impl Identification {
     }
 
     fn judge_held_back(&self, verdicts: &mut Vec<Verdict>) {
-        let Some(validation) = &self.validation else {
-            return;
+        let validation = match &self.validation {
+            None => return,
+            Some(Err(error)) => return verdicts.push(Verdict::NotJudged(error.to_string())),
+            Some(Ok(validation)) => validation,
         };
         let chi_square = validation.chi_square;
         verdicts.push(if chi_square <= HELD_BACK {
@@ -297,6 +314,8 @@ impl Verdict {
     pub fn weight(&self) -> Weight {
         match self {
             Self::NotConverged(_)
+            | Self::Shortened { .. }
+            | Self::NotJudged(_)
             | Self::ResidualTooLarge { .. }
             | Self::DelayAlarm { .. }
             | Self::HeldParameter { .. }
@@ -324,6 +343,12 @@ impl fmt::Display for Verdict {
                 "the fit did not converge: {termination}. Better starting values may help \
                  ([parameters] with start, or [body])"
             ),
+            Self::Shortened { wanted, used } => write!(
+                f,
+                "the robot could not be simulated over {wanted} s, and was fitted in segments of {used} \
+                 s: the model is far from the robot, or its unstable mode is very fast"
+            ),
+            Self::NotJudged(why) => write!(f, "the data held back could not be used: {why}"),
             Self::ResidualIsNoise { normalised } => write!(
                 f,
                 "the robot explains the log to {normalised:.2} times the noise of its sensors"

@@ -3,7 +3,7 @@
 use super::CommandError;
 use super::simulate::PNG_SCALE;
 use crate::html::Drawing;
-use crate::identification::{drawings, report, summary};
+use crate::identification::{drawings, published, report, summary};
 use crate::input::{self, InputError};
 use crate::output;
 use crate::progress::Progress;
@@ -34,8 +34,11 @@ pub struct IdentifyArguments {
     /// Do not impose mechanics: see what the data say alone
     #[arg(long)]
     pub unphysical: bool,
+    /// Show the published chain, too: p by linear regression, b by refinement
+    #[arg(long)]
+    pub published: bool,
     /// Print a commented configuration and stop
-    #[arg(long, conflicts_with_all = ["logs", "config", "unphysical"])]
+    #[arg(long, conflicts_with_all = ["logs", "config", "unphysical", "published"])]
     pub example: bool,
 }
 
@@ -76,8 +79,17 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, CommandError> {
              below holds\n"
         }
     };
+    let chain = if arguments.published {
+        format!(
+            "\nThe published chain, to compare with\n{}{}\n",
+            published::linear_parameters(&identification).on_screen(),
+            published::refined(&identification)
+        )
+    } else {
+        String::new()
+    };
     Ok(format!(
-        "{lengths}{}\nwritten to {}: parameters.toml, report.html, figures\n",
+        "{lengths}{}{chain}\nwritten to {}: parameters.toml, report.html, figures\n",
         summary::text(&identification),
         arguments.out.display()
     ))

@@ -1,5 +1,6 @@
 //! The report of an identification: one self-contained HTML file.
 
+use super::published;
 use super::summary::mark;
 use super::tables::{self, Sheet};
 use crate::figures::FigureError;
@@ -30,7 +31,8 @@ pub fn html(identification: &Identification, drawings: &[Drawing]) -> Result<Str
          <h2>Verdict</h2>\n{}\n<h2>Parameters</h2>\n{}\n<p>{}</p>\n\
          <h2>Logs</h2>\n<ul>\n{logs}</ul>\n<h2>Figures</h2>\n{}\n\
          <h2>Poles at the upright position</h2>\n{}\n<h2>Residuals</h2>\n{}\n\
-         <h2>Structures of friction</h2>\n{}\n<h2>Correlations of the parameters</h2>\n{}\n",
+         <h2>Structures of friction</h2>\n{}\n<h2>Correlations of the parameters</h2>\n{}\n\
+         <h2>The published chain, to compare with</h2>\n{}\n<pre>{}</pre>\n",
         mechanics(identification),
         identification.estimate.fit.values,
         verdicts(identification),
@@ -41,6 +43,8 @@ pub fn html(identification: &Identification, drawings: &[Drawing]) -> Result<Str
         table(&tables::residuals(identification)),
         table(&tables::structures(identification)),
         table(&tables::correlations(identification)),
+        table(&published::linear_parameters(identification)),
+        escape(&published::refined(identification)),
     );
     Ok(html::page("A ballbot, identified", &body))
 }
@@ -80,7 +84,7 @@ fn verdicts(identification: &Identification) -> String {
 
 fn table(sheet: &Sheet) -> String {
     if sheet.rows.is_empty() {
-        return "<p>None: no data were held back.</p>".to_owned();
+        return "<p>None.</p>".to_owned();
     }
     html::table(&sheet.headers, &sheet.rows)
 }

@@ -14,7 +14,7 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    fn new(headers: &[&str]) -> Self {
+    pub(super) fn new(headers: &[&str]) -> Self {
         Self {
             headers: headers.iter().map(|header| (*header).to_owned()).collect(),
             rows: Vec::new(),
