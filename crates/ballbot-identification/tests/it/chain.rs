@@ -282,3 +282,22 @@ fn several_runs_are_one_fit_and_a_drawing_is_a_prior() {
     assert!(error < 5.0, "{error} %");
     assert!(warnings(&found).is_empty(), "{:?}", warnings(&found));
 }
+
+#[test]
+#[ignore = "takes a minute: cargo test -p ballbot-identification -- --ignored"]
+fn ten_minutes_at_one_kilohertz_are_identified_within_a_minute() {
+    let laboratory = Laboratory {
+        rate: 1000.0,
+        duration: 600.0,
+        ..real()
+    };
+    let text = csv(&laboratory.record(1));
+    assert_eq!(text.lines().count(), 600_001);
+    let clock = std::time::Instant::now();
+    let found = identified_from(&text, "");
+    let seconds = clock.elapsed().as_secs_f64();
+    assert!(seconds < 60.0, "{seconds} s");
+    assert!(warnings(&found).is_empty(), "{:?}", warnings(&found));
+    let error = percent(found.estimate.values[Parameter::B1], laboratory.plant.b1);
+    assert!(error < 0.5, "{error} %");
+}
