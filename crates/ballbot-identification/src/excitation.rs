@@ -101,6 +101,9 @@ pub enum ExcitationError {
 /// The tilt is brought to within this part of its limit.
 const MARGIN: f64 = 0.95;
 
+/// A robot that leans so far has fallen, rad.
+const FALLEN: f64 = 1.5;
+
 /// Fading in and out, s: no jump of the torque.
 const FADE: f64 = 1.0;
 
@@ -267,8 +270,8 @@ impl ExcitationTask {
             motion.run.torque.push(excitation - gain.dot(&x));
             motion.states.push(x);
             motion.tilt = motion.tilt.max(x[1].abs());
-            if !(motion.tilt <= 1.5) {
-                motion.tilt = 1.5;
+            if !x[1].is_finite() || motion.tilt > FALLEN {
+                motion.tilt = FALLEN;
                 break;
             }
             let acting = row
@@ -278,7 +281,8 @@ impl ExcitationTask {
                 x = robot.step(&x, acting, interval / steps);
             }
         }
-        motion.run.stretches = vec![0..motion.run.time.len()];
+        let rows = 0..motion.run.time.len();
+        motion.run.stretches.push(rows);
         motion
     }
 

@@ -233,7 +233,7 @@ impl Identification {
                 let correlation = self.correlation(one, other);
                 let vague = |parameter: Parameter| {
                     let value = self.estimate.values[parameter].abs();
-                    !(self.standard_deviation(parameter) <= WANTED * value)
+                    exceeds(self.standard_deviation(parameter), WANTED * value)
                 };
                 // Two that are known well may be as correlated as they like.
                 if correlation.abs() > 0.98 && (vague(one) || vague(other)) {
@@ -254,7 +254,7 @@ impl Identification {
         );
         match parameter {
             Parameter::TiltOffset | Parameter::GyroBias | Parameter::TorqueBias => None,
-            Parameter::Delay => (!(deviation <= VAGUE_DELAY)).then_some(Verdict::VagueDelay {
+            Parameter::Delay => exceeds(deviation, VAGUE_DELAY).then_some(Verdict::VagueDelay {
                 standard_deviation: deviation,
             }),
             Parameter::RollingFriction | Parameter::DriveFriction | Parameter::DriveCoulomb => {
@@ -264,8 +264,7 @@ impl Identification {
             }
             Parameter::B1 | Parameter::B2 | Parameter::B3 | Parameter::TorqueGain => {
                 let relative = (deviation / value).abs();
-                // Written so that a deviation that is no number is weak.
-                (!(relative <= WEAK)).then_some(Verdict::Weak {
+                exceeds(relative, WEAK).then_some(Verdict::Weak {
                     parameter,
                     relative,
                     factor: relative / WANTED,
@@ -307,6 +306,11 @@ impl Identification {
             });
         }
     }
+}
+
+/// Whether a deviation is above a limit; one that is no number is.
+fn exceeds(deviation: f64, limit: f64) -> bool {
+    deviation.is_nan() || deviation > limit
 }
 
 impl Verdict {

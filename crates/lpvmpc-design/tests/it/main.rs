@@ -13,3 +13,4 @@ mod nist;
 mod riccati;
 mod rk4_step;
 mod terminal;
+mod shooting;
