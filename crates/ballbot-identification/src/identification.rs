@@ -140,6 +140,11 @@ impl Identification {
         }
     }
 
+    /// Whether there are fewer than two segments per parameter: their scatter then tells nothing.
+    pub fn has_few_segments(&self) -> bool {
+        self.estimate.segments.len() < 2 * self.estimate.fit.reduced.indices.len()
+    }
+
     /// Standard deviation of a parameter; zero if it was held.
     pub fn standard_deviation(&self, parameter: Parameter) -> f64 {
         let index = parameter.index();

@@ -31,6 +31,13 @@ pub enum Verdict {
         /// Used, s.
         used: f64,
     },
+    /// Residuals that are not white, and too few segments to take their scatter.
+    TooShort {
+        /// Segments.
+        segments: usize,
+        /// Parameters that were found.
+        parameters: usize,
+    },
     /// The held-back data could not be used.
     NotJudged(String),
     /// The residual is about the noise of the sensors.
@@ -174,6 +181,12 @@ impl Identification {
             verdicts.push(Verdict::Shortened {
                 wanted: self.segment,
                 used: self.estimate.segment,
+            });
+        }
+        if !self.is_white() && self.has_few_segments() {
+            verdicts.push(Verdict::TooShort {
+                segments: self.estimate.segments.len(),
+                parameters: self.estimate.fit.reduced.indices.len(),
             });
         }
         let mut noise = true;
@@ -320,6 +333,7 @@ impl Verdict {
             Self::NotConverged(_)
             | Self::Shortened { .. }
             | Self::NotJudged(_)
+            | Self::TooShort { .. }
             | Self::ResidualTooLarge { .. }
             | Self::DelayAlarm { .. }
             | Self::HeldParameter { .. }
@@ -352,6 +366,14 @@ impl fmt::Display for Verdict {
                 "the robot could not be simulated over {wanted} s, and was fitted in segments of {used} \
                  s: the model is far from the robot, or its unstable mode is very fast"
             ),
+            Self::TooShort {
+                segments,
+                parameters,
+            } => write!(
+                f,
+                "the residuals are not white, and {segments} segments for {parameters} parameters are \
+                 too few to take their scatter: the intervals are too narrow. Record for longer"
+            ),
             Self::NotJudged(why) => write!(f, "the data held back could not be used: {why}"),
             Self::ResidualIsNoise { normalised } => write!(
                 f,
@@ -369,8 +391,7 @@ impl fmt::Display for Verdict {
             } => write!(
                 f,
                 "the residual of the {output} is not white (correlation {correlation:.2} over {lag} \
-                 rows): a filtered sensor, disturbances, or a part of the model that is missing. \
-                 The standard deviations are taken from the scatter of the segments"
+                 rows): a filtered sensor, disturbances, or a part of the model that is missing"
             ),
             Self::DelayAlarm {
                 held,

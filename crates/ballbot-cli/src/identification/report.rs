@@ -58,8 +58,8 @@ fn mechanics(identification: &Identification) -> &'static str {
 }
 
 fn intervals(identification: &Identification) -> &'static str {
-    if identification.is_white() {
-        "The residuals are white, so the intervals are those of white noise."
+    if identification.has_few_segments() || identification.is_white() {
+        "The intervals are those of white residuals."
     } else {
         "The residuals are not white, so the intervals are taken from the scatter of the segments."
     }

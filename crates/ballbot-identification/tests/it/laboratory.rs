@@ -187,13 +187,13 @@ impl Laboratory {
                 time: Vec::new(),
                 outputs: Vec::new(),
                 torque: Vec::new(),
-                stretches: vec![0..rows],
+                stretches: std::iter::once(0..rows).collect(),
                 torque_kind: Torque::Applied,
             },
             commanded: Vec::new(),
             largest_tilt: 0.0,
         };
-        for row in 0..rows {
+        for (row, excitation) in excitation.iter().enumerate() {
             let time = row as f64 * interval;
             let noise = self.noise.map(|sigma| sigma * normal(rng));
             let phi = match self.ball_angle {
@@ -210,7 +210,7 @@ impl Laboratory {
                 outputs[0] + outputs[1]
             };
             let measured = Vector4::new(ball, outputs[1], speed, outputs[2]);
-            let commanded = excitation[row] - gain.dot(&measured);
+            let commanded = excitation - gain.dot(&measured);
             let torque = commanded.clamp(-self.limit, self.limit);
             record.run.time.push(time);
             record.run.outputs.push(outputs);
