@@ -397,3 +397,46 @@ fn units_are_converted_at_the_edge() {
         assert!((read.torque[row] - truth.torque[row]).abs() < 1e-12);
     }
 }
+
+#[test]
+fn no_damage_to_a_file_makes_the_reader_panic() {
+    let good = good().into_bytes();
+    let mut rng = fastrand::Rng::with_seed(11);
+    for _ in 0..300 {
+        let mut damaged = good.clone();
+        for _ in 0..rng.usize(1..6) {
+            let place = rng.usize(..damaged.len());
+            match rng.u8(..4) {
+                0 => damaged[place] = rng.u8(..),
+                1 => {
+                    let end = (place + rng.usize(..400)).min(damaged.len());
+                    damaged.drain(place..end);
+                }
+                2 => damaged.truncate(place.max(1)),
+                _ => {
+                    let piece = damaged[place..(place + 60).min(damaged.len())].to_vec();
+                    let to = rng.usize(..damaged.len());
+                    damaged.splice(to..to, piece);
+                }
+            }
+            if damaged.is_empty() {
+                damaged.push(b'\n');
+            }
+        }
+        match read_with(&damaged, "") {
+            // What is read is a run: times increase within a stretch, every torque is a number.
+            Ok(log) => {
+                for stretch in log.run.stretches {
+                    let time = &log.run.time[stretch.clone()];
+                    assert!(time.windows(2).all(|pair| pair[0] < pair[1]));
+                    assert!(
+                        log.run.torque[stretch]
+                            .iter()
+                            .all(|torque| torque.is_finite())
+                    );
+                }
+            }
+            Err(error) => assert!(error.to_string().len() > 20),
+        }
+    }
+}

@@ -6,6 +6,11 @@
 //! Statistical Reference Datasets, nonlinear regression, www.itl.nist.gov/div898/strd (Misra1a,
 //! Rat42, MGH09, BoxBOD, Thurber).
 
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on must fail, in its support functions too"
+)]
+
 use lpvmpc_design::{Fit, LeastSquaresSettings, ResidualModel, levenberg_marquardt};
 use nalgebra::{DMatrix, DVector};
 
