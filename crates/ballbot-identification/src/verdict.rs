@@ -1,9 +1,11 @@
 //! What a builder should know of a fit, in words.
 
+use crate::coordinates::LONGEST_DELAY;
 use crate::estimate::Status;
 use crate::identification::Identification;
+use crate::log::quantile;
 use crate::parameter::Parameter;
-use crate::residuals::OUTPUTS;
+use crate::residuals::{OUTPUTS, SegmentResidual};
 use crate::structures::{Structure, best};
 use lpvmpc_design::ShootingTermination;
 use std::fmt;
@@ -30,6 +32,15 @@ pub enum Verdict {
         wanted: f64,
         /// Used, s.
         used: f64,
+    },
+    /// A stretch that the robot explains much worse than the rest.
+    Disturbed {
+        /// Number of the run, counted from 1.
+        run: usize,
+        /// From when to when, s.
+        time: (f64, f64),
+        /// Its residuals over those of the others.
+        ratio: f64,
     },
     /// Residuals that are not white, and too few segments to take their scatter.
     TooShort {
@@ -141,6 +152,10 @@ pub enum Verdict {
 /// Residual over noise from which on a model misses something.
 const TOO_LARGE: f64 = 1.3;
 
+/// Residuals of a segment over the usual ones from which on it stands out. Chance gives 1.2 with a
+/// hundred rows.
+const STANDS_OUT: f64 = 3.0;
+
 /// A parameter known worse than this is weak.
 const WEAK: f64 = 0.1;
 
@@ -189,6 +204,7 @@ impl Identification {
                 parameters: self.estimate.fit.reduced.indices.len(),
             });
         }
+        verdicts.extend(self.disturbed());
         let mut noise = true;
         for (output, residual) in OUTPUTS.into_iter().zip(&self.residuals) {
             if residual.normalised() > TOO_LARGE {
@@ -211,6 +227,31 @@ impl Identification {
             let normalised = self.normalised_residual();
             verdicts.push(Verdict::ResidualIsNoise { normalised });
         }
+    }
+
+    /// The worst segment, if it stands out.
+    fn disturbed(&self) -> Option<Verdict> {
+        let spread = |segment: &SegmentResidual| {
+            let residuals = segment.measured.iter().zip(&segment.simulated);
+            let squares = residuals
+                .map(|(measured, simulated)| (measured - simulated).component_div(&self.floor))
+                .flat_map(|residual| [residual[0], residual[1], residual[2]])
+                .filter(|residual| !residual.is_nan())
+                .map(|residual| residual * residual);
+            let (sum, count) = squares.fold((0.0, 0.0), |(sum, count), s| (sum + s, count + 1.0));
+            (sum / f64::max(count, 1.0)).sqrt()
+        };
+        let spreads: Vec<f64> = self.simulated.iter().map(spread).collect();
+        let usual = quantile(&mut spreads.clone(), 0.5);
+        let worst = (0..spreads.len()).max_by(|a, b| spreads[*a].total_cmp(&spreads[*b]))?;
+        let segment = &self.simulated[worst];
+        let ratio = spreads[worst] / usual;
+        let ends = segment.time.first().zip(segment.time.last())?;
+        (ratio > STANDS_OUT).then_some(Verdict::Disturbed {
+            run: segment.run + 1,
+            time: (*ends.0, *ends.1),
+            ratio,
+        })
     }
 
     fn judge_held(&self, verdicts: &mut Vec<Verdict>) {
@@ -237,6 +278,10 @@ impl Identification {
         for parameter in Parameter::ALL {
             match self.estimate.status[parameter] {
                 Status::Held => continue,
+                // Without delay, noise wants a negative one half of the time.
+                Status::AtBound
+                    if parameter == Parameter::Delay
+                        && self.estimate.values[parameter] < LONGEST_DELAY => {}
                 Status::AtBound => verdicts.push(Verdict::AtBound(parameter)),
                 Status::Found => verdicts.extend(self.judge_precision(parameter)),
             }
@@ -334,6 +379,7 @@ impl Verdict {
             | Self::Shortened { .. }
             | Self::NotJudged(_)
             | Self::TooShort { .. }
+            | Self::Disturbed { .. }
             | Self::ResidualTooLarge { .. }
             | Self::DelayAlarm { .. }
             | Self::HeldParameter { .. }
@@ -365,6 +411,12 @@ impl fmt::Display for Verdict {
                 f,
                 "the robot could not be simulated over {wanted} s, and was fitted in segments of {used} \
                  s: the model is far from the robot, or its unstable mode is very fast"
+            ),
+            Self::Disturbed { run, time, ratio } => write!(
+                f,
+                "run {run}, {:.2} s to {:.2} s: the residuals are {ratio:.1} times those of the rest. Was \
+                 the robot pushed, or did the ball slip? Leave this part of the log out",
+                time.0, time.1
             ),
             Self::TooShort {
                 segments,
@@ -417,6 +469,11 @@ impl fmt::Display for Verdict {
                  whether the other parameters stay",
                 parameter.words(),
                 parameter.unit()
+            ),
+            Self::AtBound(Parameter::Delay) => write!(
+                f,
+                "the delay is longer than the {LONGEST_DELAY} s that are looked at: are the columns \
+                 shifted against each other?"
             ),
             Self::AtBound(parameter) => write!(
                 f,

@@ -87,6 +87,24 @@ fn an_ignored_delay_raises_the_alarm() {
 }
 
 #[test]
+fn a_push_is_found_where_it_was() {
+    let laboratory = Laboratory {
+        push: Some((7.5, 0.5)),
+        ..real()
+    };
+    let found = identified(&laboratory, 3, "");
+    let when = found
+        .verdicts()
+        .into_iter()
+        .find_map(|verdict| match verdict {
+            Verdict::Disturbed { time, .. } => Some(time),
+            _ => None,
+        });
+    let (from, to) = when.unwrap();
+    assert!(from <= 7.5 && 7.5 <= to, "{from} to {to}");
+}
+
+#[test]
 fn an_ignored_tilt_offset_is_found_out() {
     let config = "[parameters]\ntilt_offset_rad = { fixed = 0.0 }";
     let found = identified(&real(), 3, config);

@@ -35,6 +35,8 @@ pub struct Laboratory {
     /// Largest torque that the motors give, N m.
     pub limit: f64,
     pub ball_angle: BallAngle,
+    /// When, and by how much the tilt rate jumps, s and rad/s.
+    pub push: Option<(f64, f64)>,
 }
 
 /// What the robot did.
@@ -68,6 +70,7 @@ pub fn healthy() -> Laboratory {
         amplitude: 1.0,
         limit: 20.0,
         ball_angle: BallAngle::Inertial,
+        push: None,
     }
 }
 
@@ -195,6 +198,11 @@ impl Laboratory {
         };
         for (row, excitation) in excitation.iter().enumerate() {
             let time = row as f64 * interval;
+            if let Some((when, rate)) = self.push
+                && (time - when).abs() < 0.5 * interval
+            {
+                x[3] += rate;
+            }
             let noise = self.noise.map(|sigma| sigma * normal(rng));
             let phi = match self.ball_angle {
                 BallAngle::Inertial => x[0],
