@@ -1,6 +1,7 @@
 //! The fit itself: from runs and choices to parameters with their covariance.
 
 use crate::coordinates::{Coordinates, LONGEST_DELAY};
+use crate::covariance::covariances;
 use crate::log::{BallAngle, Run};
 use crate::model::{Segment, SegmentedRuns};
 use crate::parameter::{Choice, Parameter, Values};
@@ -372,48 +373,4 @@ pub fn residual_noise(
         }
         (sum / f64::from(count) * lost).sqrt()
     })
-}
-
-/// The covariance of the parameters from the information, and from the scatter of the segments.
-fn covariances(
-    problem: &ShootingProblem<'_, SegmentedRuns<'_>, 4, 3>,
-    fit: &ShootingFit<4>,
-    coordinates: &Coordinates,
-) -> (DMatrix<f64>, DMatrix<f64>) {
-    let reduced = problem.reduced(&fit.parameters, &fit.initial, &fit.reduced.indices);
-    let (n, all) = (reduced.indices.len(), Parameter::ALL.len());
-    let inverse = inverse(&reduced.information);
-    let mut meat = DMatrix::zeros(n, n);
-    for score in &reduced.scores {
-        meat += score * score.transpose();
-    }
-    // What the segments' scores lose to the parameters that were fitted to them.
-    let segments = reduced.scores.len() as f64;
-    let lost = segments / (segments - n as f64).max(1.0);
-    let scatter = &inverse * meat * &inverse * lost;
-    let jacobian = coordinates.jacobian();
-    let spread = |covariance: DMatrix<f64>| {
-        let mut whole = DMatrix::zeros(all, all);
-        for (i, row) in reduced.indices.iter().enumerate() {
-            for (j, column) in reduced.indices.iter().enumerate() {
-                whole[(*row, *column)] = covariance[(i, j)];
-            }
-        }
-        &jacobian * whole * jacobian.transpose()
-    };
-    (spread(inverse), spread(scatter))
-}
-
-/// Inverse of an information matrix; infinite where it tells nothing.
-pub fn inverse(information: &DMatrix<f64>) -> DMatrix<f64> {
-    let n = information.nrows();
-    let scale = information.diagonal().map(|entry| 1.0 / entry.sqrt());
-    let scaled = DMatrix::from_fn(n, n, |i, j| information[(i, j)] * scale[i] * scale[j]);
-    match scaled.cholesky() {
-        Some(factor) => {
-            let inverse = factor.inverse();
-            DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j])
-        }
-        None => DMatrix::from_diagonal_element(n, n, f64::INFINITY),
-    }
 }

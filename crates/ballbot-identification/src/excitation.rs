@@ -1,6 +1,7 @@
 //! A torque that tells the parameters of a stabilised robot, and how well it will tell them.
 
-use crate::estimate::{Task, inverse};
+use crate::covariance::{inverse, of_parameters};
+use crate::estimate::Task;
 use crate::log::{BallAngle, Run, Torque};
 use crate::model::{LONGEST_STEP, Robot};
 use crate::parameter::{Choice, Parameter, Values};
@@ -313,14 +314,7 @@ impl ExcitationTask {
         let coordinates = model.coordinates.of(&self.robot);
         let reduced = problem.reduced(&coordinates, &initial, &indices);
         let covariance = inverse(&reduced.information);
-        let mut whole = DMatrix::zeros(Parameter::ALL.len(), Parameter::ALL.len());
-        for (i, row) in indices.iter().enumerate() {
-            for (j, column) in indices.iter().enumerate() {
-                whole[(*row, *column)] = covariance[(i, j)];
-            }
-        }
-        let jacobian = model.coordinates.jacobian();
-        let covariance = &jacobian * whole * jacobian.transpose();
+        let covariance = of_parameters(&covariance, &indices, &model.coordinates);
         Values(Parameter::ALL.map(|parameter| {
             let index = parameter.index();
             covariance[(index, index)].sqrt()

@@ -12,6 +12,7 @@ pub mod noise;
 
 mod config;
 mod coordinates;
+mod covariance;
 mod estimate;
 mod excitation;
 mod identification;

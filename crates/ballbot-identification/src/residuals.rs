@@ -152,7 +152,7 @@ pub fn score_tests(task: &Task<'_>, estimate: &Estimate) -> Vec<ScoreTest> {
             .select_rows(&indices)
             .select_columns(&indices);
         let gradient = reduced.gradient.select_rows(&indices);
-        let covariance = crate::estimate::inverse(&information);
+        let covariance = crate::covariance::inverse(&information);
         let last = indices.len() - 1;
         let change = -(covariance.row(last) * gradient)[0];
         let standard_deviation = covariance[(last, last)].sqrt();
