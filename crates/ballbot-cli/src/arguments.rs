@@ -2,16 +2,9 @@
 
 use crate::commands::{
     bench::BenchArguments, certify::CertifyArguments, completions::CompletionsArguments,
-    linearize::LinearizeArguments, lqr::LqrArguments, refine::RefineArguments,
-    reproduce::ReproduceArguments, scenario::ScenarioArguments, simulate::SimulateArguments,
-    verify::VerifyArguments,
-    bench::BenchArguments, completions::CompletionsArguments, identify::IdentifyArguments,
-    linearize::LinearizeArguments, lqr::LqrArguments, refine::RefineArguments,
-    reproduce::ReproduceArguments, scenario::ScenarioArguments, simulate::SimulateArguments,
-    bench::BenchArguments, completions::CompletionsArguments, excite::ExciteArguments,
-    identify::IdentifyArguments, linearize::LinearizeArguments, lqr::LqrArguments,
-    refine::RefineArguments, reproduce::ReproduceArguments, scenario::ScenarioArguments,
-    simulate::SimulateArguments,
+    excite::ExciteArguments, identify::IdentifyArguments, linearize::LinearizeArguments,
+    lqr::LqrArguments, refine::RefineArguments, reproduce::ReproduceArguments,
+    scenario::ScenarioArguments, simulate::SimulateArguments, verify::VerifyArguments,
 };
 use clap::{Parser, Subcommand};
 

@@ -12,5 +12,5 @@ mod lqr;
 mod nist;
 mod riccati;
 mod rk4_step;
-mod terminal;
 mod shooting;
+mod terminal;
