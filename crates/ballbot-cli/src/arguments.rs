@@ -2,9 +2,9 @@
 
 use crate::commands::{
     bench::BenchArguments, certify::CertifyArguments, completions::CompletionsArguments,
-    linearize::LinearizeArguments, lqr::LqrArguments, refine::RefineArguments,
-    reproduce::ReproduceArguments, scenario::ScenarioArguments, simulate::SimulateArguments,
-    verify::VerifyArguments,
+    excite::ExciteArguments, identify::IdentifyArguments, linearize::LinearizeArguments,
+    lqr::LqrArguments, refine::RefineArguments, reproduce::ReproduceArguments,
+    scenario::ScenarioArguments, simulate::SimulateArguments, verify::VerifyArguments,
 };
 use clap::{Parser, Subcommand};
 
@@ -40,6 +40,10 @@ pub enum Command {
     Bench(BenchArguments),
     /// List or show the built-in scenarios
     Scenario(ScenarioArguments),
+    /// Design a safe torque that tells a robot's parameters
+    Excite(ExciteArguments),
+    /// Find a robot's parameters, with error bars, from its logs
+    Identify(IdentifyArguments),
     /// Find the nonlinear model's parameters b from a linear model's parameters p
     Refine(RefineArguments),
     /// Show the linear model: A, B, poles, controllability

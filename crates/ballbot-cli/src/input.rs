@@ -1,6 +1,7 @@
 //! TOML files that are handed in.
 
 use ballbot::Ballbot;
+use ballbot_identification::ConfigError;
 use ballbot_scenario::{ParameterTable, ScenarioError};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -37,6 +38,14 @@ pub enum InputError {
         /// What would be right.
         expected: &'static str,
     },
+    /// A configuration of an identification that makes no sense.
+    #[error("{}: {source}", path.display())]
+    Identification {
+        /// The file.
+        path: PathBuf,
+        /// Key, value and what would be right.
+        source: ConfigError,
+    },
     /// Parameters that make no sense.
     #[error("{}: {source}", path.display())]
     Parameters {
@@ -47,16 +56,23 @@ pub enum InputError {
     },
 }
 
+/// The text of a file.
+///
+/// # Errors
+/// [`InputError::Read`].
+pub fn read_text(path: &Path) -> Result<String, InputError> {
+    std::fs::read_to_string(path).map_err(|source| InputError::Read {
+        path: path.to_owned(),
+        source,
+    })
+}
+
 /// The content of a TOML file.
 ///
 /// # Errors
 /// [`InputError::Read`] or [`InputError::Syntax`].
 pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, InputError> {
-    let text = std::fs::read_to_string(path).map_err(|source| InputError::Read {
-        path: path.to_owned(),
-        source,
-    })?;
-    toml::from_str(&text).map_err(|error| InputError::Syntax {
+    toml::from_str(&read_text(path)?).map_err(|error| InputError::Syntax {
         path: path.to_owned(),
         message: error.to_string(),
     })

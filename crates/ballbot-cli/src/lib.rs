@@ -5,6 +5,8 @@ pub mod benchmark;
 pub mod certificate_page;
 pub mod commands;
 pub mod figures;
+pub mod html;
+pub mod identification;
 pub mod input;
 pub mod json;
 pub mod linear_model;
@@ -31,6 +33,8 @@ pub fn run(arguments: Arguments) -> Result<String, CommandError> {
         Command::Simulate(arguments) => commands::simulate::run(&arguments),
         Command::Bench(arguments) => commands::bench::run(&arguments),
         Command::Scenario(arguments) => commands::scenario::run(&arguments),
+        Command::Excite(arguments) => commands::excite::run(&arguments),
+        Command::Identify(arguments) => commands::identify::run(&arguments),
         Command::Refine(arguments) => commands::refine::run(&arguments),
         Command::Linearize(arguments) => commands::linearize::run(&arguments),
         Command::Lqr(arguments) => commands::lqr::run(&arguments),

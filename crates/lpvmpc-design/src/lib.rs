@@ -4,6 +4,7 @@
 //! | for | use |
 //! |---|---|
 //! | parameters that make a model fit | [`levenberg_marquardt()`], [`gauss_newton`] |
+//! | parameters from measured runs | [`ShootingProblem`], [`autocorrelation`] |
 //! | a linear model of a nonlinear plant | [`linearize`], [`poles`], [`controllability_rank`] |
 //! | a gain and a terminal cost | [`lqr_continuous`], [`lqr_discrete`], [`solve_care`], [`solve_dare`] |
 //! | exact sampling of a frozen model | [`zero_order_hold`] |
@@ -53,7 +54,9 @@ mod lqr;
 mod matrix_check;
 mod modes;
 mod offset_free;
+mod residual_tests;
 mod riccati;
+mod shooting;
 mod stability;
 mod terminal;
 
@@ -71,7 +74,12 @@ pub use lqr::{Lqr, lqr_continuous, lqr_discrete};
 pub use matrix_check::MatrixError;
 pub use modes::{controllability_rank, poles};
 pub use offset_free::{OffsetFreeError, check_offset_free};
+pub use residual_tests::{Correlation, NORMAL_95, autocorrelation, cross_correlation};
 pub use riccati::{LqProblem, RiccatiError, RiccatiSolution, solve_care, solve_dare};
+pub use shooting::{
+    Prior, Reduced, ShootingError, ShootingFit, ShootingModel, ShootingProblem, ShootingSettings,
+    ShootingTermination, Unknown,
+};
 pub use stability::{
     FrozenError, FrozenStability, Rk4Step, Rk4StepError, SchedulingGrid, check_rk4_step,
     frozen_stability,

@@ -3,6 +3,8 @@
 pub mod bench;
 pub mod certify;
 pub mod completions;
+pub mod excite;
+pub mod identify;
 pub mod linearize;
 pub mod lqr;
 pub mod model;
@@ -17,6 +19,7 @@ use crate::input::InputError;
 use crate::output::FileError;
 use crate::refinement::RefinementError;
 use crate::regulator::RegulatorError;
+use ballbot_identification::{EstimateError, ExcitationError, log::LogError};
 use ballbot_scenario::ScenarioError;
 use lpvmpc_design::{CertifyError, ClaimError, DocumentError, MatrixError};
 use lpvmpc_sim::PlantError;
@@ -61,6 +64,15 @@ pub enum CommandError {
     /// A certificate that cannot be read, or was changed.
     #[error(transparent)]
     Certificate(#[from] DocumentError),
+    /// A log that cannot be used.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A log that no robot could be found from.
+    #[error(transparent)]
+    Estimate(#[from] EstimateError),
+    /// An excitation that cannot be.
+    #[error(transparent)]
+    Excitation(#[from] ExcitationError),
     /// A run that ended before its time.
     #[error(
         "the {what} ended early, {ending}\nat phi = {:.4} rad, theta = {:.4} rad, phi_dot = {:.4} \

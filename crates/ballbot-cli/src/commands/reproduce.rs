@@ -2,10 +2,10 @@
 
 use super::CommandError;
 use super::simulate::PNG_SCALE;
+use crate::html::Drawing;
 use crate::output;
 use crate::recording;
 use crate::reproduction::claims::{self, Claim};
-use crate::reproduction::drawings::Drawing;
 use crate::reproduction::tables::Sheet;
 use crate::reproduction::{Reproduction, report};
 use clap::Args;

@@ -1,19 +1,9 @@
 //! The figures of the paper.
 
 use super::Reproduction;
-use crate::figures::{Figure, ModelRuns, Role, convergence, models};
+use crate::figures::{ModelRuns, Role, convergence, models};
+use crate::html::Drawing;
 use crate::pictures::{self, Shown};
-
-/// A figure with its file name and caption.
-#[derive(Debug)]
-pub struct Drawing {
-    /// File name without extension.
-    pub name: &'static str,
-    /// One or two sentences under it.
-    pub caption: String,
-    /// The figure.
-    pub figure: Figure,
-}
 
 impl Reproduction {
     /// All figures, in the order of the paper.

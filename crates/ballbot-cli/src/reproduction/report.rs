@@ -2,9 +2,9 @@
 
 use super::Reproduction;
 use super::claims::Claim;
-use super::drawings::Drawing;
 use super::tables::Sheet;
 use crate::figures::FigureError;
+use crate::html::{self, Drawing, escape};
 use ballbot::{Ballbot, LinearParameters};
 
 /// The report's text.
@@ -19,15 +19,7 @@ pub fn html(
     machine: &str,
 ) -> Result<String, FigureError> {
     let agreeing = claims.iter().filter(|claim| claim.agrees()).count();
-    let mut figures = String::new();
-    for drawing in drawings {
-        figures += &format!(
-            "<figure id=\"{}\">{}<figcaption>{}</figcaption></figure>\n",
-            drawing.name,
-            drawing.figure.svg()?,
-            escape(&drawing.caption)
-        );
-    }
+    let figures = html::figures(drawings)?;
     let (claims_sheet, others) = match sheets.split_first() {
         Some((first, others)) => (table(first), others),
         None => (String::new(), sheets),
@@ -36,12 +28,8 @@ pub fn html(
         .iter()
         .map(|sheet| format!("<h3>{}</h3>\n{}", escape(sheet.title), table(sheet)))
         .collect();
-    Ok(format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>The ballbot paper, reproduced</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
-         <main>\n<h1>The ballbot paper, reproduced</h1>\n\
-         <p>D. S. Karachalios and H. S. Abbas, <cite>Parameter Refinement of a Ballbot and \
+    let body = format!(
+        "<p>D. S. Karachalios and H. S. Abbas, <cite>Parameter Refinement of a Ballbot and \
          Predictive Control for Reference Tracking with Linear Parameter-Varying Embedding</cite>. \
          Every number below was computed by this program; <strong>{agreeing} of {} published \
          statements agree</strong> within their stated tolerance. Times were taken on {} with {}.\
@@ -50,55 +38,18 @@ pub fn html(
          <h2>Figures</h2>\n{figures}\n\
          <h2>Tables</h2>\n{tables}\n\
          <h2>Differences from the paper</h2>\n{}\n\
-         <h2>What b* means physically</h2>\n{}\n\
-         </main>\n</body>\n</html>\n",
+         <h2>What b* means physically</h2>\n{}\n",
         claims.len(),
         escape(machine),
         concat!("ballbot ", env!("CARGO_PKG_VERSION")),
         differences(reproduction),
         verdict(reproduction),
-    ))
-}
-
-const STYLE: &str = "
-:root { color-scheme: light; }
-body { margin: 0; font: 16px/1.5 system-ui, sans-serif; color: #1b1f24; background: #fff; }
-main { max-width: 60rem; margin: 0 auto; padding: 1.5rem 1rem 4rem; }
-h1 { font-size: 1.9rem; line-height: 1.2; } h2 { margin-top: 2.5rem; border-bottom: 1px solid #d0d7de; }
-figure { margin: 2rem 0; } figure svg { width: 100%; height: auto; }
-figcaption { font-size: .92rem; color: #444c56; }
-.scroll { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .88rem; font-variant-numeric: tabular-nums; }
-th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #e4e8ec; white-space: nowrap; }
-th:first-child, td:first-child { text-align: left; white-space: normal; min-width: 7rem; }
-th { border-bottom: 2px solid #8c959f; white-space: normal; vertical-align: bottom; }
-.differs { color: #b3261e; font-weight: 600; } .agrees { color: #1a7f37; }
-pre { white-space: pre-wrap; background: #f6f8fa; padding: .8rem 1rem; border-radius: 6px; }
-";
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
+    );
+    Ok(html::page("The ballbot paper, reproduced", &body))
 }
 
 fn table(sheet: &Sheet) -> String {
-    let line = |cells: &[String], tag: &str| {
-        let cells = cells.iter().map(|cell| {
-            let class = match cell.as_str() {
-                "agrees" => " class=\"agrees\"",
-                "DIFFERS" => " class=\"differs\"",
-                _ => "",
-            };
-            format!("<{tag}{class}>{}</{tag}>", escape(cell))
-        });
-        format!("<tr>{}</tr>\n", cells.collect::<String>())
-    };
-    let rows: String = sheet.rows.iter().map(|row| line(row, "td")).collect();
-    format!(
-        "<div class=\"scroll\"><table>\n<thead>{}</thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n",
-        line(&sheet.headers, "th")
-    )
+    html::table(&sheet.headers, &sheet.rows)
 }
 
 /// The paper's slips, and what is done instead.

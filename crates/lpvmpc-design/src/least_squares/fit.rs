@@ -18,6 +18,10 @@ pub struct Fit {
     pub residual_norm: f64,
     /// dF/db at b, m x n, without weights.
     pub jacobian: DMatrix<f64>,
+    /// Covariance of the parameters, n x n: ||W F||^2 / (m - n) (J'W^2 J)^-1, for independent errors
+    /// whose standard deviations are in proportion to 1/w_i. `None` without spare equations (m = n),
+    /// or where the Jacobian is rank deficient.
+    pub covariance: Option<DMatrix<f64>>,
     /// Every accepted iterate; the first is the start, the last is `parameters`.
     pub history: Vec<Iteration>,
     /// Why the iteration ended.
@@ -171,6 +175,7 @@ impl Fit {
         Self {
             residual: weighted.model.residual(&point.b),
             jacobian: weighted.model.jacobian(&point.b),
+            covariance: covariance(point),
             residual_norm: point.residual.norm(),
             parameters: point.b.clone(),
             history,
@@ -190,6 +195,21 @@ impl Iteration {
                 .map_or(0.0, |previous| (b - &previous.parameters).norm()),
         }
     }
+}
+
+/// See [`Fit::covariance`].
+fn covariance(point: &Point) -> Option<DMatrix<f64>> {
+    let (m, n) = point.jacobian.shape();
+    let scaled = ScaledJacobian::new(&point.jacobian)?;
+    if m == n || scaled.deficiency.is_some() {
+        return None;
+    }
+    let v = scaled.svd.v_t?.transpose();
+    // J = U S V' D with D the column norms, so (J'J)^-1 = (D^-1 V S^-1)(D^-1 V S^-1)'.
+    let root = DMatrix::from_fn(n, n, |row, column| {
+        v[(row, column)] / (scaled.svd.singular_values[column] * scaled.column_norms[row])
+    });
+    Some(&root * root.transpose() * (point.residual.norm_squared() / (m - n) as f64))
 }
 
 /// The Jacobian of a point with its columns scaled to length one, decomposed.

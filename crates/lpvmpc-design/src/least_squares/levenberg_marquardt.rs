@@ -8,6 +8,10 @@ use nalgebra::{DMatrix, DVector, Dyn, storage::Owned};
 use super::fit::{Evaluated, Fit, Iteration, ScaledJacobian, Termination};
 use super::{LeastSquaresError, LeastSquaresSettings, NoPoint, Point, ResidualModel, Weighted};
 
+/// The first step is at most this many times ||D b||, D the column norms of W J. MINPACK's usual 100
+/// lets it jump to where the residual is flat (NIST's BoxBOD from its first start).
+const FIRST_STEP: f64 = 1.0;
+
 /// Levenberg-Marquardt from `start`: Gauss-Newton steps shortened to a trust region, so that every
 /// accepted iterate lowers the weighted residual (Moré 1978).
 ///
@@ -38,6 +42,7 @@ pub fn levenberg_marquardt<M: ResidualModel>(
         .with_ftol(settings.reduction_tolerance)
         .with_gtol(settings.orthogonality_tolerance)
         .with_patience(settings.max_iterations)
+        .with_stepbound(FIRST_STEP)
         .minimize(problem);
     let b = problem.b;
     let mut progress = problem.progress.into_inner();

@@ -12,4 +12,5 @@ mod lqr;
 mod nist;
 mod riccati;
 mod rk4_step;
+mod shooting;
 mod terminal;

@@ -1,0 +1,202 @@
+//! `ballbot excite`.
+
+use super::CommandError;
+use super::identify::configuration;
+use crate::arguments::{finite, positive};
+use crate::input::{self, InputError};
+use crate::output;
+use crate::table::{Table, number};
+use ballbot_identification::{Config, Excitation, ExcitationTask, Parameter, Values};
+use clap::Args;
+use nalgebra::{Vector3, Vector4};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `ballbot excite`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  ballbot excite --config my-robot.toml                     from masses, priors or starts
+  ballbot excite --robot out/identification/parameters.toml from an identification
+  ballbot excite --amplitude 2 --tilt-limit 8 --gain=-0.5,-12,-0.6,-2.5
+
+Add the torque to that of the loop that holds the robot, log, and identify. Without --gain the loop
+is an LQR of the expected robot. Gains are for u = -K x, x = (phi, theta, phi_dot, theta_dot).")]
+pub struct ExciteArguments {
+    /// What the robot is expected to be, lengths, noise [default: the paper's lengths]
+    #[arg(long, value_name = "FILE.toml")]
+    pub config: Option<PathBuf>,
+    /// Parameters from `ballbot identify`, in place of what the configuration expects
+    #[arg(long, value_name = "parameters.toml")]
+    pub robot: Option<PathBuf>,
+    /// Lowest and highest frequency, Hz
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 2, value_parser = positive, default_values_t = [0.2, 6.0])]
+    pub band: Vec<f64>,
+    /// Number of harmonics
+    #[arg(long, default_value_t = 15)]
+    pub harmonics: usize,
+    /// Largest torque of the excitation, N m
+    #[arg(long, value_parser = positive, default_value_t = 1.0)]
+    pub amplitude: f64,
+    /// Length, s
+    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 20.0)]
+    pub length: f64,
+    /// Largest tilt, degrees; the torque is made smaller until it is kept
+    #[arg(long, value_name = "DEGREES", value_parser = positive, default_value_t = 10.0)]
+    pub tilt_limit: f64,
+    /// Rows per second of loop and log
+    #[arg(long, value_name = "HZ", value_parser = positive, default_value_t = 200.0)]
+    pub rate: f64,
+    /// Gains of your loop, N m per rad and per rad/s
+    #[arg(long, value_delimiter = ',', num_args = 4, value_parser = finite, allow_negative_numbers = true, value_name = "K1,K2,K3,K4")]
+    pub gain: Option<Vec<f64>>,
+    /// Where the torque is written
+    #[arg(long, value_name = "FILE.csv", default_value = "out/excitation.csv")]
+    pub out: PathBuf,
+}
+
+/// The noise of an ordinary inertial unit and encoder, where the configuration does not know it:
+/// ball angle and tilt, rad, and rate, rad/s.
+const ORDINARY_NOISE: [f64; 3] = [1e-3, 1e-3, 5e-3];
+
+/// Designs, predicts and writes.
+///
+/// # Errors
+/// A file cannot be used or written, or there is no such excitation.
+pub fn run(arguments: &ExciteArguments) -> Result<String, CommandError> {
+    let config = configuration(arguments.config.as_deref())?;
+    let task = task(arguments, &config)?;
+    let excitation = task.design()?;
+    let csv = csv(&excitation);
+    output::write_files(&[(&arguments.out, csv.as_bytes())])?;
+    Ok(report(&task, &excitation, &arguments.out))
+}
+
+fn task(arguments: &ExciteArguments, config: &Config) -> Result<ExcitationTask, CommandError> {
+    let choices = config
+        .choices()
+        .map_err(|source| InputError::Identification {
+            path: arguments.config.clone().unwrap_or_default(),
+            source,
+        })?;
+    let geometry = config.geometry();
+    let mut robot = Values::expected(&choices, &geometry);
+    if let Some(path) = &arguments.robot {
+        let file: IdentifiedFile = input::read_toml(path)?;
+        for (key, entry) in file.identification.parameters {
+            if let (Some(parameter), Some(value)) = (Parameter::from_key(&key), entry.value) {
+                robot[parameter] = value;
+            }
+        }
+    }
+    let noise = config.noise();
+    let pair = |values: &[f64]| (values[0], values[1]);
+    Ok(ExcitationTask {
+        robot,
+        geometry,
+        choices,
+        band: pair(&arguments.band),
+        harmonics: arguments.harmonics,
+        amplitude: arguments.amplitude,
+        duration: arguments.length,
+        tilt_limit: arguments.tilt_limit.to_radians(),
+        rate: arguments.rate,
+        noise: Vector3::from_fn(|i, _| noise[i].unwrap_or(ORDINARY_NOISE[i])),
+        gain: arguments.gain.as_deref().map(Vector4::from_column_slice),
+        segment: config.fit.segment_s,
+    })
+}
+
+/// What of `parameters.toml` is needed.
+#[derive(Deserialize)]
+struct IdentifiedFile {
+    identification: Identified,
+}
+
+#[derive(Deserialize)]
+struct Identified {
+    #[serde(flatten)]
+    parameters: BTreeMap<String, Entry>,
+}
+
+/// A parameter; the covariance has no value.
+#[derive(Deserialize)]
+struct Entry {
+    value: Option<f64>,
+}
+
+fn csv(excitation: &Excitation) -> String {
+    let mut text = "t_s,torque_excitation_nm\n".to_owned();
+    for (time, torque) in excitation.time.iter().zip(&excitation.torque) {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{time},{torque}");
+    }
+    text
+}
+
+fn report(task: &ExcitationTask, excitation: &Excitation, out: &Path) -> String {
+    let mut text = String::new();
+    let frequencies = &excitation.frequencies;
+    let ends = [frequencies.first(), frequencies.last()].map(|end| end.copied().unwrap_or(0.0));
+    let gain: Vec<String> = excitation.gain.iter().map(|k| number(*k)).collect();
+    let _ = writeln!(
+        text,
+        "{} harmonics from {:.2} Hz to {:.2} Hz, {} s, at most {:.3} N m{}\n\
+         expected in the loop u = -K x, K = ({}): tilt at most {:.2} deg, torque at most {:.2} N m, \
+         travel at most {:.2} m\n",
+        frequencies.len(),
+        ends[0],
+        ends[1],
+        task.duration,
+        excitation.amplitude,
+        if excitation.amplitude < task.amplitude {
+            " (less than asked for: the tilt limits it)"
+        } else {
+            ""
+        },
+        gain.join(", "),
+        excitation.tilt.to_degrees(),
+        excitation.total_torque,
+        excitation.travel,
+    );
+    let mut table = Table::new([
+        "parameter",
+        "expected value",
+        "expected std. dev.",
+        "relative",
+        "unit",
+    ]);
+    for parameter in Parameter::ALL {
+        if !task.choices[parameter].is_free() {
+            continue;
+        }
+        let (value, deviation) = (
+            task.robot[parameter],
+            excitation.standard_deviations[parameter],
+        );
+        let relative = 100.0 * (deviation / value).abs();
+        table.row([
+            parameter.key().to_owned(),
+            format!("{value:.5}"),
+            format!("{deviation:.2e}"),
+            if relative.is_finite() {
+                format!("{relative:.1} %")
+            } else {
+                String::new()
+            },
+            parameter.unit().to_owned(),
+        ]);
+    }
+    let _ = writeln!(
+        text,
+        "What the log will tell (Cramer-Rao bound for noise of {:e} rad, {:e} rad, {:e} rad/s; a model \
+         that is right)\n{table}\nwritten to {}",
+        task.noise[0],
+        task.noise[1],
+        task.noise[2],
+        out.display()
+    );
+    text
+}

@@ -1,0 +1,143 @@
+//! `ballbot identify`.
+
+use super::CommandError;
+use super::simulate::PNG_SCALE;
+use crate::html::Drawing;
+use crate::identification::{drawings, published, report, summary};
+use crate::input::{self, InputError};
+use crate::output;
+use crate::progress::Progress;
+use ballbot_identification::{Config, Identification, identify, log};
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `ballbot identify`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  ballbot identify log.csv                       a log in the format of `ballbot simulate --log`
+  ballbot identify --example > my-robot.toml     columns, units, lengths, priors: a file to edit
+  ballbot identify a.csv b.csv --config my-robot.toml --out results
+
+Several logs are runs of one plane of one robot. Writes parameters.toml (for `ballbot lqr
+--parameters` and for scenario files), report.html and the figures as SVG and PNG.")]
+pub struct IdentifyArguments {
+    /// CSV files with a header
+    #[arg(value_name = "LOG.csv", required_unless_present = "example")]
+    pub logs: Vec<PathBuf>,
+    /// Columns, units, lengths, priors [default: the paper's lengths]
+    #[arg(long, value_name = "FILE.toml")]
+    pub config: Option<PathBuf>,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/identification")]
+    pub out: PathBuf,
+    /// Do not impose mechanics: see what the data say alone
+    #[arg(long)]
+    pub unphysical: bool,
+    /// Show the published chain, too: p by linear regression, b by refinement
+    #[arg(long)]
+    pub published: bool,
+    /// Print a commented configuration and stop
+    #[arg(long, conflicts_with_all = ["logs", "config", "unphysical", "published"])]
+    pub example: bool,
+}
+
+/// Reads, fits, judges and writes.
+///
+/// # Errors
+/// A file cannot be used or written, or no robot explains the logs.
+pub fn run(arguments: &IdentifyArguments) -> Result<String, CommandError> {
+    if arguments.example {
+        return Ok(Config::EXAMPLE.to_owned());
+    }
+    let mut config = configuration(arguments.config.as_deref())?;
+    config.fit.physical &= !arguments.unphysical;
+    let logs = arguments
+        .logs
+        .iter()
+        .map(|path| log::read(path, &config.log));
+    let logs = logs.collect::<Result<Vec<_>, _>>()?;
+    let choices = config
+        .choices()
+        .map_err(|error| InputError::Identification {
+            path: arguments.config.clone().unwrap_or_default(),
+            source: error,
+        })?;
+    let progress = Progress::new("fitting", EXPECTED_STEPS);
+    let step = std::cell::Cell::new(0);
+    let identification = identify(logs, &config, choices, &|_| {
+        step.set(step.get() + 1);
+        progress.set(step.get().min(EXPECTED_STEPS - 1));
+    })?;
+    drop(progress);
+    let drawings = drawings::drawings(&identification);
+    write(&arguments.out, &identification, &drawings)?;
+    let lengths = match arguments.config {
+        Some(_) => "",
+        None => {
+            "without --config the lengths are those of the paper's robot; if yours differ, nothing \
+             below holds\n"
+        }
+    };
+    let chain = if arguments.published {
+        format!(
+            "\nThe published chain, to compare with\n{}{}\n",
+            published::linear_parameters(&identification).on_screen(),
+            published::refined(&identification)
+        )
+    } else {
+        String::new()
+    };
+    Ok(format!(
+        "{lengths}{}{chain}\nwritten to {}: parameters.toml, report.html, figures\n",
+        summary::text(&identification),
+        arguments.out.display()
+    ))
+}
+
+/// Steps of a usual identification: coarse fits of three starts, the fit with its noise, four
+/// structures.
+const EXPECTED_STEPS: usize = 60;
+
+/// The configuration in a file; the defaults without one.
+///
+/// # Errors
+/// The file cannot be read or makes no sense.
+pub fn configuration(path: Option<&Path>) -> Result<Config, InputError> {
+    let Some(path) = path else {
+        return Ok(Config::default());
+    };
+    Config::parse(&input::read_text(path)?).map_err(|source| InputError::Identification {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+fn write(
+    folder: &Path,
+    identification: &Identification,
+    drawings: &[Drawing],
+) -> Result<(), CommandError> {
+    let mut files: Vec<(PathBuf, Vec<u8>)> = vec![
+        (
+            folder.join("parameters.toml"),
+            identification.parameter_file().into_bytes(),
+        ),
+        (
+            folder.join("report.html"),
+            report::html(identification, drawings)?.into_bytes(),
+        ),
+    ];
+    for drawing in drawings {
+        let path = folder.join("figures").join(drawing.name);
+        let svg = drawing.figure.svg()?.into_bytes();
+        files.push((path.with_extension("svg"), svg));
+        files.push((path.with_extension("png"), drawing.figure.png(PNG_SCALE)?));
+    }
+    let files: Vec<(&Path, &[u8])> = files
+        .iter()
+        .map(|(path, content)| (path.as_path(), content.as_slice()))
+        .collect();
+    output::write_files(&files)?;
+    Ok(())
+}

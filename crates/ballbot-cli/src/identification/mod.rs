@@ -1,0 +1,7 @@
+//! What `ballbot identify` shows of an identification: tables, figures, report, words.
+
+pub mod drawings;
+pub mod published;
+pub mod report;
+pub mod summary;
+pub mod tables;

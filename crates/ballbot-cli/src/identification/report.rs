@@ -1,0 +1,90 @@
+//! The report of an identification: one self-contained HTML file.
+
+use super::published;
+use super::summary::mark;
+use super::tables::{self, Sheet};
+use crate::figures::FigureError;
+use crate::html::{self, Drawing, escape};
+use ballbot_identification::{Identification, Weight};
+
+/// The report's text.
+///
+/// # Errors
+/// A figure cannot be drawn.
+pub fn html(identification: &Identification, drawings: &[Drawing]) -> Result<String, FigureError> {
+    let (fitted, held_back) = identification.times;
+    let logs: String = identification
+        .findings
+        .iter()
+        .map(|(name, findings)| {
+            let findings = findings.iter().map(|finding| escape(&finding.to_string()));
+            let mut findings: Vec<String> = findings.collect();
+            if findings.is_empty() {
+                findings.push("nothing odd".to_owned());
+            }
+            format!("<li>{}: {}</li>\n", escape(name), findings.join("; "))
+        })
+        .collect();
+    let body = format!(
+        "<p>{fitted:.1} s of the log were fitted, {held_back:.1} s held back to judge the fit. \
+         {} of {} values.</p>\n\
+         <h2>Verdict</h2>\n{}\n<h2>Parameters</h2>\n{}\n<p>{}</p>\n\
+         <h2>Logs</h2>\n<ul>\n{logs}</ul>\n<h2>Figures</h2>\n{}\n\
+         <h2>Poles at the upright position</h2>\n{}\n<h2>Residuals</h2>\n{}\n\
+         <h2>Structures of friction</h2>\n{}\n<h2>Correlations of the parameters</h2>\n{}\n\
+         <h2>The published chain, to compare with</h2>\n{}\n<pre>{}</pre>\n",
+        mechanics(identification),
+        identification.estimate.fit.values,
+        verdicts(identification),
+        table(&tables::parameters(identification)),
+        intervals(identification),
+        html::figures(drawings)?,
+        table(&tables::poles(identification)),
+        table(&tables::residuals(identification)),
+        table(&tables::structures(identification)),
+        table(&tables::correlations(identification)),
+        table(&published::linear_parameters(identification)),
+        escape(&published::refined(identification)),
+    );
+    Ok(html::page("A ballbot, identified", &body))
+}
+
+fn mechanics(identification: &Identification) -> &'static str {
+    if identification.physical {
+        "A positive mass matrix and dissipating friction were imposed; the fit is to"
+    } else {
+        "Mechanics was not imposed; the fit is to"
+    }
+}
+
+fn intervals(identification: &Identification) -> &'static str {
+    if identification.has_few_segments() || identification.is_white() {
+        "The intervals are those of white residuals."
+    } else {
+        "The residuals are not white, so the intervals are taken from the scatter of the segments."
+    }
+}
+
+fn verdicts(identification: &Identification) -> String {
+    let items = identification.verdicts();
+    let items = items.iter().map(|verdict| {
+        let class = match verdict.weight() {
+            Weight::Good => "agrees",
+            Weight::Note => "",
+            Weight::Warning => "differs",
+        };
+        format!(
+            "<li><span class=\"{class}\">{}</span> {}</li>\n",
+            mark(verdict.weight()),
+            escape(&verdict.to_string()).replace('\n', "<br>")
+        )
+    });
+    format!("<ul>\n{}</ul>", items.collect::<String>())
+}
+
+fn table(sheet: &Sheet) -> String {
+    if sheet.rows.is_empty() {
+        return "<p>None.</p>".to_owned();
+    }
+    html::table(&sheet.headers, &sheet.rows)
+}

@@ -1,0 +1,167 @@
+//! The tables of an identification, for the screen and for the report.
+
+use crate::table::{Table, complex};
+use ballbot_identification::{HORIZONS, Identification, OUTPUTS, Parameter, Status};
+use lpvmpc_design::NORMAL_95;
+
+/// A table of texts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sheet {
+    /// Column headers, with units.
+    pub headers: Vec<String>,
+    /// Rows of cells.
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Sheet {
+    pub(super) fn new(headers: &[&str]) -> Self {
+        Self {
+            headers: headers.iter().map(|header| (*header).to_owned()).collect(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// For the screen.
+    pub fn on_screen(&self) -> Table {
+        let mut table = Table::new(self.headers.clone());
+        for row in &self.rows {
+            table.row(row.clone());
+        }
+        table
+    }
+}
+
+/// A value with as many digits as its standard deviation leaves it.
+fn rounded(value: f64, deviation: f64) -> String {
+    if !(deviation > 0.0 && deviation.is_finite()) {
+        return format!("{value}");
+    }
+    let decimals = (1.0 - deviation.log10().floor()).clamp(0.0, 12.0) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// The parameters with standard deviations and 95 % intervals.
+pub fn parameters(identification: &Identification) -> Sheet {
+    let mut sheet = Sheet::new(&[
+        "parameter",
+        "value",
+        "std. dev.",
+        "95 % interval",
+        "unit",
+        "",
+    ]);
+    for parameter in Parameter::ALL {
+        let value = identification.estimate.values[parameter];
+        let deviation = identification.standard_deviation(parameter);
+        let status = identification.estimate.status[parameter];
+        let (least, most) = identification.interval(parameter);
+        let (deviation_text, interval) = match status {
+            Status::Found => (
+                rounded(deviation, deviation),
+                format!(
+                    "{} to {}",
+                    rounded(least, deviation),
+                    rounded(most, deviation)
+                ),
+            ),
+            Status::Held | Status::AtBound => (String::new(), String::new()),
+        };
+        sheet.rows.push(vec![
+            parameter.key().to_owned(),
+            rounded(value, deviation),
+            deviation_text,
+            interval,
+            parameter.unit().to_owned(),
+            match status {
+                Status::Held => "held",
+                Status::Found => "",
+                Status::AtBound => "at its bound",
+            }
+            .to_owned(),
+        ]);
+    }
+    sheet
+}
+
+/// The poles with 95 % intervals.
+pub fn poles(identification: &Identification) -> Sheet {
+    let mut sheet = Sheet::new(&["pole [1/s]", "real part +-", "imaginary part +-"]);
+    for pole in &identification.poles {
+        let (re, im) = pole.standard_deviation;
+        sheet.rows.push(vec![
+            complex(pole.value),
+            format!("{:.3}", NORMAL_95 * re),
+            format!("{:.3}", NORMAL_95 * im),
+        ]);
+    }
+    sheet
+}
+
+/// Correlations of the parameters that were found.
+pub fn correlations(identification: &Identification) -> Sheet {
+    let found: Vec<Parameter> = Parameter::ALL
+        .into_iter()
+        .filter(|parameter| identification.estimate.status[*parameter] == Status::Found)
+        .collect();
+    let keys = found.iter().map(|parameter| parameter.key());
+    let headers: Vec<&str> = std::iter::once("").chain(keys).collect();
+    let mut sheet = Sheet::new(&headers);
+    for row in &found {
+        let entries = found
+            .iter()
+            .map(|column| format!("{:.2}", identification.correlation(*row, *column)));
+        let row = std::iter::once(row.key().to_owned()).chain(entries);
+        sheet.rows.push(row.collect());
+    }
+    sheet
+}
+
+/// The residuals against the noise of the sensors.
+pub fn residuals(identification: &Identification) -> Sheet {
+    let mut sheet = Sheet::new(&[
+        "output",
+        "residual (rms)",
+        "noise of the sensor",
+        "ratio",
+        "autocorrelation beyond its bound",
+        "largest, at lag",
+        "white",
+    ]);
+    for (output, residual) in OUTPUTS.iter().zip(&identification.residuals) {
+        let (lag, largest) = residual.autocorrelation.largest();
+        sheet.rows.push(vec![
+            (*output).to_owned(),
+            format!("{:.3e}", residual.spread),
+            format!("{:.3e}", residual.floor),
+            format!("{:.2}", residual.normalised()),
+            format!("{:.0} %", 100.0 * residual.autocorrelation.exceeding()),
+            format!("{largest:.3}, {lag}"),
+            if residual.is_white() { "yes" } else { "no" }.to_owned(),
+        ]);
+    }
+    sheet
+}
+
+/// Structures of friction on held-back data.
+pub fn structures(identification: &Identification) -> Sheet {
+    let mut headers = vec![
+        "friction".to_owned(),
+        "chi^2, fitted".to_owned(),
+        "chi^2, held back".to_owned(),
+    ];
+    headers.extend(HORIZONS.map(|horizon| format!("tilt error over {horizon} s [mrad]")));
+    let rows = identification.structures.iter().map(|compared| {
+        let mut row = vec![
+            compared.structure.words().to_owned(),
+            format!("{:.3}", compared.fitted_chi_square),
+            format!("{:.3}", compared.validation.chi_square),
+        ];
+        let errors = compared.validation.errors.iter();
+        row.extend(errors.map(|error| format!("{:.2}", 1e3 * error[1])));
+        row
+    });
+    Sheet {
+        headers,
+        rows: rows.collect(),
+    }
+}

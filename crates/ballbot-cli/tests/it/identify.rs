@@ -1,0 +1,196 @@
+//! `ballbot identify` and `ballbot excite`.
+
+use crate::{assert_says, failure, json, numbers, text};
+use ballbot_identification::log::BallAngle;
+use ballbot_identification::{ExcitationTask, Parameter, Robot, Values};
+use nalgebra::{Vector3, Vector4};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// A robot with a delay of two rows and a tilt offset.
+fn robot() -> ExcitationTask {
+    let mut robot = Values([0.0; Parameter::ALL.len()]);
+    for (parameter, value) in [
+        (Parameter::B1, 0.0387),
+        (Parameter::B2, 0.02),
+        (Parameter::B3, 0.1487),
+        (Parameter::RollingFriction, 0.01),
+        (Parameter::DriveFriction, 0.03),
+        (Parameter::TorqueGain, 0.1),
+        (Parameter::Delay, 0.01),
+        (Parameter::TiltOffset, 0.01),
+    ] {
+        robot[parameter] = value;
+    }
+    ExcitationTask {
+        robot,
+        geometry: ballbot::Geometry::paper(),
+        choices: Values::usual(),
+        band: (0.2, 6.0),
+        harmonics: 15,
+        amplitude: 2.0,
+        duration: 12.0,
+        tilt_limit: 0.3,
+        rate: 200.0,
+        noise: Vector3::new(1e-3, 1e-3, 5e-3),
+        gain: None,
+        segment: 1.0,
+    }
+}
+
+/// A log of that robot, its noise even and of the same variance as a normal one.
+fn log() -> String {
+    let task = robot();
+    let excitation = task.design().unwrap();
+    let robot = Robot::new(task.robot, task.geometry);
+    let mut rng = fastrand::Rng::with_seed(7);
+    let mut even = || 12.0_f64.sqrt() * (rng.f64() - 0.5);
+    let mut text = "t_s,phi_rad,theta_rad,theta_dot_rad_s,torque_commanded_nm\n".to_owned();
+    let (mut x, mut torques) = (Vector4::zeros(), vec![0.0; 2]);
+    for (time, added) in excitation.time.iter().zip(&excitation.torque) {
+        let noise = task.noise.map(|deviation| deviation * even());
+        let outputs = robot.outputs(&x, BallAngle::Inertial) + noise;
+        let torque = added - excitation.gain.dot(&x);
+        let [phi, theta, rate] = outputs.into();
+        writeln!(text, "{time},{phi},{theta},{rate},{torque}").unwrap();
+        torques.push(torque);
+        for _ in 0..5 {
+            x = robot.step(&x, torques[torques.len() - 3], 1e-3);
+        }
+    }
+    text
+}
+
+fn name(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+#[test]
+fn a_log_becomes_parameters_a_report_and_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let (log_file, out) = (folder.path().join("log.csv"), folder.path().join("out"));
+    std::fs::write(&log_file, log()).unwrap();
+    let summary = text(&[
+        "identify",
+        name(&log_file),
+        "--out",
+        name(&out),
+        "--published",
+    ]);
+    assert_says(
+        &summary,
+        &[
+            "the lengths are those of the paper's robot",
+            "b1_m2",
+            "95 % interval",
+            "good: a rigid ballbot can have these parameters",
+            "The published chain",
+        ],
+    );
+    assert!(!summary.contains("WARNING"), "{summary}");
+
+    let parameters = out.join("parameters.toml");
+    let table: toml::Table = std::fs::read_to_string(&parameters)
+        .unwrap()
+        .parse()
+        .unwrap();
+    let b1 = table["parameters"]["b1_m2"].as_float().unwrap();
+    assert!((b1 / 0.0387 - 1.0).abs() < 0.03, "{b1}");
+    let delay = table["identification"]["delay_s"]["value"]
+        .as_float()
+        .unwrap();
+    assert!((delay - 0.01).abs() < 1e-3, "{delay}");
+    let covariance = table["identification"]["covariance"]["matrix"]
+        .as_array()
+        .unwrap();
+    let deviation = table["identification"]["b1_m2"]["standard_deviation"]
+        .as_float()
+        .unwrap();
+    let variance = covariance[0][0].as_float().unwrap();
+    assert!((variance.sqrt() / deviation - 1.0).abs() < 1e-9);
+
+    // Other commands take it. Its torque is in N m: p4 = b1 l g / d, p6 = (k - b1) r_b / (r_w d) / m.
+    let model = json(&["linearize", "--json", "--parameters", name(&parameters)]);
+    let b = model["b"].as_array().unwrap();
+    let p6 = numbers(&b[3])[0];
+    let k: f64 = 0.02 - 0.2978 * 0.12;
+    let d = 0.0387 * 0.1487 - k * k;
+    let expected = (k - 0.0387) * 0.12 / (0.05 * d) * 0.1;
+    assert!((p6 / expected - 1.0).abs() < 0.05, "{p6} for {expected}");
+
+    let report = std::fs::read_to_string(out.join("report.html")).unwrap();
+    for part in [
+        "Verdict",
+        "<svg",
+        "Poles",
+        "published chain",
+        "Correlations",
+    ] {
+        assert!(report.contains(part), "{part}");
+    }
+    for figure in ["fit", "residuals", "correlations", "predictions"] {
+        assert!(
+            out.join("figures")
+                .join(figure)
+                .with_extension("png")
+                .exists()
+        );
+    }
+
+    // And an excitation is designed for what was found.
+    let torque = folder.path().join("torque.csv");
+    let words = text(&[
+        "excite",
+        "--robot",
+        name(&parameters),
+        "--amplitude",
+        "50",
+        "--tilt-limit",
+        "5",
+        "--out",
+        name(&torque),
+    ]);
+    assert_says(&words, &["the tilt limits it", "delay_s", "Cramer-Rao"]);
+    let csv = std::fs::read_to_string(&torque).unwrap();
+    assert!(csv.starts_with("t_s,torque_excitation_nm\n0,0\n"));
+    assert_eq!(csv.lines().count(), 4001);
+}
+
+#[test]
+fn the_example_is_a_configuration() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("robot.toml");
+    std::fs::write(&config, text(&["identify", "--example"])).unwrap();
+    let out = folder.path().join("torque.csv");
+    text(&["excite", "--config", name(&config), "--out", name(&out)]);
+}
+
+#[test]
+fn what_cannot_be_used_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, content: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        path
+    };
+    failure(&["identify"], 2);
+    let message = failure(&["identify", "none.csv"], 1);
+    assert_says(&message, &["none.csv", "cannot be read"]);
+    let empty = file("empty.csv", "");
+    assert_says(
+        &failure(&["identify", name(&empty)], 1),
+        &["empty.csv: is empty"],
+    );
+    let config = file("robot.toml", "[parameters]\nmass = \"free\"\n");
+    let good = file("log.csv", &log());
+    let message = failure(&["identify", name(&good), "--config", name(&config)], 1);
+    assert_says(&message, &["robot.toml", "parameters.mass", "b1_m2"]);
+    let short = file(
+        "short.csv",
+        &log().lines().take(121).collect::<Vec<_>>().join("\n"),
+    );
+    let message = failure(&["identify", name(&short)], 1);
+    assert_says(&message, &["no stretch of 1 s"]);
+    let message = failure(&["excite", "--length", "3", "--out", name(&empty)], 1);
+    assert_says(&message, &["the length is 3", "10.0 s"]);
+}

@@ -1,0 +1,368 @@
+//! The configuration file of an identification.
+
+use crate::log::Columns;
+use crate::parameter::{Choice, Parameter, Values};
+use ballbot::Geometry;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// A configuration, as written in a TOML file. Every table may be left out.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Where the quantities stand.
+    pub log: Columns,
+    /// Lengths and gravity.
+    pub geometry: GeometryTable,
+    /// Masses and inertias from a drawing.
+    pub body: Option<BodyTable>,
+    /// What is done with each parameter, by its key; see [`Parameter::key`].
+    pub parameters: BTreeMap<String, ChoiceTable>,
+    /// Known noise of the sensors.
+    pub noise: NoiseTable,
+    /// The fit.
+    pub fit: FitTable,
+}
+
+/// Lengths and gravity; the paper's robot where nothing is said.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GeometryTable {
+    /// l, m.
+    pub centre_of_mass_m: f64,
+    /// r_b, m.
+    pub ball_radius_m: f64,
+    /// r_w, m.
+    pub wheel_radius_m: f64,
+    /// g, m/s^2.
+    pub gravity_m_s2: f64,
+}
+
+impl Default for GeometryTable {
+    fn default() -> Self {
+        let paper = Geometry::paper();
+        Self {
+            centre_of_mass_m: paper.centre_of_mass,
+            ball_radius_m: paper.ball_radius,
+            wheel_radius_m: paper.wheel_radius,
+            gravity_m_s2: paper.gravity,
+        }
+    }
+}
+
+/// Masses and inertias from a drawing: they become priors of b1, b2, b3 and the torque gain.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BodyTable {
+    /// m_a, kg, wheels and motors included.
+    pub body_mass_kg: f64,
+    /// I_a about the centre of mass, kg m^2.
+    pub body_inertia_kg_m2: f64,
+    /// m_k, kg.
+    pub ball_mass_kg: f64,
+    /// I_k, kg m^2.
+    pub ball_inertia_kg_m2: f64,
+    /// I_w of one wheel with its motor's rotor as seen at the wheel, kg m^2.
+    pub wheel_inertia_kg_m2: f64,
+    /// Angle of the wheels' contact points from the top of the ball, degrees.
+    pub zenith_angle_deg: f64,
+    /// Relative standard deviation of what follows from these numbers.
+    pub uncertainty: f64,
+}
+
+/// What is done with a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum ChoiceTable {
+    /// `"free"`.
+    Free,
+    /// `{ fixed = 0.1 }`.
+    Fixed(f64),
+    /// `{ start = 0.1 }`: free, from there.
+    Start(f64),
+    /// `{ prior = { mean = 0.1, standard_deviation = 0.02 } }`.
+    Prior {
+        /// Expected value.
+        mean: f64,
+        /// Standard deviation.
+        standard_deviation: f64,
+    },
+}
+
+/// Standard deviations of the sensors' noise; what is left out is found from the log.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct NoiseTable {
+    /// Of the ball angle, rad.
+    pub phi_rad: Option<f64>,
+    /// Of the tilt, rad.
+    pub theta_rad: Option<f64>,
+    /// Of the tilt rate, rad/s.
+    pub theta_dot_rad_s: Option<f64>,
+}
+
+/// How the fit is made.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FitTable {
+    /// Only a robot that mechanics allows.
+    pub physical: bool,
+    /// Length of a segment, s.
+    pub segment_s: f64,
+    /// The part of each run, at its end, that is held back to judge the fit.
+    pub held_back: f64,
+}
+
+impl Default for FitTable {
+    fn default() -> Self {
+        Self {
+            physical: true,
+            segment_s: 1.0,
+            held_back: 0.25,
+        }
+    }
+}
+
+/// What makes no sense in a configuration.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ConfigError {
+    /// Not TOML, an unknown or missing key, or a value of the wrong type.
+    #[error("{0}")]
+    Syntax(String),
+    /// A parameter that does not exist.
+    #[error("parameters.{key}: there is no such parameter; there are {}", Parameter::ALL.map(Parameter::key).join(", "))]
+    UnknownParameter {
+        /// What was written.
+        key: String,
+    },
+    /// A value out of range.
+    #[error("{key} = {value}: it must be {expected}")]
+    Value {
+        /// The key with its table.
+        key: String,
+        /// What was given.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
+}
+
+impl Config {
+    /// A commented example with all keys and their defaults.
+    pub const EXAMPLE: &str = include_str!("config.example.toml");
+
+    /// The configuration in a text.
+    ///
+    /// # Errors
+    /// [`ConfigError`].
+    pub fn parse(text: &str) -> Result<Self, ConfigError> {
+        let config: Self =
+            toml::from_str(text).map_err(|error| ConfigError::Syntax(error.to_string()))?;
+        config.check()?;
+        Ok(config)
+    }
+
+    fn check(&self) -> Result<(), ConfigError> {
+        let geometry = &self.geometry;
+        for (key, value) in [
+            ("geometry.centre_of_mass_m", geometry.centre_of_mass_m),
+            ("geometry.ball_radius_m", geometry.ball_radius_m),
+            ("geometry.wheel_radius_m", geometry.wheel_radius_m),
+            ("geometry.gravity_m_s2", geometry.gravity_m_s2),
+        ] {
+            positive(key, value)?;
+        }
+        let noise = [
+            ("noise.phi_rad", self.noise.phi_rad),
+            ("noise.theta_rad", self.noise.theta_rad),
+            ("noise.theta_dot_rad_s", self.noise.theta_dot_rad_s),
+        ];
+        for (key, value) in noise {
+            value.map_or(Ok(()), |value| positive(key, value))?;
+        }
+        let FitTable {
+            segment_s,
+            held_back,
+            ..
+        } = self.fit;
+        within("fit.segment_s", segment_s, 0.1, 10.0, "from 0.1 to 10 s")?;
+        within("fit.held_back", held_back, 0.0, 0.8, "from 0 to 0.8")?;
+        self.body.map_or(Ok(()), |body| body.check())?;
+        self.choices().map(|_| ())
+    }
+
+    /// Lengths and gravity.
+    pub fn geometry(&self) -> Geometry<f64> {
+        Geometry {
+            centre_of_mass: self.geometry.centre_of_mass_m,
+            ball_radius: self.geometry.ball_radius_m,
+            wheel_radius: self.geometry.wheel_radius_m,
+            gravity: self.geometry.gravity_m_s2,
+        }
+    }
+
+    /// Known noise of ball angle, tilt and rate.
+    pub fn noise(&self) -> [Option<f64>; 3] {
+        [
+            self.noise.phi_rad,
+            self.noise.theta_rad,
+            self.noise.theta_dot_rad_s,
+        ]
+    }
+
+    /// What is done with each parameter.
+    ///
+    /// # Errors
+    /// An unknown key, or a value out of range.
+    pub fn choices(&self) -> Result<Values<Choice>, ConfigError> {
+        let mut choices = Values::usual();
+        if let Some(body) = self.body {
+            body.priors(&self.geometry(), &mut choices);
+        }
+        for (key, table) in &self.parameters {
+            let parameter = Parameter::from_key(key)
+                .ok_or_else(|| ConfigError::UnknownParameter { key: key.clone() })?;
+            choices[parameter] = table.choice(&format!("parameters.{key}"))?;
+        }
+        if let Choice::Fixed(delay) | Choice::Free { start: Some(delay) } =
+            choices[Parameter::Delay]
+        {
+            let longest = crate::coordinates::LONGEST_DELAY;
+            within("parameters.delay_s", delay, 0.0, longest, "from 0 to 0.1 s")?;
+        }
+        Ok(choices)
+    }
+}
+
+impl ChoiceTable {
+    fn choice(self, key: &str) -> Result<Choice, ConfigError> {
+        let finite = |value: f64| within(key, value, -1e9, 1e9, "a finite number").map(|()| value);
+        Ok(match self {
+            Self::Free => Choice::FREE,
+            Self::Fixed(value) => Choice::Fixed(finite(value)?),
+            Self::Start(value) => Choice::Free {
+                start: Some(finite(value)?),
+            },
+            Self::Prior {
+                mean,
+                standard_deviation,
+            } => {
+                positive(
+                    &format!("{key}.prior.standard_deviation"),
+                    standard_deviation,
+                )?;
+                Choice::Prior {
+                    mean: finite(mean)?,
+                    standard_deviation,
+                }
+            }
+        })
+    }
+}
+
+impl BodyTable {
+    fn check(&self) -> Result<(), ConfigError> {
+        positive("body.body_mass_kg", self.body_mass_kg)?;
+        positive("body.body_inertia_kg_m2", self.body_inertia_kg_m2)?;
+        positive("body.ball_mass_kg", self.ball_mass_kg)?;
+        positive("body.ball_inertia_kg_m2", self.ball_inertia_kg_m2)?;
+        positive("body.wheel_inertia_kg_m2", self.wheel_inertia_kg_m2)?;
+        positive("body.uncertainty", self.uncertainty)?;
+        let angle = self.zenith_angle_deg;
+        within(
+            "body.zenith_angle_deg",
+            angle,
+            1.0,
+            89.0,
+            "from 1 to 89 degrees",
+        )
+    }
+
+    /// b2 = 3/2 cos^2(alpha) (r_b/r_w)^2 I_w/m_a, b1 = b2 + (I_k + (m_k + m_a) r_b^2)/m_a,
+    /// b3 = b2 + l^2 + I_a/m_a.
+    fn priors(&self, geometry: &Geometry<f64>, choices: &mut Values<Choice>) {
+        let mass = self.body_mass_kg;
+        let gear = geometry.ball_radius / geometry.wheel_radius;
+        let cos = self.zenith_angle_deg.to_radians().cos();
+        let b2 = 1.5 * (cos * gear).powi(2) * self.wheel_inertia_kg_m2 / mass;
+        let rolling = (self.ball_mass_kg + mass) * geometry.ball_radius.powi(2);
+        let b1 = b2 + (self.ball_inertia_kg_m2 + rolling) / mass;
+        let b3 = b2 + geometry.centre_of_mass.powi(2) + self.body_inertia_kg_m2 / mass;
+        for (parameter, mean) in [
+            (Parameter::B1, b1),
+            (Parameter::B2, b2),
+            (Parameter::B3, b3),
+            (Parameter::TorqueGain, 1.0 / mass),
+        ] {
+            choices[parameter] = Choice::Prior {
+                mean,
+                standard_deviation: self.uncertainty * mean,
+            };
+        }
+    }
+}
+
+fn positive(key: &str, value: f64) -> Result<(), ConfigError> {
+    within(key, value, f64::MIN_POSITIVE, 1e9, "a positive number")
+}
+
+fn within(
+    key: &str,
+    value: f64,
+    least: f64,
+    most: f64,
+    expected: &'static str,
+) -> Result<(), ConfigError> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    Err(ConfigError::Value {
+        key: key.to_owned(),
+        value,
+        expected,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_example_says_the_defaults() {
+        assert_eq!(Config::parse(Config::EXAMPLE).unwrap(), Config::default());
+    }
+
+    #[test]
+    fn what_the_example_leaves_out_can_be_put_in() {
+        let lines = Config::EXAMPLE
+            .lines()
+            .map(|line| line.strip_prefix("#= ").unwrap_or(line));
+        let text = lines.collect::<Vec<_>>().join("\n");
+        let config = Config::parse(&text).unwrap();
+        assert!(config.body.is_some() && !config.parameters.is_empty());
+        assert!(config.noise.phi_rad.is_some());
+    }
+
+    #[test]
+    fn wrong_values_are_named() {
+        for (text, part) in [
+            (
+                "[geometry]\nball_radius_m = -1",
+                "geometry.ball_radius_m = -1",
+            ),
+            ("[fit]\nsegment_s = nan", "fit.segment_s"),
+            ("[fit]\nheld_back = 1.0", "from 0 to 0.8"),
+            ("[parameters]\nb7 = \"free\"", "there is no such parameter"),
+            ("[parameters]\ndelay_s = { fixed = 3.0 }", "from 0 to 0.1 s"),
+            (
+                "[parameters]\nb1_m2 = { prior = { mean = 1.0, standard_deviation = 0.0 } }",
+                "a positive number",
+            ),
+            ("[log.theta]\ncolumn = \"t\"\nunit = \"grad\"", "grad"),
+            ("[logs]", "logs"),
+        ] {
+            let message = Config::parse(text).unwrap_err().to_string();
+            assert!(message.contains(part), "{message}");
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! From the information of a fit to the covariance of the parameters.
+
+use crate::coordinates::Coordinates;
+use crate::model::SegmentedRuns;
+use crate::parameter::Parameter;
+use lpvmpc_design::{ShootingFit, ShootingProblem};
+use nalgebra::DMatrix;
+
+/// The covariance of the parameters from the information, and from the scatter of the segments.
+pub fn covariances(
+    problem: &ShootingProblem<'_, SegmentedRuns<'_>, 4, 3>,
+    fit: &ShootingFit<4>,
+    coordinates: &Coordinates,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let reduced = problem.reduced(&fit.parameters, &fit.initial, &fit.reduced.indices);
+    let n = reduced.indices.len();
+    let inverse = inverse(&reduced.information);
+    let mut meat = DMatrix::zeros(n, n);
+    for score in &reduced.scores {
+        meat += score * score.transpose();
+    }
+    // What the segments' scores lose to the parameters that were fitted to them.
+    let segments = reduced.scores.len() as f64;
+    let lost = segments / (segments - n as f64).max(1.0);
+    let scatter = &inverse * meat * &inverse * lost;
+    let of = |covariance| of_parameters(&covariance, &reduced.indices, coordinates);
+    (of(inverse), of(scatter))
+}
+
+/// The covariance of all parameters from that of the coordinates `indices`; zero for the others.
+pub fn of_parameters(
+    covariance: &DMatrix<f64>,
+    indices: &[usize],
+    coordinates: &Coordinates,
+) -> DMatrix<f64> {
+    let all = Parameter::ALL.len();
+    let mut whole = DMatrix::zeros(all, all);
+    for (i, row) in indices.iter().enumerate() {
+        for (j, column) in indices.iter().enumerate() {
+            whole[(*row, *column)] = covariance[(i, j)];
+        }
+    }
+    let jacobian = coordinates.jacobian();
+    &jacobian * whole * jacobian.transpose()
+}
+
+/// Inverse of an information matrix; infinite where it tells nothing.
+pub fn inverse(information: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = information.nrows();
+    let scale = information.diagonal().map(|entry| 1.0 / entry.sqrt());
+    let scaled = DMatrix::from_fn(n, n, |i, j| information[(i, j)] * scale[i] * scale[j]);
+    match scaled.cholesky() {
+        Some(factor) => {
+            let inverse = factor.inverse();
+            DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j])
+        }
+        None => DMatrix::from_diagonal_element(n, n, f64::INFINITY),
+    }
+}

@@ -1,0 +1,376 @@
+//! The fit itself: from runs and choices to parameters with their covariance.
+
+use crate::coordinates::{Coordinates, LONGEST_DELAY};
+use crate::covariance::covariances;
+use crate::log::{BallAngle, Run};
+use crate::model::{Segment, SegmentedRuns};
+use crate::parameter::{Choice, Parameter, Values};
+use crate::segments::{segments, spread};
+use crate::start::{linear_fits, typical};
+use ballbot::Geometry;
+use lpvmpc_design::{
+    Prior, ShootingError, ShootingFit, ShootingProblem, ShootingSettings, Unknown,
+};
+use nalgebra::{DMatrix, Vector3, Vector4};
+use std::ops::Range;
+
+/// What is to be fitted, and to what.
+#[derive(Clone, Debug)]
+pub struct Task<'a> {
+    /// The runs.
+    pub runs: &'a [Run],
+    /// What phi is relative to.
+    pub ball_angle: BallAngle,
+    /// Lengths and gravity, known.
+    pub geometry: Geometry<f64>,
+    /// What is done with each parameter.
+    pub choices: Values<Choice>,
+    /// Only a robot that mechanics allows.
+    pub physical: bool,
+    /// Length of a segment, s.
+    pub segment: f64,
+    /// Known noise of ball angle, tilt and tilt rate; what is `None` is found.
+    pub noise: [Option<f64>; 3],
+}
+
+/// A fitted robot.
+#[derive(Clone, Debug)]
+pub struct Estimate {
+    /// All parameters, held ones included.
+    pub values: Values,
+    /// Their covariance if the residuals are white noise, in the order of [`Parameter::ALL`]; zero
+    /// for what was held, by choice or at a bound.
+    pub covariance: DMatrix<f64>,
+    /// Their covariance from the scatter of the segments, right for coloured residuals, too.
+    pub scatter_covariance: DMatrix<f64>,
+    /// What became of each parameter.
+    pub status: Values<Status>,
+    /// Noise of ball angle, tilt and tilt rate as the residuals show it.
+    pub noise: Vector3<f64>,
+    /// The fit.
+    pub fit: ShootingFit<4>,
+    /// Its segments.
+    pub segments: Vec<Segment>,
+    /// Length of a segment, s; less than was asked for if the robot could not be simulated so long.
+    pub segment: f64,
+}
+
+/// What became of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// Held by choice.
+    Held,
+    /// Found.
+    Found,
+    /// Wanted beyond what mechanics allows, and was held at the bound.
+    AtBound,
+}
+
+/// Why there is no estimate.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum EstimateError {
+    /// The segments are longer than what there is.
+    #[error(
+        "no stretch of the log is long enough for a segment of {segment} s after the first {lead} s"
+    )]
+    NoSegments {
+        /// Length of a segment, s.
+        segment: f64,
+        /// Left out at the begin, s.
+        lead: f64,
+    },
+    /// No start from which the robot can be simulated.
+    #[error(
+        "from none of the starting values can the log be simulated: {0}. Are units, signs and \
+         lengths right?"
+    )]
+    NoStart(ShootingError),
+    /// The fit.
+    #[error(transparent)]
+    Shooting(#[from] ShootingError),
+}
+
+/// Told the number of steps of the fit so far.
+pub type Progress<'a> = &'a dyn Fn(usize);
+
+/// Segments of the first, coarse fit: so short that the unstable mode hardly grows, so few that
+/// trying several starts costs nothing, s.
+const COARSE: f64 = 0.25;
+const COARSE_COUNT: usize = 80;
+const COARSE_SETTINGS: ShootingSettings = ShootingSettings {
+    reduction_tolerance: 1e-2,
+    max_iterations: 40,
+};
+
+/// Times that the noise is found anew from the residuals, at most.
+const REWEIGHTINGS: usize = 6;
+
+impl Task<'_> {
+    /// Time at the begin of a stretch whose torque a delay may need, s.
+    pub fn lead(&self) -> f64 {
+        match self.choices[Parameter::Delay] {
+            Choice::Fixed(delay) => delay,
+            _ => LONGEST_DELAY,
+        }
+    }
+
+    /// Fits the robot to these stretches. `floor` is the noise to begin with.
+    ///
+    /// # Errors
+    /// [`EstimateError`].
+    pub fn estimate(
+        &self,
+        stretches: &[(usize, Range<usize>)],
+        floor: Vector3<f64>,
+        progress: Progress<'_>,
+    ) -> Result<Estimate, EstimateError> {
+        let start = self.start(stretches, floor, progress)?;
+        let mut length = self.segment;
+        loop {
+            let segments = segments(self.runs, stretches, length, self.lead());
+            let task = Task {
+                segment: length,
+                ..self.clone()
+            };
+            match task.estimate_from(start, segments, floor, progress) {
+                // A wrong model can be so unstable that a segment is too long for it.
+                Err(EstimateError::Shooting(ShootingError::NonFiniteStart { .. }))
+                    if length > COARSE =>
+                {
+                    length = (0.5 * length).max(COARSE);
+                }
+                result => return result,
+            }
+        }
+    }
+
+    /// Fits the robot to these segments from a start.
+    ///
+    /// # Errors
+    /// [`EstimateError`].
+    pub fn estimate_from(
+        &self,
+        start: Values,
+        segments: Vec<Segment>,
+        floor: Vector3<f64>,
+        progress: Progress<'_>,
+    ) -> Result<Estimate, EstimateError> {
+        if segments.is_empty() {
+            return Err(EstimateError::NoSegments {
+                segment: self.segment,
+                lead: self.lead(),
+            });
+        }
+        let model = self.model(segments);
+        let mut noise = self.known(floor);
+        let mut initial = model.initial_states(&start);
+        let mut unknowns = self.unknowns(&start, &model.coordinates);
+        let priors = self.priors(&model.coordinates);
+        let mut rounds = 0;
+        let (fit, problem) = loop {
+            let problem = self.problem(&model, &unknowns, &priors, noise);
+            let fit = problem.fit(initial, &ShootingSettings::default(), progress)?;
+            let next = self.known(residual_noise(&problem, &fit));
+            let change = next.component_div(&noise).map(|ratio| (ratio - 1.0).abs());
+            rounds += 1;
+            if change.max() < 0.01 || rounds > REWEIGHTINGS {
+                break (fit, self.problem(&model, &unknowns, &priors, noise));
+            }
+            noise = next;
+            for (unknown, value) in unknowns.iter_mut().zip(&fit.parameters) {
+                unknown.start = *value;
+            }
+            initial = fit.initial;
+        };
+        let (covariance, scatter_covariance) = covariances(&problem, &fit, &model.coordinates);
+        let status = self.status(&fit);
+        Ok(Estimate {
+            values: model.coordinates.values(&fit.parameters),
+            covariance,
+            scatter_covariance,
+            status,
+            noise,
+            fit,
+            segments: model.segments,
+            segment: self.segment,
+        })
+    }
+
+    /// The runs cut into segments, as data of a fit.
+    pub fn model(&self, segments: Vec<Segment>) -> SegmentedRuns<'_> {
+        SegmentedRuns {
+            runs: self.runs,
+            segments,
+            coordinates: Coordinates::new(&self.choices, self.geometry),
+            ball_angle: self.ball_angle,
+        }
+    }
+
+    /// The fit's problem.
+    pub fn problem<'p, 'm>(
+        &self,
+        model: &'p SegmentedRuns<'m>,
+        unknowns: &'p [Unknown],
+        priors: &'p [Prior],
+        noise: Vector3<f64>,
+    ) -> ShootingProblem<'p, SegmentedRuns<'m>, 4, 3> {
+        ShootingProblem {
+            model,
+            unknowns,
+            priors,
+            noise,
+            state_scale: Vector4::repeat(1.0),
+        }
+    }
+
+    /// The best of several starts after a coarse fit.
+    fn start(
+        &self,
+        stretches: &[(usize, Range<usize>)],
+        floor: Vector3<f64>,
+        progress: Progress<'_>,
+    ) -> Result<Values, EstimateError> {
+        let lead = self.lead();
+        let coarse = segments(self.runs, stretches, COARSE, lead);
+        if coarse.is_empty() {
+            return Err(EstimateError::NoSegments {
+                segment: COARSE,
+                lead,
+            });
+        }
+        let model = self.model(spread(&coarse, COARSE_COUNT));
+        let priors = self.priors(&model.coordinates);
+        let mut best: Option<(f64, Values)> = None;
+        let mut refused = None;
+        for start in self.candidates(stretches) {
+            let unknowns = self.unknowns(&start, &model.coordinates);
+            let start = model.coordinates.values(&starts(&unknowns));
+            let problem = self.problem(&model, &unknowns, &priors, self.known(floor));
+            match problem.fit(model.initial_states(&start), &COARSE_SETTINGS, progress) {
+                Ok(fit) if best.is_none_or(|(least, _)| fit.chi_square < least) => {
+                    best = Some((fit.chi_square, model.coordinates.values(&fit.parameters)));
+                }
+                Ok(_) => {}
+                Err(error) => refused = Some(error),
+            }
+        }
+        match (best, refused) {
+            (Some((_, start)), _) => Ok(start),
+            (None, Some(error)) => Err(EstimateError::NoStart(error)),
+            (None, None) => Ok(typical(&self.geometry, 0.0)),
+        }
+    }
+
+    /// Where the coarse fits start.
+    fn candidates(&self, stretches: &[(usize, Range<usize>)]) -> Vec<Values> {
+        let delay = match self.choices[Parameter::Delay] {
+            Choice::Fixed(delay) => Some(delay),
+            Choice::Free { start } => start,
+            Choice::Prior { mean, .. } => Some(mean),
+        };
+        let fits = linear_fits(self.runs, stretches, self.ball_angle, delay);
+        let best = fits.first().map_or(0.0, |fit| fit.delay);
+        let mut candidates = vec![typical(&self.geometry, delay.unwrap_or(best))];
+        let robots = fits.iter().filter_map(|fit| fit.robot(&self.geometry));
+        candidates.extend(robots.take(2));
+        candidates
+    }
+
+    /// Known noise before found noise.
+    fn known(&self, found: Vector3<f64>) -> Vector3<f64> {
+        Vector3::from_fn(|output, _| self.noise[output].unwrap_or(found[output]))
+    }
+
+    /// The unknowns of the fit, from a start that the choices overrule and mechanics bounds.
+    pub fn unknowns(&self, start: &Values, coordinates: &Coordinates) -> Vec<Unknown> {
+        let mut values = *start;
+        for parameter in Parameter::ALL {
+            let value = &mut values[parameter];
+            match self.choices[parameter] {
+                Choice::Fixed(fixed) => *value = fixed,
+                Choice::Free { start: Some(start) } => *value = start,
+                Choice::Free { start: None } => {}
+                // A prior is a start only where nothing was found.
+                Choice::Prior { mean, .. } if !value.is_finite() => *value = mean,
+                Choice::Prior { .. } => {}
+            }
+        }
+        let bounds = coordinates.bounds(&values, self.physical);
+        let scales = coordinates.scales();
+        let starts = coordinates.of(&values);
+        let unknown = |parameter: Parameter| {
+            let free = self.choices[parameter].is_free();
+            let (lower, upper) = if free {
+                bounds[parameter]
+            } else {
+                (f64::NEG_INFINITY, f64::INFINITY)
+            };
+            Unknown {
+                start: starts[parameter.index()].max(lower).min(upper),
+                lower,
+                upper,
+                scale: scales[parameter],
+                free,
+            }
+        };
+        Parameter::ALL.map(unknown).to_vec()
+    }
+
+    /// What is known beforehand, in the fit's coordinates.
+    pub fn priors(&self, coordinates: &Coordinates) -> Vec<Prior> {
+        let jacobian = coordinates.jacobian();
+        let origin = coordinates.values(&[0.0; Parameter::ALL.len()]);
+        let priors = Parameter::ALL.into_iter().filter_map(|parameter| {
+            let Choice::Prior {
+                mean,
+                standard_deviation,
+            } = self.choices[parameter]
+            else {
+                return None;
+            };
+            Some(Prior {
+                coefficients: jacobian.row(parameter.index()).iter().copied().collect(),
+                mean: mean - origin[parameter],
+                standard_deviation,
+            })
+        });
+        priors.collect()
+    }
+
+    fn status(&self, fit: &ShootingFit<4>) -> Values<Status> {
+        Values(Parameter::ALL.map(|parameter| {
+            if fit.reduced.indices.contains(&parameter.index()) {
+                Status::Found
+            } else if self.choices[parameter].is_free() {
+                Status::AtBound
+            } else {
+                Status::Held
+            }
+        }))
+    }
+}
+
+fn starts(unknowns: &[Unknown]) -> Vec<f64> {
+    unknowns.iter().map(|unknown| unknown.start).collect()
+}
+
+/// Standard deviation of the residuals of each output; 1 for one that is not measured.
+pub fn residual_noise(
+    problem: &ShootingProblem<'_, SegmentedRuns<'_>, 4, 3>,
+    fit: &ShootingFit<4>,
+) -> Vector3<f64> {
+    let residuals = problem.residuals(&fit.parameters, &fit.initial);
+    let lost = fit.values as f64 / fit.degrees_of_freedom().max(1.0);
+    Vector3::from_fn(|output, _| {
+        let values = residuals.iter().flatten().map(|row| row[output]);
+        let (sum, count) = values
+            .filter(|value| !value.is_nan())
+            .fold((0.0, 0), |(sum, count), value| {
+                (sum + value * value, count + 1)
+            });
+        if count == 0 || sum == 0.0 {
+            return problem.noise[output];
+        }
+        (sum / f64::from(count) * lost).sqrt()
+    })
+}

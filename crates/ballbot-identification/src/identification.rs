@@ -1,0 +1,217 @@
+//! From logs to a judged robot: the whole way.
+
+use crate::config::Config;
+use crate::estimate::{Estimate, EstimateError, Progress, Task};
+use crate::log::{Finding, Log, Run};
+use crate::noise;
+use crate::parameter::{Choice, Parameter, Values};
+use crate::poles::{Pole, linear_model, uncertain_poles};
+use crate::published::{LinearRegression, regression};
+use crate::residuals::{OutputResidual, ScoreTest, SegmentResidual, score_tests, simulated, tests};
+use crate::segments::Split;
+use crate::structures::{Compared, compare};
+use crate::validation::{Validation, validate};
+use ballbot::{Ballbot, Consistency, Geometry, LinearParameters, limits};
+use lpvmpc_design::NORMAL_95;
+use nalgebra::{DMatrix, Vector3};
+
+/// A robot found from logs, and what speaks for and against it.
+#[derive(Clone, Debug)]
+pub struct Identification {
+    /// Lengths and gravity, as they were given.
+    pub geometry: Geometry<f64>,
+    /// Whether mechanics was imposed.
+    pub physical: bool,
+    /// Length of a segment that was asked for, s.
+    pub segment: f64,
+    /// What was done with each parameter.
+    pub choices: Values<Choice>,
+    /// What is odd about each log.
+    pub findings: Vec<(String, Vec<Finding>)>,
+    /// The fit.
+    pub estimate: Estimate,
+    /// Noise of the sensors, from the logs alone.
+    pub floor: Vector3<f64>,
+    /// Measured and simulated outputs of the fitted segments.
+    pub simulated: Vec<SegmentResidual>,
+    /// The residuals of each measured output.
+    pub residuals: Vec<OutputResidual>,
+    /// What the residuals say about the parameters that were held.
+    pub scores: Vec<ScoreTest>,
+    /// Poles at the upright position.
+    pub poles: Vec<Pole>,
+    /// On held-back data, if any were held back; or why it could not be judged there.
+    pub validation: Option<Result<Validation, EstimateError>>,
+    /// Structures of friction compared on held-back data, those that could be fitted; empty if none
+    /// were held back.
+    pub structures: Vec<Compared>,
+    /// The published way to p, to compare with.
+    pub published: Option<LinearRegression>,
+    /// Time that was fitted and time that was held back, s.
+    pub times: (f64, f64),
+}
+
+/// Identifies one robot from all of the logs.
+///
+/// # Errors
+/// There is too little to fit, or the robot cannot be simulated.
+pub fn identify(
+    logs: Vec<Log>,
+    config: &Config,
+    choices: Values<Choice>,
+    progress: Progress<'_>,
+) -> Result<Identification, EstimateError> {
+    let (runs, findings): (Vec<Run>, Vec<_>) = logs
+        .into_iter()
+        .map(|log| {
+            let name = log.run.name.clone();
+            (log.run, (name, log.findings))
+        })
+        .unzip();
+    let task = Task {
+        runs: &runs,
+        ball_angle: config.log.ball_angle,
+        geometry: config.geometry(),
+        choices,
+        physical: config.fit.physical,
+        segment: config.fit.segment_s,
+        noise: config.noise(),
+    };
+    let floor = noise::floor(&runs);
+    let split = Split::new(&runs, config.fit.held_back);
+    let estimate = task.estimate(&split.fitted, floor, progress)?;
+    let task = Task {
+        segment: estimate.segment,
+        ..task
+    };
+    let simulated = simulated(&task, &estimate);
+    let residuals = tests(&simulated, estimate.noise, floor);
+    let scores = score_tests(&task, &estimate);
+    let (validation, structures) = if split.held_back.is_empty() {
+        (None, Vec::new())
+    } else {
+        let (values, noise) = (&estimate.values, estimate.noise);
+        let validation = validate(&task, values, noise, &split.held_back);
+        let structures = compare(&task, &estimate, &split.held_back, progress);
+        (Some(validation), structures)
+    };
+    let time = |stretches: &[(usize, std::ops::Range<usize>)]| {
+        let lengths = stretches.iter().map(|(run, rows)| runs[*run].length(rows));
+        lengths.sum()
+    };
+    let mut identification = Identification {
+        geometry: task.geometry,
+        physical: task.physical,
+        segment: config.fit.segment_s,
+        choices,
+        findings,
+        floor,
+        simulated,
+        residuals,
+        scores,
+        poles: Vec::new(),
+        validation,
+        structures,
+        published: regression(&runs, task.ball_angle),
+        times: (time(&split.fitted), time(&split.held_back)),
+        estimate,
+    };
+    identification.poles = uncertain_poles(
+        &identification.estimate,
+        identification.covariance(),
+        identification.geometry,
+    );
+    Ok(identification)
+}
+
+impl Identification {
+    /// Whether all residuals are white noise.
+    pub fn is_white(&self) -> bool {
+        self.residuals.iter().all(OutputResidual::is_white)
+    }
+
+    /// The covariance that the intervals are from: that of white residuals, or, where they are not
+    /// white, that of the segments' scatter.
+    pub fn covariance(&self) -> &DMatrix<f64> {
+        if self.is_white() {
+            &self.estimate.covariance
+        } else {
+            &self.estimate.scatter_covariance
+        }
+    }
+
+    /// Whether there are fewer than two segments per parameter: their scatter then tells nothing.
+    pub fn has_few_segments(&self) -> bool {
+        self.estimate.segments.len() < 2 * self.estimate.fit.reduced.indices.len()
+    }
+
+    /// Standard deviation of a parameter; zero if it was held.
+    pub fn standard_deviation(&self, parameter: Parameter) -> f64 {
+        let index = parameter.index();
+        self.covariance()[(index, index)].sqrt()
+    }
+
+    /// 95 % interval of a parameter.
+    pub fn interval(&self, parameter: Parameter) -> (f64, f64) {
+        let value = self.estimate.values[parameter];
+        let half = NORMAL_95 * self.standard_deviation(parameter);
+        (value - half, value + half)
+    }
+
+    /// Correlation of two parameters; zero if one was held.
+    pub fn correlation(&self, one: Parameter, other: Parameter) -> f64 {
+        let covariance = self.covariance();
+        let (i, j) = (one.index(), other.index());
+        let scale = (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+        if scale > 0.0 {
+            covariance[(i, j)] / scale
+        } else {
+            0.0
+        }
+    }
+
+    /// The plant in the project's own form, whose torque is in N m: the torque gain is part of the
+    /// virtual wheel's radius, r_w / gain, since torque enters by r_b / r_w alone. Drive friction,
+    /// Coulomb friction, delay and biases are not part of it.
+    pub fn ballbot(&self) -> Ballbot<f64> {
+        ballbot(&self.estimate.values, self.geometry)
+    }
+
+    /// The fitted inertias and friction against mechanics.
+    pub fn consistency(&self) -> Consistency<f64> {
+        self.ballbot().consistency(limits::THETA)
+    }
+
+    /// p of the fitted robot, its drive friction included.
+    pub fn linear_parameters(&self) -> Option<LinearParameters<f64>> {
+        let (a, b) = linear_model(&self.estimate.values, self.geometry)?;
+        Some(LinearParameters {
+            p1: a[(2, 1)],
+            p2: a[(2, 2)],
+            p3: b[2],
+            p4: a[(3, 1)],
+            p5: a[(3, 2)],
+            p6: b[3],
+        })
+    }
+
+    /// The residuals' spread over the noise that the sensors have by themselves.
+    pub fn normalised_residual(&self) -> f64 {
+        let squares = self.residuals.iter().map(|one| one.normalised().powi(2));
+        (squares.sum::<f64>() / self.residuals.len().max(1) as f64).sqrt()
+    }
+}
+
+/// See [`Identification::ballbot`].
+pub fn ballbot(values: &Values, geometry: Geometry<f64>) -> Ballbot<f64> {
+    Ballbot {
+        b1: values[Parameter::B1],
+        b2: values[Parameter::B2],
+        b3: values[Parameter::B3],
+        b4: values[Parameter::RollingFriction],
+        geometry: Geometry {
+            wheel_radius: geometry.wheel_radius / values[Parameter::TorqueGain],
+            ..geometry
+        },
+    }
+}

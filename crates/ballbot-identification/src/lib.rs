@@ -1,0 +1,44 @@
+//! A ballbot's parameters from its logs.
+//!
+//! A log (time, ball angle, tilt, tilt rate, torque) is read and looked at ([`log::read`]); the
+//! robot that explains it is found by simulating it, never by differentiating noise, and judged
+//! ([`identify`]). Everything is in SI units from the moment a column has been read.
+//!
+//! State x = (phi, theta, phi_dot, theta_dot), both angles against the vertical; signs and
+//! parameters are those of [`ballbot::Ballbot`].
+
+pub mod log;
+pub mod noise;
+
+mod config;
+mod coordinates;
+mod covariance;
+mod estimate;
+mod excitation;
+mod identification;
+mod model;
+mod parameter;
+mod parameter_file;
+mod poles;
+mod published;
+mod residuals;
+mod segments;
+mod start;
+mod structures;
+mod validation;
+mod verdict;
+
+pub use config::{Config, ConfigError};
+pub use coordinates::{Coordinates, LONGEST_DELAY};
+pub use estimate::{Estimate, EstimateError, Progress, Status, Task};
+pub use excitation::{Excitation, ExcitationError, ExcitationTask};
+pub use identification::{Identification, ballbot, identify};
+pub use model::{COULOMB_SPEED, LONGEST_STEP, Robot, Segment, SegmentedRuns};
+pub use parameter::{Choice, Parameter, Values};
+pub use poles::{Pole, linear_model, uncertain_poles};
+pub use published::{LinearRegression, regression};
+pub use residuals::{OUTPUTS, OutputResidual, ScoreTest, SegmentResidual, score_tests};
+pub use segments::{Split, segments};
+pub use structures::{Compared, Structure, best, compare};
+pub use validation::{HORIZONS, Validation, validate};
+pub use verdict::{Verdict, Weight};

@@ -1,0 +1,188 @@
+//! Where a log's quantities stand, and in which units.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Which columns of a file are read, and how; the `[log]` table of a configuration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Columns {
+    /// What stands between two fields.
+    pub delimiter: char,
+    /// Time stamps.
+    pub time: Channel,
+    /// Ball angle, as the wheels' encoders give it.
+    pub phi: Channel,
+    /// Tilt, as the inertial unit gives it.
+    pub theta: Channel,
+    /// Tilt rate, as the gyroscope gives it. An empty column name says that there is none.
+    pub theta_dot: Channel,
+    /// Torque of the virtual wheel. Without a column name it is `torque_applied_nm` if the file has
+    /// that, otherwise `torque_commanded_nm`.
+    pub torque: Channel,
+    /// What the ball angle is relative to.
+    pub ball_angle: BallAngle,
+    /// Go on although the units look wrong.
+    pub accept_suspicious_units: bool,
+}
+
+/// One column.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Channel {
+    /// Name in the header.
+    #[serde(default)]
+    pub column: String,
+    /// Unit of the file.
+    pub unit: Unit,
+    /// Multiplies the value, for example r_w / r_b for a wheel's angle, a motor's torque per
+    /// ampere, or -1 for the other sign.
+    #[serde(default = "one")]
+    pub factor: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// What the ball angle phi of a log is relative to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BallAngle {
+    /// The floor: phi of the model, the ball has rolled by r_b phi.
+    #[default]
+    Inertial,
+    /// The body: phi - theta, what an encoder on the body sees.
+    RelativeToBody,
+}
+
+/// A unit of a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Unit {
+    /// Seconds.
+    #[serde(rename = "s")]
+    Second,
+    /// Milliseconds.
+    #[serde(rename = "ms")]
+    Millisecond,
+    /// Microseconds.
+    #[serde(rename = "us")]
+    Microsecond,
+    /// Nanoseconds.
+    #[serde(rename = "ns")]
+    Nanosecond,
+    /// Radians.
+    #[serde(rename = "rad")]
+    Radian,
+    /// Degrees.
+    #[serde(rename = "deg")]
+    Degree,
+    /// Turns.
+    #[serde(rename = "turn")]
+    Turn,
+    /// Radians per second.
+    #[serde(rename = "rad/s")]
+    RadianPerSecond,
+    /// Degrees per second.
+    #[serde(rename = "deg/s")]
+    DegreePerSecond,
+    /// Turns per minute.
+    #[serde(rename = "rpm")]
+    TurnPerMinute,
+    /// Newton metres.
+    #[serde(rename = "Nm")]
+    NewtonMetre,
+    /// Millinewton metres.
+    #[serde(rename = "mNm")]
+    MillinewtonMetre,
+    /// Amperes, with the torque per ampere as the factor.
+    #[serde(rename = "A")]
+    Ampere,
+}
+
+/// What a unit measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Dimension {
+    Time,
+    Angle,
+    Rate,
+    Torque,
+}
+
+impl fmt::Display for Dimension {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Time => "a time: s, ms, us or ns",
+            Self::Angle => "an angle: rad, deg or turn",
+            Self::Rate => "a rate: rad/s, deg/s or rpm",
+            Self::Torque => "a torque: Nm or mNm, or A with the torque per ampere as factor",
+        })
+    }
+}
+
+impl Unit {
+    pub(super) fn dimension(self) -> Dimension {
+        match self {
+            Self::Second | Self::Millisecond | Self::Microsecond | Self::Nanosecond => {
+                Dimension::Time
+            }
+            Self::Radian | Self::Degree | Self::Turn => Dimension::Angle,
+            Self::RadianPerSecond | Self::DegreePerSecond | Self::TurnPerMinute => Dimension::Rate,
+            Self::NewtonMetre | Self::MillinewtonMetre | Self::Ampere => Dimension::Torque,
+        }
+    }
+
+    /// The SI unit's number for one of this unit.
+    pub(super) fn in_si(self) -> f64 {
+        use std::f64::consts::{PI, TAU};
+        match self {
+            Self::Second
+            | Self::Radian
+            | Self::RadianPerSecond
+            | Self::NewtonMetre
+            | Self::Ampere => 1.0,
+            Self::Millisecond | Self::MillinewtonMetre => 1e-3,
+            Self::Microsecond => 1e-6,
+            Self::Nanosecond => 1e-9,
+            Self::Degree | Self::DegreePerSecond => PI / 180.0,
+            Self::Turn => TAU,
+            Self::TurnPerMinute => TAU / 60.0,
+        }
+    }
+}
+
+impl Channel {
+    fn new(column: &str, unit: Unit) -> Self {
+        Self {
+            column: column.to_owned(),
+            unit,
+            factor: 1.0,
+        }
+    }
+
+    /// SI units for one of the file's.
+    pub(super) fn scale(&self) -> f64 {
+        self.unit.in_si() * self.factor
+    }
+}
+
+/// The column of the torque that acted.
+pub(super) const APPLIED: &str = "torque_applied_nm";
+/// The column of the torque that was asked for.
+pub(super) const COMMANDED: &str = "torque_commanded_nm";
+
+impl Default for Columns {
+    /// The format that `ballbot simulate --log` writes.
+    fn default() -> Self {
+        Self {
+            delimiter: ',',
+            time: Channel::new("t_s", Unit::Second),
+            phi: Channel::new("phi_rad", Unit::Radian),
+            theta: Channel::new("theta_rad", Unit::Radian),
+            theta_dot: Channel::new("theta_dot_rad_s", Unit::RadianPerSecond),
+            torque: Channel::new("", Unit::NewtonMetre),
+            ball_angle: BallAngle::Inertial,
+            accept_suspicious_units: false,
+        }
+    }
+}

@@ -1,0 +1,235 @@
+//! What is odd about a log and yet no reason to refuse it.
+
+use std::fmt;
+
+/// Something the builder should know. Lines are counted from 1, times are since the first row.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Finding {
+    /// The text begins with a byte order mark.
+    ByteOrderMark,
+    /// The last line is cut off.
+    IncompleteLastRow {
+        /// Line.
+        line: usize,
+    },
+    /// Empty fields, NaN or infinity.
+    MissingValues {
+        /// The column.
+        column: String,
+        /// How many rows.
+        count: usize,
+        /// Line of the first.
+        line: usize,
+    },
+    /// Rows are missing.
+    Gaps {
+        /// How many gaps.
+        count: usize,
+        /// The longest, s.
+        longest: f64,
+        /// When the longest begins, s.
+        time: f64,
+    },
+    /// A time stamp like the one before.
+    DuplicateStamps {
+        /// How many rows.
+        count: usize,
+        /// Line of the first.
+        line: usize,
+    },
+    /// A time stamp before the one before.
+    BackwardStamps {
+        /// How many rows.
+        count: usize,
+        /// Line of the first.
+        line: usize,
+        /// By how much the first goes back, s.
+        by: f64,
+    },
+    /// The rows are not evenly spaced.
+    Jitter {
+        /// Median interval, s.
+        median: f64,
+        /// What 99 % of the intervals are below, s.
+        most: f64,
+        /// The longest interval that is no gap, s.
+        longest: f64,
+    },
+    /// A value that jumps: a reset, a wrap or a spike.
+    Jumps {
+        /// The column.
+        column: String,
+        /// How many.
+        count: usize,
+        /// Line of the first.
+        line: usize,
+        /// Its size, SI.
+        size: f64,
+    },
+    /// The sensor stands still for longer than a robot does.
+    Frozen {
+        /// The column.
+        column: String,
+        /// For how long, s.
+        duration: f64,
+        /// Line of its begin.
+        line: usize,
+    },
+    /// The column has steps.
+    Quantised {
+        /// The column.
+        column: String,
+        /// The step, SI.
+        step: f64,
+    },
+    /// The torque is at its limit.
+    Saturated {
+        /// The limit, N m.
+        limit: f64,
+        /// In which part of the rows.
+        part: f64,
+        /// Only the torque that was asked for is known.
+        commanded: bool,
+    },
+    /// What acted is not what was asked for.
+    CommandNotApplied {
+        /// Root of the mean square difference, N m.
+        difference: f64,
+    },
+    /// The robot leans more than a standing one.
+    Fallen {
+        /// Rows that are left out.
+        count: usize,
+        /// When the first of them is, s.
+        time: f64,
+        /// Line of the first.
+        line: usize,
+    },
+    /// The tilt hardly changes with its rate.
+    TiltAgainstRate {
+        /// Slope; 1 is right.
+        slope: f64,
+    },
+    /// Suspicious units that the builder accepts.
+    AcceptedUnits(super::error::Suspicion),
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ByteOrderMark => {
+                write!(f, "the file begins with a byte order mark; it is skipped")
+            }
+            Self::IncompleteLastRow { line } => {
+                write!(f, "line {line}, the last, is cut off; it is left out")
+            }
+            Self::MissingValues {
+                column,
+                count,
+                line,
+            } => write!(
+                f,
+                "`{column}` is missing or not finite in {count} rows, first in line {line}; they \
+                 are not filled in"
+            ),
+            Self::Gaps {
+                count,
+                longest,
+                time,
+            } => write!(
+                f,
+                "{count} gap(s) in the time stamps, the longest of {longest:.3} s after {time:.3} s; \
+                 the fit does not reach across"
+            ),
+            Self::DuplicateStamps { count, line } => write!(
+                f,
+                "{count} row(s) repeat the time stamp before, first in line {line}; the run is cut \
+                 there"
+            ),
+            Self::BackwardStamps { count, line, by } => write!(
+                f,
+                "the time goes back {count} time(s), first in line {line} by {by:.4} s (rows out of \
+                 order, or a restart of the clock); the run is cut there"
+            ),
+            Self::Jitter {
+                median,
+                most,
+                longest,
+            } => write!(
+                f,
+                "the rows are not evenly spaced: {:.3} ms in the middle, 99 % below {:.3} ms, at most \
+                 {:.3} ms; the stamps are used as they are",
+                median * 1e3,
+                most * 1e3,
+                longest * 1e3
+            ),
+            Self::Jumps {
+                column,
+                count,
+                line,
+                size,
+            } => {
+                let turns = size.abs() / std::f64::consts::TAU;
+                let kind = if (turns - turns.round()).abs() < 0.05 && turns > 0.5 {
+                    "an angle that wraps around"
+                } else {
+                    "a reset or a spike"
+                };
+                write!(
+                    f,
+                    "`{column}` jumps {count} time(s), first by {size:.3} in line {line} ({kind}); the \
+                     run is cut there"
+                )
+            }
+            Self::Frozen {
+                column,
+                duration,
+                line,
+            } => write!(
+                f,
+                "`{column}` does not change for {duration:.2} s from line {line} on: a sensor that \
+                 hangs?"
+            ),
+            Self::Quantised { column, step } => {
+                write!(f, "`{column}` has steps of {step:.2e}")
+            }
+            Self::Saturated {
+                limit,
+                part,
+                commanded,
+            } => {
+                write!(
+                    f,
+                    "the torque is at its limit of {limit:.3} N m in {:.1} % of the rows",
+                    100.0 * part
+                )?;
+                if *commanded {
+                    write!(
+                        f,
+                        "; it is the commanded one: if the motors gave less, friction and inertias \
+                         are wrong. Log the torque that was applied"
+                    )?;
+                }
+                Ok(())
+            }
+            Self::CommandNotApplied { difference } => write!(
+                f,
+                "the applied torque differs from the commanded one by {difference:.3} N m (rms); the \
+                 applied one is used"
+            ),
+            Self::Fallen { count, time, line } => write!(
+                f,
+                "the robot leans beyond 0.8 rad after {time:.2} s (line {line}): it fell, or was \
+                 lifted; {count} rows are left out"
+            ),
+            Self::TiltAgainstRate { slope } => write!(
+                f,
+                "the tilt changes by {slope:.2} times the integral of its rate, where 1 is right; \
+                 the robot moved too little to say why"
+            ),
+            Self::AcceptedUnits(suspicion) => {
+                write!(f, "accepted although suspicious: {suspicion}")
+            }
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! The result as a TOML file.
+
+use crate::estimate::Status;
+use crate::identification::Identification;
+use crate::parameter::Parameter;
+use std::fmt::Write as _;
+
+impl Identification {
+    /// `parameters.toml`: the robot as a `[parameters]` table of a scenario, what does not fit into
+    /// that, and the covariance.
+    pub fn parameter_file(&self) -> String {
+        let mut text = String::new();
+        let robot = self.ballbot();
+        let geometry = &robot.geometry;
+        // Writing to a string cannot fail; {:?} gives the shortest digits that read back the same.
+        let _ = write!(
+            text,
+            "# A ballbot identified by `ballbot identify`.\n\
+             # `ballbot lqr --parameters` and `ballbot linearize --parameters` take this file; for \
+             `ballbot simulate`\n# copy [parameters] into the scenario.\n\n\
+             [parameters]\nb1_m2 = {:?}\nb2_m2 = {:?}\nb3_m2 = {:?}\nb4_m2_s = {:?}\n\
+             centre_of_mass_m = {:?}\nball_radius_m = {:?}\n\
+             # r_w / gain = {:?} / {:?}: torque enters by r_b / r_w alone, so the gain (1 / body mass) is\n\
+             # in it, and the model's torque is in N m.\n\
+             wheel_radius_m = {:?}\ngravity_m_s2 = {:?}\n",
+            robot.b1,
+            robot.b2,
+            robot.b3,
+            robot.b4,
+            geometry.centre_of_mass,
+            geometry.ball_radius,
+            self.geometry.wheel_radius,
+            self.estimate.values[Parameter::TorqueGain],
+            geometry.wheel_radius,
+            geometry.gravity,
+        );
+        let _ = write!(
+            text,
+            "\n# All that was found or held, with standard deviations.\n"
+        );
+        for parameter in Parameter::ALL {
+            let status = match self.estimate.status[parameter] {
+                Status::Held => "held",
+                Status::Found => "found",
+                Status::AtBound => "at its bound",
+            };
+            let _ = write!(
+                text,
+                "\n[identification.{}] # {}\nvalue = {:?} # {}\nstandard_deviation = {:?}\n\
+                 status = \"{status}\"\n",
+                parameter.key(),
+                parameter.words(),
+                self.estimate.values[parameter],
+                parameter.unit(),
+                self.standard_deviation(parameter),
+            );
+        }
+        let keys = Parameter::ALL.map(|parameter| format!("\"{parameter}\""));
+        let _ = write!(
+            text,
+            "\n[identification.covariance]\nparameters = [{}]\nmatrix = [\n",
+            keys.join(", ")
+        );
+        for row in self.covariance().row_iter() {
+            let entries: Vec<String> = row.iter().map(|entry| format!("{entry:?}")).collect();
+            let _ = writeln!(text, "    [{}],", entries.join(", "));
+        }
+        text + "]\n"
+    }
+}

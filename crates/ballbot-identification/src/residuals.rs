@@ -1,0 +1,171 @@
+//! What the residuals say about the model.
+
+use crate::estimate::{Estimate, Task};
+use crate::log::Run;
+use crate::model::SegmentedRuns;
+use crate::parameter::Parameter;
+use lpvmpc_design::{Correlation, ShootingModel, autocorrelation, cross_correlation};
+use nalgebra::Vector3;
+
+/// The outputs in words, in the order of all vectors of three.
+pub const OUTPUTS: [&str; 3] = ["ball angle", "tilt", "tilt rate"];
+
+/// Lags that are looked at, rows.
+const LAGS: usize = 25;
+
+/// The residuals of one output.
+#[derive(Clone, Debug)]
+pub struct OutputResidual {
+    /// Standard deviation, rad or rad/s.
+    pub spread: f64,
+    /// The least it can be: the noise of the sensor.
+    pub floor: f64,
+    /// Correlation with itself.
+    pub autocorrelation: Correlation,
+    /// Correlation with the torque.
+    pub with_torque: Correlation,
+}
+
+impl OutputResidual {
+    /// Residual over noise: 1 is right, from about 1.3 on the model misses something.
+    pub fn normalised(&self) -> f64 {
+        self.spread / self.floor
+    }
+
+    /// Whether it is noise. A fit leaves correlations of a few percent; with many rows they are
+    /// significant, and mean nothing.
+    pub fn is_white(&self) -> bool {
+        let (_, largest) = self.autocorrelation.largest();
+        self.autocorrelation.exceeding() <= 0.2 || largest.abs() < 0.1
+    }
+}
+
+/// Measured minus simulated outputs with their times, segment by segment.
+#[derive(Clone, Debug)]
+pub struct SegmentResidual {
+    /// Which run.
+    pub run: usize,
+    /// Times of the rows, s.
+    pub time: Vec<f64>,
+    /// Measured outputs.
+    pub measured: Vec<Vector3<f64>>,
+    /// Simulated outputs.
+    pub simulated: Vec<Vector3<f64>>,
+    /// Torque, N m.
+    pub torque: Vec<f64>,
+}
+
+/// What the fitted robot does, beside what was measured.
+pub fn simulated(task: &Task<'_>, estimate: &Estimate) -> Vec<SegmentResidual> {
+    let model = task.model(estimate.segments.clone());
+    let pairs = estimate.segments.iter().zip(&estimate.fit.initial);
+    pairs
+        .enumerate()
+        .map(|(index, (segment, initial))| {
+            let mut simulated = Vec::new();
+            model.simulate(index, &estimate.fit.parameters, initial, &mut simulated);
+            let rows = segment.first..segment.end;
+            let run: &Run = &task.runs[segment.run];
+            SegmentResidual {
+                run: segment.run,
+                time: run.time[rows.clone()].to_vec(),
+                measured: run.outputs[rows.clone()].to_vec(),
+                simulated,
+                torque: run.torque[rows].to_vec(),
+            }
+        })
+        .collect()
+}
+
+/// The residuals output by output.
+pub fn tests(
+    segments: &[SegmentResidual],
+    noise: Vector3<f64>,
+    floor: Vector3<f64>,
+) -> Vec<OutputResidual> {
+    let torque: Vec<Vec<f64>> = segments.iter().map(|s| s.torque.clone()).collect();
+    (0..OUTPUTS.len())
+        .filter(|output| {
+            let mut rows = segments.iter().flat_map(|segment| &segment.measured);
+            rows.any(|row| !row[*output].is_nan())
+        })
+        .map(|output| {
+            let residual = |segment: &SegmentResidual| {
+                let pairs = segment.measured.iter().zip(&segment.simulated);
+                pairs.map(|(m, s)| m[output] - s[output]).collect()
+            };
+            let pieces: Vec<Vec<f64>> = segments.iter().map(residual).collect();
+            OutputResidual {
+                spread: noise[output],
+                floor: floor[output],
+                autocorrelation: autocorrelation(&pieces, LAGS),
+                with_torque: cross_correlation(&pieces, &torque, LAGS),
+            }
+        })
+        .collect()
+}
+
+/// What a fit of a parameter that was held would change, to first order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScoreTest {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// The value that it was held at.
+    pub held: f64,
+    /// By how much the residuals want to change it.
+    pub change: f64,
+    /// Standard deviation of the change.
+    pub standard_deviation: f64,
+}
+
+/// From so many standard deviations on a score is no chance: of seven held parameters none reaches
+/// it in 99.9 % of the fits.
+const ALARM: f64 = 4.0;
+
+impl ScoreTest {
+    /// Whether the residuals ask for it.
+    pub fn is_alarm(&self) -> bool {
+        self.change.abs() > ALARM * self.standard_deviation
+    }
+}
+
+/// A score test (Rao 1948) of every parameter that was held. `noise` is that of the residuals, so
+/// a model that misses much asks for little by itself.
+pub fn score_tests(task: &Task<'_>, estimate: &Estimate) -> Vec<ScoreTest> {
+    let model: SegmentedRuns<'_> = task.model(estimate.segments.clone());
+    let unknowns = task.unknowns(&estimate.values, &model.coordinates);
+    let priors = task.priors(&model.coordinates);
+    let problem = task.problem(&model, &unknowns, &priors, estimate.noise);
+    let all: Vec<usize> = (0..Parameter::ALL.len()).collect();
+    let (parameters, initial) = (&estimate.fit.parameters, &estimate.fit.initial);
+    let reduced = problem.reduced(parameters, initial, &all);
+    let found = &estimate.fit.reduced.indices;
+    let bounds = model.coordinates.bounds(&estimate.values, task.physical);
+    let held = Parameter::ALL
+        .into_iter()
+        .filter(|parameter| !task.choices[*parameter].is_free());
+    held.filter_map(|parameter| {
+        let mut indices = found.clone();
+        indices.push(parameter.index());
+        let information = reduced
+            .information
+            .select_rows(&indices)
+            .select_columns(&indices);
+        let gradient = reduced.gradient.select_rows(&indices);
+        let covariance = crate::covariance::inverse(&information);
+        let last = indices.len() - 1;
+        let change = -(covariance.row(last) * gradient)[0];
+        let standard_deviation = covariance[(last, last)].sqrt();
+        let (lower, upper) = bounds[parameter];
+        let value = parameters[parameter.index()];
+        let possible = (change > 0.0 && value < upper) || (change < 0.0 && value > lower);
+        let finite = change.is_finite() && standard_deviation.is_finite();
+        (possible && finite).then_some(ScoreTest {
+            parameter,
+            held: value,
+            change,
+            standard_deviation,
+        })
+    })
+    .collect()
+}

@@ -1,0 +1,233 @@
+//! From numbers to verdicts. The one place of their limits.
+
+use super::Verdict;
+use crate::coordinates::LONGEST_DELAY;
+use crate::estimate::Status;
+use crate::identification::Identification;
+use crate::log::quantile;
+use crate::parameter::Parameter;
+use crate::residuals::{OUTPUTS, SegmentResidual};
+use crate::structures::{Structure, best};
+use lpvmpc_design::ShootingTermination;
+
+/// Residual over noise from which on a model misses something.
+const TOO_LARGE: f64 = 1.3;
+
+/// Residuals of a segment over the usual ones from which on it stands out. Chance gives 1.2 with a
+/// hundred rows.
+const STANDS_OUT: f64 = 3.0;
+
+/// A parameter known worse than this is weak.
+const WEAK: f64 = 0.1;
+
+/// What is asked of a good log.
+const WANTED: f64 = 0.05;
+
+/// A delay should be known to this, s.
+const VAGUE_DELAY: f64 = 2e-3;
+
+/// Held-back data may be explained so much worse, chi^2 per value.
+const HELD_BACK: f64 = 1.3;
+
+impl Identification {
+    /// All that is to be said, the gravest first.
+    pub fn verdicts(&self) -> Vec<Verdict> {
+        let mut verdicts = Vec::new();
+        self.judge_residuals(&mut verdicts);
+        self.judge_held(&mut verdicts);
+        self.judge_found(&mut verdicts);
+        self.judge_held_back(&mut verdicts);
+        let consistency = self.consistency();
+        // The range of tilts is that of the paper's constraints.
+        verdicts.push(if consistency.is_physical() {
+            Verdict::Physical
+        } else {
+            Verdict::Unphysical(consistency.to_string())
+        });
+        verdicts.sort_by_key(|verdict| std::cmp::Reverse(verdict.weight()));
+        verdicts
+    }
+
+    fn judge_residuals(&self, verdicts: &mut Vec<Verdict>) {
+        let termination = self.estimate.fit.termination;
+        if termination != ShootingTermination::Converged {
+            verdicts.push(Verdict::NotConverged(termination));
+        }
+        if self.estimate.segment < self.segment {
+            verdicts.push(Verdict::Shortened {
+                wanted: self.segment,
+                used: self.estimate.segment,
+            });
+        }
+        if !self.is_white() && self.has_few_segments() {
+            verdicts.push(Verdict::TooShort {
+                segments: self.estimate.segments.len(),
+                parameters: self.estimate.fit.reduced.indices.len(),
+            });
+        }
+        verdicts.extend(self.disturbed());
+        let mut noise = true;
+        for (output, residual) in OUTPUTS.into_iter().zip(&self.residuals) {
+            if residual.normalised() > TOO_LARGE {
+                noise = false;
+                verdicts.push(Verdict::ResidualTooLarge {
+                    output,
+                    normalised: residual.normalised(),
+                });
+            }
+            if !residual.is_white() {
+                let (lag, correlation) = residual.autocorrelation.largest();
+                verdicts.push(Verdict::Coloured {
+                    output,
+                    correlation,
+                    lag,
+                });
+            }
+        }
+        if noise {
+            let normalised = self.normalised_residual();
+            verdicts.push(Verdict::ResidualIsNoise { normalised });
+        }
+    }
+
+    /// The worst segment, if it stands out.
+    fn disturbed(&self) -> Option<Verdict> {
+        let spread = |segment: &SegmentResidual| {
+            let residuals = segment.measured.iter().zip(&segment.simulated);
+            let squares = residuals
+                .map(|(measured, simulated)| (measured - simulated).component_div(&self.floor))
+                .flat_map(|residual| [residual[0], residual[1], residual[2]])
+                .filter(|residual| !residual.is_nan())
+                .map(|residual| residual * residual);
+            let (sum, count) = squares.fold((0.0, 0.0), |(sum, count), s| (sum + s, count + 1.0));
+            (sum / f64::max(count, 1.0)).sqrt()
+        };
+        let spreads: Vec<f64> = self.simulated.iter().map(spread).collect();
+        let usual = quantile(&mut spreads.clone(), 0.5);
+        let worst = (0..spreads.len()).max_by(|a, b| spreads[*a].total_cmp(&spreads[*b]))?;
+        let segment = &self.simulated[worst];
+        let ratio = spreads[worst] / usual;
+        let ends = segment.time.first().zip(segment.time.last())?;
+        (ratio > STANDS_OUT).then_some(Verdict::Disturbed {
+            run: segment.run + 1,
+            time: (*ends.0, *ends.1),
+            ratio,
+        })
+    }
+
+    fn judge_held(&self, verdicts: &mut Vec<Verdict>) {
+        for score in self.scores.iter().filter(|score| score.is_alarm()) {
+            let significance = score.change.abs() / score.standard_deviation;
+            let (held, wanted) = (score.held, score.held + score.change);
+            verdicts.push(match score.parameter {
+                Parameter::Delay => Verdict::DelayAlarm {
+                    held,
+                    wanted,
+                    significance,
+                },
+                parameter => Verdict::HeldParameter {
+                    parameter,
+                    held,
+                    wanted,
+                    significance,
+                },
+            });
+        }
+    }
+
+    fn judge_found(&self, verdicts: &mut Vec<Verdict>) {
+        for parameter in Parameter::ALL {
+            match self.estimate.status[parameter] {
+                Status::Held => continue,
+                // Without delay, noise wants a negative one half of the time.
+                Status::AtBound
+                    if parameter == Parameter::Delay
+                        && self.estimate.values[parameter] < LONGEST_DELAY => {}
+                Status::AtBound => verdicts.push(Verdict::AtBound(parameter)),
+                Status::Found => verdicts.extend(self.judge_precision(parameter)),
+            }
+        }
+        for (i, one) in Parameter::ALL.into_iter().enumerate() {
+            for other in Parameter::ALL.into_iter().skip(i + 1) {
+                let correlation = self.correlation(one, other);
+                let vague = |parameter: Parameter| {
+                    let value = self.estimate.values[parameter].abs();
+                    exceeds(self.standard_deviation(parameter), WANTED * value)
+                };
+                // Two that are known well may be as correlated as they like.
+                if correlation.abs() > 0.98 && (vague(one) || vague(other)) {
+                    verdicts.push(Verdict::Correlated {
+                        one,
+                        other,
+                        correlation,
+                    });
+                }
+            }
+        }
+    }
+
+    fn judge_precision(&self, parameter: Parameter) -> Option<Verdict> {
+        let (value, deviation) = (
+            self.estimate.values[parameter],
+            self.standard_deviation(parameter),
+        );
+        match parameter {
+            Parameter::TiltOffset | Parameter::GyroBias | Parameter::TorqueBias => None,
+            Parameter::Delay => exceeds(deviation, VAGUE_DELAY).then_some(Verdict::VagueDelay {
+                standard_deviation: deviation,
+            }),
+            Parameter::RollingFriction | Parameter::DriveFriction | Parameter::DriveCoulomb => {
+                let (least, most) = self.interval(parameter);
+                (least <= 0.0 && most >= 0.0)
+                    .then_some(Verdict::IndistinctFromZero { parameter, most })
+            }
+            Parameter::B1 | Parameter::B2 | Parameter::B3 | Parameter::TorqueGain => {
+                let relative = (deviation / value).abs();
+                exceeds(relative, WEAK).then_some(Verdict::Weak {
+                    parameter,
+                    relative,
+                    factor: relative / WANTED,
+                })
+            }
+        }
+    }
+
+    fn judge_held_back(&self, verdicts: &mut Vec<Verdict>) {
+        let validation = match &self.validation {
+            None => return,
+            Some(Err(error)) => return verdicts.push(Verdict::NotJudged(error.to_string())),
+            Some(Ok(validation)) => validation,
+        };
+        let chi_square = validation.chi_square;
+        verdicts.push(if chi_square <= HELD_BACK {
+            Verdict::HeldBackGood { chi_square }
+        } else {
+            Verdict::HeldBackBad { chi_square }
+        });
+        let own = |structure: Structure| {
+            [
+                Parameter::RollingFriction,
+                Parameter::DriveFriction,
+                Parameter::DriveCoulomb,
+            ]
+            .into_iter()
+            .all(|friction| {
+                self.choices[friction].is_free() == structure.parameters().contains(&friction)
+            })
+        };
+        if let Some(best) = best(&self.structures)
+            && !own(best.structure)
+        {
+            verdicts.push(Verdict::OtherStructure {
+                structure: best.structure,
+                chi_square: best.validation.chi_square,
+                own: chi_square,
+            });
+        }
+    }
+}
+
+/// Whether a deviation is above a limit; one that is no number is.
+fn exceeds(deviation: f64, limit: f64) -> bool {
+    deviation.is_nan() || deviation > limit
+}

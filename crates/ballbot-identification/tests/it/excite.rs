@@ -1,0 +1,120 @@
+//! Designed excitation: limits are kept, and the expected precision is the precision.
+
+use crate::laboratory::healthy;
+use ballbot_identification::log::BallAngle;
+use ballbot_identification::{
+    ExcitationError, ExcitationTask, Parameter, Split, Task, Values, noise,
+};
+use fastrand::Rng;
+use nalgebra::Vector4;
+
+fn task() -> ExcitationTask {
+    let healthy = healthy();
+    let mut robot = Values([0.0; Parameter::ALL.len()]);
+    robot[Parameter::B1] = healthy.plant.b1;
+    robot[Parameter::B2] = healthy.plant.b2;
+    robot[Parameter::B3] = healthy.plant.b3;
+    robot[Parameter::RollingFriction] = healthy.plant.b4;
+    robot[Parameter::DriveFriction] = healthy.drive_friction;
+    robot[Parameter::TorqueGain] = healthy.torque_gain;
+    robot[Parameter::Delay] = 0.01;
+    ExcitationTask {
+        robot,
+        geometry: healthy.plant.geometry,
+        choices: Values::usual(),
+        band: (0.2, 6.0),
+        harmonics: 15,
+        amplitude: 1.0,
+        duration: 20.0,
+        tilt_limit: 0.2,
+        rate: 200.0,
+        noise: healthy.noise,
+        gain: None,
+        segment: 1.0,
+    }
+}
+
+#[test]
+fn the_tilt_limit_is_kept_and_the_torque_as_large_as_it_allows() {
+    let free = task().design().unwrap();
+    assert_eq!(free.amplitude, 1.0);
+    let most = free
+        .torque
+        .iter()
+        .fold(0.0_f64, |most, torque| most.max(torque.abs()));
+    assert!((most - 1.0).abs() < 1e-12);
+    assert!((free.torque[0], *free.time.last().unwrap()) == (0.0, 19.995));
+    let tight = ExcitationTask {
+        tilt_limit: 0.5 * free.tilt,
+        ..task()
+    };
+    let tight = tight.design().unwrap();
+    assert!(tight.tilt <= 0.5 * free.tilt && tight.tilt > 0.4 * free.tilt);
+    // Half the torque, twice the deviation.
+    let ratio = tight.standard_deviations[Parameter::B1] / free.standard_deviations[Parameter::B1];
+    assert!((ratio * tight.amplitude - 1.0).abs() < 0.05, "{ratio}");
+}
+
+#[test]
+fn the_expected_precision_is_that_of_the_fit() {
+    let task = task();
+    let excitation = task.design().unwrap();
+    // The laboratory plays the designed torque, with the gains that the design counted on.
+    let laboratory = crate::laboratory::Laboratory {
+        delay: 0.01,
+        ..healthy()
+    };
+    let run = laboratory.play(&excitation.torque, &excitation.gain, &mut Rng::with_seed(1));
+    let runs = [run.run];
+    let fit = Task {
+        runs: &runs,
+        ball_angle: BallAngle::Inertial,
+        geometry: task.geometry,
+        choices: task.choices,
+        physical: true,
+        segment: task.segment,
+        noise: [None; 3],
+    };
+    let split = Split::new(&runs, 0.0);
+    let floor = noise::floor(&runs);
+    let estimate = fit.estimate(&split.fitted, floor, &|_| {}).unwrap();
+    for parameter in Parameter::ALL {
+        let index = parameter.index();
+        let (expected, found) = (
+            excitation.standard_deviations[parameter],
+            estimate.covariance[(index, index)].sqrt(),
+        );
+        // The loop of the laboratory answers to noise, so it excites a little more.
+        assert!(
+            found <= 1.1 * expected && found >= 0.6 * expected,
+            "{parameter}: {found} for {expected}"
+        );
+    }
+    assert!(run.largest_tilt < 1.2 * excitation.tilt);
+}
+
+#[test]
+fn what_cannot_be_done_is_said() {
+    let refused = |change: fn(&mut ExcitationTask)| {
+        let mut task = task();
+        change(&mut task);
+        task.design().unwrap_err()
+    };
+    let message = refused(|task| task.band = (0.2, 150.0)).to_string();
+    assert!(
+        message.contains("the highest frequency is 150") && message.contains("100 Hz"),
+        "{message}"
+    );
+    let message = refused(|task| task.duration = 5.0).to_string();
+    assert!(
+        message.contains("the length is 5") && message.contains("10.0 s"),
+        "{message}"
+    );
+    let message = refused(|task| task.amplitude = f64::NAN).to_string();
+    assert!(message.contains("the torque is NaN"), "{message}");
+    let unstable = refused(|task| task.gain = Some(Vector4::zeros()));
+    assert!(
+        matches!(unstable, ExcitationError::Unstable { .. }),
+        "{unstable}"
+    );
+}

@@ -1,0 +1,11 @@
+//! Identification of simulated robots whose truth is known.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on must fail, in its support functions too"
+)]
+
+mod accuracy;
+mod chain;
+mod excite;
+mod laboratory;
+mod malformed;

@@ -1,0 +1,133 @@
+//! The normal equations of one segment: its initial state beside the parameters.
+
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+
+use super::{ShootingModel, ShootingProblem};
+
+/// Differences are taken over this part of a scale: the truncation, about this part of the slope,
+/// and the rounding, 1e-16 / 1e-6 of the value, are then both far below the noise of any data.
+const DIFFERENCE: f64 = 1e-6;
+
+/// Gauss-Newton normal equations of chi^2 / 2 of one segment, in (initial state, parameters).
+#[derive(Debug, Clone)]
+pub(super) struct Block<const NX: usize> {
+    states: SMatrix<f64, NX, NX>,
+    /// NX x parameters.
+    mixed: DMatrix<f64>,
+    parameters: DMatrix<f64>,
+    state_gradient: SVector<f64, NX>,
+    parameter_gradient: DVector<f64>,
+}
+
+impl<const NX: usize> Block<NX> {
+    /// Sensitivities by forward differences of whole simulations.
+    pub(super) fn new<M, const NY: usize>(
+        problem: &ShootingProblem<'_, M, NX, NY>,
+        segment: usize,
+        parameters: &[f64],
+        initial: &SVector<f64, NX>,
+        indices: &[usize],
+    ) -> Self
+    where
+        M: ShootingModel<NX, NY>,
+    {
+        let measured = problem.model.measured(segment);
+        let rows = measured.len();
+        let simulate = |parameters: &[f64], initial: &SVector<f64, NX>| {
+            let mut outputs = Vec::with_capacity(rows);
+            problem
+                .model
+                .simulate(segment, parameters, initial, &mut outputs);
+            outputs
+        };
+        let base = simulate(parameters, initial);
+        let columns = NX + indices.len();
+        // The last column is the residual.
+        let mut jacobian = DMatrix::zeros(rows * NY, columns + 1);
+        let mut fill = |column: usize, moved: &[SVector<f64, NY>], step: f64| {
+            let mut target = jacobian.column_mut(column);
+            for (row, (moved, base)) in moved.iter().zip(&base).enumerate() {
+                for output in 0..NY {
+                    if !measured[row][output].is_nan() {
+                        target[row * NY + output] =
+                            (moved[output] - base[output]) / (step * problem.noise[output]);
+                    }
+                }
+            }
+        };
+        for state in 0..NX {
+            let mut moved = *initial;
+            moved[state] += DIFFERENCE * problem.state_scale[state];
+            let step = moved[state] - initial[state];
+            fill(state, &simulate(parameters, &moved), step);
+        }
+        let mut moved = parameters.to_vec();
+        for (place, &index) in indices.iter().enumerate() {
+            let unknown = &problem.unknowns[index];
+            // Away from an upper bound, so that no bound is left.
+            let wanted = DIFFERENCE * unknown.scale;
+            let up = parameters[index] + wanted <= unknown.upper;
+            moved[index] += if up { wanted } else { -wanted };
+            let step = moved[index] - parameters[index];
+            fill(NX + place, &simulate(&moved, initial), step);
+            moved[index] = parameters[index];
+        }
+        // (simulated + 1) - simulated, with the measured value as what it is moved to.
+        fill(columns, measured, -1.0);
+        Self::from_normal_equations(&jacobian.tr_mul(&jacobian), indices.len())
+    }
+
+    /// From [J F]'[J F] with the columns (states, parameters, residual).
+    fn from_normal_equations(square: &DMatrix<f64>, n: usize) -> Self {
+        let last = NX + n;
+        Self {
+            states: square.fixed_view::<NX, NX>(0, 0).into_owned(),
+            mixed: square.view((0, NX), (NX, n)).into_owned(),
+            parameters: square.view((NX, NX), (n, n)).into_owned(),
+            state_gradient: square.fixed_view::<NX, 1>(0, last).into_owned(),
+            parameter_gradient: square.view((NX, last), (n, 1)).column(0).into_owned(),
+        }
+    }
+
+    /// The inverse of the states' block with its diagonal raised by `damping`.
+    ///
+    /// The damping is relative, so what no output tells of a state needs an absolute part too.
+    fn inverse_states(&self, damping: f64) -> SMatrix<f64, NX, NX> {
+        let mut states = self.states;
+        for i in 0..NX {
+            states[(i, i)] += damping * states[(i, i)];
+            if states[(i, i)] == 0.0 {
+                states[(i, i)] = 1.0;
+            }
+        }
+        states
+            .cholesky()
+            .map_or_else(SMatrix::zeros, |factor| factor.inverse())
+    }
+
+    /// Information and gradient in the parameters, the state eliminated (Schur complement). The
+    /// parameters' own diagonal is raised by `damping`, too.
+    pub(super) fn eliminated(&self, damping: f64) -> (DMatrix<f64>, DVector<f64>) {
+        let inverse = self.inverse_states(damping);
+        let gain = self.mixed.tr_mul(&inverse);
+        let mut information = &self.parameters - &gain * &self.mixed;
+        for i in 0..information.nrows() {
+            information[(i, i)] += damping * self.parameters[(i, i)];
+        }
+        (
+            information,
+            &self.parameter_gradient - gain * self.state_gradient,
+        )
+    }
+
+    /// By how much the state's own undamped step lowers chi^2 of the quadratic model.
+    pub(super) fn state_gain(&self) -> f64 {
+        let step = self.inverse_states(0.0) * self.state_gradient;
+        self.state_gradient.dot(&step)
+    }
+
+    /// The state's step that belongs to a step of the parameters.
+    pub(super) fn state_step(&self, step: &DVector<f64>, damping: f64) -> SVector<f64, NX> {
+        -self.inverse_states(damping) * (self.state_gradient + &self.mixed * step)
+    }
+}
