@@ -3,7 +3,7 @@
 use crate::commands::{
     bench::BenchArguments, completions::CompletionsArguments, linearize::LinearizeArguments,
     lqr::LqrArguments, refine::RefineArguments, reproduce::ReproduceArguments,
-    scenario::ScenarioArguments, simulate::SimulateArguments,
+    scenario::ScenarioArguments, simulate::SimulateArguments, view::ViewArguments,
 };
 use clap::{Parser, Subcommand};
 
@@ -45,6 +45,8 @@ pub enum Command {
     Linearize(LinearizeArguments),
     /// Design a linear-quadratic regulator u = -K x and check it at frozen scheduling
     Lqr(LqrArguments),
+    /// Serve the ballbot in the browser, to this machine only
+    View(ViewArguments),
     /// Print the completions for a shell
     Completions(CompletionsArguments),
 }

@@ -33,6 +33,7 @@ pub fn run(arguments: Arguments) -> Result<String, CommandError> {
         Command::Refine(arguments) => commands::refine::run(&arguments),
         Command::Linearize(arguments) => commands::linearize::run(&arguments),
         Command::Lqr(arguments) => commands::lqr::run(&arguments),
+        Command::View(arguments) => commands::view::run(&arguments),
         Command::Completions(arguments) => commands::completions::run(&arguments),
     }
 }

@@ -32,6 +32,8 @@ mod prepare;
 mod reference;
 mod run;
 mod schema;
+mod session;
+pub mod words;
 mod world;
 mod world_table;
 
@@ -48,6 +50,7 @@ pub use schema::{
     ModelKind, ParameterTable, PointTable, PredictorTable, ReferenceTable, Scenario, SineTable,
     StateTable, TerminalTable,
 };
+pub use session::{Phase, Session, Trouble};
 pub use world::{PlaneWorld, Robot};
 pub use world_table::{
     ActuatorTable, AngleSensorTable, DelayTable, FloorTable, PlaneName, PushTable, RateSensorTable,

@@ -9,6 +9,7 @@ pub mod refine;
 pub mod reproduce;
 pub mod scenario;
 pub mod simulate;
+pub mod view;
 
 use crate::figures::FigureError;
 use crate::input::InputError;
@@ -47,6 +48,9 @@ pub enum CommandError {
     /// The plant cannot be integrated.
     #[error(transparent)]
     Plant(#[from] PlantError),
+    /// The page cannot be served.
+    #[error(transparent)]
+    View(#[from] view::ViewError),
     /// A figure that cannot be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),

@@ -1,0 +1,23 @@
+// What a first visit loads, compressed; fails above the limits that the page promises.
+import { readdirSync, readFileSync } from "node:fs";
+import { dirname, join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { gzipSync } from "node:zlib";
+
+const LIMITS_KB = { wasm: 150, all: 400 };
+
+const dist = join(dirname(dirname(fileURLToPath(import.meta.url))), "dist");
+const files = readdirSync(dist, { recursive: true, withFileTypes: true }).filter((f) => f.isFile());
+const sizes = files.map((file) => {
+  const bytes = gzipSync(readFileSync(join(file.parentPath, file.name)), { level: 9 }).length;
+  return { name: file.name, kB: bytes / 1000 };
+});
+sizes.push({ name: "all", kB: sizes.reduce((sum, { kB }) => sum + kB, 0) });
+let over = false;
+for (const { name, kB } of sizes) {
+  const limit = name.endsWith(".wasm") ? LIMITS_KB.wasm : name === "all" ? LIMITS_KB.all : Infinity;
+  const exceeded = kB > limit;
+  over ||= exceeded;
+  console.log(`${kB.toFixed(1).padStart(7)} kB  ${name}${exceeded ? `  (above ${limit} kB)` : ""}`);
+}
+process.exitCode = over ? 1 : 0;
