@@ -85,7 +85,7 @@ export class App implements Source {
   }
 
   private async configure(setup: Scenario, robots: RobotKind[], keep: boolean): Promise<void> {
-    const setups = robots.map((robot) => ({ label: robot.label, toml: toToml(robot.derive(setup)) }));
+    const setups = robots.map((robot) => ({ label: robot.label, setup: robot.derive(setup) }));
     const planes = this.planes;
     const facts = await this.engine.call({ kind: "configure", robots: setups, keep });
     this.playback?.stop();

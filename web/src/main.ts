@@ -24,7 +24,7 @@ const TRAIL = 25;
 /** Points of a trail. */
 const TRAIL_POINTS = 700;
 /** Tilt rate per length of the dragged arrow, rad/s per m. */
-const PUSH_PER_METRE = 2;
+const PUSH_PER_METRE = 20;
 const SPEEDS: [number, string][] = [[1, "1\u00d7"], [0.5, "\u00bd\u00d7"], [0.25, "\u00bc\u00d7"], [0.1, "0.1\u00d7"], [0.02, "0.02\u00d7"]];
 const HINTS: Record<Tool, string> = {
   target: "Click or drag on the floor: the robot goes there. Drag the robot: a push. Right button or two fingers: camera.",
@@ -135,6 +135,11 @@ function radius(): number {
   return app.setup.parameters.ball_radius_m;
 }
 
+/** The way on the floor for an angle of the ball, to the millimetre. */
+function metres(phi: number): number {
+  return Math.round(phi * radius() * 1000) / 1000;
+}
+
 function robotPoint(): FloorPoint {
   const history = app.histories[0];
   if (!history) return { x: 0, y: 0 };
@@ -213,7 +218,7 @@ function showWords(): void {
   if (alertBox.textContent !== text) alertBox.textContent = text;
   alertBox.hidden = text === "";
   const target = app.histories[0];
-  if (target) panel?.showTarget(target.nowAt(0, 5) * radius(), target.planes === 2 ? target.nowAt(1, 5) * radius() : 0);
+  if (target) panel?.showTarget(metres(target.nowAt(0, 5)), target.planes === 2 ? metres(target.nowAt(1, 5)) : 0);
 }
 
 let lastSlow = 0;

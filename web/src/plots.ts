@@ -5,6 +5,16 @@ import "uplot/dist/uPlot.min.css";
 import type { History } from "./history";
 import { ROW } from "./protocol";
 import type { Range, Scenario } from "./scenario";
+import { medianStep } from "./status";
+
+/** At most three powers of ten, evenly spaced. */
+function decades(low: number, high: number): number[] {
+  const [from, to] = [Math.round(Math.log10(low)), Math.round(Math.log10(high))];
+  const step = Math.max(Math.ceil((to - from) / 3), 1);
+  const made: number[] = [];
+  for (let exponent = from; exponent <= to; exponent += step) made.push(10 ** exponent);
+  return made;
+}
 
 /** What a strip shows. */
 interface Strip {
@@ -142,7 +152,10 @@ export class Plots {
       },
       axes: [
         { show: true, size: last ? 24 : 0, stroke: ink, font, grid: { stroke: faint, width: 1 }, ticks: { show: false }, ...(last ? {} : { values: () => [] }) },
-        { size: AXIS_WIDTH, stroke: ink, font, grid: { stroke: faint, width: 1 }, ticks: { show: false }, space: 26 },
+        {
+          size: AXIS_WIDTH, stroke: ink, font, grid: { stroke: faint, width: 1 }, ticks: { show: false }, space: 26,
+          ...(strip.logarithmic ? { splits: (_chart: uPlot, _axis: number, low: number, high: number) => decades(low, high), filter: (_chart: uPlot, splits: number[]) => splits, values: (_chart: uPlot, splits: number[]) => splits.map((value) => value.toExponential(0).replace("e+", "e")) } : {}),
+        },
       ],
       hooks: {
         drawClear: [(chart) => this.shadeBounds(chart, strip)],
@@ -169,6 +182,8 @@ export class Plots {
       from = Math.min(from, value);
       to = Math.max(to, value);
     }
+    // A rare long step, when the machine was busy, may leave the strip.
+    if (strip.column === ROW.stepMicroseconds) to = Math.min(to, 4 * this.usualStep());
     if (strip.fromZero) return [0, Math.max(to * 1.1, strip.least)];
     const middle = (from + to) / 2;
     const half = Math.max(((to - from) / 2) * 1.1, strip.least);
@@ -184,6 +199,10 @@ export class Plots {
       const values = Array.from({ length: states.length / 4 }, (_, i) => states[4 * i + component] ?? 0);
       return [Math.min(...values), Math.max(...values)].filter(Number.isFinite);
     });
+  }
+
+  private usualStep(): number {
+    return Math.max(...this.shown.map(({ history }) => medianStep(history)).filter(Number.isFinite), 1);
   }
 
   private planeOf(history: History): number {

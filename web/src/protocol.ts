@@ -11,7 +11,7 @@ export interface Preset {
 /** One robot of a run. */
 export interface RobotSetup {
   label: string;
-  toml: string;
+  setup: Scenario;
 }
 
 /** A push on the body in one instant: change of the tilt's rate in each plane, rad/s. */

@@ -2,7 +2,8 @@
 
 import init, { Simulation, presets, scenario } from "./generated/ballbot_web.js";
 import wasmUrl from "./generated/ballbot_web_bg.wasm?url";
-import type { Batch, Call, FromWorker, RobotBatch, RobotFacts, ToWorker } from "./protocol";
+import { parse } from "smol-toml";
+import type { Batch, Call, FromWorker, RobotBatch, RobotFacts, RobotSetup, ToWorker } from "./protocol";
 import { Recorder } from "./recorder";
 
 interface Robot {
@@ -92,14 +93,14 @@ function tick(): void {
   setTimeout(tick, TICK);
 }
 
-function configure(setups: { label: string; toml: string }[], keep: boolean): RobotFacts[] {
+function configure(setups: RobotSetup[], keep: boolean): RobotFacts[] {
   const next: Robot[] = [];
   try {
-    for (const [index, { label, toml }] of setups.entries()) {
+    for (const [index, { label, setup }] of setups.entries()) {
       const before = keep ? robots[index] : undefined;
       const simulation = before
-        ? before.simulation.reconfigured(toml)
-        : new Simulation(toml);
+        ? before.simulation.reconfigured(setup)
+        : new Simulation(setup);
       next.push({ label, simulation, recorder: before?.recorder ?? new Recorder() });
     }
   } catch (error) {
@@ -112,6 +113,7 @@ function configure(setups: { label: string; toml: string }[], keep: boolean): Ro
   if (!keep) {
     restarted = true;
     completed = false;
+    running = false;
     clock = 0;
   }
   // After the answer, which tells the page how many robots there are.
@@ -130,7 +132,7 @@ function answer(call: Call): unknown {
     case "presets":
       return presets().map(({ name, text }) => ({ name, text }));
     case "parse":
-      return scenario(call.toml);
+      return scenario(parse(call.toml));
     case "configure":
       return configure(call.robots, call.keep);
     case "step":

@@ -58,7 +58,7 @@ test("a recorded run is played back", async ({ page }) => {
 });
 
 const BROKEN: [name: string, text: string, message: string][] = [
-  ["broken.toml", "title = ", "not a valid scenario"],
+  ["broken.toml", "title = ", "Invalid TOML"],
   ["unknown.toml", "titel = 'x'", "unknown field"],
   ["broken.csv", "t_s,phi_rad\n0,1\n", "theta_rad"],
   ["letters.csv", "t_s,phi_rad,theta_rad,phi_dot_rad_s,theta_dot_rad_s,torque_nm,phi_ref_rad\n0,0,0,0,0,0,0\n1,x,0,0,0,0,0\n2,0,0,0,0,,0\n", "line 3"],

@@ -88,7 +88,7 @@ test("a push within the limits is survived", async ({ page }) => {
   await open(page);
   await page.locator("#play").click();
   await until(page, 0.5);
-  await fill(page, "Push", "0.8");
+  await fill(page, "Push", "6");
   await page.getByRole("button", { name: "\u2192" }).click();
   await until(page, 6);
   await expect(page.locator("#alert")).toBeHidden();
@@ -101,7 +101,7 @@ test("a push that is too large ends on the floor, with the reason", async ({ pag
   await open(page);
   await page.locator("#play").click();
   await until(page, 0.5);
-  await fill(page, "Push", "9");
+  await fill(page, "Push", "70");
   await page.getByRole("button", { name: "\u2192" }).click();
   await expect(page.locator("#alert")).toContainText("the robot has fallen: theta", { timeout: 30_000 });
   await expect(page.locator("#alert")).toContainText("LPV MPC");
@@ -113,7 +113,7 @@ test("in an ideal world a controller without a plan gives up, and says which bou
   await scenario(page, "tight-bounds");
   await page.locator("#play").click();
   await until(page, 0.2);
-  await fill(page, "Push", "4");
+  await fill(page, "Push", "40");
   await page.getByRole("button", { name: "\u2192" }).click();
   await expect(page.locator("#alert")).toContainText(/no plan at t = .* s: infeasible: .* bound of .* cannot be met/);
 });

@@ -84,7 +84,7 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError::Syntax`] with line and column.
     pub fn parse(text: &str, origin: &str) -> Result<Self, ScenarioError> {
-        read(text).map_err(|error| ScenarioError::Syntax {
+        toml::from_str(text).map_err(|error| ScenarioError::Syntax {
             origin: origin.to_owned(),
             message: error.to_string(),
         })
@@ -186,19 +186,6 @@ impl Scenario {
             })
             .collect()
     }
-}
-
-#[cfg(not(target_family = "wasm"))]
-fn read(text: &str) -> Result<Scenario, toml::de::Error> {
-    toml::from_str(text)
-}
-
-/// In two steps: a WebAssembly module becomes smaller by a third, and the message about an
-/// unknown key names its table instead of its line.
-#[cfg(target_family = "wasm")]
-fn read(text: &str) -> Result<Scenario, toml::de::Error> {
-    let table: toml::Table = text.parse()?;
-    table.try_into()
 }
 
 /// A run of more samples would not fit in memory with its record.

@@ -2,6 +2,8 @@
 //! in [`ballbot_scenario`]. Angles in rad, rates in rad/s, torque in N m, times in s. Errors
 //! are messages for people.
 
+mod from_js;
+
 use ballbot_scenario::{Phase, PhiReference, PointTable, Prepared, Scenario, Session, builtin};
 use std::path::Path;
 use std::time::Duration;
@@ -17,15 +19,13 @@ fn clock() -> Duration {
     Duration::from_secs_f64(milliseconds() / 1e3)
 }
 
-/// What the text of a scenario file is called in messages.
-const ORIGIN: &str = "the set-up";
-
-fn parse(toml: &str) -> Result<Scenario, String> {
-    Scenario::parse(toml, ORIGIN).map_err(|error| error.to_string())
+fn read(setup: JsValue) -> Result<Scenario, String> {
+    let scenario = from_js::from_js(setup);
+    scenario.map_err(|error| format!("this is not a valid scenario:\n{error}"))
 }
 
-fn prepare(toml: &str) -> Result<Prepared, String> {
-    let prepared = parse(toml)?.prepare(Path::new(""));
+fn prepare(setup: JsValue) -> Result<Prepared, String> {
+    let prepared = read(setup)?.prepare(Path::new(""));
     prepared.map_err(|error| error.to_string())
 }
 
@@ -50,14 +50,17 @@ pub fn presets() -> Vec<Preset> {
         .collect()
 }
 
-/// The scenario of a TOML text as an object with the keys of the file, all checks passed.
+/// A scenario, as an object with the keys of its file: all checks passed, all defaults written
+/// out.
 ///
 /// # Errors
-/// What is wrong with the text or a value.
+/// What is wrong with a key or a value.
 #[wasm_bindgen]
-pub fn scenario(toml: &str) -> Result<JsValue, String> {
-    prepare(toml)?;
-    serde_wasm_bindgen::to_value(&parse(toml)?).map_err(|error| error.to_string())
+pub fn scenario(setup: JsValue) -> Result<JsValue, String> {
+    let scenario = read(setup)?;
+    let prepared = scenario.prepare(Path::new(""));
+    prepared.map_err(|error| error.to_string())?;
+    serde_wasm_bindgen::to_value(&scenario).map_err(|error| error.to_string())
 }
 
 /// A robot in its world, stepped from outside.
@@ -68,13 +71,13 @@ pub struct Simulation {
 
 #[wasm_bindgen]
 impl Simulation {
-    /// The scenario of a TOML text at time zero.
+    /// A scenario, an object with the keys of its file, at time zero.
     ///
     /// # Errors
-    /// What is wrong with the text or a value.
+    /// What is wrong with a key or a value.
     #[wasm_bindgen(constructor)]
-    pub fn new(toml: &str) -> Result<Simulation, String> {
-        let session = Session::new(prepare(toml)?).map_err(|error| error.to_string())?;
+    pub fn new(setup: JsValue) -> Result<Simulation, String> {
+        let session = Session::new(prepare(setup)?).map_err(|error| error.to_string())?;
         Ok(Self { session })
     }
 
@@ -82,8 +85,8 @@ impl Simulation {
     ///
     /// # Errors
     /// As the constructor; this simulation stays as it is.
-    pub fn reconfigured(&self, toml: &str) -> Result<Simulation, String> {
-        let session = self.session.reconfigured(prepare(toml)?);
+    pub fn reconfigured(&self, setup: JsValue) -> Result<Simulation, String> {
+        let session = self.session.reconfigured(prepare(setup)?);
         Ok(Self {
             session: session.map_err(|error| error.to_string())?,
         })

@@ -22,7 +22,10 @@ function row(spec: FieldSpec, ...controls: HTMLElement[]): HTMLElement {
   const id = `field-${count++}`;
   const label = element("label", { textContent: spec.label, htmlFor: id });
   if (controls[0]) controls[0].id = id;
-  for (const extra of controls.slice(1)) extra.setAttribute("aria-label", `${spec.label}, ${extra.getAttribute("aria-label") ?? "slider"}`);
+  for (const control of controls) {
+    const part = control.getAttribute("aria-label");
+    if (part !== null) control.setAttribute("aria-label", `${spec.label}, ${part}`);
+  }
   const line = element("div", { className: "field" }, label, ...controls);
   if (spec.unit) line.append(element("span", { className: "unit", textContent: spec.unit }));
   if (spec.title) line.title = spec.title;
@@ -32,6 +35,16 @@ function row(spec: FieldSpec, ...controls: HTMLElement[]): HTMLElement {
 /** Text of a number field; an infinite bound is an empty field. */
 function shown(value: number): string {
   return Number.isFinite(value) ? String(Number(value.toPrecision(6))) : "";
+}
+
+/** Whether somebody is in the middle of typing into a field, which then must not be set. */
+class Typing {
+  now = false;
+
+  constructor(input: HTMLInputElement) {
+    input.addEventListener("input", () => (this.now = true));
+    for (const done of ["change", "blur"]) input.addEventListener(done, () => (this.now = false));
+  }
 }
 
 export interface NumberSpec extends FieldSpec {
@@ -54,6 +67,8 @@ export function numberField(spec: NumberSpec, changed: (value: number) => void):
   const input = element("input", { type: "number", inputMode: "decimal", step: "any" });
   const slides = spec.min !== undefined && spec.max !== undefined;
   const slider = element("input", { type: "range", step: String(spec.step ?? "any") });
+  slider.setAttribute("aria-label", "slider");
+  const typing = new Typing(input);
   const toSlider = (value: number) => (spec.logarithmic ? Math.log10(Math.max(value, 1e-9)) : value);
   if (slides) {
     slider.min = String(toSlider(spec.min ?? 0));
@@ -76,7 +91,7 @@ export function numberField(spec: NumberSpec, changed: (value: number) => void):
   return {
     element: slides ? row(spec, input, slider) : row(spec, input),
     set(value) {
-      if (document.activeElement !== input) input.value = shown(value);
+      if (!typing.now) input.value = shown(value);
       if (document.activeElement !== slider) slider.value = String(toSlider(value));
     },
   };
@@ -90,6 +105,7 @@ export function rangeField(spec: FieldSpec, changed: (value: [number, number]) =
     return input;
   };
   const [lower, upper] = [make("lower bound"), make("upper bound")];
+  const typing = [new Typing(lower), new Typing(upper)] as const;
   const read = (input: HTMLInputElement, empty: number) => (input.value.trim() === "" ? empty : Number(input.value));
   for (const input of [lower, upper]) {
     input.addEventListener("change", () => changed([read(lower, -Infinity), read(upper, Infinity)]));
@@ -97,8 +113,8 @@ export function rangeField(spec: FieldSpec, changed: (value: [number, number]) =
   return {
     element: row(spec, lower, upper),
     set([low, high]) {
-      if (document.activeElement !== lower) lower.value = shown(low);
-      if (document.activeElement !== upper) upper.value = shown(high);
+      if (!typing[0].now) lower.value = shown(low);
+      if (!typing[1].now) upper.value = shown(high);
     },
   };
 }

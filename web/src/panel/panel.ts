@@ -24,6 +24,12 @@ const RAD_PER_DEG = Math.PI / 180;
 /** The largest number of sub-steps the slider offers; the field takes any. */
 const SUBSTEPS = 8;
 
+function licences(): HTMLElement {
+  const link = document.createElement("a");
+  [link.href, link.textContent, link.className] = ["./licences.txt", "Licences", "note licences"];
+  return link;
+}
+
 export class Panel {
   private readonly shows: Show[] = [];
   private readonly presetField: Field<string>;
@@ -31,7 +37,7 @@ export class Panel {
   private chosen: string[] = [];
   private initialTerminal: Terminal = "discrete_riccati";
   private targetFields: [Field<number>, Field<number>];
-  private pushBy = 0.6;
+  private pushBy = 5;
   private target = { x: 0, y: 0 };
 
   constructor(host: HTMLElement, presets: [name: string, title: string][], private readonly actions: PanelActions) {
@@ -47,6 +53,7 @@ export class Panel {
       section("Controller", true, ...this.controller()),
       section("Bounds", false, ...this.bounds()),
       section("World", false, ...this.world(), note("The controller knows nothing of these. With any of them set, a controller without a plan goes on with its best guess; in an ideal world it gives up.")),
+      licences(),
     );
   }
 
@@ -79,7 +86,7 @@ export class Panel {
   }
 
   private pushes(): HTMLElement[] {
-    const strength = numberField({ label: "Push", unit: "rad/s", title: "Change of the tilt rate at once", min: 0.1, max: 4, step: 0.1 }, (value) => {
+    const strength = numberField({ label: "Push", unit: "rad/s", title: "Change of the tilt rate at once", min: 0.5, max: 40, step: 0.5 }, (value) => {
       this.pushBy = value;
     });
     strength.set(this.pushBy);
@@ -110,7 +117,7 @@ export class Panel {
     const q = names.map((name, i) => this.number(`controller.q.${i}`, { label: `Q ${name}`, min: 0.01, max: 10000, logarithmic: true }));
     return [
       this.number("controller.horizon", { label: "Horizon N", unit: "samples", min: 1, max: 200, step: 1 }),
-      this.number("controller.t_s", { label: "Sampling time", unit: "ms", factor: 1e-3, min: 1, max: 100, logarithmic: true }),
+      this.number("controller.t_s", { label: "Sampling t_s", unit: "ms", factor: 1e-3, min: 1, max: 100, logarithmic: true }),
       ...q,
       this.number("controller.r", { label: "R", min: 1, max: 100000, logarithmic: true }),
       this.terminal(),
@@ -175,7 +182,7 @@ export class Panel {
       factor("b2", "b2 factor"),
       factor("b3", "b3 factor"),
       factor("b4", "b4 factor"),
-      factor("centre_of_mass", "Mass height factor"),
+      factor("centre_of_mass", "l factor"),
       this.number("world.actuator.limit_nm", { label: "Motor limit", unit: "N m", whenEmpty: Infinity, absent: Infinity }),
       this.number("world.seed", { label: "Seed", title: "The same seed, the same noise" }),
     ];

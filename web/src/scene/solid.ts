@@ -10,6 +10,8 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Robot, toScene } from "./robot";
 import type { FloorPoint, Picture, RobotPicture, Shape, Theme, View } from "./view";
 
+/** How fast the camera goes after the robots, 1/s. */
+const FOLLOW_RATE = 3.5;
 const HALF = 12;
 const LINE_POINTS = 2048;
 const PLAN_POINTS = 256;
@@ -228,7 +230,8 @@ export class SolidView implements View {
   /** Camera, light and grid move along with the robots. */
   private follow(point: FloorPoint): void {
     const goal = toScene(point.x, point.y);
-    const step = goal.sub(this.followed).multiplyScalar(0.06);
+    const elapsed = Math.min((performance.now() - this.lastFrame) / 1000, 0.2);
+    const step = goal.sub(this.followed).multiplyScalar(1 - Math.exp(-elapsed * FOLLOW_RATE));
     this.followed.add(step);
     this.camera.position.add(step);
     this.controls.target.add(step);
