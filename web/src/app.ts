@@ -78,7 +78,8 @@ export class App implements Source {
         return true;
       } catch (error) {
         this.events.message(text(error), "error");
-        this.events.setup();
+        // Fields show what holds, not what was refused.
+        if (this.facts.length > 0) this.events.setup();
         return false;
       }
     });
