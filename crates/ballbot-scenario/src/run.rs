@@ -75,8 +75,6 @@ impl Prepared {
         let period = plane.world.settings.period;
         // In a browser the longest horizon must do for all: the time per step follows the horizon
         // that is used, and every size is code that has to be loaded.
-        // In a browser the longest horizon must do for all: the time per step follows the horizon
-        // that is used, and every size is code that has to be loaded.
         let regulator = match (self.settings.horizon, self.feedback.is_plain()) {
             #[cfg(not(target_family = "wasm"))]
             (..=20, true) => self.state_feedback::<20, 24>(),

@@ -5,6 +5,7 @@ use crate::error::ScenarioError;
 use crate::prepare::{Plane, Prepared};
 use crate::reference::PhiReference;
 use crate::run::PlaneLoop;
+use crate::schema::PointTable;
 use crate::words;
 use lpvmpc::Status;
 use lpvmpc_sim::{Disturbance, Ending, Sample, WorldError};
@@ -276,7 +277,7 @@ impl Session {
     pub fn set_targets(&mut self, targets: &[f64]) {
         let time_s = self.time();
         for (plane, phi_rad) in self.prepared.planes.iter_mut().zip(targets) {
-            let point = crate::schema::PointTable {
+            let point = PointTable {
                 time_s,
                 phi_rad: *phi_rad,
             };
@@ -309,7 +310,7 @@ impl Session {
         }
     }
 
-    /// The planes with their references.
+    /// The planes, with what they have to follow.
     pub fn planes(&self) -> &[Plane] {
         &self.prepared.planes
     }
@@ -342,15 +343,15 @@ fn shifted(ending: Ending, origin: f64) -> Ending {
 /// What is left of a push at the time `now`, on a clock that begins there.
 fn after(push: &Disturbance<4, 2>, now: f64) -> Option<Disturbance<4, 2>> {
     match *push {
-        Disturbance::Jump { time, change } => (time >= now).then(|| Disturbance::Jump {
+        Disturbance::Jump { time, change } => (time >= now).then_some(Disturbance::Jump {
             time: time - now,
             change,
         }),
-        Disturbance::Impulse { time, impulse } => (time >= now).then(|| Disturbance::Impulse {
+        Disturbance::Impulse { time, impulse } => (time >= now).then_some(Disturbance::Impulse {
             time: time - now,
             impulse,
         }),
-        Disturbance::Load { from, until, load } => (until > now).then(|| Disturbance::Load {
+        Disturbance::Load { from, until, load } => (until > now).then_some(Disturbance::Load {
             from: (from - now).max(0.0),
             until: until - now,
             load,
