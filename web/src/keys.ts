@@ -11,7 +11,7 @@ export interface KeyActions {
 /** An arrow key moves the target by this much, m. */
 const MOVE = 0.25;
 /** Shift and an arrow key push by this much, rad/s. */
-const PUSH = 5;
+const PUSH = 3;
 
 const ARROWS: Record<string, [number, number]> = {
   ArrowLeft: [-1, 0],

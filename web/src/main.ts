@@ -24,7 +24,7 @@ const TRAIL = 25;
 /** Points of a trail. */
 const TRAIL_POINTS = 700;
 /** Tilt rate per length of the dragged arrow, rad/s per m. */
-const PUSH_PER_METRE = 20;
+const PUSH_PER_METRE = 10;
 const SPEEDS: [number, string][] = [[1, "1\u00d7"], [0.5, "\u00bd\u00d7"], [0.25, "\u00bc\u00d7"], [0.1, "0.1\u00d7"], [0.02, "0.02\u00d7"]];
 const HINTS: Record<Tool, string> = {
   target: "Click or drag on the floor: the robot goes there. Drag the robot: a push. Right button or two fingers: camera.",

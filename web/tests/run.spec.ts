@@ -90,7 +90,7 @@ test("a push within the limits is survived", async ({ page }) => {
   await open(page);
   await page.locator("#play").click();
   await until(page, 0.5);
-  await fill(page, "Push", "6");
+  await fill(page, "Push", "5");
   await page.getByRole("button", { name: "\u2192" }).click();
   await until(page, 6);
   await expect(page.locator("#alert")).toBeHidden();
@@ -103,7 +103,7 @@ test("a push that is too large ends on the floor, with the reason", async ({ pag
   await open(page);
   await page.locator("#play").click();
   await until(page, 0.5);
-  await fill(page, "Push", "70");
+  await fill(page, "Push", "20");
   await page.getByRole("button", { name: "\u2192" }).click();
   await expect(page.locator("#alert")).toContainText("the robot has fallen: theta", { timeout: 30_000 });
   await expect(page.locator("#alert")).toContainText("LPV MPC");

@@ -1,11 +1,11 @@
 //! A scenario run step by step is the run at once, and a person can take part in it.
 
-use ballbot_scenario::{Phase, Prepared, Scenario, Session, Surroundings};
+use ballbot_scenario::{Phase, Prepared, Scenario, ScenarioError, Session, Surroundings};
 use std::path::Path;
 use std::time::Duration;
 
-fn prepared(scenario: &Scenario) -> Prepared {
-    scenario.prepare(Path::new(".")).unwrap()
+fn prepared(scenario: &Scenario) -> Result<Prepared, ScenarioError> {
+    scenario.prepare(Path::new("."))
 }
 
 fn clock() -> Duration {
@@ -22,14 +22,14 @@ fn step_by_step_is_the_run_at_once() {
     for name in ["two-setpoints", "tight-bounds", "lissajous"] {
         let mut scenario = Scenario::load(name).unwrap();
         scenario.duration_s = scenario.duration_s.min(5.0);
-        let at_once = prepared(&scenario);
+        let at_once = prepared(&scenario).unwrap();
         let runs = at_once
             .run(&Surroundings {
                 clock: &clock,
                 progress: &|_| (),
             })
             .unwrap();
-        let mut session = Session::new(prepared(&scenario)).unwrap();
+        let mut session = Session::new(prepared(&scenario).unwrap()).unwrap();
         for k in 0..at_once.samples {
             assert!(session.step(&clock));
             for (sample, run) in session.samples().iter().zip(&runs) {
@@ -45,7 +45,7 @@ fn step_by_step_is_the_run_at_once() {
 #[test]
 fn a_target_is_reached_from_where_the_robot_is() {
     let scenario = Scenario::load("single-setpoint").unwrap();
-    let mut session = Session::new(prepared(&scenario)).unwrap();
+    let mut session = Session::new(prepared(&scenario).unwrap()).unwrap();
     run_until(&mut session, 1.0);
     session.set_targets(&[-1.0]);
     run_until(&mut session, 6.0);
@@ -56,12 +56,12 @@ fn a_target_is_reached_from_where_the_robot_is() {
 #[test]
 fn new_settings_leave_state_and_time_alone() {
     let mut scenario = Scenario::load("two-setpoints").unwrap();
-    let mut session = Session::new(prepared(&scenario)).unwrap();
+    let mut session = Session::new(prepared(&scenario).unwrap()).unwrap();
     run_until(&mut session, 1.1);
     let (time, state) = (session.time(), *session.states().next().unwrap());
     scenario.controller.t_s = 0.02;
     scenario.controller.horizon = 60;
-    let mut session = session.reconfigured(prepared(&scenario)).unwrap();
+    let mut session = session.reconfigured(prepared(&scenario).unwrap()).unwrap();
     assert_eq!(session.time(), time);
     assert_eq!(*session.states().next().unwrap(), state);
     // The scenario's second set point still comes at 3 s of the whole.
@@ -74,7 +74,7 @@ fn new_settings_leave_state_and_time_alone() {
 #[test]
 fn a_push_that_cannot_be_held_ends_on_the_floor_with_its_reason() {
     let scenario = Scenario::load("tight-bounds").unwrap();
-    let mut session = Session::new(prepared(&scenario)).unwrap();
+    let mut session = Session::new(prepared(&scenario).unwrap()).unwrap();
     run_until(&mut session, 0.2);
     assert_eq!(session.fall_in_words(), None);
     session.push(0, 0.0, 4.0).unwrap();
@@ -95,7 +95,7 @@ fn a_push_that_cannot_be_held_ends_on_the_floor_with_its_reason() {
 #[test]
 fn a_push_that_is_no_number_is_refused() {
     let scenario = Scenario::load("two-setpoints").unwrap();
-    let mut session = Session::new(prepared(&scenario)).unwrap();
+    let mut session = Session::new(prepared(&scenario).unwrap()).unwrap();
     assert!(session.push(0, 0.0, f64::NAN).is_err());
     run_until(&mut session, 0.5);
     assert_eq!(session.phase(), &Phase::Running);

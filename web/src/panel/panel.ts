@@ -37,7 +37,7 @@ export class Panel {
   private chosen: string[] = [];
   private initialTerminal: Terminal = "discrete_riccati";
   private targetFields: [Field<number>, Field<number>];
-  private pushBy = 5;
+  private pushBy = 3;
   private target = { x: 0, y: 0 };
 
   constructor(host: HTMLElement, presets: [name: string, title: string][], private readonly actions: PanelActions) {
