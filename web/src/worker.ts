@@ -61,16 +61,24 @@ function sampleAll(): void {
   for (const { simulation, recorder } of robots) recorder.sample(simulation);
 }
 
+/** Time of the next sample: of the robots that still move. Infinite when all lie on the floor. */
 function nextTime(): number {
-  return Math.min(...robots.map(({ simulation }) => simulation.time()));
+  const moving = robots.filter(({ simulation }) => !simulation.is_down());
+  return Math.min(...moving.map(({ simulation }) => simulation.time()));
 }
 
 function endOfRun(): number {
   return Math.max(...robots.map(({ simulation }) => simulation.duration()));
 }
 
-/** Stops where the scenario ends, once; whoever lets it run on may do so. */
+/** Stops where the scenario ends, once; whoever lets it run on may do so. Stops for good when
+ *  nothing moves any more. */
 function stopAtTheEnd(): void {
+  if (nextTime() === Infinity) {
+    running = false;
+    clock = Math.max(...robots.map(({ simulation }) => simulation.time()));
+    return;
+  }
   if (!completed && nextTime() > endOfRun() - 1e-9) {
     completed = true;
     running = false;
@@ -84,6 +92,7 @@ function tick(): void {
   lastTick = now;
   if (running && robots.length > 0) {
     clock += elapsed * speed;
+    stopAtTheEnd();
     while (running && nextTime() <= clock) {
       sampleAll();
       stopAtTheEnd();
@@ -138,7 +147,7 @@ function answer(call: Call): unknown {
     case "step":
       running = false;
       sampleAll();
-      clock = nextTime();
+      if (nextTime() < Infinity) clock = nextTime();
       stopAtTheEnd();
       send();
       return null;
