@@ -5,6 +5,7 @@ use crate::commands::{
     excite::ExciteArguments, identify::IdentifyArguments, linearize::LinearizeArguments,
     lqr::LqrArguments, refine::RefineArguments, reproduce::ReproduceArguments,
     scenario::ScenarioArguments, simulate::SimulateArguments, verify::VerifyArguments,
+    view::ViewArguments,
 };
 use clap::{Parser, Subcommand};
 
@@ -54,6 +55,8 @@ pub enum Command {
     Certify(CertifyArguments),
     /// Prove the claims of a certificate again
     Verify(VerifyArguments),
+    /// Serve the ballbot in the browser, to this machine only
+    View(ViewArguments),
     /// Print the completions for a shell
     Completions(CompletionsArguments),
 }

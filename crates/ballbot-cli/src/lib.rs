@@ -40,6 +40,7 @@ pub fn run(arguments: Arguments) -> Result<String, CommandError> {
         Command::Lqr(arguments) => commands::lqr::run(&arguments),
         Command::Certify(arguments) => commands::certify::run(&arguments),
         Command::Verify(arguments) => commands::verify::run(&arguments),
+        Command::View(arguments) => commands::view::run(&arguments),
         Command::Completions(arguments) => commands::completions::run(&arguments),
     }
 }

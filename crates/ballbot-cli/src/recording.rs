@@ -1,6 +1,6 @@
 //! Recorded runs as files and arrays.
 
-use ballbot_scenario::{Plane, Prepared};
+use ballbot_scenario::{Plane, Prepared, words};
 use lpvmpc_sim::{Ending, LogRow, Trajectory};
 use nalgebra::Vector3;
 
@@ -43,7 +43,7 @@ pub fn trajectory_csv(trajectory: &Trajectory<4, 1>) -> String {
     let status = match &trajectory.ending {
         Ending::Complete => String::new(),
         // Commas would be columns.
-        other => ending_in_words(other).replace(',', ";"),
+        other => words::ending(other).replace(',', ";"),
     };
     text += &format!(
         "{:?},{:?},{:?},{:?},{:?},,{:?},,{status},\n",
@@ -75,30 +75,6 @@ pub fn log_csv(log: &[LogRow<4, 1>]) -> String {
         );
     }
     text
-}
-
-/// Why a run ended, with its time.
-pub fn ending_in_words(ending: &Ending) -> String {
-    match ending {
-        Ending::Complete => "complete".to_owned(),
-        Ending::OutOfRange { t, component } => {
-            let state = STATES.get(*component).copied().unwrap_or("state");
-            format!("the robot has fallen: {state} left its range by t = {t:.3} s")
-        }
-        Ending::NoPlan { t, status } => format!("no plan at t = {t:.3} s: {}", named(status)),
-        Ending::PlantFailed { t, error } => format!("at t = {t:.3} s: {error}"),
-    }
-}
-
-const STATES: [&str; 4] = ["phi", "theta", "phi_dot", "theta_dot"];
-
-/// The solver's status with the ballbot's names.
-fn named(status: &lpvmpc::Status<f64>) -> String {
-    let mut text = status.to_string();
-    for (index, name) in STATES.iter().enumerate() {
-        text = text.replace(&format!("state {index}"), name);
-    }
-    text.replace("input 0", "the torque")
 }
 
 /// `motors.csv`: the three motors' torques, held from each sample to the next.

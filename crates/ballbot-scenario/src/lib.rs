@@ -33,6 +33,8 @@ mod prepare;
 mod reference;
 mod run;
 mod schema;
+mod session;
+pub mod words;
 mod world;
 mod world_table;
 
@@ -50,6 +52,7 @@ pub use schema::{
     ModelKind, ParameterTable, PointTable, PredictorTable, ReferenceTable, Scenario, SineTable,
     StateTable, TerminalTable,
 };
+pub use session::{Phase, Session, Trouble};
 pub use world::{PlaneWorld, Robot};
 pub use world_table::{
     ActuatorTable, AngleSensorTable, DelayTable, DeviationsTable, FloorTable, PlaneName, PushTable,

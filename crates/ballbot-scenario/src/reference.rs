@@ -129,6 +129,10 @@ fn one_plane(
             check_points(points, &format!("{key}.minimum_jerk.points"))?;
             Ok(PhiReference::MinimumJerk(points.clone()))
         }
+        ReferenceTable::Lines { points } => {
+            check_points(points, &format!("{key}.lines.points"))?;
+            Ok(PhiReference::Interpolated(points.clone()))
+        }
         ReferenceTable::Sine(sine) => {
             for (name, value) in [
                 ("amplitude_rad", sine.amplitude_rad),
@@ -146,7 +150,7 @@ fn one_plane(
         ReferenceTable::Lissajous(_) | ReferenceTable::Planes { .. } => Err(ScenarioError::value(
             key,
             "a reference of two planes",
-            "one plane takes set_points, sine, minimum_jerk or csv",
+            "one plane takes set_points, sine, minimum_jerk, lines or csv",
         )),
     }
 }

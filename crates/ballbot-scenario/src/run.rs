@@ -73,14 +73,22 @@ impl Prepared {
     pub fn closed_loop(&self, plane: &Plane) -> Result<PlaneLoop, ScenarioError> {
         // Up to 4 rows of a terminal equality come on top of one row per input.
         let period = plane.world.settings.period;
+        // In a browser the longest horizon must do for all: the time per step follows the horizon
+        // that is used, and every size is code that has to be loaded.
         let regulator = match (self.settings.horizon, self.feedback.is_plain()) {
+            #[cfg(not(target_family = "wasm"))]
             (..=20, true) => self.state_feedback::<20, 24>(),
+            #[cfg(not(target_family = "wasm"))]
             (21..=50, true) => self.state_feedback::<50, 54>(),
+            #[cfg(not(target_family = "wasm"))]
             (51..=100, true) => self.state_feedback::<100, 104>(),
             (_, true) => self.state_feedback::<LONGEST_HORIZON, { LONGEST_HORIZON + 4 }>(),
             // The torque's own bounds come on top where its rate is the input.
+            #[cfg(not(target_family = "wasm"))]
             (..=20, false) => self.output_feedback::<20, 44>(period),
+            #[cfg(not(target_family = "wasm"))]
             (21..=50, false) => self.output_feedback::<50, 104>(period),
+            #[cfg(not(target_family = "wasm"))]
             (51..=100, false) => self.output_feedback::<100, 204>(period),
             (_, false) => {
                 self.output_feedback::<LONGEST_HORIZON, { 2 * LONGEST_HORIZON + 4 }>(period)

@@ -244,6 +244,11 @@ pub enum ReferenceTable {
         /// In order of time; at rest at each of them.
         points: Vec<PointTable>,
     },
+    /// Straight lines from point to point; the ends hold.
+    Lines {
+        /// In order of time.
+        points: Vec<PointTable>,
+    },
     /// A file.
     Csv(CsvTable),
     /// Two planes: X = amplitude sin(omega t) in each.

@@ -13,6 +13,7 @@ pub mod reproduce;
 pub mod scenario;
 pub mod simulate;
 pub mod verify;
+pub mod view;
 
 use crate::figures::FigureError;
 use crate::input::InputError;
@@ -52,6 +53,9 @@ pub enum CommandError {
     /// The plant cannot be integrated.
     #[error(transparent)]
     Plant(#[from] PlantError),
+    /// The page cannot be served.
+    #[error(transparent)]
+    View(#[from] view::ViewError),
     /// A figure that cannot be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),

@@ -7,7 +7,7 @@ use crate::pictures::{self, Shown};
 use crate::progress::Progress;
 use crate::recording::{self, Columns, Metrics};
 use crate::table::Table;
-use ballbot_scenario::{Prepared, Scenario, Surroundings};
+use ballbot_scenario::{Prepared, Scenario, Surroundings, words};
 use clap::Args;
 use lpvmpc_sim::{Ending, LogRow, Recording, Trajectory};
 use std::path::{Path, PathBuf};
@@ -69,7 +69,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
         None => Ok(summary),
         Some((what, run)) => Err(CommandError::EndedEarly {
             what,
-            ending: recording::ending_in_words(&run.ending),
+            ending: words::ending(&run.ending),
             state: run.final_state.into(),
             folder,
         }),

@@ -1,0 +1,360 @@
+//! A scenario run step by step, by a person who takes part: targets move, pushes come, settings
+//! change while it runs. Sample for sample it is [`Prepared::run`].
+
+use crate::error::ScenarioError;
+use crate::prepare::{Plane, Prepared};
+use crate::reference::PhiReference;
+use crate::run::PlaneLoop;
+use crate::schema::PointTable;
+use crate::words;
+use lpvmpc::Status;
+use lpvmpc_sim::{Disturbance, Ending, Sample, WorldError};
+use nalgebra::{Vector1, Vector3, Vector4};
+use std::f64::consts::FRAC_PI_2;
+use std::time::Duration;
+
+/// A robot in its world, with all its planes.
+pub struct Session {
+    prepared: Prepared,
+    loops: Vec<PlaneLoop>,
+    /// Time at which the loops began, s.
+    origin: f64,
+    samples: Vec<Sample<4, 1>>,
+    phase: Phase,
+    trouble: Trouble,
+}
+
+/// Whether the robot still stands.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Phase {
+    /// The controller is at work.
+    Running,
+    /// It gave up, for this reason; the robot falls without torque.
+    Falling(Ending),
+    /// It lies on the floor, or its motion cannot be followed any further.
+    Down(Ending),
+}
+
+/// What led to a fall.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trouble {
+    /// The first of the samples without interruption until now that had no plan: time and why.
+    pub without_plan: Option<(f64, Status<f64>)>,
+    /// For how long the torque of some plane has been at its bound without interruption, s.
+    pub saturated: f64,
+}
+
+impl Session {
+    /// The scenario at time zero.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Controller`] or [`ScenarioError::World`] if either refuses its settings.
+    pub fn new(prepared: Prepared) -> Result<Self, ScenarioError> {
+        let loops = prepared.planes.iter().map(|plane| {
+            let mut closed_loop = prepared.closed_loop(plane)?;
+            lie_down(&mut closed_loop);
+            Ok(closed_loop)
+        });
+        Ok(Self {
+            loops: loops.collect::<Result<_, ScenarioError>>()?,
+            prepared,
+            origin: 0.0,
+            samples: Vec::new(),
+            phase: Phase::Running,
+            trouble: Trouble::default(),
+        })
+    }
+
+    /// The same robot where it stands, at the same time, under another scenario. A plane that
+    /// it did not have starts as that scenario says.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn reconfigured(&self, mut prepared: Prepared) -> Result<Self, ScenarioError> {
+        let now = self.time();
+        for (plane, before) in prepared.planes.iter_mut().zip(&self.loops) {
+            plane.initial_state = *before.world.state();
+            plane.world.settings.disturbances = plane
+                .world
+                .settings
+                .disturbances
+                .iter()
+                .filter_map(|push| after(push, now))
+                .collect();
+        }
+        Ok(Self {
+            origin: now,
+            phase: self.phase.clone(),
+            trouble: self.trouble.clone(),
+            ..Self::new(prepared)?
+        })
+    }
+
+    /// The scenario.
+    pub fn prepared(&self) -> &Prepared {
+        &self.prepared
+    }
+
+    /// Time since the beginning, s.
+    pub fn time(&self) -> f64 {
+        self.origin + self.loops.first().map_or(0.0, |plane| plane.world.time())
+    }
+
+    /// The true state of each plane.
+    pub fn states(&self) -> impl Iterator<Item = &Vector4<f64>> {
+        self.loops.iter().map(|plane| plane.world.state())
+    }
+
+    /// phi_ref of each plane now, rad.
+    pub fn targets(&self) -> impl Iterator<Item = f64> {
+        let now = self.time();
+        self.prepared
+            .planes
+            .iter()
+            .map(move |plane| plane.reference.at(now))
+    }
+
+    /// The last sample of each plane; empty before the first.
+    pub fn samples(&self) -> &[Sample<4, 1>] {
+        &self.samples
+    }
+
+    /// The motors' torques (tau_1, tau_2, tau_3) of the last sample, N m; zero before the first.
+    pub fn motor_torques(&self) -> Vector3<f64> {
+        let torque = |plane: usize| self.samples.get(plane).map_or(0.0, |sample| sample.u[0]);
+        let torques = Vector3::new(torque(0), torque(1), 0.0);
+        self.prepared.wheels.motors(&torques)
+    }
+
+    /// The states that the model of a plane reaches under its last plan, one per sample of the
+    /// horizon; empty when there is no such plane.
+    pub fn prediction(&self, plane: usize) -> Vec<Vector4<f64>> {
+        let regulator = self.loops.get(plane).map(|plane| &plane.regulator);
+        regulator.map_or_else(Vec::new, |regulator| regulator.prediction())
+    }
+
+    /// Whether the robot still stands.
+    pub fn phase(&self) -> &Phase {
+        &self.phase
+    }
+
+    /// What the controllers said at the last sample, for people.
+    pub fn status_in_words(&self) -> String {
+        match self.phase {
+            Phase::Running => {
+                let statuses = self.samples.iter().map(|sample| sample.status);
+                let worst = statuses.reduce(|a, b| if a.is_solved() { b } else { a });
+                worst.map_or_else(String::new, |status| words::status(&status))
+            }
+            Phase::Falling(_) => "no plan, no torque".to_owned(),
+            Phase::Down(_) => "on the floor".to_owned(),
+        }
+    }
+
+    /// Why the robot does not stand any more, for people; `None` while it stands.
+    pub fn fall_in_words(&self) -> Option<String> {
+        let (Phase::Falling(ending) | Phase::Down(ending)) = &self.phase else {
+            return None;
+        };
+        let mut text = words::ending(ending);
+        if let Some((t, status)) = &self.trouble.without_plan
+            && !matches!(ending, Ending::NoPlan { .. })
+        {
+            text += &format!("; no plan from t = {t:.3} s on: {}", words::status(status));
+        }
+        if self.trouble.saturated > 0.0 {
+            let saturated = self.trouble.saturated;
+            text += &format!("; the torque had been at its bound for {saturated:.2} s");
+        }
+        Some(text)
+    }
+
+    /// One sample of the control in all planes; `false` if the robot lies on the floor.
+    /// `clock` is monotonic.
+    pub fn step(&mut self, clock: &dyn Fn() -> Duration) -> bool {
+        match self.phase {
+            Phase::Running => self.sample(clock),
+            Phase::Falling(_) => self.fall(),
+            Phase::Down(_) => return false,
+        }
+        true
+    }
+
+    fn sample(&mut self, clock: &dyn Fn() -> Duration) {
+        let origin = self.origin;
+        let mut samples = Vec::with_capacity(self.loops.len());
+        for (closed_loop, plane) in self.loops.iter_mut().zip(&self.prepared.planes) {
+            let reference = |t| plane.state_reference(origin + t);
+            match closed_loop.sample(&reference, clock, &mut |_| ()) {
+                Ok(mut sample) => {
+                    sample.t += origin;
+                    samples.push(sample);
+                }
+                Err(ending) => {
+                    self.give_up(ending);
+                    return;
+                }
+            }
+        }
+        self.samples = samples;
+        self.note_trouble();
+    }
+
+    fn note_trouble(&mut self) {
+        let unsolved = self.samples.iter().find(|s| !s.status.is_solved());
+        self.trouble.without_plan = match (unsolved, &self.trouble.without_plan) {
+            (None, _) => None,
+            (Some(_), Some(first)) => Some(*first),
+            (Some(sample), None) => Some((sample.t, sample.status)),
+        };
+        let bounds = &self.prepared.settings.u;
+        let at_bound = |sample: &Sample<4, 1>| {
+            let u = sample.u[0];
+            u <= bounds.lower[0] || u >= bounds.upper[0]
+        };
+        if self.samples.iter().any(at_bound) {
+            self.trouble.saturated += self.prepared.settings.t_s;
+        } else {
+            self.trouble.saturated = 0.0;
+        }
+    }
+
+    /// The planes that were not asked any more catch up with those that were.
+    fn give_up(&mut self, ending: Ending) {
+        let ending = shifted(ending, self.origin);
+        let latest = self.loops.iter().map(|plane| plane.world.time());
+        let latest = latest.fold(0.0, f64::max);
+        self.phase = match ending {
+            Ending::NoPlan { .. } => Phase::Falling(ending),
+            _ => Phase::Down(ending),
+        };
+        self.coast(latest);
+    }
+
+    fn fall(&mut self) {
+        let t = self.time();
+        let now = self.loops.first().map_or(0.0, |plane| plane.world.time());
+        for ((sample, plane), closed_loop) in self
+            .samples
+            .iter_mut()
+            .zip(&self.prepared.planes)
+            .zip(&self.loops)
+        {
+            *sample = Sample {
+                t,
+                x: *closed_loop.world.state(),
+                estimate: *closed_loop.world.state(),
+                u: Vector1::zeros(),
+                x_ref: plane.state_reference(t),
+                cost: f64::NAN,
+                active_bounds: 0,
+                step_time: Duration::ZERO,
+                ..sample.clone()
+            };
+        }
+        self.coast(now + self.prepared.settings.t_s);
+    }
+
+    /// Moves every plane on to the time `until` of its world without torque.
+    fn coast(&mut self, until: f64) {
+        for closed_loop in &mut self.loops {
+            let world = &mut closed_loop.world;
+            world.command(Vector1::zeros());
+            while world.time() < until - 0.5 * world.period() {
+                let moved = world.advance();
+                if moved.is_err() || world.state()[1].abs() > FRAC_PI_2 {
+                    if let Phase::Falling(ending) = &self.phase {
+                        self.phase = Phase::Down(ending.clone());
+                    }
+                    return;
+                }
+            }
+        }
+    }
+
+    /// From now on phi of each plane has to go to these values, rad. What is beyond the
+    /// robot's planes is not heard.
+    pub fn set_targets(&mut self, targets: &[f64]) {
+        let time_s = self.time();
+        for (plane, phi_rad) in self.prepared.planes.iter_mut().zip(targets) {
+            let point = PointTable {
+                time_s,
+                phi_rad: *phi_rad,
+            };
+            plane.reference = PhiReference::Steps(vec![point]);
+        }
+    }
+
+    /// From now on the planes follow these references; their times count from the beginning of
+    /// the session.
+    pub fn set_references(&mut self, references: impl IntoIterator<Item = PhiReference>) {
+        for (plane, reference) in self.prepared.planes.iter_mut().zip(references) {
+            plane.reference = reference;
+        }
+    }
+
+    /// Pushes a plane now: its rates change by (phi_dot, theta_dot), rad/s.
+    ///
+    /// # Errors
+    /// [`WorldError::Disturbance`] if the numbers are not finite.
+    pub fn push(&mut self, plane: usize, phi_dot: f64, theta_dot: f64) -> Result<(), WorldError> {
+        match self.loops.get_mut(plane) {
+            Some(closed_loop) => {
+                let time = closed_loop.world.time();
+                closed_loop.world.disturb(Disturbance::Jump {
+                    time,
+                    change: Vector4::new(0.0, 0.0, phi_dot, theta_dot),
+                })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The planes, with what they have to follow.
+    pub fn planes(&self) -> &[Plane] {
+        &self.prepared.planes
+    }
+}
+
+/// Beyond a right angle the robot lies on the floor.
+fn lie_down(closed_loop: &mut PlaneLoop) {
+    closed_loop.range.lower[1] = -FRAC_PI_2;
+    closed_loop.range.upper[1] = FRAC_PI_2;
+}
+
+fn shifted(ending: Ending, origin: f64) -> Ending {
+    match ending {
+        Ending::Complete => Ending::Complete,
+        Ending::NoPlan { t, status } => Ending::NoPlan {
+            t: origin + t,
+            status,
+        },
+        Ending::OutOfRange { t, component } => Ending::OutOfRange {
+            t: origin + t,
+            component,
+        },
+        Ending::PlantFailed { t, error } => Ending::PlantFailed {
+            t: origin + t,
+            error,
+        },
+    }
+}
+
+/// What is left of a push at the time `now`, on a clock that begins there.
+fn after(push: &Disturbance<4, 2>, now: f64) -> Option<Disturbance<4, 2>> {
+    match *push {
+        Disturbance::Jump { time, change } => (time >= now).then_some(Disturbance::Jump {
+            time: time - now,
+            change,
+        }),
+        Disturbance::Impulse { time, impulse } => (time >= now).then_some(Disturbance::Impulse {
+            time: time - now,
+            impulse,
+        }),
+        Disturbance::Load { from, until, load } => (until > now).then_some(Disturbance::Load {
+            from: (from - now).max(0.0),
+            until: until - now,
+            load,
+        }),
+    }
+}

@@ -1,0 +1,223 @@
+//! The ballbot's closed loop for a browser: what JavaScript can call, and nothing that is not
+//! in [`ballbot_scenario`]. Angles in rad, rates in rad/s, torque in N m, times in s. Errors
+//! are messages for people.
+
+mod from_js;
+
+use ballbot_scenario::{Phase, PhiReference, PointTable, Prepared, Scenario, Session, builtin};
+use std::path::Path;
+use std::time::Duration;
+use wasm_bindgen::prelude::*;
+
+#[wasm_bindgen]
+extern "C" {
+    #[wasm_bindgen(js_namespace = performance, js_name = now)]
+    fn milliseconds() -> f64;
+}
+
+fn clock() -> Duration {
+    Duration::from_secs_f64(milliseconds() / 1e3)
+}
+
+fn read(setup: JsValue) -> Result<Scenario, String> {
+    let scenario = from_js::from_js(setup);
+    scenario.map_err(|error| format!("this is not a valid scenario:\n{error}"))
+}
+
+fn prepare(setup: JsValue) -> Result<Prepared, String> {
+    let prepared = read(setup)?.prepare(Path::new(""));
+    prepared.map_err(|error| error.to_string())
+}
+
+/// A built-in scenario.
+#[wasm_bindgen(getter_with_clone)]
+pub struct Preset {
+    /// Its name on the command line.
+    pub name: String,
+    /// The commented TOML file.
+    pub text: String,
+}
+
+/// The built-in scenarios.
+#[wasm_bindgen]
+pub fn presets() -> Vec<Preset> {
+    builtin::ALL
+        .into_iter()
+        .map(|preset| Preset {
+            name: preset.name.to_owned(),
+            text: preset.text.to_owned(),
+        })
+        .collect()
+}
+
+/// A scenario, as an object with the keys of its file: all checks passed, all defaults written
+/// out.
+///
+/// # Errors
+/// What is wrong with a key or a value.
+#[wasm_bindgen]
+pub fn scenario(setup: JsValue) -> Result<JsValue, String> {
+    let scenario = read(setup)?;
+    let prepared = scenario.prepare(Path::new(""));
+    prepared.map_err(|error| error.to_string())?;
+    serde_wasm_bindgen::to_value(&scenario).map_err(|error| error.to_string())
+}
+
+/// A robot in its world, stepped from outside.
+#[wasm_bindgen]
+pub struct Simulation {
+    session: Session,
+}
+
+#[wasm_bindgen]
+impl Simulation {
+    /// A scenario, an object with the keys of its file, at time zero.
+    ///
+    /// # Errors
+    /// What is wrong with a key or a value.
+    #[wasm_bindgen(constructor)]
+    pub fn new(setup: JsValue) -> Result<Simulation, String> {
+        let session = Session::new(prepare(setup)?).map_err(|error| error.to_string())?;
+        Ok(Self { session })
+    }
+
+    /// The same robot where it stands, under another scenario.
+    ///
+    /// # Errors
+    /// As the constructor; this simulation stays as it is.
+    pub fn reconfigured(&self, setup: JsValue) -> Result<Simulation, String> {
+        let session = self.session.reconfigured(prepare(setup)?);
+        Ok(Self {
+            session: session.map_err(|error| error.to_string())?,
+        })
+    }
+
+    /// Planes: 1 or 2.
+    pub fn planes(&self) -> usize {
+        self.session.planes().len()
+    }
+
+    /// Sampling time of the control, s.
+    pub fn sampling_time(&self) -> f64 {
+        self.session.prepared().settings.t_s
+    }
+
+    /// Horizon, samples.
+    pub fn horizon(&self) -> usize {
+        self.session.prepared().settings.horizon
+    }
+
+    /// Samples until the scenario's end.
+    pub fn samples(&self) -> usize {
+        self.session.prepared().samples
+    }
+
+    /// Time of the scenario's end, s.
+    pub fn duration(&self) -> f64 {
+        self.samples() as f64 * self.sampling_time()
+    }
+
+    /// Time, s.
+    pub fn time(&self) -> f64 {
+        self.session.time()
+    }
+
+    /// One sample; `false` if the robot lies on the floor and nothing moved.
+    pub fn step(&mut self) -> bool {
+        self.session.step(&clock)
+    }
+
+    /// The last sample, per plane: time, phi, theta, phi_dot, theta_dot, torque, phi_ref, cost,
+    /// active bounds, microseconds of the step, and the four states it was decided for.
+    pub fn row(&self) -> Vec<f64> {
+        let samples = self.session.samples().iter();
+        samples
+            .flat_map(|s| {
+                let (x, e) = (&s.x, &s.estimate);
+                let step_us = s.step_time.as_secs_f64() * 1e6;
+                let active = s.active_bounds as f64;
+                [
+                    s.t, x[0], x[1], x[2], x[3], s.u[0], s.x_ref[0], s.cost, active, step_us, e[0],
+                    e[1], e[2], e[3],
+                ]
+            })
+            .collect()
+    }
+
+    /// The three motors' torques of the last sample.
+    pub fn motors(&self) -> Vec<f64> {
+        self.session.motor_torques().as_slice().to_vec()
+    }
+
+    /// The state now, per plane: time, phi, theta, phi_dot, theta_dot, phi_ref.
+    pub fn now(&self) -> Vec<f64> {
+        let t = self.session.time();
+        let planes = self.session.states().zip(self.session.targets());
+        planes
+            .flat_map(|(x, target)| [t, x[0], x[1], x[2], x[3], target])
+            .collect()
+    }
+
+    /// The states that the last plan of a plane leads through, four per sample.
+    pub fn prediction(&self, plane: usize) -> Vec<f64> {
+        let states = self.session.prediction(plane);
+        states.iter().flat_map(|x| x.iter().copied()).collect()
+    }
+
+    /// phi_ref of a plane at `count` times, evenly from zero to the scenario's end.
+    pub fn reference(&self, plane: usize, count: usize) -> Vec<f64> {
+        let step = self.duration() / count.saturating_sub(1).max(1) as f64;
+        let plane = self.session.planes().get(plane);
+        let at = |plane: &ballbot_scenario::Plane| {
+            let times = (0..count).map(|i| i as f64 * step);
+            times.map(|t| plane.reference.at(t)).collect()
+        };
+        plane.map_or_else(Vec::new, at)
+    }
+
+    /// What the controllers said at the last sample.
+    pub fn status(&self) -> String {
+        self.session.status_in_words()
+    }
+
+    /// Why the robot does not stand any more; absent while it stands.
+    pub fn ending(&self) -> Option<String> {
+        self.session.fall_in_words()
+    }
+
+    /// Whether it lies on the floor.
+    pub fn is_down(&self) -> bool {
+        matches!(self.session.phase(), Phase::Down(_))
+    }
+
+    /// From now on the ball has to go to these angles.
+    pub fn set_target(&mut self, phi_x: f64, phi_y: f64) {
+        self.session.set_targets(&[phi_x, phi_y]);
+    }
+
+    /// From now on the ball has to follow straight lines between these angles, at these times.
+    pub fn set_path(&mut self, times: &[f64], phi_x: &[f64], phi_y: &[f64]) {
+        let reference = |phi: &[f64]| {
+            let points = times.iter().zip(phi);
+            PhiReference::Interpolated(
+                points
+                    .map(|(&time_s, &phi_rad)| PointTable { time_s, phi_rad })
+                    .collect(),
+            )
+        };
+        self.session
+            .set_references([reference(phi_x), reference(phi_y)]);
+    }
+
+    /// Changes the rates of the tilt at once.
+    ///
+    /// # Errors
+    /// A number that is not finite.
+    pub fn push(&mut self, theta_dot_x: f64, theta_dot_y: f64) -> Result<(), String> {
+        for (plane, theta_dot) in [theta_dot_x, theta_dot_y].into_iter().enumerate() {
+            let pushed = self.session.push(plane, 0.0, theta_dot);
+            pushed.map_err(|error| error.to_string())?;
+        }
+        Ok(())
+    }
+}

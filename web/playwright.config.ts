@@ -1,0 +1,26 @@
+import { defineConfig } from "@playwright/test";
+
+const port = 8018;
+
+export default defineConfig({
+  testDir: "tests",
+  timeout: 120_000,
+  fullyParallel: false,
+  workers: 1,
+  reporter: [["list"]],
+  use: {
+    baseURL: `http://127.0.0.1:${port}/`,
+    viewport: { width: 1440, height: 900 },
+    launchOptions: {
+      // The system's Chromium; WebGL is computed by the processor.
+      executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium",
+      args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"],
+    },
+  },
+  // The program itself serves the page: what is tested is what a user gets.
+  webServer: {
+    command: `${process.env["BALLBOT"] ?? "../target/release/ballbot"} view --port ${port}`,
+    url: `http://127.0.0.1:${port}/`,
+    reuseExistingServer: false,
+  },
+});

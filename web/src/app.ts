@@ -1,0 +1,301 @@
+// The page's state: one set-up, the robots derived from it, and what they did.
+
+import { Engine, type Source } from "./engine";
+import { readTrajectory, trajectoryCsv } from "./files";
+import { History } from "./history";
+import * as link from "./link";
+import { Live, timedPath } from "./live";
+import { Playback } from "./playback";
+import type { Batch, Call, Preset, RobotFacts } from "./protocol";
+import { robotsNamed, type RobotKind } from "./robots";
+import { toToml, withValue, type Scenario } from "./scenario";
+import type { FloorPoint } from "./scene/view";
+
+export interface AppEvents {
+  message(text: string, kind: "error" | "info"): void;
+  /** The set-up or the choice of robots changed. */
+  setup(): void;
+  /** New histories: what was drawn is void. */
+  restarted(): void;
+  /** Running or not. */
+  running(): void;
+}
+
+/** Time between two predictions that are kept, s. */
+const FAN_INTERVAL = 0.4;
+
+function text(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
+}
+
+export class App implements Source {
+  setup!: Scenario;
+  presets: Preset[] = [];
+  preset = "";
+  robots: RobotKind[] = robotsNamed([]);
+  histories: History[] = [];
+  references: Float64Array[][] = [];
+  planes = 1;
+  isRunning = false;
+  isComplete = false;
+  speed = 1;
+  playback: Playback | undefined;
+  playbackName = "";
+  onBatch: (batch: Batch) => void = () => {};
+  private readonly engine = new Engine();
+  private readonly live = new Live();
+  private facts: RobotFacts[] = [];
+  private clock = 0;
+  private clockAt = 0;
+  private queue: Promise<unknown> = Promise.resolve();
+
+  constructor(private readonly events: AppEvents, private readonly ownPresets: Preset[]) {
+    this.engine.onBatch = (batch) => {
+      if (!this.playback) this.receive(batch);
+    };
+    this.engine.onFailure = (reason) => events.message(reason, "error");
+  }
+
+  /** Reads the presets, then opens the link in the address or the first preset. */
+  async start(fragment: string): Promise<void> {
+    this.presets = [...this.ownPresets, ...(await this.engine.call({ kind: "presets" }))];
+    if (fragment !== "" && (await this.openLink(fragment))) return;
+    await this.openPreset(this.presets[0]?.name ?? "");
+  }
+
+  /** One thing after the other: a slider may move faster than its last value is taken in. */
+  private inOrder<T>(work: () => Promise<T>): Promise<T> {
+    const result = this.queue.then(work, work);
+    this.queue = result.catch(() => {});
+    return result;
+  }
+
+  /** Does it, or says why not and changes nothing. */
+  private attempt(work: () => Promise<void>): Promise<boolean> {
+    return this.inOrder(async () => {
+      try {
+        await work();
+        return true;
+      } catch (error) {
+        this.events.message(text(error), "error");
+        // Fields show what holds, not what was refused.
+        if (this.facts.length > 0) this.events.setup();
+        return false;
+      }
+    });
+  }
+
+  private async configure(setup: Scenario, robots: RobotKind[], keep: boolean): Promise<void> {
+    const setups = robots.map((robot) => ({ label: robot.label, setup: robot.derive(setup) }));
+    const planes = this.planes;
+    const facts = await this.engine.call({ kind: "configure", robots: setups, keep });
+    this.playback?.stop();
+    this.playback = undefined;
+    [this.setup, this.robots, this.facts] = [setup, robots, facts];
+    this.planes = facts[0]?.planes ?? 1;
+    if (!keep) this.live.clear();
+    if (!keep || this.planes !== planes || this.histories.length !== facts.length) this.renew();
+    for (const [i, history] of this.histories.entries()) {
+      history.samplingTime = facts[i]?.sampling_time ?? history.samplingTime;
+    }
+    this.events.setup();
+    if (keep) await this.repeatOrder();
+  }
+
+  private renew(): void {
+    this.histories = this.facts.map(({ planes, sampling_time }) => new History(planes, sampling_time, FAN_INTERVAL));
+    this.events.restarted();
+  }
+
+  async openPreset(name: string): Promise<void> {
+    const preset = this.presets.find((candidate) => candidate.name === name);
+    if (preset) await this.openToml(preset.text, name);
+  }
+
+  openToml(toml: string, preset: string, robots?: string[]): Promise<boolean> {
+    return this.attempt(async () => {
+      const setup = await this.engine.call({ kind: "parse", toml });
+      await this.configure(setup, robotsNamed(robots ?? [setup.controller.model]), false);
+      this.preset = preset;
+      this.run(false);
+      this.events.setup();
+    });
+  }
+
+  async openLink(fragment: string): Promise<boolean> {
+    try {
+      const { toml, robots } = await link.decode(fragment);
+      return await this.openToml(toml, "", robots);
+    } catch (error) {
+      this.events.message(text(error), "error");
+      return false;
+    }
+  }
+
+  change(path: string, value: unknown): Promise<boolean> {
+    return this.attempt(async () => {
+      const setup = withValue(this.setup, path, value);
+      await this.configure(setup, this.robots, this.time() > 0 && !this.playback);
+    });
+  }
+
+  chooseRobots(names: string[]): Promise<boolean> {
+    return this.attempt(() => this.configure(this.setup, robotsNamed(names), false));
+  }
+
+  /** The ball radius: angles times this are lengths on the floor. */
+  private get radius(): number {
+    return this.setup.parameters.ball_radius_m;
+  }
+
+  private async tell(call: Call): Promise<void> {
+    try {
+      await this.engine.call(call);
+    } catch (error) {
+      this.events.message(text(error), "error");
+    }
+  }
+
+  private async repeatOrder(): Promise<void> {
+    const { order } = this.live;
+    if (order?.kind === "target") await this.sendTarget(order.at);
+    if (order?.kind === "path") await this.sendPath(order.points);
+  }
+
+  private sendTarget(at: FloorPoint): Promise<void> {
+    return this.tell({ kind: "target", phi: { x: at.x / this.radius, y: at.y / this.radius } });
+  }
+
+  private sendPath(points: { x: number; y: number; time_s: number }[]): Promise<void> {
+    return this.tell({
+      kind: "path",
+      points: points.map(({ x, y, time_s }) => ({ time_s, phi: { x: x / this.radius, y: y / this.radius } })),
+    });
+  }
+
+  target(at: FloorPoint): void {
+    if (this.playback) return;
+    this.live.target(at, this.sampleTime());
+    void this.sendTarget(at);
+    this.runOn();
+  }
+
+  path(points: FloorPoint[], from: FloorPoint): void {
+    if (this.playback) return;
+    const timed = timedPath(points, from, this.sampleTime());
+    this.live.path(timed);
+    void this.sendPath(timed);
+    this.runOn();
+  }
+
+  /** Pushes the bodies towards a direction: change of the lean's rates, rad/s. */
+  push(towards: FloorPoint): void {
+    if (this.playback) return;
+    // The body leans towards +x where theta is negative.
+    const push = { x: -towards.x, y: -towards.y };
+    this.live.push(push.x, push.y, this.sampleTime());
+    void this.tell({ kind: "push", push });
+    this.runOn();
+  }
+
+  /** Whoever reaches into the scene wants to see what happens. */
+  private runOn(): void {
+    if (!this.isRunning) this.run(true);
+  }
+
+  run(running: boolean, speed = this.speed): void {
+    this.speed = speed;
+    (this.playback ?? this.engine).run(running, speed);
+  }
+
+  step(): void {
+    if (this.playback) this.playback.step();
+    else void this.tell({ kind: "step" });
+  }
+
+  reset(): void {
+    if (this.playback) {
+      this.playback.reset();
+      return;
+    }
+    void this.attempt(async () => {
+      await this.configure(this.setup, this.robots, false);
+      this.run(false);
+    });
+  }
+
+  play(files: { name: string; text: string }[]): void {
+    try {
+      const sorted = files.toSorted((a, b) => a.name.localeCompare(b.name)).slice(0, 2);
+      const planes = sorted.map(({ name, text: csv }) => readTrajectory(csv, name));
+      const playback = new Playback(planes);
+      this.engine.run(false, this.speed);
+      this.playback?.stop();
+      this.playback = playback;
+      this.playbackName = sorted.map(({ name }) => name).join(", ");
+      this.planes = planes.length;
+      this.robots = this.robots.slice(0, 1);
+      this.histories = [new History(planes.length, playback.samplingTime, FAN_INTERVAL)];
+      this.references = [planes.map(({ rows }) => Float64Array.from(rows, (row) => row[6] ?? 0))];
+      this.events.setup();
+      this.events.restarted();
+      playback.onBatch = (batch) => this.receive(batch);
+      playback.run(true, this.speed);
+    } catch (error) {
+      this.events.message(text(error), "error");
+    }
+  }
+
+  private receive(batch: Batch): void {
+    if (batch.restarted && this.histories.some(({ total }) => total > 0)) {
+      this.histories = this.histories.map(({ planes, samplingTime }) => new History(planes, samplingTime, FAN_INTERVAL));
+      this.events.restarted();
+    }
+    // A batch from before the last change of the robots is void.
+    if (batch.robots.length !== this.histories.length) return;
+    for (const [i, robot] of batch.robots.entries()) this.histories[i]?.add(robot);
+    if (batch.references) this.references = batch.references;
+    [this.clock, this.clockAt] = [batch.clock, performance.now()];
+    const ended = batch.complete && !this.isComplete;
+    this.isComplete = batch.complete;
+    if (batch.running !== this.isRunning || ended) {
+      this.isRunning = batch.running;
+      this.events.running();
+    }
+    this.onBatch(batch);
+  }
+
+  /** Simulated time for the eye, s. */
+  time(): number {
+    const elapsed = this.isRunning ? ((performance.now() - this.clockAt) / 1000) * this.speed : 0;
+    return Math.min(this.clock + elapsed, this.sampleTime());
+  }
+
+  /** Time up to which the robots were simulated, s. */
+  private sampleTime(): number {
+    return Math.max(0, ...this.histories.map((history) => history.nowAt(0, 0)));
+  }
+
+  /** The set-up as a file for `ballbot simulate`: the first robot, with what was done to it. */
+  toml(): string {
+    const setup = this.live.into(this.setup, this.planes);
+    return toToml(this.robots[0]?.derive(setup) ?? setup);
+  }
+
+  /** The run so far: a file per plane and robot. */
+  csv(): { name: string; text: string }[] {
+    const several = this.histories.length > 1;
+    return this.histories.flatMap((history, i) => {
+      const robot = several ? `_${this.robots[i]?.name ?? i}` : "";
+      return Array.from({ length: history.planes }, (_, plane) => {
+        const axis = history.planes === 1 ? "" : plane === 0 ? "_x" : "_y";
+        return { name: `trajectory${robot}${axis}.csv`, text: trajectoryCsv(history, plane) };
+      });
+    });
+  }
+
+  async fragment(): Promise<string> {
+    const setup = this.live.into(this.setup, this.planes);
+    return link.encode({ toml: toToml(setup), robots: this.robots.map(({ name }) => name) });
+  }
+}

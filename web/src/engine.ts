@@ -1,0 +1,50 @@
+// The page's end of the worker.
+
+import type { Answers, Batch, Call, FromWorker } from "./protocol";
+
+/** Whatever delivers batches: the simulation, or a recorded file. */
+export interface Source {
+  onBatch: (batch: Batch) => void;
+  run(running: boolean, speed: number): void;
+  step(): void;
+  reset(): void;
+}
+
+type Waiting = { resolve: (value: never) => void; reject: (error: Error) => void };
+
+export class Engine {
+  onBatch: (batch: Batch) => void = () => {};
+  onFailure: (text: string) => void = () => {};
+  private readonly worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+  private readonly waiting = new Map<number, Waiting>();
+  private nextId = 0;
+
+  constructor() {
+    this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.receive(data);
+    this.worker.onerror = (event) => this.onFailure(event.message);
+  }
+
+  /** Asks the worker; rejects with its message. */
+  call<K extends Call["kind"]>(call: Extract<Call, { kind: K }>): Promise<Answers[K]> {
+    const id = this.nextId++;
+    this.worker.postMessage({ id, call });
+    return new Promise((resolve, reject) => this.waiting.set(id, { resolve, reject }));
+  }
+
+  run(running: boolean, speed: number): void {
+    this.worker.postMessage({ run: { running, speed } });
+  }
+
+  private receive(message: FromWorker): void {
+    if ("batch" in message) {
+      this.onBatch(message.batch);
+    } else if ("failed" in message) {
+      this.onFailure(message.failed);
+    } else {
+      const waiting = this.waiting.get(message.id);
+      this.waiting.delete(message.id);
+      if ("error" in message) waiting?.reject(new Error(message.error));
+      else waiting?.resolve(message.value as never);
+    }
+  }
+}

@@ -1,0 +1,101 @@
+// Files that come in and go out: TOML set-ups, CSV runs.
+
+import type { History } from "./history";
+import { ROW, ROW_WIDTH, NOW_WIDTH } from "./protocol";
+
+/** Columns of trajectory.csv, as `ballbot simulate` writes it. */
+export const COLUMNS = [
+  "t_s", "phi_rad", "theta_rad", "phi_dot_rad_s", "theta_dot_rad_s", "torque_nm", "phi_ref_rad", "cost", "status", "step_us",
+] as const;
+
+/** A row per sample, then the state at the end without a torque. */
+export function trajectoryCsv(history: History, plane: number): string {
+  const lines: string[] = [COLUMNS.join(",")];
+  const plain = (text: string) => text.replaceAll(",", ";").replaceAll("\n", " ");
+  for (let i = 0; i < history.length; i++) {
+    const values = [ROW.time, ROW.phi, ROW.theta, ROW.phiDot, ROW.thetaDot, ROW.torque, ROW.phiReference, ROW.cost]
+      .map((column) => history.at(i, plane, column));
+    const step = history.at(i, plane, ROW.stepMicroseconds).toFixed(3);
+    lines.push(`${values.join(",")},${plain(history.statusAt(i))},${step}`);
+  }
+  const now = [0, 1, 2, 3, 4].map((column) => history.nowAt(plane, column));
+  lines.push(`${now.join(",")},,${history.nowAt(plane, 5)},,${plain(history.ending ?? "")},`);
+  return `${lines.join("\n")}\n`;
+}
+
+/** A recorded run of one plane. */
+export interface Recorded {
+  rows: Float64Array[];
+  statuses: string[];
+  /** The last row: time, phi, theta, phi_dot, theta_dot, phi_ref. */
+  final: Float64Array;
+  ending: string;
+}
+
+/** Reads trajectory.csv. Throws with line and reason. */
+export function readTrajectory(text: string, name: string): Recorded {
+  const lines = text.split(/\r?\n/).filter((line) => line.trim() !== "");
+  const header = (lines[0] ?? "").split(",").map((column) => column.trim());
+  const missing = COLUMNS.slice(0, 7).filter((column) => !header.includes(column));
+  if (missing.length > 0) {
+    throw new Error(`${name}: the column ${missing.join(", ")} is missing; it must have the columns of trajectory.csv: ${COLUMNS.join(", ")}`);
+  }
+  if (lines.length < 3) throw new Error(`${name}: there is nothing to play: a run has at least two rows below the header`);
+  const place = (column: string) => header.indexOf(column);
+  const places = COLUMNS.slice(0, 8).map(place);
+  const rows: Float64Array[] = [];
+  const statuses: string[] = [];
+  let final: Float64Array | undefined;
+  let ending = "";
+  for (const [i, line] of lines.slice(1).entries()) {
+    const cells = line.split(",");
+    const number = (column: number, mayBeEmpty: boolean): number => {
+      const cell = (cells[column] ?? "").trim();
+      const value = cell === "" ? NaN : Number(cell);
+      if (!Number.isFinite(value) && !(mayBeEmpty && cell === "")) {
+        throw new Error(`${name}, line ${i + 2}: "${cell}" in the column ${header[column] ?? column + 1} is not a number`);
+      }
+      return value;
+    };
+    const isLast = i === lines.length - 2;
+    const values = places.map((column, k) => (column < 0 ? NaN : number(column, k >= 7 || (isLast && k === 5))));
+    const status = place("status") < 0 ? "" : (cells[place("status")] ?? "");
+    const before = rows.at(-1)?.[ROW.time] ?? -Infinity;
+    if ((values[0] ?? NaN) <= before) throw new Error(`${name}, line ${i + 2}: the time does not increase`);
+    if (isLast) {
+      final = Float64Array.from([...values.slice(0, 5), values[6] ?? 0]);
+      ending = status;
+    } else {
+      const row = new Float64Array(ROW_WIDTH);
+      row.set(values);
+      row[ROW.stepMicroseconds] = place("step_us") < 0 ? NaN : Number(cells[place("step_us")] || NaN);
+      row.set(row.subarray(ROW.phi, ROW.phi + 4), ROW.estimate);
+      rows.push(row);
+      statuses.push(status);
+    }
+  }
+  return { rows, statuses, final: final ?? new Float64Array(NOW_WIDTH), ending };
+}
+
+/** Hands a file to the user. */
+export function save(name: string, text: string, type: string): void {
+  const link = document.createElement("a");
+  const url = URL.createObjectURL(new Blob([text], { type }));
+  link.href = url;
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(url), 1000);
+}
+
+/** Lets the user choose files. */
+export function choose(accept: string, multiple: boolean): Promise<File[]> {
+  const input = document.createElement("input");
+  input.type = "file";
+  input.accept = accept;
+  input.multiple = multiple;
+  return new Promise((resolve) => {
+    input.addEventListener("change", () => resolve([...(input.files ?? [])]));
+    input.addEventListener("cancel", () => resolve([]));
+    input.click();
+  });
+}

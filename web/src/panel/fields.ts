@@ -1,0 +1,153 @@
+// The elements that the panel is made of. Every one is a native control with a label.
+
+export interface FieldSpec {
+  label: string;
+  unit?: string;
+  title?: string;
+}
+
+let count = 0;
+
+function element<K extends keyof HTMLElementTagNameMap>(
+  name: K,
+  properties: Partial<HTMLElementTagNameMap[K]> = {},
+  ...children: (Node | string)[]
+): HTMLElementTagNameMap[K] {
+  const made = Object.assign(document.createElement(name), properties);
+  made.append(...children);
+  return made;
+}
+
+function row(spec: FieldSpec, ...controls: HTMLElement[]): HTMLElement {
+  const id = `field-${count++}`;
+  const label = element("label", { textContent: spec.label, htmlFor: id });
+  if (controls[0]) controls[0].id = id;
+  for (const control of controls) {
+    const part = control.getAttribute("aria-label");
+    if (part !== null) control.setAttribute("aria-label", `${spec.label}, ${part}`);
+  }
+  const line = element("div", { className: "field" }, label, ...controls);
+  if (spec.unit) line.append(element("span", { className: "unit", textContent: spec.unit }));
+  if (spec.title) line.title = spec.title;
+  return line;
+}
+
+/** Text of a number field; an infinite bound is an empty field. */
+function shown(value: number): string {
+  return Number.isFinite(value) ? String(Number(value.toPrecision(6))) : "";
+}
+
+/** Whether somebody is in the middle of typing into a field, which then must not be set. */
+class Typing {
+  now = false;
+
+  constructor(input: HTMLInputElement) {
+    input.addEventListener("input", () => (this.now = true));
+    for (const done of ["change", "blur"]) input.addEventListener(done, () => (this.now = false));
+  }
+}
+
+export interface NumberSpec extends FieldSpec {
+  /** With both, a slider stands beside the number. */
+  min?: number;
+  max?: number;
+  step?: number;
+  /** The slider moves in decades. */
+  logarithmic?: boolean;
+  /** What an empty field means; without it an empty field is not accepted. */
+  whenEmpty?: number;
+}
+
+export interface Field<T> {
+  element: HTMLElement;
+  set(value: T): void;
+}
+
+export function numberField(spec: NumberSpec, changed: (value: number) => void): Field<number> {
+  const input = element("input", { type: "number", inputMode: "decimal", step: "any" });
+  const slides = spec.min !== undefined && spec.max !== undefined;
+  const slider = element("input", { type: "range", step: String(spec.step ?? "any") });
+  slider.setAttribute("aria-label", "slider");
+  const typing = new Typing(input);
+  const toSlider = (value: number) => (spec.logarithmic ? Math.log10(Math.max(value, 1e-9)) : value);
+  if (slides) {
+    slider.min = String(toSlider(spec.min ?? 0));
+    slider.max = String(toSlider(spec.max ?? 1));
+    if (spec.logarithmic) slider.step = "0.05";
+  }
+  if (spec.whenEmpty !== undefined) input.placeholder = "none";
+  input.addEventListener("change", () => {
+    const value = input.value.trim() === "" ? spec.whenEmpty : Number(input.value);
+    if (value === undefined || Number.isNaN(value)) return;
+    slider.value = String(toSlider(value));
+    changed(value);
+  });
+  slider.addEventListener("input", () => {
+    const at = Number(slider.value);
+    const value = spec.logarithmic ? Number((10 ** at).toPrecision(2)) : at;
+    input.value = shown(value);
+    changed(value);
+  });
+  return {
+    element: slides ? row(spec, input, slider) : row(spec, input),
+    set(value) {
+      if (!typing.now) input.value = shown(value);
+      if (document.activeElement !== slider) slider.value = String(toSlider(value));
+    },
+  };
+}
+
+/** [lower, upper]; an empty field is no bound. */
+export function rangeField(spec: FieldSpec, changed: (value: [number, number]) => void): Field<[number, number]> {
+  const make = (name: string) => {
+    const input = element("input", { type: "number", inputMode: "decimal", step: "any", placeholder: "none" });
+    input.setAttribute("aria-label", name);
+    return input;
+  };
+  const [lower, upper] = [make("lower bound"), make("upper bound")];
+  const typing = [new Typing(lower), new Typing(upper)] as const;
+  const read = (input: HTMLInputElement, empty: number) => (input.value.trim() === "" ? empty : Number(input.value));
+  for (const input of [lower, upper]) {
+    input.addEventListener("change", () => changed([read(lower, -Infinity), read(upper, Infinity)]));
+  }
+  return {
+    element: row(spec, lower, upper),
+    set([low, high]) {
+      if (!typing[0].now) lower.value = shown(low);
+      if (!typing[1].now) upper.value = shown(high);
+    },
+  };
+}
+
+export function choiceField(spec: FieldSpec, choices: [value: string, text: string][], changed: (value: string) => void): Field<string> {
+  const select = element("select", {}, ...choices.map(([value, text]) => element("option", { value, textContent: text })));
+  select.addEventListener("change", () => changed(select.value));
+  return { element: row(spec, select), set: (value) => void (select.value = value) };
+}
+
+export function checkField(spec: FieldSpec, changed: (value: boolean) => void): Field<boolean> {
+  const input = element("input", { type: "checkbox" });
+  input.addEventListener("change", () => changed(input.checked));
+  const box = row(spec, input);
+  box.classList.add("check");
+  return { element: box, set: (value) => void (input.checked = value) };
+}
+
+export function button(text: string, title: string, clicked: () => void): HTMLButtonElement {
+  const made = element("button", { textContent: text, title, type: "button" });
+  made.addEventListener("click", clicked);
+  return made;
+}
+
+export function buttons(...made: HTMLButtonElement[]): HTMLElement {
+  return element("div", { className: "buttons" }, ...made);
+}
+
+export function note(text: string): HTMLElement {
+  return element("p", { className: "note", textContent: text });
+}
+
+export function section(title: string, open: boolean, ...children: HTMLElement[]): HTMLElement {
+  const details = element("details", { open }, element("summary", { textContent: title }), ...children);
+  return details;
+}

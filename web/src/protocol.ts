@@ -1,0 +1,117 @@
+// What page and worker say to each other.
+
+import type { Scenario } from "./scenario";
+
+/** A preset: its name and its TOML text. */
+export interface Preset {
+  name: string;
+  text: string;
+}
+
+/** One robot of a run. */
+export interface RobotSetup {
+  label: string;
+  setup: Scenario;
+}
+
+/** A push on the body in one instant: change of the tilt's rate in each plane, rad/s. */
+export interface Push {
+  x: number;
+  y: number;
+}
+
+/** Phi in both planes, rad. */
+export interface PhiPair {
+  x: number;
+  y: number;
+}
+
+/** Calls that are answered with a value or an error. */
+export type Call =
+  | { kind: "presets" }
+  | { kind: "parse"; toml: string }
+  | { kind: "configure"; robots: RobotSetup[]; keep: boolean }
+  | { kind: "step" }
+  | { kind: "target"; phi: PhiPair }
+  | { kind: "path"; points: { time_s: number; phi: PhiPair }[] }
+  | { kind: "push"; push: Push };
+
+/** What comes back from each call. */
+export interface Answers {
+  presets: Preset[];
+  parse: Scenario;
+  configure: RobotFacts[];
+  step: null;
+  target: null;
+  path: null;
+  push: null;
+}
+
+/** What holds for a robot during a run. */
+export interface RobotFacts {
+  label: string;
+  planes: number;
+  sampling_time: number;
+  horizon: number;
+  samples: number;
+}
+
+export type ToWorker =
+  | { id: number; call: Call }
+  | { run: { running: boolean; speed: number } };
+
+/** Columns of a row: one sample in one plane. Times in s, angles in rad, torque in N m. */
+export const ROW = {
+  time: 0,
+  phi: 1,
+  theta: 2,
+  phiDot: 3,
+  thetaDot: 4,
+  torque: 5,
+  phiReference: 6,
+  cost: 7,
+  activeBounds: 8,
+  stepMicroseconds: 9,
+  estimate: 10,
+} as const;
+export const ROW_WIDTH = 14;
+
+/** What happened to one robot since the last batch. */
+export interface RobotBatch {
+  /** Samples times planes times ROW_WIDTH. */
+  rows: Float64Array;
+  /** Samples times three, N m. */
+  motors: Float64Array;
+  /** Status of each sample, in words, run-length coded: the first sample it holds from. */
+  statuses: { from: number; text: string }[];
+  /** The state now, per plane: time, phi, theta, phi_dot, theta_dot, phi_ref. */
+  now: Float64Array;
+  /** Per plane: the states that the last plan leads through, four per sample. */
+  prediction: Float64Array[];
+  /** Why it stopped, in words; absent while it runs. */
+  ending?: string;
+  /** It lies on the floor. */
+  down: boolean;
+}
+
+export const NOW_WIDTH = 6;
+
+export interface Batch {
+  /** Simulated time that the display has reached, s. */
+  clock: number;
+  running: boolean;
+  speed: number;
+  /** Set at the first batch of a run: what was shown before is void. */
+  restarted: boolean;
+  /** The run has reached the end of its scenario. */
+  complete: boolean;
+  robots: RobotBatch[];
+  /** Per robot, per plane: phi_ref at equidistant times over the run, for the floor. Sent when it changed. */
+  references?: Float64Array[][];
+}
+
+export type FromWorker =
+  | { id: number; value: unknown }
+  | { id: number; error: string }
+  | { batch: Batch }
+  | { failed: string };

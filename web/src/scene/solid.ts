@@ -1,0 +1,285 @@
+// The floor in three dimensions.
+
+import {
+  BufferAttribute, BufferGeometry, CircleGeometry, Color, DirectionalLight, DynamicDrawUsage, Fog,
+  HemisphereLight, Line, LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial,
+  MeshStandardMaterial, PCFShadowMap, PerspectiveCamera, Plane, Points,
+  PointsMaterial, Raycaster, RingGeometry, Scene, Vector2, Vector3, WebGLRenderer,
+} from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { Robot, toScene } from "./robot";
+import type { FloorPoint, Picture, RobotPicture, Shape, Theme, View } from "./view";
+
+/** How fast the camera goes after the robots, 1/s. */
+const FOLLOW_RATE = 3.5;
+const HALF = 12;
+const LINE_POINTS = 2048;
+const PLAN_POINTS = 256;
+
+/** A line on the floor whose points change. */
+class FloorLine {
+  readonly object: Line | Points;
+  private readonly positions: BufferAttribute;
+
+  constructor(material: LineBasicMaterial | PointsMaterial, capacity: number, private readonly height: number) {
+    const geometry = new BufferGeometry();
+    this.positions = new BufferAttribute(new Float32Array(3 * capacity), 3);
+    this.positions.setUsage(DynamicDrawUsage);
+    geometry.setAttribute("position", this.positions);
+    this.object = material instanceof PointsMaterial ? new Points(geometry, material) : new Line(geometry, material);
+    this.object.frustumCulled = false;
+  }
+
+  set(count: number, point: (i: number) => FloorPoint, lane: number): void {
+    const shown = Math.min(count, this.positions.count);
+    for (let i = 0; i < shown; i++) {
+      const { x, y } = point(i);
+      this.positions.setXYZ(i, x, this.height, -(y + lane));
+    }
+    this.positions.needsUpdate = true;
+    this.object.geometry.setDrawRange(0, shown);
+  }
+
+  dispose(): void {
+    this.object.geometry.dispose();
+    (this.object.material as LineBasicMaterial).dispose();
+  }
+}
+
+/** Everything that belongs to one robot. */
+class Actor {
+  readonly robot: Robot;
+  readonly ghost: Robot;
+  readonly trail: FloorLine;
+  readonly plan: FloorLine;
+  readonly reference: FloorLine;
+  readonly goal: Mesh;
+
+  constructor(private readonly scene: Scene, shape: Shape, theme: Theme, readonly colour: string) {
+    const line = (hex: string, opacity: number) =>
+      new LineBasicMaterial({ color: new Color(hex), transparent: true, opacity });
+    this.robot = new Robot(shape, theme, colour, false);
+    this.ghost = new Robot(shape, theme, colour, true);
+    this.trail = new FloorLine(line(colour, 0.75), LINE_POINTS, 0.004);
+    this.reference = new FloorLine(line(theme.reference, 0.9), LINE_POINTS, 0.003);
+    this.plan = new FloorLine(
+      new PointsMaterial({ color: new Color(colour), size: 5, sizeAttenuation: false, transparent: true, opacity: 0.9 }),
+      PLAN_POINTS, 0.006,
+    );
+    const { ballRadius: r } = shape;
+    this.goal = new Mesh(
+      new RingGeometry(r * 0.78, r * 0.92, 48),
+      new MeshBasicMaterial({ color: new Color(colour), transparent: true, opacity: 0.9 }),
+    );
+    this.goal.rotation.x = -Math.PI / 2;
+    scene.add(...this.objects());
+  }
+
+  private objects() {
+    return [this.robot.group, this.ghost.group, this.goal, this.trail.object, this.plan.object, this.reference.object];
+  }
+
+  draw(picture: RobotPicture): void {
+    const { pose, prediction, trail, reference, goal, lane } = picture;
+    this.robot.place(pose, lane);
+    const end = prediction.at(-1);
+    // A ghost that stands where the robot stands would only blur it.
+    const apart = end ? Math.hypot(end.x - pose.x, end.y - pose.y) : 0;
+    this.ghost.group.visible = end !== undefined && apart > 0.03;
+    if (end) this.ghost.place(end, lane);
+    const pair = (values: Float32Array) => (i: number) => ({ x: values[2 * i] ?? 0, y: values[2 * i + 1] ?? 0 });
+    this.trail.set(trail.length / 2, pair(trail), lane);
+    this.reference.set(reference.length / 2, pair(reference), lane);
+    this.plan.set(prediction.length, (i) => prediction[i] ?? pose, lane);
+    this.goal.position.copy(toScene(goal.x, goal.y + lane, 0.005));
+  }
+
+  dispose(): void {
+    this.scene.remove(...this.objects());
+    this.robot.dispose();
+    this.ghost.dispose();
+    for (const line of [this.trail, this.plan, this.reference]) line.dispose();
+    this.goal.geometry.dispose();
+    (this.goal.material as MeshBasicMaterial).dispose();
+  }
+}
+
+function gridLines(step: number, skip: number, colour: string, opacity: number): LineSegments {
+  const points: number[] = [];
+  const count = Math.round(HALF / step);
+  for (let i = -count; i <= count; i++) {
+    if (skip > 0 && i % skip === 0) continue;
+    const at = i * step;
+    points.push(at, 0, -HALF, at, 0, HALF, -HALF, 0, at, HALF, 0, at);
+  }
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(new Float32Array(points), 3));
+  const material = new LineBasicMaterial({ color: new Color(colour), transparent: true, opacity });
+  const lines = new LineSegments(geometry, material);
+  lines.position.y = 0.001;
+  return lines;
+}
+
+export class SolidView implements View {
+  readonly kind = "3d";
+  readonly element: HTMLCanvasElement;
+  private readonly renderer: WebGLRenderer;
+  private readonly scene = new Scene();
+  private readonly camera = new PerspectiveCamera(36, 1, 0.05, 60);
+  private readonly controls: OrbitControls;
+  private readonly sun = new DirectionalLight("#ffffff", 2.4);
+  private readonly sky = new HemisphereLight("#ffffff", "#8a919c", 1.5);
+  private readonly floor: Mesh<CircleGeometry, MeshStandardMaterial>;
+  private grid: LineSegments[] = [];
+  private actors: Actor[] = [];
+  private stroke: FloorLine;
+  private theme: Theme;
+  private shape: Shape = { ballRadius: 0.12, wheelRadius: 0.05, zenith: Math.PI / 4, centreOfMass: 0.3 };
+  private followed = new Vector3();
+  private slowFrames = 0;
+  private lastFrame = 0;
+
+  /** Throws where there is no WebGL. */
+  constructor(private readonly host: HTMLElement, theme: Theme) {
+    this.theme = theme;
+    this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
+    this.element = this.renderer.domElement;
+    host.append(this.element);
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = PCFShadowMap;
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    this.floor = new Mesh(new CircleGeometry(40, 48), new MeshStandardMaterial({ roughness: 1 }));
+    this.floor.rotation.x = -Math.PI / 2;
+    this.floor.receiveShadow = true;
+    this.sun.castShadow = true;
+    this.sun.shadow.mapSize.set(1024, 1024);
+    this.sun.shadow.radius = 3;
+    this.sun.shadow.bias = -0.0006;
+    const box = this.sun.shadow.camera;
+    [box.left, box.right, box.bottom, box.top, box.near, box.far] = [-1.6, 1.6, -1.6, 1.6, 0.5, 8];
+    this.stroke = new FloorLine(new LineBasicMaterial({ color: new Color(theme.ink) }), LINE_POINTS, 0.01);
+    this.scene.add(this.floor, this.sun, this.sun.target, this.sky, this.stroke.object);
+    this.camera.position.set(0.9, 1.35, 2.9);
+    this.controls = new OrbitControls(this.camera, this.element);
+    this.controls.target.set(0, 0.32, 0);
+    this.controls.maxPolarAngle = Math.PI / 2 - 0.04;
+    [this.controls.minDistance, this.controls.maxDistance] = [0.8, 14];
+    this.controls.enableDamping = true;
+    this.setCameraTool(false);
+    this.setTheme(theme);
+    this.resize();
+  }
+
+  setCameraTool(on: boolean): void {
+    // Values of three's MOUSE and TOUCH: rotate 0, dolly 1, pan 2; two fingers dolly-rotate 3.
+    this.controls.mouseButtons = { LEFT: on ? 0 : null, MIDDLE: 2, RIGHT: on ? 2 : 0 };
+    this.controls.touches = { ONE: on ? 0 : null, TWO: 3 };
+  }
+
+  setShape(shape: Shape): void {
+    this.shape = shape;
+    this.clearActors();
+  }
+
+  setTheme(theme: Theme): void {
+    this.theme = theme;
+    const background = new Color(theme.background);
+    this.scene.background = background;
+    this.scene.fog = new Fog(background, 6, 15);
+    this.floor.material.color = background.clone().multiplyScalar(theme.dark ? 0.9 : 0.97);
+    this.sky.intensity = theme.dark ? 1.1 : 1.9;
+    this.sky.groundColor = new Color(theme.dark ? "#20252c" : "#c3c8cf");
+    this.sun.intensity = theme.dark ? 2.2 : 2.0;
+    for (const lines of this.grid) {
+      this.scene.remove(lines);
+      lines.geometry.dispose();
+      (lines.material as LineBasicMaterial).dispose();
+    }
+    this.grid = [gridLines(0.25, 4, theme.grid, 0.5), gridLines(1, 0, theme.gridStrong, 0.9)];
+    this.scene.add(...this.grid);
+    this.clearActors();
+  }
+
+  private clearActors(): void {
+    for (const actor of this.actors) actor.dispose();
+    this.actors = [];
+  }
+
+  resize(): void {
+    const { clientWidth, clientHeight } = this.host;
+    if (clientWidth === 0 || clientHeight === 0) return;
+    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.camera.aspect = clientWidth / clientHeight;
+    this.camera.updateProjectionMatrix();
+  }
+
+  draw(picture: Picture): void {
+    const colours = picture.robots.map(({ colour }) => colour);
+    if (colours.join() !== this.actors.map(({ colour }) => colour).join()) {
+      this.clearActors();
+      this.actors = colours.map((colour) => new Actor(this.scene, this.shape, this.theme, colour));
+    }
+    for (const [i, robot] of picture.robots.entries()) this.actors[i]?.draw(robot);
+    this.stroke.set(picture.stroke.length, (i) => picture.stroke[i] ?? { x: 0, y: 0 }, 0);
+    this.follow(picture.follow);
+    this.controls.update();
+    this.renderer.render(this.scene, this.camera);
+    this.adapt();
+  }
+
+  /** Camera, light and grid move along with the robots. */
+  private follow(point: FloorPoint): void {
+    const goal = toScene(point.x, point.y);
+    const elapsed = Math.min((performance.now() - this.lastFrame) / 1000, 0.2);
+    const step = goal.sub(this.followed).multiplyScalar(1 - Math.exp(-elapsed * FOLLOW_RATE));
+    this.followed.add(step);
+    this.camera.position.add(step);
+    this.controls.target.add(step);
+    this.sun.target.position.copy(this.followed);
+    this.sun.position.copy(this.followed).add(new Vector3(-1.3, 3.4, 1.5));
+    for (const lines of this.grid) {
+      lines.position.x = Math.round(this.followed.x);
+      lines.position.z = Math.round(this.followed.z);
+    }
+    this.floor.position.set(this.followed.x, 0, this.followed.z);
+  }
+
+  /** Gives up shadows, then resolution, where the graphics cannot keep up. */
+  private adapt(): void {
+    const now = performance.now();
+    const slow = now - this.lastFrame > 40;
+    this.lastFrame = now;
+    this.slowFrames = slow ? this.slowFrames + 1 : Math.max(this.slowFrames - 1, 0);
+    if (this.slowFrames < 40) return;
+    this.slowFrames = 0;
+    if (this.renderer.shadowMap.enabled) {
+      this.renderer.shadowMap.enabled = false;
+      this.sun.castShadow = false;
+    } else if (this.renderer.getPixelRatio() > 0.75) {
+      this.renderer.setPixelRatio(this.renderer.getPixelRatio() * 0.75);
+      this.resize();
+    }
+  }
+
+  floorAt(clientX: number, clientY: number): FloorPoint | undefined {
+    const box = this.element.getBoundingClientRect();
+    const ray = new Raycaster();
+    const place = new Vector2(
+      ((clientX - box.left) / box.width) * 2 - 1,
+      1 - ((clientY - box.top) / box.height) * 2,
+    );
+    ray.setFromCamera(place, this.camera);
+    const hit = ray.ray.intersectPlane(new Plane(new Vector3(0, 1, 0), 0), new Vector3());
+    if (!hit || hit.distanceTo(this.camera.position) > 30) return undefined;
+    return { x: hit.x, y: -hit.z };
+  }
+
+  project(x: number, y: number, height: number): { clientX: number; clientY: number } {
+    const box = this.element.getBoundingClientRect();
+    const point = toScene(x, y, height).project(this.camera);
+    return {
+      clientX: box.left + ((point.x + 1) / 2) * box.width,
+      clientY: box.top + ((1 - point.y) / 2) * box.height,
+    };
+  }
+}

@@ -1,0 +1,199 @@
+// The control loop, beside the page: samples at their own rate, whatever the screen does.
+
+import init, { Simulation, presets, scenario } from "./generated/ballbot_web.js";
+import wasmUrl from "./generated/ballbot_web_bg.wasm?url";
+import { parse } from "smol-toml";
+import type { Batch, Call, FromWorker, RobotBatch, RobotFacts, RobotSetup, ToWorker } from "./protocol";
+import { Recorder } from "./recorder";
+
+interface Robot {
+  label: string;
+  simulation: Simulation;
+  recorder: Recorder;
+}
+
+/** At most this much is caught up after the machine was busy, s. */
+const MOST_BEHIND = 0.1;
+/** Time between two looks at the clock, ms. */
+const TICK = 4;
+/** Time between two batches, ms: one per frame of the screen. */
+const BATCH = 15;
+/** Points of a reference on the floor. */
+const REFERENCE_POINTS = 400;
+
+let robots: Robot[] = [];
+let running = false;
+let speed = 1;
+let clock = 0;
+let lastTick = 0;
+let lastBatch = 0;
+let restarted = false;
+let referencesChanged = false;
+let completed = false;
+
+function post(message: FromWorker, transfer: Transferable[] = []): void {
+  self.postMessage(message, { transfer });
+}
+
+function send(): void {
+  const batch: Batch = {
+    clock,
+    running,
+    speed,
+    restarted,
+    complete: completed,
+    robots: robots.map(({ recorder, simulation }): RobotBatch => recorder.take(simulation)),
+  };
+  if (referencesChanged) {
+    batch.references = robots.map(({ simulation }) =>
+      Array.from({ length: simulation.planes() }, (_, plane) =>
+        simulation.reference(plane, REFERENCE_POINTS),
+      ),
+    );
+  }
+  restarted = false;
+  referencesChanged = false;
+  lastBatch = performance.now();
+  post({ batch }, batch.robots.flatMap(({ rows, motors }) => [rows.buffer, motors.buffer]));
+}
+
+function sampleAll(): void {
+  for (const { simulation, recorder } of robots) recorder.sample(simulation);
+}
+
+/** Time of the next sample: of the robots that still move. Infinite when all lie on the floor. */
+function nextTime(): number {
+  const moving = robots.filter(({ simulation }) => !simulation.is_down());
+  return Math.min(...moving.map(({ simulation }) => simulation.time()));
+}
+
+function endOfRun(): number {
+  return Math.max(...robots.map(({ simulation }) => simulation.duration()));
+}
+
+/** Stops where the scenario ends, once; whoever lets it run on may do so. Stops for good when
+ *  nothing moves any more. */
+function stopAtTheEnd(): void {
+  if (nextTime() === Infinity) {
+    running = false;
+    clock = Math.max(...robots.map(({ simulation }) => simulation.time()));
+    return;
+  }
+  if (!completed && nextTime() > endOfRun() - 1e-9) {
+    completed = true;
+    running = false;
+    clock = nextTime();
+  }
+}
+
+function tick(): void {
+  const now = performance.now();
+  const elapsed = Math.min((now - lastTick) / 1000, MOST_BEHIND);
+  lastTick = now;
+  if (running && robots.length > 0) {
+    clock += elapsed * speed;
+    stopAtTheEnd();
+    while (running && nextTime() <= clock) {
+      sampleAll();
+      stopAtTheEnd();
+    }
+    if (now - lastBatch >= BATCH || !running) send();
+  }
+  setTimeout(tick, TICK);
+}
+
+function configure(setups: RobotSetup[], keep: boolean): RobotFacts[] {
+  const next: Robot[] = [];
+  try {
+    for (const [index, { label, setup }] of setups.entries()) {
+      const before = keep ? robots[index] : undefined;
+      const simulation = before
+        ? before.simulation.reconfigured(setup)
+        : new Simulation(setup);
+      next.push({ label, simulation, recorder: before?.recorder ?? new Recorder() });
+    }
+  } catch (error) {
+    for (const { simulation } of next) simulation.free();
+    throw error;
+  }
+  for (const { simulation } of robots) simulation.free();
+  robots = next;
+  referencesChanged = true;
+  if (!keep) {
+    restarted = true;
+    completed = false;
+    running = false;
+    clock = 0;
+  }
+  // After the answer, which tells the page how many robots there are.
+  queueMicrotask(send);
+  return robots.map(({ label, simulation }) => ({
+    label,
+    planes: simulation.planes(),
+    sampling_time: simulation.sampling_time(),
+    horizon: simulation.horizon(),
+    samples: simulation.samples(),
+  }));
+}
+
+function answer(call: Call): unknown {
+  switch (call.kind) {
+    case "presets":
+      return presets().map(({ name, text }) => ({ name, text }));
+    case "parse":
+      return scenario(parse(call.toml));
+    case "configure":
+      return configure(call.robots, call.keep);
+    case "step":
+      running = false;
+      sampleAll();
+      if (nextTime() < Infinity) clock = nextTime();
+      stopAtTheEnd();
+      send();
+      return null;
+    case "target":
+      for (const { simulation } of robots) simulation.set_target(call.phi.x, call.phi.y);
+      referencesChanged = true;
+      send();
+      return null;
+    case "path": {
+      const times = Float64Array.from(call.points, ({ time_s }) => time_s);
+      const x = Float64Array.from(call.points, ({ phi }) => phi.x);
+      const y = Float64Array.from(call.points, ({ phi }) => phi.y);
+      for (const { simulation } of robots) simulation.set_path(times, x, y);
+      referencesChanged = true;
+      send();
+      return null;
+    }
+    case "push":
+      for (const { simulation } of robots) simulation.push(call.push.x, call.push.y);
+      return null;
+  }
+}
+
+async function start(): Promise<void> {
+  try {
+    await init({ module_or_path: wasmUrl });
+    lastTick = performance.now();
+    tick();
+  } catch (error) {
+    post({ failed: `the controller's WebAssembly module cannot be loaded: ${error}` });
+    throw error;
+  }
+}
+
+const started = start();
+
+self.onmessage = async ({ data }: MessageEvent<ToWorker>) => {
+  await started;
+  if ("run" in data) {
+    ({ running, speed } = data.run);
+    send();
+    return;
+  }
+  try {
+    post({ id: data.id, value: answer(data.call) });
+  } catch (error) {
+    post({ id: data.id, error: error instanceof Error ? error.message : String(error) });
+  }
+};

@@ -1,0 +1,108 @@
+// Every control does what it says: the set-up that is saved has its value, and the run shows it.
+
+import { expect, test } from "@playwright/test";
+import { fill, largest, open, openSection, saved, scenario, table, until } from "./page";
+
+const NUMBERS: [section: string, label: string, typed: string, key: string, value: number][] = [
+  ["Controller", "Horizon N", "35", "horizon", 35],
+  ["Controller", "Sampling t_s", "20", "t_s", 0.02],
+  ["Controller", "R", "500", "r", 500],
+  ["Controller", "Sub-steps", "4", "substeps", 4],
+  ["World", "Slope x", "2", "slope_x_deg", 2],
+  ["World", "Slope y", "-1", "slope_y_deg", -1],
+  ["World", "Delay", "12", "transport_s", 0.012],
+  ["World", "Noise, rates", "0.1", "noise_rad_s", 0.1],
+  ["World", "b1 factor", "1.05", "b1_factor", 1.05],
+  ["World", "b2 factor", "0.99", "b2_factor", 0.99],
+  ["World", "b3 factor", "1.02", "b3_factor", 1.02],
+  ["World", "b4 factor", "0.8", "b4_factor", 0.8],
+  ["World", "l factor", "0.98", "centre_of_mass_factor", 0.98],
+  ["World", "Motor limit", "2", "limit_nm", 2],
+  ["World", "Seed", "7", "seed", 7],
+];
+
+test("numbers go into the set-up", async ({ page }) => {
+  const problems = await open(page);
+  for (const [section, label, typed, key, value] of NUMBERS) {
+    await openSection(page, section);
+    await fill(page, label, typed);
+    const toml = await saved(page, "Save TOML");
+    const found = [...toml.matchAll(new RegExp(`^${key} = (.*)$`, "gm"))].map(([, number]) => Number(number));
+    expect(found.some((number) => Math.abs(number - value) < 1e-12), `${label}: ${found}`).toBe(true);
+  }
+  for (const [i, name] of ["phi", "theta", "phi_dot", "theta_dot"].entries()) await fill(page, `Q ${name}`, String(i + 2));
+  expect(await saved(page, "Save TOML")).toContain("q = [2, 3, 4, 5]");
+  await page.getByLabel("Terminal", { exact: true }).selectOption("equality");
+  expect(await saved(page, "Save TOML")).toContain('terminal = "equality"');
+  expect(problems).toEqual([]);
+});
+
+test("a slider does what its number does", async ({ page }) => {
+  await open(page);
+  await page.getByLabel("Horizon N, slider").fill("42");
+  await expect(page.getByLabel("Horizon N", { exact: true })).toHaveValue("42");
+  expect(await saved(page, "Save TOML")).toContain("horizon = 42");
+});
+
+test("a tighter bound is kept while the robot goes on", async ({ page }) => {
+  await open(page);
+  await scenario(page, "two-setpoints");
+  await openSection(page, "Bounds");
+  await page.getByLabel("torque, lower bound").fill("-0.6");
+  await page.getByLabel("torque, upper bound").fill("0.6");
+  await page.getByLabel("torque, upper bound").press("Enter");
+  await page.locator("#play").click();
+  await until(page, 3.9);
+  const csv = table(await saved(page, "Save CSV"));
+  expect(largest(csv["torque_nm"])).toBeLessThan(0.6 + 1e-9);
+  expect(largest(csv["torque_nm"])).toBeGreaterThan(0.55);
+});
+
+test("settings change while it runs, and the robot stays where it is", async ({ page }) => {
+  await open(page);
+  await page.locator("#play").click();
+  await fill(page, "Target X", "0.5");
+  await until(page, 4);
+  await fill(page, "Horizon N", "30");
+  await until(page, 6);
+  await expect(page.locator("#alert")).toBeHidden();
+  const csv = table(await saved(page, "Save CSV"));
+  const phi = csv["phi_rad"] ?? [];
+  const jump = Math.max(...phi.slice(1).map((value, i) => Math.abs(value - (phi[i] ?? value))));
+  expect(jump).toBeLessThan(1.6);
+  expect((phi.at(-1) ?? NaN) * 0.12).toBeCloseTo(0.5, 1);
+});
+
+test("a value that makes no sense is refused with a message, and nothing changes", async ({ page }) => {
+  await open(page);
+  const before = await saved(page, "Save TOML");
+  await fill(page, "Horizon N", "500");
+  await expect(page.locator("#message")).toContainText("controller.horizon = 500");
+  await expect(page.getByLabel("Horizon N", { exact: true })).toHaveValue("20");
+  expect(await saved(page, "Save TOML")).toBe(before);
+});
+
+test("the keyboard is enough", async ({ page }) => {
+  await open(page);
+  await page.locator("#scene").focus();
+  await page.keyboard.press("ArrowRight");
+  await expect(page.getByLabel("Target X", { exact: true })).toHaveValue("0.25");
+  await until(page, 3);
+  await page.keyboard.press("Shift+ArrowLeft");
+  await page.keyboard.press(" ");
+  await expect(page.locator("#play")).toHaveText("Run");
+  await page.keyboard.press("r");
+  await expect(page.locator("#clock")).toHaveText("0.00 s");
+  await page.keyboard.press(".");
+  await expect(page.locator("#clock")).toHaveText("0.05 s");
+  const unnamed = await page.evaluate(() =>
+    [...document.querySelectorAll("button, select, input, [role=img], [role=application]")]
+      .filter((element) => {
+        const input = element as HTMLInputElement;
+        const name = element.getAttribute("aria-label") ?? element.textContent ?? "";
+        return name.trim() === "" && (input.labels?.length ?? 0) === 0;
+      })
+      .map((element) => element.outerHTML),
+  );
+  expect(unnamed).toEqual([]);
+});

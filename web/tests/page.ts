@@ -1,0 +1,85 @@
+// What the tests do with the page, in a user's words.
+
+import { readFile } from "node:fs/promises";
+import { expect, type Page } from "@playwright/test";
+
+/** Opens the page; the returned list fills with everything that goes wrong in it. */
+export async function open(page: Page, address = "./"): Promise<string[]> {
+  const problems: string[] = [];
+  page.on("console", (message) => {
+    if (message.type() === "error" || message.type() === "warning") problems.push(message.text());
+  });
+  page.on("pageerror", (error) => problems.push(error.message));
+  page.on("request", (request) => {
+    const { protocol, hostname } = new URL(request.url());
+    const own = hostname === "127.0.0.1" || protocol === "blob:" || protocol === "data:";
+    if (!own) problems.push(`loads ${request.url()}`);
+  });
+  await page.goto(address);
+  await ready(page);
+  // Software rendering is slow; the tests do not judge its pictures.
+  return problems;
+}
+
+export async function ready(page: Page): Promise<void> {
+  await page.waitForFunction(() => document.documentElement.dataset["ready"] === "true");
+}
+
+export async function scenario(page: Page, name: string): Promise<void> {
+  await page.getByLabel("Scenario", { exact: true }).selectOption(name);
+  await expect(page.locator("#clock")).toHaveText("0.00 s");
+}
+
+export async function clock(page: Page): Promise<number> {
+  return parseFloat((await page.locator("#clock").textContent()) ?? "");
+}
+
+/** Waits until the simulated time is at least `seconds`. */
+export async function until(page: Page, seconds: number): Promise<void> {
+  await expect.poll(() => clock(page), { timeout: 90_000 }).toBeGreaterThanOrEqual(seconds);
+}
+
+export async function openSection(page: Page, title: string): Promise<void> {
+  const details = page.locator("details", { has: page.locator("summary", { hasText: new RegExp(`^${title}$`) }) });
+  if (!(await details.evaluate((element: HTMLDetailsElement) => element.open))) await details.locator("summary").click();
+}
+
+/** Types into a number field of the panel. */
+export async function fill(page: Page, label: string, value: string): Promise<void> {
+  const field = page.locator(".panel").getByLabel(label, { exact: true });
+  await field.fill(value);
+  await field.press("Enter");
+  await field.blur();
+}
+
+/** The content of what a button saves. */
+export async function saved(page: Page, button: string): Promise<string> {
+  const download = page.waitForEvent("download");
+  await page.getByRole("button", { name: button }).click();
+  return readFile(await (await download).path(), "utf8");
+}
+
+/** Chooses a file in the dialogue of the button "Open". */
+export async function openFile(page: Page, name: string, text: string): Promise<void> {
+  const chooser = page.waitForEvent("filechooser");
+  await page.getByRole("button", { name: "Open" }).click();
+  await (await chooser).setFiles({ name, mimeType: "text/plain", buffer: Buffer.from(text) });
+}
+
+export interface Table {
+  [column: string]: number[];
+}
+
+/** The numbers of a trajectory; an empty cell is NaN. */
+export function table(csv: string): Table {
+  const [header, ...lines] = csv.trimEnd().split("\n");
+  const columns = (header ?? "").split(",");
+  const cells = lines.map((line) => line.split(","));
+  return Object.fromEntries(
+    columns.map((name, i) => [name, cells.map((row) => (row[i] === "" ? NaN : Number(row[i])))]),
+  );
+}
+
+export function largest(values: number[] | undefined): number {
+  return Math.max(...(values ?? []).filter(Number.isFinite).map(Math.abs));
+}

@@ -1,0 +1,178 @@
+// The runs: the numbers are those of the program, and a person can take part.
+
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { expect, test } from "@playwright/test";
+import { clock, fill, largest, open, openSection, saved, scenario, table, until } from "./page";
+
+const ballbot = process.env["BALLBOT"] ?? "../target/release/ballbot";
+
+/** What the program writes for a scenario, file by file. */
+function simulated(toml: string): (file: string) => string {
+  const folder = mkdtempSync(join(tmpdir(), "ballbot-"));
+  const file = join(folder, "scenario.toml");
+  writeFileSync(file, toml);
+  execFileSync(ballbot, ["simulate", file, "--out", folder], { stdio: "ignore" });
+  return (name) => readFileSync(join(folder, name), "utf8");
+}
+
+const NUMBERS = ["t_s", "phi_rad", "theta_rad", "phi_dot_rad_s", "theta_dot_rad_s", "torque_nm", "phi_ref_rad", "cost"];
+
+function expectSame(here: string, there: string): void {
+  const [ours, theirs] = [table(here), table(there)];
+  for (const column of NUMBERS) {
+    const [a, b] = [ours[column] ?? [], theirs[column] ?? []];
+    expect(a.length, `rows of ${column}`).toBe(b.length);
+    for (const [i, value] of a.entries()) {
+      const other = b[i] ?? NaN;
+      if (Number.isNaN(value) && Number.isNaN(other)) continue;
+      const scale = column === "cost" ? Math.max(1, Math.abs(other)) : 1;
+      expect(Math.abs(value - other) / scale, `${column}, row ${i}: ${value} and ${other}`).toBeLessThan(1e-9);
+    }
+  }
+}
+
+for (const name of ["two-setpoints", "tight-bounds"]) {
+  test(`${name} is the same run as in the program`, async ({ page }) => {
+    const problems = await open(page);
+    await scenario(page, name);
+    await page.locator("#play").click();
+    await expect(page.locator("#message")).toContainText("End of the scenario", { timeout: 60_000 });
+    const csv = await saved(page, "Save CSV");
+    const toml = await saved(page, "Save TOML");
+    expectSame(csv, simulated(toml)("trajectory.csv"));
+    expect(problems).toEqual([]);
+  });
+}
+
+test("a saved set-up with noise, delay and slope runs the same in the program", async ({ page }) => {
+  await open(page);
+  await scenario(page, "two-setpoints");
+  await openSection(page, "World");
+  await fill(page, "Slope x", "1");
+  await fill(page, "Noise, rates", "0.02");
+  await fill(page, "Delay", "5");
+  await fill(page, "b3 factor", "1.05");
+  await page.locator("#play").click();
+  await expect(page.locator("#message")).toContainText("End of the scenario", { timeout: 60_000 });
+  const csv = await saved(page, "Save CSV");
+  expectSame(csv, simulated(await saved(page, "Save TOML"))("trajectory.csv"));
+});
+
+test("run, pause, step, slow motion and reset", async ({ page }) => {
+  await open(page);
+  await scenario(page, "two-setpoints");
+  await page.locator("#step").click();
+  await page.locator("#step").click();
+  await expect(page.locator("#clock")).toHaveText("0.10 s");
+  await page.locator("#play").click();
+  await until(page, 0.5);
+  await page.locator("#play").click();
+  await expect(page.locator("#play")).toHaveText("Run");
+  // The picture of the last sample may take a frame.
+  await page.waitForTimeout(400);
+  const paused = await clock(page);
+  await page.waitForTimeout(400);
+  expect(await clock(page)).toBe(paused);
+  await page.locator("#speed").selectOption("0.1");
+  await page.locator("#play").click();
+  await page.waitForTimeout(1500);
+  const slow = (await clock(page)) - paused;
+  expect(slow).toBeGreaterThan(0.02);
+  expect(slow).toBeLessThan(0.5);
+  await page.locator("#reset").click();
+  await expect(page.locator("#clock")).toHaveText("0.00 s");
+});
+
+test("a push within the limits is survived", async ({ page }) => {
+  await open(page);
+  await page.locator("#play").click();
+  await until(page, 0.5);
+  await fill(page, "Push", "5");
+  await page.getByRole("button", { name: "\u2192" }).click();
+  await until(page, 6);
+  await expect(page.locator("#alert")).toBeHidden();
+  const csv = table(await saved(page, "Save CSV"));
+  expect(largest(csv["theta_dot_rad_s"])).toBeGreaterThan(0.5);
+  expect(Math.abs(csv["theta_rad"]?.at(-1) ?? NaN)).toBeLessThan(0.02);
+});
+
+test("a push that is too large ends on the floor, with the reason", async ({ page }) => {
+  await open(page);
+  await page.locator("#play").click();
+  await until(page, 0.5);
+  await fill(page, "Push", "20");
+  await page.getByRole("button", { name: "\u2192" }).click();
+  await expect(page.locator("#alert")).toContainText("the robot has fallen: theta", { timeout: 30_000 });
+  await expect(page.locator("#alert")).toContainText("LPV MPC");
+  await expect(page.locator("#alert")).toContainText(/no plan from t = .* s on: infeasible: .* bound of/);
+});
+
+test("in an ideal world a controller without a plan gives up, and says which bound", async ({ page }) => {
+  await open(page);
+  await scenario(page, "tight-bounds");
+  await page.locator("#play").click();
+  await until(page, 0.2);
+  await fill(page, "Push", "40");
+  await page.getByRole("button", { name: "\u2192" }).click();
+  await expect(page.locator("#alert")).toContainText(/no plan at t = .* s: infeasible: .* bound of .* cannot be met/);
+});
+
+test("the target can be dragged on the floor", async ({ page }) => {
+  await open(page);
+  const box = await page.locator("#scene").boundingBox();
+  if (!box) throw new Error("no scene");
+  const [x, y] = [box.x + box.width * 0.75, box.y + box.height * 0.75];
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.mouse.move(x + 40, y - 30, { steps: 4 });
+  await page.mouse.up();
+  await until(page, 6);
+  const target = Number(await page.getByLabel("Target X", { exact: true }).inputValue());
+  expect(Math.abs(target)).toBeGreaterThan(0.1);
+  const phi = table(await saved(page, "Save CSV"))["phi_rad"]?.at(-1) ?? NaN;
+  expect(phi * 0.12).toBeCloseTo(target, 1);
+});
+
+test("a drawn path is followed", async ({ page }) => {
+  await open(page);
+  await page.getByText("Draw path").click();
+  const box = await page.locator("#scene").boundingBox();
+  if (!box) throw new Error("no scene");
+  await page.mouse.move(box.x + box.width * 0.25, box.y + box.height * 0.8);
+  await page.mouse.down();
+  await page.mouse.move(box.x + box.width * 0.45, box.y + box.height * 0.85, { steps: 8 });
+  await page.mouse.move(box.x + box.width * 0.7, box.y + box.height * 0.78, { steps: 8 });
+  await page.mouse.up();
+  await until(page, 3);
+  const toml = await saved(page, "Save TOML");
+  expect(toml).toContain("[reference.planes.x.lines]");
+  await expect(page.locator("#alert")).toBeHidden();
+});
+
+test("three robots run side by side", async ({ page }) => {
+  const problems = await open(page);
+  await scenario(page, "two-setpoints");
+  await page.locator(".panel").getByLabel("linear MPC").check();
+  await page.locator(".panel").getByLabel("LQR").check();
+  await page.locator("#play").click();
+  await until(page, 1.5);
+  await expect(page.locator("#status > div")).toHaveCount(3);
+  expect(problems).toEqual([]);
+});
+
+test("the time per step that is shown is the measured one, and below 100 us for N = 20", async ({ page }) => {
+  await open(page);
+  await scenario(page, "two-setpoints");
+  await page.locator("#play").click();
+  await expect(page.locator("#message")).toContainText("End of the scenario", { timeout: 60_000 });
+  const steps = (table(await saved(page, "Save CSV"))["step_us"] ?? []).filter(Number.isFinite).sort((a, b) => a - b);
+  const middle = ((steps[39] ?? NaN) + (steps[40] ?? NaN)) / 2;
+  const shown = parseFloat((await page.locator("#status .time").textContent()) ?? "");
+  expect(shown).toBeCloseTo(middle, 1);
+  expect(middle).toBeGreaterThan(0);
+  expect(middle).toBeLessThan(100);
+  test.info().annotations.push({ type: "median time per step", description: `${middle} us` });
+});
