@@ -1,5 +1,6 @@
 //! From the three virtual torques to the three motors (eq. (6)), and back.
 
+use crate::trigonometry::sin_cos;
 use lpvmpc::Scalar;
 use nalgebra::{Matrix3, Vector3, convert};
 
@@ -38,7 +39,7 @@ impl<T: Scalar> Wheels<T> {
     pub fn new(zenith_angle: T) -> Result<Self, BadZenithAngle<T>> {
         if zenith_angle > T::zero() && zenith_angle < T::frac_pi_2() {
             Ok(Self {
-                sin_cos: zenith_angle.sin_cos(),
+                sin_cos: sin_cos(zenith_angle),
             })
         } else {
             Err(BadZenithAngle(zenith_angle))
@@ -48,7 +49,7 @@ impl<T: Scalar> Wheels<T> {
     /// The paper's robot: pi/4.
     pub fn paper() -> Self {
         Self {
-            sin_cos: T::frac_pi_4().sin_cos(),
+            sin_cos: sin_cos(T::frac_pi_4()),
         }
     }
 

@@ -220,34 +220,42 @@ where
 
     /// Algorithm 1, lines 1 to 8: the predictor's matrices along the scheduling window, which
     /// is that of the last rollout (Algorithm 2, steps 5 and 9).
-    // Not inlined, so that each loop has the registers for itself: a tenth of the step's time.
-    #[inline(never)]
     fn predict(&self, x: &SVector<T, NX>, ocp: &mut Ocp<T, NX, NU, N>) {
         ocp.horizon = self.settings.horizon;
         ocp.x0 = *x;
-        // The window's inputs are the last plan's from the second on; the last one is repeated.
-        let inputs = self.solution.u.iter().take(self.settings.horizon);
-        let inputs = inputs.clone().skip(1).chain(inputs.last());
-        let window = self.rollout.iter().zip(inputs);
-        for (stage, (x, u)) in ocp.stages.iter_mut().zip(window) {
-            self.linearize(x, u, stage);
-        }
+        self.linearize(x, &self.solution.u, 1, ocp);
     }
 
-    #[inline(always)]
-    fn linearize(&self, x: &SVector<T, NX>, u: &SVector<T, NU>, stage: &mut Stage<T, NX, NU>) {
+    /// The predictor's matrices along the last rollout, which began at `x` and had these
+    /// `inputs`, from its sample `first` (0 or 1) on; the last input is repeated.
+    // Not inlined, so that each loop has the registers for itself: a tenth of the step's time.
+    #[inline(never)]
+    fn linearize(
+        &self,
+        x: &SVector<T, NX>,
+        inputs: &[SVector<T, NU>; N],
+        first: usize,
+        ocp: &mut Ocp<T, NX, NU, N>,
+    ) {
         let ControllerSettings { t_s, predictor, .. } = &self.settings;
-        (stage.a, stage.b) = match &self.settings.scheduling {
-            Scheduling::Predicted => predictor.linearize(&self.model, x, u, *t_s),
-            Scheduling::Held(held) => {
-                let (a, b) = self.model.matrices(held);
-                predictor.discretize(&a, &b, *t_s)
-            }
-        };
+        let horizon = self.settings.horizon;
+        let states = core::iter::once(x).chain(&self.rollout).skip(first);
+        let inputs = inputs.iter().take(horizon);
+        let window = states.zip(inputs.clone().skip(first).chain(inputs.last()));
+        for (stage, (x, u)) in ocp.stages.iter_mut().zip(window).take(horizon) {
+            (stage.a, stage.b) = match &self.settings.scheduling {
+                Scheduling::Predicted => predictor.linearize(&self.model, x, u, *t_s),
+                Scheduling::Held(held) => {
+                    let (a, b) = self.model.matrices(held);
+                    predictor.discretize(&a, &b, *t_s)
+                }
+            };
+        }
     }
 
     /// The further quadratic programs of the sample, each along the relaxed plan of the one
     /// before. The plan is the last program's.
+    #[inline(never)]
     fn iterate(&mut self, x: &SVector<T, NX>, workspace: &mut Workspace<T, NX, NU, N, M>) {
         self.problems = 1;
         let most = self.settings.iterations.most();
@@ -262,7 +270,7 @@ where
         let mut relaxation = Relaxation::new();
         let mut inputs = self.solution.u;
         while self.problems < most {
-            self.predict_again(x, &inputs, ocp);
+            self.linearize(x, &inputs, 0, ocp);
             solver.solve(ocp, &settings, &mut self.solution);
             self.problems += 1;
             let change = relaxation.advance(&mut inputs, &self.solution.u);
@@ -277,20 +285,6 @@ where
             self.solution.u = plan;
         }
         self.roll_out(x);
-    }
-
-    /// The predictor's matrices along the rollout of `inputs` from `x`, which is the last one.
-    fn predict_again(
-        &self,
-        x: &SVector<T, NX>,
-        inputs: &[SVector<T, NU>; N],
-        ocp: &mut Ocp<T, NX, NU, N>,
-    ) {
-        let states = core::iter::once(x).chain(&self.rollout);
-        let window = states.zip(inputs).take(self.settings.horizon);
-        for (stage, (x, u)) in ocp.stages.iter_mut().zip(window) {
-            self.linearize(x, u, stage);
-        }
     }
 
     /// Algorithm 1, cost: the reference enters the linear terms.
