@@ -1,11 +1,11 @@
 //! The command line.
 
 use crate::commands::{
-    bench::BenchArguments, certify::CertifyArguments, completions::CompletionsArguments,
-    excite::ExciteArguments, identify::IdentifyArguments, linearize::LinearizeArguments,
-    lqr::LqrArguments, refine::RefineArguments, reproduce::ReproduceArguments,
-    scenario::ScenarioArguments, simulate::SimulateArguments, verify::VerifyArguments,
-    view::ViewArguments,
+    bench::BenchArguments, campaign::CampaignArguments, certify::CertifyArguments,
+    completions::CompletionsArguments, excite::ExciteArguments, identify::IdentifyArguments,
+    linearize::LinearizeArguments, lqr::LqrArguments, refine::RefineArguments,
+    reproduce::ReproduceArguments, scenario::ScenarioArguments, simulate::SimulateArguments,
+    verify::VerifyArguments, view::ViewArguments,
 };
 use clap::{Parser, Subcommand};
 
@@ -57,6 +57,8 @@ pub enum Command {
     Verify(VerifyArguments),
     /// Serve the ballbot in the browser, to this machine only
     View(ViewArguments),
+    /// Run many closed loops and count what is guaranteed, and where that ends
+    Campaign(CampaignArguments),
     /// Print the completions for a shell
     Completions(CompletionsArguments),
 }

@@ -1,7 +1,13 @@
 //! The parts of the program `ballbot`.
 
+#![allow(
+    clippy::neg_cmp_op_on_partial_ord,
+    reason = "a comparison with a number that is not one must take the failing branch"
+)]
+
 pub mod arguments;
 pub mod benchmark;
+pub mod campaign;
 pub mod certificate_page;
 pub mod commands;
 pub mod figures;
@@ -41,6 +47,7 @@ pub fn run(arguments: Arguments) -> Result<String, CommandError> {
         Command::Certify(arguments) => commands::certify::run(&arguments),
         Command::Verify(arguments) => commands::verify::run(&arguments),
         Command::View(arguments) => commands::view::run(&arguments),
+        Command::Campaign(arguments) => commands::campaign::run(&arguments),
         Command::Completions(arguments) => commands::completions::run(&arguments),
     }
 }

@@ -5,7 +5,7 @@ use lpvmpc_sim::{Ending, LogRow, Trajectory};
 use nalgebra::Vector3;
 
 /// The columns of `trajectory.csv`.
-pub const COLUMNS: [&str; 10] = [
+pub const COLUMNS: [&str; 16] = [
     "t_s",
     "phi_rad",
     "theta_rad",
@@ -16,6 +16,12 @@ pub const COLUMNS: [&str; 10] = [
     "cost",
     "status",
     "step_us",
+    "gap_phi_rad",
+    "gap_theta_rad",
+    "gap_phi_dot_rad_s",
+    "gap_theta_dot_rad_s",
+    "decision",
+    "artificial_set_point_rad",
 ];
 
 /// `trajectory.csv`: one row per sample, the state at the sample and the torque held after it;
@@ -24,10 +30,14 @@ pub const COLUMNS: [&str; 10] = [
 pub fn trajectory_csv(trajectory: &Trajectory<4, 1>) -> String {
     let mut text = COLUMNS.join(",") + "\n";
     for sample in &trajectory.samples {
-        let x = &sample.x;
+        let (x, gap) = (&sample.x, &sample.gap);
         let step_us = sample.step_time.as_secs_f64() * 1e6;
+        let guard = sample.guard.map_or_else(
+            || ",".to_owned(),
+            |guard| format!("{},{:?}", guard.decision, guard.set_point),
+        );
         text += &format!(
-            "{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{},{step_us:.3}\n",
+            "{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{},{step_us:.3},{:?},{:?},{:?},{:?},{guard}\n",
             sample.t,
             x[0],
             x[1],
@@ -36,7 +46,11 @@ pub fn trajectory_csv(trajectory: &Trajectory<4, 1>) -> String {
             sample.u[0],
             sample.x_ref[0],
             sample.cost,
-            sample.status
+            sample.status,
+            gap[0],
+            gap[1],
+            gap[2],
+            gap[3],
         );
     }
     let x = &trajectory.final_state;
@@ -46,7 +60,7 @@ pub fn trajectory_csv(trajectory: &Trajectory<4, 1>) -> String {
         other => words::ending(other).replace(',', ";"),
     };
     text += &format!(
-        "{:?},{:?},{:?},{:?},{:?},,{:?},,{status},\n",
+        "{:?},{:?},{:?},{:?},{:?},,{:?},,{status},,,,,,,\n",
         trajectory.final_time, x[0], x[1], x[2], x[3], trajectory.final_reference[0]
     );
     text

@@ -1,4 +1,4 @@
-//! The built-in scenarios: the paper's, to the letter.
+//! The built-in scenarios: the paper's, to the letter, and what goes beyond it.
 
 /// A built-in scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,13 +24,14 @@ macro_rules! builtin {
 pub const TERMINAL_CERTIFICATE: &str = include_str!("builtin/terminal-certificate.json");
 
 /// All built-in scenarios.
-pub const ALL: [Builtin; 6] = [
+pub const ALL: [Builtin; 7] = [
     builtin!("two-setpoints"),
     builtin!("two-setpoints-linear"),
     builtin!("lissajous"),
     builtin!("single-setpoint"),
     builtin!("single-setpoint-terminal"),
     builtin!("tight-bounds"),
+    builtin!("far-setpoints"),
 ];
 
 /// The built-in scenario with this name.

@@ -76,6 +76,9 @@ pub enum ScenarioError {
     /// The controller refuses its settings.
     #[error("controller: {0}")]
     Controller(#[from] lpvmpc::ControllerError),
+    /// The guarded controller refuses its settings.
+    #[error("controller: {0}")]
+    Guarded(#[from] lpvmpc::GuardedError),
 }
 
 impl ScenarioError {

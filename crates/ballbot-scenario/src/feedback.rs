@@ -38,7 +38,12 @@ const ESTIMATOR_STEP: f64 = 0.5;
 impl Feedback {
     /// Whether the controller stands alone: on the readings, at once, with preview.
     pub(crate) fn is_plain(&self) -> bool {
-        self.estimator.is_none() && self.delay == 0.0 && self.ramp.is_none() && self.preview
+        self.is_direct() && self.preview
+    }
+
+    /// Whether the controller decides for the measured state, and its torque is what is sent.
+    pub(crate) fn is_direct(&self) -> bool {
+        self.estimator.is_none() && self.delay == 0.0 && self.ramp.is_none()
     }
 
     /// Checks what the scenario says about it. `settings` are those of the plain controller.
@@ -55,7 +60,7 @@ impl Feedback {
                 .transpose()?,
             delay: not_negative("controller.delay_s", table.delay_s)?,
             ramp: ramp
-                .map(|ramp| ramp.settings(table.terminal, ballbot, settings))
+                .map(|ramp| ramp.settings(&table.terminal, ballbot, settings))
                 .transpose()?,
             preview: table.preview,
         })
@@ -167,7 +172,7 @@ impl TorqueRateTable {
     /// The plain controller's settings with the torque as a fifth state.
     fn settings(
         &self,
-        terminal: TerminalTable,
+        terminal: &TerminalTable,
         ballbot: &Ballbot<f64>,
         plain: &ControllerSettings<f64, 4, 1, 2>,
     ) -> Result<ControllerSettings<f64, 5, 1, 2>, ScenarioError> {
@@ -188,7 +193,7 @@ impl TorqueRateTable {
         let terminal = match terminal {
             TerminalTable::None => TerminalIngredient::Cost(Matrix5::zeros()),
             TerminalTable::Equality => TerminalIngredient::Equality,
-            TerminalTable::DiscreteRiccati => {
+            TerminalTable::DiscreteRiccati | TerminalTable::Certified(_) => {
                 let model = RampedInput::<_, 4>(*ballbot);
                 let (a, b): (Matrix5<f64>, Vector5<f64>) = model.matrices(&Vector2::zeros());
                 let (a, b) = plain.predictor.discretize(&a, &b, plain.t_s);

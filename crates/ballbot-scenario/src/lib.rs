@@ -28,6 +28,7 @@ mod certificate;
 mod error;
 mod feedback;
 mod feedback_table;
+mod guarantee;
 mod output_feedback;
 mod prepare;
 mod reference;
@@ -46,11 +47,11 @@ pub use feedback_table::{
 };
 pub use prepare::{Plane, Prepared};
 pub use reference::PhiReference;
-pub use run::{LONGEST_HORIZON, PlaneLoop, Surroundings};
+pub use run::{GUARDED_ACTIVE, GUARDED_HORIZONS, LONGEST_HORIZON, PlaneLoop, Surroundings};
 pub use schema::{
-    BoundsTable, ControllerTable, CsvTable, IntegrationTable, LinearModelTable, LissajousTable,
-    ModelKind, ParameterTable, PointTable, PredictorTable, ReferenceTable, Scenario, SineTable,
-    StateTable, TerminalTable,
+    BoundsTable, CertifiedTable, ControllerTable, CsvTable, IntegrationTable, IterationsTable,
+    LinearModelTable, LissajousTable, ModelKind, ParameterTable, PointTable, PredictorTable,
+    ReferenceTable, Scenario, SineTable, StateTable, TerminalTable,
 };
 pub use session::{Phase, Session, Trouble};
 pub use world::{PlaneWorld, Robot};

@@ -155,6 +155,8 @@ impl<const NX: usize> Plan<NX> {
                 status,
                 active_bounds,
                 step_time,
+                gap: Vector4::zeros(),
+                guard: None,
             },
         }
     }

@@ -4,16 +4,19 @@ use crate::error::ScenarioError;
 use crate::feedback::Feedback;
 use crate::reference::{self, PhiReference, finite};
 use crate::schema::{
-    BoundsTable, ControllerTable, LinearModelTable, ModelKind, ParameterTable, PredictorTable,
-    Scenario, StateTable, TerminalTable,
+    BoundsTable, ControllerTable, IterationsTable, LinearModelTable, ModelKind, ParameterTable,
+    PredictorTable, Scenario, StateTable, TerminalTable,
 };
 use crate::world::PlaneWorld;
 use crate::world_table::PlaneName;
-use crate::{builtin, run::LONGEST_HORIZON};
+use crate::{
+    builtin,
+    run::{GUARDED_HORIZONS, LONGEST_HORIZON},
+};
 use ballbot::{Ballbot, Geometry, LinearParameters, Wheels};
 use lpvmpc::{
-    Bounds, ControllerSettings, Iterations, LpvModel, Predictor, Rk4, Scheduling, SolverSettings,
-    TerminalIngredient, Weights,
+    Bounds, ControllerSettings, GuardedSettings, Iterations, LpvModel, Predictor, Rk4, Scheduling,
+    SolverSettings, TerminalIngredient, Weights,
 };
 use lpvmpc_sim::Tolerances;
 use nalgebra::{DMatrix, Matrix1, Matrix4, Vector1, Vector2, Vector4};
@@ -32,6 +35,9 @@ pub struct Prepared {
     pub settings: ControllerSettings<f64, 4, 1, 2>,
     /// What stands around the controller.
     pub feedback: Feedback,
+    /// Where the terminal set is certified: the settings of the guarded controller, which then
+    /// runs. `settings` are those of the same problem without guard.
+    pub guarded: Option<GuardedSettings<f64, 4, 1>>,
     /// One plane, or x and y.
     pub planes: Vec<Plane>,
     /// Samples in the run.
@@ -106,6 +112,16 @@ impl Scenario {
         };
         check_motion(&ballbot, &self.bounds)?;
         let settings = self.controller.settings(&ballbot, bounds)?;
+        let guarded = self.controller.guarded(&ballbot, &settings, directory)?;
+        let feedback = Feedback::new(&self.controller, &ballbot, &settings)?;
+        if guarded.is_some() && !feedback.is_direct() {
+            return Err(ScenarioError::value(
+                "controller.terminal.certified",
+                "(given)",
+                "the guarantee is for the measured state and a torque that acts at once; leave \
+                 estimator, delay_s and torque_rate out",
+            ));
+        }
         let samples = (duration / settings.t_s - 1e-9).ceil();
         if samples > MOST_SAMPLES {
             return Err(ScenarioError::value(
@@ -142,8 +158,9 @@ impl Scenario {
             ballbot,
             wheels,
             settings,
-            feedback: Feedback::new(&self.controller, &ballbot, &settings)?,
+            feedback,
             planes: self.planes(references, &ballbot, settings.t_s, tolerances)?,
+            guarded,
             samples: samples as usize,
             tolerances,
         })
@@ -378,9 +395,49 @@ impl ControllerTable {
             x,
             u,
             scheduling,
-            iterations: Iterations::Fixed(1),
+            iterations: self.iterations(),
             solver: SolverSettings::default(),
         })
+    }
+
+    fn iterations(&self) -> Iterations<f64> {
+        match self.iterations {
+            None => Iterations::Fixed(1),
+            Some(IterationsTable::Fixed(most)) => Iterations::Fixed(most),
+            Some(IterationsTable::UntilConverged { tolerance, most }) => {
+                Iterations::UntilConverged { tolerance, most }
+            }
+        }
+    }
+
+    fn guarded(
+        &self,
+        ballbot: &Ballbot<f64>,
+        settings: &ControllerSettings<f64, 4, 1, 2>,
+        directory: &Path,
+    ) -> Result<Option<GuardedSettings<f64, 4, 1>>, ScenarioError> {
+        let TerminalTable::Certified(table) = &self.terminal else {
+            return Ok(None);
+        };
+        if self.model == ModelKind::Linear {
+            return Err(ScenarioError::value(
+                "controller.model",
+                "linear",
+                "a guarantee needs the nonlinear prediction, \"lpv\"",
+            ));
+        }
+        let guarded = table.settings(ballbot, settings, directory)?;
+        if !GUARDED_HORIZONS.contains(&self.horizon) {
+            return Err(ScenarioError::value(
+                "controller.horizon",
+                self.horizon,
+                format!(
+                    "with a certified terminal set it must be one of {GUARDED_HORIZONS:?} samples \
+                     (the library itself takes any compile-time size)"
+                ),
+            ));
+        }
+        Ok(Some(guarded))
     }
 
     fn predictor(&self, upright: &Matrix4<f64>) -> Result<Predictor, ScenarioError> {
@@ -424,16 +481,17 @@ impl ControllerTable {
         let q = dynamic(&weights.q);
         let r = DMatrix::from_element(1, 1, weights.r[0]);
         let cost = |p: DMatrix<f64>| TerminalIngredient::Cost(Matrix4::from_fn(|i, j| p[(i, j)]));
-        Ok(match self.terminal {
+        Ok(match &self.terminal {
             TerminalTable::None => TerminalIngredient::Cost(Matrix4::zeros()),
             TerminalTable::Equality => TerminalIngredient::Equality,
-            TerminalTable::DiscreteRiccati => {
+            // The certified cost is the guarded controller's; without guard it is as by default.
+            TerminalTable::DiscreteRiccati | TerminalTable::Certified(_) => {
                 let (a_d, b_d) = predictor.discretize(&a, &b, self.t_s);
                 cost(lpvmpc_design::lqr_discrete(&dynamic(&a_d), &dynamic(&b_d), &q, &r)?.p)
             }
             TerminalTable::ContinuousRiccati { linear_model } => {
                 let (a, b) = match linear_model {
-                    Some(table) => LinearParameters::from(table).matrices(),
+                    Some(table) => LinearParameters::from(*table).matrices(),
                     None => (a, b),
                 };
                 cost(lpvmpc_design::lqr_continuous(&dynamic(&a), &dynamic(&b), &q, &r)?.p)

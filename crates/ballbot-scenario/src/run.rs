@@ -5,13 +5,25 @@ use crate::feedback::longest_step;
 use crate::output_feedback::{Belief, Core, OutputFeedback};
 use crate::prepare::{Plane, Prepared};
 use crate::world::{PlaneWorld, Robot};
-use lpvmpc::{Controller, DelayLine, Estimator, RampedInput, Workspace};
-use lpvmpc_sim::{ClosedLoop, Course, Recording, Regulator, StateFeedback, Trajectory, World};
+use lpvmpc::{
+    Controller, DelayLine, Estimator, GuardedController, GuardedSettings, GuardedWorkspace,
+    RampedInput, Workspace,
+};
+use lpvmpc_sim::{
+    ClosedLoop, Course, GuardedFeedback, Recording, Regulator, StateFeedback, Trajectory, World,
+};
 use nalgebra::{Vector3, Vector4};
 use std::time::Duration;
 
 /// The longest horizon that is compiled in, samples.
 pub const LONGEST_HORIZON: usize = 200;
+
+/// The horizons that are compiled in for the guarded controller, samples.
+pub const GUARDED_HORIZONS: [usize; 3] = [10, 20, 30];
+
+/// Bounds that the guarded controller's quadratic program may have active at once; soft bounds
+/// can be many.
+pub const GUARDED_ACTIVE: usize = 200;
 
 /// What the run reads and reports besides its results.
 pub struct Surroundings<'a> {
@@ -71,11 +83,31 @@ impl Prepared {
     /// # Errors
     /// [`ScenarioError::Controller`] if the controller refuses its settings.
     pub fn closed_loop(&self, plane: &Plane) -> Result<PlaneLoop, ScenarioError> {
+        let regulator = match &self.guarded {
+            Some(settings) => self.guarded_feedback(settings),
+            None => self.feedback_without_guard(plane.world.settings.period),
+        }?;
+        let PlaneWorld {
+            robot,
+            settings,
+            without_plan,
+            range,
+        } = plane.world.clone();
+        let world = World::new(robot, plane.initial_state, settings)?;
+        let mut closed_loop = ClosedLoop::new(regulator, world)?;
+        closed_loop.without_plan = without_plan;
+        closed_loop.range = range;
+        Ok(closed_loop)
+    }
+
+    fn feedback_without_guard(
+        &self,
+        period: f64,
+    ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
         // Up to 4 rows of a terminal equality come on top of one row per input.
-        let period = plane.world.settings.period;
         // In a browser the longest horizon must do for all: the time per step follows the horizon
         // that is used, and every size is code that has to be loaded.
-        let regulator = match (self.settings.horizon, self.feedback.is_plain()) {
+        match (self.settings.horizon, self.feedback.is_plain()) {
             #[cfg(not(target_family = "wasm"))]
             (..=20, true) => self.state_feedback::<20, 24>(),
             #[cfg(not(target_family = "wasm"))]
@@ -93,18 +125,39 @@ impl Prepared {
             (_, false) => {
                 self.output_feedback::<LONGEST_HORIZON, { 2 * LONGEST_HORIZON + 4 }>(period)
             }
-        }?;
-        let PlaneWorld {
-            robot,
-            settings,
-            without_plan,
-            range,
-        } = plane.world.clone();
-        let world = World::new(robot, plane.initial_state, settings)?;
-        let mut closed_loop = ClosedLoop::new(regulator, world)?;
-        closed_loop.without_plan = without_plan;
-        closed_loop.range = range;
-        Ok(closed_loop)
+        }
+    }
+
+    fn guarded_feedback(
+        &self,
+        settings: &GuardedSettings<f64, 4, 1>,
+    ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
+        // As many as GUARDED_HORIZONS; N + 2 stages each.
+        match self.settings.horizon {
+            ..=10 => self.guarded_sized::<10, 12>(settings),
+            11..=20 => self.guarded_sized::<20, 22>(settings),
+            _ => self.guarded_sized::<30, 32>(settings),
+        }
+    }
+
+    fn guarded_sized<const N: usize, const NP: usize>(
+        &self,
+        settings: &GuardedSettings<f64, 4, 1>,
+    ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
+        Ok(Box::new(GuardedFeedback::<
+            _,
+            4,
+            1,
+            2,
+            N,
+            5,
+            NP,
+            GUARDED_ACTIVE,
+        > {
+            controller: GuardedController::new(self.ballbot, *settings)?,
+            workspace: Box::new(GuardedWorkspace::new()),
+            x: Vector4::zeros(),
+        }))
     }
 
     fn state_feedback<const N: usize, const M: usize>(

@@ -120,6 +120,24 @@ pub struct ControllerTable {
     /// The limits of the motors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motors: Option<MotorsTable>,
+    /// Quadratic programs per sample; one when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub iterations: Option<IterationsTable>,
+}
+
+/// Quadratic programs per sample, each along the rollout of the one before.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum IterationsTable {
+    /// So many.
+    Fixed(usize),
+    /// Until the plan repeats itself.
+    UntilConverged {
+        /// No torque of the plan changes by more than this, relative to the largest.
+        tolerance: f64,
+        /// At most so many.
+        most: usize,
+    },
 }
 
 fn yes() -> bool {
@@ -137,7 +155,7 @@ pub enum ModelKind {
 }
 
 /// The end of the horizon.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum TerminalTable {
     /// Nothing.
@@ -160,6 +178,23 @@ pub enum TerminalTable {
         /// Symmetric positive semidefinite, 4 x 4.
         p: [[f64; 4]; 4],
     },
+    /// A terminal set that `ballbot certify` has proved, with its cost, its law and an artificial
+    /// set point: the loop that is guaranteed (`docs/guarantees.md`).
+    Certified(CertifiedTable),
+}
+
+/// A certified terminal set.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CertifiedTable {
+    /// File written by `ballbot certify`, relative to the scenario file; the certificate of the
+    /// built-in scenarios' robot when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certificate: Option<String>,
+    /// Cost of (artificial set point - reference)^2, 1/rad^2; the terminal cost of 1 rad beside
+    /// the set point when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset_weight: Option<f64>,
 }
 
 /// The predictor.

@@ -104,6 +104,8 @@ impl Regulator<10, 3, 10> for Planes {
             },
             active_bounds: x.active_bounds + y.active_bounds,
             step_time: x.step_time + y.step_time,
+            gap: State::zeros(),
+            guard: None,
         }
     }
 

@@ -1,5 +1,6 @@
 //! Regulator and world together: Algorithm 2 around the continuous plant.
 
+use crate::guarded_loop::Guard;
 use crate::plant::{Plant, PlantError, Tolerances, Unloaded};
 use crate::regulator::{Regulator, StateFeedback};
 use crate::world::{World, WorldError};
@@ -28,6 +29,10 @@ pub struct Sample<const NX: usize, const NU: usize> {
     pub active_bounds: usize,
     /// Time that the controller took, by the clock that was handed in.
     pub step_time: Duration,
+    /// Nonlinear rollout minus prediction at the end of the horizon, in state units.
+    pub gap: SVector<f64, NX>,
+    /// What only a guarded controller knows.
+    pub guard: Option<Guard>,
 }
 
 /// How a run ended.
@@ -189,8 +194,10 @@ where
         self.regulator.observe(self.world.measurement());
         let decision = self.regulator.decide(self.k, reference, clock);
         let status = decision.status;
+        // A guarded controller has an answer whatever its quadratic program said.
+        let guarded = decision.guard.is_some();
         let usable = match self.without_plan {
-            WithoutPlan::End => status.is_solved(),
+            WithoutPlan::End => guarded || status.is_solved(),
             WithoutPlan::Apply => status != Status::NotFinite,
         };
         if !usable {
@@ -217,6 +224,8 @@ where
             status,
             active_bounds: decision.active_bounds,
             step_time: decision.step_time,
+            gap: decision.gap,
+            guard: decision.guard,
         })
     }
 

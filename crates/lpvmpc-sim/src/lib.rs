@@ -12,6 +12,7 @@
 mod actuator;
 pub mod closed_loop;
 mod disturbance;
+mod guarded_loop;
 pub mod plant;
 mod regulator;
 mod sensor;
@@ -23,6 +24,7 @@ pub use closed_loop::{
     record, run,
 };
 pub use disturbance::Disturbance;
+pub use guarded_loop::{Actuation, Guard, GuardedFeedback, GuardedLoop};
 pub use plant::{Plant, PlantError, Tolerances, Unloaded, advance};
 pub use regulator::{Decision, Regulator, StateFeedback};
 pub use sensor::{Measurement, Sensor};

@@ -1,5 +1,6 @@
 //! What decides in a closed loop: measurements in, commands out.
 
+use crate::guarded_loop::Guard;
 use crate::sensor::Measurement;
 use lpvmpc::{Controller, LpvModel, Reference, Status, Workspace};
 use nalgebra::SVector;
@@ -23,6 +24,10 @@ pub struct Decision<const NX: usize, const NU: usize> {
     pub active_bounds: usize,
     /// Time that the controller took, by the clock that was handed in.
     pub step_time: Duration,
+    /// Nonlinear rollout minus prediction at the end of the horizon, in state units.
+    pub gap: SVector<f64, NX>,
+    /// What only a guarded controller knows.
+    pub guard: Option<Guard>,
 }
 
 /// What stands between the sensors and the actuators.
@@ -143,6 +148,8 @@ where
             status,
             active_bounds,
             step_time,
+            gap: self.controller.gap(),
+            guard: None,
         }
     }
 

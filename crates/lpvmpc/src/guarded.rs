@@ -18,6 +18,7 @@ use crate::model::{LpvModel, Scalar};
 use crate::ocp::Ocp;
 use crate::solution::{Solution, Status};
 use crate::solver::{Solver, SolverSettings, WarmStart};
+use core::fmt;
 use nalgebra::{SVector, convert};
 use plan::Plan;
 pub use settings::{GuardedError, GuardedIterations, GuardedSettings, TerminalSet};
@@ -41,6 +42,18 @@ impl Decision {
     /// Whether bounds and convergence are guaranteed from here on, for the plant as modelled.
     pub fn is_guaranteed(self) -> bool {
         self <= Self::TerminalLaw
+    }
+}
+
+impl fmt::Display for Decision {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NewPlan => "new plan",
+            Self::Candidate => "candidate",
+            Self::TerminalLaw => "terminal law",
+            Self::SoftBounds => "soft bounds",
+            Self::SaturatedLqr => "saturated LQR",
+        })
     }
 }
 
@@ -82,6 +95,12 @@ impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usiz
             solver: Solver::new(),
             solution: Solution::default(),
         }
+    }
+
+    /// Bounds that are active in the last quadratic program, edges of terminal set and trust
+    /// region included.
+    pub fn active_bounds(&self) -> usize {
+        self.solution.active.len()
     }
 }
 

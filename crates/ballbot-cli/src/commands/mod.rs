@@ -1,6 +1,7 @@
 //! One module per command: its arguments, and what it prints.
 
 pub mod bench;
+pub mod campaign;
 pub mod certify;
 pub mod completions;
 pub mod excite;
@@ -59,6 +60,9 @@ pub enum CommandError {
     /// A figure that cannot be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),
+    /// The threads of a campaign.
+    #[error("cannot start the threads: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
     /// No set could be certified.
     #[error("no certificate: {0}")]
     Certify(#[from] CertifyError),

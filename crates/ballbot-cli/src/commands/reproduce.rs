@@ -66,7 +66,8 @@ fn write(
 ) -> Result<(), CommandError> {
     let machine = machine();
     let mut files: Vec<(PathBuf, Vec<u8>)> = Vec::new();
-    for drawing in drawings {
+    let guarantee = &reproduction.guarantee;
+    for drawing in drawings.iter().chain([&guarantee.drawing()]) {
         let path = folder.join("figures").join(drawing.name);
         files.push((
             path.with_extension("svg"),
@@ -74,7 +75,7 @@ fn write(
         ));
         files.push((path.with_extension("png"), drawing.figure.png(PNG_SCALE)?));
     }
-    for sheet in sheets {
+    for sheet in sheets.iter().chain(&guarantee.sheets()) {
         let path = folder.join("tables").join(sheet.name).with_extension("csv");
         files.push((path, sheet.csv().into_bytes()));
     }

@@ -2,7 +2,9 @@
 
 pub mod claims;
 pub mod drawings;
+pub mod guarantee;
 pub mod models;
+pub mod nonlinear;
 pub mod report;
 pub mod runs;
 pub mod tables;
@@ -13,6 +15,7 @@ use crate::progress::Progress;
 use crate::refinement::{Refinement, RefinementProblem};
 use crate::regulator::{Regulator, RegulatorProblem, Time};
 use ballbot::{Ballbot, LinearParameters};
+use guarantee::Guarantee;
 use models::ModelComparison;
 use runs::{Run, Runs};
 
@@ -33,6 +36,8 @@ pub struct Reproduction {
     /// How far the plan's end is from where the nonlinear model ends under it, at the first
     /// sample of scenario 3 with terminal equality: (phi, theta) in rad.
     pub terminal_gap: (f64, f64),
+    /// What is guaranteed, beyond the paper.
+    pub guarantee: Guarantee,
 }
 
 impl Reproduction {
@@ -41,7 +46,7 @@ impl Reproduction {
     /// # Errors
     /// What went wrong; none of it should, as there is no input.
     pub fn compute() -> Result<Self, CommandError> {
-        let progress = Progress::new("reproducing", 4);
+        let progress = Progress::new("reproducing", 5);
         let refinement = RefinementProblem::paper().solve()?;
         progress.set(1);
         let models = ModelComparison::compute()?;
@@ -51,6 +56,8 @@ impl Reproduction {
         let terminal_gap = runs.terminal_equality.first_terminal_gap()?;
         let regulators = [regulator(&runs.two_setpoints)?, regulator(&runs.lissajous)?];
         progress.set(4);
+        let guarantee = Guarantee::compute()?;
+        progress.set(5);
         Ok(Self {
             refinement,
             residual_at_printed_b: residual_at_printed_b(),
@@ -58,6 +65,7 @@ impl Reproduction {
             runs,
             regulators,
             terminal_gap,
+            guarantee,
         })
     }
 }

@@ -66,8 +66,13 @@ impl Runs {
 }
 
 impl Run {
-    fn compute(name: &'static str) -> Result<Self, CommandError> {
-        let prepared = Scenario::load(name)?.prepare(Path::new("."))?;
+    pub(super) fn compute(name: &'static str) -> Result<Self, CommandError> {
+        Self::of(name, &Scenario::load(name)?)
+    }
+
+    /// The run of a scenario under a name.
+    pub(super) fn of(name: &'static str, scenario: &Scenario) -> Result<Self, CommandError> {
+        let prepared = scenario.prepare(Path::new("."))?;
         let recordings = record(&prepared)?.into_iter();
         let trajectories: Vec<_> = recordings.map(|recording| recording.trajectory).collect();
         let metrics = prepared

@@ -22,7 +22,7 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    fn new(name: &'static str, title: &'static str, headers: &[&str]) -> Self {
+    pub(super) fn new(name: &'static str, title: &'static str, headers: &[&str]) -> Self {
         Self {
             name,
             title,
@@ -31,7 +31,7 @@ impl Sheet {
         }
     }
 
-    fn row<const K: usize>(&mut self, name: &str, cells: [String; K]) {
+    pub(super) fn row<const K: usize>(&mut self, name: &str, cells: [String; K]) {
         self.rows
             .push(std::iter::once(name.to_owned()).chain(cells).collect());
     }

@@ -1,11 +1,12 @@
 //! The commands of the program `ballbot` that run closed loops: `simulate`, `scenario`,
-//! `reproduce`.
+//! `reproduce`, `campaign`.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
+mod campaign;
 mod failures;
 mod recorded;
 mod reproduce;

@@ -4,7 +4,9 @@ use std::path::Path;
 
 /// The columns of every trajectory.
 const COLUMNS: &str = "t_s,phi_rad,theta_rad,phi_dot_rad_s,theta_dot_rad_s,torque_nm,\
-                       phi_ref_rad,cost,status,step_us";
+                       phi_ref_rad,cost,status,step_us,\
+                       gap_phi_rad,gap_theta_rad,gap_phi_dot_rad_s,gap_theta_dot_rad_s,\
+                       decision,artificial_set_point_rad";
 
 /// One sample.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,7 +28,7 @@ pub struct End {
     pub status: String,
 }
 
-fn cells(line: &str) -> [&str; 10] {
+fn cells(line: &str) -> [&str; 16] {
     let cells: Vec<&str> = line.split(',').collect();
     cells.try_into().unwrap()
 }
@@ -53,10 +55,13 @@ pub fn trajectory(path: &Path) -> (Vec<Row>, End) {
         cost,
         status,
         step,
+        gap @ ..,
+        _decision,
+        _set_point,
     ] = cells(lines.pop().unwrap());
     assert_eq!(
-        [torque, cost, step],
-        [""; 3],
+        ([torque, cost, step], gap),
+        ([""; 3], [""; 4]),
         "the last row is a state alone"
     );
     let end = End {
@@ -77,7 +82,12 @@ pub fn trajectory(path: &Path) -> (Vec<Row>, End) {
             cost,
             status,
             step,
+            gap @ ..,
+            decision,
+            set_point,
         ] = cells(line);
+        let _: [f64; 4] = gap.map(number);
+        assert_eq!(decision.is_empty(), set_point.is_empty());
         assert_eq!(status, "solved");
         assert!(number(step) >= 0.0);
         Row {

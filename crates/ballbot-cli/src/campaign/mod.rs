@@ -1,0 +1,113 @@
+//! Many closed loops: what is guaranteed, counted, and where it ends.
+//!
+//! A run is settled by variant, seed and its number alone, and runs are counted in their order,
+//! so results are the same bit for bit on any number of threads.
+
+mod drawing;
+mod paper;
+mod run;
+mod tally;
+mod variant;
+
+pub use drawing::drawing;
+pub use run::{Record, Wanted};
+pub use tally::Tally;
+pub use variant::Variant;
+
+use crate::commands::CommandError;
+use crate::progress::Progress;
+use ballbot_scenario::{Prepared, Scenario};
+use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What is to be run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Campaign {
+    /// Closed loops of the nominal variant.
+    pub runs: usize,
+    /// Closed loops of each other variant.
+    pub other_runs: usize,
+    /// Samples of each closed loop.
+    pub samples: usize,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Threads; 0 for one per core.
+    pub threads: usize,
+}
+
+/// Stack of a thread, bytes: a controller and its workspace are made on it.
+const STACK: usize = 32 << 20;
+
+/// The runs of a variant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// The variant.
+    pub variant: Variant,
+    /// Its runs, in their order.
+    pub records: Vec<Record>,
+    /// All of them together.
+    pub tally: Tally,
+}
+
+/// The scenarios that the campaign takes its controllers from.
+#[derive(Debug)]
+pub struct Scenarios {
+    /// The guaranteed loop.
+    pub guaranteed: Prepared,
+    /// The paper's literal scheme.
+    pub paper: Prepared,
+}
+
+impl Scenarios {
+    /// The built-in ones.
+    ///
+    /// # Errors
+    /// None should occur, as there is no input.
+    pub fn built_in() -> Result<Self, CommandError> {
+        let prepare = |name: &str| Scenario::load(name)?.prepare(Path::new("."));
+        Ok(Self {
+            guaranteed: prepare("far-setpoints")?,
+            paper: prepare("single-setpoint-terminal")?,
+        })
+    }
+}
+
+impl Campaign {
+    /// Runs every variant.
+    ///
+    /// # Errors
+    /// A controller refuses its settings, or the threads cannot be started.
+    pub fn run(&self, scenarios: &Scenarios) -> Result<Vec<Outcome>, CommandError> {
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(self.threads)
+            .stack_size(STACK)
+            .build()?;
+        pool.install(|| self.run_here(scenarios))
+    }
+
+    fn run_here(&self, scenarios: &Scenarios) -> Result<Vec<Outcome>, CommandError> {
+        let total = self.runs + (Variant::ALL.len() - 1) * self.other_runs;
+        let progress = Progress::new("running", total);
+        let done = AtomicUsize::new(0);
+        let outcome = |variant: &Variant| {
+            let runs = match variant {
+                Variant::Nominal => self.runs,
+                _ => self.other_runs,
+            };
+            let records = (0..runs).into_par_iter().map(|number| {
+                let record = variant.run(scenarios, self, number);
+                progress.set(done.fetch_add(1, Ordering::Relaxed) + 1);
+                record
+            });
+            let records = records.collect::<Result<Vec<_>, _>>()?;
+            Ok(Outcome {
+                variant: *variant,
+                tally: Tally::of(&records),
+                records,
+            })
+        };
+        Variant::ALL.iter().map(outcome).collect()
+    }
+}

@@ -1,0 +1,62 @@
+//! The negative control: the paper's scheme to the letter.
+
+use super::run::{N, Record, Wanted, has_fallen};
+use crate::commands::CommandError;
+use ballbot::Ballbot;
+use ballbot_scenario::{Prepared, ScenarioError};
+use lpvmpc::{Controller, Reference, Workspace};
+use nalgebra::Vector4;
+
+/// Runs the controller of `prepared` until it has no plan, for then the scheme has no torque.
+pub(super) fn run(
+    prepared: &Prepared,
+    start: Vector4<f64>,
+    wanted: &Wanted,
+    samples: usize,
+) -> Result<Record, CommandError> {
+    // One bound per input, and the four rows of the terminal equality.
+    let controller = Controller::<Ballbot<f64>, f64, 4, 1, 2, N, { N + 4 }>::new(
+        prepared.ballbot,
+        prepared.settings,
+    );
+    let mut controller = controller.map_err(ScenarioError::from)?;
+    let mut workspace = Box::new(Workspace::new());
+    let mut record = Record::default();
+    let mut x = start;
+    let mut before: Option<(f64, f64)> = None;
+    for wanted in wanted.points().iter().take(samples) {
+        record.look_at(&x, prepared);
+        let reference = Reference::constant(Vector4::new(*wanted, 0.0, 0.0, 0.0));
+        let plan = controller.step(&x, &reference, &mut workspace);
+        if !plan.status.is_solved() {
+            record.infeasible += 1;
+            return Ok(record);
+        }
+        let u = plan.u[0];
+        record.samples += 1;
+        record.largest_gap = record.largest_gap.max(controller.gap().amax());
+        let cost = controller.tracking_cost(&x, &reference);
+        if let Some((same, earlier)) = before
+            && same == *wanted
+        {
+            record.compare(earlier, cost);
+        }
+        before = Some((*wanted, cost));
+        let moved = lpvmpc_sim::advance(
+            &prepared.ballbot,
+            &x,
+            &u,
+            prepared.settings.t_s,
+            prepared.tolerances,
+        );
+        match moved {
+            Ok(next) if !has_fallen(&next) => x = next,
+            _ => {
+                record.fell = true;
+                return Ok(record);
+            }
+        }
+    }
+    record.look_at(&x, prepared);
+    Ok(record)
+}

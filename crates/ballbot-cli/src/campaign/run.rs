@@ -1,0 +1,187 @@
+//! One closed loop of a campaign.
+
+use super::variant::{Random, Variant};
+use crate::commands::CommandError;
+use ballbot::Ballbot;
+use ballbot_scenario::{GUARDED_ACTIVE, Prepared, ScenarioError};
+use lpvmpc::{Decision, GuardedController, GuardedSettings, GuardedWorkspace};
+use lpvmpc_sim::GuardedLoop;
+use nalgebra::Vector4;
+use serde::Serialize;
+
+/// Horizon of the campaign's controllers.
+pub(super) const N: usize = 20;
+type Guarded = GuardedController<Ballbot<f64>, f64, 4, 1, 2, N, 5, { N + 2 }>;
+type Workspace = GuardedWorkspace<f64, 1, 5, { N + 2 }, GUARDED_ACTIVE>;
+
+/// What a closed loop amounts to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Record {
+    /// Samples at which a torque was applied.
+    pub samples: usize,
+    /// Samples without a plan that keeps all bounds.
+    pub infeasible: usize,
+    /// States outside the bounds, at samples.
+    pub violations: usize,
+    /// How often each decision was taken, from [`Decision::NewPlan`] on.
+    pub decisions: [usize; 5],
+    /// Samples at which the cost of the plan grew though the set point stayed.
+    pub cost_growths: usize,
+    /// Largest |theta|, rad.
+    pub largest_tilt_rad: f64,
+    /// Largest part of the cost by which it grew where it must not.
+    pub largest_growth: f64,
+    /// The robot fell: |theta| beyond a right angle, or no motion any more.
+    pub fell: bool,
+    /// Largest difference of rollout and prediction at the end of the horizon, in state units.
+    pub largest_gap: f64,
+}
+
+/// Set points and when they are given.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wanted(Vec<f64>);
+
+impl Wanted {
+    /// A set point up to `farthest` rad from 0, and others at random times, 40 samples apart on
+    /// average.
+    pub(super) fn draw(random: &mut Random, samples: usize, farthest: f64) -> Self {
+        let mut wanted = farthest * random.symmetric();
+        let points = (0..samples).map(|_| {
+            let (jump, next) = (random.uniform(), random.symmetric());
+            if jump < 1.0 / 40.0 {
+                wanted = farthest * next;
+            }
+            wanted
+        });
+        Self(points.collect())
+    }
+
+    /// The set points, one per sample.
+    pub fn points(&self) -> &[f64] {
+        &self.0
+    }
+}
+
+/// The guaranteed loop, ready to run.
+pub(super) struct Loop<'a> {
+    prepared: &'a Prepared,
+    guarded: GuardedLoop<Ballbot<f64>, Ballbot<f64>, 4, 1, 2, N, 5, { N + 2 }>,
+    workspace: Box<Workspace>,
+}
+
+impl<'a> Loop<'a> {
+    /// A state drawn evenly from the certified set around phi = 0.
+    pub fn start(prepared: &Prepared, random: &mut Random) -> Result<Vector4<f64>, CommandError> {
+        let GuardedSettings { terminal, .. } = settings(prepared)?;
+        let direction = Vector4::from_fn(|_, _| random.normal()).normalize();
+        let radius = terminal.level.sqrt() * random.uniform().powf(0.25);
+        // With P = L L', x = L^-T y has x'Px = |y|^2.
+        let factor = terminal.p.cholesky().map(|factor| factor.l().transpose());
+        let state = factor.and_then(|root| root.solve_upper_triangular(&(direction * radius)));
+        state.ok_or_else(|| no_certificate().into())
+    }
+
+    /// The loop of `prepared` around the plant that `plant` draws.
+    pub fn new(
+        prepared: &'a Prepared,
+        plant: impl FnOnce(&mut Random) -> Ballbot<f64>,
+        random: &mut Random,
+    ) -> Result<Self, CommandError> {
+        let controller = Guarded::new(prepared.ballbot, *settings(prepared)?);
+        let controller = controller.map_err(ScenarioError::from)?;
+        let start = Self::start(prepared, random)?;
+        let plant = plant(random);
+        Ok(Self {
+            prepared,
+            guarded: GuardedLoop::new(controller, plant, start, prepared.tolerances),
+            workspace: Box::new(Workspace::new()),
+        })
+    }
+
+    /// Runs the loop.
+    pub fn record(
+        &mut self,
+        variant: &Variant,
+        wanted: &Wanted,
+        samples: usize,
+        random: &mut Random,
+    ) -> Record {
+        let mut record = Record::default();
+        // The set point and the cost before, while the cost must not grow.
+        let mut before: Option<(f64, f64)> = None;
+        for wanted in wanted.points().iter().take(samples) {
+            if let Some(jump) = variant.push(self.prepared, random) {
+                self.guarded.push(&jump);
+                before = None;
+            }
+            record.look_at(self.guarded.state(), self.prepared);
+            let step = self.guarded.decide(*wanted, &mut self.workspace);
+            record.samples += 1;
+            record.decisions[step.decision as usize] += 1;
+            record.largest_gap = record.largest_gap.max(step.gap.amax());
+            if !step.decision.is_guaranteed() {
+                record.infeasible += 1;
+            }
+            if let Some((same, cost)) = before
+                && same == *wanted
+            {
+                record.compare(cost, step.cost);
+            }
+            before = step
+                .decision
+                .is_guaranteed()
+                .then_some((*wanted, step.cost));
+            let actuation = variant.actuation(random);
+            let moved = self.guarded.advance(&step.u, &actuation);
+            if moved.is_err() || has_fallen(self.guarded.state()) {
+                record.fell = true;
+                break;
+            }
+        }
+        record.look_at(self.guarded.state(), self.prepared);
+        record
+    }
+}
+
+impl Record {
+    /// Takes a state into account.
+    pub(super) fn look_at(&mut self, x: &Vector4<f64>, prepared: &Prepared) {
+        self.largest_tilt_rad = self.largest_tilt_rad.max(x[1].abs());
+        if !prepared.settings.x.contains(x, 0.0) {
+            self.violations += 1;
+        }
+    }
+
+    /// The cost may grow by rounding: each of the some hundred terms it is the sum of is rounded
+    /// to 1e-16 of it, and close to 0 the plant's integration is not exact.
+    pub(super) fn compare(&mut self, before: f64, after: f64) {
+        const RELATIVE: f64 = 1e-12;
+        const ABSOLUTE: f64 = 1e-9;
+        if !(after <= before * (1.0 + RELATIVE) + ABSOLUTE) {
+            self.cost_growths += 1;
+            self.largest_growth = self.largest_growth.max(after / before - 1.0);
+        }
+    }
+
+    /// The count of a decision.
+    pub fn count(&self, decision: Decision) -> usize {
+        self.decisions[decision as usize]
+    }
+}
+
+/// Beyond a right angle nothing brings the robot back.
+pub(super) fn has_fallen(x: &Vector4<f64>) -> bool {
+    !(x[1].abs() < std::f64::consts::FRAC_PI_2)
+}
+
+fn settings(prepared: &Prepared) -> Result<&GuardedSettings<f64, 4, 1>, ScenarioError> {
+    prepared.guarded.as_ref().ok_or_else(no_certificate)
+}
+
+fn no_certificate() -> ScenarioError {
+    ScenarioError::Value {
+        key: "controller.terminal".to_owned(),
+        value: "(not certified)".to_owned(),
+        expected: "a campaign needs a certified terminal set".to_owned(),
+    }
+}

@@ -1,0 +1,162 @@
+//! What differs from the nominal closed loop.
+
+use super::run::{Loop, Record, Wanted};
+use super::{Campaign, Scenarios, paper};
+use crate::commands::CommandError;
+use ballbot::Ballbot;
+use ballbot_scenario::Prepared;
+use lpvmpc_sim::Actuation;
+use nalgebra::{Vector1, Vector4};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal, StandardUniform};
+use std::fmt;
+
+/// The kinds of closed loops in a campaign.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Variant {
+    /// The plant is the model, the torque acts as commanded.
+    Nominal,
+    /// Now and then a push changes the rates by up to so much of their bounds.
+    Pushes(f64),
+    /// b1, b2 and b3 of the plant differ by up to this part of their values, each for itself. A
+    /// plant whose mass matrix is singular at some tilt within the bounds is drawn again.
+    Parameters(f64),
+    /// The torque has a normally distributed error with this standard deviation, N m.
+    TorqueNoise(f64),
+    /// The torque acts so many seconds late.
+    Delay(f64),
+    /// The paper's scheme to the letter: terminal equality for a predictor whose scheduling is
+    /// frozen, one Runge-Kutta step, set points up to so many rad apart. The negative control.
+    Paper(f64),
+}
+
+impl Variant {
+    /// All of them, in the order of the table.
+    pub const ALL: [Self; 10] = [
+        Self::Nominal,
+        Self::Pushes(0.1),
+        Self::Pushes(0.4),
+        Self::Parameters(0.05),
+        Self::Parameters(0.2),
+        Self::TorqueNoise(0.05),
+        Self::TorqueNoise(0.2),
+        Self::Delay(0.01),
+        Self::Delay(0.03),
+        Self::Paper(2.0 * std::f64::consts::PI),
+    ];
+
+    /// Run `number` of the campaign.
+    pub(super) fn run(
+        &self,
+        scenarios: &Scenarios,
+        campaign: &Campaign,
+        number: usize,
+    ) -> Result<Record, CommandError> {
+        let mut random = Random::new(campaign.seed, number);
+        let prepared = &scenarios.guaranteed;
+        match self {
+            Self::Paper(farthest) => {
+                let start = Loop::start(prepared, &mut random)?;
+                let wanted = Wanted::draw(&mut random, campaign.samples, *farthest);
+                paper::run(&scenarios.paper, start, &wanted, campaign.samples)
+            }
+            _ => {
+                let mut run =
+                    Loop::new(prepared, |random| self.plant(prepared, random), &mut random)?;
+                let wanted = Wanted::draw(&mut random, campaign.samples, FARTHEST);
+                Ok(run.record(self, &wanted, campaign.samples, &mut random))
+            }
+        }
+    }
+
+    fn plant(&self, prepared: &Prepared, random: &mut Random) -> Ballbot<f64> {
+        let nominal = prepared.ballbot;
+        let Self::Parameters(part) = *self else {
+            return nominal;
+        };
+        let tilt = prepared.settings.x.upper[1];
+        loop {
+            let mut factor = || 1.0 + part * random.symmetric();
+            let plant = Ballbot {
+                b1: nominal.b1 * factor(),
+                b2: nominal.b2 * factor(),
+                b3: nominal.b3 * factor(),
+                ..nominal
+            };
+            // With a singular mass matrix there is no motion to run.
+            if plant.consistency(tilt).mass_invertible {
+                return plant;
+            }
+        }
+    }
+
+    /// The push before sample `k`, in state units.
+    pub(super) fn push(&self, prepared: &Prepared, random: &mut Random) -> Option<Vector4<f64>> {
+        let Self::Pushes(part) = *self else {
+            return None;
+        };
+        let rates = prepared.settings.x.upper * part;
+        let (phi_dot, theta_dot) = (random.symmetric(), random.symmetric());
+        (random.uniform() < PUSHES)
+            .then(|| Vector4::new(0.0, 0.0, phi_dot * rates[2], theta_dot * rates[3]))
+    }
+
+    /// What becomes of the torque in a sample.
+    pub(super) fn actuation(&self, random: &mut Random) -> Actuation<1> {
+        let ideal = Actuation::ideal();
+        match *self {
+            Self::TorqueNoise(deviation) => Actuation {
+                error: Vector1::new(deviation * random.normal()),
+                ..ideal
+            },
+            Self::Delay(delay) => Actuation { delay, ..ideal },
+            _ => ideal,
+        }
+    }
+}
+
+/// Largest distance of a set point from phi = 0, rad.
+const FARTHEST: f64 = 100.0;
+/// Part of the samples that begin with a push.
+const PUSHES: f64 = 0.02;
+
+impl fmt::Display for Variant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Nominal => f.write_str("nominal"),
+            Self::Pushes(part) => write!(f, "pushes, {:.0} % of the rates' bounds", 100.0 * part),
+            Self::Parameters(part) => write!(f, "b1 to b3 ±{:.0} %", 100.0 * part),
+            Self::TorqueNoise(deviation) => write!(f, "torque noise {deviation} N m"),
+            Self::Delay(delay) => write!(f, "torque {:.0} ms late", 1e3 * delay),
+            Self::Paper(_) => f.write_str("the paper's scheme"),
+        }
+    }
+}
+
+/// The random numbers of one run.
+#[derive(Debug)]
+pub struct Random(ChaCha8Rng);
+
+impl Random {
+    fn new(seed: u64, number: usize) -> Self {
+        let mut generator = ChaCha8Rng::seed_from_u64(seed);
+        generator.set_stream(number as u64);
+        Self(generator)
+    }
+
+    /// Uniform in [0, 1).
+    pub fn uniform(&mut self) -> f64 {
+        StandardUniform.sample(&mut self.0)
+    }
+
+    /// Uniform in [-1, 1).
+    pub fn symmetric(&mut self) -> f64 {
+        2.0 * self.uniform() - 1.0
+    }
+
+    /// Normally distributed with standard deviation 1.
+    pub fn normal(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.0)
+    }
+}

@@ -1,0 +1,175 @@
+//! `ballbot campaign`.
+
+use super::CommandError;
+use crate::campaign::{Campaign, Outcome, Record, Scenarios, drawing};
+use crate::commands::simulate::PNG_SCALE;
+use crate::json;
+use crate::output;
+use crate::pictures::limits;
+use crate::table::Table;
+use clap::Args;
+use lpvmpc::Decision;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Arguments of `ballbot campaign`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  ballbot campaign                             10 000 closed loops, and 500 of each variant
+  ballbot campaign --runs 200 --samples 60     a quick look
+  ballbot campaign --json                      for other programs
+
+Each loop starts at random in the certified set and gets random set points, up to 100 rad away, at
+random times. Variants show where the guarantee ends: pushes, wrong parameters, torque noise, delay;
+the paper's scheme is the negative control. The same seed gives the same numbers on any number of
+threads. Writes campaign.csv (one row per run) and a figure.")]
+pub struct CampaignArguments {
+    /// Closed loops of the nominal plant; a twentieth of them of every other variant
+    #[arg(long, default_value = "10000", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub runs: u32,
+    /// Samples of each closed loop
+    #[arg(long, default_value = "100", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub samples: u32,
+    /// Seed of everything random
+    #[arg(long, default_value = "1")]
+    pub seed: u64,
+    /// Threads, one per core if not given; the numbers do not depend on them
+    #[arg(long, default_value = "0", hide_default_value = true)]
+    pub threads: usize,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/campaign")]
+    pub out: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Runs the campaign and writes its results.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn run(arguments: &CampaignArguments) -> Result<String, CommandError> {
+    let campaign = Campaign {
+        runs: arguments.runs as usize,
+        other_runs: (arguments.runs as usize).div_ceil(20),
+        samples: arguments.samples as usize,
+        seed: arguments.seed,
+        threads: arguments.threads,
+    };
+    let scenarios = Scenarios::built_in()?;
+    let outcomes = campaign.run(&scenarios)?;
+    let figure = drawing(&outcomes, limits(&scenarios.guaranteed).states[1]);
+    let paths = ["campaign.csv", "campaign.svg", "campaign.png"];
+    let paths = paths.map(|name| arguments.out.join(name));
+    let contents = [
+        csv(&outcomes).into_bytes(),
+        figure.svg()?.into_bytes(),
+        figure.png(PNG_SCALE)?,
+    ];
+    let files: Vec<_> = paths.iter().zip(&contents).collect();
+    let files: Vec<_> = files
+        .iter()
+        .map(|(path, content)| (path.as_path(), content.as_slice()))
+        .collect();
+    output::write_files(&files)?;
+    if arguments.json {
+        return Ok(json::text(&document(&campaign, &outcomes)));
+    }
+    Ok(format!(
+        "{} samples of {} s per run, seed {}\n{}written to {}\n",
+        campaign.samples,
+        scenarios.guaranteed.settings.t_s,
+        campaign.seed,
+        table(&outcomes),
+        arguments.out.display()
+    ))
+}
+
+const DECISIONS: [Decision; 5] = [
+    Decision::NewPlan,
+    Decision::Candidate,
+    Decision::TerminalLaw,
+    Decision::SoftBounds,
+    Decision::SaturatedLqr,
+];
+
+/// One column per variant.
+fn table(outcomes: &[Outcome]) -> Table {
+    let mut table = Table::new([
+        "",
+        "runs",
+        "samples",
+        "infeasible",
+        "violated",
+        "cost grew",
+        "kept runs",
+        "fell",
+        "tilt [rad]",
+        "new plan",
+        "candidate",
+        "term. law",
+        "soft",
+        "sat. LQR",
+    ]);
+    for Outcome { variant, tally, .. } in outcomes {
+        let total = &tally.total;
+        let counts = [
+            tally.runs,
+            total.samples,
+            total.infeasible,
+            total.violations,
+            total.cost_growths,
+            tally.runs_within_bounds,
+            tally.runs_fallen,
+        ];
+        let cells = std::iter::once(variant.to_string())
+            .chain(counts.iter().map(usize::to_string))
+            .chain([format!("{:.3}", total.largest_tilt_rad)])
+            .chain(DECISIONS.map(|decision| total.count(decision).to_string()));
+        table.row(cells);
+    }
+    table
+}
+
+fn document(campaign: &Campaign, outcomes: &[Outcome]) -> serde_json::Value {
+    let variants = outcomes
+        .iter()
+        .map(|outcome| json!({ "variant": outcome.variant.to_string(), "tally": outcome.tally }));
+    json!({
+        "samples": campaign.samples,
+        "seed": campaign.seed,
+        "decisions": DECISIONS.map(|decision| decision.to_string()),
+        "variants": variants.collect::<Vec<_>>(),
+    })
+}
+
+fn csv(outcomes: &[Outcome]) -> String {
+    let mut text = "variant,run,samples,infeasible,violations,cost_growths,largest_growth,\
+                    largest_tilt_rad,largest_gap,fell,new_plan,candidate,terminal_law,\
+                    soft_bounds,saturated_lqr\n"
+        .to_owned();
+    for outcome in outcomes {
+        // Commas would be columns.
+        let name = outcome.variant.to_string().replace(',', ";");
+        for (number, record) in outcome.records.iter().enumerate() {
+            let Record {
+                samples,
+                infeasible,
+                violations,
+                cost_growths,
+                largest_growth,
+                largest_tilt_rad,
+                largest_gap,
+                fell,
+                decisions: [new, candidate, law, soft, saturated],
+            } = record;
+            text += &format!(
+                "{name},{number},{samples},{infeasible},{violations},{cost_growths},\
+                 {largest_growth:?},{largest_tilt_rad:?},{largest_gap:?},{fell},{new},{candidate},\
+                 {law},{soft},{saturated}\n"
+            );
+        }
+    }
+    text
+}

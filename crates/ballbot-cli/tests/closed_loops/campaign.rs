@@ -1,0 +1,57 @@
+//! A small campaign: what is guaranteed holds, and the negative control fails.
+
+use ballbot_cli::campaign::{Campaign, Outcome, Scenarios, Variant};
+
+const SMALL: Campaign = Campaign {
+    runs: 200,
+    other_runs: 20,
+    samples: 60,
+    seed: 7,
+    threads: 0,
+};
+
+fn of(outcomes: &[Outcome], wanted: impl Fn(&Variant) -> bool) -> &Outcome {
+    outcomes
+        .iter()
+        .find(|outcome| wanted(&outcome.variant))
+        .unwrap()
+}
+
+#[test]
+fn the_nominal_loop_keeps_its_promise_and_the_paper_s_scheme_does_not() {
+    let outcomes = SMALL.run(&Scenarios::built_in().unwrap()).unwrap();
+    let nominal = of(&outcomes, |variant| *variant == Variant::Nominal).tally;
+    assert_eq!(nominal.runs, 200);
+    assert_eq!(nominal.total.samples, 200 * 60);
+    assert_eq!(nominal.runs_within_bounds, 200);
+    assert_eq!(nominal.total.infeasible, 0);
+    assert_eq!(nominal.total.violations, 0);
+    assert_eq!(nominal.total.cost_growths, 0);
+    // The search for something better is no formality.
+    assert!(nominal.total.decisions[0] > nominal.total.samples / 2);
+
+    let paper = of(&outcomes, |variant| matches!(variant, Variant::Paper(_))).tally;
+    assert!(paper.total.infeasible > 0, "{paper:?}");
+    assert!(paper.runs_within_bounds < paper.runs / 2, "{paper:?}");
+    // Nothing is guaranteed with wrong parameters; that the cost never grows is the first to go.
+    let wrong = of(&outcomes, |variant| *variant == Variant::Parameters(0.2)).tally;
+    assert!(wrong.total.cost_growths > 0, "{wrong:?}");
+}
+
+/// The same seed gives the same numbers, bit for bit, on one thread and on four.
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let few = Campaign {
+        runs: 8,
+        other_runs: 4,
+        samples: 30,
+        seed: 3,
+        threads: 1,
+    };
+    let scenarios = Scenarios::built_in().unwrap();
+    let on = |threads| Campaign { threads, ..few }.run(&scenarios).unwrap();
+    let one = on(1);
+    assert_eq!(one, on(4));
+    let other = Campaign { seed: 4, ..few }.run(&scenarios).unwrap();
+    assert_ne!(one[0].records, other[0].records);
+}

@@ -1,0 +1,170 @@
+//! The guaranteed loop from a scenario: far set points, and certificates that do not fit.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on must fail, in its support functions too"
+)]
+
+use ballbot_scenario::{IterationsTable, Scenario, ScenarioError, Surroundings, builtin};
+use lpvmpc_sim::{Ending, Trajectory};
+use std::path::Path;
+use std::time::Duration;
+
+fn run(scenario: &Scenario) -> Trajectory<4, 1> {
+    let prepared = scenario.prepare(Path::new(".")).unwrap();
+    let surroundings = Surroundings {
+        clock: &|| Duration::ZERO,
+        progress: &|_| (),
+    };
+    prepared.run(&surroundings).unwrap().remove(0)
+}
+
+/// Set points 100 rad away, and others before they are reached: every input is backed, no bound
+/// is violated, the cost never grows between two jumps, and the robot arrives. It stands at the
+/// first one for 20 s, after which the controller once could not leave it: its trust region had
+/// been halved at every sample in which there was nothing to improve.
+#[test]
+fn far_set_points_are_reached_with_every_bound_kept() {
+    let scenario = Scenario::load("far-setpoints").unwrap();
+    let prepared = scenario.prepare(Path::new(".")).unwrap();
+    let trajectory = run(&scenario);
+    assert_eq!(trajectory.ending, Ending::Complete);
+    for x in trajectory.states() {
+        assert!(prepared.settings.x.contains(x, 0.0), "{x}");
+    }
+    for pair in trajectory.samples.windows(2) {
+        let [before, after] = pair else { continue };
+        assert!(after.guard.unwrap().decision.is_guaranteed());
+        assert!(prepared.settings.u.contains(&after.u, 0.0));
+        if before.x_ref == after.x_ref {
+            assert!(after.cost <= before.cost * (1.0 + 1e-12) + 1e-9);
+        }
+    }
+    for (time, set_point) in [(29.0, 100.0), (61.0, -20.0), (79.0, 0.0)] {
+        let sample = &trajectory.samples[(time / 0.05) as usize];
+        assert!((sample.x[0] - set_point).abs() < 1e-4, "{}", sample.x);
+    }
+}
+
+/// One program per sample keeps every promise, too; three go faster.
+#[test]
+fn more_programs_per_sample_arrive_earlier() {
+    let arrival = |programs: usize| {
+        let mut scenario = Scenario::load("far-setpoints").unwrap();
+        scenario.duration_s = 20.0;
+        scenario.controller.iterations = Some(IterationsTable::Fixed(programs));
+        let trajectory = run(&scenario);
+        let samples = &trajectory.samples;
+        assert!(
+            samples
+                .iter()
+                .all(|s| s.guard.unwrap().decision.is_guaranteed())
+        );
+        let near = samples.iter().find(|s| (s.x[0] - 100.0).abs() < 1.0);
+        near.unwrap().t
+    };
+    let (one, three) = (arrival(1), arrival(3));
+    assert!(three < 0.7 * one, "{three} s against {one} s");
+}
+
+/// A reference beyond the bounds of phi: the robot stops at the nearest admissible set point,
+/// which leaves room for the terminal set.
+#[test]
+fn an_unreachable_set_point_is_approached_as_far_as_the_bounds_allow() {
+    let mut scenario = Scenario::load("far-setpoints").unwrap();
+    scenario.bounds.phi_rad = [-10.0, 10.0];
+    scenario.duration_s = 10.0;
+    let [_, upper] = scenario
+        .prepare(Path::new("."))
+        .unwrap()
+        .guarded
+        .unwrap()
+        .set_points;
+    assert!(upper < 10.0 && upper > 7.0, "{upper}");
+    let end = run(&scenario).final_state;
+    assert!((end[0] - upper).abs() < 1e-3, "{end} instead of {upper}");
+}
+
+#[track_caller]
+fn refused(change: impl Fn(&mut Scenario), words: &[&str]) {
+    let mut scenario = Scenario::load("far-setpoints").unwrap();
+    change(&mut scenario);
+    let said = match scenario.prepare(Path::new(".")) {
+        Ok(_) => panic!("accepted: {words:?}"),
+        Err(error) => error.to_string(),
+    };
+    for word in words {
+        assert!(said.contains(word), "no `{word}` in: {said}");
+    }
+}
+
+#[test]
+fn a_certificate_of_something_else_is_refused() {
+    refused(
+        |s| s.parameters.b1_m2 *= 1.01,
+        &["another robot", "certify"],
+    );
+    refused(|s| s.controller.t_s = 0.04, &["controller.t_s", "0.05 s"]);
+    refused(|s| s.controller.q[0] = 300.0, &["controller.q", "200.0"]);
+    refused(|s| s.controller.r = 2000.0, &["controller.r", "1000"]);
+    refused(
+        |s| s.bounds.theta_rad = [-0.05, 0.05],
+        &["bounds.theta_rad", "reaches"],
+    );
+    refused(
+        |s| s.bounds.torque_nm = [-0.05, 1.5],
+        &["bounds.torque_nm", "reaches"],
+    );
+    refused(
+        |s| s.bounds.phi_rad = [0.0, 1.0],
+        &["bounds.phi_rad", "fit"],
+    );
+    refused(
+        |s| {
+            s.controller.iterations = Some(IterationsTable::UntilConverged {
+                tolerance: 1e-6,
+                most: 10,
+            });
+        },
+        &["controller.iterations", "fixed"],
+    );
+    refused(|s| s.controller.horizon = 25, &["controller.horizon", "20"]);
+}
+
+/// The certificate's digest is looked at, so that a patched number does not pass unseen.
+#[test]
+fn a_changed_certificate_is_refused() {
+    let folder = std::env::temp_dir().join(format!("ballbot-certificate-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let changed = builtin::TERMINAL_CERTIFICATE.replacen("1999.998", "9999.998", 1);
+    std::fs::write(folder.join("changed.json"), changed).unwrap();
+    let text = builtin::find("far-setpoints").unwrap().text;
+    let table = "[controller.terminal.certified]\n";
+    let text = text.replacen(
+        table,
+        &format!("{table}certificate = \"changed.json\"\n"),
+        1,
+    );
+    let scenario = Scenario::parse(&text, "far.toml").unwrap();
+    let error = scenario.prepare(&folder).unwrap_err();
+    std::fs::remove_dir_all(&folder).unwrap();
+    assert!(matches!(error, ScenarioError::Value { .. }));
+    assert!(error.to_string().contains("digest"), "{error}");
+}
+
+/// Several programs per sample close the gap that one leaves at the first sample of a jump.
+#[test]
+fn iterations_are_a_key_of_the_scenario() {
+    let text = builtin::find("single-setpoint").unwrap().text;
+    let key = "until_converged = { tolerance = 1e-10, most = 60 }";
+    let text = text.replacen(
+        "[controller.predictor.rk4]\nsubsteps = 1",
+        &format!("[controller.iterations]\n{key}\n[controller.predictor.stage_consistent]"),
+        1,
+    );
+    let converged = run(&Scenario::parse(&text, "my.toml").unwrap());
+    let once = run(&Scenario::parse(&text.replacen(key, "fixed = 1", 1), "my.toml").unwrap());
+    let gap = |run: &Trajectory<4, 1>| run.samples[0].gap.amax();
+    assert!(gap(&once) > 1e-2, "{}", gap(&once));
+    assert!(gap(&converged) < 1e-8, "{}", gap(&converged));
+}

@@ -1,0 +1,207 @@
+//! The guarded controller: as a regulator in a world, and around the continuous plant with a
+//! few faults that cost no more than a campaign can pay.
+
+use crate::plant::{self, PlantError, Tolerances};
+use crate::regulator::{Decision, Regulator};
+use crate::sensor::Measurement;
+use lpvmpc::{GuardedController, GuardedSettings, GuardedStep, GuardedWorkspace, LpvModel};
+use nalgebra::SVector;
+use std::time::Duration;
+
+/// What becomes of a commanded input on its way to the plant, for one sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Actuation<const NU: usize> {
+    /// Time until the new input acts, s, from 0 to the sampling time; the input before it acts
+    /// until then.
+    pub delay: f64,
+    /// Added to the new input, in input units.
+    pub error: SVector<f64, NU>,
+}
+
+impl<const NU: usize> Actuation<NU> {
+    /// The input acts at once and as commanded.
+    pub fn ideal() -> Self {
+        Self {
+            delay: 0.0,
+            error: SVector::zeros(),
+        }
+    }
+}
+
+/// A guarded controller and its plant. Sizes as in [`GuardedController`].
+#[derive(Clone, Debug)]
+pub struct GuardedLoop<
+    C,
+    P,
+    const NX: usize,
+    const NU: usize,
+    const NS: usize,
+    const N: usize,
+    const NA: usize,
+    const NP: usize,
+> {
+    controller: GuardedController<C, f64, NX, NU, NS, N, NA, NP>,
+    plant: P,
+    tolerances: Tolerances,
+    x: SVector<f64, NX>,
+    /// The input that acts on the plant.
+    acting: SVector<f64, NU>,
+}
+
+impl<
+    C,
+    P,
+    const NX: usize,
+    const NU: usize,
+    const NS: usize,
+    const N: usize,
+    const NA: usize,
+    const NP: usize,
+> GuardedLoop<C, P, NX, NU, NS, N, NA, NP>
+where
+    C: LpvModel<f64, NX, NU, NS>,
+    P: LpvModel<f64, NX, NU, NS>,
+{
+    /// The loop with the plant in the state `x`, no input acting on it.
+    pub fn new(
+        controller: GuardedController<C, f64, NX, NU, NS, N, NA, NP>,
+        plant: P,
+        x: SVector<f64, NX>,
+        tolerances: Tolerances,
+    ) -> Self {
+        Self {
+            controller,
+            plant,
+            tolerances,
+            x,
+            acting: SVector::zeros(),
+        }
+    }
+
+    /// The plant's state.
+    pub fn state(&self) -> &SVector<f64, NX> {
+        &self.x
+    }
+
+    /// Adds `jump`, in state units, to the plant's state: a push.
+    pub fn push(&mut self, jump: &SVector<f64, NX>) {
+        self.x += jump;
+    }
+
+    /// The controller's answer to the measured state and the wanted set point.
+    pub fn decide<const M: usize>(
+        &mut self,
+        wanted: f64,
+        workspace: &mut GuardedWorkspace<f64, NU, NA, NP, M>,
+    ) -> GuardedStep<f64, NX, NU> {
+        self.controller.step(&self.x, wanted, workspace)
+    }
+
+    /// The plant's motion under the input `u` until the next sample.
+    ///
+    /// # Errors
+    /// [`PlantError`]; the state then stays as it was.
+    pub fn advance(
+        &mut self,
+        u: &SVector<f64, NU>,
+        actuation: &Actuation<NU>,
+    ) -> Result<(), PlantError> {
+        let t_s = self.controller.settings().t_s;
+        let u = u + actuation.error;
+        let mut x = self.x;
+        for (u, duration) in [(self.acting, actuation.delay), (u, t_s - actuation.delay)] {
+            x = plant::advance(&self.plant, &x, &u, duration, self.tolerances)?;
+        }
+        self.x = x;
+        self.acting = u;
+        Ok(())
+    }
+}
+
+/// What a guarded controller says of a sample besides its plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Guard {
+    /// What the input is backed by.
+    pub decision: lpvmpc::Decision,
+    /// The artificial set point z: the plan ends at z times the direction of the set points.
+    pub set_point: f64,
+}
+
+/// A guarded controller on the measured state itself. A reading that is missing keeps its last
+/// value (zero before the first). The wanted set point is the reference's coordinate along the
+/// direction of the set points, without preview.
+#[derive(Debug)]
+pub struct GuardedFeedback<
+    C,
+    const NX: usize,
+    const NU: usize,
+    const NS: usize,
+    const N: usize,
+    const NA: usize,
+    const NP: usize,
+    const M: usize,
+> {
+    /// What decides.
+    pub controller: GuardedController<C, f64, NX, NU, NS, N, NA, NP>,
+    /// Its memory.
+    pub workspace: Box<GuardedWorkspace<f64, NU, NA, NP, M>>,
+    /// The measured state.
+    pub x: SVector<f64, NX>,
+}
+
+impl<
+    C,
+    const NX: usize,
+    const NU: usize,
+    const NS: usize,
+    const N: usize,
+    const NA: usize,
+    const NP: usize,
+    const M: usize,
+> Regulator<NX, NU, NX> for GuardedFeedback<C, NX, NU, NS, N, NA, NP, M>
+where
+    C: LpvModel<f64, NX, NU, NS>,
+{
+    fn t_s(&self) -> f64 {
+        self.controller.settings().t_s
+    }
+
+    fn observe(&mut self, measurement: &Measurement<NX>) {
+        for (x, value) in self.x.iter_mut().zip(&measurement.values) {
+            *x = value.unwrap_or(*x);
+        }
+    }
+
+    fn decide(
+        &mut self,
+        k: usize,
+        reference: &dyn Fn(f64) -> SVector<f64, NX>,
+        clock: &dyn Fn() -> Duration,
+    ) -> Decision<NX, NU> {
+        let GuardedSettings { t_s, direction, .. } = *self.controller.settings();
+        let x_ref = reference(k as f64 * t_s);
+        let wanted = x_ref.dot(&direction) / direction.norm_squared();
+        let before = clock();
+        let step = self.controller.step(&self.x, wanted, &mut self.workspace);
+        let step_time = clock().saturating_sub(before);
+        Decision {
+            u: step.u,
+            estimate: self.x,
+            x_ref,
+            cost: step.cost,
+            status: step.status,
+            active_bounds: self.workspace.active_bounds(),
+            step_time,
+            gap: step.gap,
+            guard: Some(Guard {
+                decision: step.decision,
+                set_point: step.set_point,
+            }),
+        }
+    }
+
+    fn prediction(&self) -> Vec<SVector<f64, NX>> {
+        let rollout = self.controller.rollout();
+        rollout.map_or_else(Vec::new, |states| states.to_vec())
+    }
+}
