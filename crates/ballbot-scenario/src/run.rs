@@ -100,6 +100,9 @@ impl Prepared {
         Ok(closed_loop)
     }
 
+    // Neither this nor what follows is inlined: each size builds its memory on the stack before it
+    // is boxed, and one frame for all sizes overflows the 2 MB of a thread.
+    #[inline(never)]
     fn feedback_without_guard(
         &self,
         period: f64,
@@ -128,6 +131,7 @@ impl Prepared {
         }
     }
 
+    #[inline(never)]
     fn guarded_feedback(
         &self,
         settings: &GuardedSettings<f64, 4, 1>,
@@ -140,6 +144,7 @@ impl Prepared {
         }
     }
 
+    #[inline(never)]
     fn guarded_sized<const N: usize, const NP: usize>(
         &self,
         settings: &GuardedSettings<f64, 4, 1>,
@@ -160,6 +165,7 @@ impl Prepared {
         }))
     }
 
+    #[inline(never)]
     fn state_feedback<const N: usize, const M: usize>(
         &self,
     ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
@@ -171,6 +177,7 @@ impl Prepared {
         Ok(Box::new(StateFeedback::new(controller, workspace)))
     }
 
+    #[inline(never)]
     fn output_feedback<const N: usize, const M: usize>(
         &self,
         period: f64,
