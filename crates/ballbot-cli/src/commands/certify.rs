@@ -39,7 +39,7 @@ pub struct CertifyArguments {
     #[arg(long, default_value = "0.15", value_parser = share)]
     pub contraction: f64,
     /// Boxes of states that one proof may look at
-    #[arg(long, default_value = "10000")]
+    #[arg(long, default_value = "40000")]
     pub boxes: usize,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/certificate")]
