@@ -1,25 +1,25 @@
 //! Validated numerics: enclosures that hold in spite of rounding.
 //!
 //! A model's formulas, written once over [`Arithmetic`], are evaluated on [`Interval`]s (all
-//! values in a range), on [`Affine`] forms (all values over a box, with their dependence on the
+//! values in a range), on [`TaylorModel`]s (all values over a box, with their dependence on the
 //! box) and on power series of either (the motion over time).
 
-mod affine;
-mod affine_map;
 mod composition;
 mod elementary;
 mod flow;
 mod interval;
 mod positive;
 mod series;
+mod taylor_map;
+mod taylor_model;
 
-pub use affine::Affine;
-pub use affine_map::AffineMap;
 pub use elementary::{Arithmetic, Elementary};
 pub(crate) use flow::product;
 pub use flow::{AnalyticModel, FlowError, Frame, SampleEnclosure, SampledLaw};
 pub use interval::Interval;
 pub(crate) use positive::{is_positive_definite, smallest_eigenvalue};
+pub use taylor_map::TaylorMap;
+pub use taylor_model::TaylorModel;
 
 /// Columns of a matrix with `N` rows.
 pub(crate) type Columns<T, const N: usize> = Vec<[T; N]>;

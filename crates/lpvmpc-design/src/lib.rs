@@ -62,8 +62,8 @@ mod terminal;
 
 pub use discretize::{DiscretizeError, zero_order_hold};
 pub use enclosure::{
-    Affine, AffineMap, AnalyticModel, Arithmetic, Elementary, FlowError, Frame, Interval,
-    SampleEnclosure, SampledLaw,
+    AnalyticModel, Arithmetic, Elementary, FlowError, Frame, Interval, SampleEnclosure, SampledLaw,
+    TaylorMap, TaylorModel,
 };
 pub use least_squares::{
     Evaluated, Fit, Iteration, LeastSquaresError, LeastSquaresSettings, RankDeficiency,

@@ -1,12 +1,12 @@
 //! Enclosures of a plant's motion over one sample, for all initial states in a box.
 
 use super::Columns;
-use super::affine::Affine;
-use super::affine_map::AffineMap;
-use super::composition::Composition;
+use super::composition::{Composition, Uncertain};
 use super::elementary::Arithmetic;
 use super::interval::Interval;
 use super::series::{CAPACITY, Series};
+use super::taylor_map::{ROUNDING, TaylorMap};
+use super::taylor_model::TaylorModel;
 use nalgebra::{SMatrix, SVector};
 use thiserror::Error;
 
@@ -53,8 +53,12 @@ pub struct Frame<const NX: usize> {
 /// What is known of every motion over a sample that starts in a box of y.
 #[derive(Debug, Clone)]
 pub struct SampleEnclosure<const NX: usize> {
-    /// G in y(t_s) = G y(0), over the box.
-    pub transition: AffineMap<NX, NX, NX>,
+    /// G + E in y(t_s) = (G + E) y(0), over the box: G, affine and without error.
+    pub transition: TaylorMap<NX, NX, NX>,
+    /// S, with E'E <= S over the box.
+    pub error_square: SMatrix<f64, NX, NX>,
+    /// How much G depends on each coordinate of the box, in the Frobenius norm.
+    pub dependence: [f64; NX],
     /// Where the states x are during the sample.
     pub states: [Interval; NX],
 }
@@ -72,7 +76,7 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
     /// u = -K T y(0).
     ///
     /// # Errors
-    /// No a-priori enclosure was found.
+    /// No enclosure was found: the box is too large.
     pub fn enclose<M, const NS: usize>(
         &self,
         model: &M,
@@ -85,10 +89,10 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
     {
         let t = constants(&frame.t);
         let inverse = constants(&frame.inverse);
-        let symbol = |i: usize| Affine::symbol(centre[i], half_widths[i], i);
-        let y: [[Affine<NX>; 1]; NX] = std::array::from_fn(|i| [symbol(i)]);
-        let minus_k = matrix(|i, j| Affine::constant(-self.k[(i, j)]));
-        let gain: [[Affine<NX>; NX]; NU] = product(&minus_k, &t);
+        let symbol = |i: usize| TaylorModel::symbol(centre[i], half_widths[i], i);
+        let y: [[TaylorModel<NX>; 1]; NX] = std::array::from_fn(|i| [symbol(i)]);
+        let minus_k = matrix(|i, j| TaylorModel::constant(-self.k[(i, j)]));
+        let gain: [[TaylorModel<NX>; NX]; NU] = product(&minus_k, &t);
         let u = product(&gain, &y);
         let steps = 1_u32 << self.halvings;
         let step = Step {
@@ -96,24 +100,31 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
             input: std::array::from_fn(|i| u[i][0]),
             length: self.t_s / f64::from(steps),
         };
-        let gain = AffineMap::of(&gain);
-        let identity = matrix(|i, j| Affine::constant(if i == j { 1.0 } else { 0.0 }));
+        let gain = TaylorMap::of(&gain);
         let mut x = product(&t, &y).map(|[x]| x);
-        let mut transition = Composition::from(AffineMap::of(&identity));
+        let mut transition = Composition::identity();
         let mut states: Option<[Interval; NX]> = None;
         for _ in 0..steps {
             let (end, phi, gamma, during) = step.enclose(&x)?;
             x = end;
-            let phi = AffineMap::of(&product(&inverse, &product(&phi, &t)));
-            let gamma = AffineMap::of(&product(&inverse, &gamma));
-            transition.advance(&phi, &gamma.times(&gain));
+            let phi = uncertain(&inverse, &phi, &t);
+            let unit = matrix(|i, j| TaylorModel::constant(if i == j { 1.0 } else { 0.0 }));
+            let gamma = uncertain(&inverse, &gamma, &unit);
+            transition.advance(&phi, &gamma, &gain);
             states = Some(match states {
                 None => during,
                 Some(before) => std::array::from_fn(|i| before[i].hull(during[i])),
             });
         }
+        let dependence = transition.dependence();
+        let (transition, error_square) = transition.affine();
+        if error_square.iter().any(|entry| !entry.is_finite()) {
+            return Err(FlowError { step: step.length });
+        }
         Ok(SampleEnclosure {
-            transition: transition.map(),
+            transition,
+            error_square,
+            dependence,
             states: states.unwrap_or([Interval::EVERYTHING; NX]),
         })
     }
@@ -123,27 +134,27 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
 /// the constant W = [u, 0, I], from [x, I, 0] on.
 struct Step<'a, M, const NX: usize, const NU: usize> {
     model: &'a M,
-    input: [Affine<NX>; NU],
+    input: [TaylorModel<NX>; NU],
     length: f64,
 }
 
 /// The state after the step, Phi, Gamma and where the state is meanwhile.
 type StepEnclosure<const NX: usize, const NU: usize> = (
-    [Affine<NX>; NX],
-    [[Affine<NX>; NX]; NX],
-    [[Affine<NX>; NU]; NX],
+    [TaylorModel<NX>; NX],
+    [[TaylorModel<NX>; NX]; NX],
+    [[TaylorModel<NX>; NU]; NX],
     [Interval; NX],
 );
 
 impl<M, const NX: usize, const NU: usize> Step<'_, M, NX, NU> {
     fn enclose<const NS: usize>(
         &self,
-        x: &[Affine<NX>; NX],
+        x: &[TaylorModel<NX>; NX],
     ) -> Result<StepEnclosure<NX, NU>, FlowError>
     where
         M: AnalyticModel<NX, NU, NS>,
     {
-        let unit = |is_one: bool| Affine::constant(if is_one { 1.0 } else { 0.0 });
+        let unit = |is_one: bool| TaylorModel::constant(if is_one { 1.0 } else { 0.0 });
         let mut columns = vec![*x];
         columns.extend((0..NX).map(|j| std::array::from_fn(|i| unit(i == j))));
         columns.extend((0..NU).map(|_| std::array::from_fn(|_| unit(false))));
@@ -159,21 +170,21 @@ impl<M, const NX: usize, const NU: usize> Step<'_, M, NX, NU> {
     /// The columns a step later, and where the state is during the step.
     fn advance<const NS: usize>(
         &self,
-        columns: &Columns<Affine<NX>, NX>,
-        affine_inputs: &Columns<Affine<NX>, NU>,
-    ) -> Result<(Columns<Affine<NX>, NX>, [Interval; NX]), FlowError>
+        columns: &Columns<TaylorModel<NX>, NX>,
+        model_inputs: &Columns<TaylorModel<NX>, NU>,
+    ) -> Result<(Columns<TaylorModel<NX>, NX>, [Interval; NX]), FlowError>
     where
         M: AnalyticModel<NX, NU, NS>,
     {
-        let inputs = ranges(affine_inputs);
+        let inputs = ranges(model_inputs);
         let during = self.a_priori(&ranges(columns), &inputs)?;
         let remainder = &coefficients(self.model, &during, &inputs, ORDER)[ORDER];
-        let series = coefficients(self.model, columns, affine_inputs, ORDER - 1);
+        let series = coefficients(self.model, columns, model_inputs, ORDER - 1);
         let step = Interval::point(self.length);
         let end = (0..columns.len()).map(|column| {
             std::array::from_fn(|i| {
-                let rest = Affine::from(remainder[column][i]);
-                let h = Affine::constant(self.length);
+                let rest = TaylorModel::from(remainder[column][i]);
+                let h = TaylorModel::constant(self.length);
                 series
                     .iter()
                     .rev()
@@ -238,8 +249,50 @@ const FIRST_GUESS: f64 = 1.5;
 /// Share of its width by which a guess is widened on either side.
 const INFLATION: f64 = 0.05;
 
-fn constants<const D: usize, const N: usize>(m: &[[Interval; N]; N]) -> [[Affine<D>; N]; N] {
-    m.map(|row| row.map(Affine::from))
+/// T^-1 M R for an uncertain M: its error is T^-1 E R, and a column of E that is nearly zero stays
+/// apart. With W = diag(w) R, F = T^-1 E diag(1/w).
+fn uncertain<const D: usize, const N: usize, const K: usize>(
+    inverse: &[[TaylorModel<D>; N]; N],
+    m: &[[TaylorModel<D>; K]; N],
+    right: &[[TaylorModel<D>; K]; K],
+) -> Uncertain<N, K, D> {
+    let exact = m.map(|row| {
+        row.map(|entry| TaylorModel {
+            error: 0.0,
+            ..entry
+        })
+    });
+    let column = |j: usize| {
+        let entry = |i: usize| -> f64 {
+            let terms = inverse[i].iter().zip(m);
+            terms
+                .map(|(t, row)| t.range().magnitude() * row[j].error)
+                .sum()
+        };
+        (0..N).map(|i| entry(i).powi(2)).sum::<f64>().sqrt()
+    };
+    let right_rows = SMatrix::<f64, K, K>::from_fn(|i, j| right[i][j].middle);
+    let lengths: [f64; K] = std::array::from_fn(|j| right_rows.row(j).norm());
+    // Column by column what is E's share of T^-1 E R.
+    let shares: [f64; K] = std::array::from_fn(|j| column(j) * lengths[j]);
+    let largest = shares.iter().fold(0.0, |a: f64, b| a.max(*b));
+    let weight = |j: usize| {
+        if largest > 0.0 {
+            (shares[j] / largest).sqrt() / lengths[j]
+        } else {
+            0.0
+        }
+    };
+    Uncertain {
+        map: TaylorMap::of(&product(inverse, &product(&exact, right))),
+        // |F|_F^2 = sum of c_j^2 / w_j^2.
+        size: (shares.iter().sum::<f64>() * largest).sqrt() * (1.0 + ROUNDING),
+        acts_on: SMatrix::from_fn(|i, j| weight(i) * right_rows[(i, j)]),
+    }
+}
+
+fn constants<const D: usize, const N: usize>(m: &[[Interval; N]; N]) -> [[TaylorModel<D>; N]; N] {
+    m.map(|row| row.map(TaylorModel::from))
 }
 
 fn matrix<T, const R: usize, const C: usize>(f: impl Fn(usize, usize) -> T) -> [[T; C]; R] {
@@ -254,10 +307,12 @@ pub(crate) fn product<T: Arithmetic, const R: usize, const N: usize, const C: us
     matrix(|i, j| (0..N).fold(T::constant(0.0), |sum, k| sum + a[i][k] * b[k][j]))
 }
 
-fn ranges<const D: usize, const N: usize>(columns: &Columns<Affine<D>, N>) -> Columns<Interval, N> {
+fn ranges<const D: usize, const N: usize>(
+    columns: &Columns<TaylorModel<D>, N>,
+) -> Columns<Interval, N> {
     columns
         .iter()
-        .map(|column| column.map(Affine::range))
+        .map(|column| column.map(TaylorModel::range))
         .collect()
 }
 

@@ -1,6 +1,7 @@
 //! A statement proved on a box by proving it on the parts that bisection leaves.
 
 use nalgebra::SVector;
+use rayon::prelude::*;
 
 /// The points with |x_i - centre_i| <= half_widths_i.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,13 +75,16 @@ pub(super) enum Uncovered<const N: usize> {
 
 /// A cell is not cut more often than this.
 const MOST_CUTS: u32 = 60;
+/// Cells that are looked at together, on as many threads as there are; a number of its own, so
+/// that the result is the same on any number of threads.
+const TOGETHER: usize = 64;
 
 /// Proves a statement on `whole` by looking at `most_cells` cells at most. `progress` hears which
 /// share of it is done.
 pub(super) fn cover<const N: usize>(
     whole: Cell<N>,
     most_cells: usize,
-    examine: impl Fn(&Cell<N>) -> Finding,
+    examine: impl Fn(&Cell<N>) -> Finding + Sync,
     progress: &dyn Fn(f64),
 ) -> Result<Covered, Uncovered<N>> {
     let mut open = vec![(whole, 0_u32)];
@@ -89,28 +93,32 @@ pub(super) fn cover<const N: usize>(
         spare: f64::INFINITY,
     };
     let (mut examined, mut share) = (0, 0.0);
-    while let Some((cell, cuts)) = open.pop() {
-        examined += 1;
-        let at = cell.centre;
-        match examine(&cell) {
-            Finding::Fails { excess } => return Err(Uncovered::False { at, excess }),
-            Finding::Open { .. } if cuts == MOST_CUTS || examined >= most_cells => {
-                return Err(Uncovered::Undecided {
-                    at,
-                    cells: examined,
-                });
+    while !open.is_empty() {
+        let batch = open.split_off(open.len().saturating_sub(TOGETHER));
+        let findings: Vec<Finding> = batch.par_iter().map(|(cell, _)| examine(cell)).collect();
+        for ((cell, cuts), finding) in batch.into_iter().zip(findings) {
+            examined += 1;
+            let at = cell.centre;
+            match finding {
+                Finding::Fails { excess } => return Err(Uncovered::False { at, excess }),
+                Finding::Open { .. } if cuts == MOST_CUTS || examined >= most_cells => {
+                    return Err(Uncovered::Undecided {
+                        at,
+                        cells: examined,
+                    });
+                }
+                Finding::Open { across } => {
+                    open.extend(cell.halves(across).map(|half| (half, cuts + 1)));
+                    continue;
+                }
+                Finding::Holds { spare } => {
+                    covered.cells += 1;
+                    covered.spare = covered.spare.min(spare);
+                }
+                Finding::Outside => {}
             }
-            Finding::Open { across } => {
-                open.extend(cell.halves(across).map(|half| (half, cuts + 1)));
-                continue;
-            }
-            Finding::Holds { spare } => {
-                covered.cells += 1;
-                covered.spare = covered.spare.min(spare);
-            }
-            Finding::Outside => {}
+            share += 0.5_f64.powi(cuts as i32);
         }
-        share += 0.5_f64.powi(cuts as i32);
         progress(share);
     }
     Ok(covered)

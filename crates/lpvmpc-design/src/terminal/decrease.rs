@@ -2,12 +2,13 @@
 
 use super::cover::{Cell, Finding};
 use super::ellipsoid::Ellipsoid;
-use super::normalised::{Normaliser, Square, corners, from_fn, minus_identity, transposed};
+use super::normalised::{Normaliser, Square, corners, from_fn, transposed};
 use crate::enclosure::{
-    AnalyticModel, Interval, SampledLaw, is_positive_definite, product, smallest_eigenvalue,
+    AnalyticModel, Arithmetic, Interval, SampledLaw, is_positive_definite, product,
+    smallest_eigenvalue,
 };
-use nalgebra::SMatrix;
-use std::cell::Cell as Shared;
+use nalgebra::{DMatrix, SMatrix, SVector, SymmetricEigen};
+use std::sync::{Mutex, PoisonError};
 
 /// The statement (1 - contraction) P - Q - K'RK - Psi'P Psi > 0 for every x in the ellipsoid,
 /// where x+ = Psi x is the state a sample after x under u = -K x, held.
@@ -19,13 +20,13 @@ pub(super) struct Decrease<'a, M, const NX: usize, const NU: usize> {
     pub allowed: Square<NX>,
     pub ellipsoid: Ellipsoid<NX>,
     /// Where the states have been during the samples, over all cells that were proved.
-    pub states: Shared<[Interval; NX]>,
+    pub states: Mutex<[Interval; NX]>,
 }
 
 impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
     pub fn examine<const NS: usize>(&self, cell: &Cell<NX>) -> Finding
     where
-        M: AnalyticModel<NX, NU, NS>,
+        M: AnalyticModel<NX, NU, NS> + Sync,
     {
         if self.ellipsoid.misses(cell) {
             return Finding::Outside;
@@ -40,36 +41,72 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
             };
         };
         let g = sample.transition;
-        // A bound of the norm of (G + E)'(G + E) - G'G for |E| <= error.
-        let (size, error) = (Interval::point(g.norm()), Interval::point(g.error));
-        let shift = error * (size + size + error);
-        let at = |corner: &[f64; NX]| minus_identity(&self.rest(&g.at(corner)), shift);
+        let middle = g.at(&[0.0; NX]);
+        let spread = self.spread(&middle, &sample.error_square);
+        let at = |corner: &[f64; NX]| self.rest(&g.at(corner), &spread, 1.0);
         // The matrix depends on G'G, which is convex along lines: the corners are the worst.
         if corners().all(|corner| is_positive_definite(&at(&corner))) {
-            let states = self.states.get();
-            self.states
-                .set(std::array::from_fn(|i| states[i].hull(sample.states[i])));
+            let mut states = self.states.lock().unwrap_or_else(PoisonError::into_inner);
+            *states = std::array::from_fn(|i| states[i].hull(sample.states[i]));
+            drop(states);
             let spare = corners().map(|corner| smallest_eigenvalue(&at(&corner)));
             return Finding::Holds {
                 spare: spare.fold(f64::INFINITY, f64::min),
             };
         }
-        let highest = smallest_eigenvalue(&self.rest(&g.at(&[0.0; NX]))) + shift.upper;
+        let highest = smallest_eigenvalue(&self.rest(&middle, &spread, -1.0));
         if highest < 0.0 && !self.ellipsoid.misses(&cell.middle()) {
             return Finding::Fails { excess: -highest };
         }
-        let weights: [f64; NX] = std::array::from_fn(|i| g.weight(i));
+        let weights = sample.dependence;
         let across = (0..NX).max_by(|a, b| weights[*a].total_cmp(&weights[*b]));
         Finding::Open {
             across: across.unwrap_or(0),
         }
     }
 
-    /// allowed - G'G.
-    fn rest(&self, g: &Square<NX>) -> Square<NX> {
-        let square = product(&transposed(g), g);
-        from_fn(|i, j| self.allowed[i][j] - square[i][j])
+    /// The split that costs least where the inequality is tightest, roughly.
+    fn spread(&self, g: &Square<NX>, error_square: &SMatrix<f64, NX, NX>) -> Spread<NX> {
+        let none = Spread {
+            share: 0.0,
+            square: SMatrix::zeros(),
+        };
+        let rest = self.rest(g, &none, 1.0);
+        let rest = DMatrix::from_fn(NX, NX, |i, j| rest[i.max(j)][i.min(j)].middle());
+        let eigen = SymmetricEigen::new(rest);
+        let tightest = SVector::from_fn(|i, _| eigen.eigenvectors[(i, eigen.eigenvalues.imin())]);
+        let size = SMatrix::<f64, NX, NX>::from_fn(|i, j| g[i][j].middle()) * tightest;
+        let error = (error_square * tightest).dot(&tightest).sqrt();
+        Spread {
+            share: (error / size.norm()).clamp(1e-9, 0.5),
+            square: *error_square,
+        }
     }
+
+    /// allowed less what bounds (G + E)'(G + E) from above (`sign` 1) or from below (-1):
+    /// G'G and S = E'E in (1 + d) G'G + (1 + 1/d) S, in (1 - d) G'G - (1/d - 1) S.
+    fn rest(&self, g: &Square<NX>, spread: &Spread<NX>, sign: f64) -> Square<NX> {
+        let one = Interval::point(1.0);
+        let share = Interval::point(spread.share);
+        let (stretch, added) = if spread.share > 0.0 {
+            let signed = Interval::point(sign);
+            (one + signed * share, one + signed * share.reciprocal())
+        } else {
+            (one, one)
+        };
+        let square = product(&transposed(g), g);
+        from_fn(|i, j| {
+            let error = Interval::point(spread.square[(i, j)]);
+            self.allowed[i][j] - stretch * square[i][j] - added * error
+        })
+    }
+}
+
+/// How an error E with E'E <= `square` is told from G, by the arithmetic and geometric mean: the
+/// `share` d of G'G for the mixed terms.
+struct Spread<const NX: usize> {
+    share: f64,
+    square: SMatrix<f64, NX, NX>,
 }
 
 /// (1 - contraction) P - Q - K'RK.

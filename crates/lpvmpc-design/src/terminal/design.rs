@@ -65,7 +65,7 @@ pub fn certify_terminal<M, Plant, const NX: usize, const NU: usize, const NS: us
 ) -> Result<(Certificate<Plant, NX, NU, NS>, Proof<NX>), CertifyError>
 where
     M: LpvModel<f64, NX, NU, NS>,
-    Plant: AnalyticModel<NX, NU, NS>,
+    Plant: AnalyticModel<NX, NU, NS> + Sync,
 {
     let limits = problem.scheduling_limits;
     let grid = SchedulingGrid::new(-limits, limits, [GRID_POINTS; NS])?;

@@ -8,7 +8,7 @@ use super::normalised::{Normaliser, from_fn};
 use super::quadratic;
 use crate::enclosure::{AnalyticModel, Interval, SampledLaw};
 use nalgebra::SVector;
-use std::cell::Cell;
+use std::sync::{Mutex, PoisonError};
 use thiserror::Error;
 
 /// What a proof found, beyond that the claims hold.
@@ -105,7 +105,7 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
         progress: &dyn Fn(f64),
     ) -> Result<Proof<NX>, ClaimError>
     where
-        M: AnalyticModel<NX, NU, NS>,
+        M: AnalyticModel<NX, NU, NS> + Sync,
     {
         self.check_numbers()?;
         let positive = |name| move || ClaimError::NotPositive { name };
@@ -141,7 +141,10 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
                 boxes: cells,
             },
         })?;
-        let during = decrease.states.get();
+        let during = decrease
+            .states
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner);
         let reach = SVector::from_fn(|i, _| during[i].magnitude());
         for i in 0..NX {
             check_limit(
@@ -191,7 +194,7 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
     /// The limits hold wherever x'Px <= level.
     fn check_limits<M>(&self, model: &M, ellipsoid: &Ellipsoid<NX>) -> Result<(), ClaimError>
     where
-        M: AnalyticModel<NX, NU, NS>,
+        M: AnalyticModel<NX, NU, NS> + Sync,
     {
         let mut box_of_states = [Interval::EVERYTHING; NX];
         for (i, range) in box_of_states.iter_mut().enumerate() {
@@ -245,7 +248,7 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
             normaliser,
             allowed: from_fn(|i, j| allowed[i][j] * unit),
             ellipsoid,
-            states: Cell::new([Interval::point(0.0); NX]),
+            states: Mutex::new([Interval::point(0.0); NX]),
         }
     }
 }

@@ -4,7 +4,7 @@ use super::cover::{Cell, Covered, Finding, Uncovered, cover};
 use super::lmi::{AffineMatrix, maximise_log_det};
 use super::normalised::{Normaliser, corners, from_fn, minus_identity, transposed};
 use crate::enclosure::{
-    Affine, AffineMap, AnalyticModel, Arithmetic, Interval, is_positive_definite, product,
+    AnalyticModel, Arithmetic, Interval, TaylorMap, TaylorModel, is_positive_definite, product,
     smallest_eigenvalue,
 };
 use crate::stability::SchedulingGrid;
@@ -63,7 +63,7 @@ pub(super) fn prove<M, const NX: usize, const NU: usize, const NS: usize>(
     limits: &SVector<f64, NS>,
 ) -> Result<Covered, Uncovered<NS>>
 where
-    M: AnalyticModel<NX, NU, NS>,
+    M: AnalyticModel<NX, NU, NS> + Sync,
 {
     const MOST_CELLS: usize = 100_000;
     let whole = Cell {
@@ -71,7 +71,7 @@ where
         half_widths: *limits,
     };
     let examine = |cell: &Cell<NS>| {
-        let decay = decay(model, k, normaliser, rate, cell);
+        let decay = decay(model, k, normaliser, rate, cell).affine();
         let shift = Interval::point(decay.error);
         let at = |corner: &[f64; NS]| minus_identity(&decay.at(corner), shift);
         if corners().all(|corner| is_positive_definite(&at(&corner))) {
@@ -100,21 +100,22 @@ fn decay<M, const NX: usize, const NU: usize, const NS: usize>(
     normaliser: &Normaliser<NX>,
     rate: f64,
     cell: &Cell<NS>,
-) -> AffineMap<NX, NX, NS>
+) -> TaylorMap<NX, NX, NS>
 where
-    M: AnalyticModel<NX, NU, NS>,
+    M: AnalyticModel<NX, NU, NS> + Sync,
 {
-    let symbol = |i: usize| Affine::symbol(cell.centre[i], cell.half_widths[i], i);
+    let symbol = |i: usize| TaylorModel::symbol(cell.centre[i], cell.half_widths[i], i);
     let (a, b) = model.matrices(&std::array::from_fn(symbol));
-    let minus_k: [[Affine<NS>; NX]; NU] = from_fn(|i, j| Affine::constant(-k[(i, j)]));
+    let minus_k: [[TaylorModel<NS>; NX]; NU] = from_fn(|i, j| TaylorModel::constant(-k[(i, j)]));
     let input = product(&b, &minus_k);
-    let closed: [[Affine<NS>; NX]; NX] = from_fn(|i, j| a[i][j] + input[i][j]);
-    let p: [[Affine<NS>; NX]; NX] = from_fn(|i, j| Affine::from(normaliser.p()[i][j]));
-    let t: [[Affine<NS>; NX]; NX] = from_fn(|i, j| Affine::from(normaliser.frame.t[i][j]));
+    let closed: [[TaylorModel<NS>; NX]; NX] = from_fn(|i, j| a[i][j] + input[i][j]);
+    let p: [[TaylorModel<NS>; NX]; NX] = from_fn(|i, j| TaylorModel::from(normaliser.p()[i][j]));
+    let t: [[TaylorModel<NS>; NX]; NX] =
+        from_fn(|i, j| TaylorModel::from(normaliser.frame.t[i][j]));
     let half = product(&transposed(&t), &product(&p, &product(&closed, &t)));
     let unit = product(&transposed(&t), &product(&p, &t));
-    let twice = Affine::constant(2.0 * rate);
-    AffineMap::of(&from_fn(|i, j| {
+    let twice = TaylorModel::constant(2.0 * rate);
+    TaylorMap::of(&from_fn(|i, j| {
         -(half[i][j] + half[j][i]) - twice * unit[i][j]
     }))
 }

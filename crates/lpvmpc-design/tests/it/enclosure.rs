@@ -1,7 +1,9 @@
 //! Enclosures must contain what they enclose.
 
 use lpvmpc::{LpvModel, Rk4};
-use lpvmpc_design::{Affine, AnalyticModel, Arithmetic, Frame, Interval, SampledLaw};
+use lpvmpc_design::{
+    AnalyticModel, Arithmetic, Frame, Interval, SampledLaw, TaylorMap, TaylorModel,
+};
 use nalgebra::{Matrix1x2, Matrix2, Vector1, Vector2};
 use proptest::prelude::*;
 
@@ -19,12 +21,28 @@ fn truth(x: f64, y: f64) -> f64 {
     (x.sin() * y - y.cos() * sinc(x)) / (2.0 + x * x) - sinc(x * y) / (2.0 + y.cos())
 }
 
+/// The polynomial of a Taylor model at z.
+fn at(model: &TaylorModel<2>, z: [f64; 2]) -> f64 {
+    let squares = model.squares;
+    model.middle
+        + model.slopes[0] * z[0]
+        + model.slopes[1] * z[1]
+        + squares[0][0] * z[0] * z[0]
+        + squares[0][1] * z[0] * z[1]
+        + squares[1][1] * z[1] * z[1]
+}
+
+fn map_at(map: &TaylorMap<2, 2, 2>, z: [f64; 2]) -> Matrix2<f64> {
+    let entries = map.entries();
+    Matrix2::from_fn(|i, j| at(&entries[i][j], z))
+}
+
 /// What rounding may make of [`truth`].
 const ROUNDING: f64 = 1e-14;
 
 proptest! {
     #[test]
-    fn intervals_and_affine_forms_contain_the_values(
+    fn intervals_and_taylor_models_contain_the_values(
         x in -2.0..2.0_f64, y in -2.0..2.0_f64,
         dx in 0.0..0.5_f64, dy in 0.0..0.5_f64,
         zx in -1.0..1.0_f64, zy in -1.0..1.0_f64,
@@ -32,9 +50,11 @@ proptest! {
         let exact = truth(x + zx * dx, y + zy * dy);
         let range = formula(Interval::around(x, dx), Interval::around(y, dy));
         prop_assert!(range.lower <= exact + ROUNDING && exact - ROUNDING <= range.upper);
-        let form = formula(Affine::<2>::symbol(x, dx, 0), Affine::symbol(y, dy, 1));
-        let value = form.middle + form.slopes[0] * zx + form.slopes[1] * zy;
+        let form = formula(TaylorModel::<2>::symbol(x, dx, 0), TaylorModel::symbol(y, dy, 1));
+        let value = at(&form, [zx, zy]);
         prop_assert!((value - exact).abs() <= form.error + ROUNDING, "{form:?} for {exact}");
+        let range = form.range();
+        prop_assert!(range.lower <= exact + ROUNDING && exact - ROUNDING <= range.upper);
     }
 
     #[test]
@@ -42,6 +62,39 @@ proptest! {
         let range = formula(Interval::point(x), Interval::point(y));
         // Two hundred roundings, of terms of sinc's series that sum up to cosh(4).
         prop_assert!(range.upper - range.lower < 200.0 * f64::EPSILON * 4.0_f64.cosh());
+    }
+
+    #[test]
+    fn products_of_maps_contain_the_products(
+        entries in prop::collection::vec(-1.0..1.0_f64, 48),
+        errors in prop::array::uniform2(0.0..0.1_f64),
+        z in prop::array::uniform2(-1.0..1.0_f64),
+        turn in prop::array::uniform2(-1.0..1.0_f64),
+    ) {
+        let map = |first: usize, error: f64| {
+            let matrix = |k: usize| Matrix2::from_column_slice(&entries[first + 4 * k..][..4]);
+            TaylorMap::<2, 2, 2> {
+                middle: matrix(0),
+                slopes: [matrix(1), matrix(2)],
+                squares: [[matrix(3), matrix(4)], [Matrix2::zeros(), matrix(5)]],
+                error,
+            }
+        };
+        let maps = [map(0, errors[0]), map(24, errors[1])];
+        // A matrix that the map stands for: an error of the full size, in some direction.
+        let members = [0, 1].map(|i| {
+            let rotation = nalgebra::Rotation2::new(3.0 * turn[i]).into_inner();
+            map_at(&maps[i], z) + rotation * errors[i]
+        });
+        let product = maps[0].times(&maps[1]);
+        let miss = (members[0] * members[1] - map_at(&product, z)).singular_values().max();
+        prop_assert!(miss <= product.error, "{miss:e} > {:e}", product.error);
+        let sum = maps[0].plus(&maps[1]);
+        let miss = (members[0] + members[1] - map_at(&sum, z)).singular_values().max();
+        prop_assert!(miss <= sum.error * (1.0 + 1e-12) + 1e-14);
+        let affine = product.affine();
+        let miss = (members[0] * members[1] - map_at(&affine, z)).singular_values().max();
+        prop_assert!(miss <= affine.error);
     }
 
     #[test]
@@ -62,7 +115,8 @@ proptest! {
         let g = Matrix2::from(sample.transition.middle
             + sample.transition.slopes[0] * z[0] + sample.transition.slopes[1] * z[1]);
         let error = (g * x - end).norm();
-        prop_assert!(error <= sample.transition.error * x.norm() + 1e-11, "{error:e}");
+        let allowed = (sample.error_square * x).dot(&x).sqrt();
+        prop_assert!(error <= allowed + 1e-11, "{error:e} > {allowed:e}");
         for i in 0..2 {
             prop_assert!(sample.states[i].lower <= end[i] && end[i] <= sample.states[i].upper);
         }
@@ -70,23 +124,23 @@ proptest! {
 }
 
 #[test]
-fn errors_of_affine_forms_shrink_with_the_square_of_the_box() {
+fn errors_of_taylor_models_shrink_with_the_third_power_of_the_box() {
     let error = |width: f64| {
         formula(
-            Affine::<2>::symbol(0.7, width, 0),
-            Affine::symbol(-0.4, width, 1),
+            TaylorModel::<2>::symbol(0.7, width, 0),
+            TaylorModel::symbol(-0.4, width, 1),
         )
         .error
     };
     let order = (error(1e-1) / error(1e-3)).log10() / 2.0;
-    assert!((order - 2.0).abs() < 0.15, "order {order}");
+    assert!((order - 3.0).abs() < 0.15, "order {order}");
 }
 
 #[test]
 fn what_may_be_divided_by_zero_is_unknown() {
     let range = Interval::point(1.0) / Interval::new(-1.0, 1.0);
     assert_eq!(range, Interval::EVERYTHING);
-    let form = Affine::<1>::constant(1.0) / Affine::symbol(0.0, 1.0, 0);
+    let form = TaylorModel::<1>::constant(1.0) / TaylorModel::symbol(0.0, 1.0, 0);
     assert_eq!(form.error, f64::INFINITY);
 }
 

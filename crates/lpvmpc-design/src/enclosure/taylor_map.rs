@@ -1,0 +1,212 @@
+//! Matrices over a box, with an error in the Euclidean norm.
+
+use super::interval::Interval;
+use super::taylor_model::TaylorModel;
+use nalgebra::SMatrix;
+
+/// A matrix over the box -1 <= z_i <= 1: at every z it is within `error`, in the Euclidean
+/// operator norm, of `middle` + sum of `slopes[i]` z_i + sum over i <= j of `squares[i][j]` z_i z_j.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TaylorMap<const R: usize, const C: usize, const D: usize> {
+    /// The matrix at z = 0, up to the error.
+    pub middle: SMatrix<f64, R, C>,
+    /// Its linear dependence on z.
+    pub slopes: [SMatrix<f64, R, C>; D],
+    /// Its quadratic dependence on z; the part below the diagonal is zero.
+    pub squares: [[SMatrix<f64, R, C>; D]; D],
+    /// The largest distance from the true matrix, rounding included; infinite when unknown.
+    pub error: f64,
+}
+
+/// Bounds the rounding of an entry of a sum of up to four products of matrices of up to a dozen
+/// rows, relative to the product of their norms, and of the norms themselves.
+pub(super) const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+impl<const R: usize, const C: usize, const D: usize> TaylorMap<R, C, D> {
+    /// The map with these entries.
+    pub fn of(entries: &[[TaylorModel<D>; C]; R]) -> Self {
+        let errors = SMatrix::<f64, R, C>::from_fn(|i, j| entries[i][j].error);
+        let matrix = |coefficient: &dyn Fn(&TaylorModel<D>) -> f64| {
+            SMatrix::from_fn(|i, j| coefficient(&entries[i][j]))
+        };
+        Self {
+            middle: matrix(&|entry| entry.middle),
+            slopes: std::array::from_fn(|k| matrix(&|entry| entry.slopes[k])),
+            squares: std::array::from_fn(|k| {
+                std::array::from_fn(|l| matrix(&|entry| entry.squares[k][l]))
+            }),
+            error: known(frobenius(&errors)),
+        }
+    }
+
+    /// The same matrix at every z.
+    pub fn constant(middle: SMatrix<f64, R, C>) -> Self {
+        Self {
+            middle,
+            slopes: [SMatrix::zeros(); D],
+            squares: [[SMatrix::zeros(); D]; D],
+            error: 0.0,
+        }
+    }
+
+    /// Its entries.
+    pub fn entries(&self) -> [[TaylorModel<D>; C]; R] {
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| TaylorModel {
+                middle: self.middle[(i, j)],
+                slopes: std::array::from_fn(|k| self.slopes[k][(i, j)]),
+                squares: std::array::from_fn(|k| {
+                    std::array::from_fn(|l| self.squares[k][l][(i, j)])
+                }),
+                error: self.error,
+            })
+        })
+    }
+
+    /// A bound of the norm over the whole box, without the error.
+    pub fn norm(&self) -> f64 {
+        (euclidean(&self.middle) + self.deviation()) * (1.0 + ROUNDING)
+    }
+
+    /// A bound of the norm of the part that varies with z.
+    pub(super) fn deviation(&self) -> f64 {
+        self.parts(euclidean).iter().sum::<f64>() * (1.0 + ROUNDING)
+    }
+
+    /// The sums of the norms of the linear and of the quadratic part.
+    fn parts(&self, norm: fn(&SMatrix<f64, R, C>) -> f64) -> [f64; 2] {
+        let slopes: f64 = self.slopes.iter().map(norm).sum();
+        let squares: f64 = self.upper().map(|(i, j)| norm(&self.squares[i][j])).sum();
+        [slopes, squares].map(|sum| sum * (1.0 + ROUNDING))
+    }
+
+    /// The places of the quadratic part.
+    fn upper(&self) -> impl Iterator<Item = (usize, usize)> + use<R, C, D> {
+        (0..D).flat_map(|i| (i..D).map(move |j| (i, j)))
+    }
+
+    /// The product.
+    pub fn times<const N: usize>(&self, other: &TaylorMap<C, N, D>) -> TaylorMap<R, N, D> {
+        let (m, n) = (&self.middle, &other.middle);
+        let (p, q) = (&self.slopes, &other.slopes);
+        let mut squares = [[SMatrix::zeros(); D]; D];
+        for (i, j) in self.upper() {
+            let mixed = p[i] * q[j]
+                + if i == j {
+                    SMatrix::zeros()
+                } else {
+                    p[j] * q[i]
+                };
+            squares[i][j] = m * other.squares[i][j] + self.squares[i][j] * n + mixed;
+        }
+        let (a, b) = (euclidean(m), euclidean(n));
+        let ([a1, a2], [b1, b2]) = (self.parts(euclidean), other.parts(euclidean));
+        // Of order three and four.
+        let beyond = a1 * b2 + a2 * b1 + a2 * b2;
+        let errors = self.error * (b + b1 + b2 + other.error) + other.error * (a + a1 + a2);
+        TaylorMap {
+            middle: m * n,
+            slopes: std::array::from_fn(|k| m * q[k] + p[k] * n),
+            squares,
+            error: known(
+                (beyond + errors + ROUNDING * self.size() * other.size()) * (1.0 + ROUNDING),
+            ),
+        }
+    }
+
+    /// The sum.
+    pub fn plus(&self, other: &Self) -> Self {
+        let sum = Self {
+            middle: self.middle + other.middle,
+            slopes: std::array::from_fn(|k| self.slopes[k] + other.slopes[k]),
+            squares: std::array::from_fn(|k| {
+                std::array::from_fn(|l| self.squares[k][l] + other.squares[k][l])
+            }),
+            error: 0.0,
+        };
+        let rounding = ROUNDING * sum.size();
+        Self {
+            error: known((self.error + other.error + rounding) * (1.0 + ROUNDING)),
+            ..sum
+        }
+    }
+
+    /// A bound of the entries' sizes, each summed over all coefficients.
+    fn size(&self) -> f64 {
+        let [slopes, squares] = self.parts(frobenius);
+        frobenius(&self.middle) + slopes + squares
+    }
+
+    /// The same map with its quadratic part in the error: z_i^2 is 1/2, give or take 1/2.
+    pub fn affine(&self) -> Self {
+        let mut affine = Self {
+            squares: [[SMatrix::zeros(); D]; D],
+            ..*self
+        };
+        let mut terms = self.error + ROUNDING * self.size();
+        for (i, j) in self.upper() {
+            let square = self.squares[i][j];
+            if i == j {
+                affine.middle += square * 0.5;
+                terms += 0.5 * euclidean(&square);
+            } else {
+                terms += euclidean(&square);
+            }
+        }
+        affine.error = known(terms * (1.0 + ROUNDING));
+        affine
+    }
+
+    /// The linear part at a corner of the box, given by the signs of z, without the error.
+    pub fn at(&self, corner: &[f64; D]) -> [[Interval; C]; R] {
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                let terms = self.slopes.iter().zip(corner);
+                terms.fold(
+                    Interval::point(self.middle[(i, j)]),
+                    |sum, (slope, sign)| sum + Interval::point(slope[(i, j)] * sign),
+                )
+            })
+        })
+    }
+
+    /// How much the matrix depends on z_`symbol`.
+    pub fn weight(&self, symbol: usize) -> f64 {
+        let squares = self.upper().filter(|(i, j)| *i == symbol || *j == symbol);
+        frobenius(&self.slopes[symbol])
+            + squares
+                .map(|(i, j)| frobenius(&self.squares[i][j]))
+                .sum::<f64>()
+    }
+}
+
+pub(super) fn known(error: f64) -> f64 {
+    if error.is_nan() { f64::INFINITY } else { error }
+}
+
+pub(super) fn frobenius<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) -> f64 {
+    m.norm() * (1.0 + ROUNDING)
+}
+
+/// An upper bound of the Euclidean operator norm, at most 1 % above it for four columns: with
+/// S = M'M, |M|^2 = |S| <= |S^n|_F^(1/n).
+pub(super) fn euclidean<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) -> f64 {
+    const SQUARINGS: i32 = 5;
+    let mut power = m.transpose() * m;
+    let mut bound = 1.0;
+    let mut exponent = 0.5;
+    for _ in 0..SQUARINGS {
+        // Scaled, so that it neither overflows nor vanishes.
+        let size = power.norm();
+        if size <= f64::MIN_POSITIVE || !size.is_finite() {
+            return frobenius(m);
+        }
+        bound *= size.powf(exponent);
+        exponent *= 0.5;
+        power /= size;
+        power *= power;
+    }
+    // S^n loses at most a few roundings of its own norm at each squaring, of which the n-th
+    // root is taken; the powers are as exact.
+    bound * power.norm().powf(exponent) * (1.0 + 16.0 * ROUNDING)
+}
