@@ -6,8 +6,11 @@
 
 use crate::commands::CommandError;
 use ballbot::Ballbot;
-use ballbot_scenario::{Prepared, Scenario, ScenarioError};
-use lpvmpc::{Controller, Reference, Solution, Solver, Workspace};
+use ballbot_scenario::{GUARDED_ACTIVE, Prepared, Scenario, ScenarioError};
+use lpvmpc::{
+    Controller, GuardedController, GuardedIterations, GuardedWorkspace, Reference, Solution,
+    Solver, TerminalIngredient, Workspace,
+};
 use lpvmpc_sim::advance;
 use nalgebra::Vector4;
 use serde::Serialize;
@@ -30,6 +33,11 @@ const M: usize = N + 4;
 /// Repetitions of each sample.
 const PASSES: usize = 30;
 
+/// Samples of the guaranteed loop, and how long it keeps a set point.
+const GUARDED_SAMPLES: usize = 400;
+const HOLD: usize = 80;
+
+type Guarded = GuardedController<Ballbot<f64>, f64, 4, 1, 2, N, 5, { N + 2 }>;
 type Control = Controller<Ballbot<f64>, f64, 4, 1, 2, N, M>;
 
 /// Statistics of a time over a sequence, in microseconds.
@@ -69,6 +77,66 @@ impl Times {
             max: at(1.0),
         }
     }
+}
+
+/// The times of the guaranteed step and of the plain one from the same states.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GuardedTimes {
+    /// Without guarantee: terminal cost, the same predictor.
+    pub plain_us: Times,
+    /// With artificial set point, certified terminal set and acceptance test; one quadratic
+    /// program.
+    pub guarded_us: Times,
+}
+
+/// Times the guaranteed loop of the scenario `far-setpoints`, with set points within a turn, along
+/// with the plain controller.
+///
+/// # Errors
+/// A controller refuses its settings or the plant cannot be integrated.
+pub fn time_guarded() -> Result<GuardedTimes, CommandError> {
+    let prepared = Scenario::load("far-setpoints")?.prepare(Path::new("."))?;
+    let Some(mut settings) = prepared.guarded else {
+        return Err(CommandError::Usage("no terminal set".to_owned()));
+    };
+    settings.iterations = GuardedIterations {
+        known: 1,
+        ..settings.iterations
+    };
+    let mut plain_settings = prepared.settings;
+    plain_settings.terminal = TerminalIngredient::Cost(settings.terminal.p);
+    let refused = ScenarioError::from;
+    let mut plain = Control::new(prepared.ballbot, plain_settings).map_err(refused)?;
+    let mut guarded = Guarded::new(prepared.ballbot, settings).map_err(ScenarioError::from)?;
+    let mut workspace = Box::new(Workspace::<f64, 4, 1, N, M>::new());
+    let mut memory = Box::new(GuardedWorkspace::<f64, 1, 5, { N + 2 }, GUARDED_ACTIVE>::new());
+    let (mut plain_us, mut guarded_us) = (Vec::new(), Vec::new());
+    let mut x = Vector4::zeros();
+    for k in 0..GUARDED_SAMPLES {
+        let wanted = [1.0, -0.5, 2.0, -2.0, 0.0][k / HOLD % 5];
+        let reference = Reference::constant(Vector4::new(wanted, 0.0, 0.0, 0.0));
+        let before = plain.clone();
+        plain_us.push(shortest(|| {
+            plain.clone_from(&before);
+            let start = Instant::now();
+            black_box(plain.step(black_box(&x), &reference, &mut workspace));
+            start.elapsed()
+        }));
+        let (before, remembered) = (guarded.clone(), memory.clone());
+        let mut u = prepared.settings.u.lower;
+        guarded_us.push(shortest(|| {
+            guarded.clone_from(&before);
+            memory.clone_from(&remembered);
+            let start = Instant::now();
+            u = black_box(guarded.step(black_box(&x), wanted, &mut memory)).u;
+            start.elapsed()
+        }));
+        x = advance(&prepared.ballbot, &x, &u, settings.t_s, prepared.tolerances)?;
+    }
+    Ok(GuardedTimes {
+        plain_us: Times::new(plain_us),
+        guarded_us: Times::new(guarded_us),
+    })
 }
 
 /// Times one built-in scenario.

@@ -1,8 +1,8 @@
 //! The figures of recorded runs.
 
 use crate::figures::{
-    Band, Figure, Limits, PathRun, PlaneRun, Reference, Role, closed_loop, motor_torques,
-    path_in_plane, two_planes,
+    Band, Figure, Limits, PathRun, PlaneRun, Reference, Role, closed_loop, gap_panel, guard_panels,
+    motor_torques, path_in_plane, two_planes,
 };
 use crate::recording::Columns;
 use ballbot_scenario::{PhiReference, Prepared};
@@ -97,6 +97,34 @@ pub fn path(title: &str, prepared: &Prepared, planes: [&Columns; 2]) -> Figure {
         y: &positions[1],
     };
     path_in_plane(title, &[run], Some((&references[0], &references[1])))
+}
+
+/// How far the plans of a run were from the model's rollout, and, for a run with a guarantee, what
+/// each torque was backed by and where the plan was to end.
+pub fn plans(title: &str, columns: &Columns) -> Figure {
+    let samples = columns.gap.len();
+    let time = columns.time.get(..samples).unwrap_or(&columns.time);
+    let mut panels = vec![gap_panel(time, &columns.gap)];
+    if columns.guard.len() == samples && samples > 0 {
+        let set_points = columns.guard.iter().map(|guard| guard.set_point);
+        let decisions = columns.guard.iter().map(|guard| {
+            // From 1, as in the label of the axis.
+            f64::from(guard.decision as u8 + 1)
+        });
+        panels.extend(guard_panels(
+            time,
+            &set_points.collect::<Vec<_>>(),
+            columns.phi_reference.get(..samples).unwrap_or_default(),
+            &decisions.collect::<Vec<_>>(),
+        ));
+    }
+    Figure {
+        title: title.to_owned(),
+        height: 60.0 + 260.0 * panels.len() as f64,
+        panels,
+        columns: 1,
+        width: 900.0,
+    }
 }
 
 /// The three motors' torques.

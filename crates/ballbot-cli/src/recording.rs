@@ -1,7 +1,7 @@
 //! Recorded runs as files and arrays.
 
 use ballbot_scenario::{Plane, Prepared, words};
-use lpvmpc_sim::{Ending, LogRow, Trajectory};
+use lpvmpc_sim::{Ending, Guard, LogRow, Trajectory};
 use nalgebra::Vector3;
 
 /// The columns of `trajectory.csv`.
@@ -114,6 +114,11 @@ pub struct Columns {
     pub cost: Vec<f64>,
     /// phi_ref at those times, rad.
     pub phi_reference: Vec<f64>,
+    /// Rolled-out minus predicted state at the end of each plan's horizon.
+    pub gap: Vec<[f64; 4]>,
+    /// What each torque was backed by, and the artificial set point in rad, where there is a
+    /// guarantee.
+    pub guard: Vec<Guard>,
 }
 
 impl From<&Trajectory<4, 1>> for Columns {
@@ -127,6 +132,8 @@ impl From<&Trajectory<4, 1>> for Columns {
             torque: samples.iter().map(|sample| sample.u[0]).collect(),
             cost: samples.iter().map(|sample| sample.cost).collect(),
             phi_reference: references.chain([trajectory.final_reference[0]]).collect(),
+            gap: samples.iter().map(|sample| sample.gap.into()).collect(),
+            guard: samples.iter().filter_map(|sample| sample.guard).collect(),
         }
     }
 }

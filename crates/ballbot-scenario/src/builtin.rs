@@ -19,7 +19,7 @@ macro_rules! builtin {
 }
 
 /// The certificate of a terminal set of the robot of the built-in scenarios, as JSON for
-/// [`crate::TerminalCertificate`]: written by `ballbot certify --size 0.125`, checked by
+/// [`crate::TerminalCertificate`]: written by `ballbot certify --size 0.25`, checked by
 /// `ballbot verify`.
 pub const TERMINAL_CERTIFICATE: &str = include_str!("builtin/terminal-certificate.json");
 

@@ -129,11 +129,10 @@ impl Rk4 {
         let (mut a_d, mut b_d) = (SMatrix::identity(), SMatrix::zeros());
         let mut x = *x;
         for _ in 0..self.substeps {
-            let (mut a_step, mut b_step) = (SMatrix::identity(), SMatrix::zeros());
-            let (mut k, mut l) = (SMatrix::zeros(), SMatrix::zeros());
-            let mut slope = SVector::zeros();
-            let zero = T::zero();
-            for (reach, weight) in [(zero, sixth), (half, third), (half, third), (h, sixth)] {
+            let (mut k, mut l) = model.matrices(&model.scheduling(&x));
+            let mut slope = k * x + l * u;
+            let (mut a_step, mut b_step) = (SMatrix::identity() + k * sixth, l * sixth);
+            for (reach, weight) in [(half, third), (half, third), (h, sixth)] {
                 let (a, b) = model.matrices(&model.scheduling(&(x + slope * reach)));
                 (k, l) = (a + product(&a, &(k * reach)), b + product(&a, &(l * reach)));
                 slope = k * x + l * u;

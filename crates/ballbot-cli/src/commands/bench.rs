@@ -1,7 +1,7 @@
 //! `ballbot bench`.
 
 use super::CommandError;
-use crate::benchmark::{self, SEQUENCES, SequenceTimes, Times};
+use crate::benchmark::{self, GuardedTimes, SEQUENCES, SequenceTimes, Times};
 use crate::output;
 use crate::progress::Progress;
 use crate::table::Table;
@@ -17,7 +17,7 @@ Examples:
   ballbot bench --json times.json
 
 Times the quadratic program alone and the controller's whole step on this machine, along closed
-loops of the built-in scenarios. Each sample is repeated and its shortest time counts.")]
+loops of the built-in scenarios; and the guaranteed step against the plain one. Each sample is repeated and its shortest time counts.")]
 pub struct BenchArguments {
     /// Write the times to this file as JSON, too
     #[arg(long, value_name = "FILE")]
@@ -29,14 +29,19 @@ pub struct BenchArguments {
 /// # Errors
 /// The file cannot be written.
 pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
-    let progress = Progress::new("timing", SEQUENCES.len());
+    let progress = Progress::new("timing", SEQUENCES.len() + 1);
     let mut sequences: Vec<SequenceTimes> = Vec::with_capacity(SEQUENCES.len());
     for name in SEQUENCES {
         sequences.push(benchmark::time(name)?);
         progress.set(sequences.len());
     }
+    let guarded = benchmark::time_guarded()?;
+    progress.set(sequences.len() + 1);
     if let Some(path) = &arguments.json {
-        let document = format!("{:#}\n", json!({ "sequences": sequences }));
+        let document = format!(
+            "{:#}\n",
+            json!({ "sequences": sequences, "guarded": guarded })
+        );
         output::write_files(&[(path, document.as_bytes())])?;
     }
     let mut table = Table::new([
@@ -57,5 +62,18 @@ pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
         row.push(sequence.max_active.to_string());
         table.row(row);
     }
-    Ok(table.to_string())
+    Ok(format!("{table}\n{}", guarded_table(&guarded)))
+}
+
+fn guarded_table(times: &GuardedTimes) -> Table {
+    let mut table = Table::new(["far-setpoints, step in us", "median", "p99", "max"]);
+    let rows = [
+        ("plain, the same predictor", times.plain_us),
+        ("guaranteed", times.guarded_us),
+    ];
+    for (name, times) in rows {
+        let cells = [times.median, times.p99, times.max].map(|t| format!("{t:.2}"));
+        table.row([vec![name.to_owned()], cells.to_vec()].concat());
+    }
+    table
 }

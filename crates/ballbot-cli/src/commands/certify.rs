@@ -55,8 +55,8 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Halvings of the search for the size: it ends within a thirty-second of the bounds.
-const HALVINGS: usize = 5;
+/// Sizes that the search looks at: multiples of a thirty-second of the bounds.
+const SIZES: usize = 32;
 
 type Certified = (TerminalCertificate, Proof<4>);
 
@@ -84,20 +84,36 @@ pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
     ))
 }
 
-/// The largest size that can be certified, by bisection.
+/// The largest set that can be certified. A larger box of tilts allows a larger set, up to where
+/// the law has to cope with so many plants that the set shrinks again; the larger the set, the
+/// harder the proof. So the sizes up to the largest designed set are bisected.
 fn search(arguments: &CertifyArguments, prepared: &Prepared) -> Result<Certified, CommandError> {
-    let (mut low, mut high) = (0.0, 1.0);
+    let sizes = (1..=SIZES).map(|i| i as f64 / SIZES as f64);
+    let designed: Vec<(f64, f64)> = sizes
+        .map(|size| {
+            let design = problem(arguments, prepared, size).design(&prepared.ballbot);
+            (size, design.map_or(f64::NEG_INFINITY, |set| set.log_det()))
+        })
+        .collect();
+    let mut largest = 0;
+    for (i, (_, volume)) in designed.iter().enumerate() {
+        if *volume > designed[largest].1 {
+            largest = i;
+        }
+    }
+    let (mut low, mut high) = (0, largest + 1);
     let mut best = None;
     let mut last = None;
-    for _ in 0..HALVINGS {
-        let size = 0.5 * (low + high);
-        match certify(arguments, prepared, size) {
+    // Below `low` there is a proof, from `high` on there is none.
+    while low < high {
+        let middle = (low + high) / 2;
+        match certify(arguments, prepared, designed[middle].0) {
             Ok(found) => {
-                low = size;
+                low = middle + 1;
                 best = Some(found);
             }
             Err(error) => {
-                high = size;
+                high = middle;
                 last = Some(error);
             }
         }
@@ -109,15 +125,16 @@ fn search(arguments: &CertifyArguments, prepared: &Prepared) -> Result<Certified
     }
 }
 
-fn certify(
+/// What is asked of the set that keeps tilt and tilt rate within `size` of their bounds.
+fn problem(
     arguments: &CertifyArguments,
     prepared: &Prepared,
     size: f64,
-) -> Result<Certified, CertifyError> {
+) -> CertificateProblem<4, 1, 2> {
     let settings = &prepared.settings;
     let state_limits = symmetric(&settings.x);
     let [theta, theta_dot] = [1, 3].map(|i| size * state_limits[i]);
-    let problem = CertificateProblem {
+    CertificateProblem {
         terminal: TerminalProblem {
             t_s: settings.t_s,
             q: settings.weights.q,
@@ -130,7 +147,15 @@ fn certify(
         state_limits,
         scheduling_limits: Vector2::new(theta, theta_dot),
         written_by: format!("ballbot {}", env!("CARGO_PKG_VERSION")),
-    };
+    }
+}
+
+fn certify(
+    arguments: &CertifyArguments,
+    prepared: &Prepared,
+    size: f64,
+) -> Result<Certified, CertifyError> {
+    let problem = problem(arguments, prepared, size);
     let progress = Progress::new("proving", STEPS);
     let robot = RobotTable::from(&prepared.ballbot);
     certify_terminal(

@@ -180,11 +180,16 @@ fn figures(prepared: &Prepared, trajectories: &[Trajectory<4, 1>]) -> Vec<(&'sta
                 ("figure", pictures::both_planes(title, prepared, planes)),
                 ("path", pictures::path(title, prepared, [x, y])),
                 ("motors", pictures::motors("Motor torques", x, &torques)),
+                ("plans_x", pictures::plans("Plans of the x plane", x)),
+                ("plans_y", pictures::plans("Plans of the y plane", y)),
             ]
         }
         runs => {
             let shown: Vec<Shown<'_>> = runs.iter().map(shown).collect();
-            vec![("figure", pictures::one_plane(title, prepared, &shown))]
+            let mut figures = vec![("figure", pictures::one_plane(title, prepared, &shown))];
+            let plans = |columns| ("plans", pictures::plans("Plans", columns));
+            figures.extend(columns.first().map(plans));
+            figures
         }
     }
 }

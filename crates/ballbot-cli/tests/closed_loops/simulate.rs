@@ -43,9 +43,9 @@ fn every_built_in_scenario_runs_and_is_recorded() {
             }
         }
         let figures: &[&str] = if name == "lissajous" {
-            &["figure", "motors", "path"]
+            &["figure", "motors", "path", "plans_x", "plans_y"]
         } else {
-            &["figure"]
+            &["figure", "plans"]
         };
         for figure in figures {
             assert_figure(&results, figure);

@@ -4,6 +4,7 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
+mod certify;
 mod identify;
 mod linearize;
 mod lqr;

@@ -72,7 +72,7 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
     ///
     /// A step of the motion is linear in its initial state and input, x+ = Phi x + Gamma u, with
     /// Phi and Gamma that depend on where the motion leads the scheduling. They are enclosed as
-    /// affine forms in y, then composed in the coordinates of the frame, from G = I on, with
+    /// Taylor models in y, then composed in the coordinates of the frame, from G = I on, with
     /// u = -K T y(0).
     ///
     /// # Errors

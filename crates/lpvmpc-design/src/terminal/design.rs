@@ -3,7 +3,7 @@
 use super::certificate::{Certificate, QuadraticClaim, Record, TerminalClaim};
 use super::proof::{ClaimError, Proof};
 use super::quadratic;
-use super::synthesis::{SynthesisError, TerminalProblem, synthesize_terminal};
+use super::synthesis::{SynthesisError, TerminalIngredients, TerminalProblem, synthesize_terminal};
 use crate::enclosure::AnalyticModel;
 use crate::stability::{FrozenError, SchedulingGrid};
 use lpvmpc::LpvModel;
@@ -52,6 +52,24 @@ const INSIDE: f64 = 1.0 - 1e-6;
 /// The rate that is claimed, of the one that was designed.
 const RATE_SHARE: f64 = 0.5;
 
+impl<const NX: usize, const NU: usize, const NS: usize> CertificateProblem<NX, NU, NS> {
+    /// The terminal ingredients alone, designed at the points of a grid, without any proof.
+    ///
+    /// # Errors
+    /// No ingredients at the points of the grid.
+    pub fn design<M>(&self, model: &M) -> Result<TerminalIngredients<NX, NU>, CertifyError>
+    where
+        M: LpvModel<f64, NX, NU, NS>,
+    {
+        Ok(synthesize_terminal(model, &self.grid()?, &self.terminal)?)
+    }
+
+    fn grid(&self) -> Result<SchedulingGrid<NS>, FrozenError> {
+        let limits = self.scheduling_limits;
+        SchedulingGrid::new(-limits, limits, [GRID_POINTS; NS])
+    }
+}
+
 /// Designs terminal ingredients for `model`, and proves them; at most `most_boxes` boxes are
 /// looked at, and `progress` hears which share of the proof is done.
 ///
@@ -67,15 +85,13 @@ where
     M: LpvModel<f64, NX, NU, NS>,
     Plant: AnalyticModel<NX, NU, NS> + Sync,
 {
-    let limits = problem.scheduling_limits;
-    let grid = SchedulingGrid::new(-limits, limits, [GRID_POINTS; NS])?;
     let terminal = &problem.terminal;
-    let ingredients = synthesize_terminal(model, &grid, terminal)?;
+    let ingredients = problem.design(model)?;
     let scale = ingredients
         .p
         .diagonal()
         .map(|p| (terminal.level / p).sqrt());
-    let (p, rate) = quadratic::synthesize(model, &grid, &ingredients.k, &scale)
+    let (p, rate) = quadratic::synthesize(model, &problem.grid()?, &ingredients.k, &scale)
         .ok_or(CertifyError::NoCommonLyapunov)?;
     let mut certificate = Certificate {
         written_by: problem.written_by.clone(),
@@ -85,7 +101,7 @@ where
         r: terminal.r,
         state_limits: problem.state_limits,
         input_limits: terminal.input_limits,
-        scheduling_limits: limits,
+        scheduling_limits: problem.scheduling_limits,
         terminal: TerminalClaim {
             k: ingredients.k,
             p: ingredients.p,

@@ -46,6 +46,17 @@ pub struct TerminalIngredients<const NX: usize, const NU: usize> {
     pub log_det_gap: f64,
 }
 
+impl<const NX: usize, const NU: usize> TerminalIngredients<NX, NU> {
+    /// log det (P/level)^-1: twice the logarithm of the set's volume, up to a constant. Minus
+    /// infinity for a P that is not positive definite.
+    pub fn log_det(&self) -> f64 {
+        let factor = (self.p / self.level).cholesky();
+        factor.map_or(f64::NEG_INFINITY, |factor| {
+            -2.0 * factor.l().diagonal().map(f64::ln).sum()
+        })
+    }
+}
+
 /// There are no terminal ingredients.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SynthesisError {
