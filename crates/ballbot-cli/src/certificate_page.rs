@@ -2,6 +2,7 @@
 
 use crate::commands::certify::semi_axes;
 use crate::figures::{Band, Dash, Figure, FigureError, Panel, Role, Series, Style};
+use crate::html;
 use ballbot_scenario::TerminalCertificate;
 use lpvmpc_design::Proof;
 use nalgebra::Matrix2;
@@ -55,35 +56,42 @@ pub fn html(
     certificate: &TerminalCertificate,
     proof: &Proof<4>,
 ) -> Result<String, FigureError> {
-    let svg = figure("Certified terminal set", certificate).svg()?;
+    let svg = figure("Phase planes", certificate).svg()?;
     let axes = semi_axes(certificate);
+    let bound = |limit: f64| {
+        if limit.is_finite() {
+            format!("{limit:.4}")
+        } else {
+            "none".to_owned()
+        }
+    };
     let rows: String = (0..4)
         .map(|i| {
             format!(
                 "<tr><td>{}</td><td>{:.4}</td><td>{:.4}</td><td>{}</td></tr>",
-                NAMES[i], axes[i], proof.reach[i], certificate.state_limits[i]
+                NAMES[i],
+                axes[i],
+                proof.reach[i],
+                bound(certificate.state_limits[i])
             )
         })
         .collect();
     let terminal = &certificate.terminal;
-    Ok(format!(
-        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Certificate</title>\
-         <style>body{{font:16px/1.5 sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem}}\
-         td,th{{padding:.2rem 1rem;text-align:right}}svg{{max-width:100%;height:auto}}</style>\
-         <h1>Certified terminal set</h1><p>For: {title}. Robot, weights and bounds are in \
-         certificate.json; <code>ballbot verify</code> proves every claim again.</p>\
-         <p>For <b>every</b> state with x'Px ≤ {:.6}, the nonlinear robot under the torque \
+    let body = format!(
+        "<p>For: {}. Robot, weights and bounds are in certificate.json; \
+         <code>ballbot verify</code> proves every claim again.</p>\
+         <p>For <b>every</b> state with x'Px ≤ {:.3}, the nonlinear robot under the torque \
          u = −K x, held over each sample of {} s,</p><ul>\
          <li>has x'Px smaller after the sample by at least the stage cost x'Qx + u'Ru and {:.2e} \
          of itself, so it never leaves the set,</li>\
          <li>stays within the bounds of torque and states, also between the samples.</li></ul>\
          <p>And A − BK is quadratically stable (rate {} 1/s) for every motion of \
          |θ| ≤ {:.4} rad, |θ'| ≤ {:.4} rad/s in continuous time.</p>\
-         {svg}\
-         <table><tr><th>state</th><th>in the set, at most</th><th>between samples, below</th>\
-         <th>bound</th></tr>{rows}</table>\
-         <p>K = {:.6?}, for u = −K x. Proved on {} boxes of states and {} of schedulings.</p>\
-         </html>\n",
+         <figure>{svg}</figure>\
+         <div class=\"scroll\"><table><tr><th>state</th><th>in the set, at most</th>\
+         <th>between samples, below</th><th>bound</th></tr>{rows}</table></div>\
+         <p>K = {:.6?}, for u = −K x. Proved on {} boxes of states and {} of schedulings.</p>\n",
+        html::escape(title),
         terminal.level,
         certificate.t_s,
         terminal.contraction,
@@ -93,7 +101,8 @@ pub fn html(
         terminal.k.as_slice(),
         proof.boxes,
         proof.scheduling_boxes,
-    ))
+    );
+    Ok(html::page("Certified terminal set", &body))
 }
 
 type Outline = (Vec<f64>, Vec<f64>);

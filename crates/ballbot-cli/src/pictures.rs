@@ -1,8 +1,8 @@
 //! The figures of recorded runs.
 
 use crate::figures::{
-    Band, Figure, Limits, PathRun, PlaneRun, Reference, Role, closed_loop, gap_panel, guard_panels,
-    motor_torques, path_in_plane, two_planes,
+    self, Band, Figure, GuardRun, Limits, PathRun, PlaneRun, PlansRun, Reference, Role,
+    closed_loop, motor_torques, path_in_plane, two_planes,
 };
 use crate::recording::Columns;
 use ballbot_scenario::{PhiReference, Prepared};
@@ -103,28 +103,26 @@ pub fn path(title: &str, prepared: &Prepared, planes: [&Columns; 2]) -> Figure {
 /// each torque was backed by and where the plan was to end.
 pub fn plans(title: &str, columns: &Columns) -> Figure {
     let samples = columns.gap.len();
-    let time = columns.time.get(..samples).unwrap_or(&columns.time);
-    let mut panels = vec![gap_panel(time, &columns.gap)];
-    if columns.guard.len() == samples && samples > 0 {
-        let set_points = columns.guard.iter().map(|guard| guard.set_point);
-        let decisions = columns.guard.iter().map(|guard| {
-            // From 1, as in the label of the axis.
-            f64::from(guard.decision as u8 + 1)
-        });
-        panels.extend(guard_panels(
-            time,
-            &set_points.collect::<Vec<_>>(),
-            columns.phi_reference.get(..samples).unwrap_or_default(),
-            &decisions.collect::<Vec<_>>(),
-        ));
-    }
-    Figure {
-        title: title.to_owned(),
-        height: 60.0 + 260.0 * panels.len() as f64,
-        panels,
-        columns: 1,
-        width: 900.0,
-    }
+    let first = |values: &[f64]| values.get(..samples).unwrap_or(values).to_vec();
+    let (time, wanted) = (first(&columns.time), first(&columns.phi_reference));
+    let guard = columns.guard.iter();
+    let (set_points, decisions): (Vec<f64>, Vec<f64>) = guard
+        .map(|guard| (guard.set_point, f64::from(guard.decision as u8 + 1)))
+        .unzip();
+    let guard = (columns.guard.len() == samples).then_some(GuardRun {
+        set_points: &set_points,
+        wanted: &wanted,
+        decisions: &decisions,
+    });
+    let gap = &columns.gap;
+    figures::plans(
+        title,
+        &PlansRun {
+            time: &time,
+            gap,
+            guard,
+        },
+    )
 }
 
 /// The three motors' torques.

@@ -6,7 +6,7 @@ use ballbot::Ballbot;
 use ballbot_scenario::{GUARDED_ACTIVE, Prepared, ScenarioError};
 use lpvmpc::{Decision, GuardedController, GuardedSettings, GuardedWorkspace};
 use lpvmpc_sim::GuardedLoop;
-use nalgebra::Vector4;
+use nalgebra::{Vector1, Vector4};
 use serde::Serialize;
 
 /// Horizon of the campaign's controllers.
@@ -35,6 +35,8 @@ pub struct Record {
     pub fell: bool,
     /// Largest difference of rollout and prediction at the end of the horizon, in state units.
     pub largest_gap: f64,
+    /// Cost of the closed loop: the stage costs of states and torques, about the wanted set point.
+    pub cost: f64,
 }
 
 /// Set points and when they are given.
@@ -81,13 +83,19 @@ impl<'a> Loop<'a> {
         state.ok_or_else(|| no_certificate().into())
     }
 
-    /// The loop of `prepared` around the plant that `plant` draws.
+    /// The loop of `prepared`, with so many programs per sample if given, around the plant that
+    /// `plant` draws.
     pub fn new(
         prepared: &'a Prepared,
+        programs: Option<usize>,
         plant: impl FnOnce(&mut Random) -> Ballbot<f64>,
         random: &mut Random,
     ) -> Result<Self, CommandError> {
-        let controller = Guarded::new(prepared.ballbot, *settings(prepared)?);
+        let mut settings = *settings(prepared)?;
+        if let Some(known) = programs {
+            settings.iterations.known = known;
+        }
+        let controller = Guarded::new(prepared.ballbot, settings);
         let controller = controller.map_err(ScenarioError::from)?;
         let start = Self::start(prepared, random)?;
         let plant = plant(random);
@@ -131,6 +139,7 @@ impl<'a> Loop<'a> {
                 .decision
                 .is_guaranteed()
                 .then_some((*wanted, step.cost));
+            record.pay(self.guarded.state(), *wanted, &step.u, self.prepared);
             let actuation = variant.actuation(random);
             let moved = self.guarded.advance(&step.u, &actuation);
             if moved.is_err() || has_fallen(self.guarded.state()) {
@@ -150,6 +159,13 @@ impl Record {
         if !prepared.settings.x.contains(x, 0.0) {
             self.violations += 1;
         }
+    }
+
+    /// Adds the stage cost.
+    fn pay(&mut self, x: &Vector4<f64>, wanted: f64, u: &Vector1<f64>, prepared: &Prepared) {
+        let weights = &prepared.settings.weights;
+        let error = x - Vector4::x() * wanted;
+        self.cost += (weights.q * error).dot(&error) + (weights.r * u).dot(u);
     }
 
     /// The cost may grow by rounding: each of the some hundred terms it is the sum of is rounded

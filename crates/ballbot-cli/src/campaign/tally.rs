@@ -45,6 +45,7 @@ impl Tally {
         total.largest_tilt_rad = total.largest_tilt_rad.max(record.largest_tilt_rad);
         total.largest_growth = total.largest_growth.max(record.largest_growth);
         total.largest_gap = total.largest_gap.max(record.largest_gap);
+        total.cost += record.cost;
         total.fell |= record.fell;
     }
 }

@@ -17,6 +17,9 @@ use std::fmt;
 pub enum Variant {
     /// The plant is the model, the torque acts as commanded.
     Nominal,
+    /// The same with up to so many programs per sample, until none improves the plan any more:
+    /// nonlinear MPC to convergence, as the measure of the cost.
+    Converged(usize),
     /// Now and then a push changes the rates by up to so much of their bounds.
     Pushes(f64),
     /// b1, b2 and b3 of the plant differ by up to this part of their values, each for itself. A
@@ -33,8 +36,9 @@ pub enum Variant {
 
 impl Variant {
     /// All of them, in the order of the table.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Nominal,
+        Self::Converged(30),
         Self::Pushes(0.1),
         Self::Pushes(0.4),
         Self::Parameters(0.05),
@@ -62,8 +66,12 @@ impl Variant {
                 paper::run(&scenarios.paper, start, &wanted, campaign.samples)
             }
             _ => {
-                let mut run =
-                    Loop::new(prepared, |random| self.plant(prepared, random), &mut random)?;
+                let programs = match *self {
+                    Self::Converged(programs) => Some(programs),
+                    _ => None,
+                };
+                let plant = |random: &mut Random| self.plant(prepared, random);
+                let mut run = Loop::new(prepared, programs, plant, &mut random)?;
                 let wanted = Wanted::draw(&mut random, campaign.samples, FARTHEST);
                 Ok(run.record(self, &wanted, campaign.samples, &mut random))
             }
@@ -125,6 +133,7 @@ impl fmt::Display for Variant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Nominal => f.write_str("nominal"),
+            Self::Converged(_) => f.write_str("nominal, nonlinear MPC"),
             Self::Pushes(part) => write!(f, "pushes, {:.0} % of the rates' bounds", 100.0 * part),
             Self::Parameters(part) => write!(f, "b1 to b3 ±{:.0} %", 100.0 * part),
             Self::TorqueNoise(deviation) => write!(f, "torque noise {deviation} N m"),

@@ -1,7 +1,7 @@
 //! `ballbot campaign`.
 
 use super::CommandError;
-use crate::campaign::{Campaign, Outcome, Record, Scenarios, drawing};
+use crate::campaign::{Campaign, Outcome, Record, Scenarios, cost_ratios, drawing};
 use crate::commands::simulate::PNG_SCALE;
 use crate::json;
 use crate::output;
@@ -77,11 +77,12 @@ pub fn run(arguments: &CampaignArguments) -> Result<String, CommandError> {
         return Ok(json::text(&document(&campaign, &outcomes)));
     }
     Ok(format!(
-        "{} samples of {} s per run, seed {}\n{}written to {}\n",
+        "{} samples of {} s per run, seed {}\n{}{}written to {}\n",
         campaign.samples,
         scenarios.guaranteed.settings.t_s,
         campaign.seed,
         table(&outcomes),
+        price(&cost_ratios(&outcomes)),
         arguments.out.display()
     ))
 }
@@ -94,7 +95,24 @@ const DECISIONS: [Decision; 5] = [
     Decision::SaturatedLqr,
 ];
 
-/// One column per variant.
+/// The cost against nonlinear MPC, in words.
+fn price(ratios: &[f64]) -> String {
+    let percent = |part: f64| {
+        let index = ((ratios.len() as f64 * part) as usize).min(ratios.len().saturating_sub(1));
+        let ratio = ratios.get(index).copied().unwrap_or(f64::NAN);
+        format!("{:+.2} %", 100.0 * (ratio - 1.0))
+    };
+    format!(
+        "closed-loop cost against nonlinear MPC to convergence, {} pairs of runs: \
+         median {}, from {} to {}\n",
+        ratios.len(),
+        percent(0.5),
+        percent(0.0),
+        percent(1.0)
+    )
+}
+
+/// One row per variant.
 fn table(outcomes: &[Outcome]) -> Table {
     let mut table = Table::new([
         "",
@@ -140,13 +158,14 @@ fn document(campaign: &Campaign, outcomes: &[Outcome]) -> serde_json::Value {
         "samples": campaign.samples,
         "seed": campaign.seed,
         "decisions": DECISIONS.map(|decision| decision.to_string()),
+        "cost_ratios_to_nonlinear_mpc": cost_ratios(outcomes),
         "variants": variants.collect::<Vec<_>>(),
     })
 }
 
 fn csv(outcomes: &[Outcome]) -> String {
     let mut text = "variant,run,samples,infeasible,violations,cost_growths,largest_growth,\
-                    largest_tilt_rad,largest_gap,fell,new_plan,candidate,terminal_law,\
+                    largest_tilt_rad,largest_gap,cost,fell,new_plan,candidate,terminal_law,\
                     soft_bounds,saturated_lqr\n"
         .to_owned();
     for outcome in outcomes {
@@ -161,12 +180,13 @@ fn csv(outcomes: &[Outcome]) -> String {
                 largest_growth,
                 largest_tilt_rad,
                 largest_gap,
+                cost,
                 fell,
                 decisions: [new, candidate, law, soft, saturated],
             } = record;
             text += &format!(
                 "{name},{number},{samples},{infeasible},{violations},{cost_growths},\
-                 {largest_growth:?},{largest_tilt_rad:?},{largest_gap:?},{fell},{new},{candidate},\
+                 {largest_growth:?},{largest_tilt_rad:?},{largest_gap:?},{cost:?},{fell},{new},{candidate},\
                  {law},{soft},{saturated}\n"
             );
         }

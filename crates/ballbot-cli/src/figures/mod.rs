@@ -32,4 +32,4 @@ pub use closed_loop::{Limits, PlaneRun, Reference, closed_loop, motor_torques};
 pub use figure::{Band, Dash, Figure, FigureError, Panel, Role, Scale, Series, Style};
 pub use models::{ModelRuns, convergence, models};
 pub use planes::{PathRun, path_in_plane, two_planes};
-pub use plans::{gap_panel, guard_panels};
+pub use plans::{GuardRun, PlansRun, plans};

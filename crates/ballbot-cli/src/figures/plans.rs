@@ -1,7 +1,49 @@
-//! Panels about the plans of a run: their gap to the rollout, and what backs them.
+//! A figure about the plans of a run: their gap to the rollout, and what backs them.
 
+use super::axis::share_horizontal_view;
 use super::closed_loop::{REFERENCE_LABEL, TIME_LABEL};
-use super::figure::{Dash, Panel, Role, Scale, Series, Style};
+use super::figure::{Dash, Figure, Panel, Role, Scale, Series, Style};
+
+/// What is known of the plans at each instant `time`, s.
+#[derive(Clone, Copy, Debug)]
+pub struct PlansRun<'a> {
+    /// Instants, s.
+    pub time: &'a [f64],
+    /// Rolled-out minus predicted state (phi, theta, phi_dot, theta_dot) at the end of the horizon,
+    /// rad and rad/s.
+    pub gap: &'a [[f64; 4]],
+    /// Of a run with a guarantee.
+    pub guard: Option<GuardRun<'a>>,
+}
+
+/// What a guarantee rests on at each instant.
+#[derive(Clone, Copy, Debug)]
+pub struct GuardRun<'a> {
+    /// Artificial set point, rad.
+    pub set_points: &'a [f64],
+    /// Wanted set point, rad.
+    pub wanted: &'a [f64],
+    /// 1 for a new plan, 2 for the candidate, 3 for the terminal law, 4 for soft bounds, 5 for the
+    /// saturated LQR.
+    pub decisions: &'a [f64],
+}
+
+/// One panel of the gap, and for a run with a guarantee one of the set points and one of the
+/// decisions.
+pub fn plans(title: &str, run: &PlansRun<'_>) -> Figure {
+    let mut panels = vec![gap_panel(run)];
+    if let Some(guard) = &run.guard {
+        panels.extend(guard_panels(run.time, guard));
+    }
+    share_horizontal_view(&mut panels);
+    Figure {
+        title: title.to_owned(),
+        height: 80.0 + 260.0 * panels.len() as f64,
+        panels,
+        columns: 1,
+        width: 900.0,
+    }
+}
 
 /// Names and colours of the components of a gap, with their units.
 const GAP_SERIES: [(&str, Role); 4] = [
@@ -11,55 +53,30 @@ const GAP_SERIES: [(&str, Role); 4] = [
     ("θ\u{307} [rad/s]", Role::Member(0)),
 ];
 
-/// Sizes of the difference of rolled-out and predicted state at the end of the horizon. A gap
-/// below the accuracy of the numbers is drawn at that.
-pub fn gap_panel(time: &[f64], gap: &[[f64; 4]]) -> Panel {
+/// Sizes on a logarithmic scale; what is below the accuracy of the numbers is drawn at that.
+fn gap_panel(run: &PlansRun<'_>) -> Panel {
     let series = GAP_SERIES.iter().enumerate().map(|(i, (label, role))| {
-        let sizes: Vec<f64> = gap
-            .iter()
-            .map(|gap| gap[i].abs().max(f64::EPSILON))
-            .collect();
-        Series::new(label, time, &sizes, Style::Line(Dash::Solid), *role)
+        let sizes = run.gap.iter().map(|gap| gap[i].abs().max(f64::EPSILON));
+        let sizes: Vec<f64> = sizes.collect();
+        Series::new(label, run.time, &sizes, Style::Line(Dash::Solid), *role)
     });
-    let mut panel = Panel::new(
-        TIME_LABEL,
-        "|rollout – prediction| at the end",
-        series.collect(),
-    );
+    let label = "|rollout – prediction| at the end";
+    let mut panel = Panel::new(TIME_LABEL, label, series.collect());
     panel.y_scale = Scale::Log;
     panel
 }
 
-/// The artificial set point with the wanted one, rad, and the decision of each sample, 1 to 5.
-pub fn guard_panels(
-    time: &[f64],
-    set_points: &[f64],
-    wanted: &[f64],
-    decisions: &[f64],
-) -> [Panel; 2] {
+fn guard_panels(time: &[f64], guard: &GuardRun<'_>) -> [Panel; 2] {
     let steps = |label: &str, values: &[f64], dash: Dash, role: Role| {
         Series::new(label, time, values, Style::Steps(dash), role)
     };
-    let aims = Panel::new(
-        TIME_LABEL,
-        "set point [rad]",
-        vec![
-            steps("artificial", set_points, Dash::Solid, Role::Lpv),
-            steps(REFERENCE_LABEL, wanted, Dash::Dashed, Role::Reference),
-        ],
-    );
+    let aims = vec![
+        steps("artificial", guard.set_points, Dash::Solid, Role::Nonlinear),
+        steps(REFERENCE_LABEL, guard.wanted, Dash::Dashed, Role::Reference),
+    ];
     let label = "1 new plan, 2 candidate, 3 terminal law, 4 soft bounds, 5 saturated LQR";
-    let mut backed = Panel::new(
-        TIME_LABEL,
-        "backed by",
-        vec![Series::new(
-            label,
-            time,
-            decisions,
-            Style::Markers,
-            Role::Nonlinear,
-        )],
-    );
+    let backed = steps(label, guard.decisions, Dash::Solid, Role::Member(1));
+    let mut backed = Panel::new(TIME_LABEL, "backed by", vec![backed]);
     backed.y_range = Some((0.5, 5.5));
-    [aims, backed]
+    [Panel::new(TIME_LABEL, "set point [rad]", aims), backed]
 }
