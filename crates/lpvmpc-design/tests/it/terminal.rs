@@ -7,8 +7,8 @@
 use lpvmpc::{LpvModel, Rk4};
 use lpvmpc_design::{
     AnalyticModel, Arithmetic, Certificate, CertificateProblem, CertifyError, ClaimError,
-    MOST_BOXES, SchedulingGrid, SynthesisError, TerminalProblem, certify_terminal, lqr_discrete,
-    synthesize_terminal, zero_order_hold,
+    MOST_BOXES, SchedulingGrid, SynthesisError, TerminalIngredients, TerminalProblem,
+    certify_terminal, lqr_discrete, synthesize_terminal, zero_order_hold,
 };
 use nalgebra::{DMatrix, Matrix1, Matrix1x2, Matrix2, Vector1, Vector2};
 use proptest::prelude::*;
@@ -69,6 +69,14 @@ fn one_grid_point_gives_the_riccati_solution() {
         let q = DMatrix::from_diagonal(&nalgebra::dvector![10.0, 1.0]) / kept;
         let r = nalgebra::dmatrix![0.1] / kept;
         let lqr = lqr_discrete(&(a / kept.sqrt()), &(b / kept.sqrt()), &q, &r).unwrap();
+        // No set is larger than that of the Riccati solution, and the gap says how much is missing.
+        let p = Matrix2::from_column_slice(lqr.p.as_slice());
+        let largest = TerminalIngredients { p, ..found }.log_det();
+        let missing = largest - found.log_det();
+        assert!(
+            missing > -1e-9 && missing <= found.log_det_gap,
+            "{missing:e}"
+        );
         for i in 0..4 {
             let (p, expected) = (found.p.as_slice()[i], lqr.p.as_slice()[i]);
             // log det is flat at its maximum: a gap of 1e-4 leaves sqrt(1e-4) in the entries.
