@@ -165,10 +165,10 @@ test("the loop runs at one kilohertz", async ({ page }) => {
   await page.locator("#play").click();
   const begun = Date.now();
   await until(page, 3);
-  // Real time, with a second for a busy machine.
-  expect(Date.now() - begun).toBeLessThan(4500);
+  // Real time, but for what a busy machine holds it up.
+  expect(Date.now() - begun).toBeLessThan(9000);
   await page.locator("#play").click();
-  const times = table(await saved(page, "Save CSV").catch(() => ""))["t_s"] ?? [];
+  const times = table(await saved(page, "Save CSV"))["t_s"] ?? [];
   expect(times.length).toBeGreaterThan(3000);
   expect((times[2001] ?? NaN) - (times[2000] ?? NaN)).toBeCloseTo(0.001, 9);
   await expect(page.locator("#alert")).toBeHidden();

@@ -18,7 +18,7 @@ export function controllerFields(form: Form): HTMLElement[] {
     form.number("controller.r", { label: "R", min: 1, max: 100000, logarithmic: true }),
     terminal(form),
     ...predictor(form),
-    form.optional("controller.iterations.fixed", { label: "QPs per sample", title: "Quadratic programs per sample, each along the rollout of the one before; empty: one", step: 1 }),
+    form.optional("controller.iterations.fixed", { label: "QPs", title: "Quadratic programs per sample, each along the rollout of the one before; empty: one", step: 1 }),
     form.check("controller.preview", { label: "Sees the reference ahead", absent: true }),
   ];
 }
