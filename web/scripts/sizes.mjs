@@ -1,24 +1,32 @@
-// What a first visit loads, compressed with gzip; fails when it grows. The goal, 150 kB for the
-// module and 400 kB in all, is not met.
+// What a first visit loads, compressed; fails when it is more than the limits. The limits are for
+// brotli, which most web hosts send; gzip is shown beside it. The goal for the module, 150 kB, is
+// missed by 7 kB: compiled for size it would be met, and a step would take two to three times as long.
 import { readdirSync, readFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
-import { gzipSync } from "node:zlib";
+import { brotliCompressSync, gzipSync } from "node:zlib";
 
-const LIMITS_KB = { wasm: 270, all: 470 };
+const LIMITS_KB = { wasm: 160, all: 400 };
 
 const dist = join(dirname(dirname(fileURLToPath(import.meta.url))), "dist");
 const files = readdirSync(dist, { recursive: true, withFileTypes: true }).filter((f) => f.isFile());
 const sizes = files.map((file) => {
-  const bytes = gzipSync(readFileSync(join(file.parentPath, file.name)), { level: 9 }).length;
-  return { name: file.name, kB: bytes / 1000 };
+  const content = readFileSync(join(file.parentPath, file.name));
+  return {
+    name: file.name,
+    brotli: brotliCompressSync(content).length / 1000,
+    gzip: gzipSync(content, { level: 9 }).length / 1000,
+  };
 });
-sizes.push({ name: "all", kB: sizes.reduce((sum, { kB }) => sum + kB, 0) });
+const sum = (kind) => sizes.reduce((total, size) => total + size[kind], 0);
+sizes.push({ name: "all", brotli: sum("brotli"), gzip: sum("gzip") });
+const shown = (kB) => `${kB.toFixed(1).padStart(7)} kB`;
+console.log("     brotli        gzip");
 let over = false;
-for (const { name, kB } of sizes) {
+for (const { name, brotli, gzip } of sizes) {
   const limit = name.endsWith(".wasm") ? LIMITS_KB.wasm : name === "all" ? LIMITS_KB.all : Infinity;
-  const exceeded = kB > limit;
+  const exceeded = brotli > limit;
   over ||= exceeded;
-  console.log(`${kB.toFixed(1).padStart(7)} kB  ${name}${exceeded ? `  (above ${limit} kB)` : ""}`);
+  console.log(`${shown(brotli)}  ${shown(gzip)}  ${name}${exceeded ? `  (above ${limit} kB)` : ""}`);
 }
 process.exitCode = over ? 1 : 0;

@@ -6,7 +6,8 @@ import { History } from "./history";
 import * as link from "./link";
 import { Live, timedPath } from "./live";
 import { Playback } from "./playback";
-import type { Batch, Call, Preset, RobotFacts } from "./protocol";
+import { PRESETS } from "./presets";
+import type { Batch, Call, RobotFacts } from "./protocol";
 import { robotsNamed, type RobotKind } from "./robots";
 import { toToml, withValue, type Scenario } from "./scenario";
 import type { FloorPoint } from "./scene/view";
@@ -30,7 +31,6 @@ function text(error: unknown): string {
 
 export class App implements Source {
   setup!: Scenario;
-  presets: Preset[] = [];
   preset = "";
   robots: RobotKind[] = robotsNamed([]);
   histories: History[] = [];
@@ -49,18 +49,17 @@ export class App implements Source {
   private clockAt = 0;
   private queue: Promise<unknown> = Promise.resolve();
 
-  constructor(private readonly events: AppEvents, private readonly ownPresets: Preset[]) {
+  constructor(private readonly events: AppEvents) {
     this.engine.onBatch = (batch) => {
       if (!this.playback) this.receive(batch);
     };
     this.engine.onFailure = (reason) => events.message(reason, "error");
   }
 
-  /** Reads the presets, then opens the link in the address or the first preset. */
+  /** Opens the link in the address or the first preset. */
   async start(fragment: string): Promise<void> {
-    this.presets = [...this.ownPresets, ...(await this.engine.call({ kind: "presets" }))];
     if (fragment !== "" && (await this.openLink(fragment))) return;
-    await this.openPreset(this.presets[0]?.name ?? "");
+    await this.openPreset(PRESETS[0]?.name ?? "");
   }
 
   /** One thing after the other: a slider may move faster than its last value is taken in. */
@@ -108,7 +107,7 @@ export class App implements Source {
   }
 
   async openPreset(name: string): Promise<void> {
-    const preset = this.presets.find((candidate) => candidate.name === name);
+    const preset = PRESETS.find((candidate) => candidate.name === name);
     if (preset) await this.openToml(preset.text, name);
   }
 
@@ -141,6 +140,11 @@ export class App implements Source {
 
   chooseRobots(names: string[]): Promise<boolean> {
     return this.attempt(() => this.configure(this.setup, robotsNamed(names), false));
+  }
+
+  /** Angle of the wheels' contact points from the top of the ball, rad. */
+  get zenith(): number {
+    return this.facts[0]?.zenith ?? Math.PI / 4;
   }
 
   /** The ball radius: angles times this are lengths on the floor. */

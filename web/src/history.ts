@@ -22,6 +22,8 @@ export class History {
   predictions: Float64Array[] = [];
   /** Per plane: earlier predictions. */
   fans: Prediction[][] = [];
+  /** Per plane: the active bounds of the last plan, in words. */
+  activeBounds: string[] = [];
   status = "";
   statusFrom: { sample: number; text: string }[] = [];
   ending: string | undefined;
@@ -59,6 +61,7 @@ export class History {
     this.length = Math.min(this.total, CAPACITY);
     this.now = batch.now;
     this.predictions = batch.prediction;
+    this.activeBounds = batch.activeBounds;
     this.ending = batch.ending;
     this.down = batch.down;
     if (count > 0) this.keepPrediction();

@@ -1,55 +1,29 @@
 // Puts the page together.
 
 import "./style.css";
-import drive from "../presets/drive.toml?raw";
 import { App } from "./app";
+import { connectControls } from "./controls";
 import { choose, save } from "./files";
-import { connectKeys } from "./keys";
-import { poseAt, predictedPoses, type Pose } from "./motion";
+import { CAPACITY } from "./history";
+import { MessageBox } from "./message";
+import { byId } from "./page";
 import { Panel } from "./panel/panel";
-import { Plots } from "./plots";
-import { ROW } from "./protocol";
+import { Pictures } from "./pictures";
+import { Plots } from "./plots/plots";
+import { PRESETS, titleOf } from "./presets";
+import { colourOf } from "./robots";
 import { FlatView } from "./scene/flat";
-import { Pointer, type Tool } from "./scene/pointer";
+import { Pointer } from "./scene/pointer";
 import { SolidView } from "./scene/solid";
-import { readTheme, type FloorPoint, type RobotPicture, type View } from "./scene/view";
+import { readTheme, type FloorPoint, type View } from "./scene/view";
 import { StatusList } from "./status";
 
 /** Time between two updates of plots and words, ms. */
 const SLOW = 60;
-/** Lanes of robots side by side, m. */
-const LANE = 0.6;
-/** How far back the ball's way is drawn, s. */
-const TRAIL = 25;
-/** Points of a trail. */
-const TRAIL_POINTS = 700;
 /** Tilt rate per length of the dragged arrow, rad/s per m. */
 const PUSH_PER_METRE = 10;
-const SPEEDS: [number, string][] = [[1, "1\u00d7"], [0.5, "\u00bd\u00d7"], [0.25, "\u00bc\u00d7"], [0.1, "0.1\u00d7"], [0.02, "0.02\u00d7"]];
-const HINTS: Record<Tool, string> = {
-  target: "Click or drag on the floor: the robot goes there. Drag the robot: a push. Right button or two fingers: camera.",
-  path: "Draw on the floor: the robot follows the line.",
-  push: "Drag: the arrow is the push.",
-  camera: "Drag to turn, wheel or two fingers to zoom.",
-};
 
-function byId<T extends HTMLElement>(id: string): T {
-  const found = document.getElementById(id);
-  if (!found) throw new Error(`the page has no #${id}`);
-  return found as T;
-}
-
-const messageBox = byId("message");
-let messageTimer = 0;
-
-function message(text: string, kind: "error" | "info"): void {
-  messageBox.textContent = text;
-  messageBox.className = `message ${kind}`;
-  messageBox.hidden = false;
-  clearTimeout(messageTimer);
-  messageTimer = window.setTimeout(() => (messageBox.hidden = true), kind === "error" ? 12_000 : 3500);
-}
-
+const messages = new MessageBox(byId("message"));
 const host = byId("scene");
 
 function makeView(): View {
@@ -62,7 +36,7 @@ function makeView(): View {
       host.replaceChildren();
     }
   }
-  message("No WebGL here: the floor is shown from above.", "info");
+  messages.show("No WebGL here: the floor is shown from above.", "info");
   return new FlatView(host, theme);
 }
 
@@ -70,25 +44,10 @@ const view = makeView();
 document.body.classList.add(`view-${view.kind}`);
 const plots = new Plots(byId("plots"));
 const status = new StatusList(byId("status"));
-const playButton = byId<HTMLButtonElement>("play");
-const alertBox = byId("alert");
+const app = new App({ message: (text, kind) => messages.show(text, kind), setup: setupShown, restarted, running: runningShown });
+const pictures = new Pictures(app);
 let panel: Panel | undefined;
-let trails: Float32Array[] = [];
-let references: Float32Array[] = [];
-const kept = { bounds: "", shape: "" };
-
-const colourOf = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-
-function restarted(): void {
-  const shown = app.histories.map((history, i) => ({ history, colour: colourOf(app.robots[i]?.colour ?? "--robot-lpv") }));
-  plots.setRobots(shown, app.setup.bounds);
-  byId("planes").hidden = app.planes === 1;
-  trails = [];
-  alertBox.hidden = true;
-  const legend = byId("legend");
-  legend.replaceChildren(...app.robots.map(({ label, colour }) => swatch(label, `dot ${colour.slice(2)}`)));
-  legend.append(swatch("reference", "dash reference"), swatch("plan", "dash plan"), swatch("outside the bounds", "box outside"));
-}
+let shownShape = "";
 
 function swatch(text: string, className: string): HTMLElement {
   const made = document.createElement("span");
@@ -97,117 +56,57 @@ function swatch(text: string, className: string): HTMLElement {
   return made;
 }
 
+function restarted(): void {
+  plots.setRobots(app.histories.map((history, i) => ({ history, colour: colourOf(app.robots[i]) })), app.setup.bounds);
+  byId("planes").hidden = app.planes === 1;
+  pictures.forget();
+  byId("alert").hidden = true;
+  const legend = byId("legend");
+  legend.replaceChildren(...app.robots.map(({ label, colour }) => swatch(label, `dot ${colour.slice(2)}`)));
+  legend.append(swatch("reference", "dash reference"), swatch("plan", "dash plan"), swatch("outside the bounds", "box outside"));
+}
+
 function setupShown(): void {
   const { setup } = app;
   byId("title").textContent = app.playback ? `recorded: ${app.playbackName}` : setup.title;
   panel?.show(setup, app.preset, app.robots.map(({ name }) => name));
   plots.setBounds(setup.bounds);
-  const p = setup.parameters;
-  const shape = {
-    ballRadius: p.ball_radius_m,
-    wheelRadius: p.wheel_radius_m,
-    zenith: (p.zenith_angle_deg * Math.PI) / 180,
-    centreOfMass: p.centre_of_mass_m,
-  };
+  const { ball_radius_m: ballRadius, wheel_radius_m: wheelRadius, centre_of_mass_m: centreOfMass } = setup.parameters;
+  const shape = { ballRadius, wheelRadius, centreOfMass, zenith: app.zenith };
   const key = JSON.stringify(shape);
-  if (key !== kept.shape) {
-    kept.shape = key;
+  if (key !== shownShape) {
+    shownShape = key;
     view.setShape(shape);
   }
 }
 
 function runningShown(): void {
-  playButton.textContent = app.isRunning ? "Pause" : "Run";
-  playButton.setAttribute("aria-pressed", String(app.isRunning));
-  if (app.isComplete && !app.isRunning) message(app.playback ? "End of the recording." : "End of the scenario. Run goes on from here, Reset starts again.", "info");
+  const play = byId("play");
+  play.textContent = app.isRunning ? "Pause" : "Run";
+  play.setAttribute("aria-pressed", String(app.isRunning));
+  if (app.isComplete && !app.isRunning) {
+    messages.show(app.playback ? "End of the recording." : "End of the scenario. Run goes on from here, Reset starts again.", "info");
+  }
 }
 
-const app = new App(
-  { message, setup: setupShown, restarted, running: runningShown },
-  [{ name: "drive", text: drive }],
-);
-
-function lane(index: number): number {
-  return (index - (app.histories.length - 1) / 2) * LANE;
+function sendTo({ x, y }: FloorPoint): void {
+  app.target({ x, y: app.planes === 2 ? y : 0 });
 }
 
-function radius(): number {
-  return app.setup.parameters.ball_radius_m;
-}
-
-/** The way on the floor for an angle of the ball, to the millimetre. */
-function metres(phi: number): number {
-  return Math.round(phi * radius() * 1000) / 1000;
-}
-
-function robotPoint(): FloorPoint {
-  const history = app.histories[0];
-  if (!history) return { x: 0, y: 0 };
-  const { x, y } = poseAt(history, app.time(), radius());
-  return { x, y: y + lane(0) };
-}
-
-function sendTo(point: FloorPoint): void {
-  app.target({ x: point.x, y: app.planes === 2 ? point.y : 0 });
+/** A point of the floor in the first robot's lane. */
+function inLane({ x, y }: FloorPoint): FloorPoint {
+  return { x, y: app.planes === 2 ? y - pictures.lane(0) : 0 };
 }
 
 const pointer = new Pointer(view, {
-  target: ({ x, y }) => sendTo({ x, y: y - lane(0) }),
-  path: (points) => {
-    const flat = points.map(({ x, y }) => ({ x, y: app.planes === 2 ? y - lane(0) : 0 }));
-    const { x, y } = robotPoint();
-    app.path(flat, { x, y: app.planes === 2 ? y - lane(0) : 0 });
-  },
+  target: (point) => app.target(inLane(point)),
+  path: (points) => app.path(points.map(inLane), inLane(pictures.firstRobot())),
   push: ({ x, y }) => app.push({ x: x * PUSH_PER_METRE, y: y * PUSH_PER_METRE }),
-  robot: robotPoint,
+  robot: () => pictures.firstRobot(),
 });
 
-/** The ball's way and the references, thinned for drawing. */
-function updateLines(time: number): void {
-  const r = radius();
-  trails = app.histories.map((history) => {
-    const from = history.indexAt(time - TRAIL);
-    const until = history.indexAt(time);
-    const stride = Math.max(Math.ceil((until - from) / TRAIL_POINTS), 1);
-    const points: number[] = [];
-    for (let i = from; i < until; i += stride) {
-      points.push(history.at(i, 0, ROW.phi) * r, history.planes === 2 ? history.at(i, 1, ROW.phi) * r : 0);
-    }
-    return Float32Array.from(points);
-  });
-  references = app.references.map(([x, y]) => {
-    const points = new Float32Array(2 * (x?.length ?? 0));
-    for (let i = 0; i < (x?.length ?? 0); i++) {
-      points[2 * i] = (x?.[i] ?? 0) * r;
-      points[2 * i + 1] = (y?.[i] ?? 0) * r;
-    }
-    return points;
-  });
-}
-
-function pictures(time: number): { robots: RobotPicture[]; poses: Pose[] } {
-  const r = radius();
-  const poses = app.histories.map((history) => poseAt(history, time, r));
-  const robots = app.histories.map((history, i): RobotPicture => {
-    const pose = poses[i] as Pose;
-    const trail = trails[i] ?? new Float32Array(0);
-    const joined = new Float32Array(trail.length + 2);
-    joined.set(trail);
-    joined.set([pose.x, pose.y], trail.length);
-    return {
-      pose,
-      prediction: history.ending === undefined ? predictedPoses(history, r) : [],
-      trail: joined,
-      reference: references[i] ?? new Float32Array(0),
-      goal: { x: history.nowAt(0, 5) * r, y: history.planes === 2 ? history.nowAt(1, 5) * r : 0 },
-      lane: lane(i),
-      colour: colourOf(app.robots[i]?.colour ?? "--robot-lpv"),
-    };
-  });
-  return { robots, poses };
-}
-
-function showWords(): void {
+/** Statuses, reasons of falls, target, clock. */
+function showWords(time: number): void {
   status.show(app.histories.map((history, i) => ({
     label: app.robots[i]?.label ?? "",
     colour: app.robots[i]?.colour ?? "--robot-lpv",
@@ -215,10 +114,13 @@ function showWords(): void {
   })));
   const fallen = app.histories.flatMap(({ ending }, i) => (ending === undefined ? [] : [`${app.robots[i]?.label}: ${ending}`]));
   const text = fallen.join("\n");
-  if (alertBox.textContent !== text) alertBox.textContent = text;
-  alertBox.hidden = text === "";
-  const target = app.histories[0];
-  if (target) panel?.showTarget(metres(target.nowAt(0, 5)), target.planes === 2 ? metres(target.nowAt(1, 5)) : 0);
+  const alert = byId("alert");
+  if (alert.textContent !== text) alert.textContent = text;
+  alert.hidden = text === "";
+  const millimetres = (length: number) => Math.round(length * 1000) / 1000;
+  const target = pictures.firstTarget();
+  panel?.showTarget(millimetres(target.x), millimetres(target.y));
+  byId("clock").textContent = `${time.toFixed(2)} s`;
 }
 
 let lastSlow = 0;
@@ -229,19 +131,11 @@ function frame(now: number): void {
   const time = app.time();
   if (now - lastSlow > SLOW) {
     lastSlow = now;
-    updateLines(time);
+    pictures.updateLines(time);
     plots.draw(time);
-    showWords();
-    byId("clock").textContent = `${time.toFixed(2)} s`;
+    showWords(time);
   }
-  const { robots, poses } = pictures(time);
-  const mean = (value: (pose: Pose) => number) => poses.reduce((sum, pose) => sum + value(pose), 0) / poses.length;
-  view.draw({
-    robots,
-    stroke: pointer.stroke,
-    strokeKind: pointer.strokeKind,
-    follow: { x: mean(({ x }) => x), y: mean(({ y }) => y) },
-  });
+  view.draw({ ...pictures.at(time), stroke: pointer.stroke, strokeKind: pointer.strokeKind });
 }
 
 async function openFiles(files: File[]): Promise<void> {
@@ -250,7 +144,14 @@ async function openFiles(files: File[]): Promise<void> {
   const csv = read.filter(({ name }) => name.toLowerCase().endsWith(".csv"));
   if (toml) await app.openToml(toml.text, "");
   else if (csv.length > 0) app.play(csv);
-  else if (read.length > 0) message(`${read[0]?.name}: this is neither a set-up (.toml) nor a recorded run (.csv)`, "error");
+  else if (read.length > 0) messages.show(`${read[0]?.name}: this is neither a set-up (.toml) nor a recorded run (.csv)`, "error");
+}
+
+function saveCsv(): void {
+  for (const { name, text } of app.csv()) save(name, text, "text/csv");
+  if (app.histories.some(({ total, length }) => total > length)) {
+    messages.show(`The file holds the last ${CAPACITY} samples; what was before them is not kept.`, "info");
+  }
 }
 
 async function copyLink(): Promise<void> {
@@ -259,52 +160,10 @@ async function copyLink(): Promise<void> {
   history.replaceState(null, "", address);
   try {
     await navigator.clipboard.writeText(address.href);
-    message("The link is in the clipboard and in the address bar.", "info");
+    messages.show("The link is in the clipboard and in the address bar.", "info");
   } catch {
-    message("The link is in the address bar.", "info");
+    messages.show("The link is in the address bar.", "info");
   }
-}
-
-function connectControls(): void {
-  playButton.addEventListener("click", () => app.run(!app.isRunning));
-  byId("step").addEventListener("click", () => app.step());
-  byId("reset").addEventListener("click", () => app.reset());
-  const speed = byId<HTMLSelectElement>("speed");
-  for (const [value, text] of SPEEDS) speed.add(new Option(text, String(value)));
-  speed.addEventListener("change", () => app.run(app.isRunning, Number(speed.value)));
-  for (const input of document.querySelectorAll<HTMLInputElement>("input[name=tool]")) {
-    input.addEventListener("change", () => {
-      pointer.tool = input.value as Tool;
-      view.setCameraTool(input.value === "camera");
-      byId("hint").textContent = HINTS[pointer.tool];
-    });
-  }
-  for (const input of document.querySelectorAll<HTMLInputElement>("input[name=plane]")) {
-    input.addEventListener("change", () => plots.setPlane(Number(input.value)));
-  }
-  byId("hint").textContent = HINTS.target;
-  const toggle = byId("panel-toggle");
-  toggle.addEventListener("click", () => {
-    const hidden = document.body.classList.toggle("no-panel");
-    toggle.setAttribute("aria-expanded", String(!hidden));
-    resized();
-  });
-  window.addEventListener("dragover", (event) => event.preventDefault());
-  window.addEventListener("drop", (event) => {
-    event.preventDefault();
-    void openFiles([...(event.dataTransfer?.files ?? [])]);
-  });
-  window.addEventListener("hashchange", () => void app.openLink(location.hash.slice(1)));
-  connectKeys(host, {
-    toggle: () => app.run(!app.isRunning),
-    step: () => app.step(),
-    reset: () => app.reset(),
-    moveTarget: (dx, dy) => {
-      const first = app.histories[0];
-      if (first) sendTo({ x: first.nowAt(0, 5) * radius() + dx, y: (first.planes === 2 ? first.nowAt(1, 5) * radius() : 0) + dy });
-    },
-    push: (x, y) => app.push({ x, y }),
-  });
 }
 
 function resized(): void {
@@ -312,16 +171,8 @@ function resized(): void {
   plots.resize();
 }
 
-async function start(): Promise<void> {
-  connectControls();
-  new ResizeObserver(resized).observe(host);
-  new ResizeObserver(resized).observe(byId("plots"));
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-    view.setTheme(readTheme());
-    restarted();
-  });
-  await app.start(location.hash.slice(1));
-  panel = new Panel(byId("panel"), app.presets.map(({ name, text }) => [name, titleOf(text, name)]), {
+function makePanel(): Panel {
+  return new Panel(byId("panel"), PRESETS.map((preset) => [preset.name, titleOf(preset)]), {
     preset: (name) => void app.openPreset(name),
     change: (path, value) => void app.change(path, value),
     robots: (names) => void app.chooseRobots(names),
@@ -329,22 +180,30 @@ async function start(): Promise<void> {
     push: (x, y) => app.push({ x, y }),
     openFiles: () => void choose(".toml,.csv", true).then(openFiles),
     saveToml: () => save("scenario.toml", app.toml(), "application/toml"),
-    saveCsv: () => {
-      for (const { name, text } of app.csv()) save(name, text, "text/csv");
-    },
+    saveCsv,
     copyLink: () => void copyLink(),
   });
-  panel.remember(app.setup);
+}
+
+async function start(): Promise<void> {
+  const moveTarget = (dx: number, dy: number) => {
+    const { x, y } = pictures.firstTarget();
+    sendTo({ x: x + dx, y: y + dy });
+  };
+  connectControls({ app, view, plots, pointer, resized, moveTarget, openFiles: (files) => void openFiles(files) });
+  new ResizeObserver(resized).observe(host);
+  new ResizeObserver(resized).observe(byId("plots"));
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    view.setTheme(readTheme());
+    restarted();
+  });
+  await app.start(location.hash.slice(1));
+  panel = makePanel();
   setupShown();
   runningShown();
   document.documentElement.dataset["ready"] = "true";
   requestAnimationFrame(frame);
 }
 
-/** The title in a scenario file, for the list. */
-function titleOf(toml: string, name: string): string {
-  return /^title\s*=\s*"(.*)"/m.exec(toml)?.[1] ?? name;
-}
-
 // A browser whose controller cannot be loaded says so in the page.
-start().catch((error: unknown) => message(String(error), "error"));
+start().catch((error: unknown) => messages.show(String(error), "error"));

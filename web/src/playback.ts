@@ -94,6 +94,7 @@ export class Playback implements Source {
           ),
           now: this.now(),
           prediction: this.planes.map(() => new Float64Array(0)),
+          activeBounds: [],
           down: false,
           ...(complete && ending !== undefined ? { ending } : {}),
         },

@@ -2,12 +2,6 @@
 
 import type { Scenario } from "./scenario";
 
-/** A preset: its name and its TOML text. */
-export interface Preset {
-  name: string;
-  text: string;
-}
-
 /** One robot of a run. */
 export interface RobotSetup {
   label: string;
@@ -28,7 +22,6 @@ export interface PhiPair {
 
 /** Calls that are answered with a value or an error. */
 export type Call =
-  | { kind: "presets" }
   | { kind: "parse"; toml: string }
   | { kind: "configure"; robots: RobotSetup[]; keep: boolean }
   | { kind: "step" }
@@ -38,7 +31,6 @@ export type Call =
 
 /** What comes back from each call. */
 export interface Answers {
-  presets: Preset[];
   parse: Scenario;
   configure: RobotFacts[];
   step: null;
@@ -54,6 +46,8 @@ export interface RobotFacts {
   sampling_time: number;
   horizon: number;
   samples: number;
+  /** Angle of the wheels' contact points from the top of the ball, rad. */
+  zenith: number;
 }
 
 export type ToWorker =
@@ -86,6 +80,8 @@ export interface RobotBatch {
   statuses: { from: number; text: string }[];
   /** The state now, per plane: time, phi, theta, phi_dot, theta_dot, phi_ref. */
   now: Float64Array;
+  /** Per plane: the bounds that are active in the last plan, in words. */
+  activeBounds: string[];
   /** Per plane: the states that the last plan leads through, four per sample. */
   prediction: Float64Array[];
   /** Why it stopped, in words; absent while it runs. */

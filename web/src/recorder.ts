@@ -33,6 +33,9 @@ export class Recorder {
       prediction: Array.from({ length: simulation.planes() }, (_, plane) =>
         simulation.prediction(plane),
       ),
+      activeBounds: Array.from({ length: simulation.planes() }, (_, plane) =>
+        simulation.active_bounds(plane),
+      ),
       down: simulation.is_down(),
       ...(ending === undefined ? {} : { ending }),
     };

@@ -48,3 +48,9 @@ export function robotsNamed(names: string[]): RobotKind[] {
   const chosen = ROBOTS.filter(({ name }) => names.includes(name));
   return chosen.length > 0 ? chosen : ROBOTS.slice(0, 1);
 }
+
+/** A robot's colour in the present theme. */
+export function colourOf(robot: RobotKind | undefined): string {
+  const name = (robot ?? ROBOTS[0])?.colour ?? "";
+  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+}

@@ -13,7 +13,7 @@ export interface Parameters {
   ball_radius_m: number;
   wheel_radius_m: number;
   gravity_m_s2: number;
-  zenith_angle_deg: number;
+  zenith_angle_deg?: number;
 }
 
 export interface Point {
@@ -40,15 +40,15 @@ export interface Scenario {
     horizon: number;
     q: [number, number, number, number];
     r: number;
-    terminal: Terminal;
+    terminal?: Terminal;
     predictor?: string | { [kind: string]: unknown };
     [key: string]: unknown;
   };
   bounds: {
-    phi_rad: Range;
-    theta_rad: Range;
-    phi_dot_rad_s: Range;
-    theta_dot_rad_s: Range;
+    phi_rad?: Range;
+    theta_rad?: Range;
+    phi_dot_rad_s?: Range;
+    theta_dot_rad_s?: Range;
     torque_nm: Range;
   };
   reference: Reference;

@@ -25,12 +25,18 @@ export function medianStep(history: History): number {
   return median(values);
 }
 
-function activeBounds(history: History): number {
+/** How many bounds are active in the last plans, and which. */
+function activeBounds(history: History): string {
   let total = 0;
   for (let plane = 0; plane < history.planes; plane++) {
     total += history.length > 0 ? history.at(history.length - 1, plane, ROW.activeBounds) : 0;
   }
-  return total;
+  if (!(total > 0)) return "";
+  const named = history.activeBounds.flatMap((text, plane) =>
+    text === "" ? [] : [history.planes === 1 ? text : `${"xy"[plane]}: ${text}`],
+  );
+  const count = `, ${total} active bound${total === 1 ? "" : "s"}`;
+  return named.length > 0 ? `${count} (${named.join("; ")})` : count;
 }
 
 export interface Line {
@@ -51,9 +57,7 @@ export class StatusList {
       if (!name || !words || !time) continue;
       name.textContent = label;
       name.className = `dot ${colour.slice(2)}`;
-      const active = activeBounds(history);
-      const bounds = active > 0 ? `, ${active} active bound${active === 1 ? "" : "s"}` : "";
-      words.textContent = (history.status || "ready") + bounds;
+      words.textContent = (history.status || "ready") + activeBounds(history);
       const step = medianStep(history);
       time.textContent = Number.isFinite(step) ? `${step.toFixed(1)} \u00b5s per step (median)` : "";
       line.classList.toggle("bad", history.status !== "" && history.status !== "solved");

@@ -1,7 +1,8 @@
 // The control loop, beside the page: samples at their own rate, whatever the screen does.
 
-import init, { Simulation, presets, scenario } from "./generated/ballbot_web.js";
+import init, { Simulation, check } from "./generated/ballbot_web.js";
 import wasmUrl from "./generated/ballbot_web_bg.wasm?url";
+import builtin from "../../crates/ballbot-scenario/src/builtin/terminal-certificate.json";
 import { parse } from "smol-toml";
 import type { Batch, Call, FromWorker, RobotBatch, RobotFacts, RobotSetup, ToWorker } from "./protocol";
 import { Recorder } from "./recorder";
@@ -20,6 +21,8 @@ const TICK = 4;
 const BATCH = 15;
 /** Points of a reference on the floor. */
 const REFERENCE_POINTS = 400;
+
+const { certificate } = builtin;
 
 let robots: Robot[] = [];
 let running = false;
@@ -108,8 +111,8 @@ function configure(setups: RobotSetup[], keep: boolean): RobotFacts[] {
     for (const [index, { label, setup }] of setups.entries()) {
       const before = keep ? robots[index] : undefined;
       const simulation = before
-        ? before.simulation.reconfigured(setup)
-        : new Simulation(setup);
+        ? before.simulation.reconfigured(setup, certificate)
+        : new Simulation(setup, certificate);
       next.push({ label, simulation, recorder: before?.recorder ?? new Recorder() });
     }
   } catch (error) {
@@ -133,15 +136,17 @@ function configure(setups: RobotSetup[], keep: boolean): RobotFacts[] {
     sampling_time: simulation.sampling_time(),
     horizon: simulation.horizon(),
     samples: simulation.samples(),
+    zenith: simulation.zenith_angle(),
   }));
 }
 
 function answer(call: Call): unknown {
   switch (call.kind) {
-    case "presets":
-      return presets().map(({ name, text }) => ({ name, text }));
-    case "parse":
-      return scenario(parse(call.toml));
+    case "parse": {
+      const setup = parse(call.toml);
+      check(setup, certificate);
+      return setup;
+    }
     case "configure":
       return configure(call.robots, call.keep);
     case "step":

@@ -17,7 +17,9 @@ const NUMBERS: [section: string, label: string, typed: string, key: string, valu
   ["World", "b3 factor", "1.02", "b3_factor", 1.02],
   ["World", "b4 factor", "0.8", "b4_factor", 0.8],
   ["World", "l factor", "0.98", "centre_of_mass_factor", 0.98],
-  ["World", "Motor limit", "2", "limit_nm", 2],
+  ["World", "Torque limit", "2", "limit_nm", 2],
+  ["On a real robot", "Known delay", "15", "delay_s", 0.015],
+  ["Controller", "QPs", "2", "fixed", 2],
   ["World", "Seed", "7", "seed", 7],
 ];
 
@@ -35,6 +37,55 @@ test("numbers go into the set-up", async ({ page }) => {
   await page.getByLabel("Terminal", { exact: true }).selectOption("equality");
   expect(await saved(page, "Save TOML")).toContain('terminal = "equality"');
   expect(problems).toEqual([]);
+});
+
+test("predictor, estimator, moves, torque rate and motors go into the set-up", async ({ page }) => {
+  const problems = await open(page);
+  const panel = page.locator(".panel");
+  await panel.getByLabel("Predictor", { exact: true }).selectOption("exact");
+  expect(await saved(page, "Save TOML")).toContain("[controller.predictor.exact]");
+  await fill(page, "Sub-steps", "3");
+  expect(await saved(page, "Save TOML")).toMatch(/\[controller.predictor.exact\]\nsubsteps = 3/);
+  await fill(page, "Sub-steps", "");
+  expect(await saved(page, "Save TOML")).not.toContain("substeps");
+  await panel.getByLabel("Predictor", { exact: true }).selectOption("rk4");
+  await expect(panel.getByLabel("Sub-steps", { exact: true })).toHaveValue("1");
+  await panel.getByLabel("Predictor", { exact: true }).selectOption("stage_consistent");
+  await openSection(page, "On a real robot");
+  await expect(panel.getByLabel("Noise phi", { exact: true })).toBeHidden();
+  for (const label of ["Estimator (Kalman filter)", "Set points as smooth moves", "Bounded torque rate", "Motor limits known"]) {
+    await panel.getByLabel(label, { exact: true }).check();
+  }
+  await fill(page, "Noise phi", "0.002");
+  await panel.getByLabel("Finds", { exact: true }).selectOption("none");
+  await fill(page, "Ball speed", "5");
+  await fill(page, "Rate limit", "30");
+  await fill(page, "Each motor", "1.5");
+  const toml = await saved(page, "Save TOML");
+  for (const line of ["phi_noise_rad = 0.002", 'disturbances = "none"', "phi_dot_rad_s = 5", "limit_nm_s = 30", "limit_nm = 1.5"]) {
+    expect(toml).toContain(line);
+  }
+  await page.locator("#play").click();
+  await fill(page, "Target X", "0.3");
+  await until(page, 3);
+  await expect(page.locator("#alert")).toBeHidden();
+  await panel.getByLabel("Estimator (Kalman filter)", { exact: true }).uncheck();
+  expect(await saved(page, "Save TOML")).not.toContain("controller.estimator");
+  expect(problems).toEqual([]);
+});
+
+test("the guaranteed loop runs, and says where it belongs", async ({ page }) => {
+  await open(page);
+  await scenario(page, "far-setpoints");
+  await expect(page.locator(".panel").getByLabel("Terminal", { exact: true })).toHaveValue("certified");
+  await page.locator("#play").click();
+  await until(page, 3);
+  await expect(page.locator("#alert")).toBeHidden();
+  const phi = table(await saved(page, "Save CSV"))["phi_rad"] ?? [];
+  expect(phi.at(-1) ?? NaN).toBeGreaterThan(3);
+  await fill(page, "Horizon N", "25");
+  await expect(page.locator("#message")).toContainText("must be one of [20]");
+  await expect(page.getByLabel("Horizon N", { exact: true })).toHaveValue("20");
 });
 
 test("a slider does what its number does", async ({ page }) => {

@@ -2,7 +2,7 @@
 
 import { readFileSync } from "node:fs";
 import { expect, test } from "@playwright/test";
-import { fill, open, openFile, openSection, ready, saved, scenario, until } from "./page";
+import { drop, fill, open, openFile, openSection, ready, saved, scenario, until } from "./page";
 
 test("a link holds the whole set-up", async ({ page, context }) => {
   await context.grantPermissions(["clipboard-read", "clipboard-write"]);
@@ -35,7 +35,7 @@ test("a TOML file goes out and in", async ({ page }) => {
 
 test("every built-in file goes in as it stands", async ({ page }) => {
   await open(page);
-  for (const name of ["two-setpoints", "lissajous", "tight-bounds", "single-setpoint-terminal"]) {
+  for (const name of ["two-setpoints", "lissajous", "tight-bounds", "single-setpoint-terminal", "two-setpoints-linear", "far-setpoints"]) {
     const text = readFileSync(`../crates/ballbot-scenario/src/builtin/${name}.toml`, "utf8");
     await openFile(page, `${name}.toml`, text);
     await expect(page.locator("#title")).toHaveText(/^title\s*=\s*"(.*)"/m.exec(text)?.[1] ?? "");
@@ -55,6 +55,29 @@ test("a recorded run is played back", async ({ page }) => {
   expect(await saved(page, "Save CSV")).toBe(csv);
   await page.locator("#reset").click();
   await expect(page.locator("#clock")).toHaveText("0.00 s");
+});
+
+test("a recorded run of two planes is dropped on the page and played back", async ({ page }) => {
+  await open(page);
+  await scenario(page, "lissajous");
+  await page.locator("#play").click();
+  await until(page, 2);
+  await page.locator("#play").click();
+  const downloads: Promise<string>[] = [];
+  page.on("download", (download) => downloads.push(download.path().then((path) => readFileSync(path, "utf8"))));
+  await page.getByRole("button", { name: "Save CSV" }).click();
+  await expect.poll(() => downloads.length).toBe(2);
+  const [x = "", y = ""] = await Promise.all(downloads);
+  await scenario(page, "two-setpoints");
+  // In the wrong order: their names say which is which.
+  await drop(page, [["trajectory_y.csv", y], ["trajectory_x.csv", x]]);
+  await expect(page.locator("#title")).toHaveText("recorded: trajectory_x.csv, trajectory_y.csv");
+  await expect(page.locator("#message")).toContainText("End of the recording", { timeout: 30_000 });
+  await page.getByRole("button", { name: "Save CSV" }).click();
+  await expect.poll(() => downloads.length).toBe(4);
+  expect(await Promise.all(downloads.slice(2))).toEqual([x, y]);
+  await drop(page, [["notes.txt", "x"]]);
+  await expect(page.locator("#message")).toContainText("neither a set-up");
 });
 
 const BROKEN: [name: string, text: string, message: string][] = [

@@ -66,6 +66,16 @@ export async function openFile(page: Page, name: string, text: string): Promise<
   await (await chooser).setFiles({ name, mimeType: "text/plain", buffer: Buffer.from(text) });
 }
 
+/** Drops files on the page. */
+export async function drop(page: Page, files: [name: string, text: string][]): Promise<void> {
+  await page.evaluate((dropped) => {
+    const data = new DataTransfer();
+    for (const [name, text] of dropped) data.items.add(new File([text], name, { type: "text/plain" }));
+    const scene = document.getElementById("scene");
+    scene?.dispatchEvent(new DragEvent("drop", { dataTransfer: data, bubbles: true, cancelable: true }));
+  }, files);
+}
+
 export interface Table {
   [column: string]: number[];
 }

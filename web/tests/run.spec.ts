@@ -34,7 +34,7 @@ function expectSame(here: string, there: string): void {
   }
 }
 
-for (const name of ["two-setpoints", "tight-bounds"]) {
+for (const name of ["two-setpoints", "tight-bounds", "single-setpoint-terminal"]) {
   test(`${name} is the same run as in the program`, async ({ page }) => {
     const problems = await open(page);
     await scenario(page, name);
@@ -152,6 +152,29 @@ test("a drawn path is followed", async ({ page }) => {
   await expect(page.locator("#alert")).toBeHidden();
 });
 
+test("active bounds are named, with the time at which they begin", async ({ page }) => {
+  await open(page);
+  await scenario(page, "tight-bounds");
+  await page.locator("#step").click();
+  await expect(page.locator("#status")).toContainText(/\d+ active bounds? \(.*(theta|torque|phi_dot|theta_dot) (lower|upper) \d\.\d\d s ahead/);
+});
+
+test("the loop runs at one kilohertz", async ({ page }) => {
+  const problems = await open(page);
+  await fill(page, "Sampling t_s", "1");
+  await page.locator("#play").click();
+  const begun = Date.now();
+  await until(page, 3);
+  // Real time, but for what a busy machine holds it up.
+  expect(Date.now() - begun).toBeLessThan(9000);
+  await page.locator("#play").click();
+  const times = table(await saved(page, "Save CSV"))["t_s"] ?? [];
+  expect(times.length).toBeGreaterThan(3000);
+  expect((times[2001] ?? NaN) - (times[2000] ?? NaN)).toBeCloseTo(0.001, 9);
+  await expect(page.locator("#alert")).toBeHidden();
+  expect(problems).toEqual([]);
+});
+
 test("three robots run side by side", async ({ page }) => {
   const problems = await open(page);
   await scenario(page, "two-setpoints");
@@ -160,6 +183,19 @@ test("three robots run side by side", async ({ page }) => {
   await page.locator("#play").click();
   await until(page, 1.5);
   await expect(page.locator("#status > div")).toHaveCount(3);
+  await expect(page.locator("#message")).toContainText("End of the scenario", { timeout: 60_000 });
+  const runs: Promise<[string, string]>[] = [];
+  page.on("download", (download) => runs.push(download.path().then((path) => [download.suggestedFilename(), readFileSync(path, "utf8")])));
+  await page.getByRole("button", { name: "Save CSV" }).click();
+  await expect.poll(() => runs.length).toBe(3);
+  const files = Object.fromEntries(await Promise.all(runs));
+  // The first robot's run is that of the same scenario alone; the others are those of theirs.
+  const toml = await saved(page, "Save TOML");
+  expectSame(files["trajectory_lpv.csv"] ?? "", simulated(toml)("trajectory.csv"));
+  const linear = simulated(toml.replace('model = "lpv"', 'model = "linear"'));
+  expectSame(files["trajectory_linear.csv"] ?? "", linear("trajectory.csv"));
+  const lqr = table(files["trajectory_lqr.csv"] ?? "");
+  expect(largest(lqr["torque_nm"])).toBeLessThanOrEqual(1.5 + 1e-12);
   expect(problems).toEqual([]);
 });
 

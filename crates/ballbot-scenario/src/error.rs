@@ -1,6 +1,7 @@
 //! What can be wrong with a scenario, said to a person.
 
 use crate::builtin;
+use std::fmt::Display;
 use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -91,15 +92,17 @@ impl ScenarioError {
         }
     }
 
-    pub(crate) fn value(
-        key: impl Into<String>,
-        value: impl ToString,
-        expected: impl Into<String>,
-    ) -> Self {
+    /// A value that makes no sense, with what would be right.
+    pub(crate) fn value(key: impl Display, value: impl Display, expected: impl Display) -> Self {
+        Self::of(&key, &value, &expected)
+    }
+
+    /// Not generic: there are many such messages, and a browser has to load their code.
+    fn of(key: &dyn Display, value: &dyn Display, expected: &dyn Display) -> Self {
         Self::Value {
-            key: key.into(),
+            key: key.to_string(),
             value: value.to_string(),
-            expected: expected.into(),
+            expected: expected.to_string(),
         }
     }
 }

@@ -3,6 +3,8 @@
 
 use crate::certificate::TerminalCertificate;
 use crate::error::ScenarioError;
+use crate::files::Files;
+use crate::prepare::dynamic;
 use crate::schema::CertifiedTable;
 use crate::{RobotTable, builtin};
 use ballbot::Ballbot;
@@ -10,7 +12,7 @@ use lpvmpc::{
     ControllerSettings, GuardedIterations, GuardedSettings, Iterations, Predictor, TerminalSet,
     Weights,
 };
-use nalgebra::{Matrix4, SMatrix, Vector4};
+use nalgebra::{SMatrix, Vector4};
 use std::path::Path;
 
 const KEY: &str = "controller.terminal.certified";
@@ -23,33 +25,36 @@ const SEARCH: usize = 30;
 /// Price of a state bound exceeded by its width, in largest terminal costs of the set.
 const SOFT_PRICE: f64 = 1e3;
 
-impl CertifiedTable {
-    /// The certificate, as it was written. It is not proved again here: `ballbot verify` does.
-    fn read(&self, directory: &Path) -> Result<TerminalCertificate, ScenarioError> {
-        let (origin, text) = match &self.certificate {
-            None => (
-                "(built-in)".to_owned(),
-                builtin::TERMINAL_CERTIFICATE.into(),
-            ),
-            Some(file) => {
-                let path = directory.join(file);
-                let text = std::fs::read_to_string(&path);
-                let text = text.map_err(|source| ScenarioError::Read {
-                    path: path.clone(),
-                    source,
-                })?;
-                (path.display().to_string(), text)
-            }
-        };
-        let certificate = TerminalCertificate::from_json(&text);
-        certificate
-            .and_then(|read| TerminalCertificate::check_digest(&text).map(|()| read))
-            .map_err(|error| {
-                let key = format!("{KEY}.certificate");
-                ScenarioError::value(key, origin, error.to_string())
-            })
-    }
+/// A certificate, as it was written. It is not proved again here: `ballbot verify` does.
+pub(crate) fn read(
+    file: Option<&str>,
+    directory: &Path,
+) -> Result<TerminalCertificate, ScenarioError> {
+    let (origin, text) = match file {
+        None => (
+            "(built-in)".to_owned(),
+            builtin::TERMINAL_CERTIFICATE.into(),
+        ),
+        Some(file) => {
+            let path = directory.join(file);
+            let text = std::fs::read_to_string(&path);
+            let text = text.map_err(|source| ScenarioError::Read {
+                path: path.clone(),
+                source,
+            })?;
+            (path.display().to_string(), text)
+        }
+    };
+    let certificate = TerminalCertificate::from_json(&text);
+    certificate
+        .and_then(|read| TerminalCertificate::check_digest(&text).map(|()| read))
+        .map_err(|error| {
+            let key = format!("{KEY}.certificate");
+            ScenarioError::value(key, origin, error.to_string())
+        })
+}
 
+impl CertifiedTable {
     /// The guarded controller's settings for the problem of `plain`.
     ///
     /// # Errors
@@ -58,7 +63,7 @@ impl CertifiedTable {
         &self,
         ballbot: &Ballbot<f64>,
         plain: &ControllerSettings<f64, 4, 1, 2>,
-        directory: &Path,
+        files: &dyn Files,
     ) -> Result<GuardedSettings<f64, 4, 1>, ScenarioError> {
         let Predictor::StageConsistent(rk4) = plain.predictor else {
             return Err(ScenarioError::value(
@@ -74,7 +79,7 @@ impl CertifiedTable {
                 "with a certified terminal set their number must be fixed",
             ));
         };
-        let certificate = self.read(directory)?;
+        let certificate = files.certificate(self.certificate.as_deref())?;
         check_plant(&certificate, ballbot, plain.t_s)?;
         check_cost(&certificate, &plain.weights)?;
         let terminal = TerminalSet {
@@ -139,7 +144,7 @@ fn check_cost(
     weights: &Weights<f64, 4, 1>,
 ) -> Result<(), ScenarioError> {
     let rest = certificate.q - weights.q;
-    if rest.symmetric_eigenvalues().min() < 0.0 {
+    if dynamic(&rest).symmetric_eigenvalues().min() < 0.0 {
         return Err(ScenarioError::value(
             "controller.q",
             numbers(&weights.q.diagonal()),
@@ -168,7 +173,7 @@ fn check_bounds(
     terminal: &TerminalSet<f64, 4, 1>,
     plain: &ControllerSettings<f64, 4, 1, 2>,
 ) -> Result<Vector4<f64>, ScenarioError> {
-    let inverse: Matrix4<f64> = terminal.p.try_inverse().ok_or_else(|| {
+    let inverse = dynamic(&terminal.p).try_inverse().ok_or_else(|| {
         ScenarioError::value(
             format!("{KEY}.certificate"),
             "P",
@@ -176,7 +181,7 @@ fn check_bounds(
         )
     })?;
     let reach = |row: &SMatrix<f64, 1, 4>| {
-        let square = terminal.level * (row * inverse * row.transpose())[0];
+        let square = terminal.level * (row * &inverse * row.transpose())[0];
         square.sqrt()
     };
     let semi_axes = Vector4::from_fn(|i, _| reach(&Vector4::ith(i, 1.0).transpose()));

@@ -28,10 +28,12 @@ mod certificate;
 mod error;
 mod feedback;
 mod feedback_table;
+mod files;
 mod guarantee;
 mod output_feedback;
 mod prepare;
 mod reference;
+mod reference_file;
 mod run;
 mod schema;
 mod session;
@@ -45,6 +47,7 @@ pub use feedback::Feedback;
 pub use feedback_table::{
     DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
 };
+pub use files::Files;
 pub use prepare::{Plane, Prepared};
 pub use reference::PhiReference;
 pub use run::{GUARDED_ACTIVE, GUARDED_HORIZONS, LONGEST_HORIZON, PlaneLoop, Surroundings};

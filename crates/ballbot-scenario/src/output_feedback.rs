@@ -2,8 +2,8 @@
 
 use ballbot::Ballbot;
 use lpvmpc::{
-    Bounds, Controller, DelayLine, Estimator, LpvModel, RampedInput, Reading, Reference, Rk4,
-    Solution, Workspace,
+    BoundId, Bounds, Controller, DelayLine, Estimator, LpvModel, Quantity, RampedInput, Reading,
+    Reference, Rk4, Solution, Workspace,
 };
 use lpvmpc_sim::{Decision, Measurement, Regulator};
 use nalgebra::{SVector, Vector1, Vector4};
@@ -262,5 +262,32 @@ impl<const N: usize, const M: usize> Regulator<4, 1, 4> for OutputFeedback<N, M>
                 controller.rollout().iter().map(robot).collect()
             }
         }
+    }
+
+    /// With the torque as a fifth state, its bounds are those of the input, and those of its rate
+    /// are left out.
+    fn active_bounds(&self) -> Vec<BoundId> {
+        match &self.core {
+            Core::Held { controller, .. } => {
+                let active = controller.solution().active.iter();
+                active.map(|row| row.bound).collect()
+            }
+            Core::Ramped { controller, .. } => {
+                let active = controller.solution().active.iter().map(|row| row.bound);
+                active.filter_map(of_the_robot).collect()
+            }
+        }
+    }
+}
+
+/// A bound of the plant with the torque as fifth state, as one of the robot.
+fn of_the_robot(bound: BoundId) -> Option<BoundId> {
+    match bound.quantity {
+        Quantity::State(4) => Some(BoundId {
+            quantity: Quantity::Input(0),
+            ..bound
+        }),
+        Quantity::State(_) => Some(bound),
+        Quantity::Input(_) | Quantity::Row(_) => None,
     }
 }

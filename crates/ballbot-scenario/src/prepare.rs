@@ -2,6 +2,7 @@
 
 use crate::error::ScenarioError;
 use crate::feedback::Feedback;
+use crate::files::Files;
 use crate::reference::{self, PhiReference, finite};
 use crate::schema::{
     BoundsTable, ControllerTable, IterationsTable, LinearModelTable, ModelKind, ParameterTable,
@@ -97,11 +98,15 @@ impl Scenario {
     }
 
     /// Checks everything and works out what the file leaves to be computed. Reference files
-    /// are looked for in `directory`.
+    /// and certificates are looked for in `files`, a folder as a rule.
     ///
     /// # Errors
     /// A [`ScenarioError`] with key, value and what would be right.
-    pub fn prepare(&self, directory: &Path) -> Result<Prepared, ScenarioError> {
+    pub fn prepare(&self, files: impl Files) -> Result<Prepared, ScenarioError> {
+        self.prepare_with(&files)
+    }
+
+    fn prepare_with(&self, files: &dyn Files) -> Result<Prepared, ScenarioError> {
         let duration = positive("duration_s", self.duration_s)?;
         let ballbot = self.parameters.ballbot()?;
         let wheels = self.parameters.wheels()?;
@@ -112,7 +117,7 @@ impl Scenario {
         };
         check_motion(&ballbot, &self.bounds)?;
         let settings = self.controller.settings(&ballbot, bounds)?;
-        let guarded = self.controller.guarded(&ballbot, &settings, directory)?;
+        let guarded = self.controller.guarded(&ballbot, &settings, files)?;
         let feedback = Feedback::new(&self.controller, &ballbot, &settings)?;
         if guarded.is_some() && !feedback.is_direct() {
             return Err(ScenarioError::value(
@@ -130,8 +135,7 @@ impl Scenario {
                 format!("at most {MOST_SAMPLES} samples of controller.t_s can be recorded"),
             ));
         }
-        let references =
-            reference::resolve(&self.reference, &ballbot.geometry, duration, directory)?;
+        let references = reference::resolve(&self.reference, &ballbot.geometry, duration, files)?;
         let references = match &self.controller.shaping {
             Some(table) => {
                 let limits = table.limits(&ballbot)?;
@@ -414,7 +418,7 @@ impl ControllerTable {
         &self,
         ballbot: &Ballbot<f64>,
         settings: &ControllerSettings<f64, 4, 1, 2>,
-        directory: &Path,
+        files: &dyn Files,
     ) -> Result<Option<GuardedSettings<f64, 4, 1>>, ScenarioError> {
         let TerminalTable::Certified(table) = &self.terminal else {
             return Ok(None);
@@ -426,7 +430,7 @@ impl ControllerTable {
                 "a guarantee needs the nonlinear prediction, \"lpv\"",
             ));
         }
-        let guarded = table.settings(ballbot, settings, directory)?;
+        let guarded = table.settings(ballbot, settings, files)?;
         if !GUARDED_HORIZONS.contains(&self.horizon) {
             return Err(ScenarioError::value(
                 "controller.horizon",

@@ -19,7 +19,12 @@ use std::time::Duration;
 pub const LONGEST_HORIZON: usize = 200;
 
 /// The horizons that are compiled in for the guarded controller, samples.
-pub const GUARDED_HORIZONS: [usize; 3] = [10, 20, 30];
+#[cfg(not(target_family = "wasm"))]
+pub const GUARDED_HORIZONS: &[usize] = &[10, 20, 30];
+/// The horizon that is compiled in for the guarded controller, samples: in a browser every size
+/// is code that has to be loaded.
+#[cfg(target_family = "wasm")]
+pub const GUARDED_HORIZONS: &[usize] = &[20];
 
 /// Bounds that the guarded controller's quadratic program may have active at once; soft bounds
 /// can be many.
@@ -117,7 +122,7 @@ impl Prepared {
             (21..=50, true) => self.state_feedback::<50, 54>(),
             #[cfg(not(target_family = "wasm"))]
             (51..=100, true) => self.state_feedback::<100, 104>(),
-            (_, true) => self.state_feedback::<LONGEST_HORIZON, { LONGEST_HORIZON + 4 }>(),
+            (_, true) => self.state_feedback::<LONGEST_HORIZON, { 2 * LONGEST_HORIZON + 4 }>(),
             // The torque's own bounds come on top where its rate is the input.
             #[cfg(not(target_family = "wasm"))]
             (..=20, false) => self.output_feedback::<20, 44>(period),
@@ -138,9 +143,11 @@ impl Prepared {
     ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
         // As many as GUARDED_HORIZONS; N + 2 stages each.
         match self.settings.horizon {
+            #[cfg(not(target_family = "wasm"))]
             ..=10 => self.guarded_sized::<10, 12>(settings),
-            11..=20 => self.guarded_sized::<20, 22>(settings),
-            _ => self.guarded_sized::<30, 32>(settings),
+            #[cfg(not(target_family = "wasm"))]
+            21.. => self.guarded_sized::<30, 32>(settings),
+            _ => self.guarded_sized::<20, 22>(settings),
         }
     }
 

@@ -151,6 +151,14 @@ impl Session {
         }
     }
 
+    /// The bounds that are active in the last plan of a plane, for people; empty when there are
+    /// none, or no such plane.
+    pub fn active_bounds_in_words(&self, plane: usize) -> String {
+        let regulator = self.loops.get(plane).map(|plane| &plane.regulator);
+        let bounds = regulator.map_or_else(Vec::new, |regulator| regulator.active_bounds());
+        words::active_bounds(&bounds, self.prepared.settings.t_s)
+    }
+
     /// Why the robot does not stand any more, for people; `None` while it stands.
     pub fn fall_in_words(&self) -> Option<String> {
         let (Phase::Falling(ending) | Phase::Down(ending)) = &self.phase else {

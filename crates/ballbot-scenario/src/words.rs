@@ -1,6 +1,6 @@
 //! Statuses and endings for people, with the ballbot's names.
 
-use lpvmpc::Status;
+use lpvmpc::{BoundId, Quantity, Side, Status};
 use lpvmpc_sim::Ending;
 
 /// Names of the states, in their order.
@@ -28,4 +28,57 @@ pub fn status(status: &Status<f64>) -> String {
         text = text.replace(&format!("state {index}"), name);
     }
     text.replace("input 0", "the torque")
+}
+
+/// Active bounds of a plan with samples of `t_s` seconds, by name, with the time ahead at which
+/// each begins to be active: "theta upper 0.35 s ahead".
+pub fn active_bounds(bounds: &[BoundId], t_s: f64) -> String {
+    let mut first: Vec<BoundId> = Vec::new();
+    for bound in bounds {
+        let known = first
+            .iter_mut()
+            .find(|known| known.quantity == bound.quantity && known.side == bound.side);
+        match known {
+            Some(known) => known.stage = known.stage.min(bound.stage),
+            None => first.push(*bound),
+        }
+    }
+    first.sort_unstable_by_key(|bound| bound.stage);
+    let texts = first.iter().map(|bound| {
+        let name = match bound.quantity {
+            Quantity::State(index) => STATES.get(index).copied().unwrap_or("state"),
+            Quantity::Input(_) => "torque",
+            Quantity::Row(_) => "row",
+        };
+        let side = match bound.side {
+            Side::Lower => "lower",
+            Side::Upper => "upper",
+            Side::Equality => "terminal equality",
+        };
+        format!("{name} {side} {:.2} s ahead", bound.stage as f64 * t_s)
+    });
+    texts.collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_active_bound_is_named_once_with_the_time_at_which_it_begins() {
+        let bound = |stage, quantity, side| BoundId {
+            stage,
+            quantity,
+            side,
+        };
+        let bounds = [
+            bound(8, Quantity::State(1), Side::Upper),
+            bound(7, Quantity::State(1), Side::Upper),
+            bound(0, Quantity::Input(0), Side::Lower),
+        ];
+        assert_eq!(
+            active_bounds(&bounds, 0.05),
+            "torque lower 0.00 s ahead, theta upper 0.35 s ahead"
+        );
+    }
 }

@@ -1,12 +1,13 @@
 //! JavaScript values as serde sees them. Unlike the reader of `serde-wasm-bindgen` it notices
-//! unknown keys and names the place of a mistake, and it is asked for exactly the type that is
-//! wanted, which keeps the module small.
+//! unknown keys and names the place of a mistake. Tables are looked up field by field, in the
+//! order of the struct: serde's code for a sequence is a third of that for a map, and a page has
+//! to load it.
 
-use js_sys::{Array, Object};
+use js_sys::{Array, Object, Reflect};
 use serde::de::value::StringDeserializer;
 use serde::de::{
-    DeserializeOwned, DeserializeSeed, Deserializer, EnumAccess, Error, IntoDeserializer,
-    MapAccess, SeqAccess, VariantAccess, Visitor,
+    DeserializeOwned, DeserializeSeed, Deserializer, EnumAccess, Error, Expected, IntoDeserializer,
+    SeqAccess, VariantAccess, Visitor,
 };
 use std::fmt;
 use wasm_bindgen::{JsCast, JsValue};
@@ -21,26 +22,39 @@ pub fn from_js<T: DeserializeOwned>(value: JsValue) -> Result<T, Mistake> {
 
 /// Where a value is not what it should be, and why.
 #[derive(Debug)]
-pub struct Mistake {
+pub struct Mistake(Box<Place>);
+
+#[derive(Debug)]
+struct Place {
     /// Keys from the inside out.
-    place: Vec<String>,
+    keys: Vec<String>,
     message: String,
+    /// The first entry that a sequence lacks.
+    lacks: Option<usize>,
 }
 
 impl Mistake {
+    /// Names the field that is missing.
+    fn naming(mut self, names: &[&str]) -> Self {
+        if let Some(name) = self.0.lacks.take().and_then(|place| names.get(place)) {
+            self.0.message = format!("missing field `{name}`");
+        }
+        self
+    }
+
     fn below(mut self, key: &str) -> Self {
-        self.place.push(key.to_owned());
+        self.0.keys.push(key.to_owned());
         self
     }
 }
 
 impl fmt::Display for Mistake {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, key) in self.place.iter().rev().enumerate() {
+        for (i, key) in self.0.keys.iter().rev().enumerate() {
             write!(f, "{}{key}", if i > 0 { "." } else { "" })?;
         }
-        let colon = if self.place.is_empty() { "" } else { ": " };
-        write!(f, "{colon}{}", self.message)
+        let colon = if self.0.keys.is_empty() { "" } else { ": " };
+        write!(f, "{colon}{}", self.0.message)
     }
 }
 
@@ -48,10 +62,17 @@ impl std::error::Error for Mistake {}
 
 impl Error for Mistake {
     fn custom<M: fmt::Display>(message: M) -> Self {
-        Self {
-            place: Vec::new(),
+        Self(Box::new(Place {
+            keys: Vec::new(),
             message: message.to_string(),
-        }
+            lacks: None,
+        }))
+    }
+
+    fn invalid_length(given: usize, expected: &dyn Expected) -> Self {
+        let mut mistake = Self::custom(format!("{expected} is expected"));
+        mistake.0.lacks = Some(given);
+        mistake
     }
 }
 
@@ -91,16 +112,35 @@ impl Node {
         self.0.as_string().ok_or_else(|| self.expected("a text"))
     }
 
-    fn table(self) -> Result<Table, Mistake> {
-        if self.0.is_object() && !self.0.is_array() {
-            let entries = Object::entries(self.0.unchecked_ref());
-            Ok(Table {
-                entries: entries.into_iter(),
-                waiting: None,
-            })
-        } else {
-            Err(self.expected("a table"))
+    fn is_table(&self) -> bool {
+        self.0.is_object() && !self.0.is_array()
+    }
+
+    /// The table with these fields, and no others.
+    fn table(self, names: &'static [&'static str]) -> Result<Table, Mistake> {
+        if !self.is_table() {
+            return Err(self.expected("a table"));
         }
+        for key in Object::keys(self.0.unchecked_ref::<Object>()) {
+            let key = key.as_string().unwrap_or_default();
+            if !names.contains(&key.as_str()) {
+                return Err(Mistake::unknown_field(&key, names));
+            }
+        }
+        Ok(Table {
+            object: self.0,
+            names,
+            read: 0,
+        })
+    }
+
+    fn fields<'de, V: Visitor<'de>>(
+        self,
+        names: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Mistake> {
+        let read = visitor.visit_seq(self.table(names)?);
+        read.map_err(|mistake| mistake.naming(names))
     }
 
     fn list(self) -> Result<List, Mistake> {
@@ -182,17 +222,13 @@ impl<'de> Deserializer<'de> for Node {
         self.deserialize_seq(visitor)
     }
 
-    fn deserialize_map<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Mistake> {
-        visitor.visit_map(self.table()?)
-    }
-
     fn deserialize_struct<V: Visitor<'de>>(
         self,
         _name: &'static str,
-        _fields: &'static [&'static str],
+        fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Mistake> {
-        self.deserialize_map(visitor)
+        self.fields(fields, visitor)
     }
 
     fn deserialize_enum<V: Visitor<'de>>(
@@ -207,9 +243,16 @@ impl<'de> Deserializer<'de> for Node {
                 content: Node(JsValue::UNDEFINED),
             });
         }
-        let mut table = self.table()?;
-        match (table.next(), table.next()) {
-            (Some((name, content)), None) => visitor.visit_enum(Choice { name, content }),
+        if !self.is_table() {
+            return Err(self.expected("a table"));
+        }
+        let entries = Object::entries(self.0.unchecked_ref::<Object>());
+        let choice: Array = entries.get(0).unchecked_into();
+        match (entries.length(), choice.get(0).as_string()) {
+            (1, Some(name)) => visitor.visit_enum(Choice {
+                name,
+                content: Node(choice.get(1)),
+            }),
             _ => Err(Mistake::custom("one choice is expected, as its only key")),
         }
     }
@@ -219,49 +262,36 @@ impl<'de> Deserializer<'de> for Node {
     }
 
     serde::forward_to_deserialize_any! {
-        i8 i16 i32 i64 i128 u8 u16 u32 u128 f32 char bytes byte_buf unit unit_struct tuple_struct
+        i8 i16 i32 i64 i128 u8 u16 u32 u128 f32 char bytes byte_buf unit unit_struct tuple_struct map
     }
 }
 
+/// The fields of a struct in their order.
 struct Table {
-    entries: js_sys::ArrayIntoIter,
-    waiting: Option<(String, Node)>,
+    object: JsValue,
+    names: &'static [&'static str],
+    read: usize,
 }
 
-impl Table {
-    /// The next key that has a value.
-    fn next(&mut self) -> Option<(String, Node)> {
-        loop {
-            let pair: Array = self.entries.next()?.unchecked_into();
-            let (key, value) = (pair.get(0), Node(pair.get(1)));
-            if !value.is_absent() {
-                return Some((key.as_string().unwrap_or_default(), value));
-            }
-        }
-    }
-}
-
-impl<'de> MapAccess<'de> for Table {
+impl<'de> SeqAccess<'de> for Table {
     type Error = Mistake;
 
-    fn next_key_seed<K: DeserializeSeed<'de>>(
+    /// `None` for a field that is absent: what that means, the struct says.
+    fn next_element_seed<S: DeserializeSeed<'de>>(
         &mut self,
-        seed: K,
-    ) -> Result<Option<K::Value>, Mistake> {
-        self.waiting = self.next();
-        let key = self.waiting.as_ref().map(|(key, _)| key.clone());
-        let read = |key: String| -> Result<K::Value, Mistake> {
-            let key: StringDeserializer<Mistake> = key.into_deserializer();
-            seed.deserialize(key)
+        seed: S,
+    ) -> Result<Option<S::Value>, Mistake> {
+        let Some(name) = self.names.get(self.read) else {
+            return Ok(None);
         };
-        key.map(read).transpose()
-    }
-
-    fn next_value_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<S::Value, Mistake> {
-        match self.waiting.take() {
-            Some((key, value)) => seed.deserialize(value).map_err(|error| error.below(&key)),
-            None => Err(Mistake::custom("a value without its key")),
+        self.read += 1;
+        let value = Reflect::get(&self.object, &JsValue::from_str(name));
+        let value = Node(value.unwrap_or(JsValue::UNDEFINED));
+        if value.is_absent() {
+            return Ok(None);
         }
+        let read = seed.deserialize(value);
+        read.map(Some).map_err(|mistake| mistake.below(name))
     }
 }
 
@@ -338,11 +368,12 @@ impl<'de> VariantAccess<'de> for Content {
 
     fn struct_variant<V: Visitor<'de>>(
         self,
-        _fields: &'static [&'static str],
+        fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Mistake> {
-        self.1
-            .deserialize_map(visitor)
+        let content = self.1;
+        content
+            .fields(fields, visitor)
             .map_err(|error| error.below(&self.0))
     }
 }

@@ -3,9 +3,10 @@
 //! are messages for people.
 
 mod from_js;
+mod page_files;
 
-use ballbot_scenario::{Phase, PhiReference, PointTable, Prepared, Scenario, Session, builtin};
-use std::path::Path;
+use ballbot_scenario::{Phase, PhiReference, PointTable, Prepared, Scenario, Session};
+use page_files::PageFiles;
 use std::time::Duration;
 use wasm_bindgen::prelude::*;
 
@@ -19,48 +20,21 @@ fn clock() -> Duration {
     Duration::from_secs_f64(milliseconds() / 1e3)
 }
 
-fn read(setup: JsValue) -> Result<Scenario, String> {
-    let scenario = from_js::from_js(setup);
-    scenario.map_err(|error| format!("this is not a valid scenario:\n{error}"))
-}
-
-fn prepare(setup: JsValue) -> Result<Prepared, String> {
-    let prepared = read(setup)?.prepare(Path::new(""));
+/// `certificate` is the built-in one as an object.
+fn prepare(setup: JsValue, certificate: JsValue) -> Result<Prepared, String> {
+    let scenario: Result<Scenario, _> = from_js::from_js(setup);
+    let scenario = scenario.map_err(|error| format!("this is not a valid scenario:\n{error}"))?;
+    let prepared = scenario.prepare(PageFiles { certificate });
     prepared.map_err(|error| error.to_string())
 }
 
-/// A built-in scenario.
-#[wasm_bindgen(getter_with_clone)]
-pub struct Preset {
-    /// Its name on the command line.
-    pub name: String,
-    /// The commented TOML file.
-    pub text: String,
-}
-
-/// The built-in scenarios.
-#[wasm_bindgen]
-pub fn presets() -> Vec<Preset> {
-    builtin::ALL
-        .into_iter()
-        .map(|preset| Preset {
-            name: preset.name.to_owned(),
-            text: preset.text.to_owned(),
-        })
-        .collect()
-}
-
-/// A scenario, as an object with the keys of its file: all checks passed, all defaults written
-/// out.
+/// Whether an object with the keys of a scenario file is one that can be run.
 ///
 /// # Errors
 /// What is wrong with a key or a value.
 #[wasm_bindgen]
-pub fn scenario(setup: JsValue) -> Result<JsValue, String> {
-    let scenario = read(setup)?;
-    let prepared = scenario.prepare(Path::new(""));
-    prepared.map_err(|error| error.to_string())?;
-    serde_wasm_bindgen::to_value(&scenario).map_err(|error| error.to_string())
+pub fn check(setup: JsValue, certificate: JsValue) -> Result<(), String> {
+    prepare(setup, certificate).map(|_| ())
 }
 
 /// A robot in its world, stepped from outside.
@@ -76,8 +50,9 @@ impl Simulation {
     /// # Errors
     /// What is wrong with a key or a value.
     #[wasm_bindgen(constructor)]
-    pub fn new(setup: JsValue) -> Result<Simulation, String> {
-        let session = Session::new(prepare(setup)?).map_err(|error| error.to_string())?;
+    pub fn new(setup: JsValue, certificate: JsValue) -> Result<Simulation, String> {
+        let session =
+            Session::new(prepare(setup, certificate)?).map_err(|error| error.to_string())?;
         Ok(Self { session })
     }
 
@@ -85,8 +60,9 @@ impl Simulation {
     ///
     /// # Errors
     /// As the constructor; this simulation stays as it is.
-    pub fn reconfigured(&self, setup: JsValue) -> Result<Simulation, String> {
-        let session = self.session.reconfigured(prepare(setup)?);
+    pub fn reconfigured(&self, setup: JsValue, certificate: JsValue) -> Result<Simulation, String> {
+        let prepared = prepare(setup, certificate)?;
+        let session = self.session.reconfigured(prepared);
         Ok(Self {
             session: session.map_err(|error| error.to_string())?,
         })
@@ -178,6 +154,16 @@ impl Simulation {
     /// What the controllers said at the last sample.
     pub fn status(&self) -> String {
         self.session.status_in_words()
+    }
+
+    /// The bounds that are active in the last plan of a plane.
+    pub fn active_bounds(&self, plane: usize) -> String {
+        self.session.active_bounds_in_words(plane)
+    }
+
+    /// Angle of the wheels' contact points from the top of the ball, rad.
+    pub fn zenith_angle(&self) -> f64 {
+        self.session.prepared().wheels.zenith_angle()
     }
 
     /// Why the robot does not stand any more; absent while it stands.

@@ -53,6 +53,12 @@ impl<T: Scalar> Wheels<T> {
         }
     }
 
+    /// Angle of the wheels' contact points from the top of the ball, rad.
+    pub fn zenith_angle(&self) -> T {
+        let (sin, cos) = self.sin_cos;
+        sin.atan2(cos)
+    }
+
     /// The motors' torques for the virtual torques (tau_x, tau_y, tau_z).
     pub fn motors(&self, virtual_torques: &Vector3<T>) -> Vector3<T> {
         self.matrix() * virtual_torques

@@ -20,7 +20,7 @@ pub fn poles(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, MatrixError> {
         // it. A similarity by any reflector takes it out of such a fixed point.
         .or_else(|| eigenvalues(&reflected(&balanced)))
         .ok_or(MatrixError::EigenvaluesDidNotConverge { name: NAME })?;
-    eigenvalues.sort_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
+    eigenvalues.sort_unstable_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
     Ok(eigenvalues)
 }
 
@@ -92,20 +92,25 @@ pub(crate) fn distance_to_unreachable(
     pole: Complex<f64>,
 ) -> Option<f64> {
     let (n, m) = b.shape();
-    let pencil = DMatrix::from_fn(n, n + m, |row, column| {
-        if column >= n {
-            Complex::from(b[(row, column - n)])
-        } else if row == column {
-            pole - a[(row, column)]
-        } else {
-            Complex::from(-a[(row, column)])
+    // [Re, -Im; Im, Re] has the singular values of Re + i Im, each twice.
+    let mut pencil = DMatrix::zeros(2 * n, 2 * (n + m));
+    for half in 0..2 {
+        let (top, left) = (half * n, half * (n + m));
+        pencil.view_mut((top, left), (n, n)).copy_from(&-a);
+        pencil.view_mut((top, left + n), (n, m)).copy_from(b);
+        for i in 0..n {
+            pencil[(top + i, left + i)] += pole.re;
         }
-    });
+    }
+    for i in 0..n {
+        pencil[(i, n + m + i)] = -pole.im;
+        pencil[(n + i, i)] = pole.im;
+    }
     let size = a.amax().max(b.amax());
     if size == 0.0 {
         return Some(0.0);
     }
-    let svd = SVD::try_new(pencil, false, false, f64::EPSILON, QR_ITERATION_CAP)?;
+    let svd = SVD::try_new_unordered(pencil, false, false, f64::EPSILON, QR_ITERATION_CAP)?;
     Some(svd.singular_values.min() / size)
 }
 

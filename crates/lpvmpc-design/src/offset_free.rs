@@ -76,7 +76,7 @@ pub fn check_offset_free(
         let length = column.norm();
         column.unscale_mut(if length > 0.0 { length } else { 1.0 });
     }
-    let values = joint.singular_values();
+    let values = joint.singular_values_unordered();
     let least = NEGLIGIBLE * values.max();
     let rank = values.iter().filter(|value| **value > least).count();
     if rank == n + n_d {

@@ -2,7 +2,7 @@
 
 use crate::guarded_loop::Guard;
 use crate::sensor::Measurement;
-use lpvmpc::{Controller, LpvModel, Reference, Status, Workspace};
+use lpvmpc::{BoundId, Controller, LpvModel, Reference, Status, Workspace};
 use nalgebra::SVector;
 use std::ops::DerefMut;
 use std::time::Duration;
@@ -56,6 +56,12 @@ pub trait Regulator<const NX: usize, const NU: usize, const NY: usize> {
 
     /// The states that the model reaches under the last plan, one per sample of the horizon.
     fn prediction(&self) -> Vec<SVector<f64, NX>>;
+
+    /// The bounds that are active in the last plan. None from a controller whose problem is not
+    /// stated in the plant's own states and inputs.
+    fn active_bounds(&self) -> Vec<BoundId> {
+        Vec::new()
+    }
 }
 
 impl<R, const NX: usize, const NU: usize, const NY: usize> Regulator<NX, NU, NY> for Box<R>
@@ -85,6 +91,10 @@ where
 
     fn prediction(&self) -> Vec<SVector<f64, NX>> {
         (**self).prediction()
+    }
+
+    fn active_bounds(&self) -> Vec<BoundId> {
+        (**self).active_bounds()
     }
 }
 
@@ -155,6 +165,11 @@ where
 
     fn prediction(&self) -> Vec<SVector<f64, NX>> {
         self.controller.rollout().to_vec()
+    }
+
+    fn active_bounds(&self) -> Vec<BoundId> {
+        let active = self.controller.solution().active.iter();
+        active.map(|row| row.bound).collect()
     }
 }
 

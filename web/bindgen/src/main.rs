@@ -13,6 +13,5 @@ fn main() -> Result<()> {
         .web(true)?
         .typescript(true)
         .remove_producers_section(true)
-        .remove_name_section(true)
         .generate(folder)
 }

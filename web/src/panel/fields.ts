@@ -56,6 +56,8 @@ export interface NumberSpec extends FieldSpec {
   logarithmic?: boolean;
   /** What an empty field means; without it an empty field is not accepted. */
   whenEmpty?: number;
+  /** What to do when the field was emptied, which then leaves the choice to the controller. */
+  cleared?: () => void;
 }
 
 export interface Field<T> {
@@ -76,7 +78,12 @@ export function numberField(spec: NumberSpec, changed: (value: number) => void):
     if (spec.logarithmic) slider.step = "0.05";
   }
   if (spec.whenEmpty !== undefined) input.placeholder = "none";
+  if (spec.cleared) input.placeholder = "default";
   input.addEventListener("change", () => {
+    if (input.value.trim() === "" && spec.cleared) {
+      spec.cleared();
+      return;
+    }
     const value = input.value.trim() === "" ? spec.whenEmpty : Number(input.value);
     if (value === undefined || Number.isNaN(value)) return;
     slider.value = String(toSlider(value));

@@ -1,124 +1,17 @@
 // The floor in three dimensions.
 
 import {
-  BufferAttribute, BufferGeometry, CircleGeometry, Color, DirectionalLight, DynamicDrawUsage, Fog,
-  HemisphereLight, Line, LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial,
-  MeshStandardMaterial, PCFShadowMap, PerspectiveCamera, Plane, Points,
-  PointsMaterial, Raycaster, RingGeometry, Scene, Vector2, Vector3, WebGLRenderer,
+  CircleGeometry, Color, DirectionalLight, Fog, HemisphereLight, LineBasicMaterial, LineSegments, Mesh,
+  MeshStandardMaterial, PCFShadowMap, PerspectiveCamera, Plane, Raycaster, Scene, Vector2, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { Robot, toScene } from "./robot";
-import type { FloorPoint, Picture, RobotPicture, Shape, Theme, View } from "./view";
+import { Actor } from "./actor";
+import { FloorLine, gridLines, LINE_POINTS } from "./lines";
+import { toScene } from "./robot";
+import type { FloorPoint, Picture, Shape, Theme, View } from "./view";
 
 /** How fast the camera goes after the robots, 1/s. */
 const FOLLOW_RATE = 3.5;
-const HALF = 12;
-const LINE_POINTS = 2048;
-const PLAN_POINTS = 256;
-
-/** A line on the floor whose points change. */
-class FloorLine {
-  readonly object: Line | Points;
-  private readonly positions: BufferAttribute;
-
-  constructor(material: LineBasicMaterial | PointsMaterial, capacity: number, private readonly height: number) {
-    const geometry = new BufferGeometry();
-    this.positions = new BufferAttribute(new Float32Array(3 * capacity), 3);
-    this.positions.setUsage(DynamicDrawUsage);
-    geometry.setAttribute("position", this.positions);
-    this.object = material instanceof PointsMaterial ? new Points(geometry, material) : new Line(geometry, material);
-    this.object.frustumCulled = false;
-  }
-
-  set(count: number, point: (i: number) => FloorPoint, lane: number): void {
-    const shown = Math.min(count, this.positions.count);
-    for (let i = 0; i < shown; i++) {
-      const { x, y } = point(i);
-      this.positions.setXYZ(i, x, this.height, -(y + lane));
-    }
-    this.positions.needsUpdate = true;
-    this.object.geometry.setDrawRange(0, shown);
-  }
-
-  dispose(): void {
-    this.object.geometry.dispose();
-    (this.object.material as LineBasicMaterial).dispose();
-  }
-}
-
-/** Everything that belongs to one robot. */
-class Actor {
-  readonly robot: Robot;
-  readonly ghost: Robot;
-  readonly trail: FloorLine;
-  readonly plan: FloorLine;
-  readonly reference: FloorLine;
-  readonly goal: Mesh;
-
-  constructor(private readonly scene: Scene, shape: Shape, theme: Theme, readonly colour: string) {
-    const line = (hex: string, opacity: number) =>
-      new LineBasicMaterial({ color: new Color(hex), transparent: true, opacity });
-    this.robot = new Robot(shape, theme, colour, false);
-    this.ghost = new Robot(shape, theme, colour, true);
-    this.trail = new FloorLine(line(colour, 0.75), LINE_POINTS, 0.004);
-    this.reference = new FloorLine(line(theme.reference, 0.9), LINE_POINTS, 0.003);
-    this.plan = new FloorLine(
-      new PointsMaterial({ color: new Color(colour), size: 5, sizeAttenuation: false, transparent: true, opacity: 0.9 }),
-      PLAN_POINTS, 0.006,
-    );
-    const { ballRadius: r } = shape;
-    this.goal = new Mesh(
-      new RingGeometry(r * 0.78, r * 0.92, 48),
-      new MeshBasicMaterial({ color: new Color(colour), transparent: true, opacity: 0.9 }),
-    );
-    this.goal.rotation.x = -Math.PI / 2;
-    scene.add(...this.objects());
-  }
-
-  private objects() {
-    return [this.robot.group, this.ghost.group, this.goal, this.trail.object, this.plan.object, this.reference.object];
-  }
-
-  draw(picture: RobotPicture): void {
-    const { pose, prediction, trail, reference, goal, lane } = picture;
-    this.robot.place(pose, lane);
-    const end = prediction.at(-1);
-    // A ghost that stands where the robot stands would only blur it.
-    const apart = end ? Math.hypot(end.x - pose.x, end.y - pose.y) : 0;
-    this.ghost.group.visible = end !== undefined && apart > 0.03;
-    if (end) this.ghost.place(end, lane);
-    const pair = (values: Float32Array) => (i: number) => ({ x: values[2 * i] ?? 0, y: values[2 * i + 1] ?? 0 });
-    this.trail.set(trail.length / 2, pair(trail), lane);
-    this.reference.set(reference.length / 2, pair(reference), lane);
-    this.plan.set(prediction.length, (i) => prediction[i] ?? pose, lane);
-    this.goal.position.copy(toScene(goal.x, goal.y + lane, 0.005));
-  }
-
-  dispose(): void {
-    this.scene.remove(...this.objects());
-    this.robot.dispose();
-    this.ghost.dispose();
-    for (const line of [this.trail, this.plan, this.reference]) line.dispose();
-    this.goal.geometry.dispose();
-    (this.goal.material as MeshBasicMaterial).dispose();
-  }
-}
-
-function gridLines(step: number, skip: number, colour: string, opacity: number): LineSegments {
-  const points: number[] = [];
-  const count = Math.round(HALF / step);
-  for (let i = -count; i <= count; i++) {
-    if (skip > 0 && i % skip === 0) continue;
-    const at = i * step;
-    points.push(at, 0, -HALF, at, 0, HALF, -HALF, 0, at, HALF, 0, at);
-  }
-  const geometry = new BufferGeometry();
-  geometry.setAttribute("position", new BufferAttribute(new Float32Array(points), 3));
-  const material = new LineBasicMaterial({ color: new Color(colour), transparent: true, opacity });
-  const lines = new LineSegments(geometry, material);
-  lines.position.y = 0.001;
-  return lines;
-}
 
 export class SolidView implements View {
   readonly kind = "3d";

@@ -2,10 +2,12 @@
 
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import type { History } from "./history";
-import { ROW } from "./protocol";
-import type { Range, Scenario } from "./scenario";
-import { medianStep } from "./status";
+import { ROW } from "../protocol";
+import type { Scenario } from "../scenario";
+import { medianStep } from "../status";
+import { columns, planeOf, type Shown } from "./columns";
+import { drawNow, drawPredictions, shadeBounds } from "./marks";
+import { STRIPS, type Strip } from "./strips";
 
 /** At most three powers of ten, evenly spaced. */
 function decades(low: number, high: number): number[] {
@@ -16,47 +18,9 @@ function decades(low: number, high: number): number[] {
   return made;
 }
 
-/** What a strip shows. */
-interface Strip {
-  title: string;
-  unit: string;
-  /** Column of the sample, or a motor by its number. */
-  column?: number;
-  motors?: boolean;
-  /** Component of the predicted state. */
-  predicted?: number;
-  bound?: (bounds: Scenario["bounds"]) => Range;
-  /** Held from each sample to the next. */
-  held?: boolean;
-  logarithmic?: boolean;
-  /** The smallest half-height of the scale, so that noise does not fill the strip. */
-  least: number;
-  fromZero?: boolean;
-  reference?: boolean;
-}
-
-const STRIPS: Strip[] = [
-  { title: "phi", unit: "rad", column: ROW.phi, predicted: 0, bound: (b) => b.phi_rad, least: 0.5, reference: true },
-  { title: "theta", unit: "rad", column: ROW.theta, predicted: 1, bound: (b) => b.theta_rad, least: 0.05 },
-  { title: "phi_dot", unit: "rad/s", column: ROW.phiDot, predicted: 2, bound: (b) => b.phi_dot_rad_s, least: 1 },
-  { title: "theta_dot", unit: "rad/s", column: ROW.thetaDot, predicted: 3, bound: (b) => b.theta_dot_rad_s, least: 0.2 },
-  { title: "torque", unit: "N m", column: ROW.torque, bound: (b) => b.torque_nm, held: true, least: 0.05 },
-  { title: "motor torques", unit: "N m", motors: true, held: true, least: 0.05 },
-  { title: "cost J", unit: "", column: ROW.cost, held: true, logarithmic: true, least: 1 },
-  { title: "active bounds", unit: "", column: ROW.activeBounds, held: true, least: 2, fromZero: true },
-  { title: "time per step", unit: "\u00b5s", column: ROW.stepMicroseconds, held: true, least: 20, fromZero: true },
-];
-
 /** Shown at once, s. */
 const WINDOW = 8;
-/** Points of a curve; more would not be seen. */
-const MOST_POINTS = 900;
 const AXIS_WIDTH = 52;
-
-export interface Shown {
-  history: History;
-  colour: string;
-}
 
 interface Colours {
   ink: string;
@@ -158,8 +122,8 @@ export class Plots {
         },
       ],
       hooks: {
-        drawClear: [(chart) => this.shadeBounds(chart, strip)],
-        draw: [(chart) => this.drawPredictions(chart, strip)],
+        drawClear: [(chart) => shadeBounds(chart, this.bounds && strip.bound?.(this.bounds), this.colours.outside)],
+        draw: [(chart) => this.drawOver(chart, strip)],
       },
     };
   }
@@ -194,7 +158,7 @@ export class Plots {
     const component = strip.predicted;
     if (component === undefined) return [];
     return this.shown.flatMap(({ history }) => {
-      const states = history.predictions[this.planeOf(history)];
+      const states = history.predictions[planeOf(history, this.plane)];
       if (!states) return [];
       const values = Array.from({ length: states.length / 4 }, (_, i) => states[4 * i + component] ?? 0);
       return [Math.min(...values), Math.max(...values)].filter(Number.isFinite);
@@ -205,64 +169,10 @@ export class Plots {
     return Math.max(...this.shown.map(({ history }) => medianStep(history)).filter(Number.isFinite), 1);
   }
 
-  private planeOf(history: History): number {
-    return Math.min(this.plane, history.planes - 1);
-  }
-
-  private shadeBounds(chart: uPlot, strip: Strip): void {
-    const bounds = this.bounds && strip.bound?.(this.bounds);
-    if (!bounds) return;
-    const { ctx, bbox } = chart;
-    const edge = (value: number) =>
-      Math.min(Math.max(chart.valToPos(value, "y", true), bbox.top), bbox.top + bbox.height);
-    const [top, bottom] = [edge(bounds[1]), edge(bounds[0])];
-    ctx.save();
-    ctx.fillStyle = this.colours.outside;
-    if (Number.isFinite(bounds[1])) ctx.fillRect(bbox.left, bbox.top, bbox.width, top - bbox.top);
-    if (Number.isFinite(bounds[0])) ctx.fillRect(bbox.left, bottom, bbox.width, bbox.top + bbox.height - bottom);
-    ctx.restore();
-  }
-
-  /** The plan ahead, and earlier plans behind what then happened. */
-  private drawPredictions(chart: uPlot, strip: Strip): void {
-    const component = strip.predicted;
-    const { ctx, bbox } = chart;
-    const ratio = uPlot.pxRatio;
-    ctx.save();
-    ctx.beginPath();
-    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-    ctx.clip();
-    if (component !== undefined) {
-      for (const { history, colour } of this.shown) {
-        const plane = this.planeOf(history);
-        ctx.strokeStyle = colour;
-        ctx.lineWidth = ratio;
-        const curve = (time: number, states: Float64Array) => {
-          ctx.beginPath();
-          for (let i = 0; 4 * i < states.length; i++) {
-            const x = chart.valToPos(time + i * history.samplingTime, "x", true);
-            ctx.lineTo(x, chart.valToPos(states[4 * i + component] ?? 0, "y", true));
-          }
-          ctx.stroke();
-        };
-        ctx.globalAlpha = 0.35;
-        for (const { time, states } of history.fans[plane] ?? []) curve(time, states);
-        ctx.globalAlpha = 0.9;
-        ctx.setLineDash([3 * ratio, 3 * ratio]);
-        const states = history.predictions[plane];
-        if (states) curve(history.nowAt(plane, ROW.time), states);
-        ctx.setLineDash([]);
-      }
-    }
-    ctx.globalAlpha = 0.5;
-    ctx.strokeStyle = this.colours.ink;
-    ctx.lineWidth = ratio;
-    const now = Math.round(chart.valToPos(this.time, "x", true)) + 0.5;
-    ctx.beginPath();
-    ctx.moveTo(now, bbox.top);
-    ctx.lineTo(now, bbox.top + bbox.height);
-    ctx.stroke();
-    ctx.restore();
+  /** The plans, and a line where now is. */
+  private drawOver(chart: uPlot, strip: Strip): void {
+    if (strip.predicted !== undefined) drawPredictions(chart, strip.predicted, this.shown, this.plane);
+    drawNow(chart, this.time, this.colours.ink);
   }
 
   resize(): void {
@@ -282,7 +192,7 @@ export class Plots {
     for (const [index, strip] of STRIPS.entries()) {
       const chart = this.charts[index];
       if (!chart) continue;
-      chart.setData(this.data(strip), true);
+      chart.setData(columns(strip, this.shown, this.plane, this.timeRange()[0]), true);
       const output = outputs[index];
       if (output) output.textContent = this.valueNow(strip);
     }
@@ -293,53 +203,8 @@ export class Plots {
     if (!history || history.length === 0) return "";
     const last = history.length - 1;
     if (strip.motors) return [0, 1, 2].map((i) => history.motor(last, i).toFixed(2)).join("  ");
-    const value = history.at(last, this.planeOf(history), strip.column ?? 0);
+    const value = history.at(last, planeOf(history, this.plane), strip.column ?? 0);
     if (!Number.isFinite(value)) return "";
     return strip.fromZero ? value.toFixed(0) : strip.logarithmic ? value.toPrecision(3) : value.toFixed(3);
-  }
-
-  /** One column of times, then the columns of every robot. Robots may have stopped early. */
-  private data(strip: Strip): uPlot.AlignedData {
-    const longest = this.shown.map(({ history }) => history).reduce<History | undefined>(
-      (most, history) => (most === undefined || history.total > most.total ? history : most), undefined);
-    if (!longest || longest.length === 0) return [[], ...this.emptyColumns(strip)];
-    const [start] = this.timeRange();
-    const from = Math.max(longest.indexAt(start) - 1, 0);
-    const stride = Math.max(Math.ceil((longest.length - from) / MOST_POINTS), 1);
-    const indices: number[] = [];
-    for (let i = from; i < longest.length; i += stride) indices.push(i);
-    const end = longest.nowAt(0, ROW.time);
-    const times = [...indices.map((i) => longest.at(i, 0, ROW.time)), end];
-    const columns: (number | null)[][] = [];
-    for (const { history } of this.shown) {
-      const offset = longest.total - longest.length - (history.total - history.length);
-      const column = (value: (i: number) => number, final: number | null) => {
-        const values = indices.map((i) => {
-          const at = i + offset;
-          const known = at >= 0 && at < history.length ? value(at) : NaN;
-          return Number.isFinite(known) ? known : null;
-        });
-        columns.push([...values, history === longest ? final : null]);
-      };
-      const plane = this.planeOf(history);
-      const last = history.length - 1;
-      if (strip.motors) {
-        for (let motor = 0; motor < 3; motor++) column((i) => history.motor(i, motor), history.motor(last, motor));
-      } else {
-        const key = strip.column ?? ROW.phi;
-        const final = strip.held ? history.at(last, plane, key) : history.nowAt(plane, key);
-        column((i) => history.at(i, plane, key), Number.isFinite(final) ? final : null);
-      }
-    }
-    if (strip.reference) {
-      const plane = this.planeOf(longest);
-      columns.push([...indices.map((i) => longest.at(i, plane, ROW.phiReference)), longest.nowAt(plane, 5)]);
-    }
-    return [times, ...columns] as uPlot.AlignedData;
-  }
-
-  private emptyColumns(strip: Strip): number[][] {
-    const perRobot = strip.motors ? 3 : 1;
-    return Array.from({ length: this.shown.length * perRobot + (strip.reference ? 1 : 0) }, () => []);
   }
 }

@@ -1,0 +1,126 @@
+// What decides: the controller's own numbers, and what stands around it on a real robot.
+
+import { kindOf, type Scenario } from "../scenario";
+import { numberField } from "./fields";
+import type { Form } from "./form";
+
+const STATES = ["phi", "theta", "phi_dot", "theta_dot"];
+/** The largest number of sub-steps the slider offers; the field takes any. */
+const SUBSTEPS = 8;
+const RAD_PER_DEG = Math.PI / 180;
+
+export function controllerFields(form: Form): HTMLElement[] {
+  const weight = { min: 0.01, max: 10000, logarithmic: true };
+  return [
+    form.number("controller.horizon", { label: "Horizon N", unit: "samples", min: 1, max: 200, step: 1 }),
+    form.number("controller.t_s", { label: "Sampling t_s", unit: "ms", factor: 1e-3, min: 1, max: 100, logarithmic: true }),
+    ...STATES.map((name, i) => form.number(`controller.q.${i}`, { label: `Q ${name}`, ...weight })),
+    form.number("controller.r", { label: "R", min: 1, max: 100000, logarithmic: true }),
+    terminal(form),
+    ...predictor(form),
+    form.optional("controller.iterations.fixed", { label: "QPs", title: "Quadratic programs per sample, each along the rollout of the one before; empty: one", step: 1 }),
+    form.check("controller.preview", { label: "Sees the reference ahead", absent: true }),
+  ];
+}
+
+const TERMINALS: [kind: string, text: string][] = [
+  ["discrete_riccati", "cost of the LQR"],
+  ["equality", "equality x_N = x_ref"],
+  ["certified", "certified set (guaranteed loop)"],
+  ["none", "none"],
+  ["continuous_riccati", "continuous Riccati (paper)"],
+  ["cost", "P of the file"],
+];
+
+/** Tables of a file, such as its certificate, come back when their kind is chosen again. */
+function terminal(form: Form): HTMLElement {
+  const known = new Map<string, unknown>([["certified", { certified: {} }], ["continuous_riccati", { continuous_riccati: {} }]]);
+  form.watch(({ controller }) => {
+    const kind = kindOf(controller.terminal);
+    if (kind !== undefined) known.set(kind, controller.terminal);
+  });
+  return form.choice(
+    "controller.terminal",
+    { label: "Terminal", title: "The certified set belongs to the built-in robot, to t_s = 50 ms and, in this page, to N = 20" },
+    TERMINALS,
+    (value) => kindOf(value as string | object | undefined) ?? "discrete_riccati",
+    (kind) => known.get(kind) ?? kind,
+  );
+}
+
+const PREDICTORS: [kind: string, text: string][] = [
+  ["stage_consistent", "scheduling of every stage"],
+  ["exact", "scheduling frozen, exact"],
+  ["rk4", "scheduling frozen, RK4 (paper)"],
+];
+
+/** The paper's predictor is the only one that does not choose its sub-steps itself. */
+function predictor(form: Form): HTMLElement[] {
+  const substeps = (setup: Scenario) => Object.values(setup.controller.predictor ?? {})[0] as { substeps?: number } | undefined;
+  let chosen = "stage_consistent";
+  const write = (kind: string, steps: number | undefined) =>
+    form.change("controller.predictor", { [kind]: steps !== undefined ? { substeps: steps } : kind === "rk4" ? { substeps: 1 } : {} });
+  const field = numberField(
+    { label: "Sub-steps", title: "Runge-Kutta steps per sample; empty: chosen from the fastest pole", min: 1, max: SUBSTEPS, step: 1, cleared: () => write(chosen, undefined) },
+    (value) => write(chosen, value),
+  );
+  form.watch((setup) => {
+    chosen = kindOf(setup.controller.predictor) ?? "stage_consistent";
+    field.set(substeps(setup)?.substeps ?? NaN);
+  });
+  const choice = form.choice(
+    "controller.predictor",
+    { label: "Predictor" },
+    PREDICTORS,
+    (value) => kindOf(value as string | object | undefined) ?? "stage_consistent",
+    (kind) => ({ [kind]: kind === "rk4" ? { substeps: 1 } : {} }),
+  );
+  return [choice, field.element];
+}
+
+/** Estimator, delay, ramps, moves and motors. */
+export function feedbackFields(form: Form): HTMLElement[] {
+  return [
+    estimator(form),
+    form.number("controller.delay_s", { label: "Known delay", title: "The controller decides for the state at which its torque will act", unit: "ms", factor: 1e-3, min: 0, max: 60, step: 1, absent: 0 }),
+    form.table("controller.shaping", { label: "Set points as smooth moves" }, { tilt_rad: 0.1, phi_dot_rad_s: 8 },
+      form.number("controller.shaping.tilt_rad", { label: "Tilt", unit: "deg", factor: RAD_PER_DEG, min: 0.5, max: 20, step: 0.5 }),
+      form.number("controller.shaping.phi_dot_rad_s", { label: "Ball speed", unit: "rad/s", min: 0.5, max: 30, step: 0.5 })),
+    form.table("controller.torque_rate", { label: "Bounded torque rate" }, { limit_nm_s: 20, weight: 1 },
+      form.number("controller.torque_rate.limit_nm_s", { label: "Rate limit", unit: "N m/s", min: 1, max: 200, logarithmic: true, whenEmpty: Infinity }),
+      form.number("controller.torque_rate.weight", { label: "Rate weight", min: 0.001, max: 1000, logarithmic: true })),
+    form.table("controller.motors", { label: "Motor limits known" }, { limit_nm: 2 },
+      form.number("controller.motors.limit_nm", { label: "Each motor", unit: "N m", min: 0.1, max: 5, step: 0.1 }),
+      form.number("controller.motors.yaw_reserve_nm", { label: "Yaw reserve", unit: "N m", min: 0, max: 2, step: 0.1, absent: 0 })),
+  ];
+}
+
+function estimator(form: Form): HTMLElement {
+  const key = (name: string) => `controller.estimator.${name}`;
+  const disturbances = form.choice(
+    key("disturbances"),
+    { label: "Finds", title: "Constants that then leave no error in phi" },
+    [["default", "torque and tilt offset"], ["none", "nothing"], ["torque_and_tilt", "as in the file"]],
+    (value) => kindOf(value as string | object | undefined) ?? "default",
+    (kind) => (kind === "none" ? "none" : undefined),
+  );
+  return form.table("controller.estimator", { label: "Estimator (Kalman filter)" }, {},
+    form.optional(key("phi_noise_rad"), { label: "Noise phi", unit: "rad" }),
+    form.optional(key("theta_noise_rad"), { label: "Noise theta", unit: "rad" }),
+    form.optional(key("theta_dot_noise_rad_s"), { label: "Noise rate", unit: "rad/s" }),
+    form.optional(key("phi_dot_drift_rad_s"), { label: "Drift phi_dot", unit: "rad/s" }),
+    form.optional(key("theta_dot_drift_rad_s"), { label: "Drift theta_dot", unit: "rad/s" }),
+    form.optional(key("outlier_deviations"), { label: "Outliers", title: "Readings further off than this many standard deviations are not believed" }),
+    disturbances,
+  );
+}
+
+export function boundFields(form: Form): HTMLElement[] {
+  return [
+    form.range("bounds.phi_rad", { label: "phi", unit: "rad" }),
+    form.range("bounds.theta_rad", { label: "theta", unit: "rad" }),
+    form.range("bounds.phi_dot_rad_s", { label: "phi_dot", unit: "rad/s" }),
+    form.range("bounds.theta_dot_rad_s", { label: "theta_dot", unit: "rad/s" }),
+    form.range("bounds.torque_nm", { label: "torque", unit: "N m" }),
+  ];
+}

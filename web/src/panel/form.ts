@@ -1,0 +1,89 @@
+// Fields that show and change values of the set-up, each by its path.
+
+import { valueAt, type Range, type Scenario } from "../scenario";
+import { checkField, choiceField, numberField, rangeField, type FieldSpec, type NumberSpec } from "./fields";
+
+export interface FormNumber extends NumberSpec {
+  /** The set-up's unit over the field's. */
+  factor?: number;
+  /** Shown where the set-up has no value. */
+  absent?: number;
+  /** A second path that gets the same value. */
+  also?: string;
+}
+
+export class Form {
+  private readonly shows: ((setup: Scenario) => void)[] = [];
+
+  /** `change` sets a value of the set-up; `undefined` leaves the key out. */
+  constructor(readonly change: (path: string, value: unknown) => void) {}
+
+  show(setup: Scenario): void {
+    for (const show of this.shows) show(setup);
+  }
+
+  /** Calls back with every set-up that is shown. */
+  watch(show: (setup: Scenario) => void): void {
+    this.shows.push(show);
+  }
+
+  /** A number, in its own unit or in another one for people. */
+  number(path: string, spec: FormNumber): HTMLElement {
+    const factor = spec.factor ?? 1;
+    const field = numberField(spec, (value) => {
+      this.change(path, value * factor);
+      if (spec.also !== undefined) this.change(spec.also, value * factor);
+    });
+    this.watch((setup) => {
+      const value = valueAt(setup, path);
+      field.set((typeof value === "number" ? value : (spec.absent ?? NaN)) / factor);
+    });
+    return field.element;
+  }
+
+  /** A number that may be left to the controller: an empty field. */
+  optional(path: string, spec: FormNumber): HTMLElement {
+    return this.number(path, { ...spec, cleared: () => this.change(path, undefined) });
+  }
+
+  range(path: string, spec: FieldSpec): HTMLElement {
+    const field = rangeField(spec, (value) => this.change(path, value));
+    this.watch((setup) => field.set((valueAt(setup, path) as Range | undefined) ?? [-Infinity, Infinity]));
+    return field.element;
+  }
+
+  check(path: string, spec: FieldSpec & { absent: boolean }): HTMLElement {
+    const field = checkField(spec, (on) => this.change(path, on));
+    this.watch((setup) => field.set((valueAt(setup, path) as boolean | undefined) ?? spec.absent));
+    return field.element;
+  }
+
+  /** `read` says which choice a set-up has, `write` what a choice puts at the path. */
+  choice(
+    path: string,
+    spec: FieldSpec,
+    choices: [value: string, text: string][],
+    read: (value: unknown) => string,
+    write: (value: string) => unknown,
+  ): HTMLElement {
+    const field = choiceField(spec, choices, (value) => this.change(path, write(value)));
+    this.watch((setup) => field.set(read(valueAt(setup, path))));
+    return field.element;
+  }
+
+  /** A table that may be absent, with a box that puts it in; its fields are seen while it is there. */
+  table(path: string, spec: FieldSpec, initial: object, ...fields: HTMLElement[]): HTMLElement {
+    const box = checkField(spec, (on) => this.change(path, on ? initial : undefined));
+    const group = document.createElement("div");
+    group.className = "table";
+    group.append(...fields);
+    const whole = document.createElement("div");
+    whole.append(box.element, group);
+    this.watch((setup) => {
+      const present = valueAt(setup, path) !== undefined;
+      box.set(present);
+      group.hidden = !present;
+    });
+    return whole;
+  }
+}
