@@ -37,8 +37,8 @@ const PASSES: usize = 30;
 const GUARDED_SAMPLES: usize = 400;
 const HOLD: usize = 80;
 
-type Guarded = GuardedController<Ballbot<f64>, f64, 4, 1, 2, N, 5, { N + 2 }>;
-type Control = Controller<Ballbot<f64>, f64, 4, 1, 2, N, M>;
+type Guarded = GuardedController<Ballbot<f64>, f64, 4, 1, 3, N, 5, { N + 2 }>;
+type Control = Controller<Ballbot<f64>, f64, 4, 1, 3, N, M>;
 
 /// Statistics of a time over a sequence, in microseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -1,5 +1,7 @@
-//! The LPV embedding of the ballbot: scheduling (theta, theta_dot), matrices A_c and B_c
-//! (eq. (4) and the paper's Table of elements).
+//! The LPV embedding of the ballbot: scheduling (theta, theta_dot, phi_dot -
+//! theta_dot), matrices A_c and B_c (eq. (4) and the paper's Table of elements). The third
+//! scheduling parameter, the drive's speed, is for Coulomb friction alone, which the paper does not
+//! have.
 //!
 //! The table prints B31 with an unbalanced bracket; here it is r_b (b3 - k) / (r_w d), as
 //! M^-1 B~ gives. Its sinc(theta) is sin(theta)/theta.
@@ -7,11 +9,11 @@
 use crate::parameters::{Ballbot, Field};
 use crate::trigonometry::sin_cos;
 use lpvmpc::{LpvModel, Scalar};
-use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
+use nalgebra::{Matrix4, Vector1, Vector3, Vector4};
 
-/// The scheduling (theta, theta_dot), as the embedding's formulas need it.
+/// The scheduling as the embedding's formulas need it.
 #[derive(Clone, Copy, Debug)]
-pub struct Tilt<T> {
+pub struct Scheduled<T> {
     /// sin(theta).
     pub sin: T,
     /// cos(theta).
@@ -20,6 +22,8 @@ pub struct Tilt<T> {
     pub sinc: T,
     /// theta_dot, rad/s.
     pub rate: T,
+    /// The drive's friction at its speed, m^2/s: [`DriveFriction::coefficient`](crate::DriveFriction::coefficient).
+    pub drive: T,
     /// The number 1.
     pub one: T,
 }
@@ -36,7 +40,7 @@ pub struct Accelerations<T> {
 impl<T: Field> Ballbot<T> {
     /// The embedding's rows of the accelerations, on numbers or on sets of numbers.
     #[inline(always)]
-    pub fn accelerations(&self, tilt: Tilt<T>) -> Accelerations<T> {
+    pub fn accelerations(&self, at: Scheduled<T>) -> Accelerations<T> {
         let Self {
             b1,
             b3,
@@ -44,39 +48,52 @@ impl<T: Field> Ballbot<T> {
             geometry,
             ..
         } = *self;
-        let k = self.coupling(tilt.cos);
-        let inverse = tilt.one / self.determinant(k);
-        let gravity = geometry.centre_of_mass * geometry.gravity * tilt.sinc * inverse;
+        let k = self.coupling(at.cos);
+        let inverse = at.one / self.determinant(k);
+        let gravity = geometry.centre_of_mass * geometry.gravity * at.sinc * inverse;
         let centrifugal =
-            geometry.centre_of_mass * geometry.ball_radius * tilt.sin * tilt.rate * inverse;
+            geometry.centre_of_mass * geometry.ball_radius * at.sin * at.rate * inverse;
         let friction = -b4 * inverse;
         let torque = self.gear() * inverse;
+        // A unit of force in the drive accelerates ball and body so.
+        let (ball, body) = (b3 - k, k - b1);
+        let drive = at.drive * inverse;
+        let (ball_drive, body_drive) = (drive * ball, drive * body);
         Accelerations {
             a: [
-                [gravity * k, friction * b3, centrifugal * b3],
-                [gravity * b1, friction * k, centrifugal * k],
+                [
+                    gravity * k,
+                    friction * b3 - ball_drive,
+                    centrifugal * b3 + ball_drive,
+                ],
+                [
+                    gravity * b1,
+                    friction * k - body_drive,
+                    centrifugal * k + body_drive,
+                ],
             ],
-            b: [torque * (b3 - k), torque * (k - b1)],
+            b: [torque * ball, torque * body],
         }
     }
 }
 
-impl<T: Scalar> LpvModel<T, 4, 1, 2> for Ballbot<T> {
-    /// sigma(x) = (theta, theta_dot), rad and rad/s.
-    fn scheduling(&self, x: &Vector4<T>) -> Vector2<T> {
-        Vector2::new(x[1], x[3])
+impl<T: Scalar> LpvModel<T, 4, 1, 3> for Ballbot<T> {
+    /// sigma(x) = (theta, theta_dot, phi_dot - theta_dot), rad and rad/s.
+    fn scheduling(&self, x: &Vector4<T>) -> Vector3<T> {
+        Vector3::new(x[1], x[3], x[2] - x[3])
     }
 
     #[inline(always)]
-    fn matrices(&self, scheduling: &Vector2<T>) -> (Matrix4<T>, Vector4<T>) {
+    fn matrices(&self, scheduling: &Vector3<T>) -> (Matrix4<T>, Vector4<T>) {
         let (theta, theta_dot) = (scheduling[0], scheduling[1]);
         let (sin, cos) = sin_cos(theta);
         let (zero, one) = (T::zero(), T::one());
-        let Accelerations { a: [phi, body], b } = self.accelerations(Tilt {
+        let Accelerations { a: [phi, body], b } = self.accelerations(Scheduled {
             sin,
             cos,
             sinc: sinc(theta, sin),
             rate: theta_dot,
+            drive: self.drive.coefficient(scheduling[2]),
             one,
         });
         #[rustfmt::skip]

@@ -12,6 +12,7 @@ mod consistency;
 mod disturbed;
 mod dynamics;
 mod embedding;
+mod friction;
 mod heading;
 mod linear;
 mod parameters;
@@ -20,7 +21,8 @@ mod wheels;
 
 pub use consistency::Consistency;
 pub use disturbed::Disturbed;
-pub use embedding::{Accelerations, Tilt};
+pub use embedding::{Accelerations, Scheduled};
+pub use friction::{CREEP_SPEED, DriveFriction};
 pub use heading::Heading;
 pub use parameters::{Ballbot, Field, Geometry, LinearParameters, limits};
 pub use wheels::{BadZenithAngle, Wheels};

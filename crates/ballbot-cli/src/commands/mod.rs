@@ -11,6 +11,7 @@ pub mod lqr;
 pub mod model;
 pub mod refine;
 pub mod reproduce;
+pub mod robot;
 pub mod scenario;
 pub mod simulate;
 pub mod verify;

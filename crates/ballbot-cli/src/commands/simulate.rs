@@ -1,13 +1,14 @@
 //! `ballbot simulate`.
 
 use super::CommandError;
+use super::robot::RobotArguments;
 use crate::figures::{Figure, Role};
 use crate::output;
 use crate::pictures::{self, Shown};
 use crate::progress::Progress;
 use crate::recording::{self, Columns, Metrics};
 use crate::table::Table;
-use ballbot_scenario::{Prepared, Scenario, Surroundings, words};
+use ballbot_scenario::{Prepared, Surroundings, words};
 use clap::Args;
 use lpvmpc_sim::{Ending, LogRow, Recording, Trajectory};
 use std::path::{Path, PathBuf};
@@ -26,6 +27,9 @@ figure as SVG and PNG. --log adds what the sensors of `[world]` delivered. A run
 pub struct SimulateArguments {
     /// A built-in scenario or a TOML file
     pub scenario: String,
+    /// The robot.
+    #[command(flatten)]
+    pub robot: RobotArguments,
     /// Folder for the results [default: out/SCENARIO]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -39,9 +43,8 @@ pub struct SimulateArguments {
 /// # Errors
 /// The scenario is not valid, a file cannot be written, or the run ended early.
 pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
-    let scenario = Scenario::load(&arguments.scenario)?;
+    let prepared = arguments.robot.prepare(&arguments.scenario)?;
     let file = Path::new(&arguments.scenario);
-    let prepared = scenario.prepare(file.parent().unwrap_or(Path::new(".")))?;
     let name = file.file_stem().unwrap_or(file.as_os_str());
     let folder = match &arguments.out {
         Some(folder) => folder.clone(),
@@ -157,8 +160,25 @@ fn write(
         .map(|(path, content)| (path.as_path(), content.as_slice()))
         .collect();
     output::write_files(&files)?;
-    Ok(())
+    // What an earlier run of another kind left in the folder would be taken for this one's.
+    let written = |name: &str| files.iter().any(|(path, _)| path.ends_with(name));
+    let stale = RESULTS.into_iter().filter(|name| !written(name));
+    Ok(output::remove_files(stale.map(|name| folder.join(name)))?)
 }
+
+/// All files that a run can leave in its folder.
+const RESULTS: [&str; 10] = [
+    "trajectory.csv",
+    "trajectory_x.csv",
+    "trajectory_y.csv",
+    "motors.csv",
+    "figure.svg",
+    "figure.png",
+    "path.svg",
+    "path.png",
+    "motors.svg",
+    "motors.png",
+];
 
 /// The figures with their names; none when a plane has no sample to draw.
 fn figures(prepared: &Prepared, trajectories: &[Trajectory<4, 1>]) -> Vec<(&'static str, Figure)> {
