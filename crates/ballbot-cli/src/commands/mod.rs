@@ -10,6 +10,7 @@ pub mod linearize;
 pub mod lqr;
 pub mod model;
 pub mod refine;
+pub mod rehearse;
 pub mod reproduce;
 pub mod robot;
 pub mod scenario;

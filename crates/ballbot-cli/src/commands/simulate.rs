@@ -23,7 +23,8 @@ Examples:
   ballbot simulate my.toml               a file made by `ballbot scenario show NAME`
 
 Writes trajectory.csv (for two planes trajectory_x.csv, trajectory_y.csv and motors.csv) and a
-figure as SVG and PNG. --log adds what the sensors of `[world]` delivered. A run that ends early keeps what it recorded, and exits with 1.")]
+figure as SVG and PNG, in place of those of an earlier run in the same folder. --log adds what the
+sensors of `[world]` delivered. A run that ends early keeps what it recorded, and exits with 1.")]
 pub struct SimulateArguments {
     /// A built-in scenario or a TOML file
     pub scenario: String,
@@ -43,6 +44,25 @@ pub struct SimulateArguments {
 /// # Errors
 /// The scenario is not valid, a file cannot be written, or the run ended early.
 pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
+    Ok(complete(arguments)?.summary)
+}
+
+/// A run that came to its end.
+#[derive(Clone, Debug)]
+pub struct Simulated {
+    /// What was run.
+    pub prepared: Prepared,
+    /// What happened in each plane.
+    pub trajectories: Vec<Trajectory<4, 1>>,
+    /// Its numbers, for people.
+    pub summary: String,
+}
+
+/// [`run`] with all that is known of it.
+///
+/// # Errors
+/// As [`run`].
+pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError> {
     let prepared = arguments.robot.prepare(&arguments.scenario)?;
     let file = Path::new(&arguments.scenario);
     let name = file.file_stem().unwrap_or(file.as_os_str());
@@ -69,7 +89,11 @@ pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
         .zip(&trajectories)
         .find(|(_, run)| run.ending != Ending::Complete);
     match early {
-        None => Ok(summary),
+        None => Ok(Simulated {
+            prepared,
+            trajectories,
+            summary,
+        }),
         Some((what, run)) => Err(CommandError::EndedEarly {
             what,
             ending: words::ending(&run.ending),

@@ -58,7 +58,7 @@ fn the_continuous_regulator_of_b() {
 
 #[test]
 fn the_sampled_regulators_of_b() {
-    let one = of_refined(&[]);
+    let one = of_refined(&["--substeps", "1"]);
     assert_eq!(one["time"]["t_s"], 0.05);
     assert_eq!(one["time"]["substeps"], 1);
     assert_close(
