@@ -3,7 +3,7 @@
 use crate::error::ScenarioError;
 use crate::number::{finite, positive};
 use crate::schema::{BoundsTable, ParameterTable};
-use crate::uncertainty::{IdentificationTable, Uncertainty};
+use crate::uncertainty::Uncertainty;
 use ballbot::{Ballbot, DriveFriction, Geometry, Wheels};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, Visitor};
@@ -63,7 +63,7 @@ pub struct KnownRobot {
 #[derive(Deserialize)]
 struct ParameterFile {
     parameters: ParameterTable,
-    identification: Option<IdentificationTable>,
+    identification: Option<Uncertainty>,
 }
 
 impl Parameters {
@@ -71,8 +71,8 @@ impl Parameters {
     /// looked for in `directory`.
     ///
     /// # Errors
-    /// A file that cannot be read or has no such table, a number that is not finite, a length
-    /// that is not positive, or a covariance that is none.
+    /// A file that cannot be read or has no such table, a number that is not finite, or a
+    /// length that is not positive.
     pub fn read(&self, key: &str, directory: &Path) -> Result<KnownRobot, ScenarioError> {
         match self {
             Self::Table(table) => table.robot(key),
@@ -95,9 +95,8 @@ impl Parameters {
 fn robot_in(text: &str) -> Result<KnownRobot, ScenarioError> {
     let file: ParameterFile = toml::from_str(text)
         .map_err(|error| ScenarioError::ParameterFile(error.to_string().trim_end().to_owned()))?;
-    let uncertainty = file.identification.as_ref().map(Uncertainty::new);
     Ok(KnownRobot {
-        uncertainty: uncertainty.transpose()?,
+        uncertainty: file.identification,
         ..file.parameters.robot("parameters")?
     })
 }
