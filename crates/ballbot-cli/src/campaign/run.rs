@@ -190,7 +190,7 @@ pub(super) fn has_fallen(x: &Vector4<f64>) -> bool {
     !(x[1].abs() < std::f64::consts::FRAC_PI_2)
 }
 
-fn settings(prepared: &Prepared) -> Result<&GuardedSettings<f64, 4, 1>, ScenarioError> {
+pub(super) fn settings(prepared: &Prepared) -> Result<&GuardedSettings<f64, 4, 1>, ScenarioError> {
     prepared.guarded.as_ref().ok_or_else(no_certificate)
 }
 

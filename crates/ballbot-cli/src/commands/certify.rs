@@ -136,7 +136,6 @@ fn search(
 fn problem(
     arguments: &CertifyArguments,
     prepared: &Prepared,
-    robot: RobotTable,
     size: f64,
 ) -> CertificateProblem<4, 1, 2> {
     let settings = &prepared.settings;
@@ -161,6 +160,7 @@ fn problem(
 fn certify(
     arguments: &CertifyArguments,
     prepared: &Prepared,
+    robot: RobotTable,
     size: f64,
 ) -> Result<Certified, CertifyError> {
     let problem = problem(arguments, prepared, size);
