@@ -2,7 +2,7 @@
 
 use crate::error::ScenarioError;
 use crate::schema::is_zero;
-use ballbot::{Accelerations, Ballbot, DriveFriction, Geometry, Scheduled};
+use ballbot::{Accelerations, Ballbot, DriveFriction, Geometry, Tilt};
 use lpvmpc::LpvModel;
 use lpvmpc_design::{AnalyticModel, Arithmetic, Certificate};
 use nalgebra::{Matrix4, Vector2, Vector3, Vector4};
@@ -101,15 +101,20 @@ impl AnalyticModel<4, 1, 2> for RobotTable {
     fn matrices<T: Arithmetic>(&self, &[theta, rate]: &[T; 2]) -> ([[T; 4]; 4], [[T; 1]; 4]) {
         let (zero, one) = (T::constant(0.0), T::constant(1.0));
         let robot = self.lift(T::constant);
-        let at = Scheduled {
+        let tilt = Tilt {
             sin: theta.sin(),
             cos: theta.cos(),
             sinc: theta.sinc(),
             rate,
-            drive: robot.drive.viscous,
             one,
         };
-        let Accelerations { a: [phi, body], b } = robot.accelerations(at);
+        let bare = robot.accelerations(tilt);
+        let Accelerations { a: [phi, body], b } = if self.drive_friction_m2_s == 0.0 {
+            bare
+        } else {
+            let gear = robot.geometry.ball_radius / robot.geometry.wheel_radius;
+            bare.with_drive_friction(robot.drive.viscous / gear)
+        };
         let a = [
             [zero, zero, one, zero],
             [zero, zero, zero, one],

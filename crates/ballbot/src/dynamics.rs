@@ -63,7 +63,12 @@ impl<T: Scalar> Ballbot<T> {
     /// friction at the speed phi_dot - theta_dot (rad/s).
     #[inline(always)]
     pub(crate) fn driving_force(&self, torque: T, speed: T) -> T {
-        self.gear() * torque - self.drive.coefficient(speed) * speed
+        let driven = self.gear() * torque;
+        if self.drive.is_none() {
+            driven
+        } else {
+            driven - self.drive.coefficient(speed) * speed
+        }
     }
 
     /// M^-1 (force_phi, force_theta) in rad/s^2, for generalised forces in m^2/s^2.

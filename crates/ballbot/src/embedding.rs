@@ -11,9 +11,9 @@ use crate::trigonometry::sin_cos;
 use lpvmpc::{LpvModel, Scalar};
 use nalgebra::{Matrix4, Vector1, Vector3, Vector4};
 
-/// The scheduling as the embedding's formulas need it.
+/// The scheduling (theta, theta_dot), as the embedding's formulas need it.
 #[derive(Clone, Copy, Debug)]
-pub struct Scheduled<T> {
+pub struct Tilt<T> {
     /// sin(theta).
     pub sin: T,
     /// cos(theta).
@@ -22,8 +22,6 @@ pub struct Scheduled<T> {
     pub sinc: T,
     /// theta_dot, rad/s.
     pub rate: T,
-    /// The drive's friction at its speed, m^2/s: [`DriveFriction::coefficient`](crate::DriveFriction::coefficient).
-    pub drive: T,
     /// The number 1.
     pub one: T,
 }
@@ -38,9 +36,10 @@ pub struct Accelerations<T> {
 }
 
 impl<T: Field> Ballbot<T> {
-    /// The embedding's rows of the accelerations, on numbers or on sets of numbers.
+    /// The embedding's rows of the accelerations, on numbers or on sets of numbers, without friction
+    /// in the drive.
     #[inline(always)]
-    pub fn accelerations(&self, at: Scheduled<T>) -> Accelerations<T> {
+    pub fn accelerations(&self, tilt: Tilt<T>) -> Accelerations<T> {
         let Self {
             b1,
             b3,
@@ -48,31 +47,42 @@ impl<T: Field> Ballbot<T> {
             geometry,
             ..
         } = *self;
-        let k = self.coupling(at.cos);
-        let inverse = at.one / self.determinant(k);
-        let gravity = geometry.centre_of_mass * geometry.gravity * at.sinc * inverse;
+        let k = self.coupling(tilt.cos);
+        let inverse = tilt.one / self.determinant(k);
+        let gravity = geometry.centre_of_mass * geometry.gravity * tilt.sinc * inverse;
         let centrifugal =
-            geometry.centre_of_mass * geometry.ball_radius * at.sin * at.rate * inverse;
+            geometry.centre_of_mass * geometry.ball_radius * tilt.sin * tilt.rate * inverse;
         let friction = -b4 * inverse;
         let torque = self.gear() * inverse;
-        // A unit of force in the drive accelerates ball and body so.
-        let (ball, body) = (b3 - k, k - b1);
-        let drive = at.drive * inverse;
-        let (ball_drive, body_drive) = (drive * ball, drive * body);
         Accelerations {
             a: [
-                [
-                    gravity * k,
-                    friction * b3 - ball_drive,
-                    centrifugal * b3 + ball_drive,
-                ],
-                [
-                    gravity * b1,
-                    friction * k - body_drive,
-                    centrifugal * k + body_drive,
-                ],
+                [gravity * k, friction * b3, centrifugal * b3],
+                [gravity * b1, friction * k, centrifugal * k],
             ],
-            b: [torque * ball, torque * body],
+            b: [torque * (b3 - k), torque * (k - b1)],
+        }
+    }
+}
+
+impl<T: Field> Accelerations<T> {
+    /// The same with a drive that loses `coefficient` (N m s/rad) times its speed phi_dot - theta_dot
+    /// of its torque.
+    #[inline(always)]
+    pub fn with_drive_friction(self, coefficient: T) -> Self {
+        let Self {
+            a: [[gravity, rolling, centrifugal], [pull, drag, swing]],
+            b: [ball, body],
+        } = self;
+        Self {
+            a: [
+                [
+                    gravity,
+                    rolling - coefficient * ball,
+                    centrifugal + coefficient * ball,
+                ],
+                [pull, drag - coefficient * body, swing + coefficient * body],
+            ],
+            b: [ball, body],
         }
     }
 }
@@ -88,14 +98,18 @@ impl<T: Scalar> LpvModel<T, 4, 1, 3> for Ballbot<T> {
         let (theta, theta_dot) = (scheduling[0], scheduling[1]);
         let (sin, cos) = sin_cos(theta);
         let (zero, one) = (T::zero(), T::one());
-        let Accelerations { a: [phi, body], b } = self.accelerations(Scheduled {
+        let bare = self.accelerations(Tilt {
             sin,
             cos,
             sinc: sinc(theta, sin),
             rate: theta_dot,
-            drive: self.drive.coefficient(scheduling[2]),
             one,
         });
+        let Accelerations { a: [phi, body], b } = if self.drive.is_none() {
+            bare
+        } else {
+            bare.with_drive_friction(self.drive.coefficient(scheduling[2]) / self.gear())
+        };
         #[rustfmt::skip]
         let a = Matrix4::new(
             zero, zero,    one,     zero,

@@ -36,20 +36,18 @@ impl<T: Scalar> DriveFriction<T> {
         }
     }
 
-    /// F(v)/v at the speed `speed` = phi_dot - theta_dot in rad/s: m^2/s.
+    /// Whether there is none: such robots pay for this question alone.
     #[inline(always)]
-    pub fn coefficient(&self, speed: T) -> T {
-        if self.coulomb == T::zero() {
-            self.viscous
-        } else {
-            self.viscous + self.coulomb_coefficient(speed)
-        }
+    pub(crate) fn is_none(&self) -> bool {
+        self.viscous == T::zero() && self.coulomb == T::zero()
     }
 
-    // Not inlined, so that robots without it pay for the question alone.
+    /// F(v)/v at the speed `speed` = phi_dot - theta_dot in rad/s: m^2/s.
+    // Neither inlined nor expected, so that robots without friction keep their registers.
+    #[cold]
     #[inline(never)]
-    fn coulomb_coefficient(&self, speed: T) -> T {
+    pub fn coefficient(&self, speed: T) -> T {
         let creep: T = convert(CREEP_SPEED);
-        self.coulomb / (speed * speed + creep * creep).sqrt()
+        self.viscous + self.coulomb / (speed * speed + creep * creep).sqrt()
     }
 }

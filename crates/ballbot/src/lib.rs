@@ -21,7 +21,7 @@ mod wheels;
 
 pub use consistency::Consistency;
 pub use disturbed::Disturbed;
-pub use embedding::{Accelerations, Scheduled};
+pub use embedding::{Accelerations, Tilt};
 pub use friction::{CREEP_SPEED, DriveFriction};
 pub use heading::Heading;
 pub use parameters::{Ballbot, Field, Geometry, LinearParameters, limits};
