@@ -43,10 +43,11 @@ impl<T: Scalar> DriveFriction<T> {
     }
 
     /// F(v)/v at the speed `speed` = phi_dot - theta_dot in rad/s: m^2/s.
-    // Neither inlined nor expected, so that robots without friction keep their registers.
+    // Neither inlined nor expected, and by value, so that robots without friction keep their
+    // registers and what was read from memory.
     #[cold]
     #[inline(never)]
-    pub fn coefficient(&self, speed: T) -> T {
+    pub fn coefficient(self, speed: T) -> T {
         let creep: T = convert(CREEP_SPEED);
         self.viscous + self.coulomb / (speed * speed + creep * creep).sqrt()
     }
