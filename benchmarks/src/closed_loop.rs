@@ -14,7 +14,7 @@ pub const N: usize = 20;
 /// A torque bound per stage, and the four rows of a terminal equality.
 pub const M: usize = N + 4;
 
-type Control = Controller<Ballbot<f64>, f64, 4, 1, 2, N, M>;
+type Control = Controller<Ballbot<f64>, f64, 4, 1, 3, N, M>;
 
 /// A closed loop, sample by sample.
 pub struct Recording {

@@ -14,7 +14,7 @@ pub const N: usize = 20;
 pub const M: usize = N;
 
 /// The controller of one plane.
-pub type Controller = lpvmpc::Controller<ballbot::Ballbot<f32>, f32, 4, 1, 2, N, M>;
+pub type Controller = lpvmpc::Controller<ballbot::Ballbot<f32>, f32, 4, 1, 3, N, M>;
 
 /// The reference over the horizon of one plane.
 pub type Reference = lpvmpc::Reference<f32, 4, N>;

@@ -50,7 +50,7 @@ pub struct Plane {
 
 impl Recording {
     /// The scenario's controller settings, rounded to `f32`.
-    pub fn settings(&self) -> ControllerSettings<f32, 4, 1, 2> {
+    pub fn settings(&self) -> ControllerSettings<f32, 4, 1, 3> {
         let [lower, upper] = self.torque.map(Vector1::new);
         ControllerSettings {
             t_s: self.t_s,

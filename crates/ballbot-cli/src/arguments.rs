@@ -4,8 +4,8 @@ use crate::commands::{
     bench::BenchArguments, campaign::CampaignArguments, certify::CertifyArguments,
     completions::CompletionsArguments, excite::ExciteArguments, identify::IdentifyArguments,
     linearize::LinearizeArguments, lqr::LqrArguments, refine::RefineArguments,
-    reproduce::ReproduceArguments, scenario::ScenarioArguments, simulate::SimulateArguments,
-    verify::VerifyArguments, view::ViewArguments,
+    rehearse::RehearseArguments, reproduce::ReproduceArguments, scenario::ScenarioArguments,
+    simulate::SimulateArguments, verify::VerifyArguments, view::ViewArguments,
 };
 use clap::{Parser, Subcommand};
 
@@ -45,6 +45,8 @@ pub enum Command {
     Excite(ExciteArguments),
     /// Find a robot's parameters, with error bars, from its logs
     Identify(IdentifyArguments),
+    /// From an excitation to a controller, on a simulated robot
+    Rehearse(RehearseArguments),
     /// Find the nonlinear model's parameters b from a linear model's parameters p
     Refine(RefineArguments),
     /// Show the linear model: A, B, poles, controllability

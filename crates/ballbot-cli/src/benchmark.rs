@@ -6,7 +6,7 @@
 
 use crate::commands::CommandError;
 use ballbot::Ballbot;
-use ballbot_scenario::{GUARDED_ACTIVE, Prepared, Scenario, ScenarioError};
+use ballbot_scenario::{GUARDED_ACTIVE, Prepared, Scenario, ScenarioError, number};
 use lpvmpc::{
     Controller, GuardedController, GuardedIterations, GuardedWorkspace, Reference, Solution,
     Solver, TerminalIngredient, Workspace,
@@ -37,8 +37,8 @@ const PASSES: usize = 30;
 const GUARDED_SAMPLES: usize = 400;
 const HOLD: usize = 80;
 
-type Guarded = GuardedController<Ballbot<f64>, f64, 4, 1, 2, N, 5, { N + 2 }>;
-type Control = Controller<Ballbot<f64>, f64, 4, 1, 2, N, M>;
+type Guarded = GuardedController<Ballbot<f64>, f64, 4, 1, 3, N, 5, { N + 2 }>;
+type Control = Controller<Ballbot<f64>, f64, 4, 1, 3, N, M>;
 
 /// Statistics of a time over a sequence, in microseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -55,7 +55,7 @@ pub struct Times {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SequenceTimes {
     /// The scenario.
-    pub name: &'static str,
+    pub name: String,
     /// The quadratic program alone.
     pub qp_us: Times,
     /// The whole step: scheduling, predictor, quadratic program, rollout.
@@ -139,18 +139,27 @@ pub fn time_guarded() -> Result<GuardedTimes, CommandError> {
     })
 }
 
-/// Times one built-in scenario.
+/// Times the controller of a scenario, without what stands around it, on the scenario's robot
+/// in an ideal world.
 ///
 /// # Errors
-/// The controller refuses its settings or the plant cannot be integrated.
-pub fn time(name: &'static str) -> Result<SequenceTimes, CommandError> {
-    let prepared = Scenario::load(name)?.prepare(Path::new("."))?;
+/// The horizon is longer than what is compiled in here, the controller refuses its settings or
+/// the plant cannot be integrated.
+pub fn time(name: &str, prepared: &Prepared) -> Result<SequenceTimes, CommandError> {
+    let horizon = prepared.settings.horizon;
+    let expected = format!("horizons of up to {N} samples are timed");
+    number::check(
+        "controller.horizon",
+        horizon as f64,
+        horizon <= N,
+        &expected,
+    )?;
     let mut record = Record::default();
     for plane in 0..prepared.planes.len() {
-        time_plane(&prepared, plane, &mut record)?;
+        time_plane(prepared, plane, &mut record)?;
     }
     Ok(SequenceTimes {
-        name,
+        name: name.to_owned(),
         qp_us: Times::new(record.qp),
         step_us: Times::new(record.step),
         max_active: record.max_active,
@@ -176,7 +185,7 @@ fn time_plane(prepared: &Prepared, plane: usize, record: &mut Record) -> Result<
         let at = |i: usize| plane.state_reference((k + i) as f64 * t_s);
         let reference = Reference {
             stages: std::array::from_fn(at),
-            terminal: at(N),
+            terminal: at(prepared.settings.horizon),
         };
         let before = controller.clone();
         let step = shortest(|| {

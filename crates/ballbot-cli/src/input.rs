@@ -2,8 +2,7 @@
 
 use ballbot::Ballbot;
 use ballbot_identification::ConfigError;
-use ballbot_scenario::{ParameterTable, ScenarioError};
-use serde::Deserialize;
+use ballbot_scenario::ScenarioError;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
@@ -27,16 +26,12 @@ pub enum InputError {
         message: String,
     },
     /// A value that makes no sense.
-    #[error("{}: {key} = {value}: {expected}", path.display())]
+    #[error("{}: {source}", path.display())]
     Value {
         /// The file.
         path: PathBuf,
-        /// The key with its table.
-        key: String,
-        /// What was given.
-        value: f64,
-        /// What would be right.
-        expected: &'static str,
+        /// Key, value and what would be right.
+        source: ScenarioError,
     },
     /// A configuration of an identification that makes no sense.
     #[error("{}: {source}", path.display())]
@@ -45,14 +40,6 @@ pub enum InputError {
         path: PathBuf,
         /// Key, value and what would be right.
         source: ConfigError,
-    },
-    /// Parameters that make no sense.
-    #[error("{}: {source}", path.display())]
-    Parameters {
-        /// The file.
-        path: PathBuf,
-        /// Key, value and what would be right.
-        source: ScenarioError,
     },
 }
 
@@ -78,34 +65,16 @@ pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, InputError> {
     })
 }
 
-/// Other tables may stand beside this one, so that a scenario file will do.
-#[derive(Deserialize)]
-struct WithParameters {
-    parameters: ParameterTable,
-}
-
-/// The robot in the `[parameters]` table of a file.
-///
-/// # Errors
-/// As [`read_toml`], or a parameter makes no sense.
-pub fn read_parameters(path: &Path) -> Result<Ballbot<f64>, InputError> {
-    let file: WithParameters = read_toml(path)?;
-    file.parameters
-        .ballbot()
-        .map_err(|source| InputError::Parameters {
-            path: path.to_owned(),
-            source,
-        })
-}
-
 /// The robot with the keys of a `[parameters]` table.
-pub fn parameter_entries(ballbot: &Ballbot<f64>) -> [(&'static str, f64); 8] {
+pub fn parameter_entries(ballbot: &Ballbot<f64>) -> [(&'static str, f64); 10] {
     let geometry = &ballbot.geometry;
     [
         ("b1_m2", ballbot.b1),
         ("b2_m2", ballbot.b2),
         ("b3_m2", ballbot.b3),
         ("b4_m2_s", ballbot.b4),
+        ("drive_friction_m2_s", ballbot.drive.viscous),
+        ("drive_coulomb_m2_s2", ballbot.drive.coulomb),
         ("centre_of_mass_m", geometry.centre_of_mass),
         ("ball_radius_m", geometry.ball_radius),
         ("wheel_radius_m", geometry.wheel_radius),

@@ -41,6 +41,7 @@ pub fn run(arguments: Arguments) -> Result<String, CommandError> {
         Command::Scenario(arguments) => commands::scenario::run(&arguments),
         Command::Excite(arguments) => commands::excite::run(&arguments),
         Command::Identify(arguments) => commands::identify::run(&arguments),
+        Command::Rehearse(arguments) => commands::rehearse::run(&arguments),
         Command::Refine(arguments) => commands::refine::run(&arguments),
         Command::Linearize(arguments) => commands::linearize::run(&arguments),
         Command::Lqr(arguments) => commands::lqr::run(&arguments),

@@ -35,6 +35,22 @@ pub fn write_files(files: &[(&Path, &[u8])]) -> Result<(), FileError> {
     result
 }
 
+/// Removes files, those that are there.
+///
+/// # Errors
+/// The first file that could not be removed.
+pub fn remove_files(paths: impl IntoIterator<Item = PathBuf>) -> Result<(), FileError> {
+    for path in paths {
+        match fs::remove_file(&path) {
+            Err(source) if source.kind() != io::ErrorKind::NotFound => {
+                return Err(FileError { path, source });
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
 fn write_then_rename(files: &[(&Path, &[u8])], temporary: &[PathBuf]) -> Result<(), FileError> {
     let failed = |path: &Path| {
         let path = path.to_owned();

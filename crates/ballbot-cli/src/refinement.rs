@@ -1,7 +1,7 @@
 //! The nonlinear model's parameters b from the parameters p of a linear model, by least squares
 //! on F(b) = p - h(b) (section IV-A of Karachalios and Abbas).
 
-use ballbot::{Ballbot, Consistency, Geometry, LinearParameters, limits};
+use ballbot::{Ballbot, Consistency, DriveFriction, Geometry, LinearParameters, limits};
 use lpvmpc_design::{
     Fit, LeastSquaresError, LeastSquaresSettings, MatrixError, ResidualModel, gauss_newton,
     levenberg_marquardt,
@@ -122,6 +122,7 @@ impl RefinementProblem {
             b2: b[1],
             b3: b[2],
             b4: b[3],
+            drive: DriveFriction::none(),
             geometry: self.geometry,
         }
     }
@@ -176,6 +177,7 @@ mod tests {
             b2: 0.03,
             b3: 0.31,
             b4: 0.4,
+            drive: DriveFriction::none(),
             geometry: Geometry {
                 centre_of_mass: 0.45,
                 ball_radius: 0.1,

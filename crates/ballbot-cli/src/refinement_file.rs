@@ -3,7 +3,7 @@
 use crate::input::{self, InputError};
 use crate::refinement::{RefinementProblem, start_from};
 use ballbot::Geometry;
-use ballbot_scenario::LinearModelTable;
+use ballbot_scenario::{LinearModelTable, ScenarioError, number};
 use lpvmpc_design::LeastSquaresSettings;
 use nalgebra::DVector;
 use serde::Deserialize;
@@ -91,33 +91,35 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
+    fn named<T>(&self, checked: Result<T, ScenarioError>) -> Result<T, InputError> {
+        checked.map_err(|source| InputError::Value {
+            path: self.path.to_owned(),
+            source,
+        })
+    }
+
     fn value(
         &self,
         table: &str,
         key: &str,
         value: f64,
         right: bool,
-        expected: &'static str,
+        expected: &str,
     ) -> Result<f64, InputError> {
-        if right {
-            return Ok(value);
-        }
-        Err(InputError::Value {
-            path: self.path.to_owned(),
-            key: format!("{table}.{key}"),
+        self.named(number::check(
+            &format!("{table}.{key}"),
             value,
+            right,
             expected,
-        })
+        ))
     }
 
     fn finite(&self, table: &str, key: &str, value: f64) -> Result<f64, InputError> {
-        let expected = "it must be a finite number";
-        self.value(table, key, value, value.is_finite(), expected)
+        self.named(number::finite(&format!("{table}.{key}"), value))
     }
 
     fn positive(&self, table: &str, key: &str, value: f64) -> Result<f64, InputError> {
-        let right = value.is_finite() && value > 0.0;
-        self.value(table, key, value, right, "it must be a positive number")
+        self.named(number::positive(&format!("{table}.{key}"), value))
     }
 
     fn linear(&self, table: LinearModelTable) -> Result<LinearModelTable, InputError> {

@@ -7,7 +7,7 @@ use lpvmpc_design::{
     FrozenError, FrozenStability, Lqr, RiccatiError, Rk4Step, Rk4StepError, SchedulingGrid,
     check_rk4_step, frozen_stability, lqr_continuous, lqr_discrete,
 };
-use nalgebra::{DMatrix, DVector, Matrix4, RowVector4, Vector2, Vector4};
+use nalgebra::{DMatrix, DVector, Matrix4, RowVector4, Vector3, Vector4};
 
 /// What is to be designed: the gain for the cost x'Q x + R u^2.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,7 +46,7 @@ pub struct Regulator {
     /// The predictor's step, in sampled time.
     pub step: Option<Rk4Step>,
     /// The slowest of the loops A(s) - B(s) K over |theta| <= pi/3, |theta_dot| <= 2 pi.
-    pub frozen: FrozenStability<2>,
+    pub frozen: FrozenStability<3>,
 }
 
 /// Why there is no regulator.
@@ -68,6 +68,8 @@ pub enum RegulatorError {
 
 /// Grid points in each direction; odd, so that upright is one of them.
 const GRID: usize = 41;
+/// Speeds of a drive with Coulomb friction.
+const SPEEDS: usize = 5;
 
 impl RegulatorProblem {
     /// Designs the gain and checks it.
@@ -101,13 +103,22 @@ impl RegulatorProblem {
         LinearModel::from(predictor.discretize(&a, &b, t_s))
     }
 
-    fn frozen(&self, lqr: &Lqr) -> Result<FrozenStability<2>, RegulatorError> {
+    fn frozen(&self, lqr: &Lqr) -> Result<FrozenStability<3>, RegulatorError> {
         let motion = self.ballbot.consistency(limits::THETA);
         if !motion.mass_invertible {
             return Err(RegulatorError::Motion(motion.to_string()));
         }
-        let upper = Vector2::new(limits::THETA, limits::THETA_DOT);
-        let grid = SchedulingGrid::new(-upper, upper, [GRID, GRID])?;
+        let (tilt, rate) = (limits::THETA, limits::THETA_DOT);
+        // Coulomb friction damps most at rest, and is the same for both directions.
+        let (fastest, speeds) = match self.ballbot.drive.coulomb {
+            0.0 => (0.0, 1),
+            _ => (limits::PHI_DOT + limits::THETA_DOT, SPEEDS),
+        };
+        let grid = SchedulingGrid::new(
+            Vector3::new(-tilt, -rate, 0.0),
+            Vector3::new(tilt, rate, fastest),
+            [GRID, GRID, speeds],
+        )?;
         let k = RowVector4::from_column_slice(lqr.k.as_slice());
         Ok(frozen_stability(&self.ballbot, &k, &grid)?)
     }

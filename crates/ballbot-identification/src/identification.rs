@@ -3,6 +3,7 @@
 use crate::config::Config;
 use crate::estimate::{Estimate, EstimateError, Progress, Task};
 use crate::log::{Finding, Log, Run};
+use crate::model::Robot;
 use crate::noise;
 use crate::parameter::{Choice, Parameter, Values};
 use crate::poles::{Pole, linear_model, uncertain_poles};
@@ -171,8 +172,8 @@ impl Identification {
     }
 
     /// The plant in the project's own form, whose torque is in N m: the torque gain is part of the
-    /// virtual wheel's radius, r_w / gain, since torque enters by r_b / r_w alone. Drive friction,
-    /// Coulomb friction, delay and biases are not part of it.
+    /// virtual wheel's radius, r_w / gain, since torque enters by r_b / r_w alone. Delay and
+    /// biases are not part of it.
     pub fn ballbot(&self) -> Ballbot<f64> {
         ballbot(&self.estimate.values, self.geometry)
     }
@@ -204,14 +205,12 @@ impl Identification {
 
 /// See [`Identification::ballbot`].
 pub fn ballbot(values: &Values, geometry: Geometry<f64>) -> Ballbot<f64> {
+    let plant = Robot::new(*values, geometry).plant;
     Ballbot {
-        b1: values[Parameter::B1],
-        b2: values[Parameter::B2],
-        b3: values[Parameter::B3],
-        b4: values[Parameter::RollingFriction],
         geometry: Geometry {
             wheel_radius: geometry.wheel_radius / values[Parameter::TorqueGain],
             ..geometry
         },
+        ..plant
     }
 }

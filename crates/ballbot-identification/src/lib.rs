@@ -33,7 +33,7 @@ pub use coordinates::{Coordinates, LONGEST_DELAY};
 pub use estimate::{Estimate, EstimateError, Progress, Status, Task};
 pub use excitation::{Excitation, ExcitationError, ExcitationTask};
 pub use identification::{Identification, ballbot, identify};
-pub use model::{COULOMB_SPEED, LONGEST_STEP, Robot, Segment, SegmentedRuns};
+pub use model::{LONGEST_STEP, Robot, Segment, SegmentedRuns};
 pub use parameter::{Choice, Parameter, Values};
 pub use poles::{Pole, linear_model, uncertain_poles};
 pub use published::{LinearRegression, regression};

@@ -3,14 +3,9 @@
 use crate::coordinates::Coordinates;
 use crate::log::{BallAngle, Run};
 use crate::parameter::{Parameter, Values};
-use ballbot::{Ballbot, Geometry};
+use ballbot::{Ballbot, DriveFriction, Geometry};
 use lpvmpc_design::ShootingModel;
 use nalgebra::{Vector3, Vector4};
-
-/// A speed in the drive that is small against those of a moving robot, rad/s: Coulomb friction
-/// rises from its negative to its positive value over a few of it. A jump would make the fit
-/// discontinuous in the state.
-pub const COULOMB_SPEED: f64 = 0.1;
 
 /// The longest step of the integration, s. The fastest mode of a robot whose body weighs more than
 /// its ball is slower than 1 kHz: one step is well within the stability limit, and for the 50 1/s
@@ -20,7 +15,7 @@ pub const LONGEST_STEP: f64 = 2e-3;
 /// A robot with its drive and sensors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Robot {
-    /// The plant without the drive's friction.
+    /// The plant, per unit of body mass: its torque is what the torque gain makes of the logged one.
     pub plant: Ballbot<f64>,
     /// All parameters, those of the plant included.
     pub values: Values,
@@ -35,6 +30,10 @@ impl Robot {
                 b2: values[Parameter::B2],
                 b3: values[Parameter::B3],
                 b4: values[Parameter::RollingFriction],
+                drive: DriveFriction {
+                    viscous: values[Parameter::DriveFriction],
+                    coulomb: values[Parameter::DriveCoulomb],
+                },
                 geometry,
             },
             values,
@@ -42,20 +41,11 @@ impl Robot {
     }
 
     /// x_dot at the state (phi, theta, phi_dot, theta_dot) under a torque that acts, N m.
-    ///
-    /// The drive's friction acts through [1, -1], as the torque does, so it is part of the torque.
     #[inline(always)]
     pub fn f(&self, x: &Vector4<f64>, torque: f64) -> Vector4<f64> {
-        let speed = x[2] - x[3];
-        let coulomb = self.values[Parameter::DriveCoulomb];
-        let mut friction = self.values[Parameter::DriveFriction] * speed;
-        if coulomb != 0.0 {
-            friction += coulomb * (speed / COULOMB_SPEED).tanh();
-        }
-        let gear = self.plant.geometry.ball_radius / self.plant.geometry.wheel_radius;
         let driving =
             self.values[Parameter::TorqueGain] * (torque + self.values[Parameter::TorqueBias]);
-        self.plant.f(x, driving - friction / gear)
+        self.plant.f(x, driving)
     }
 
     /// The state `duration` seconds later under a constant torque: one Runge-Kutta step of order 4.

@@ -16,9 +16,10 @@ impl Identification {
         let _ = write!(
             text,
             "# A ballbot identified by `ballbot identify`.\n\
-             # `ballbot lqr --parameters` and `ballbot linearize --parameters` take this file; for \
-             `ballbot simulate`\n# copy [parameters] into the scenario.\n\n\
+             # Scenarios take it as `parameters = \"this file\"`, and all commands with a robot as \
+             `--parameters`.\n\n\
              [parameters]\nb1_m2 = {:?}\nb2_m2 = {:?}\nb3_m2 = {:?}\nb4_m2_s = {:?}\n\
+             drive_friction_m2_s = {:?}\ndrive_coulomb_m2_s2 = {:?}\n\
              centre_of_mass_m = {:?}\nball_radius_m = {:?}\n\
              # r_w / gain = {:?} / {:?}: torque enters by r_b / r_w alone, so the gain (1 / body mass) is\n\
              # in it, and the model's torque is in N m.\n\
@@ -27,6 +28,8 @@ impl Identification {
             robot.b2,
             robot.b3,
             robot.b4,
+            robot.drive.viscous,
+            robot.drive.coulomb,
             geometry.centre_of_mass,
             geometry.ball_radius,
             self.geometry.wheel_radius,

@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// The counter finds it by its name.
 #[inline(never)]
 fn counted_step(
-    controller: &mut Controller<Ballbot<f64>, f64, 4, 1, 2, N, N>,
+    controller: &mut Controller<Ballbot<f64>, f64, 4, 1, 3, N, N>,
     x: &Vector4<f64>,
     reference: &Reference<f64, 4, N>,
     workspace: &mut Workspace<f64, 4, 1, N, N>,

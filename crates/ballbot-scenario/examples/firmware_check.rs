@@ -235,7 +235,7 @@ fn check_recording<'a>(
 /// The controller of one plane in `f64`, with its own past.
 struct Replay<'a> {
     plane: &'a Plane,
-    controller: Box<Controller<Ballbot<f64>, f64, 4, 1, 2, 20, 20>>,
+    controller: Box<Controller<Ballbot<f64>, f64, 4, 1, 3, 20, 20>>,
     workspace: Box<Workspace<f64, 4, 1, 20, 20>>,
 }
 

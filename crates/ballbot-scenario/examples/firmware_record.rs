@@ -9,7 +9,7 @@
 //! ```
 
 use ballbot::{Ballbot, Geometry};
-use ballbot_scenario::{Plane, Prepared, Scenario, Surroundings};
+use ballbot_scenario::{Parameters, Plane, Prepared, Scenario, Surroundings};
 use lpvmpc::TerminalIngredient;
 use lpvmpc_sim::Trajectory;
 use std::error::Error;
@@ -32,12 +32,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         "//! The scenario `{name}` and its first {samples} samples in closed loop.\n\
          //! Written by `firmware_record {name} {samples}`, an example of `ballbot-scenario`.\n\n\
          use crate::recording::{{Plane, Recording}};\n\
-         use ballbot::{{Ballbot, Geometry}};\n\n\
+         use ballbot::{{Ballbot, DriveFriction, Geometry}};\n\n\
          /// The recording.\n\
          pub const RECORDING: Recording = Recording {{\n    name: {name:?},\n"
     );
     write_robot(&mut text, &prepared.ballbot)?;
-    let zenith_angle = scenario.parameters.zenith_angle_deg.to_radians();
+    let Parameters::Table(robot) = &scenario.parameters else {
+        return Err("the firmware takes a scenario with its own table of parameters".into());
+    };
+    let zenith_angle = robot.zenith_angle_deg.to_radians();
     writeln!(text, "    zenith_angle: {},", literal(zenith_angle))?;
     write_settings(&mut text, &prepared)?;
     writeln!(text, "    planes: &[")?;
@@ -69,6 +72,13 @@ fn write_robot(text: &mut String, robot: &Ballbot<f64>) -> std::fmt::Result {
         ("b4", robot.b4),
     ];
     fields(text, "        ", &b)?;
+    writeln!(text, "        drive: DriveFriction {{")?;
+    let friction = [
+        ("viscous", robot.drive.viscous),
+        ("coulomb", robot.drive.coulomb),
+    ];
+    fields(text, "            ", &friction)?;
+    writeln!(text, "        }},")?;
     writeln!(text, "        geometry: Geometry {{")?;
     let lengths = [
         ("centre_of_mass", centre_of_mass),

@@ -1,14 +1,19 @@
 //! The ballbot in a certificate of a terminal set.
 
-use ballbot::{Accelerations, Ballbot, Geometry, Tilt};
+use crate::error::ScenarioError;
+use crate::schema::is_zero;
+use ballbot::{Accelerations, Ballbot, DriveFriction, Geometry, Tilt};
+use lpvmpc::LpvModel;
 use lpvmpc_design::{AnalyticModel, Arithmetic, Certificate};
+use nalgebra::{Matrix4, Vector2, Vector3, Vector4};
 use serde::{Deserialize, Serialize};
 
 /// The certificate of a ballbot's terminal set: states (phi, theta, phi_dot, theta_dot), torque,
 /// scheduling (theta, theta_dot).
 pub type TerminalCertificate = Certificate<RobotTable, 4, 1, 2>;
 
-/// The parameters that the motion of one plane depends on; see [`ballbot::Ballbot`].
+/// The parameters that the motion of one plane depends on; see [`ballbot::Ballbot`]. Robots with
+/// Coulomb friction have no such table: without them the scheduling is (theta, theta_dot).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RobotTable {
@@ -20,6 +25,9 @@ pub struct RobotTable {
     pub b3_m2: f64,
     /// b4, m^2/s.
     pub b4_m2_s: f64,
+    /// The drive's viscous friction, m^2/s; 0 when absent.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub drive_friction_m2_s: f64,
     /// l, m.
     pub centre_of_mass_m: f64,
     /// r_b, m.
@@ -30,19 +38,32 @@ pub struct RobotTable {
     pub gravity_m_s2: f64,
 }
 
-impl From<&Ballbot<f64>> for RobotTable {
-    fn from(ballbot: &Ballbot<f64>) -> Self {
+impl TryFrom<&Ballbot<f64>> for RobotTable {
+    type Error = ScenarioError;
+
+    /// # Errors
+    /// The robot has Coulomb friction.
+    fn try_from(ballbot: &Ballbot<f64>) -> Result<Self, ScenarioError> {
+        let coulomb = ballbot.drive.coulomb;
+        if coulomb != 0.0 {
+            return Err(ScenarioError::value(
+                "parameters.drive_coulomb_m2_s2",
+                coulomb,
+                "there are no certificates for robots with Coulomb friction; leave it out",
+            ));
+        }
         let geometry = &ballbot.geometry;
-        Self {
+        Ok(Self {
             b1_m2: ballbot.b1,
             b2_m2: ballbot.b2,
             b3_m2: ballbot.b3,
             b4_m2_s: ballbot.b4,
+            drive_friction_m2_s: ballbot.drive.viscous,
             centre_of_mass_m: geometry.centre_of_mass,
             ball_radius_m: geometry.ball_radius,
             wheel_radius_m: geometry.wheel_radius,
             gravity_m_s2: geometry.gravity,
-        }
+        })
     }
 }
 
@@ -53,6 +74,10 @@ impl RobotTable {
             b2: constant(self.b2_m2),
             b3: constant(self.b3_m2),
             b4: constant(self.b4_m2_s),
+            drive: DriveFriction {
+                viscous: constant(self.drive_friction_m2_s),
+                coulomb: constant(0.0),
+            },
             geometry: Geometry {
                 centre_of_mass: constant(self.centre_of_mass_m),
                 ball_radius: constant(self.ball_radius_m),
@@ -63,8 +88,8 @@ impl RobotTable {
     }
 
     /// The robot.
-    pub fn ballbot(&self) -> Ballbot<f64> {
-        self.lift(|value| value)
+    pub fn ballbot(&self) -> ViscousBallbot {
+        ViscousBallbot(self.lift(|value| value))
     }
 }
 
@@ -75,6 +100,7 @@ impl AnalyticModel<4, 1, 2> for RobotTable {
 
     fn matrices<T: Arithmetic>(&self, &[theta, rate]: &[T; 2]) -> ([[T; 4]; 4], [[T; 1]; 4]) {
         let (zero, one) = (T::constant(0.0), T::constant(1.0));
+        let robot = self.lift(T::constant);
         let tilt = Tilt {
             sin: theta.sin(),
             cos: theta.cos(),
@@ -82,7 +108,13 @@ impl AnalyticModel<4, 1, 2> for RobotTable {
             rate,
             one,
         };
-        let Accelerations { a: [phi, body], b } = self.lift(T::constant).accelerations(tilt);
+        let bare = robot.accelerations(tilt);
+        let Accelerations { a: [phi, body], b } = if self.drive_friction_m2_s == 0.0 {
+            bare
+        } else {
+            let gear = robot.geometry.ball_radius / robot.geometry.wheel_radius;
+            bare.with_drive_friction(robot.drive.viscous / gear)
+        };
         let a = [
             [zero, zero, one, zero],
             [zero, zero, zero, one],
@@ -90,5 +122,22 @@ impl AnalyticModel<4, 1, 2> for RobotTable {
             [zero, body[0], body[1], body[2]],
         ];
         (a, [[zero], [zero], [b[0]], [b[1]]])
+    }
+}
+
+/// A ballbot without Coulomb friction, so that the scheduling is (theta, theta_dot).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ViscousBallbot(Ballbot<f64>);
+
+impl LpvModel<f64, 4, 1, 2> for ViscousBallbot {
+    /// sigma(x) = (theta, theta_dot), rad and rad/s.
+    fn scheduling(&self, x: &Vector4<f64>) -> Vector2<f64> {
+        Vector2::new(x[1], x[3])
+    }
+
+    fn matrices(&self, scheduling: &Vector2<f64>) -> (Matrix4<f64>, Vector4<f64>) {
+        // The drive's speed is for Coulomb friction alone.
+        let scheduling = Vector3::new(scheduling[0], scheduling[1], 0.0);
+        self.0.matrices(&scheduling)
     }
 }

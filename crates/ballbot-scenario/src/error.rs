@@ -49,9 +49,20 @@ pub enum ScenarioError {
         /// What would be right.
         expected: String,
     },
-    /// A reference file that makes no sense.
-    #[error("reference file {}{}: {problem}", path.display(), line.map_or(String::new(), |line| format!(", line {line}")))]
-    ReferenceFile {
+    /// A file of parameters is not TOML, or has no such table.
+    #[error("a file of parameters needs a table [parameters]:\n{0}")]
+    ParameterFile(String),
+    /// What is wrong in another file.
+    #[error("{}: {source}", path.display())]
+    InFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: Box<Self>,
+    },
+    /// A CSV file that makes no sense.
+    #[error("file {}{}: {problem}", path.display(), line.map_or(String::new(), |line| format!(", line {line}")))]
+    CsvFile {
         /// The file.
         path: PathBuf,
         /// The line, where the problem has one.

@@ -4,9 +4,9 @@ use crate::error::ScenarioError;
 use crate::feedback_table::{
     DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
 };
-use crate::prepare::{dynamic, positive};
+use crate::number::{not_negative, positive};
+use crate::problem::dynamic;
 use crate::schema::{ControllerTable, TerminalTable};
-use crate::world::not_negative;
 use ballbot::{Ballbot, Wheels};
 use lpvmpc::{
     Bounds, ControllerSettings, EstimatorSettings, Gate, LpvModel, MoveLimits, RampedInput,
@@ -27,7 +27,7 @@ pub struct Feedback {
     /// Time from a measurement to the torque that answers it, s.
     pub delay: f64,
     /// The controller of the plant whose input is the torque's rate.
-    pub ramp: Option<ControllerSettings<f64, 5, 1, 2>>,
+    pub ramp: Option<ControllerSettings<f64, 5, 1, 3>>,
     /// Whether the controller sees the reference before its time.
     pub preview: bool,
 }
@@ -50,7 +50,7 @@ impl Feedback {
     pub(crate) fn new(
         table: &ControllerTable,
         ballbot: &Ballbot<f64>,
-        settings: &ControllerSettings<f64, 4, 1, 2>,
+        settings: &ControllerSettings<f64, 4, 1, 3>,
     ) -> Result<Self, ScenarioError> {
         let estimator = table.estimator.as_ref();
         let ramp = table.torque_rate.as_ref();
@@ -69,7 +69,7 @@ impl Feedback {
 
 /// The longest step in s with which the estimator follows this robot.
 pub(crate) fn longest_step(ballbot: &Ballbot<f64>) -> Result<f64, ScenarioError> {
-    let (a, _) = ballbot.matrices(&Vector2::zeros());
+    let (a, _) = ballbot.matrices(&Vector3::zeros());
     let poles = lpvmpc_design::poles(&dynamic(&a))
         .map_err(|error| ScenarioError::value("parameters", "(all)", error.to_string()))?;
     let fastest = poles.iter().map(|pole| pole.norm()).fold(1.0, f64::max);
@@ -152,7 +152,7 @@ fn check_offset_free(
     ballbot: &Ballbot<f64>,
 ) -> Result<(), ScenarioError> {
     // x_dot = A (x + E_x d) + B (u + E_u d).
-    let (a, b) = ballbot.matrices(&Vector2::zeros());
+    let (a, b) = ballbot.without_coulomb().matrices(&Vector3::zeros());
     let b_d = a * settings.state_offset + b * settings.input_offset;
     let [a, b_d] = [dynamic(&a), dynamic(&b_d)];
     let [c, c_d] = [
@@ -174,8 +174,8 @@ impl TorqueRateTable {
         &self,
         terminal: &TerminalTable,
         ballbot: &Ballbot<f64>,
-        plain: &ControllerSettings<f64, 4, 1, 2>,
-    ) -> Result<ControllerSettings<f64, 5, 1, 2>, ScenarioError> {
+        plain: &ControllerSettings<f64, 4, 1, 3>,
+    ) -> Result<ControllerSettings<f64, 5, 1, 3>, ScenarioError> {
         let limit = self.limit_nm_s;
         if !(limit > 0.0) {
             return Err(ScenarioError::value(
@@ -194,8 +194,8 @@ impl TorqueRateTable {
             TerminalTable::None => TerminalIngredient::Cost(Matrix5::zeros()),
             TerminalTable::Equality => TerminalIngredient::Equality,
             TerminalTable::DiscreteRiccati | TerminalTable::Certified(_) => {
-                let model = RampedInput::<_, 4>(*ballbot);
-                let (a, b): (Matrix5<f64>, Vector5<f64>) = model.matrices(&Vector2::zeros());
+                let model = RampedInput::<_, 4>(ballbot.without_coulomb());
+                let (a, b): (Matrix5<f64>, Vector5<f64>) = model.matrices(&Vector3::zeros());
                 let (a, b) = plain.predictor.discretize(&a, &b, plain.t_s);
                 let [a, b, q] = [dynamic(&a), dynamic(&b), dynamic(&weights.q)];
                 let lqr = lpvmpc_design::lqr_discrete(&a, &b, &q, &dynamic(&weights.r))?;

@@ -2,9 +2,11 @@
 
 use crate::certificate::TerminalCertificate;
 use crate::error::ScenarioError;
+use crate::excitation::Excitation;
 use crate::guarantee;
-use crate::reference_file;
+use crate::parameters::{self, KnownRobot};
 use crate::schema::{CsvTable, PointTable};
+use crate::time_series::TimeSeries;
 use std::path::Path;
 
 /// Where reference files and certificates come from: a folder, or, in a browser, the page.
@@ -21,15 +23,41 @@ pub trait Files {
     /// # Errors
     /// The file cannot be read or is not as it was written.
     fn certificate(&self, file: Option<&str>) -> Result<TerminalCertificate, ScenarioError>;
+
+    /// The robot in the table `[parameters]` of a TOML file.
+    ///
+    /// # Errors
+    /// The file cannot be read or has no such table, or a number makes no sense.
+    fn robot(&self, file: &Path) -> Result<KnownRobot, ScenarioError>;
+
+    /// A torque on top of the loop's, from a file of `ballbot excite`.
+    ///
+    /// # Errors
+    /// The file cannot be read, or a row makes no sense.
+    fn excitation(&self, file: &Path) -> Result<Excitation, ScenarioError>;
 }
 
 /// The folder that paths are relative to.
 impl Files for &Path {
     fn reference(&self, file: &CsvTable, duration: f64) -> Result<Vec<PointTable>, ScenarioError> {
-        reference_file::read(file, duration, self)
+        let columns = [file.time_column.as_str(), file.phi_column.as_str()];
+        let series = TimeSeries::read(self.join(&file.path), columns)?;
+        series.check_covers(duration)?;
+        let points = series
+            .rows()
+            .map(|(time_s, phi_rad)| PointTable { time_s, phi_rad });
+        Ok(points.collect())
     }
 
     fn certificate(&self, file: Option<&str>) -> Result<TerminalCertificate, ScenarioError> {
         guarantee::read(file, self)
+    }
+
+    fn robot(&self, file: &Path) -> Result<KnownRobot, ScenarioError> {
+        parameters::read(file, self)
+    }
+
+    fn excitation(&self, file: &Path) -> Result<Excitation, ScenarioError> {
+        Excitation::read(self.join(file))
     }
 }

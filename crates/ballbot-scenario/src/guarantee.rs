@@ -4,8 +4,9 @@
 use crate::certificate::TerminalCertificate;
 use crate::error::ScenarioError;
 use crate::files::Files;
-use crate::prepare::dynamic;
-use crate::schema::CertifiedTable;
+use crate::problem::dynamic;
+use crate::run::GUARDED_HORIZONS;
+use crate::schema::{CertifiedTable, ControllerTable, ModelKind, TerminalTable};
 use crate::{RobotTable, builtin};
 use ballbot::Ballbot;
 use lpvmpc::{
@@ -24,6 +25,39 @@ const MARGIN: f64 = 1e-3;
 const SEARCH: usize = 30;
 /// Price of a state bound exceeded by its width, in largest terminal costs of the set.
 const SOFT_PRICE: f64 = 1e3;
+
+impl ControllerTable {
+    /// The guarded controller's settings, where the terminal set is certified.
+    pub(crate) fn guarded(
+        &self,
+        ballbot: &Ballbot<f64>,
+        settings: &ControllerSettings<f64, 4, 1, 3>,
+        files: &dyn Files,
+    ) -> Result<Option<GuardedSettings<f64, 4, 1>>, ScenarioError> {
+        let TerminalTable::Certified(table) = &self.terminal else {
+            return Ok(None);
+        };
+        if self.model == ModelKind::Linear {
+            return Err(ScenarioError::value(
+                "controller.model",
+                "linear",
+                "a guarantee needs the nonlinear prediction, \"lpv\"",
+            ));
+        }
+        let guarded = table.settings(ballbot, settings, files)?;
+        if !GUARDED_HORIZONS.contains(&self.horizon) {
+            return Err(ScenarioError::value(
+                "controller.horizon",
+                self.horizon,
+                format!(
+                    "with a certified terminal set it must be one of {GUARDED_HORIZONS:?} samples \
+                     (the library itself takes any compile-time size)"
+                ),
+            ));
+        }
+        Ok(Some(guarded))
+    }
+}
 
 /// A certificate, as it was written. It is not proved again here: `ballbot verify` does.
 pub(crate) fn read(
@@ -59,10 +93,10 @@ impl CertifiedTable {
     ///
     /// # Errors
     /// The certificate cannot be read, or is none of this robot, cost and bounds.
-    pub(crate) fn settings(
+    fn settings(
         &self,
         ballbot: &Ballbot<f64>,
-        plain: &ControllerSettings<f64, 4, 1, 2>,
+        plain: &ControllerSettings<f64, 4, 1, 3>,
         files: &dyn Files,
     ) -> Result<GuardedSettings<f64, 4, 1>, ScenarioError> {
         let Predictor::StageConsistent(rk4) = plain.predictor else {
@@ -119,7 +153,7 @@ fn check_plant(
     ballbot: &Ballbot<f64>,
     t_s: f64,
 ) -> Result<(), ScenarioError> {
-    let robot = RobotTable::from(ballbot);
+    let robot = RobotTable::try_from(ballbot)?;
     if certificate.plant != robot {
         return Err(ScenarioError::value(
             "parameters",
@@ -144,7 +178,7 @@ fn check_cost(
     weights: &Weights<f64, 4, 1>,
 ) -> Result<(), ScenarioError> {
     let rest = certificate.q - weights.q;
-    if dynamic(&rest).symmetric_eigenvalues().min() < 0.0 {
+    if rest.symmetric_eigenvalues().min() < 0.0 {
         return Err(ScenarioError::value(
             "controller.q",
             numbers(&weights.q.diagonal()),
@@ -171,7 +205,7 @@ fn check_cost(
 /// largest |x_i|.
 fn check_bounds(
     terminal: &TerminalSet<f64, 4, 1>,
-    plain: &ControllerSettings<f64, 4, 1, 2>,
+    plain: &ControllerSettings<f64, 4, 1, 3>,
 ) -> Result<Vector4<f64>, ScenarioError> {
     let inverse = dynamic(&terminal.p).try_inverse().ok_or_else(|| {
         ScenarioError::value(

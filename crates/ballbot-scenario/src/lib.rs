@@ -26,28 +26,36 @@
 pub mod builtin;
 mod certificate;
 mod error;
+mod excitation;
 mod feedback;
 mod feedback_table;
 mod files;
 mod guarantee;
+mod load;
+pub mod number;
 mod output_feedback;
+mod parameters;
 mod prepare;
+mod problem;
 mod reference;
-mod reference_file;
 mod run;
 mod schema;
 mod session;
+mod time_series;
+mod uncertainty;
 pub mod words;
 mod world;
 mod world_table;
 
-pub use certificate::{RobotTable, TerminalCertificate};
+pub use certificate::{RobotTable, TerminalCertificate, ViscousBallbot};
 pub use error::ScenarioError;
+pub use excitation::Excitation;
 pub use feedback::Feedback;
 pub use feedback_table::{
     DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
 };
 pub use files::Files;
+pub use parameters::{KnownRobot, Parameters};
 pub use prepare::{Plane, Prepared};
 pub use reference::PhiReference;
 pub use run::{GUARDED_ACTIVE, GUARDED_HORIZONS, LONGEST_HORIZON, PlaneLoop, Surroundings};
@@ -57,6 +65,7 @@ pub use schema::{
     ReferenceTable, Scenario, SineTable, StateTable, TerminalTable,
 };
 pub use session::{Phase, Session, Trouble};
+pub use uncertainty::Uncertainty;
 pub use world::{PlaneWorld, Robot};
 pub use world_table::{
     ActuatorTable, AngleSensorTable, DelayTable, DeviationsTable, FloorTable, PlaneName, PushTable,

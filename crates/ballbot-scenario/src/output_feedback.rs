@@ -36,17 +36,17 @@ pub(crate) enum Belief {
         x: Vector4<f64>,
     },
     /// From the filter.
-    Estimated(Box<Estimator<Ballbot<f64>, f64, 4, 1, 2, 3, 2>>),
+    Estimated(Box<Estimator<Ballbot<f64>, f64, 4, 1, 3, 3, 2>>),
 }
 
 /// The controller's model: torque, or rate of the torque.
 pub(crate) enum Core<const N: usize, const M: usize> {
     Held {
-        controller: Box<Controller<Ballbot<f64>, f64, 4, 1, 2, N, M>>,
+        controller: Box<Controller<Ballbot<f64>, f64, 4, 1, 3, N, M>>,
         workspace: Box<Workspace<f64, 4, 1, N, M>>,
     },
     Ramped {
-        controller: Box<Controller<RampedInput<Ballbot<f64>, 4>, f64, 5, 1, 2, N, M>>,
+        controller: Box<Controller<RampedInput<Ballbot<f64>, 4>, f64, 5, 1, 3, N, M>>,
         workspace: Box<Workspace<f64, 5, 1, N, M>>,
         /// The model's torque, N m, and its rate, N m/s.
         torque: f64,
@@ -123,14 +123,14 @@ struct Plan<const NX: usize> {
 impl<const NX: usize> Plan<NX> {
     /// One step of `controller`. The part of the state beyond the robot's is to be zero.
     fn step<P, const N: usize, const M: usize>(
-        controller: &mut Controller<P, f64, NX, 1, 2, N, M>,
+        controller: &mut Controller<P, f64, NX, 1, 3, N, M>,
         workspace: &mut Workspace<f64, NX, 1, N, M>,
         x: &SVector<f64, NX>,
         reference: &dyn Fn(usize) -> Vector4<f64>,
         clock: &dyn Fn() -> Duration,
     ) -> Self
     where
-        P: LpvModel<f64, NX, 1, 2>,
+        P: LpvModel<f64, NX, 1, 3>,
     {
         let horizon = controller.settings().horizon;
         let at = |i: usize| {

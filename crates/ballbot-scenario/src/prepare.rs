@@ -3,37 +3,28 @@
 use crate::error::ScenarioError;
 use crate::feedback::Feedback;
 use crate::files::Files;
-use crate::reference::{self, PhiReference, finite};
-use crate::schema::{
-    BoundsTable, ControllerTable, IterationsTable, LinearModelTable, ModelKind, ParameterTable,
-    PredictorTable, Scenario, StateTable, TerminalTable,
-};
+use crate::number::{finite, positive};
+use crate::parameters::check_motion;
+use crate::reference::{self, PhiReference};
+use crate::schema::{Scenario, StateTable};
 use crate::world::PlaneWorld;
 use crate::world_table::PlaneName;
-use crate::{
-    builtin,
-    run::{GUARDED_HORIZONS, LONGEST_HORIZON},
-};
-use ballbot::{Ballbot, Geometry, LinearParameters, Wheels};
-use lpvmpc::{
-    Bounds, ControllerSettings, GuardedSettings, Iterations, LpvModel, Predictor, Rk4, Scheduling,
-    SolverSettings, TerminalIngredient, Weights,
-};
+use ballbot::{Ballbot, Wheels};
+use lpvmpc::{ControllerSettings, GuardedSettings};
 use lpvmpc_sim::Tolerances;
-use nalgebra::{DMatrix, Matrix1, Matrix4, Vector1, Vector2, Vector4};
-use std::path::Path;
+use nalgebra::Vector4;
 
 /// A scenario that has passed all checks.
 #[derive(Clone, Debug)]
 pub struct Prepared {
     /// One line for figures and lists.
     pub title: String,
-    /// Plant and prediction model.
+    /// The prediction model.
     pub ballbot: Ballbot<f64>,
     /// The torque map to the motors.
     pub wheels: Wheels<f64>,
     /// The controller's settings.
-    pub settings: ControllerSettings<f64, 4, 1, 2>,
+    pub settings: ControllerSettings<f64, 4, 1, 3>,
     /// What stands around the controller.
     pub feedback: Feedback,
     /// Where the terminal set is certified: the settings of the guarded controller, which then
@@ -66,39 +57,8 @@ impl Plane {
 }
 
 impl Scenario {
-    /// A built-in scenario by its name, or a scenario file by its path.
-    ///
-    /// # Errors
-    /// [`ScenarioError::Unknown`], `Read` or `Syntax`.
-    pub fn load(name_or_path: &str) -> Result<Self, ScenarioError> {
-        if let Some(builtin) = builtin::find(name_or_path) {
-            return Self::parse(builtin.text, builtin.name);
-        }
-        let path = Path::new(name_or_path);
-        let looks_like_a_path = path.extension().is_some() || path.components().count() > 1;
-        if !path.exists() && !looks_like_a_path {
-            return Err(ScenarioError::unknown(name_or_path));
-        }
-        let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Read {
-            path: path.to_owned(),
-            source,
-        })?;
-        Self::parse(&text, name_or_path)
-    }
-
-    /// A scenario from the text of a TOML file; `origin` names it in messages.
-    ///
-    /// # Errors
-    /// [`ScenarioError::Syntax`] with line and column.
-    pub fn parse(text: &str, origin: &str) -> Result<Self, ScenarioError> {
-        toml::from_str(text).map_err(|error| ScenarioError::Syntax {
-            origin: origin.to_owned(),
-            message: error.to_string(),
-        })
-    }
-
-    /// Checks everything and works out what the file leaves to be computed. Reference files
-    /// and certificates are looked for in `files`, a folder as a rule.
+    /// Checks everything and works out what the file leaves to be computed. Files that
+    /// it names are looked for in `files`, a folder as a rule.
     ///
     /// # Errors
     /// A [`ScenarioError`] with key, value and what would be right.
@@ -108,8 +68,12 @@ impl Scenario {
 
     fn prepare_with(&self, files: &dyn Files) -> Result<Prepared, ScenarioError> {
         let duration = positive("duration_s", self.duration_s)?;
-        let ballbot = self.parameters.ballbot()?;
-        let wheels = self.parameters.wheels()?;
+        let model = self.parameters.read("parameters", files)?;
+        let (ballbot, wheels) = (model.ballbot, model.wheels);
+        let real = match &self.world {
+            Some(world) => world.real_robot(&model, files)?,
+            None => ballbot,
+        };
         let bounds = self.bounds.check()?;
         let bounds = match &self.controller.motors {
             Some(motors) => (bounds.0, motors.within(&bounds.1, &wheels)?),
@@ -163,7 +127,7 @@ impl Scenario {
             wheels,
             settings,
             feedback,
-            planes: self.planes(references, &ballbot, settings.t_s, tolerances)?,
+            planes: self.planes(references, &real, (settings.t_s, tolerances), files)?,
             guarded,
             samples: samples as usize,
             tolerances,
@@ -173,9 +137,9 @@ impl Scenario {
     fn planes(
         &self,
         references: Vec<PhiReference>,
-        ballbot: &Ballbot<f64>,
-        t_s: f64,
-        tolerances: Tolerances,
+        robot: &Ballbot<f64>,
+        (t_s, tolerances): (f64, Tolerances),
+        files: &dyn Files,
     ) -> Result<Vec<Plane>, ScenarioError> {
         let first = self.initial_state.check("initial_state")?;
         let second = match self.initial_state_y {
@@ -194,8 +158,8 @@ impl Scenario {
         planes
             .map(|(reference, (name, initial_state))| {
                 let world = match &self.world {
-                    None => PlaneWorld::ideal(*ballbot, t_s, tolerances),
-                    Some(table) => table.prepare(name, ballbot, t_s, tolerances)?,
+                    None => PlaneWorld::ideal(*robot, t_s, tolerances),
+                    Some(table) => table.prepare(name, robot, t_s, tolerances, files)?,
                 };
                 // What falls over must be integrable on its way to the floor.
                 check_motion(&world.robot.mechanics.ballbot, &self.bounds)?;
@@ -212,75 +176,6 @@ impl Scenario {
 /// A run of more samples would not fit in memory with its record.
 const MOST_SAMPLES: f64 = 1e7;
 
-pub(crate) fn positive(key: &str, value: f64) -> Result<f64, ScenarioError> {
-    if value > 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(ScenarioError::value(
-            key,
-            value,
-            "it must be a positive number",
-        ))
-    }
-}
-
-impl ParameterTable {
-    /// The robot.
-    ///
-    /// # Errors
-    /// [`ScenarioError::Value`] for a number that is not finite or a length that is not
-    /// positive.
-    pub fn ballbot(&self) -> Result<Ballbot<f64>, ScenarioError> {
-        finite("parameters.b1_m2", self.b1_m2)?;
-        finite("parameters.b2_m2", self.b2_m2)?;
-        finite("parameters.b3_m2", self.b3_m2)?;
-        finite("parameters.b4_m2_s", self.b4_m2_s)?;
-        Ok(Ballbot {
-            b1: self.b1_m2,
-            b2: self.b2_m2,
-            b3: self.b3_m2,
-            b4: self.b4_m2_s,
-            geometry: Geometry {
-                centre_of_mass: positive("parameters.centre_of_mass_m", self.centre_of_mass_m)?,
-                ball_radius: positive("parameters.ball_radius_m", self.ball_radius_m)?,
-                wheel_radius: positive("parameters.wheel_radius_m", self.wheel_radius_m)?,
-                gravity: positive("parameters.gravity_m_s2", self.gravity_m_s2)?,
-            },
-        })
-    }
-
-    fn wheels(&self) -> Result<Wheels<f64>, ScenarioError> {
-        Wheels::new(self.zenith_angle_deg.to_radians()).map_err(|error| {
-            ScenarioError::value(
-                "parameters.zenith_angle_deg",
-                self.zenith_angle_deg,
-                error.to_string(),
-            )
-        })
-    }
-}
-
-impl From<LinearModelTable> for LinearParameters<f64> {
-    fn from(table: LinearModelTable) -> Self {
-        let LinearModelTable {
-            p1,
-            p2,
-            p3,
-            p4,
-            p5,
-            p6,
-        } = table;
-        Self {
-            p1,
-            p2,
-            p3,
-            p4,
-            p5,
-            p6,
-        }
-    }
-}
-
 impl StateTable {
     fn check(&self, key: &str) -> Result<Vector4<f64>, ScenarioError> {
         finite(&format!("{key}.phi_rad"), self.phi_rad)?;
@@ -294,222 +189,4 @@ impl StateTable {
             self.theta_dot_rad_s,
         ))
     }
-}
-
-impl BoundsTable {
-    fn check(&self) -> Result<(Bounds<f64, 4>, Bounds<f64, 1>), ScenarioError> {
-        let rows = [
-            ("phi_rad", self.phi_rad),
-            ("theta_rad", self.theta_rad),
-            ("phi_dot_rad_s", self.phi_dot_rad_s),
-            ("theta_dot_rad_s", self.theta_dot_rad_s),
-            ("torque_nm", self.torque_nm),
-        ];
-        for (key, [lower, upper]) in rows {
-            // Negated, so that a bound that is not a number fails.
-            if !(lower <= upper) || lower == f64::INFINITY || upper == f64::NEG_INFINITY {
-                return Err(ScenarioError::value(
-                    format!("bounds.{key}"),
-                    format!("[{lower}, {upper}]"),
-                    "the lower bound must not be above the upper one; use -inf and inf for none",
-                ));
-            }
-        }
-        let side = |i: usize| {
-            Vector4::new(
-                self.phi_rad[i],
-                self.theta_rad[i],
-                self.phi_dot_rad_s[i],
-                self.theta_dot_rad_s[i],
-            )
-        };
-        let x = Bounds {
-            lower: side(0),
-            upper: side(1),
-        };
-        let u = Bounds {
-            lower: Vector1::new(self.torque_nm[0]),
-            upper: Vector1::new(self.torque_nm[1]),
-        };
-        Ok((x, u))
-    }
-}
-
-/// The equations of motion must have a solution at every tilt within the bounds.
-fn check_motion(ballbot: &Ballbot<f64>, bounds: &BoundsTable) -> Result<(), ScenarioError> {
-    let [lower, upper] = bounds.theta_rad;
-    let tilt = lower.abs().max(upper.abs()).min(std::f64::consts::PI);
-    let consistency = ballbot.consistency(tilt);
-    if consistency.mass_invertible {
-        Ok(())
-    } else {
-        Err(ScenarioError::Parameters(consistency.to_string()))
-    }
-}
-
-fn check_weights(table: &ControllerTable) -> Result<(), ScenarioError> {
-    for (i, weight) in table.q.iter().enumerate() {
-        if !(*weight >= 0.0 && weight.is_finite()) {
-            return Err(ScenarioError::value(
-                format!("controller.q[{i}]"),
-                weight,
-                "a state weight must be zero or positive",
-            ));
-        }
-    }
-    positive("controller.r", table.r)?;
-    positive("controller.t_s", table.t_s)?;
-    if table.horizon == 0 || table.horizon > LONGEST_HORIZON {
-        return Err(ScenarioError::value(
-            "controller.horizon",
-            table.horizon,
-            format!(
-                "it must be from 1 to {LONGEST_HORIZON} samples (the library itself takes any \
-                 compile-time size)"
-            ),
-        ));
-    }
-    Ok(())
-}
-
-impl ControllerTable {
-    fn settings(
-        &self,
-        ballbot: &Ballbot<f64>,
-        (x, u): (Bounds<f64, 4>, Bounds<f64, 1>),
-    ) -> Result<ControllerSettings<f64, 4, 1, 2>, ScenarioError> {
-        check_weights(self)?;
-        let weights = Weights {
-            q: Matrix4::from_diagonal(&Vector4::from(self.q)),
-            r: Matrix1::new(self.r),
-        };
-        let upright = ballbot.matrices(&Vector2::zeros());
-        let predictor = self.predictor(&upright.0)?;
-        let terminal = self.terminal(upright, &weights, predictor)?;
-        let scheduling = match self.model {
-            ModelKind::Lpv => Scheduling::Predicted,
-            ModelKind::Linear => Scheduling::Held(Vector2::zeros()),
-        };
-        Ok(ControllerSettings {
-            t_s: self.t_s,
-            horizon: self.horizon,
-            predictor,
-            weights,
-            terminal,
-            x,
-            u,
-            scheduling,
-            iterations: self.iterations(),
-            solver: SolverSettings::default(),
-        })
-    }
-
-    fn iterations(&self) -> Iterations<f64> {
-        match self.iterations {
-            None => Iterations::Fixed(1),
-            Some(IterationsTable::Fixed(most)) => Iterations::Fixed(most),
-            Some(IterationsTable::UntilConverged { tolerance, most }) => {
-                Iterations::UntilConverged { tolerance, most }
-            }
-        }
-    }
-
-    fn guarded(
-        &self,
-        ballbot: &Ballbot<f64>,
-        settings: &ControllerSettings<f64, 4, 1, 2>,
-        files: &dyn Files,
-    ) -> Result<Option<GuardedSettings<f64, 4, 1>>, ScenarioError> {
-        let TerminalTable::Certified(table) = &self.terminal else {
-            return Ok(None);
-        };
-        if self.model == ModelKind::Linear {
-            return Err(ScenarioError::value(
-                "controller.model",
-                "linear",
-                "a guarantee needs the nonlinear prediction, \"lpv\"",
-            ));
-        }
-        let guarded = table.settings(ballbot, settings, files)?;
-        if !GUARDED_HORIZONS.contains(&self.horizon) {
-            return Err(ScenarioError::value(
-                "controller.horizon",
-                self.horizon,
-                format!(
-                    "with a certified terminal set it must be one of {GUARDED_HORIZONS:?} samples \
-                     (the library itself takes any compile-time size)"
-                ),
-            ));
-        }
-        Ok(Some(guarded))
-    }
-
-    fn predictor(&self, upright: &Matrix4<f64>) -> Result<Predictor, ScenarioError> {
-        let a = dynamic(upright);
-        let default = PredictorTable::StageConsistent { substeps: None };
-        let table = self.predictor.unwrap_or(default);
-        let (kind, given, key): (fn(Rk4) -> Predictor, _, _) = match table {
-            PredictorTable::Rk4 { substeps } => (Predictor::FrozenRk4, Some(substeps), "rk4"),
-            PredictorTable::Exact { substeps } => (Predictor::FrozenExact, substeps, "exact"),
-            PredictorTable::StageConsistent { substeps } => {
-                (Predictor::StageConsistent, substeps, "stage_consistent")
-            }
-        };
-        let substeps = match given {
-            Some(0) => {
-                return Err(ScenarioError::value(
-                    format!("controller.predictor.{key}.substeps"),
-                    0,
-                    "at least one step per sample is needed",
-                ));
-            }
-            Some(substeps) => substeps,
-            None => {
-                let poles = lpvmpc_design::poles(&a).map_err(|error| {
-                    ScenarioError::value("parameters", "(all)", error.to_string())
-                })?;
-                let fastest = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
-                (self.t_s * fastest / ACCURATE_STEP).ceil().max(1.0) as usize
-            }
-        };
-        lpvmpc_design::check_rk4_step(&a, self.t_s, substeps)?;
-        Ok(kind(Rk4 { substeps }))
-    }
-
-    fn terminal(
-        &self,
-        (a, b): (Matrix4<f64>, Vector4<f64>),
-        weights: &Weights<f64, 4, 1>,
-        predictor: Predictor,
-    ) -> Result<TerminalIngredient<f64, 4>, ScenarioError> {
-        let q = dynamic(&weights.q);
-        let r = DMatrix::from_element(1, 1, weights.r[0]);
-        let cost = |p: DMatrix<f64>| TerminalIngredient::Cost(Matrix4::from_fn(|i, j| p[(i, j)]));
-        Ok(match &self.terminal {
-            TerminalTable::None => TerminalIngredient::Cost(Matrix4::zeros()),
-            TerminalTable::Equality => TerminalIngredient::Equality,
-            // The certified cost is the guarded controller's; without guard it is as by default.
-            TerminalTable::DiscreteRiccati | TerminalTable::Certified(_) => {
-                let (a_d, b_d) = predictor.discretize(&a, &b, self.t_s);
-                cost(lpvmpc_design::lqr_discrete(&dynamic(&a_d), &dynamic(&b_d), &q, &r)?.p)
-            }
-            TerminalTable::ContinuousRiccati { linear_model } => {
-                let (a, b) = match linear_model {
-                    Some(table) => LinearParameters::from(*table).matrices(),
-                    None => (a, b),
-                };
-                cost(lpvmpc_design::lqr_continuous(&dynamic(&a), &dynamic(&b), &q, &r)?.p)
-            }
-            TerminalTable::Cost { p } => TerminalIngredient::Cost(Matrix4::from_fn(|i, j| p[i][j])),
-        })
-    }
-}
-
-/// |step * fastest pole| that the predictor stays below when it is left to choose.
-const ACCURATE_STEP: f64 = 0.7;
-
-pub(crate) fn dynamic<const R: usize, const C: usize>(
-    m: &nalgebra::SMatrix<f64, R, C>,
-) -> DMatrix<f64> {
-    DMatrix::from_fn(R, C, |i, j| m[(i, j)])
 }

@@ -2,6 +2,7 @@
 
 use crate::error::ScenarioError;
 use crate::files::Files;
+use crate::number::finite;
 use crate::schema::{LissajousTable, PointTable, ReferenceTable, SineTable};
 use ballbot::Geometry;
 use lpvmpc::{MoveLimits, SmoothMove};
@@ -192,18 +193,6 @@ fn lissajous(
         }));
     }
     Ok(planes)
-}
-
-pub(crate) fn finite(key: &str, value: f64) -> Result<(), ScenarioError> {
-    if value.is_finite() {
-        Ok(())
-    } else {
-        Err(ScenarioError::value(
-            key,
-            value,
-            "it must be a finite number",
-        ))
-    }
 }
 
 fn check_points(points: &[PointTable], key: &str) -> Result<(), ScenarioError> {

@@ -1,6 +1,7 @@
 //! The run itself: horizons are known at run time, the method's sizes at compile time.
 
 use crate::error::ScenarioError;
+use crate::excitation::Excited;
 use crate::feedback::longest_step;
 use crate::output_feedback::{Belief, Core, OutputFeedback};
 use crate::prepare::{Plane, Prepared};
@@ -12,7 +13,7 @@ use lpvmpc::{
 use lpvmpc_sim::{
     ClosedLoop, Course, GuardedFeedback, Recording, Regulator, StateFeedback, Trajectory, World,
 };
-use nalgebra::{Vector3, Vector4};
+use nalgebra::{Vector1, Vector3, Vector4};
 use std::time::Duration;
 
 /// The longest horizon that is compiled in, samples.
@@ -97,7 +98,17 @@ impl Prepared {
             settings,
             without_plan,
             range,
+            excitation,
         } = plane.world.clone();
+        let regulator = match excitation {
+            Some(excitation) => Box::new(Excited {
+                regulator,
+                excitation,
+                command: Vector1::zeros(),
+                time: 0.0,
+            }),
+            None => regulator,
+        };
         let world = World::new(robot, plane.initial_state, settings)?;
         let mut closed_loop = ClosedLoop::new(regulator, world)?;
         closed_loop.without_plan = without_plan;
@@ -160,7 +171,7 @@ impl Prepared {
             _,
             4,
             1,
-            2,
+            3,
             N,
             5,
             NP,
@@ -177,7 +188,7 @@ impl Prepared {
         &self,
     ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
         let workspace = Box::new(Workspace::<f64, 4, 1, N, M>::new());
-        let controller = Box::new(Controller::<_, f64, 4, 1, 2, N, M>::new(
+        let controller = Box::new(Controller::<_, f64, 4, 1, 3, N, M>::new(
             self.ballbot,
             self.settings,
         )?);

@@ -1,6 +1,8 @@
-//! The scenario file: what a user writes, key by key. Meaning and checks are in `check`.
+//! The scenario file: what a user writes, key by key. Meaning and checks are in the modules
+//! named after the tables.
 
 use crate::feedback_table::{EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable};
+use crate::parameters::Parameters;
 use crate::world_table::WorldTable;
 use serde::{Deserialize, Serialize};
 
@@ -12,8 +14,9 @@ pub struct Scenario {
     pub title: String,
     /// Length of the run, s.
     pub duration_s: f64,
-    /// The robot: the plant and the controller's model.
-    pub parameters: ParameterTable,
+    /// The robot: the controller's model and, unless `[world]` says otherwise, the plant. A table, or
+    /// the path of a file with such a table.
+    pub parameters: Parameters,
     /// The controller.
     pub controller: ControllerTable,
     /// Bounds of the controller's problem.
@@ -46,6 +49,12 @@ pub struct ParameterTable {
     pub b3_m2: f64,
     /// b4, m^2/s.
     pub b4_m2_s: f64,
+    /// Viscous friction in the drive, on phi_dot - theta_dot, m^2/s.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub drive_friction_m2_s: f64,
+    /// Coulomb friction in the drive, m^2/s^2.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub drive_coulomb_m2_s2: f64,
     /// l, m.
     pub centre_of_mass_m: f64,
     /// r_b, m.
@@ -57,6 +66,10 @@ pub struct ParameterTable {
     /// Angle of the wheels' contact points from the top of the ball, degrees.
     #[serde(default = "paper_zenith_angle")]
     pub zenith_angle_deg: f64,
+}
+
+pub(crate) fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 fn paper_zenith_angle() -> f64 {

@@ -1,17 +1,17 @@
 //! The world that the robot is simulated in. Without `[world]` in the scenario it is ideal.
 
 use crate::error::ScenarioError;
-use crate::prepare::positive;
-use crate::reference::finite;
+use crate::excitation::Excitation;
+use crate::files::Files;
+use crate::number::{finite, not_negative, positive};
+use crate::parameters::KnownRobot;
 use crate::world_table::{
     ActuatorTable, AngleSensorTable, PlaneName, PushTable, RateSensorTable, SensorsTable,
     WorldTable,
 };
 use ballbot::{Ballbot, Disturbed};
 use lpvmpc::Bounds;
-use lpvmpc_sim::{
-    Actuator, CoulombFriction, Disturbance, Plant, Sensor, Tolerances, WithoutPlan, WorldSettings,
-};
+use lpvmpc_sim::{Actuator, Disturbance, Plant, Sensor, Tolerances, WithoutPlan, WorldSettings};
 use nalgebra::{Vector1, Vector2, Vector4};
 use std::f64::consts::FRAC_PI_2;
 
@@ -42,6 +42,8 @@ pub struct PlaneWorld {
     pub without_plan: WithoutPlan,
     /// Outside of it the robot has fallen.
     pub range: Bounds<f64, 4>,
+    /// What is added to the controller's torque.
+    pub excitation: Option<Excitation>,
 }
 
 impl PlaneWorld {
@@ -55,24 +57,49 @@ impl PlaneWorld {
             settings: WorldSettings::ideal(t_s, tolerances),
             without_plan: WithoutPlan::End,
             range: Bounds::none(),
+            excitation: None,
         }
     }
 }
 
-/// Speed below which dry friction is rounded off, rad/s.
-const CREEP: f64 = 0.05;
-
 impl WorldTable {
-    /// The world of one plane; `ballbot` is the controller's model.
+    /// The robot that is there, before `robot` changes it; `model` is the controller's.
     ///
     /// # Errors
-    /// [`ScenarioError::Value`] with the key.
+    /// The parameters cannot be used, or have no covariance to draw from.
+    pub(crate) fn real_robot(
+        &self,
+        model: &KnownRobot,
+        files: &dyn Files,
+    ) -> Result<Ballbot<f64>, ScenarioError> {
+        let read = match &self.parameters {
+            Some(parameters) => Some(parameters.read("world.parameters", files)?),
+            None => None,
+        };
+        let robot = read.as_ref().unwrap_or(model);
+        match (self.draw, &robot.uncertainty) {
+            (None, _) => Ok(robot.ballbot),
+            (Some(seed), Some(uncertainty)) => uncertainty.draw(&robot.ballbot, seed),
+            (Some(seed), None) => Err(ScenarioError::value(
+                "world.draw",
+                seed,
+                "the robot's parameters have no covariance; name a parameters.toml of `ballbot \
+                 identify` as parameters",
+            )),
+        }
+    }
+
+    /// The world of one plane; `ballbot` is the robot that is there.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] with the key, or an excitation that cannot be read.
     pub(crate) fn prepare(
         &self,
         plane: PlaneName,
         ballbot: &Ballbot<f64>,
         t_s: f64,
         tolerances: Tolerances,
+        files: &dyn Files,
     ) -> Result<PlaneWorld, ScenarioError> {
         let period = match self.sensor_period_s {
             Some(period) => self.sensor_period(period, t_s)?,
@@ -102,6 +129,7 @@ impl WorldTable {
             },
             without_plan: WithoutPlan::Apply,
             range,
+            excitation: self.excitation(plane, files)?,
         })
     }
 
@@ -152,6 +180,11 @@ impl WorldTable {
         real.b2 *= factor("b2_factor", robot.b2_factor)?;
         real.b3 *= factor("b3_factor", robot.b3_factor)?;
         real.b4 *= factor("b4_factor", robot.b4_factor)?;
+        real.drive.viscous *= factor("drive_friction_factor", robot.drive_friction_factor)?;
+        real.drive.coulomb *= factor("drive_coulomb_factor", robot.drive_coulomb_factor)?;
+        let key = "world.actuator.coulomb_friction_nm";
+        let dry = not_negative(key, self.actuator.coulomb_friction_nm)?;
+        real.drive.coulomb += dry * real.geometry.ball_radius / real.geometry.wheel_radius;
         real.geometry.centre_of_mass *=
             factor("centre_of_mass_factor", robot.centre_of_mass_factor)?;
         Ok(Disturbed {
@@ -160,6 +193,17 @@ impl WorldTable {
             total_mass: ratio,
             tilt_offset: offset,
         })
+    }
+
+    fn excitation(
+        &self,
+        plane: PlaneName,
+        files: &dyn Files,
+    ) -> Result<Option<Excitation>, ScenarioError> {
+        match (&self.excitation, plane) {
+            (Some(file), PlaneName::X) => files.excitation(file).map(Some),
+            _ => Ok(None),
+        }
     }
 
     fn pushes(&self, plane: PlaneName) -> Result<Vec<Disturbance<4, 2>>, ScenarioError> {
@@ -195,7 +239,8 @@ impl PushTable {
             } => {
                 not_negative(&key("rates.time_s"), time_s)?;
                 finite(&key("rates.phi_dot_rad_s"), phi_dot_rad_s)?;
-                finite(&key("rates.theta_dot_rad_s"), theta_dot_rad_s)
+                finite(&key("rates.theta_dot_rad_s"), theta_dot_rad_s)?;
+                Ok(())
             }
             Self::Impulse {
                 time_s,
@@ -205,7 +250,8 @@ impl PushTable {
             } => {
                 not_negative(&key("impulse.time_s"), time_s)?;
                 finite(&key("impulse.momentum_m_s"), momentum_m_s)?;
-                finite(&key("impulse.height_m"), height_m)
+                finite(&key("impulse.height_m"), height_m)?;
+                Ok(())
             }
             Self::Force {
                 from_s,
@@ -314,7 +360,7 @@ impl From<AngleSensorTable> for RateSensorTable {
 }
 
 impl ActuatorTable {
-    fn check(&self) -> Result<Actuator<4>, ScenarioError> {
+    fn check(&self) -> Result<Actuator, ScenarioError> {
         let limit = self.limit_nm;
         if !(limit > 0.0) {
             let expected = "it must be positive; inf for no limit";
@@ -324,32 +370,10 @@ impl ActuatorTable {
                 expected,
             ));
         }
-        let level = not_negative(
-            "world.actuator.coulomb_friction_nm",
-            self.coulomb_friction_nm,
-        )?;
         Ok(Actuator {
             limit,
             dead_zone: not_negative("world.actuator.dead_zone_nm", self.dead_zone_nm)?,
             lag: not_negative("world.actuator.lag_s", self.lag_s)?,
-            // The drive turns the ball against the body.
-            friction: (level > 0.0).then_some(CoulombFriction {
-                level,
-                speed: Vector4::new(0.0, 0.0, 1.0, -1.0),
-                creep: CREEP,
-            }),
         })
-    }
-}
-
-pub(crate) fn not_negative(key: &str, value: f64) -> Result<f64, ScenarioError> {
-    if value >= 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(ScenarioError::value(
-            key,
-            value,
-            "it must be finite and not negative",
-        ))
     }
 }

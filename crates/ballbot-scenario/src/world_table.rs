@@ -1,6 +1,8 @@
 //! `[world]` of a scenario file, key by key. What it means is in `world`.
 
+use crate::parameters::Parameters;
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// What is not ideal about the simulated world.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -18,8 +20,19 @@ pub struct WorldTable {
     pub actuator: ActuatorTable,
     /// From the measurement to the torque.
     pub delay: DelayTable,
-    /// How the robot differs from the controller's model.
+    /// The robot that is really there, as a table or a file like `parameters` of the scenario; the
+    /// controller's model when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parameters: Option<Parameters>,
+    /// The robot is drawn from the covariance in the file of its parameters, by this seed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub draw: Option<u64>,
+    /// How the robot that is there differs from what its parameters say.
     pub robot: DeviationsTable,
+    /// Torque that is added to the controller's in the x plane: a CSV file of `ballbot excite`,
+    /// relative to the scenario file. The controller does not know of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub excitation: Option<PathBuf>,
     /// The floor.
     pub floor: FloorTable,
     /// What pushes the robot.
@@ -79,7 +92,8 @@ pub struct ActuatorTable {
     pub dead_zone_nm: f64,
     /// Time constant with which the torque follows its command, s.
     pub lag_s: f64,
-    /// Coulomb friction between body and ball, as torque of the virtual wheel, N m.
+    /// Coulomb friction between body and ball on top of the robot's own, as torque of the virtual
+    /// wheel, N m.
     pub coulomb_friction_nm: f64,
     /// A constant torque on top of every command, N m.
     pub bias_nm: f64,
@@ -107,7 +121,7 @@ pub struct DelayTable {
     pub transport_s: f64,
 }
 
-/// How the simulated robot differs from the controller's model. Factors multiply `[parameters]`.
+/// How the simulated robot differs from what its parameters say: factors of them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DeviationsTable {
@@ -119,6 +133,10 @@ pub struct DeviationsTable {
     pub b3_factor: f64,
     /// Of b4.
     pub b4_factor: f64,
+    /// Of the drive's viscous friction.
+    pub drive_friction_factor: f64,
+    /// Of the drive's Coulomb friction.
+    pub drive_coulomb_factor: f64,
     /// Of the distance from the ball's centre to the centre of mass.
     pub centre_of_mass_factor: f64,
     /// Angle from the body's axis to its centre of mass, x plane, rad.
@@ -134,6 +152,8 @@ impl Default for DeviationsTable {
             b2_factor: 1.0,
             b3_factor: 1.0,
             b4_factor: 1.0,
+            drive_friction_factor: 1.0,
+            drive_coulomb_factor: 1.0,
             centre_of_mass_factor: 1.0,
             tilt_offset_x_rad: 0.0,
             tilt_offset_y_rad: 0.0,

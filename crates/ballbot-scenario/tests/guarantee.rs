@@ -5,7 +5,9 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
-use ballbot_scenario::{IterationsTable, Scenario, ScenarioError, Surroundings, builtin};
+use ballbot_scenario::{
+    IterationsTable, Parameters, Scenario, ScenarioError, Surroundings, builtin,
+};
 use lpvmpc_sim::{Ending, Trajectory};
 use std::path::Path;
 use std::time::Duration;
@@ -101,7 +103,11 @@ fn refused(change: impl Fn(&mut Scenario), words: &[&str]) {
 #[test]
 fn a_certificate_of_something_else_is_refused() {
     refused(
-        |s| s.parameters.b1_m2 *= 1.01,
+        |s| {
+            if let Parameters::Table(robot) = &mut s.parameters {
+                robot.b1_m2 *= 1.01;
+            }
+        },
         &["another robot", "certify"],
     );
     refused(|s| s.controller.t_s = 0.04, &["controller.t_s", "0.05 s"]);

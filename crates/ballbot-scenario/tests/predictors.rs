@@ -16,7 +16,7 @@ const N: usize = 20;
 const M: usize = 64;
 const FINE: Rk4 = Rk4 { substeps: 2 };
 
-type Loop = Controller<Ballbot<f64>, f64, 4, 1, 2, N, M>;
+type Loop = Controller<Ballbot<f64>, f64, 4, 1, 3, N, M>;
 
 fn scenario_3() -> Prepared {
     let scenario = Scenario::load("single-setpoint-terminal").unwrap();
@@ -24,7 +24,7 @@ fn scenario_3() -> Prepared {
 }
 
 /// Scenario 3's settings with another predictor; phi without bounds, for far set points.
-fn settings(predictor: Predictor, most: usize) -> ControllerSettings<f64, 4, 1, 2> {
+fn settings(predictor: Predictor, most: usize) -> ControllerSettings<f64, 4, 1, 3> {
     let mut settings = ControllerSettings {
         predictor,
         iterations: Iterations::UntilConverged {
@@ -39,7 +39,7 @@ fn settings(predictor: Predictor, most: usize) -> ControllerSettings<f64, 4, 1, 
 }
 
 /// The first plan from rest towards `phi` rad.
-fn plan(settings: ControllerSettings<f64, 4, 1, 2>, phi: f64) -> (Loop, Solution<f64, 4, 1, N, M>) {
+fn plan(settings: ControllerSettings<f64, 4, 1, 3>, phi: f64) -> (Loop, Solution<f64, 4, 1, N, M>) {
     let mut controller = Loop::new(Ballbot::paper(), settings).unwrap();
     let target = Reference::constant(Vector4::new(phi, 0.0, 0.0, 0.0));
     let mut workspace = Box::new(Workspace::new());

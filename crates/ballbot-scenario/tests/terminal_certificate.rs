@@ -82,7 +82,10 @@ fn the_certificate_is_of_the_built_in_robot() {
         .unwrap()
         .prepare(Path::new("."))
         .unwrap();
-    assert_eq!(found.plant, RobotTable::from(&prepared.ballbot));
+    assert_eq!(
+        found.plant,
+        RobotTable::try_from(&prepared.ballbot).unwrap()
+    );
     assert_eq!(found.t_s, prepared.settings.t_s);
     assert_eq!(found.q, prepared.settings.weights.q);
     assert_eq!(found.r, prepared.settings.weights.r);

@@ -1,8 +1,11 @@
 //! What a page has in place of files.
 
 use crate::from_js::from_js;
-use ballbot_scenario::{CsvTable, Files, PointTable, ScenarioError, TerminalCertificate};
+use ballbot_scenario::{
+    CsvTable, Excitation, Files, KnownRobot, PointTable, ScenarioError, TerminalCertificate,
+};
 use std::io::{Error, ErrorKind};
+use std::path::Path;
 use wasm_bindgen::JsValue;
 
 /// The built-in certificate, read by JavaScript, and no other file.
@@ -11,9 +14,9 @@ pub struct PageFiles {
     pub certificate: JsValue,
 }
 
-fn none(path: &str) -> ScenarioError {
+fn none(path: impl AsRef<Path>) -> ScenarioError {
     ScenarioError::Read {
-        path: path.into(),
+        path: path.as_ref().to_owned(),
         source: Error::new(ErrorKind::Unsupported, "a page in a browser has no files"),
     }
 }
@@ -32,5 +35,13 @@ impl Files for PageFiles {
                 expected: error.to_string(),
             }),
         }
+    }
+
+    fn robot(&self, file: &Path) -> Result<KnownRobot, ScenarioError> {
+        Err(none(file))
+    }
+
+    fn excitation(&self, file: &Path) -> Result<Excitation, ScenarioError> {
+        Err(none(file))
     }
 }

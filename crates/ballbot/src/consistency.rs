@@ -20,8 +20,10 @@ pub struct Consistency<T> {
     pub mass_positive: bool,
     /// M(theta) is invertible over the whole range, so that the equations can be integrated.
     pub mass_invertible: bool,
-    /// b4 >= 0: friction takes energy away.
-    pub friction_dissipative: bool,
+    /// b4 >= 0: the friction of rolling takes energy away.
+    pub rolling_dissipative: bool,
+    /// Neither coefficient of the drive's friction is negative: it takes energy away.
+    pub drive_dissipative: bool,
     /// b1 and the least a rigid body needs, b2 + r_b^2, m^2.
     pub ball_inertia: (T, T),
     /// b3 and the least a rigid body needs, b2 + l^2, m^2.
@@ -52,7 +54,8 @@ impl<T: Scalar> Ballbot<T> {
             determinant: (smallest, largest),
             mass_positive: self.b1 > zero && self.b3 > zero && smallest > zero,
             mass_invertible: smallest > zero || largest < zero,
-            friction_dissipative: self.b4 >= zero,
+            rolling_dissipative: self.b4 >= zero,
+            drive_dissipative: self.drive.viscous >= zero && self.drive.coulomb >= zero,
             ball_inertia: (self.b1, self.b2 + square(geometry.ball_radius)),
             body_inertia: (self.b3, self.b2 + square(geometry.centre_of_mass)),
         }
@@ -63,7 +66,8 @@ impl<T: Scalar> Consistency<T> {
     /// Whether a rigid ballbot with these parameters exists.
     pub fn is_physical(&self) -> bool {
         self.mass_positive
-            && self.friction_dissipative
+            && self.rolling_dissipative
+            && self.drive_dissipative
             && self.ball_inertia.0 >= self.ball_inertia.1
             && self.body_inertia.0 >= self.body_inertia.1
     }
@@ -103,10 +107,16 @@ impl<T: Scalar + fmt::LowerExp> fmt::Display for Consistency<T> {
                 )?;
             }
         }
-        if !self.friction_dissipative {
+        if !self.rolling_dissipative {
             write!(
                 f,
                 "\n- the friction b4 is negative: it feeds energy into the ball"
+            )?;
+        }
+        if !self.drive_dissipative {
+            write!(
+                f,
+                "\n- the friction in the drive is negative: it feeds energy into ball and body"
             )?;
         }
         for (name, (value, least), needs) in [

@@ -49,7 +49,7 @@ impl<T: Scalar> Disturbed<T> {
         let (sin_normal, cos_normal) = sin_cos(lean + self.slope);
         let (sin_slope, _) = sin_cos(self.slope);
         let arm = geometry.centre_of_mass * geometry.ball_radius;
-        let drive = ballbot.gear() * torque;
+        let drive = ballbot.driving_force(torque, phi_dot - theta_dot);
         let downhill = self.total_mass * geometry.gravity * geometry.ball_radius * sin_slope;
         let force_phi =
             drive + arm * sin_normal * theta_dot * theta_dot - ballbot.b4 * phi_dot - downhill

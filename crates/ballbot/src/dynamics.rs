@@ -20,9 +20,11 @@ impl<T: Scalar> Ballbot<T> {
         Vector2::new(-arm * theta.sin() * theta_dot * theta_dot, T::zero())
     }
 
-    /// Friction term D(q_dot), m^2/s^2.
-    pub fn friction(&self, phi_dot: T) -> Vector2<T> {
-        Vector2::new(self.b4 * phi_dot, T::zero())
+    /// Friction term D(q_dot), m^2/s^2: rolling on the floor, and the drive between ball and body.
+    pub fn friction(&self, phi_dot: T, theta_dot: T) -> Vector2<T> {
+        let speed = phi_dot - theta_dot;
+        let drive = self.drive.coefficient(speed) * speed;
+        Vector2::new(self.b4 * phi_dot + drive, -drive)
     }
 
     /// Gravity term G(q), m^2/s^2.
@@ -50,12 +52,23 @@ impl<T: Scalar> Ballbot<T> {
         let arm = geometry.centre_of_mass * geometry.ball_radius;
         let coupling = self.coupling(cos_theta);
         // B~ tau - C - D - G
-        let force_phi =
-            self.gear() * torque + arm * sin_theta * theta_dot * theta_dot - self.b4 * phi_dot;
-        let force_theta =
-            geometry.centre_of_mass * geometry.gravity * sin_theta - self.gear() * torque;
+        let drive = self.driving_force(torque, phi_dot - theta_dot);
+        let force_phi = drive + arm * sin_theta * theta_dot * theta_dot - self.b4 * phi_dot;
+        let force_theta = geometry.centre_of_mass * geometry.gravity * sin_theta - drive;
         let [phi_ddot, theta_ddot] = self.accelerate(coupling, force_phi, force_theta);
         Vector4::new(phi_dot, theta_dot, phi_ddot, theta_ddot)
+    }
+
+    /// What the drive does to the ball, and the opposite to the body, m^2/s^2: torque (N m) less
+    /// friction at the speed phi_dot - theta_dot (rad/s).
+    #[inline(always)]
+    pub(crate) fn driving_force(&self, torque: T, speed: T) -> T {
+        let driven = self.gear() * torque;
+        if self.drive.is_none() {
+            driven
+        } else {
+            driven - self.drive.coefficient(speed) * speed
+        }
     }
 
     /// M^-1 (force_phi, force_theta) in rad/s^2, for generalised forces in m^2/s^2.

@@ -1,5 +1,7 @@
-//! The LPV embedding of the ballbot: scheduling (theta, theta_dot), matrices A_c and B_c
-//! (eq. (4) and the paper's Table of elements).
+//! The LPV embedding of the ballbot: scheduling (theta, theta_dot, phi_dot -
+//! theta_dot), matrices A_c and B_c (eq. (4) and the paper's Table of elements). The third
+//! scheduling parameter, the drive's speed, is for Coulomb friction alone, which the paper does not
+//! have.
 //!
 //! The table prints B31 with an unbalanced bracket; here it is r_b (b3 - k) / (r_w d), as
 //! M^-1 B~ gives. Its sinc(theta) is sin(theta)/theta.
@@ -7,7 +9,7 @@
 use crate::parameters::{Ballbot, Field};
 use crate::trigonometry::sin_cos;
 use lpvmpc::{LpvModel, Scalar};
-use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
+use nalgebra::{Matrix4, Vector1, Vector3, Vector4};
 
 /// The scheduling (theta, theta_dot), as the embedding's formulas need it.
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +36,8 @@ pub struct Accelerations<T> {
 }
 
 impl<T: Field> Ballbot<T> {
-    /// The embedding's rows of the accelerations, on numbers or on sets of numbers.
+    /// The embedding's rows of the accelerations, on numbers or on sets of numbers, without friction
+    /// in the drive.
     #[inline(always)]
     pub fn accelerations(&self, tilt: Tilt<T>) -> Accelerations<T> {
         let Self {
@@ -61,24 +64,52 @@ impl<T: Field> Ballbot<T> {
     }
 }
 
-impl<T: Scalar> LpvModel<T, 4, 1, 2> for Ballbot<T> {
-    /// sigma(x) = (theta, theta_dot), rad and rad/s.
-    fn scheduling(&self, x: &Vector4<T>) -> Vector2<T> {
-        Vector2::new(x[1], x[3])
+impl<T: Field> Accelerations<T> {
+    /// The same with a drive that loses `coefficient` (N m s/rad) times its speed phi_dot - theta_dot
+    /// of its torque.
+    #[inline(always)]
+    pub fn with_drive_friction(self, coefficient: T) -> Self {
+        let Self {
+            a: [[gravity, rolling, centrifugal], [pull, drag, swing]],
+            b: [ball, body],
+        } = self;
+        Self {
+            a: [
+                [
+                    gravity,
+                    rolling - coefficient * ball,
+                    centrifugal + coefficient * ball,
+                ],
+                [pull, drag - coefficient * body, swing + coefficient * body],
+            ],
+            b: [ball, body],
+        }
+    }
+}
+
+impl<T: Scalar> LpvModel<T, 4, 1, 3> for Ballbot<T> {
+    /// sigma(x) = (theta, theta_dot, phi_dot - theta_dot), rad and rad/s.
+    fn scheduling(&self, x: &Vector4<T>) -> Vector3<T> {
+        Vector3::new(x[1], x[3], x[2] - x[3])
     }
 
     #[inline(always)]
-    fn matrices(&self, scheduling: &Vector2<T>) -> (Matrix4<T>, Vector4<T>) {
+    fn matrices(&self, scheduling: &Vector3<T>) -> (Matrix4<T>, Vector4<T>) {
         let (theta, theta_dot) = (scheduling[0], scheduling[1]);
         let (sin, cos) = sin_cos(theta);
         let (zero, one) = (T::zero(), T::one());
-        let Accelerations { a: [phi, body], b } = self.accelerations(Tilt {
+        let bare = self.accelerations(Tilt {
             sin,
             cos,
             sinc: sinc(theta, sin),
             rate: theta_dot,
             one,
         });
+        let Accelerations { a: [phi, body], b } = if self.drive.is_none() {
+            bare
+        } else {
+            bare.with_drive_friction(self.drive.coefficient(scheduling[2]) / self.gear())
+        };
         #[rustfmt::skip]
         let a = Matrix4::new(
             zero, zero,    one,     zero,

@@ -26,7 +26,8 @@ impl<T: Scalar> LinearParameters<T> {
 }
 
 impl<T: Scalar> Ballbot<T> {
-    /// h(b): the linear model of this ballbot at the upright equilibrium (eq. (11)).
+    /// h(b): the linear model of this ballbot at the upright equilibrium (eq. (11)). Its structure
+    /// has no place for friction in the drive, which is left out.
     pub fn linear_parameters(&self) -> LinearParameters<T> {
         let Self {
             b1,

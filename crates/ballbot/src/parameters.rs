@@ -3,6 +3,7 @@
 //! The paper is D. S. Karachalios and H. S. Abbas, "Parameter Refinement of a Ballbot and
 //! Predictive Control for Reference Tracking with Linear Parameter-Varying Embedding".
 
+use crate::friction::DriveFriction;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use lpvmpc::Scalar;
 use nalgebra::convert;
@@ -57,6 +58,8 @@ pub struct Ballbot<T> {
     pub b3: T,
     /// b4: viscous friction on phi_dot, m^2/s; positive when it takes energy away.
     pub b4: T,
+    /// Friction in the drive, on phi_dot - theta_dot; the paper has none.
+    pub drive: DriveFriction<T>,
     /// Lengths and gravity.
     pub geometry: Geometry<T>,
 }
@@ -69,7 +72,20 @@ impl<T: Scalar> Ballbot<T> {
             b2: convert(0.059325),
             b3: convert(0.143093),
             b4: convert(-0.07436),
+            drive: DriveFriction::none(),
             geometry: Geometry::paper(),
+        }
+    }
+
+    /// The same robot without Coulomb friction, whose slope at rest says nothing about motion:
+    /// what a linear model of a moving robot is made from.
+    pub fn without_coulomb(self) -> Self {
+        Self {
+            drive: DriveFriction {
+                coulomb: T::zero(),
+                ..self.drive
+            },
+            ..self
         }
     }
 }

@@ -117,7 +117,7 @@ pub struct LogRow<const NY: usize, const NU: usize> {
     pub measured: [Option<f64>; NY],
     /// The input commanded from here on.
     pub commanded: SVector<f64, NU>,
-    /// The mean of the actuators' outputs from here to the next row, before friction.
+    /// The mean of the actuators' outputs from here to the next row.
     pub applied: SVector<f64, NU>,
 }
 

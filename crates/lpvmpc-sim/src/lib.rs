@@ -18,7 +18,7 @@ mod regulator;
 mod sensor;
 mod world;
 
-pub use actuator::{Actuator, CoulombFriction};
+pub use actuator::Actuator;
 pub use closed_loop::{
     ClosedLoop, Course, Ending, Experiment, LogRow, Recording, Sample, Trajectory, WithoutPlan,
     record, run,

@@ -16,7 +16,7 @@ pub struct WorldSettings<const NX: usize, const NU: usize, const NY: usize, cons
     /// The sensors.
     pub sensors: [Sensor<NX>; NY],
     /// The actuators, one per input.
-    pub actuators: [Actuator<NX>; NU],
+    pub actuators: [Actuator; NU],
     /// Time from a command to its arrival at the actuators, s: computation and transport.
     pub delay: f64,
     /// What pushes the plant, in any order.
@@ -146,7 +146,7 @@ pub struct World<P, const NX: usize, const NU: usize, const NY: usize, const NL:
     period: f64,
     delay: f64,
     tolerances: Tolerances,
-    actuators: [Actuator<NX>; NU],
+    actuators: [Actuator; NU],
     channels: [Channel<NX>; NY],
     pending: Vec<Disturbance<NX, NL>>,
     steps: u64,
@@ -236,8 +236,8 @@ where
         &self.commanded
     }
 
-    /// The mean of the actuators' outputs over the last period, before friction, in input
-    /// units: what a current sensor would show.
+    /// The mean of the actuators' outputs over the last period, in input units: what a current
+    /// sensor would show.
     pub fn applied(&self) -> &SVector<f64, NU> {
         &self.mean_output
     }
@@ -360,11 +360,7 @@ where
         let at = |after: f64| {
             SVector::<f64, NU>::from_fn(|i, _| actuators[i].output(output[i], target[i], after))
         };
-        let motion = |after: f64, x: &SVector<f64, NX>| {
-            let drive = at(after);
-            let u = SVector::from_fn(|i, _| actuators[i].after_friction(drive[i], x));
-            plant.derivative(x, &u, load)
-        };
+        let motion = |after: f64, x: &SVector<f64, NX>| plant.derivative(x, &at(after), load);
         self.x = integrate(motion, &self.x, duration, self.tolerances, duration)?;
         let end = at(duration);
         let integral =

@@ -1,10 +1,10 @@
 //! The continuous plant between two samples.
 
-use ballbot::{Ballbot, Geometry};
+use ballbot::{Ballbot, DriveFriction, Geometry};
 use lpvmpc::LpvModel;
 use lpvmpc_design::zero_order_hold;
 use lpvmpc_sim::{PlantError, Tolerances, advance};
-use nalgebra::{DMatrix, Matrix1, Matrix4, Vector1, Vector2, Vector4};
+use nalgebra::{DMatrix, Matrix1, Matrix4, Vector1, Vector3, Vector4};
 
 fn tolerances(both: f64) -> Tolerances {
     Tolerances {
@@ -22,6 +22,7 @@ fn frictionless() -> Ballbot<f64> {
         b2,
         b3: b2 + geometry.centre_of_mass.powi(2) + 0.05,
         b4: 0.0,
+        drive: DriveFriction::none(),
         geometry,
     };
     assert!(robot.consistency(std::f64::consts::PI).is_physical());
@@ -49,14 +50,14 @@ fn energy_is_conserved_without_friction_and_torque() {
 }
 
 /// The ballbot with its scheduling held: a linear plant.
-struct Frozen(Vector2<f64>);
+struct Frozen(Vector3<f64>);
 
-impl LpvModel<f64, 4, 1, 2> for Frozen {
-    fn scheduling(&self, _: &Vector4<f64>) -> Vector2<f64> {
+impl LpvModel<f64, 4, 1, 3> for Frozen {
+    fn scheduling(&self, _: &Vector4<f64>) -> Vector3<f64> {
         self.0
     }
 
-    fn matrices(&self, scheduling: &Vector2<f64>) -> (Matrix4<f64>, Vector4<f64>) {
+    fn matrices(&self, scheduling: &Vector3<f64>) -> (Matrix4<f64>, Vector4<f64>) {
         Ballbot::paper().matrices(scheduling)
     }
 }
@@ -64,7 +65,7 @@ impl LpvModel<f64, 4, 1, 2> for Frozen {
 #[test]
 fn a_linear_plant_is_sampled_exactly() {
     let (x, u) = (Vector4::new(0.3, -0.2, 4.0, 1.0), Vector1::new(0.7));
-    for scheduling in [Vector2::zeros(), Vector2::new(0.8, -4.0)] {
+    for scheduling in [Vector3::zeros(), Vector3::new(0.8, -4.0, 1.0)] {
         let plant = Frozen(scheduling);
         let (a, b) = plant.matrices(&scheduling);
         let a = DMatrix::from_column_slice(4, 4, a.as_slice());
@@ -101,12 +102,12 @@ fn the_form_of_the_plant_does_not_matter() {
     /// The ballbot by A(sigma(x)) x + B(sigma(x)) u instead of f(x, u).
     struct Embedded(Ballbot<f64>);
 
-    impl LpvModel<f64, 4, 1, 2> for Embedded {
-        fn scheduling(&self, x: &Vector4<f64>) -> Vector2<f64> {
+    impl LpvModel<f64, 4, 1, 3> for Embedded {
+        fn scheduling(&self, x: &Vector4<f64>) -> Vector3<f64> {
             self.0.scheduling(x)
         }
 
-        fn matrices(&self, scheduling: &Vector2<f64>) -> (Matrix4<f64>, Vector4<f64>) {
+        fn matrices(&self, scheduling: &Vector3<f64>) -> (Matrix4<f64>, Vector4<f64>) {
             self.0.matrices(scheduling)
         }
     }

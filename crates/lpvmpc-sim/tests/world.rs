@@ -5,8 +5,7 @@
 )]
 
 use lpvmpc_sim::{
-    Actuator, CoulombFriction, Disturbance, Plant, Sensor, Tolerances, World, WorldError,
-    WorldSettings,
+    Actuator, Disturbance, Plant, Sensor, Tolerances, World, WorldError, WorldSettings,
 };
 use nalgebra::{Vector1, Vector2};
 
@@ -127,30 +126,6 @@ fn actuators_saturate_and_have_a_dead_zone() {
         assert_near(world.state()[1] * MASS, force * 0.1);
         assert_eq!(world.commanded()[0], command);
     }
-}
-
-#[test]
-fn dry_friction_stops_the_mass_and_does_not_turn_it_round() {
-    let mut settings = ideal();
-    settings.actuators[0].friction = Some(CoulombFriction {
-        level: 1.0,
-        speed: Vector2::new(0.0, 1.0),
-        creep: 1e-3,
-    });
-    let mut world = World::new(Sledge, Vector2::new(0.0, 1.0), settings).unwrap();
-    forward(&mut world, 100);
-    // 0.5 m/s^2 against the motion for 1 s; far above the creep speed the law is exact.
-    assert!((world.state()[1] - 0.5).abs() < 1e-6, "{}", world.state());
-    forward(&mut world, 200);
-    assert!(
-        world.state()[1].abs() < 1e-6,
-        "it stands: {}",
-        world.state()
-    );
-    assert!(
-        (world.state()[0] - 1.0).abs() < 2e-3,
-        "after v^2/(2a) = 1 m"
-    );
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //! Written by `firmware_record tight-bounds 80`, an example of `ballbot-scenario`.
 
 use crate::recording::{Plane, Recording};
-use ballbot::{Ballbot, Geometry};
+use ballbot::{Ballbot, DriveFriction, Geometry};
 
 /// The recording.
 pub const RECORDING: Recording = Recording {
@@ -12,6 +12,10 @@ pub const RECORDING: Recording = Recording {
         b2: 0.059325,
         b3: 0.143093,
         b4: -0.07436,
+        drive: DriveFriction {
+            viscous: 0.0,
+            coulomb: 0.0,
+        },
         geometry: Geometry {
             centre_of_mass: 0.2978,
             ball_radius: 0.12,

@@ -16,7 +16,7 @@ pub use variant::Variant;
 
 use crate::commands::CommandError;
 use crate::progress::Progress;
-use ballbot_scenario::{Prepared, Scenario};
+use ballbot_scenario::{Prepared, Scenario, ScenarioError, number};
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 use std::path::Path;
@@ -75,16 +75,32 @@ pub struct Scenarios {
     pub paper: Prepared,
 }
 
+fn built_in(name: &str) -> Result<Prepared, ScenarioError> {
+    Scenario::load(name)?.prepare(Path::new("."))
+}
+
 impl Scenarios {
     /// The built-in ones.
     ///
     /// # Errors
     /// None should occur, as there is no input.
     pub fn built_in() -> Result<Self, CommandError> {
-        let prepare = |name: &str| Scenario::load(name)?.prepare(Path::new("."));
+        Self::of(built_in("far-setpoints")?)
+    }
+
+    /// Those of this guaranteed loop.
+    ///
+    /// # Errors
+    /// It has no certified terminal set, or another horizon than campaigns have.
+    pub fn of(guaranteed: Prepared) -> Result<Self, CommandError> {
+        run::settings(&guaranteed)?;
+        let horizon = guaranteed.settings.horizon;
+        let right = horizon == run::N;
+        let expected = format!("campaigns are compiled for {} samples", run::N);
+        number::check("controller.horizon", horizon as f64, right, &expected)?;
         Ok(Self {
-            guaranteed: prepare("far-setpoints")?,
-            paper: prepare("single-setpoint-terminal")?,
+            guaranteed,
+            paper: built_in("single-setpoint-terminal")?,
         })
     }
 }

@@ -15,7 +15,7 @@ pub(super) fn run(
     samples: usize,
 ) -> Result<Record, CommandError> {
     // One bound per input, and the four rows of the terminal equality.
-    let controller = Controller::<Ballbot<f64>, f64, 4, 1, 2, N, { N + 4 }>::new(
+    let controller = Controller::<Ballbot<f64>, f64, 4, 1, 3, N, { N + 4 }>::new(
         prepared.ballbot,
         prepared.settings,
     );

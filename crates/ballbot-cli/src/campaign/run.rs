@@ -11,7 +11,7 @@ use serde::Serialize;
 
 /// Horizon of the campaign's controllers.
 pub(super) const N: usize = 20;
-type Guarded = GuardedController<Ballbot<f64>, f64, 4, 1, 2, N, 5, { N + 2 }>;
+type Guarded = GuardedController<Ballbot<f64>, f64, 4, 1, 3, N, 5, { N + 2 }>;
 type Workspace = GuardedWorkspace<f64, 1, 5, { N + 2 }, GUARDED_ACTIVE>;
 
 /// What a closed loop amounts to.
@@ -67,7 +67,7 @@ impl Wanted {
 /// The guaranteed loop, ready to run.
 pub(super) struct Loop<'a> {
     prepared: &'a Prepared,
-    guarded: GuardedLoop<Ballbot<f64>, Ballbot<f64>, 4, 1, 2, N, 5, { N + 2 }>,
+    guarded: GuardedLoop<Ballbot<f64>, Ballbot<f64>, 4, 1, 3, N, 5, { N + 2 }>,
     workspace: Box<Workspace>,
 }
 
@@ -190,7 +190,7 @@ pub(super) fn has_fallen(x: &Vector4<f64>) -> bool {
     !(x[1].abs() < std::f64::consts::FRAC_PI_2)
 }
 
-fn settings(prepared: &Prepared) -> Result<&GuardedSettings<f64, 4, 1>, ScenarioError> {
+pub(super) fn settings(prepared: &Prepared) -> Result<&GuardedSettings<f64, 4, 1>, ScenarioError> {
     prepared.guarded.as_ref().ok_or_else(no_certificate)
 }
 

@@ -1,6 +1,7 @@
 //! `ballbot bench`.
 
 use super::CommandError;
+use super::robot::RobotArguments;
 use crate::benchmark::{self, GuardedTimes, SEQUENCES, SequenceTimes, Times};
 use crate::output;
 use crate::progress::Progress;
@@ -14,11 +15,17 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   ballbot bench
+  ballbot bench my.toml --parameters out/identification/parameters.toml
   ballbot bench --json times.json
 
 Times the quadratic program alone and the controller's whole step on this machine, along closed
 loops of the built-in scenarios; and the guaranteed step against the plain one. Each sample is repeated and its shortest time counts.")]
 pub struct BenchArguments {
+    /// A built-in scenario or a TOML file [default: four of the built-in ones]
+    pub scenario: Option<String>,
+    /// The robot.
+    #[command(flatten)]
+    pub robot: RobotArguments,
     /// Write the times to this file as JSON, too
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
@@ -27,12 +34,16 @@ pub struct BenchArguments {
 /// Times all sequences.
 ///
 /// # Errors
-/// The file cannot be written.
+/// A scenario cannot be run, or the file cannot be written.
 pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
-    let progress = Progress::new("timing", SEQUENCES.len() + 1);
-    let mut sequences: Vec<SequenceTimes> = Vec::with_capacity(SEQUENCES.len());
-    for name in SEQUENCES {
-        sequences.push(benchmark::time(name)?);
+    let names = match &arguments.scenario {
+        Some(name) => vec![name.as_str()],
+        None => SEQUENCES.to_vec(),
+    };
+    let progress = Progress::new("timing", names.len() + 1);
+    let mut sequences: Vec<SequenceTimes> = Vec::with_capacity(names.len());
+    for name in names {
+        sequences.push(benchmark::time(name, &arguments.robot.prepare(name)?)?);
         progress.set(sequences.len());
     }
     let guarded = benchmark::time_guarded()?;
@@ -56,7 +67,7 @@ pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
     ]);
     for sequence in &sequences {
         let cells = |times: Times| [times.median, times.p99, times.max].map(|t| format!("{t:.2}"));
-        let mut row = vec![sequence.name.to_owned()];
+        let mut row = vec![sequence.name.clone()];
         row.extend(cells(sequence.qp_us));
         row.extend(cells(sequence.step_us));
         row.push(sequence.max_active.to_string());

@@ -1,6 +1,7 @@
 //! `ballbot campaign`.
 
 use super::CommandError;
+use super::robot::RobotArguments;
 use crate::campaign::{Campaign, Outcome, Record, Scenarios, cost_ratios, drawing};
 use crate::commands::simulate::PNG_SCALE;
 use crate::json;
@@ -18,6 +19,7 @@ use std::path::PathBuf;
 Examples:
   ballbot campaign                             10 000 closed loops, and 500 of each variant
   ballbot campaign --runs 200 --samples 60     a quick look
+  ballbot campaign my.toml                     a loop of your own, certified by `ballbot certify`
   ballbot campaign --json                      for other programs
 
 Each loop starts at random in the certified set and gets random set points, up to 100 rad away, at
@@ -25,6 +27,12 @@ random times. Variants show where the guarantee ends: pushes, wrong parameters, 
 the paper's scheme is the negative control. The same seed gives the same numbers on any number of
 threads. Writes campaign.csv (one row per run) and a figure.")]
 pub struct CampaignArguments {
+    /// A built-in scenario or a TOML file with a certified terminal set
+    #[arg(default_value = "far-setpoints")]
+    pub scenario: String,
+    /// The robot.
+    #[command(flatten)]
+    pub robot: RobotArguments,
     /// Closed loops of the nominal plant; a twentieth of them of every other variant
     #[arg(long, default_value = "10000", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub runs: u32,
@@ -48,7 +56,7 @@ pub struct CampaignArguments {
 /// Runs the campaign and writes its results.
 ///
 /// # Errors
-/// A file cannot be written.
+/// The scenario has no guarantee, or a file cannot be written.
 pub fn run(arguments: &CampaignArguments) -> Result<String, CommandError> {
     let campaign = Campaign {
         runs: arguments.runs as usize,
@@ -57,7 +65,7 @@ pub fn run(arguments: &CampaignArguments) -> Result<String, CommandError> {
         seed: arguments.seed,
         threads: arguments.threads,
     };
-    let scenarios = Scenarios::built_in()?;
+    let scenarios = Scenarios::of(arguments.robot.prepare(&arguments.scenario)?)?;
     let outcomes = campaign.run(&scenarios)?;
     let figure = drawing(&outcomes, limits(&scenarios.guaranteed).states[1]);
     let paths = ["campaign.csv", "campaign.svg", "campaign.png"];

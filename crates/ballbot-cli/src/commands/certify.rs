@@ -1,17 +1,18 @@
 //! `ballbot certify`.
 
 use super::CommandError;
+use super::robot::RobotArguments;
 use crate::arguments::positive;
 use crate::certificate_page;
 use crate::output;
 use crate::progress::Progress;
 use crate::table::{Table, number};
-use ballbot_scenario::{Prepared, RobotTable, Scenario, TerminalCertificate};
+use ballbot_scenario::{Prepared, RobotTable, TerminalCertificate};
 use clap::Args;
 use lpvmpc::Bounds;
 use lpvmpc_design::{CertificateProblem, CertifyError, Proof, TerminalProblem, certify_terminal};
 use nalgebra::{SVector, Vector2, Vector4};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `ballbot certify`.
 #[derive(Debug, Args)]
@@ -28,6 +29,9 @@ pub struct CertifyArguments {
     /// A built-in scenario or a TOML file: robot, sampling time, weights and bounds
     #[arg(default_value = "two-setpoints")]
     pub scenario: String,
+    /// The robot.
+    #[command(flatten)]
+    pub robot: RobotArguments,
     /// Share of the bounds of tilt and tilt rate that the set may use; searched for if not given
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub size: Option<f64>,
@@ -65,12 +69,11 @@ type Certified = (TerminalCertificate, Proof<4>);
 /// # Errors
 /// The scenario is not valid, no set could be proved, or a file cannot be written.
 pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
-    let scenario = Scenario::load(&arguments.scenario)?;
-    let file = Path::new(&arguments.scenario);
-    let prepared = scenario.prepare(file.parent().unwrap_or(Path::new(".")))?;
+    let prepared = arguments.robot.prepare(&arguments.scenario)?;
+    let robot = RobotTable::try_from(&prepared.ballbot)?;
     let (certificate, proof) = match arguments.size {
-        Some(size) => certify(arguments, &prepared, size)?,
-        None => search(arguments, &prepared)?,
+        Some(size) => certify(arguments, &prepared, robot, size)?,
+        None => search(arguments, &prepared, robot)?,
     };
     let json = certificate.to_json()?;
     let page = certificate_page::html(&prepared.title, &certificate, &proof)?;
@@ -87,11 +90,15 @@ pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
 /// The largest set that can be certified. A larger box of tilts allows a larger set, up to where
 /// the law has to cope with so many plants that the set shrinks again; the larger the set, the
 /// harder the proof. So the sizes up to the largest designed set are bisected.
-fn search(arguments: &CertifyArguments, prepared: &Prepared) -> Result<Certified, CommandError> {
+fn search(
+    arguments: &CertifyArguments,
+    prepared: &Prepared,
+    robot: RobotTable,
+) -> Result<Certified, CommandError> {
     let sizes = (1..=SIZES).map(|i| i as f64 / SIZES as f64);
     let designed: Vec<(f64, f64)> = sizes
         .map(|size| {
-            let design = problem(arguments, prepared, size).design(&prepared.ballbot);
+            let design = problem(arguments, prepared, size).design(&robot.ballbot());
             (size, design.map_or(f64::NEG_INFINITY, |set| set.log_det()))
         })
         .collect();
@@ -107,7 +114,7 @@ fn search(arguments: &CertifyArguments, prepared: &Prepared) -> Result<Certified
     // Below `low` there is a proof, from `high` on there is none.
     while low < high {
         let middle = (low + high) / 2;
-        match certify(arguments, prepared, designed[middle].0) {
+        match certify(arguments, prepared, robot, designed[middle].0) {
             Ok(found) => {
                 low = middle + 1;
                 best = Some(found);
@@ -153,13 +160,13 @@ fn problem(
 fn certify(
     arguments: &CertifyArguments,
     prepared: &Prepared,
+    robot: RobotTable,
     size: f64,
 ) -> Result<Certified, CertifyError> {
     let problem = problem(arguments, prepared, size);
     let progress = Progress::new("proving", STEPS);
-    let robot = RobotTable::from(&prepared.ballbot);
     certify_terminal(
-        (&prepared.ballbot, robot),
+        (&robot.ballbot(), robot),
         &problem,
         arguments.boxes,
         &|done| {

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 Examples:
   ballbot excite --config my-robot.toml                     from masses, priors or starts
-  ballbot excite --robot out/identification/parameters.toml from an identification
+  ballbot excite --parameters out/identification/parameters.toml
   ballbot excite --amplitude 2 --tilt-limit 8 --gain=-0.5,-12,-0.6,-2.5
 
 Add the torque to that of the loop that holds the robot, log, and identify. Without --gain the loop
@@ -30,7 +30,7 @@ pub struct ExciteArguments {
     pub config: Option<PathBuf>,
     /// Parameters from `ballbot identify`, in place of what the configuration expects
     #[arg(long, value_name = "parameters.toml")]
-    pub robot: Option<PathBuf>,
+    pub parameters: Option<PathBuf>,
     /// Lowest and highest frequency, Hz
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 2, value_parser = positive, default_values_t = [0.2, 6.0])]
     pub band: Vec<f64>,
@@ -83,7 +83,7 @@ fn task(arguments: &ExciteArguments, config: &Config) -> Result<ExcitationTask, 
         })?;
     let geometry = config.geometry();
     let mut robot = Values::expected(&choices, &geometry);
-    if let Some(path) = &arguments.robot {
+    if let Some(path) = &arguments.parameters {
         let file: IdentifiedFile = input::read_toml(path)?;
         for (key, entry) in file.identification.parameters {
             if let (Some(parameter), Some(value)) = (Parameter::from_key(&key), entry.value) {

@@ -7,7 +7,7 @@ use crate::linear_model::LinearModel;
 use crate::table::{self, Table};
 use clap::Args;
 use lpvmpc::LpvModel;
-use nalgebra::{Complex, Vector2};
+use nalgebra::{Complex, Vector3};
 use serde_json::{Value, json};
 
 /// Arguments of `ballbot linearize`.
@@ -37,6 +37,15 @@ pub struct LinearizeArguments {
         allow_negative_numbers = true
     )]
     pub theta_dot: Option<f64>,
+    /// Speed of the drive, phi_dot - theta_dot, degrees per second; only Coulomb friction depends
+    /// on it [default: 0]
+    #[arg(
+        long,
+        value_name = "DEG_PER_S",
+        value_parser = crate::arguments::finite,
+        allow_negative_numbers = true
+    )]
+    pub drive_speed: Option<f64>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
@@ -55,8 +64,8 @@ fn tilt(text: &str) -> Result<f64, String> {
 struct Report {
     /// In words.
     title: String,
-    /// theta in rad and theta_dot in rad/s.
-    scheduling: Vector2<f64>,
+    /// theta in rad, theta_dot and phi_dot - theta_dot in rad/s.
+    scheduling: Vector3<f64>,
     model: LinearModel,
     poles: Vec<Complex<f64>>,
     rank: usize,
@@ -82,14 +91,19 @@ impl Report {
             model: choice,
             theta,
             theta_dot,
+            drive_speed,
             ..
         } = arguments;
-        let degrees = Vector2::new(theta.unwrap_or(0.0), theta_dot.unwrap_or(0.0));
+        let degrees = Vector3::new(
+            theta.unwrap_or(0.0),
+            theta_dot.unwrap_or(0.0),
+            drive_speed.unwrap_or(0.0),
+        );
         let scheduling = degrees.map(f64::to_radians);
         let (title, model) = match choice.model {
             ModelChoice::P => {
                 refuse_for_p(arguments)?;
-                let model = choice.upright(&choice.ballbot()?);
+                let model = choice.upright(&choice.robot.ballbot()?);
                 (choice.model.description().to_owned(), model)
             }
             ModelChoice::B => {
@@ -97,7 +111,7 @@ impl Report {
                     "LPV model b at the scheduling theta = {} deg, theta_dot = {} deg/s",
                     degrees[0], degrees[1]
                 );
-                let matrices = choice.ballbot()?.matrices(&scheduling);
+                let matrices = choice.robot.ballbot()?.matrices(&scheduling);
                 (title, LinearModel::from(matrices))
             }
         };
@@ -135,6 +149,7 @@ impl Report {
             "model": arguments.model.model.name(),
             "theta_rad": self.scheduling[0],
             "theta_dot_rad_s": self.scheduling[1],
+            "drive_speed_rad_s": self.scheduling[2],
             "a": json::matrix(&self.model.a),
             "b": json::matrix(&self.model.b),
             "poles_1_s": json::poles(&self.poles),
@@ -148,7 +163,8 @@ fn refuse_for_p(arguments: &LinearizeArguments) -> Result<(), CommandError> {
     let given = [
         ("--theta", arguments.theta.is_some()),
         ("--theta-dot", arguments.theta_dot.is_some()),
-        ("--parameters", arguments.model.parameters.is_some()),
+        ("--drive-speed", arguments.drive_speed.is_some()),
+        ("--parameters", arguments.model.robot.parameters.is_some()),
     ];
     match given.into_iter().find(|(_, is_given)| *is_given) {
         Some((option, _)) => Err(CommandError::Usage(format!(

@@ -4,20 +4,22 @@ use super::CommandError;
 use super::model::ModelArguments;
 use crate::arguments::{finite, positive};
 use crate::json;
-use crate::regulator::{Regulator, RegulatorProblem, Time};
+use crate::regulator::{Regulator, RegulatorError, RegulatorProblem, Time};
 use crate::table::{self, Table, complex, number};
 use ballbot::limits;
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use lpvmpc::Rk4;
+use lpvmpc_design::accurate_rk4_substeps;
 use serde_json::{Value, json};
 
 /// Arguments of `ballbot lqr`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  ballbot lqr                                the paper's predictor: one step of 0.05 s
-  ballbot lqr --ts 0.02 --substeps 2         another sampling time
+  ballbot lqr                                the paper's robot
+  ballbot lqr --substeps 1                   the paper's predictor: one step of 0.05 s
+  ballbot lqr --ts 0.02                      another sampling time
   ballbot lqr --model p --continuous         the gain and terminal cost that the paper uses
   ballbot lqr --q 1000,1,0.1,0.1 --r 500     other weights
   ballbot lqr --parameters robot.toml        another robot
@@ -37,9 +39,9 @@ pub struct LqrArguments {
     /// Sampling time, s
     #[arg(long, value_name = "SECONDS", default_value = "0.05", value_parser = positive)]
     pub ts: f64,
-    /// Runge-Kutta steps per sample
-    #[arg(long, default_value = "1", value_parser = RangedU64ValueParser::<usize>::new().range(1..=100_000))]
-    pub substeps: usize,
+    /// Runge-Kutta steps per sample [default: as in a scenario, by the fastest pole]
+    #[arg(long, value_parser = RangedU64ValueParser::<usize>::new().range(1..=100_000))]
+    pub substeps: Option<usize>,
     /// Design in continuous time: P is then about t_s times that of sampled time
     #[arg(long, conflicts_with_all = ["ts", "substeps"])]
     pub continuous: bool,
@@ -67,9 +69,14 @@ fn state_weights(text: &str) -> Result<[f64; 4], String> {
 /// The parameters cannot be used, the sampling time is too long for the predictor, or there is no
 /// gain.
 pub fn run(arguments: &LqrArguments) -> Result<String, CommandError> {
-    let ballbot = arguments.model.ballbot()?;
+    let ballbot = arguments.model.robot.ballbot()?;
+    let linear = arguments.model.upright(&ballbot);
+    let substeps = match arguments.substeps {
+        Some(substeps) => substeps,
+        None => accurate_rk4_substeps(&linear.a, arguments.ts).map_err(RegulatorError::from)?,
+    };
     let problem = RegulatorProblem {
-        linear: arguments.model.upright(&ballbot),
+        linear,
         ballbot,
         q: arguments.q,
         r: arguments.r,
@@ -78,9 +85,7 @@ pub fn run(arguments: &LqrArguments) -> Result<String, CommandError> {
         } else {
             Time::Sampled {
                 t_s: arguments.ts,
-                predictor: Rk4 {
-                    substeps: arguments.substeps,
-                },
+                predictor: Rk4 { substeps },
             }
         },
     };

@@ -1,13 +1,11 @@
 //! Which robot, and which of its linear models.
 
-use super::CommandError;
-use crate::input;
+use super::robot::RobotArguments;
 use crate::linear_model::LinearModel;
 use ballbot::{Ballbot, LinearParameters};
 use clap::{Args, ValueEnum};
 use lpvmpc::LpvModel;
-use nalgebra::Vector2;
-use std::path::PathBuf;
+use nalgebra::Vector3;
 
 /// The robot and its linear model.
 #[derive(Debug, Args)]
@@ -15,9 +13,9 @@ pub struct ModelArguments {
     /// The linear model
     #[arg(long, value_enum, default_value_t = ModelChoice::B)]
     pub model: ModelChoice,
-    /// TOML file with a `[parameters]` table, such as a scenario [default: the paper's b*]
-    #[arg(long, value_name = "FILE.toml")]
-    pub parameters: Option<PathBuf>,
+    /// The robot.
+    #[command(flatten)]
+    pub robot: RobotArguments,
 }
 
 /// Where the linear model comes from.
@@ -48,21 +46,13 @@ impl ModelChoice {
 }
 
 impl ModelArguments {
-    /// The nonlinear model.
-    ///
-    /// # Errors
-    /// The file cannot be read or makes no sense.
-    pub fn ballbot(&self) -> Result<Ballbot<f64>, CommandError> {
-        match &self.parameters {
-            Some(path) => Ok(input::read_parameters(path)?),
-            None => Ok(Ballbot::paper()),
-        }
-    }
-
-    /// The linear model that was chosen, at the upright equilibrium of `ballbot`.
+    /// The linear model that was chosen, at the upright equilibrium of `ballbot`, without Coulomb
+    /// friction.
     pub fn upright(&self, ballbot: &Ballbot<f64>) -> LinearModel {
         match self.model {
-            ModelChoice::B => LinearModel::from(ballbot.matrices(&Vector2::zeros())),
+            ModelChoice::B => {
+                LinearModel::from(ballbot.without_coulomb().matrices(&Vector3::zeros()))
+            }
             ModelChoice::P => LinearModel::from(LinearParameters::paper().matrices()),
         }
     }

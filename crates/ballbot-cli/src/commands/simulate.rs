@@ -1,13 +1,14 @@
 //! `ballbot simulate`.
 
 use super::CommandError;
+use super::robot::RobotArguments;
 use crate::figures::{Figure, Role};
 use crate::output;
 use crate::pictures::{self, Shown};
 use crate::progress::Progress;
 use crate::recording::{self, Columns, Metrics};
 use crate::table::Table;
-use ballbot_scenario::{Prepared, Scenario, Surroundings, words};
+use ballbot_scenario::{Prepared, Surroundings, words};
 use clap::Args;
 use lpvmpc_sim::{Ending, LogRow, Recording, Trajectory};
 use std::path::{Path, PathBuf};
@@ -22,10 +23,14 @@ Examples:
   ballbot simulate my.toml               a file made by `ballbot scenario show NAME`
 
 Writes trajectory.csv (for two planes trajectory_x.csv, trajectory_y.csv and motors.csv) and a
-figure as SVG and PNG. --log adds what the sensors of `[world]` delivered. A run that ends early keeps what it recorded, and exits with 1.")]
+figure as SVG and PNG, in place of those of an earlier run in the same folder. --log adds what the
+sensors of `[world]` delivered. A run that ends early keeps what it recorded, and exits with 1.")]
 pub struct SimulateArguments {
     /// A built-in scenario or a TOML file
     pub scenario: String,
+    /// The robot.
+    #[command(flatten)]
+    pub robot: RobotArguments,
     /// Folder for the results [default: out/SCENARIO]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -39,9 +44,27 @@ pub struct SimulateArguments {
 /// # Errors
 /// The scenario is not valid, a file cannot be written, or the run ended early.
 pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
-    let scenario = Scenario::load(&arguments.scenario)?;
+    Ok(complete(arguments)?.summary)
+}
+
+/// A run that came to its end.
+#[derive(Clone, Debug)]
+pub struct Simulated {
+    /// What was run.
+    pub prepared: Prepared,
+    /// What happened in each plane.
+    pub trajectories: Vec<Trajectory<4, 1>>,
+    /// Its numbers, for people.
+    pub summary: String,
+}
+
+/// [`run`] with all that is known of it.
+///
+/// # Errors
+/// As [`run`].
+pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError> {
+    let prepared = arguments.robot.prepare(&arguments.scenario)?;
     let file = Path::new(&arguments.scenario);
-    let prepared = scenario.prepare(file.parent().unwrap_or(Path::new(".")))?;
     let name = file.file_stem().unwrap_or(file.as_os_str());
     let folder = match &arguments.out {
         Some(folder) => folder.clone(),
@@ -66,7 +89,11 @@ pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
         .zip(&trajectories)
         .find(|(_, run)| run.ending != Ending::Complete);
     match early {
-        None => Ok(summary),
+        None => Ok(Simulated {
+            prepared,
+            trajectories,
+            summary,
+        }),
         Some((what, run)) => Err(CommandError::EndedEarly {
             what,
             ending: words::ending(&run.ending),
@@ -157,8 +184,25 @@ fn write(
         .map(|(path, content)| (path.as_path(), content.as_slice()))
         .collect();
     output::write_files(&files)?;
-    Ok(())
+    // What an earlier run of another kind left in the folder would be taken for this one's.
+    let written = |name: &str| files.iter().any(|(path, _)| path.ends_with(name));
+    let stale = RESULTS.into_iter().filter(|name| !written(name));
+    Ok(output::remove_files(stale.map(|name| folder.join(name)))?)
 }
+
+/// All files that a run can leave in its folder.
+const RESULTS: [&str; 10] = [
+    "trajectory.csv",
+    "trajectory_x.csv",
+    "trajectory_y.csv",
+    "motors.csv",
+    "figure.svg",
+    "figure.png",
+    "path.svg",
+    "path.png",
+    "motors.svg",
+    "motors.png",
+];
 
 /// The figures with their names; none when a plane has no sample to draw.
 fn figures(prepared: &Prepared, trajectories: &[Trajectory<4, 1>]) -> Vec<(&'static str, Figure)> {

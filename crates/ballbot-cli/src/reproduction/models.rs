@@ -7,7 +7,7 @@ use crate::regulator::{RegulatorProblem, Time};
 use ballbot::Ballbot;
 use lpvmpc::{LpvModel, Rk4};
 use lpvmpc_sim::{Tolerances, advance};
-use nalgebra::{Matrix4, RowVector4, Vector1, Vector2, Vector4};
+use nalgebra::{Matrix4, RowVector4, Vector1, Vector3, Vector4};
 
 /// The sampling time of the experiment, s; the torque is held for as long.
 const T_S: f64 = 0.05;
@@ -53,12 +53,12 @@ pub struct ModelComparison {
 /// The plant through A(sigma(x)) x + B(sigma(x)) u, without the direct form of f.
 struct Embedded(Ballbot<f64>);
 
-impl LpvModel<f64, 4, 1, 2> for Embedded {
-    fn scheduling(&self, x: &Vector4<f64>) -> Vector2<f64> {
+impl LpvModel<f64, 4, 1, 3> for Embedded {
+    fn scheduling(&self, x: &Vector4<f64>) -> Vector3<f64> {
         self.0.scheduling(x)
     }
 
-    fn matrices(&self, scheduling: &Vector2<f64>) -> (Matrix4<f64>, Vector4<f64>) {
+    fn matrices(&self, scheduling: &Vector3<f64>) -> (Matrix4<f64>, Vector4<f64>) {
         self.0.matrices(scheduling)
     }
 }
@@ -66,12 +66,12 @@ impl LpvModel<f64, 4, 1, 2> for Embedded {
 /// The plant linearised at the upright equilibrium: scheduling held at zero.
 struct Linearised(Ballbot<f64>);
 
-impl LpvModel<f64, 4, 1, 2> for Linearised {
-    fn scheduling(&self, _x: &Vector4<f64>) -> Vector2<f64> {
-        Vector2::zeros()
+impl LpvModel<f64, 4, 1, 3> for Linearised {
+    fn scheduling(&self, _x: &Vector4<f64>) -> Vector3<f64> {
+        Vector3::zeros()
     }
 
-    fn matrices(&self, scheduling: &Vector2<f64>) -> (Matrix4<f64>, Vector4<f64>) {
+    fn matrices(&self, scheduling: &Vector3<f64>) -> (Matrix4<f64>, Vector4<f64>) {
         self.0.matrices(scheduling)
     }
 }
@@ -138,7 +138,7 @@ fn torque_at(gain: &RowVector4<f64>, x: &Vector4<f64>, t: f64) -> f64 {
 type Course = (Vec<f64>, Vec<[f64; 4]>, Vec<f64>);
 
 /// The loop around a continuous model: times, states, and the torque of each sample.
-fn continuous<P: LpvModel<f64, 4, 1, 2>>(
+fn continuous<P: LpvModel<f64, 4, 1, 3>>(
     model: &P,
     gain: &RowVector4<f64>,
 ) -> Result<Course, CommandError> {

@@ -20,7 +20,7 @@ type Inputs = [Vector1<f64>; N];
 /// Nonlinear MPC for one plane with the horizon of 20 samples.
 struct NonlinearMpc<'a> {
     ballbot: &'a Ballbot<f64>,
-    settings: &'a ControllerSettings<f64, 4, 1, 2>,
+    settings: &'a ControllerSettings<f64, 4, 1, 3>,
     p: Matrix4<f64>,
     ocp: Box<Ocp<f64, 4, 1, N>>,
     solver: Box<Solver<f64, 4, 1, N, N>>,

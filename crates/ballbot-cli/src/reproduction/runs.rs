@@ -117,7 +117,7 @@ impl Run {
             planes,
             ..
         } = &self.prepared;
-        let mut controller = Controller::<_, f64, 4, 1, 2, N, { N + 4 }>::new(*ballbot, *settings)
+        let mut controller = Controller::<_, f64, 4, 1, 3, N, { N + 4 }>::new(*ballbot, *settings)
             .map_err(ScenarioError::from)?;
         let mut workspace = Workspace::new();
         let reference = Reference::constant(planes[0].state_reference(0.0));

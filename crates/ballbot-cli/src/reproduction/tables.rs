@@ -6,7 +6,7 @@ use super::runs::Run;
 use crate::recording::{Metrics, mean_and_deviation};
 use ballbot::{Ballbot, LinearParameters, limits};
 use lpvmpc::LpvModel;
-use nalgebra::Vector2;
+use nalgebra::Vector3;
 
 /// A table with its file name and title.
 #[derive(Clone, Debug, PartialEq)]
@@ -199,9 +199,9 @@ fn elements_sheet() -> Sheet {
     );
     let plant = Ballbot::<f64>::paper();
     let points = [
-        Vector2::zeros(),
-        Vector2::new(std::f64::consts::FRAC_PI_6, 1.0),
-        Vector2::new(limits::THETA, limits::THETA_DOT),
+        Vector3::zeros(),
+        Vector3::new(std::f64::consts::FRAC_PI_6, 1.0, 0.0),
+        Vector3::new(limits::THETA, limits::THETA_DOT, 0.0),
     ];
     let matrices = points.map(|point| plant.matrices(&point));
     let p = LinearParameters::<f64>::paper();

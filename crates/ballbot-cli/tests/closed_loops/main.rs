@@ -1,5 +1,5 @@
 //! The commands of the program `ballbot` that run closed loops: `simulate`, `scenario`,
-//! `reproduce`, `campaign`.
+//! `rehearse`, `reproduce`, `campaign`.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -9,6 +9,7 @@
 mod campaign;
 mod failures;
 mod recorded;
+mod rehearsal;
 mod reproduce;
 mod scenario;
 mod simulate;

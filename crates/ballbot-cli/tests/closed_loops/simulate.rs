@@ -266,3 +266,18 @@ fn the_log_has_what_the_sensors_delivered_one_file_per_plane() {
     }
     assert!(!folder.path().join("logs/two.csv").exists());
 }
+
+#[test]
+fn nothing_of_an_earlier_run_stays_in_the_folder() {
+    // A run of one plane after one of two once left the curve and the motors of the first.
+    let folder = tempfile::tempdir().unwrap();
+    succeed(folder.path(), &["simulate", "lissajous", "--out", "same"]);
+    let same = folder.path().join("same");
+    std::fs::write(same.join("notes.txt"), "mine").unwrap();
+    succeed(
+        folder.path(),
+        &["simulate", "single-setpoint", "--out", "same"],
+    );
+    let left = ["figure.png", "figure.svg", "notes.txt", "trajectory.csv"];
+    assert_eq!(files(&same), left);
+}

@@ -141,7 +141,7 @@ fn a_log_becomes_parameters_a_report_and_words() {
     let torque = folder.path().join("torque.csv");
     let words = text(&[
         "excite",
-        "--robot",
+        "--parameters",
         name(&parameters),
         "--amplitude",
         "50",

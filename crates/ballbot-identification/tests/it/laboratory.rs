@@ -1,7 +1,7 @@
 //! A robot in a loop, with the sensors of a real one. Its equations of motion are written down once
 //! more, from the mass matrix, and integrated in steps of 0.25 ms.
 
-use ballbot::{Ballbot, Geometry, LinearParameters};
+use ballbot::{Ballbot, CREEP_SPEED, DriveFriction, Geometry, LinearParameters};
 use ballbot_identification::log::{BallAngle, Run, Torque};
 use fastrand::Rng;
 use lpvmpc_design::{linearize, lqr_continuous};
@@ -55,6 +55,7 @@ pub fn healthy() -> Laboratory {
             b2: 0.02,
             b3: 0.02 + 0.2978 * 0.2978 + 0.04,
             b4: 0.01,
+            drive: DriveFriction::none(),
             geometry: Geometry::paper(),
         },
         drive_friction: 0.03,
@@ -85,11 +86,11 @@ impl Laboratory {
         let gear = self.plant.geometry.ball_radius / self.plant.geometry.wheel_radius;
         let drive = gear * self.torque_gain * torque
             - self.drive_friction * slip
-            - self.coulomb * (slip / 0.1).tanh();
+            - self.coulomb * slip / slip.hypot(CREEP_SPEED);
         let force = Vector2::new(drive, -drive)
             - self.plant.coriolis(x[1], x[3])
             - self.plant.gravity(x[1])
-            - self.plant.friction(x[2]);
+            - self.plant.friction(x[2], x[3]);
         let acceleration = self.plant.mass(x[1]).try_inverse().unwrap() * force;
         Vector4::new(x[2], x[3], acceleration[0], acceleration[1])
     }

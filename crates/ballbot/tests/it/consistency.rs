@@ -1,7 +1,7 @@
 //! The verdict on b against mechanics.
 
 use crate::robots;
-use ballbot::{Ballbot, Geometry};
+use ballbot::{Ballbot, DriveFriction, Geometry};
 use fastrand::Rng;
 use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
@@ -24,7 +24,7 @@ fn the_papers_b_is_no_rigid_body() {
     assert!(!verdict.mass_positive);
     assert!(verdict.mass_invertible, "det M has no zero in the range");
     assert!(verdict.determinant.1 < 0.0, "{:?}", verdict.determinant);
-    assert!(!verdict.friction_dissipative);
+    assert!(!verdict.rolling_dissipative);
     let (ball, body) = (verdict.ball_inertia, verdict.body_inertia);
     assert!(
         ball.0 < ball.1 && (ball.1 - 0.0737).abs() < 5e-5,
@@ -68,6 +68,26 @@ fn each_violation_alone_is_found() {
     let least = good.consistency(PI);
     for (bad, finding) in [
         (Ballbot { b4: -1e-9, ..good }, "friction b4 is negative"),
+        (
+            Ballbot {
+                drive: DriveFriction {
+                    viscous: -1e-9,
+                    coulomb: 0.1,
+                },
+                ..good
+            },
+            "friction in the drive is negative",
+        ),
+        (
+            Ballbot {
+                drive: DriveFriction {
+                    viscous: 0.1,
+                    coulomb: f64::NAN,
+                },
+                ..good
+            },
+            "friction in the drive is negative",
+        ),
         (
             Ballbot {
                 b1: 0.999 * least.ball_inertia.1,
@@ -121,6 +141,7 @@ fn the_verdict_is_what_sampling_the_range_shows() {
             b2: robots::uniform(&mut rng, -0.05, 0.1),
             b3: robots::uniform(&mut rng, -0.02, 0.2),
             b4: 0.1,
+            drive: DriveFriction::none(),
             geometry: Geometry::paper(),
         };
         // A tilt beyond pi was once folded back: 2 pi was checked as upright alone.

@@ -1,7 +1,7 @@
 //! The disturbed plant against the undisturbed one, energy, and statics.
 
 use crate::robots;
-use ballbot::{Ballbot, Disturbed};
+use ballbot::{Ballbot, CREEP_SPEED, Disturbed};
 use fastrand::Rng;
 use nalgebra::{Vector2, Vector4};
 
@@ -61,7 +61,10 @@ fn forces_do_the_work_that_the_energy_gains() {
         let x_dot = robot.f(&x, torque, &load);
         let geometry = robot.ballbot.geometry;
         let gear = geometry.ball_radius / geometry.wheel_radius;
-        let power = gear * torque * (x[2] - x[3]) - robot.ballbot.b4 * x[2] * x[2]
+        let drive = robot.ballbot.drive;
+        let speed = x[2] - x[3];
+        let friction = drive.viscous * speed + drive.coulomb * speed / speed.hypot(CREEP_SPEED);
+        let power = (gear * torque - friction) * speed - robot.ballbot.b4 * x[2] * x[2]
             + load[0] * geometry.ball_radius * x[2]
             + load[1] * x[3];
         // Central difference along the motion: its error is of order h^2.

@@ -9,7 +9,7 @@ use nalgebra::{Vector2, Vector4};
 fn accelerations(robot: &Ballbot<f64>, x: &Vector4<f64>, torque: f64) -> Vector2<f64> {
     let force = robot.input() * torque
         - robot.coriolis(x[1], x[3])
-        - robot.friction(x[2])
+        - robot.friction(x[2], x[3])
         - robot.gravity(x[1]);
     let solution = robot.mass(x[1]).lu().solve(&force);
     solution.expect("M is invertible")
@@ -26,7 +26,7 @@ fn assert_f_solves_the_equations_of_motion(robot: &Ballbot<f64>, rng: &mut Rng) 
     let inverse = robot.mass(x[1]).try_inverse().expect("M is invertible");
     let forces = (robot.input() * torque).abs()
         + robot.coriolis(x[1], x[3]).abs()
-        + robot.friction(x[2]).abs()
+        + robot.friction(x[2], x[3]).abs()
         + robot.gravity(x[1]).abs();
     let scale = inverse.abs() * forces;
     for i in 0..2 {
@@ -63,7 +63,7 @@ fn energy_changes_by_the_power_of_torque_and_friction_alone() {
         let (far, near) = (at(2.0 * h) - at(-2.0 * h), at(h) - at(-h));
         let found = (8.0 * near - far) / (12.0 * h);
         let q_dot = Vector2::new(x[2], x[3]);
-        let expected = q_dot.dot(&(robot.input() * torque - robot.friction(x[2])));
+        let expected = q_dot.dot(&(robot.input() * torque - robot.friction(x[2], x[3])));
         // Rounding of the energies, and the stencil's own error.
         let accuracy = 1e-15 * at(0.0).abs() / h + 1e-9 * rate.norm();
         assert!(

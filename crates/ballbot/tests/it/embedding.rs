@@ -4,7 +4,7 @@ use crate::robots;
 use ballbot::Ballbot;
 use fastrand::Rng;
 use lpvmpc::LpvModel;
-use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
+use nalgebra::{Matrix4, Vector1, Vector3, Vector4};
 use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
 fn assert_embeds(robot: &Ballbot<f64>, x: &Vector4<f64>, torque: f64) {
@@ -46,7 +46,7 @@ fn the_embedding_is_exact_at_the_smallest_tilts() {
 #[test]
 fn sinc_is_one_upright_and_zero_upside_down() {
     let robot = Ballbot::<f64>::paper();
-    let element = |theta: f64| robot.matrices(&Vector2::new(theta, 0.0)).0[(3, 1)];
+    let element = |theta: f64| robot.matrices(&Vector3::new(theta, 0.0, 0.0)).0[(3, 1)];
     // A42 = b1 l g sinc(theta) / d; with sin(pi x)/(pi x) it would vanish at 1 rad.
     assert!(element(1.0).abs() > 1.0);
     assert!((element(PI) / element(0.0)).abs() < 1e-15);
@@ -60,7 +60,7 @@ fn sinc_is_one_upright_and_zero_upside_down() {
 /// before the division.
 #[rustfmt::skip]
 fn table_of_elements(robot: &Ballbot<f64>, theta: f64, theta_dot: f64) -> (Matrix4<f64>, Vector4<f64>) {
-    let Ballbot { b1, b2, b3, b4, geometry } = *robot;
+    let Ballbot { b1, b2, b3, b4, geometry, .. } = *robot;
     let (l, r_b) = (geometry.centre_of_mass, geometry.ball_radius);
     let (r_w, g) = (geometry.wheel_radius, geometry.gravity);
     let (sin, cos) = (theta.sin(), theta.cos());
@@ -82,7 +82,7 @@ fn the_elements_are_those_of_the_papers_table() {
     let robot = Ballbot::paper();
     for theta in [-FRAC_PI_3, -0.5, 1e-3, 0.2, FRAC_PI_3] {
         for theta_dot in [-TAU, 0.0, 1.3] {
-            let (a, b) = robot.matrices(&Vector2::new(theta, theta_dot));
+            let (a, b) = robot.matrices(&Vector3::new(theta, theta_dot, 0.0));
             let (a_table, b_table) = table_of_elements(&robot, theta, theta_dot);
             for (found, expected) in a.iter().chain(&b).zip(a_table.iter().chain(&b_table)) {
                 assert!(
@@ -99,7 +99,7 @@ fn a_positive_torque_lowers_the_tilt_over_the_whole_range() {
     // B41 < 0, as the prose of scenario 1 needs; the Table of p prints p6 positive.
     for step in -100..=100 {
         let theta = FRAC_PI_3 * f64::from(step) / 100.0;
-        let (_, b) = Ballbot::<f64>::paper().matrices(&Vector2::new(theta, 0.0));
+        let (_, b) = Ballbot::<f64>::paper().matrices(&Vector3::new(theta, 0.0, 0.0));
         assert!(b[3] < 0.0, "B41 = {} at {theta}", b[3]);
     }
 }

@@ -9,6 +9,7 @@ mod consistency;
 mod disturbed;
 mod dynamics;
 mod embedding;
+mod friction;
 mod linear;
 mod robots;
 mod single_precision;

@@ -1,6 +1,6 @@
 //! Robots and states to try the model on, the same ones in every run.
 
-use ballbot::{Ballbot, Geometry};
+use ballbot::{Ballbot, DriveFriction, Geometry};
 use fastrand::Rng;
 use nalgebra::Vector4;
 use std::f64::consts::{FRAC_PI_4, PI};
@@ -48,6 +48,10 @@ pub fn rigid(rng: &mut Rng) -> Ballbot<f64> {
         b2,
         b3: b2 + square(geometry.centre_of_mass) + body_inertia / body,
         b4: uniform(rng, 0.0, 0.2),
+        drive: DriveFriction {
+            viscous: uniform(rng, 0.0, 0.2),
+            coulomb: uniform(rng, 0.0, 0.5),
+        },
         geometry,
     }
 }

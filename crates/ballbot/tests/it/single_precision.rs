@@ -1,9 +1,9 @@
 //! The same model in `f32`, for a microcontroller.
 
 use crate::robots;
-use ballbot::{Ballbot, LinearParameters, Wheels};
+use ballbot::{Ballbot, DriveFriction, LinearParameters, Wheels};
 use fastrand::Rng;
-use lpvmpc::LpvModel;
+use lpvmpc::{LpvModel, Scalar};
 use nalgebra::{SMatrix, Vector3, convert};
 
 /// Every entry of `single` is `double` to the accuracy of `f32`, relative to `scale`.
@@ -22,21 +22,36 @@ fn assert_agrees<const R: usize, const C: usize>(
     }
 }
 
+fn friction<T: Scalar>() -> DriveFriction<T> {
+    DriveFriction {
+        viscous: convert(0.03),
+        coulomb: convert(0.02),
+    }
+}
+
 #[test]
 fn the_model_agrees() {
-    let (single, double) = (Ballbot::<f32>::paper(), Ballbot::<f64>::paper());
+    let (mut single, mut double) = (Ballbot::<f32>::paper(), Ballbot::<f64>::paper());
+    (single.drive, double.drive) = (friction(), friction());
     let mut rng = Rng::with_seed(10);
     for _ in 0..10_000 {
         // The same numbers in both: those that f32 has.
-        let x = robots::state(&mut rng).cast::<f32>();
+        let mut x = robots::state(&mut rng).cast::<f32>();
+        // Coulomb friction turns on the speeds' difference: both are to have the same.
+        for speed in [2, 3] {
+            x[speed] = (x[speed] * 64.0).round() / 64.0;
+        }
         let torque = robots::torque(&mut rng) as f32;
         let wide = x.cast::<f64>();
         let (a, b) = double.matrices(&double.scheduling(&wide));
         let (a_single, b_single) = single.matrices(&single.scheduling(&x));
-        assert_agrees(a_single, a, a.abs());
+        // The drive's friction is added to entries of either sign.
+        let (bare, _) = Ballbot::paper().matrices(&double.scheduling(&wide));
+        let sizes = bare.abs() + (a - bare).abs();
+        assert_agrees(a_single, a, sizes);
         assert_agrees(b_single, b, b.abs());
         let torque_wide = f64::from(torque);
-        let scale = a.abs() * wide.abs() + b.abs() * torque_wide.abs();
+        let scale = sizes * wide.abs() + b.abs() * torque_wide.abs();
         assert_agrees(single.f(&x, torque), double.f(&wide, torque_wide), scale);
     }
 }

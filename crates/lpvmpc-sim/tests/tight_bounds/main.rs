@@ -35,7 +35,7 @@ const AGREEMENT: f64 = 1e-8;
 /// The dense route's optimality conditions hold to this, relative to their largest terms.
 const OPTIMALITY: f64 = 1e-10;
 
-type Loop = Controller<Ballbot<f64>, f64, NX, 1, 2, N, M>;
+type Loop = Controller<Ballbot<f64>, f64, NX, 1, 3, N, M>;
 type Problem = Ocp<f64, NX, 1, N>;
 type Plan = Solution<f64, NX, 1, N, M>;
 

@@ -23,7 +23,7 @@ fn main() -> ! {
 /// One step of a controller that is never built: what matters is the code, not a run.
 #[inline(never)]
 fn step<T: Scalar>() {
-    let controller: Option<&mut Controller<Ballbot<T>, T, 4, 1, 2, N, M>> = black_box(None);
+    let controller: Option<&mut Controller<Ballbot<T>, T, 4, 1, 3, N, M>> = black_box(None);
     let workspace: Option<&mut Workspace<T, 4, 1, N, M>> = black_box(None);
     let inputs: Option<&(Vector4<T>, Reference<T, 4, N>)> = black_box(None);
     let wheels: Option<&Wheels<T>> = black_box(None);

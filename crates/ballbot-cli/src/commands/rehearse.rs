@@ -1,0 +1,204 @@
+//! `ballbot rehearse`: from an excitation to a controller, on a simulated robot.
+
+use super::CommandError;
+use super::simulate::{self, Simulated};
+use crate::arguments::{Arguments, Command};
+use crate::output;
+use crate::table::{Table, number};
+use ballbot::Ballbot;
+use ballbot_scenario::{Parameters, PhiReference, Plane};
+use clap::{Args, Parser};
+use lpvmpc_sim::Trajectory;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `ballbot rehearse`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  ballbot rehearse                      all stages, in out/rehearsal
+  ballbot rehearse --out my-rehearsal   again with what was changed there
+
+Designs an excitation for a robot of which only a drawing is known, records a log of the robot in a
+simulated world, identifies it from the log, and controls it with what was identified: a push, a
+metre in 4 s, a curve on the floor. The stages are commands of their own, which are shown; their
+files (robot, drawing, scenarios) are written to the folder first. Those that are there already are
+kept: change them and rehearse again.")]
+pub struct RehearseArguments {
+    /// Folder for files and results
+    #[arg(long, value_name = "DIR", default_value = "out/rehearsal")]
+    pub out: PathBuf,
+}
+
+macro_rules! file {
+    ($name:literal) => {
+        (
+            $name,
+            include_str!(concat!("../../../../docs/examples/chain/", $name)),
+        )
+    };
+}
+
+/// What the stages need.
+const FILES: [(&str, &str); 5] = [
+    file!("true-robot.toml"),
+    file!("my-robot.toml"),
+    file!("record.toml"),
+    file!("move.toml"),
+    file!("lissajous.toml"),
+];
+
+/// The stages as command lines; what begins with @ is in the folder.
+const STAGES: [&[&str]; 5] = [
+    &[
+        "excite",
+        "--config",
+        "@my-robot.toml",
+        "--amplitude",
+        "2",
+        "--out",
+        "@excitation.csv",
+    ],
+    &[
+        "simulate",
+        "@record.toml",
+        "--out",
+        "@record",
+        "--log",
+        "@log.csv",
+    ],
+    &[
+        "identify",
+        "@log.csv",
+        "--config",
+        "@my-robot.toml",
+        "--out",
+        "@identification",
+    ],
+    &["simulate", "@move.toml", "--out", "@move"],
+    &["simulate", "@lissajous.toml", "--out", "@lissajous"],
+];
+
+/// Runs all stages and sums up.
+///
+/// # Errors
+/// A file cannot be written, or a stage has no result.
+pub fn run(arguments: &RehearseArguments) -> Result<String, CommandError> {
+    let folder = &arguments.out;
+    let missing = FILES.map(|(name, text)| (folder.join(name), text));
+    let missing: Vec<(&Path, &[u8])> = missing
+        .iter()
+        .filter(|(path, _)| !path.exists())
+        .map(|(path, text)| (path.as_path(), text.as_bytes()))
+        .collect();
+    output::write_files(&missing)?;
+
+    let mut text = String::new();
+    let mut runs = Vec::new();
+    for stage in STAGES {
+        let words = stage.iter().map(|word| match word.strip_prefix('@') {
+            Some(name) => folder.join(name).into_os_string(),
+            None => (*word).into(),
+        });
+        let words: Vec<_> = std::iter::once("ballbot".into()).chain(words).collect();
+        for word in &words {
+            // Writing to a string cannot fail.
+            let _ = write!(text, "{} ", word.display());
+        }
+        let line = Arguments::try_parse_from(words)
+            .map_err(|error| CommandError::Usage(error.to_string()))?;
+        let said = match line.command {
+            Command::Simulate(arguments) => {
+                let run = simulate::complete(&arguments)?;
+                let said = run.summary.clone();
+                runs.push(run);
+                said
+            }
+            command => crate::run(Arguments { command })?,
+        };
+        let _ = writeln!(text, "\n{said}");
+    }
+    let robots = [
+        robot(folder, "true-robot.toml")?,
+        robot(folder, "identification/parameters.toml")?,
+    ];
+    Ok(text + &parameters(&robots).to_string() + &errors(&runs).to_string())
+}
+
+fn robot(folder: &Path, name: &str) -> Result<Ballbot<f64>, CommandError> {
+    let file = Parameters::File(name.into());
+    Ok(file.read("parameters", &folder)?.ballbot)
+}
+
+/// What there is beside what was found.
+fn parameters([real, found]: &[Ballbot<f64>; 2]) -> Table {
+    let mut table = Table::new(["parameter", "true", "identified", "off by"]);
+    let gain = |robot: &Ballbot<f64>| robot.geometry.ball_radius / robot.geometry.wheel_radius;
+    let rows: [(&str, f64, f64); 7] = [
+        ("b1 [m^2]", real.b1, found.b1),
+        ("b2 [m^2]", real.b2, found.b2),
+        ("b3 [m^2]", real.b3, found.b3),
+        ("b4, rolling [m^2/s]", real.b4, found.b4),
+        (
+            "friction in the drive [m^2/s]",
+            real.drive.viscous,
+            found.drive.viscous,
+        ),
+        (
+            "Coulomb friction [m^2/s^2]",
+            real.drive.coulomb,
+            found.drive.coulomb,
+        ),
+        ("torque to ball [1/kg]", gain(real), gain(found)),
+    ];
+    for (name, real, found) in rows {
+        let off = 100.0 * (found / real - 1.0);
+        let off = if off.is_finite() {
+            format!("{off:.1} %")
+        } else {
+            String::new()
+        };
+        table.row([name.to_owned(), number(real), number(found), off]);
+    }
+    table
+}
+
+/// How far the controlled robot was from where it should be.
+fn errors(runs: &[Simulated]) -> Table {
+    let mut table = Table::new(["run", "rms distance [mm]", "largest tilt [rad]"]);
+    for run in runs {
+        let planes = || run.prepared.planes.iter().zip(&run.trajectories);
+        let squares = planes().map(|(plane, trajectory)| mean_square(plane, trajectory));
+        let distance = run
+            .prepared
+            .ballbot
+            .geometry
+            .position(squares.sum::<f64>().sqrt());
+        let tilts = planes().flat_map(|(_, trajectory)| trajectory.states());
+        let tilt = tilts.fold(0.0_f64, |most, x| most.max(x[1].abs()));
+        table.row([
+            run.prepared.title.clone(),
+            format!("{:.1}", 1000.0 * distance),
+            format!("{tilt:.3}"),
+        ]);
+    }
+    table
+}
+
+/// Mean square of phi - phi_ref, rad^2: during a move if the reference is one, else over the run.
+fn mean_square(plane: &Plane, trajectory: &Trajectory<4, 1>) -> f64 {
+    let (from, until) = match &plane.reference {
+        PhiReference::MinimumJerk(points) => {
+            let time = |point: Option<&ballbot_scenario::PointTable>| point.map(|p| p.time_s);
+            (time(points.first()), time(points.last()))
+        }
+        _ => (None, None),
+    };
+    let samples = trajectory.samples.iter().filter(|sample| {
+        from.is_none_or(|from| sample.t >= from) && until.is_none_or(|until| sample.t <= until)
+    });
+    let errors: Vec<f64> = samples
+        .map(|sample| sample.x[0] - sample.x_ref[0])
+        .collect();
+    errors.iter().map(|error| error * error).sum::<f64>() / errors.len().max(1) as f64
+}

@@ -1,0 +1,206 @@
+//! `[controller]` and `[bounds]`: the problem that the controller solves at every sample.
+
+use crate::error::ScenarioError;
+use crate::number::positive;
+use crate::run::LONGEST_HORIZON;
+use crate::schema::{
+    BoundsTable, ControllerTable, IterationsTable, LinearModelTable, ModelKind, PredictorTable,
+    TerminalTable,
+};
+use ballbot::{Ballbot, LinearParameters};
+use lpvmpc::{
+    Bounds, ControllerSettings, Iterations, LpvModel, Predictor, Rk4, Scheduling, SolverSettings,
+    TerminalIngredient, Weights,
+};
+use nalgebra::{DMatrix, Matrix1, Matrix4, Vector1, Vector3, Vector4};
+
+impl From<LinearModelTable> for LinearParameters<f64> {
+    fn from(table: LinearModelTable) -> Self {
+        let LinearModelTable {
+            p1,
+            p2,
+            p3,
+            p4,
+            p5,
+            p6,
+        } = table;
+        Self {
+            p1,
+            p2,
+            p3,
+            p4,
+            p5,
+            p6,
+        }
+    }
+}
+
+impl BoundsTable {
+    pub(crate) fn check(&self) -> Result<(Bounds<f64, 4>, Bounds<f64, 1>), ScenarioError> {
+        let rows = [
+            ("phi_rad", self.phi_rad),
+            ("theta_rad", self.theta_rad),
+            ("phi_dot_rad_s", self.phi_dot_rad_s),
+            ("theta_dot_rad_s", self.theta_dot_rad_s),
+            ("torque_nm", self.torque_nm),
+        ];
+        for (key, [lower, upper]) in rows {
+            // Negated, so that a bound that is not a number fails.
+            if !(lower <= upper) || lower == f64::INFINITY || upper == f64::NEG_INFINITY {
+                return Err(ScenarioError::value(
+                    format!("bounds.{key}"),
+                    format!("[{lower}, {upper}]"),
+                    "the lower bound must not be above the upper one; use -inf and inf for none",
+                ));
+            }
+        }
+        let side = |i: usize| {
+            Vector4::new(
+                self.phi_rad[i],
+                self.theta_rad[i],
+                self.phi_dot_rad_s[i],
+                self.theta_dot_rad_s[i],
+            )
+        };
+        let x = Bounds {
+            lower: side(0),
+            upper: side(1),
+        };
+        let u = Bounds {
+            lower: Vector1::new(self.torque_nm[0]),
+            upper: Vector1::new(self.torque_nm[1]),
+        };
+        Ok((x, u))
+    }
+}
+
+fn check_weights(table: &ControllerTable) -> Result<(), ScenarioError> {
+    for (i, weight) in table.q.iter().enumerate() {
+        if !(*weight >= 0.0 && weight.is_finite()) {
+            return Err(ScenarioError::value(
+                format!("controller.q[{i}]"),
+                weight,
+                "a state weight must be zero or positive",
+            ));
+        }
+    }
+    positive("controller.r", table.r)?;
+    positive("controller.t_s", table.t_s)?;
+    if table.horizon == 0 || table.horizon > LONGEST_HORIZON {
+        return Err(ScenarioError::value(
+            "controller.horizon",
+            table.horizon,
+            format!(
+                "it must be from 1 to {LONGEST_HORIZON} samples (the library itself takes any \
+                 compile-time size)"
+            ),
+        ));
+    }
+    Ok(())
+}
+
+impl ControllerTable {
+    /// The settings of the controller without what stands around it.
+    pub(crate) fn settings(
+        &self,
+        ballbot: &Ballbot<f64>,
+        (x, u): (Bounds<f64, 4>, Bounds<f64, 1>),
+    ) -> Result<ControllerSettings<f64, 4, 1, 3>, ScenarioError> {
+        check_weights(self)?;
+        let weights = Weights {
+            q: Matrix4::from_diagonal(&Vector4::from(self.q)),
+            r: Matrix1::new(self.r),
+        };
+        // At rest Coulomb friction makes the fastest pole; beyond the horizon the robot moves.
+        let (stiffest, _) = ballbot.matrices(&Vector3::zeros());
+        let predictor = self.predictor(&stiffest)?;
+        let upright = ballbot.without_coulomb().matrices(&Vector3::zeros());
+        let terminal = self.terminal(upright, &weights, predictor)?;
+        let scheduling = match self.model {
+            ModelKind::Lpv => Scheduling::Predicted,
+            ModelKind::Linear => Scheduling::Held(Vector3::zeros()),
+        };
+        Ok(ControllerSettings {
+            t_s: self.t_s,
+            horizon: self.horizon,
+            predictor,
+            weights,
+            terminal,
+            x,
+            u,
+            scheduling,
+            iterations: self.iterations(),
+            solver: SolverSettings::default(),
+        })
+    }
+
+    fn iterations(&self) -> Iterations<f64> {
+        match self.iterations {
+            None => Iterations::Fixed(1),
+            Some(IterationsTable::Fixed(most)) => Iterations::Fixed(most),
+            Some(IterationsTable::UntilConverged { tolerance, most }) => {
+                Iterations::UntilConverged { tolerance, most }
+            }
+        }
+    }
+
+    fn predictor(&self, upright: &Matrix4<f64>) -> Result<Predictor, ScenarioError> {
+        let a = dynamic(upright);
+        let default = PredictorTable::StageConsistent { substeps: None };
+        let table = self.predictor.unwrap_or(default);
+        let (kind, given, key): (fn(Rk4) -> Predictor, _, _) = match table {
+            PredictorTable::Rk4 { substeps } => (Predictor::FrozenRk4, Some(substeps), "rk4"),
+            PredictorTable::Exact { substeps } => (Predictor::FrozenExact, substeps, "exact"),
+            PredictorTable::StageConsistent { substeps } => {
+                (Predictor::StageConsistent, substeps, "stage_consistent")
+            }
+        };
+        let substeps = match given {
+            Some(0) => {
+                return Err(ScenarioError::value(
+                    format!("controller.predictor.{key}.substeps"),
+                    0,
+                    "at least one step per sample is needed",
+                ));
+            }
+            Some(substeps) => substeps,
+            None => lpvmpc_design::accurate_rk4_substeps(&a, self.t_s)?,
+        };
+        lpvmpc_design::check_rk4_step(&a, self.t_s, substeps)?;
+        Ok(kind(Rk4 { substeps }))
+    }
+
+    fn terminal(
+        &self,
+        (a, b): (Matrix4<f64>, Vector4<f64>),
+        weights: &Weights<f64, 4, 1>,
+        predictor: Predictor,
+    ) -> Result<TerminalIngredient<f64, 4>, ScenarioError> {
+        let q = dynamic(&weights.q);
+        let r = DMatrix::from_element(1, 1, weights.r[0]);
+        let cost = |p: DMatrix<f64>| TerminalIngredient::Cost(Matrix4::from_fn(|i, j| p[(i, j)]));
+        Ok(match &self.terminal {
+            TerminalTable::None => TerminalIngredient::Cost(Matrix4::zeros()),
+            TerminalTable::Equality => TerminalIngredient::Equality,
+            // The certified cost is the guarded controller's; without guard it is as by default.
+            TerminalTable::DiscreteRiccati | TerminalTable::Certified(_) => {
+                let (a_d, b_d) = predictor.discretize(&a, &b, self.t_s);
+                cost(lpvmpc_design::lqr_discrete(&dynamic(&a_d), &dynamic(&b_d), &q, &r)?.p)
+            }
+            TerminalTable::ContinuousRiccati { linear_model } => {
+                let (a, b) = match linear_model {
+                    Some(table) => LinearParameters::from(*table).matrices(),
+                    None => (a, b),
+                };
+                cost(lpvmpc_design::lqr_continuous(&dynamic(&a), &dynamic(&b), &q, &r)?.p)
+            }
+            TerminalTable::Cost { p } => TerminalIngredient::Cost(Matrix4::from_fn(|i, j| p[i][j])),
+        })
+    }
+}
+
+pub(crate) fn dynamic<const R: usize, const C: usize>(
+    m: &nalgebra::SMatrix<f64, R, C>,
+) -> DMatrix<f64> {
+    DMatrix::from_fn(R, C, |i, j| m[(i, j)])
+}
