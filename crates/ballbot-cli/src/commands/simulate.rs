@@ -191,7 +191,7 @@ fn write(
 }
 
 /// All files that a run can leave in its folder.
-const RESULTS: [&str; 10] = [
+const RESULTS: [&str; 16] = [
     "trajectory.csv",
     "trajectory_x.csv",
     "trajectory_y.csv",
@@ -202,6 +202,12 @@ const RESULTS: [&str; 10] = [
     "path.png",
     "motors.svg",
     "motors.png",
+    "plans.svg",
+    "plans.png",
+    "plans_x.svg",
+    "plans_x.png",
+    "plans_y.svg",
+    "plans_y.png",
 ];
 
 /// The figures with their names; none when a plane has no sample to draw.
