@@ -258,7 +258,7 @@ impl MotorsTable {
     ) -> Result<Bounds<f64, 1>, ScenarioError> {
         let motor = positive("controller.motors.limit_nm", self.limit_nm)?;
         let yaw = not_negative("controller.motors.yaw_reserve_nm", self.yaw_reserve_nm)?;
-        let limit = wheels.plane_limit(motor, yaw);
+        let limit = wheels.plane_torques(motor, yaw).equal();
         let within = Bounds {
             lower: torque.lower.map(|lower| lower.max(-limit)),
             upper: torque.upper.map(|upper| upper.min(limit)),

@@ -213,6 +213,7 @@ impl Prepared {
             period,
             preview: self.feedback.preview,
             torque: self.settings.u,
+            share: f64::INFINITY,
             line: DelayLine::default(),
             time: 0.0,
         }))

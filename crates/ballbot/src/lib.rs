@@ -15,6 +15,7 @@ mod embedding;
 mod heading;
 mod linear;
 mod parameters;
+mod shares;
 mod trigonometry;
 mod wheels;
 
@@ -23,4 +24,5 @@ pub use disturbed::Disturbed;
 pub use embedding::{Accelerations, Tilt};
 pub use heading::Heading;
 pub use parameters::{Ballbot, Field, Geometry, LinearParameters, limits};
+pub use shares::PlaneTorques;
 pub use wheels::{BadZenithAngle, Wheels};
