@@ -86,13 +86,14 @@ pub struct ShapingTable {
     pub phi_dot_rad_s: f64,
 }
 
-/// The limits of the three motors.
+/// The limits of the three motors, which two planes share. In `[world.actuator]`, `limit_nm` and
+/// `dead_zone_nm` are then those of each motor.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MotorsTable {
     /// Largest torque of each motor, N m.
     pub limit_nm: f64,
-    /// Yaw torque that is kept free, N m.
+    /// Yaw torque that is kept free, N m; what yaw does not use, the planes get.
     #[serde(default)]
     pub yaw_reserve_nm: f64,
 }

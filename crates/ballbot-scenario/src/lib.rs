@@ -29,12 +29,17 @@ mod error;
 mod feedback;
 mod feedback_table;
 mod guarantee;
+mod heading;
+mod heading_table;
 mod output_feedback;
 mod prepare;
 mod reference;
 mod run;
 mod schema;
 mod session;
+mod three_motors;
+mod whole_robot;
+mod whole_run;
 pub mod words;
 mod world;
 mod world_table;
@@ -45,15 +50,18 @@ pub use feedback::Feedback;
 pub use feedback_table::{
     DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
 };
+pub use heading::Turning;
+pub use heading_table::HeadingTable;
 pub use prepare::{Plane, Prepared};
 pub use reference::PhiReference;
-pub use run::{GUARDED_ACTIVE, GUARDED_HORIZONS, LONGEST_HORIZON, PlaneLoop, Surroundings};
+pub use run::{GUARDED_ACTIVE, GUARDED_HORIZONS, LONGEST_HORIZON, PlaneLoop, Record, Surroundings};
 pub use schema::{
     BoundsTable, CertifiedTable, ControllerTable, CsvTable, IntegrationTable, IterationsTable,
     LinearModelTable, LissajousTable, ModelKind, ParameterTable, PointTable, PredictorTable,
     ReferenceTable, Scenario, SineTable, StateTable, TerminalTable,
 };
 pub use session::{Phase, Session, Trouble};
+pub use three_motors::{MotorSample, Motors};
 pub use world::{PlaneWorld, Robot};
 pub use world_table::{
     ActuatorTable, AngleSensorTable, DelayTable, DeviationsTable, FloorTable, PlaneName, PushTable,
@@ -69,3 +77,8 @@ struct Readme;
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/robust-control.md")]
 struct RobustControl;
+
+/// The code of docs/embedded.md.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/embedded.md")]
+struct Embedded;

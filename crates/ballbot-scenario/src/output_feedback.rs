@@ -1,5 +1,6 @@
 //! The controller on a real robot: estimate, predict to the moment when the torque acts, decide.
 
+use crate::three_motors::SharingPlane;
 use ballbot::Ballbot;
 use lpvmpc::{
     Bounds, Controller, ControllerSettings, DelayLine, Estimator, LpvModel, RampedInput, Reading,
@@ -184,20 +185,6 @@ impl<const N: usize, const M: usize> OutputFeedback<N, M> {
         }
     }
 
-    /// The largest torque of the last plan that would be commanded, N m.
-    fn largest_torque(&self) -> f64 {
-        let disturbance = self.belief.disturbance();
-        match &self.core {
-            Core::Held { controller, .. } => {
-                let plan = controller.solution().u.iter();
-                let plan = plan.take(controller.settings().horizon);
-                plan.fold(0.0, |most, u| most.max((u[0] - disturbance).abs()))
-            }
-            // A ramp cannot follow a share that changes from sample to sample.
-            Core::Ramped { .. } => f64::INFINITY,
-        }
-    }
-
     /// Sends a torque, within its bounds to rounding.
     fn send(&mut self, torque: f64) -> Vector1<f64> {
         let u = self.allowed().project(&Vector1::new(torque));
@@ -258,6 +245,26 @@ impl<const N: usize, const M: usize> Core<N, M> {
                 *rate = plan.input;
                 (plan.decision, None)
             }
+        }
+    }
+}
+
+impl<const N: usize, const M: usize> SharingPlane for OutputFeedback<N, M> {
+    fn largest_torque(&self) -> f64 {
+        let disturbance = self.belief.disturbance();
+        match &self.core {
+            Core::Held { controller, .. } => {
+                let plan = controller.solution().u.iter();
+                let plan = plan.take(controller.settings().horizon);
+                plan.fold(0.0, |most, u| most.max((u[0] - disturbance).abs()))
+            }
+            Core::Ramped { .. } => f64::INFINITY,
+        }
+    }
+
+    fn set_share(&mut self, torque: f64) {
+        if let Core::Held { .. } = self.core {
+            self.share = torque;
         }
     }
 }

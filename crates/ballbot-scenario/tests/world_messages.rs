@@ -122,6 +122,10 @@ fn each_mistake_is_named_with_key_value_and_what_is_right() {
             "[controller.motors]\nlimit_nm = 0.1\nyaw_reserve_nm = 1.0",
             ["controller.motors", "no torque for the planes"],
         ),
+        (
+            "[heading]\ninertia_m2 = 0.02\nstiffness_nm_rad = 0.1\ndamping_nm_s_rad = 0.03",
+            ["heading", "two planes and [controller.motors]"],
+        ),
     ] {
         let said = message(lines);
         for word in words {

@@ -73,7 +73,7 @@ impl<const NX: usize> Actuator<NX> {
     }
 
     /// What friction leaves of the output `u` at the state `x`.
-    pub(crate) fn after_friction(&self, u: f64, x: &SVector<f64, NX>) -> f64 {
+    pub fn after_friction(&self, u: f64, x: &SVector<f64, NX>) -> f64 {
         match &self.friction {
             Some(friction) => u - friction.level * (friction.speed.dot(x) / friction.creep).tanh(),
             None => u,

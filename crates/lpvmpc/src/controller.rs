@@ -46,6 +46,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
     Workspace<T, NX, NU, N, M>
 {
     /// An empty workspace.
+    #[inline(always)]
     pub fn new() -> Self {
         Self {
             ocp: Ocp::default(),
