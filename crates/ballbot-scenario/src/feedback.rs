@@ -116,7 +116,7 @@ impl EstimatorTable {
             gate: Gate {
                 deviations: self.outlier_deviations,
                 patience: self.outlier_patience,
-                oldest: f64::INFINITY,
+                oldest: self.oldest_s,
             },
         };
         if !(self.outlier_deviations > 0.0) {
@@ -124,6 +124,13 @@ impl EstimatorTable {
                 "controller.estimator.outlier_deviations",
                 self.outlier_deviations,
                 "it must be positive; inf to believe every reading",
+            ));
+        }
+        if !(self.oldest_s >= 0.0) {
+            return Err(ScenarioError::value(
+                "controller.estimator.oldest_s",
+                self.oldest_s,
+                "it must not be negative; inf for any age",
             ));
         }
         if let DisturbancesTable::TorqueAndTilt {

@@ -24,6 +24,8 @@ pub struct EstimatorTable {
     pub outlier_deviations: f64,
     /// After so many outliers of a sensor in a row the state must be wrong, and they are.
     pub outlier_patience: usize,
+    /// Readings older than this are not believed, s; inf for any age.
+    pub oldest_s: f64,
 }
 
 impl Default for EstimatorTable {
@@ -37,6 +39,7 @@ impl Default for EstimatorTable {
             disturbances: DisturbancesTable::default(),
             outlier_deviations: 6.0,
             outlier_patience: 2,
+            oldest_s: f64::INFINITY,
         }
     }
 }

@@ -110,8 +110,12 @@ impl Belief {
             }
             Self::Estimated(estimator) => {
                 line.for_each(elapsed, |duration, u| estimator.advance(u, duration));
-                let [phi, theta, _, theta_dot] = measurement.values;
-                let readings = [phi, theta, theta_dot].map(|value| value.map(Reading::fresh));
+                let reading = |i: usize| {
+                    let age = measurement.ages[i];
+                    measurement.values[i].map(|value| Reading { value, age })
+                };
+                // phi, theta and theta_dot; the filter does without phi_dot.
+                let readings = [0, 1, 3].map(reading);
                 estimator.update(&readings);
             }
         }

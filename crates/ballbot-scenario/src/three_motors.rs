@@ -156,10 +156,13 @@ impl Regulator<10, 3, 10> for PlanesAndYaw {
     }
 
     fn observe(&mut self, measurement: &Measurement<10>) {
-        let Measurement { t, values } = *measurement;
+        let Measurement { t, values, ages } = *measurement;
         for (index, regulator) in self.planes.iter_mut().enumerate() {
-            let values = std::array::from_fn(|i| values[4 * index + i]);
-            regulator.observe(&Measurement { t, values });
+            regulator.observe(&Measurement {
+                t,
+                values: std::array::from_fn(|i| values[4 * index + i]),
+                ages: std::array::from_fn(|i| ages[4 * index + i]),
+            });
         }
         for (place, value) in self.heading.iter_mut().zip(&values[HEADING..]) {
             *place = value.unwrap_or(*place);

@@ -67,6 +67,8 @@ pub(crate) fn whole_world(
                 resolution: sensor.resolution,
                 dropout: sensor.dropout,
                 every: sensor.every,
+                late: sensor.late,
+                stale: sensor.stale,
             };
         }
     }

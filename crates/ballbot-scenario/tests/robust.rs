@@ -187,6 +187,34 @@ fn the_plan_knows_what_a_disturbance_leaves_of_the_torque() {
     );
 }
 
+/// Encoders at 1 kHz, an inertial unit at 200 Hz whose readings are 10 ms late and now and then
+/// come again.
+#[test]
+fn it_follows_a_metre_with_sensors_of_different_rates_late_and_stale() {
+    let mut scenario = example("push-and-move");
+    let world = world(&mut scenario);
+    world.sensor_period_s = Some(0.001);
+    let sensors = &mut world.sensors;
+    sensors.theta.period_s = Some(0.005);
+    sensors.theta_dot.period_s = Some(0.005);
+    (sensors.theta.delay_s, sensors.theta_dot.delay_s) = (0.01, 0.01);
+    (sensors.theta.stale, sensors.theta_dot.stale) = (0.05, 0.05);
+    // Older than the delay: seen before.
+    let estimator = scenario.controller.estimator.as_mut().expect("it has one");
+    estimator.oldest_s = 0.0105;
+    let (prepared, recordings) = stands(&scenario);
+    let error = rms_mm(&prepared, &recordings[0], 6.0, 10.0);
+    assert!(error < 20.0, "{error} mm");
+    let log = &recordings[0].log;
+    let delivered = |sensor: usize| {
+        let rows = log.iter().filter(|row| row.measured[sensor].is_some());
+        rows.count() as f64 / log.len() as f64
+    };
+    // 1 % of the samples are missing; stale readings come at any time.
+    assert!((delivered(0) - 0.99).abs() < 0.01, "{}", delivered(0));
+    assert!((delivered(1) - 0.25).abs() < 0.03, "{}", delivered(1));
+}
+
 #[test]
 fn set_points_become_moves_within_tilt_and_speed() {
     let (prepared, recordings) = stands(&example("offset-free"));
