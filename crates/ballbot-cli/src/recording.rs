@@ -1,8 +1,7 @@
 //! Recorded runs as files and arrays.
 
-use ballbot_scenario::{Plane, Prepared, words};
+use ballbot_scenario::{MotorSample, Plane, Prepared, words};
 use lpvmpc_sim::{Ending, Guard, LogRow, Trajectory};
-use nalgebra::Vector3;
 
 /// The columns of `trajectory.csv`.
 pub const COLUMNS: [&str; 16] = [
@@ -91,12 +90,16 @@ pub fn log_csv(log: &[LogRow<4, 1>]) -> String {
     text
 }
 
-/// `motors.csv`: the three motors' torques, held from each sample to the next.
-pub fn motors_csv(trajectory: &Trajectory<4, 1>, torques: &[Vector3<f64>]) -> String {
-    let mut text = "t_s,motor_1_nm,motor_2_nm,motor_3_nm\n".to_owned();
-    for (sample, torque) in trajectory.samples.iter().zip(torques) {
-        let [first, second, third] = [torque[0], torque[1], torque[2]];
-        text += &format!("{:?},{first:?},{second:?},{third:?}\n", sample.t);
+/// `motors.csv`: the three motors' torques, held from each sample to the next, the heading and
+/// where it has to be.
+pub fn motors_csv(motors: &[MotorSample]) -> String {
+    let mut text = "t_s,motor_1_nm,motor_2_nm,motor_3_nm,heading_rad,heading_ref_rad\n".to_owned();
+    for sample in motors {
+        let [first, second, third] = sample.torques.into();
+        text += &format!(
+            "{:?},{first:?},{second:?},{third:?},{:?},{:?}\n",
+            sample.t, sample.heading, sample.target
+        );
     }
     text
 }

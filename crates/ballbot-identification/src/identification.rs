@@ -15,6 +15,7 @@ use crate::validation::{Validation, validate};
 use ballbot::{Ballbot, Consistency, Geometry, LinearParameters, limits};
 use lpvmpc_design::NORMAL_95;
 use nalgebra::{DMatrix, Vector3};
+use std::ops::Range;
 
 /// A robot found from logs, and what speaks for and against it.
 #[derive(Clone, Debug)]
@@ -71,35 +72,22 @@ pub fn identify(
         .unzip();
     let task = Task {
         runs: &runs,
-        ball_angle: config.log.ball_angle,
+        ball_angle: config.log.ball_angle_read(),
         geometry: config.geometry(),
         choices,
         physical: config.fit.physical,
         segment: config.fit.segment_s,
         noise: config.noise(),
     };
-    let floor = noise::floor(&runs);
     let split = Split::new(&runs, config.fit.held_back);
+    let floor = noise::floor(&runs);
     let estimate = task.estimate(&split.fitted, floor, progress)?;
     let task = Task {
         segment: estimate.segment,
         ..task
     };
     let simulated = simulated(&task, &estimate);
-    let residuals = tests(&simulated, estimate.noise, floor);
-    let scores = score_tests(&task, &estimate);
-    let (validation, structures) = if split.held_back.is_empty() {
-        (None, Vec::new())
-    } else {
-        let (values, noise) = (&estimate.values, estimate.noise);
-        let validation = validate(&task, values, noise, &split.held_back);
-        let structures = compare(&task, &estimate, &split.held_back, progress);
-        (Some(validation), structures)
-    };
-    let time = |stretches: &[(usize, std::ops::Range<usize>)]| {
-        let lengths = stretches.iter().map(|(run, rows)| runs[*run].length(rows));
-        lengths.sum()
-    };
+    let (validation, structures) = held_back(&task, &estimate, &split, progress);
     let mut identification = Identification {
         geometry: task.geometry,
         physical: task.physical,
@@ -107,22 +95,44 @@ pub fn identify(
         choices,
         findings,
         floor,
+        residuals: tests(&simulated, estimate.noise, floor),
         simulated,
-        residuals,
-        scores,
+        scores: score_tests(&task, &estimate),
         poles: Vec::new(),
         validation,
         structures,
         published: regression(&runs, task.ball_angle),
-        times: (time(&split.fitted), time(&split.held_back)),
+        times: (time(&runs, &split.fitted), time(&runs, &split.held_back)),
         estimate,
     };
+    // Their intervals are from the covariance that the residuals decide on.
     identification.poles = uncertain_poles(
         &identification.estimate,
         identification.covariance(),
         identification.geometry,
     );
     Ok(identification)
+}
+
+/// The fit on the data that were held back, and other structures of friction beside it.
+fn held_back(
+    task: &Task<'_>,
+    estimate: &Estimate,
+    split: &Split,
+    progress: Progress<'_>,
+) -> (Option<Result<Validation, EstimateError>>, Vec<Compared>) {
+    if split.held_back.is_empty() {
+        return (None, Vec::new());
+    }
+    let validation = validate(task, &estimate.values, estimate.noise, &split.held_back);
+    let structures = compare(task, estimate, &split.held_back, progress);
+    (Some(validation), structures)
+}
+
+/// The time of stretches, s.
+fn time(runs: &[Run], stretches: &[(usize, Range<usize>)]) -> f64 {
+    let lengths = stretches.iter().map(|(run, rows)| runs[*run].length(rows));
+    lengths.sum()
 }
 
 impl Identification {

@@ -4,9 +4,11 @@ use crate::error::ScenarioError;
 use crate::feedback_table::{
     DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
 };
+use crate::heading::Turning;
 use crate::number::{not_negative, positive};
 use crate::problem::dynamic;
 use crate::schema::{ControllerTable, TerminalTable};
+use crate::three_motors::Motors;
 use ballbot::{Ballbot, Wheels};
 use lpvmpc::{
     Bounds, ControllerSettings, EstimatorSettings, Gate, LpvModel, MoveLimits, RampedInput,
@@ -114,7 +116,7 @@ impl EstimatorTable {
             gate: Gate {
                 deviations: self.outlier_deviations,
                 patience: self.outlier_patience,
-                oldest: f64::INFINITY,
+                oldest: self.oldest_s,
             },
         };
         if !(self.outlier_deviations > 0.0) {
@@ -122,6 +124,13 @@ impl EstimatorTable {
                 "controller.estimator.outlier_deviations",
                 self.outlier_deviations,
                 "it must be positive; inf to believe every reading",
+            ));
+        }
+        if !(self.oldest_s >= 0.0) {
+            return Err(ScenarioError::value(
+                "controller.estimator.oldest_s",
+                self.oldest_s,
+                "it must not be negative; inf for any age",
             ));
         }
         if let DisturbancesTable::TorqueAndTilt {
@@ -250,27 +259,53 @@ impl ShapingTable {
 }
 
 impl MotorsTable {
-    /// The part of the torque's bounds that no motor objects to.
+    /// The motors, checked.
+    pub(crate) fn check(
+        &self,
+        turning: Turning,
+        wheels: &Wheels<f64>,
+    ) -> Result<Motors, ScenarioError> {
+        let motors = Motors {
+            limit: positive("controller.motors.limit_nm", self.limit_nm)?,
+            yaw: not_negative("controller.motors.yaw_reserve_nm", self.yaw_reserve_nm)?,
+            turning,
+        };
+        if motors.left(wheels).alone() > 0.0 {
+            Ok(motors)
+        } else {
+            Err(self.nothing_left())
+        }
+    }
+
+    /// The part of the torque's bounds that no motor objects to: what a plane has where it
+    /// `shares` what the other one leaves, else an equal part.
     pub(crate) fn within(
         &self,
         torque: &Bounds<f64, 1>,
         wheels: &Wheels<f64>,
+        shares: bool,
     ) -> Result<Bounds<f64, 1>, ScenarioError> {
-        let motor = positive("controller.motors.limit_nm", self.limit_nm)?;
-        let yaw = not_negative("controller.motors.yaw_reserve_nm", self.yaw_reserve_nm)?;
-        let limit = wheels.plane_limit(motor, yaw);
-        let within = Bounds {
-            lower: torque.lower.map(|lower| lower.max(-limit)),
-            upper: torque.upper.map(|upper| upper.min(limit)),
+        let left = self.check(Turning::none(), wheels)?.left(wheels);
+        let equal = left.equal();
+        let equal_part = Bounds {
+            lower: torque.lower.map(|lower| lower.max(-equal)),
+            upper: torque.upper.map(|upper| upper.min(equal)),
         };
-        if limit > 0.0 && within.lower <= within.upper {
-            Ok(within)
-        } else {
-            Err(ScenarioError::value(
-                "controller.motors",
-                format!("limit_nm {motor}, yaw_reserve_nm {yaw}"),
-                "yaw and bounds.torque_nm leave no torque for the planes",
-            ))
+        if !(equal_part.lower <= equal_part.upper) {
+            return Err(self.nothing_left());
         }
+        Ok(if shares { *torque } else { equal_part })
+    }
+
+    fn nothing_left(&self) -> ScenarioError {
+        let Self {
+            limit_nm,
+            yaw_reserve_nm,
+        } = self;
+        ScenarioError::value(
+            "controller.motors",
+            format!("limit_nm {limit_nm}, yaw_reserve_nm {yaw_reserve_nm}"),
+            "yaw and bounds.torque_nm leave no torque for the planes",
+        )
     }
 }

@@ -24,6 +24,8 @@ pub struct EstimatorTable {
     pub outlier_deviations: f64,
     /// After so many outliers of a sensor in a row the state must be wrong, and they are.
     pub outlier_patience: usize,
+    /// Readings older than this are not believed, s; inf for any age.
+    pub oldest_s: f64,
 }
 
 impl Default for EstimatorTable {
@@ -37,6 +39,7 @@ impl Default for EstimatorTable {
             disturbances: DisturbancesTable::default(),
             outlier_deviations: 6.0,
             outlier_patience: 2,
+            oldest_s: f64::INFINITY,
         }
     }
 }
@@ -86,13 +89,14 @@ pub struct ShapingTable {
     pub phi_dot_rad_s: f64,
 }
 
-/// The limits of the three motors.
+/// The limits of the three motors, which two planes share. In `[world.actuator]`, `limit_nm` and
+/// `dead_zone_nm` are then those of each motor.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MotorsTable {
     /// Largest torque of each motor, N m.
     pub limit_nm: f64,
-    /// Yaw torque that is kept free, N m.
+    /// Yaw torque that is kept free, N m; what yaw does not use, the planes get.
     #[serde(default)]
     pub yaw_reserve_nm: f64,
 }

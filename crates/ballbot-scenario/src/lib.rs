@@ -31,6 +31,8 @@ mod feedback;
 mod feedback_table;
 mod files;
 mod guarantee;
+mod heading;
+mod heading_table;
 mod load;
 pub mod number;
 mod output_feedback;
@@ -41,8 +43,11 @@ mod reference;
 mod run;
 mod schema;
 mod session;
+mod three_motors;
 mod time_series;
 mod uncertainty;
+mod whole_robot;
+mod whole_run;
 pub mod words;
 mod world;
 mod world_table;
@@ -55,16 +60,19 @@ pub use feedback_table::{
     DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
 };
 pub use files::Files;
+pub use heading::Turning;
+pub use heading_table::HeadingTable;
 pub use parameters::{KnownRobot, Parameters};
 pub use prepare::{Plane, Prepared};
 pub use reference::PhiReference;
-pub use run::{GUARDED_ACTIVE, GUARDED_HORIZONS, LONGEST_HORIZON, PlaneLoop, Surroundings};
+pub use run::{GUARDED_ACTIVE, GUARDED_HORIZONS, LONGEST_HORIZON, PlaneLoop, Record, Surroundings};
 pub use schema::{
     BoundsTable, CertifiedTable, ControllerTable, CsvTable, IntegrationTable, IterationsTable,
     LinearModelTable, LissajousTable, ModelKind, ParameterTable, PointTable, PredictorTable,
     ReferenceTable, Scenario, SineTable, StateTable, TerminalTable,
 };
 pub use session::{Phase, Session, Trouble};
+pub use three_motors::{MotorSample, Motors};
 pub use uncertainty::Uncertainty;
 pub use world::{PlaneWorld, Robot};
 pub use world_table::{
@@ -81,3 +89,8 @@ struct Readme;
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/robust-control.md")]
 struct RobustControl;
+
+/// The code of docs/embedded.md.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/embedded.md")]
+struct Embedded;

@@ -1,9 +1,10 @@
 //! The controller on a real robot: estimate, predict to the moment when the torque acts, decide.
 
+use crate::three_motors::SharingPlane;
 use ballbot::Ballbot;
 use lpvmpc::{
-    BoundId, Bounds, Controller, DelayLine, Estimator, LpvModel, Quantity, RampedInput, Reading,
-    Reference, Rk4, Solution, Workspace,
+    BoundId, Bounds, Controller, ControllerSettings, DelayLine, Estimator, LpvModel, Quantity,
+    RampedInput, Reading, Reference, Rk4, Solution, Workspace,
 };
 use lpvmpc_sim::{Decision, Measurement, Regulator};
 use nalgebra::{SVector, Vector1, Vector4};
@@ -21,7 +22,10 @@ pub(crate) struct OutputFeedback<const N: usize, const M: usize> {
     /// Time from one measurement to the next, s.
     pub(crate) period: f64,
     pub(crate) preview: bool,
+    /// Bounds of the torque by the scenario, N m.
     pub(crate) torque: Bounds<f64, 1>,
+    /// Largest torque that the other plane leaves, N m.
+    pub(crate) share: f64,
     pub(crate) line: DelayLine<f64, 1, MOST_COMMANDS>,
     /// Time of the last measurement, s.
     pub(crate) time: f64,
@@ -48,7 +52,7 @@ pub(crate) enum Core<const N: usize, const M: usize> {
     Ramped {
         controller: Box<Controller<RampedInput<Ballbot<f64>, 4>, f64, 5, 1, 3, N, M>>,
         workspace: Box<Workspace<f64, 5, 1, N, M>>,
-        /// The model's torque, N m, and its rate, N m/s.
+        /// The commanded torque, N m, and its rate, N m/s.
         torque: f64,
         rate: f64,
     },
@@ -106,8 +110,12 @@ impl Belief {
             }
             Self::Estimated(estimator) => {
                 line.for_each(elapsed, |duration, u| estimator.advance(u, duration));
-                let [phi, theta, _, theta_dot] = measurement.values;
-                let readings = [phi, theta, theta_dot].map(|value| value.map(Reading::fresh));
+                let reading = |i: usize| {
+                    let age = measurement.ages[i];
+                    measurement.values[i].map(|value| Reading { value, age })
+                };
+                // phi, theta and theta_dot; the filter does without phi_dot.
+                let readings = [0, 1, 3].map(reading);
                 estimator.update(&readings);
             }
         }
@@ -172,15 +180,23 @@ impl<const N: usize, const M: usize> OutputFeedback<N, M> {
         z
     }
 
-    /// Takes the estimated torque off the model's, keeps the bounds, and sends it.
-    fn send(&mut self, model_torque: f64) -> Vector1<f64> {
-        let u = Vector1::new(model_torque - self.belief.disturbance());
-        let u = self.torque.project(&u);
+    /// The bounds of the torque that is commanded, N m.
+    fn allowed(&self) -> Bounds<f64, 1> {
+        let within = |bound: f64| bound.max(-self.share).min(self.share);
+        Bounds {
+            lower: self.torque.lower.map(within),
+            upper: self.torque.upper.map(within),
+        }
+    }
+
+    /// Sends a torque, within its bounds to rounding.
+    fn send(&mut self, torque: f64) -> Vector1<f64> {
+        let u = self.allowed().project(&Vector1::new(torque));
         self.line.command(u, self.delay);
         u
     }
 
-    /// The model's torque in the middle of the coming period, while it moves in a ramp.
+    /// The torque in the middle of the coming period, while it moves in a ramp.
     fn next_of_ramp(&mut self) -> Option<f64> {
         match &mut self.core {
             Core::Held { .. } => None,
@@ -189,6 +205,70 @@ impl<const N: usize, const M: usize> OutputFeedback<N, M> {
                 *torque += step;
                 Some(*torque - 0.5 * step)
             }
+        }
+    }
+}
+
+impl<const N: usize, const M: usize> Core<N, M> {
+    /// Plans from `z` in the model's coordinates. Its torque is the commanded one and the
+    /// `disturbance`, so the bounds of the commanded one are shifted. Returns what is to be
+    /// said about the plan, and the torque to be commanded unless that is a ramp.
+    fn plan(
+        &mut self,
+        z: &Vector4<f64>,
+        disturbance: f64,
+        allowed: &Bounds<f64, 1>,
+        reference: &dyn Fn(usize) -> Vector4<f64>,
+        clock: &dyn Fn() -> Duration,
+    ) -> (Decision<4, 1>, Option<f64>) {
+        let [lower, upper] = [&allowed.lower, &allowed.upper].map(|u| u.add_scalar(disturbance));
+        match self {
+            Self::Held {
+                controller,
+                workspace,
+            } => {
+                let x = controller.settings().x;
+                // Bounds that are not numbers are refused; the state is none either then, and
+                // the plan says so.
+                controller.set_bounds(x, Bounds { lower, upper }).ok();
+                let plan = Plan::step(controller, workspace, z, reference, clock);
+                (plan.decision, Some(plan.input - disturbance))
+            }
+            Self::Ramped {
+                controller,
+                workspace,
+                torque,
+                rate,
+            } => {
+                let ControllerSettings { mut x, u, .. } = *controller.settings();
+                (x.lower[4], x.upper[4]) = (lower[0], upper[0]);
+                controller.set_bounds(x, u).ok();
+                let torque = Vector1::new(*torque + disturbance);
+                let joint = RampedInput::<Ballbot<f64>, 4>::join(z, &torque);
+                let plan = Plan::<5>::step(controller, workspace, &joint, reference, clock);
+                *rate = plan.input;
+                (plan.decision, None)
+            }
+        }
+    }
+}
+
+impl<const N: usize, const M: usize> SharingPlane for OutputFeedback<N, M> {
+    fn largest_torque(&self) -> f64 {
+        let disturbance = self.belief.disturbance();
+        match &self.core {
+            Core::Held { controller, .. } => {
+                let plan = controller.solution().u.iter();
+                let plan = plan.take(controller.settings().horizon);
+                plan.fold(0.0, |most, u| most.max((u[0] - disturbance).abs()))
+            }
+            Core::Ramped { .. } => f64::INFINITY,
+        }
+    }
+
+    fn set_share(&mut self, torque: f64) {
+        if let Core::Held { .. } = self.core {
+            self.share = torque;
         }
     }
 }
@@ -220,29 +300,12 @@ impl<const N: usize, const M: usize> Regulator<4, 1, 4> for OutputFeedback<N, M>
             false => reference(k as f64 * t_s),
         };
         let z = self.state_ahead();
-        let (decision, first) = match &mut self.core {
-            Core::Held {
-                controller,
-                workspace,
-            } => {
-                let plan = Plan::step(controller, workspace, &z, &ahead, clock);
-                (plan.decision, Some(plan.input))
-            }
-            Core::Ramped {
-                controller,
-                workspace,
-                torque,
-                rate,
-            } => {
-                let joint = RampedInput::<Ballbot<f64>, 4>::join(&z, &Vector1::new(*torque));
-                let plan = Plan::<5>::step(controller, workspace, &joint, &ahead, clock);
-                *rate = plan.input;
-                (plan.decision, None)
-            }
-        };
-        let model_torque = first.or_else(|| self.next_of_ramp()).unwrap_or(0.0);
+        let disturbance = self.belief.disturbance();
+        let allowed = self.allowed();
+        let (decision, first) = self.core.plan(&z, disturbance, &allowed, &ahead, clock);
+        let torque = first.or_else(|| self.next_of_ramp()).unwrap_or(0.0);
         Decision {
-            u: self.send(model_torque),
+            u: self.send(torque),
             estimate: self.belief.state(),
             x_ref: reference(k as f64 * t_s),
             ..decision
@@ -250,8 +313,8 @@ impl<const N: usize, const M: usize> Regulator<4, 1, 4> for OutputFeedback<N, M>
     }
 
     fn between(&mut self) -> Option<Vector1<f64>> {
-        let model_torque = self.next_of_ramp()?;
-        Some(self.send(model_torque))
+        let torque = self.next_of_ramp()?;
+        Some(self.send(torque))
     }
 
     fn prediction(&self) -> Vec<Vector4<f64>> {

@@ -3,10 +3,13 @@
 use crate::error::ScenarioError;
 use crate::feedback::Feedback;
 use crate::files::Files;
+use crate::heading::Turning;
+use crate::heading_table::HeadingTable;
 use crate::number::{finite, positive};
 use crate::parameters::check_motion;
 use crate::reference::{self, PhiReference};
-use crate::schema::{Scenario, StateTable};
+use crate::schema::{ControllerTable, Scenario, StateTable, TerminalTable};
+use crate::three_motors::Motors;
 use crate::world::PlaneWorld;
 use crate::world_table::PlaneName;
 use ballbot::{Ballbot, Wheels};
@@ -32,6 +35,8 @@ pub struct Prepared {
     pub guarded: Option<GuardedSettings<f64, 4, 1>>,
     /// One plane, or x and y.
     pub planes: Vec<Plane>,
+    /// The three motors, where the planes share them.
+    pub motors: Option<Motors>,
     /// Samples in the run.
     pub samples: usize,
     /// Tolerances of the plant.
@@ -75,8 +80,13 @@ impl Scenario {
             None => ballbot,
         };
         let bounds = self.bounds.check()?;
+        let references = reference::resolve(&self.reference, &ballbot.geometry, duration, files)?;
+        let motors = self.motors(references.len(), &wheels)?;
         let bounds = match &self.controller.motors {
-            Some(motors) => (bounds.0, motors.within(&bounds.1, &wheels)?),
+            Some(table) => (
+                bounds.0,
+                table.within(&bounds.1, &wheels, self.shares(&motors))?,
+            ),
             None => bounds,
         };
         check_motion(&ballbot, &self.bounds)?;
@@ -99,7 +109,6 @@ impl Scenario {
                 format!("at most {MOST_SAMPLES} samples of controller.t_s can be recorded"),
             ));
         }
-        let references = reference::resolve(&self.reference, &ballbot.geometry, duration, files)?;
         let references = match &self.controller.shaping {
             Some(table) => {
                 let limits = table.limits(&ballbot)?;
@@ -129,9 +138,40 @@ impl Scenario {
             feedback,
             planes: self.planes(references, &real, (settings.t_s, tolerances), files)?,
             guarded,
+            motors,
             samples: samples as usize,
             tolerances,
         })
+    }
+
+    /// The motors that two planes share.
+    fn motors(&self, planes: usize, wheels: &Wheels<f64>) -> Result<Option<Motors>, ScenarioError> {
+        match (&self.controller.motors, &self.heading) {
+            (Some(motors), heading) if planes == 2 => {
+                let turning = heading.as_ref().map(HeadingTable::check).transpose()?;
+                motors
+                    .check(turning.unwrap_or(Turning::none()), wheels)
+                    .map(Some)
+            }
+            (_, None) => Ok(None),
+            (_, Some(_)) => Err(ScenarioError::value(
+                "heading",
+                "(given)",
+                "a robot that turns needs two planes and [controller.motors]",
+            )),
+        }
+    }
+
+    /// Whether a plane may have more than an equal share of the motors: neither a ramp nor a
+    /// guarantee can follow bounds that change from sample to sample.
+    fn shares(&self, motors: &Option<Motors>) -> bool {
+        let ControllerTable {
+            torque_rate,
+            terminal,
+            ..
+        } = &self.controller;
+        let certified = matches!(terminal, TerminalTable::Certified(_));
+        motors.is_some() && torque_rate.is_none() && !certified
     }
 
     fn planes(

@@ -5,6 +5,7 @@ use crate::excitation::Excited;
 use crate::feedback::longest_step;
 use crate::output_feedback::{Belief, Core, OutputFeedback};
 use crate::prepare::{Plane, Prepared};
+use crate::three_motors::{MotorSample, SharingPlane};
 use crate::world::{PlaneWorld, Robot};
 use lpvmpc::{
     Controller, DelayLine, Estimator, GuardedController, GuardedSettings, GuardedWorkspace,
@@ -39,6 +40,15 @@ pub struct Surroundings<'a> {
     pub progress: &'a dyn Fn(usize),
 }
 
+/// A recorded run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Record {
+    /// What happened in each plane.
+    pub planes: Vec<Recording<4, 1, 4>>,
+    /// The motors at every sample of the control, where the planes share them.
+    pub motors: Option<Vec<MotorSample>>,
+}
+
 /// The closed loop of one plane, whatever the horizon. The sensors are those of (phi, theta,
 /// phi_dot, theta_dot), the load that of [`ballbot::Disturbed::f`].
 pub type PlaneLoop = ClosedLoop<Box<dyn Regulator<4, 1, 4>>, Robot, 4, 1, 4, 2>;
@@ -58,19 +68,19 @@ impl Prepared {
         &self,
         surroundings: &Surroundings<'_>,
     ) -> Result<Vec<Trajectory<4, 1>>, ScenarioError> {
-        let recordings = self.record(surroundings)?.into_iter();
-        Ok(recordings.map(|recording| recording.trajectory).collect())
+        let planes = self.record(surroundings)?.planes.into_iter();
+        Ok(planes.map(|recording| recording.trajectory).collect())
     }
 
-    /// [`run`](Self::run), with what the robot's sensors delivered.
+    /// [`run`](Self::run), with what the robot's sensors delivered, and its motors did.
     ///
     /// # Errors
     /// As [`run`](Self::run).
-    pub fn record(
-        &self,
-        surroundings: &Surroundings<'_>,
-    ) -> Result<Vec<Recording<4, 1, 4>>, ScenarioError> {
-        let mut recordings = Vec::with_capacity(self.planes.len());
+    pub fn record(&self, surroundings: &Surroundings<'_>) -> Result<Record, ScenarioError> {
+        if let (Some(motors), [x, y]) = (&self.motors, self.planes.as_slice()) {
+            return self.record_whole(motors, [x, y], surroundings);
+        }
+        let mut planes = Vec::with_capacity(self.planes.len());
         for (done, plane) in self.planes.iter().enumerate() {
             let course = Course {
                 samples: self.samples,
@@ -79,20 +89,32 @@ impl Prepared {
                 progress: &|samples| (surroundings.progress)(done * self.samples + samples),
             };
             let mut closed_loop = self.closed_loop(plane)?;
-            recordings.push(lpvmpc_sim::record(&mut closed_loop, &course));
+            planes.push(lpvmpc_sim::record(&mut closed_loop, &course));
         }
-        Ok(recordings)
+        Ok(Record {
+            planes,
+            motors: None,
+        })
     }
 
     /// The closed loop of one plane at time zero, to be stepped sample by sample.
     ///
     /// # Errors
-    /// [`ScenarioError::Controller`] if the controller refuses its settings.
+    /// [`ScenarioError::Controller`] if the controller refuses its settings;
+    /// [`ScenarioError::Value`] if the planes share their motors, and so make one loop.
     pub fn closed_loop(&self, plane: &Plane) -> Result<PlaneLoop, ScenarioError> {
-        let regulator = match &self.guarded {
-            Some(settings) => self.guarded_feedback(settings),
-            None => self.feedback_without_guard(plane.world.settings.period),
-        }?;
+        if self.motors.is_some() {
+            return Err(ScenarioError::value(
+                "controller.motors",
+                "(given)",
+                "two planes on shared motors are run as a whole only; leave it out to run them \
+                 sample by sample",
+            ));
+        }
+        let regulator: Box<dyn Regulator<4, 1, 4>> = match &self.guarded {
+            None if self.feedback.is_plain() => self.plain_feedback()?,
+            _ => self.sharing_plane(plane.world.settings.period)?,
+        };
         let PlaneWorld {
             robot,
             settings,
@@ -119,31 +141,41 @@ impl Prepared {
     // Neither this nor what follows is inlined: each size builds its memory on the stack before it
     // is boxed, and one frame for all sizes overflows the 2 MB of a thread.
     #[inline(never)]
-    fn feedback_without_guard(
-        &self,
-        period: f64,
-    ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
+    fn plain_feedback(&self) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
         // Up to 4 rows of a terminal equality come on top of one row per input.
         // In a browser the longest horizon must do for all: the time per step follows the horizon
         // that is used, and every size is code that has to be loaded.
-        match (self.settings.horizon, self.feedback.is_plain()) {
+        match self.settings.horizon {
             #[cfg(not(target_family = "wasm"))]
-            (..=20, true) => self.state_feedback::<20, 24>(),
+            ..=20 => self.state_feedback::<20, 24>(),
             #[cfg(not(target_family = "wasm"))]
-            (21..=50, true) => self.state_feedback::<50, 54>(),
+            21..=50 => self.state_feedback::<50, 54>(),
             #[cfg(not(target_family = "wasm"))]
-            (51..=100, true) => self.state_feedback::<100, 104>(),
-            (_, true) => self.state_feedback::<LONGEST_HORIZON, { 2 * LONGEST_HORIZON + 4 }>(),
-            // The torque's own bounds come on top where its rate is the input.
+            51..=100 => self.state_feedback::<100, 104>(),
+            // As many rows as with the torque's own bounds below: one solver for both.
+            _ => self.state_feedback::<LONGEST_HORIZON, { 2 * LONGEST_HORIZON + 4 }>(),
+        }
+    }
+
+    /// The regulator of a plane that may share its motors with another; `period` is that of the
+    /// sensors, s.
+    #[inline(never)]
+    pub(crate) fn sharing_plane(
+        &self,
+        period: f64,
+    ) -> Result<Box<dyn SharingPlane>, ScenarioError> {
+        if let Some(settings) = &self.guarded {
+            return self.guarded_feedback(settings);
+        }
+        // The torque's own bounds come on top where its rate is the input.
+        match self.settings.horizon {
             #[cfg(not(target_family = "wasm"))]
-            (..=20, false) => self.output_feedback::<20, 44>(period),
+            ..=20 => self.output_feedback::<20, 44>(period),
             #[cfg(not(target_family = "wasm"))]
-            (21..=50, false) => self.output_feedback::<50, 104>(period),
+            21..=50 => self.output_feedback::<50, 104>(period),
             #[cfg(not(target_family = "wasm"))]
-            (51..=100, false) => self.output_feedback::<100, 204>(period),
-            (_, false) => {
-                self.output_feedback::<LONGEST_HORIZON, { 2 * LONGEST_HORIZON + 4 }>(period)
-            }
+            51..=100 => self.output_feedback::<100, 204>(period),
+            _ => self.output_feedback::<LONGEST_HORIZON, { 2 * LONGEST_HORIZON + 4 }>(period),
         }
     }
 
@@ -151,7 +183,7 @@ impl Prepared {
     fn guarded_feedback(
         &self,
         settings: &GuardedSettings<f64, 4, 1>,
-    ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
+    ) -> Result<Box<dyn SharingPlane>, ScenarioError> {
         // As many as GUARDED_HORIZONS; N + 2 stages each.
         match self.settings.horizon {
             #[cfg(not(target_family = "wasm"))]
@@ -166,7 +198,7 @@ impl Prepared {
     fn guarded_sized<const N: usize, const NP: usize>(
         &self,
         settings: &GuardedSettings<f64, 4, 1>,
-    ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
+    ) -> Result<Box<dyn SharingPlane>, ScenarioError> {
         Ok(Box::new(GuardedFeedback::<
             _,
             4,
@@ -187,7 +219,7 @@ impl Prepared {
     fn state_feedback<const N: usize, const M: usize>(
         &self,
     ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
-        let workspace = Box::new(Workspace::<f64, 4, 1, N, M>::new());
+        let workspace = boxed_workspace::<4, N, M>();
         let controller = Box::new(Controller::<_, f64, 4, 1, 3, N, M>::new(
             self.ballbot,
             self.settings,
@@ -199,7 +231,7 @@ impl Prepared {
     fn output_feedback<const N: usize, const M: usize>(
         &self,
         period: f64,
-    ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
+    ) -> Result<Box<dyn SharingPlane>, ScenarioError> {
         let x = Vector4::zeros();
         let belief = match self.feedback.estimator {
             Some(settings) => {
@@ -215,13 +247,13 @@ impl Prepared {
         let core = match self.feedback.ramp {
             Some(settings) => Core::Ramped {
                 controller: Box::new(Controller::new(RampedInput(self.ballbot), settings)?),
-                workspace: Box::new(Workspace::new()),
+                workspace: boxed_workspace(),
                 torque: 0.0,
                 rate: 0.0,
             },
             None => Core::Held {
                 controller: Box::new(Controller::new(self.ballbot, self.settings)?),
-                workspace: Box::new(Workspace::new()),
+                workspace: boxed_workspace(),
             },
         };
         Ok(Box::new(OutputFeedback::<N, M> {
@@ -231,14 +263,15 @@ impl Prepared {
             period,
             preview: self.feedback.preview,
             torque: self.settings.u,
+            share: f64::INFINITY,
             line: DelayLine::default(),
             time: 0.0,
         }))
     }
 
     /// The motors' torques (tau_1, tau_2, tau_3) in N m at every sample that both planes have,
-    /// without yaw torque. The torque of the x plane is tau_x of eq. (6), that of the y plane
-    /// tau_y.
+    /// for a robot that keeps its heading of zero without yaw torque. The torque of the x plane
+    /// is tau_x of eq. (6), that of the y plane tau_y.
     pub fn motor_torques(&self, trajectories: &[Trajectory<4, 1>]) -> Vec<Vector3<f64>> {
         match trajectories {
             [x, y] => {
@@ -251,4 +284,11 @@ impl Prepared {
             _ => Vec::new(),
         }
     }
+}
+
+/// Not inlined, so that the largest thing there is has the stack for itself until it is boxed.
+#[inline(never)]
+fn boxed_workspace<const NX: usize, const N: usize, const M: usize>()
+-> Box<Workspace<f64, NX, 1, N, M>> {
+    Box::new(Workspace::new())
 }

@@ -2,6 +2,7 @@
 //! named after the tables.
 
 use crate::feedback_table::{EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable};
+use crate::heading_table::HeadingTable;
 use crate::parameters::Parameters;
 use crate::world_table::WorldTable;
 use serde::{Deserialize, Serialize};
@@ -29,6 +30,9 @@ pub struct Scenario {
     pub initial_state_y: Option<StateTable>,
     /// What phi has to follow.
     pub reference: ReferenceTable,
+    /// How the robot turns, and where it has to look.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heading: Option<HeadingTable>,
     /// Tolerances of the simulated plant.
     #[serde(default)]
     pub integration: IntegrationTable,

@@ -119,7 +119,7 @@ impl WorldTable {
             },
             settings: WorldSettings {
                 period,
-                sensors: self.sensors.check()?,
+                sensors: self.sensors.check(period)?,
                 actuators: [self.actuator.check()?],
                 delay: not_negative("world.delay.computation_s", self.delay.computation_s)?
                     + not_negative("world.delay.transport_s", self.delay.transport_s)?,
@@ -318,7 +318,8 @@ fn at_height(push: f64, height: f64) -> Vector2<f64> {
 }
 
 impl SensorsTable {
-    fn check(&self) -> Result<[Sensor<4>; 4], ScenarioError> {
+    /// `period` is that of the world's samples, s.
+    fn check(&self, period: f64) -> Result<[Sensor<4>; 4], ScenarioError> {
         let mut sensors = Sensor::ideal_states();
         let rows = [
             ("phi", self.phi.into(), "rad"),
@@ -333,17 +334,39 @@ impl SensorsTable {
             sensor.bias = table.bias_rad_s;
             sensor.resolution =
                 not_negative(&key(&format!("resolution_{unit}")), table.resolution_rad_s)?;
-            if !(0.0..=1.0).contains(&table.dropout) {
-                let expected = "it must be a probability, from 0 to 1";
-                return Err(ScenarioError::value(
-                    key("dropout"),
-                    table.dropout,
-                    expected,
-                ));
+            let room = 1.0 - table.dropout;
+            for (quantity, chance, most) in [
+                ("dropout", table.dropout, 1.0),
+                ("stale", table.stale, room),
+            ] {
+                if !(0.0..=most).contains(&chance) {
+                    let expected = format!("it must be a probability, from 0 to {most}");
+                    return Err(ScenarioError::value(key(quantity), chance, expected));
+                }
+            }
+            sensor.stale = table.stale;
+            let samples = |quantity: &str, time: f64| whole(&key(quantity), time, period);
+            sensor.late = samples("delay_s", table.delay_s)?;
+            if let Some(time) = table.period_s {
+                sensor.every = samples("period_s", positive(&key("period_s"), time)?)?.max(1);
             }
             sensor.dropout = table.dropout;
         }
         Ok(sensors)
+    }
+}
+
+/// How many samples of `period` s a time in s is.
+fn whole(key: &str, time: f64, period: f64) -> Result<usize, ScenarioError> {
+    let ratio = (time / period).round();
+    if (0.0..=1e6).contains(&ratio) && (ratio * period - time).abs() <= 1e-6 * period {
+        Ok(ratio as usize)
+    } else {
+        Err(ScenarioError::value(
+            key,
+            time,
+            format!("it must be a whole number of periods of the sensors ({period} s)"),
+        ))
     }
 }
 
@@ -355,6 +378,9 @@ impl From<AngleSensorTable> for RateSensorTable {
             bias_rad_s: table.bias_rad,
             resolution_rad_s: table.resolution_rad,
             dropout: table.dropout,
+            period_s: table.period_s,
+            delay_s: table.delay_s,
+            stale: table.stale,
         }
     }
 }

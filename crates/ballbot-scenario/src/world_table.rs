@@ -66,6 +66,14 @@ pub struct AngleSensorTable {
     pub resolution_rad: f64,
     /// Probability that a sample is missing, 0 to 1.
     pub dropout: f64,
+    /// Time from one measurement to the next, s: a whole number of `world.sensor_period_s`, which
+    /// it is when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub period_s: Option<f64>,
+    /// Time from the measurement to its delivery, s: a whole number of `world.sensor_period_s`.
+    pub delay_s: f64,
+    /// Probability that the last reading is delivered again, with its old time stamp, 0 to 1.
+    pub stale: f64,
 }
 
 /// What is wrong with the measurement of a rate.
@@ -80,6 +88,14 @@ pub struct RateSensorTable {
     pub resolution_rad_s: f64,
     /// Probability that a sample is missing, 0 to 1.
     pub dropout: f64,
+    /// Time from one measurement to the next, s: a whole number of `world.sensor_period_s`, which
+    /// it is when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub period_s: Option<f64>,
+    /// Time from the measurement to its delivery, s: a whole number of `world.sensor_period_s`.
+    pub delay_s: f64,
+    /// Probability that the last reading is delivered again, with its old time stamp, 0 to 1.
+    pub stale: f64,
 }
 
 /// What is wrong with the drive.

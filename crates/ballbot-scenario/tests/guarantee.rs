@@ -152,7 +152,7 @@ fn a_changed_certificate_is_refused() {
         1,
     );
     let scenario = Scenario::parse(&text, "far.toml").unwrap();
-    let error = scenario.prepare(&folder).unwrap_err();
+    let error = scenario.prepare(folder.as_path()).unwrap_err();
     std::fs::remove_dir_all(&folder).unwrap();
     assert!(matches!(error, ScenarioError::Value { .. }));
     assert!(error.to_string().contains("digest"), "{error}");

@@ -4,221 +4,171 @@
     reason = "a test fails by panicking, in its helper functions too"
 )]
 
-use ballbot::{Ballbot, Heading, Wheels};
-use ballbot_scenario::{MotorsTable, Prepared, Scenario};
-use lpvmpc_sim::{
-    Actuator, ClosedLoop, Course, Decision, Ending, Measurement, Plant, Recording, Regulator,
-    Sensor, Tolerances, World, WorldSettings, record,
+use ballbot_scenario::{
+    MotorsTable, Prepared, Record, Scenario, StateTable, Surroundings, WorldTable,
 };
-use nalgebra::{SVector, Vector2, Vector3, Vector4};
+use lpvmpc_sim::Ending;
 use std::path::Path;
 use std::time::Duration;
 
-/// x plane, y plane (of the floor), heading (rad) and its rate (rad/s).
-type State = SVector<f64, 10>;
-
-/// Two planes and a body that turns on the ball; the inputs are the motors' torques, N m.
-struct Robot {
-    ballbot: Ballbot<f64>,
-    wheels: Wheels<f64>,
+fn example() -> Scenario {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/turning-robot.toml");
+    Scenario::load(file.to_str().expect("text")).expect("valid")
 }
 
-/// Moment of inertia about the vertical per body mass, m^2, and friction, m^2/s.
-const YAW_INERTIA: f64 = 0.02;
-const YAW_FRICTION: f64 = 0.01;
-
-fn plane(x: &State, first: usize) -> Vector4<f64> {
-    x.fixed_rows::<4>(first).into_owned()
+fn motors(scenario: &mut Scenario) -> &mut MotorsTable {
+    scenario
+        .controller
+        .motors
+        .as_mut()
+        .expect("the example has them")
 }
 
-impl Plant<10, 3, 0> for Robot {
-    fn derivative(&self, x: &State, motors: &Vector3<f64>, _: &SVector<f64, 0>) -> State {
-        let torques = self.wheels.virtual_torques(motors);
-        let floor = Heading::new(x[8]).to_floor(&torques.xy());
-        let mut x_dot = State::zeros();
-        for (first, torque) in [(0, floor[0]), (4, floor[1])] {
-            let motion = self.ballbot.f(&plane(x, first), torque);
-            x_dot.fixed_rows_mut::<4>(first).copy_from(&motion);
-        }
-        // A positive yaw torque on the ball turns the body the other way.
-        x_dot[8] = x[9];
-        x_dot[9] = (-2.4 * torques[2] - YAW_FRICTION * x[9]) / YAW_INERTIA;
-        x_dot
-    }
-}
-
-/// One plane's regulator for x and for y, and a proportional-derivative law for the heading.
-struct Planes {
-    planes: [Box<dyn Regulator<4, 1, 4>>; 2],
-    wheels: Wheels<f64>,
-    /// Largest yaw torque, N m.
-    yaw_limit: f64,
-    /// Whether the torques are turned from the floor to the robot.
-    turns: bool,
-    heading: (f64, f64),
-    largest_motor: f64,
-}
-
-impl Regulator<10, 3, 10> for Planes {
-    fn t_s(&self) -> f64 {
-        self.planes[0].t_s()
-    }
-
-    fn observe(&mut self, measurement: &Measurement<10>) {
-        let values = &measurement.values;
-        for (plane, values) in self.planes.iter_mut().zip(values.chunks(4)) {
-            let values = values.try_into().expect("four of them");
-            let t = measurement.t;
-            plane.observe(&Measurement { t, values });
-        }
-        let (angle, rate) = (values[8].expect("ideal"), values[9].expect("ideal"));
-        self.heading = (angle, rate);
-    }
-
-    fn decide(
-        &mut self,
-        k: usize,
-        reference: &dyn Fn(f64) -> State,
-        clock: &dyn Fn() -> Duration,
-    ) -> Decision<10, 3> {
-        let along = |first: usize| move |t: f64| plane(&reference(t), first);
-        let [x, y] = &mut self.planes;
-        let (x, y) = (x.decide(k, &along(0), clock), y.decide(k, &along(4), clock));
-        let now = reference(k as f64 * self.t_s());
-        let (angle, rate) = self.heading;
-        let wanted = 0.1 * (angle - now[8]) + 0.03 * (rate - now[9]);
-        let yaw = wanted.clamp(-self.yaw_limit, self.yaw_limit);
-        let frame = Heading::new(if self.turns { angle } else { 0.0 });
-        let planes = frame.to_robot(&Vector2::new(x.u[0], y.u[0]));
-        let u = self.wheels.motors(&planes.push(yaw));
-        self.largest_motor = self.largest_motor.max(u.amax());
-        Decision {
-            u,
-            estimate: State::zeros(),
-            x_ref: now,
-            cost: x.cost + y.cost,
-            status: if x.status.is_solved() {
-                y.status
-            } else {
-                x.status
-            },
-            active_bounds: x.active_bounds + y.active_bounds,
-            step_time: x.step_time + y.step_time,
-            gap: State::zeros(),
-            guard: None,
-        }
-    }
-
-    fn prediction(&self) -> Vec<State> {
-        Vec::new()
-    }
-}
-
-const MOTOR_LIMIT: f64 = 0.5;
-const YAW_LIMIT: f64 = 0.05;
-const DURATION: f64 = 25.0;
-
-/// A Lissajous curve, started beside it, while the robot turns by 0.3 rad/s.
-fn run(turns: bool) -> (Prepared, f64, Recording<10, 3, 10>) {
-    let file =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/pushed-lissajous.toml");
-    let mut scenario = Scenario::load(file.to_str().expect("text")).expect("valid");
-    scenario.world = None;
-    scenario.controller.delay_s = 0.0;
-    scenario.controller.estimator = None;
-    scenario.controller.motors = Some(MotorsTable {
-        limit_nm: MOTOR_LIMIT,
-        yaw_reserve_nm: YAW_LIMIT,
-    });
+fn run(scenario: &Scenario) -> (Prepared, Record) {
     let prepared = scenario.prepare(Path::new(".")).expect("valid");
-    let planes = [0, 1].map(|i| {
-        let closed_loop = prepared.closed_loop(&prepared.planes[i]).expect("valid");
-        closed_loop.regulator
-    });
-    let t_s = prepared.settings.t_s;
-    let (ballbot, wheels) = (prepared.ballbot, prepared.wheels);
-    let regulator = Planes {
-        planes,
-        wheels,
-        yaw_limit: YAW_LIMIT,
-        turns,
-        heading: (0.0, 0.0),
-        largest_motor: 0.0,
-    };
-    let limited = Actuator {
-        limit: MOTOR_LIMIT,
-        ..Actuator::default()
-    };
-    let settings = WorldSettings {
-        period: t_s,
-        sensors: Sensor::ideal_states(),
-        actuators: [limited; 3],
-        delay: 0.0,
-        disturbances: Vec::new(),
-        seed: 0,
-        tolerances: Tolerances {
-            relative: 1e-9,
-            absolute: 1e-9,
-        },
-    };
-    let mut start = State::zeros();
-    // Beside the curve by 1 m and 0.6 m: the torques reach their bounds.
-    (start[0], start[4]) = (8.0, -5.0);
-    let world = World::new(Robot { ballbot, wheels }, start, settings).expect("valid");
-    let mut closed_loop = ClosedLoop::new(regulator, world).expect("one rate");
-    closed_loop.range.lower[1] = -1.5;
-    closed_loop.range.upper[1] = 1.5;
-    let reference = |t: f64| {
-        let mut x = State::zeros();
-        for (plane, first) in prepared.planes.iter().zip([0, 4]) {
-            x.fixed_rows_mut::<4>(first)
-                .copy_from(&plane.state_reference(t));
-        }
-        (x[8], x[9]) = (0.3 * t, 0.3);
-        x
-    };
-    let course = Course {
-        samples: (DURATION / t_s) as usize,
-        reference: &reference,
+    let surroundings = Surroundings {
         clock: &|| Duration::ZERO,
         progress: &|_| (),
     };
-    let recording = record(&mut closed_loop, &course);
-    (prepared, closed_loop.regulator.largest_motor, recording)
+    let record = prepared.record(&surroundings).expect("runs");
+    (prepared, record)
+}
+
+fn stands(record: &Record) -> bool {
+    let mut runs = record.planes.iter();
+    runs.all(|plane| plane.trajectory.ending == Ending::Complete)
+}
+
+fn largest_motor(record: &Record) -> f64 {
+    let samples = record.motors.as_ref().expect("they are shared");
+    let torques = samples.iter().map(|sample| sample.torques.amax());
+    torques.fold(0.0, f64::max)
 }
 
 #[test]
 fn a_turning_robot_follows_the_curve_and_no_motor_is_asked_for_more_than_it_has() {
-    let (prepared, largest_motor, recording) = run(true);
-    assert_eq!(recording.trajectory.ending, Ending::Complete);
-    let late = recording
-        .trajectory
-        .samples
-        .iter()
-        .filter(|sample| sample.t > 10.0);
-    for sample in late {
-        let error = sample.x - sample.x_ref;
-        let way = prepared.ballbot.geometry.position(error[0].hypot(error[4]));
-        assert!(way < 0.02, "{way} m beside the curve at {} s", sample.t);
-        assert!(
-            error[8].abs() < 0.2,
-            "heading off by {} at {} s",
-            error[8],
-            sample.t
-        );
+    let scenario = example();
+    let (prepared, record) = run(&scenario);
+    assert!(stands(&record));
+    let [x, y] = record.planes.as_slice() else {
+        unreachable!("two planes")
+    };
+    let samples = x.trajectory.samples.iter().zip(&y.trajectory.samples);
+    for (x, y) in samples.filter(|(x, _)| x.t > 10.0) {
+        let (along_x, along_y) = (x.x[0] - x.x_ref[0], y.x[0] - y.x_ref[0]);
+        let way = prepared.ballbot.geometry.position(along_x.hypot(along_y));
+        assert!(way < 0.02, "{way} m beside the curve at {} s", x.t);
     }
-    assert!(
-        largest_motor <= MOTOR_LIMIT * (1.0 + 1e-9),
-        "{largest_motor} N m"
-    );
-    assert!(
-        largest_motor > 0.8 * MOTOR_LIMIT,
-        "the limit was needed: {largest_motor} N m"
-    );
+    let turned = record.motors.as_ref().expect("they are shared");
+    for sample in turned.iter().filter(|sample| sample.t > 10.0) {
+        let off = sample.heading - sample.target;
+        assert!(off.abs() < 0.2, "heading off by {off} at {} s", sample.t);
+    }
+    let limit = prepared.motors.expect("given").limit;
+    let most = largest_motor(&record);
+    assert!(most <= limit * (1.0 + 1e-9), "{most} N m");
+    assert!(most > 0.9 * limit, "the limit was needed: {most} N m");
 }
 
+/// The motors' torques are turned by the measured heading: one that is wrong by more than a
+/// right angle pushes the robot the other way.
 #[test]
-fn without_the_heading_it_falls() {
-    let (_, _, recording) = run(false);
-    assert_ne!(recording.trajectory.ending, Ending::Complete);
+fn with_a_wrong_heading_it_falls() {
+    let mut scenario = example();
+    scenario.heading.as_mut().expect("given").bias_rad = 2.0;
+    // A world, in which the robot falls to the floor instead of being without a plan.
+    scenario.world = Some(WorldTable::default());
+    let (_, record) = run(&scenario);
+    let ending = &record.planes[0].trajectory.ending;
+    assert!(matches!(ending, Ending::OutOfRange { .. }), "{ending:?}");
+}
+
+/// The bound of a plane alone, in both planes at once.
+#[test]
+fn without_sharing_a_motor_is_asked_for_more_than_it_has() {
+    let mut scenario = example();
+    let limit = scenario.prepare(Path::new(".")).expect("valid").motors;
+    let limit = limit.expect("given").limit;
+    let wheels = ballbot::Wheels::<f64>::paper();
+    let alone = wheels.plane_torques(limit, 0.0).alone();
+    scenario.bounds.torque_nm = [-alone, alone];
+    scenario.controller.motors = None;
+    scenario.heading = None;
+    scenario.initial_state_y = Some(StateTable {
+        phi_rad: 8.0,
+        ..StateTable::default()
+    });
+    let (prepared, record) = run(&scenario);
+    let trajectories: Vec<_> = record.planes.into_iter().map(|p| p.trajectory).collect();
+    let torques = prepared.motor_torques(&trajectories);
+    let most = torques.iter().map(|t| t.amax()).fold(0.0, f64::max);
+    assert!(most > 1.2 * limit, "{most} N m of {limit} N m");
+}
+
+/// A push in one plane that half of the disc's square would not stand: the other plane is at
+/// rest and leaves its part.
+#[test]
+fn a_plane_that_needs_more_than_an_equal_share_gets_it() {
+    let mut scenario = example();
+    scenario.world = Some(WorldTable::default());
+    scenario.heading = None;
+    scenario.duration_s = 5.0;
+    scenario.initial_state_y = Some(StateTable::default());
+    scenario.initial_state = StateTable {
+        theta_dot_rad_s: 2.75,
+        ..StateTable::default()
+    };
+    let (prepared, record) = run(&scenario);
+    assert!(stands(&record));
+    let motors = prepared.motors.expect("given");
+    let left = prepared.wheels.plane_torques(motors.limit, 0.0);
+    let samples = record.planes[0].trajectory.samples.iter();
+    let most = samples.map(|sample| sample.u[0].abs()).fold(0.0, f64::max);
+    assert!(
+        most > 1.2 * left.equal() && most <= left.alone() * (1.0 + 1e-9),
+        "{most} N m; an equal share is {} N m",
+        left.equal()
+    );
+
+    // The negative control: an equal share as the plane's own bound.
+    scenario.bounds.torque_nm = [-left.equal(), left.equal()];
+    let (_, record) = run(&scenario);
+    assert!(!stands(&record), "an equal share must not do");
+}
+
+/// Random starts, headings, targets and pushes, with yaw at work.
+#[test]
+fn in_no_run_of_a_campaign_a_motor_gets_more_than_its_limit() {
+    let mut random = fastrand::Rng::with_seed(3);
+    let mut between = |lower: f64, upper: f64| lower + (upper - lower) * random.f64();
+    let mut at_limit = 0;
+    for run_number in 0..40 {
+        let mut scenario = example();
+        scenario.world = Some(WorldTable::default());
+        scenario.duration_s = 2.0;
+        let mut state = || StateTable {
+            phi_rad: between(-5.0, 5.0),
+            theta_rad: between(-0.15, 0.15),
+            phi_dot_rad_s: between(-3.0, 3.0),
+            theta_dot_rad_s: between(-1.0, 1.0),
+        };
+        scenario.initial_state = state();
+        scenario.initial_state_y = Some(state());
+        motors(&mut scenario).limit_nm = between(0.3, 1.0);
+        motors(&mut scenario).yaw_reserve_nm = between(0.0, 0.1);
+        let heading = scenario.heading.as_mut().expect("given");
+        heading.initial_deg = between(-180.0, 180.0);
+        heading.target_deg = between(-180.0, 180.0);
+        heading.target_rate_deg_s = between(-90.0, 90.0);
+        // Fallen or not: the torques count.
+        let (prepared, record) = run(&scenario);
+        let limit = prepared.motors.expect("given").limit;
+        let most = largest_motor(&record);
+        assert!(
+            most <= limit * (1.0 + 1e-9),
+            "run {run_number}: {most} N m of {limit} N m"
+        );
+        at_limit += usize::from(most > 0.95 * limit);
+    }
+    assert!(at_limit > 10, "the limit mattered in {at_limit} runs only");
 }

@@ -238,7 +238,7 @@ fn with_reference(name: &str, csv: &str) -> Result<(), String> {
     );
     let scenario = Scenario::parse(&text, "my.toml").expect("valid TOML");
     let prepared = scenario
-        .prepare(&directory)
+        .prepare(directory.as_path())
         .map_err(|error| error.to_string())?;
     assert!(
         (prepared.planes[0].reference.at(0.25) - 0.5).abs() < 1e-12,

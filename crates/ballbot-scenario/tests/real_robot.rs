@@ -73,7 +73,7 @@ fn run(prepared: &Prepared) -> Recording<4, 1, 4> {
         progress: &|_| (),
     };
     let mut recordings = prepared.record(&surroundings).expect("runs");
-    recordings.remove(0)
+    recordings.planes.remove(0)
 }
 
 #[track_caller]

@@ -6,8 +6,8 @@
 )]
 
 use ballbot_scenario::{
-    DeviationsTable, DisturbancesTable, MotorsTable, PlaneName, Prepared, PushTable, Scenario,
-    SensorsTable, Surroundings, TorqueRateTable, WorldTable,
+    DeviationsTable, DisturbancesTable, Prepared, Scenario, SensorsTable, Surroundings,
+    TorqueRateTable, WorldTable,
 };
 use lpvmpc_sim::{Ending, Recording};
 use std::path::Path;
@@ -25,8 +25,8 @@ fn run(scenario: &Scenario) -> (Prepared, Vec<Recording<4, 1, 4>>) {
         clock: &|| Duration::ZERO,
         progress: &|_| (),
     };
-    let recordings = prepared.record(&surroundings).expect("runs");
-    (prepared, recordings)
+    let record = prepared.record(&surroundings).expect("runs");
+    (prepared, record.planes)
 }
 
 /// Runs a scenario that must come to its end.
@@ -159,37 +159,60 @@ fn the_torque_moves_in_ramps_no_steeper_than_allowed() {
     assert!(error < 20.0, "{error} mm");
 }
 
+/// What is commanded is at a bound only where the plan is: the estimated torque is taken off the
+/// bound, not cut off the answer.
 #[test]
-fn no_motor_gets_more_than_its_limit() {
-    let mut scenario = example("pushed-lissajous");
-    scenario.duration_s = 25.0;
-    // Both planes at once.
-    let push = |plane| PushTable::Rates {
-        plane,
-        time_s: 20.0,
-        phi_dot_rad_s: 0.0,
-        theta_dot_rad_s: 1.0,
-    };
-    world(&mut scenario).pushes = vec![push(PlaneName::X), push(PlaneName::Y)];
-    let limit = 0.8;
-    scenario.controller.motors = Some(MotorsTable {
-        limit_nm: limit,
-        yaw_reserve_nm: 0.1,
-    });
+fn the_plan_knows_what_a_disturbance_leaves_of_the_torque() {
+    let mut scenario = example("push-and-move");
+    world(&mut scenario).actuator.bias_nm = 0.3;
+    scenario.bounds.torque_nm = [-0.6, 0.6];
     let (prepared, recordings) = stands(&scenario);
-    let trajectories: Vec<_> = recordings.into_iter().map(|r| r.trajectory).collect();
-    let torques = prepared.motor_torques(&trajectories);
-    let most = torques
-        .iter()
-        .map(|motors| motors.amax())
-        .fold(0.0, f64::max);
-    // The yaw torque may add sqrt(2)/3 of its reserve.
-    let reserve = 2_f64.sqrt() / 3.0 * 0.1;
-    assert!(most <= limit - reserve + 1e-9, "{most} N m");
+    let bounds = prepared.settings.u;
+    let mut at_bound = 0;
+    for sample in &recordings[0].trajectory.samples {
+        assert!(
+            bounds.contains(&sample.u, 0.0),
+            "{} at {} s",
+            sample.u,
+            sample.t
+        );
+        if sample.u == bounds.lower || sample.u == bounds.upper {
+            assert!(sample.active_bounds > 0, "cut off at {} s", sample.t);
+            at_bound += 1;
+        }
+    }
     assert!(
-        most > 0.8 * (limit - reserve),
-        "the limit was needed: {most} N m"
+        at_bound > 2,
+        "the bound mattered in {at_bound} samples only"
     );
+}
+
+/// Encoders at 1 kHz, an inertial unit at 200 Hz whose readings are 10 ms late and now and then
+/// come again.
+#[test]
+fn it_follows_a_metre_with_sensors_of_different_rates_late_and_stale() {
+    let mut scenario = example("push-and-move");
+    let world = world(&mut scenario);
+    world.sensor_period_s = Some(0.001);
+    let sensors = &mut world.sensors;
+    sensors.theta.period_s = Some(0.005);
+    sensors.theta_dot.period_s = Some(0.005);
+    (sensors.theta.delay_s, sensors.theta_dot.delay_s) = (0.01, 0.01);
+    (sensors.theta.stale, sensors.theta_dot.stale) = (0.05, 0.05);
+    // Older than the delay: seen before.
+    let estimator = scenario.controller.estimator.as_mut().expect("it has one");
+    estimator.oldest_s = 0.0105;
+    let (prepared, recordings) = stands(&scenario);
+    let error = rms_mm(&prepared, &recordings[0], 6.0, 10.0);
+    assert!(error < 20.0, "{error} mm");
+    let log = &recordings[0].log;
+    let delivered = |sensor: usize| {
+        let rows = log.iter().filter(|row| row.measured[sensor].is_some());
+        rows.count() as f64 / log.len() as f64
+    };
+    // 1 % of the samples are missing; stale readings come at any time.
+    assert!((delivered(0) - 0.99).abs() < 0.01, "{}", delivered(0));
+    assert!((delivered(1) - 0.25).abs() < 0.03, "{}", delivered(1));
 }
 
 #[test]

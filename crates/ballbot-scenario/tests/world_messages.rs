@@ -58,6 +58,25 @@ fn each_mistake_is_named_with_key_value_and_what_is_right() {
             ["world.sensors.phi.dropout = 2", "0 to 1"],
         ),
         (
+            "[world.sensors.phi]\ndropout = 0.6\nstale = 0.5",
+            ["world.sensors.phi.stale = 0.5", "0 to 0.4"],
+        ),
+        (
+            "[world]\nsensor_period_s = 0.005\n[world.sensors.theta]\ndelay_s = 0.012",
+            [
+                "world.sensors.theta.delay_s = 0.012",
+                "periods of the sensors (0.005 s)",
+            ],
+        ),
+        (
+            "[world.sensors.theta_dot]\nperiod_s = 0.0",
+            ["world.sensors.theta_dot.period_s = 0", "positive"],
+        ),
+        (
+            "[controller.estimator]\noldest_s = -1.0",
+            ["controller.estimator.oldest_s = -1", "not be negative"],
+        ),
+        (
             "[world.actuator]\nlimit_nm = 0.0",
             ["world.actuator.limit_nm = 0", "inf for no"],
         ),
@@ -121,6 +140,10 @@ fn each_mistake_is_named_with_key_value_and_what_is_right() {
         (
             "[controller.motors]\nlimit_nm = 0.1\nyaw_reserve_nm = 1.0",
             ["controller.motors", "no torque for the planes"],
+        ),
+        (
+            "[heading]\ninertia_m2 = 0.02\nstiffness_nm_rad = 0.1\ndamping_nm_s_rad = 0.03",
+            ["heading", "two planes and [controller.motors]"],
         ),
     ] {
         let said = message(lines);

@@ -7,6 +7,10 @@
 //! accelerates the ball of a rigid robot towards positive phi, but towards negative phi with the
 //! paper's parameters b*, which belong to no rigid body.
 #![no_std]
+#![allow(
+    clippy::neg_cmp_op_on_partial_ord,
+    reason = "a comparison with a number that is not one must take the failing branch"
+)]
 
 mod consistency;
 mod disturbed;
@@ -16,6 +20,7 @@ mod friction;
 mod heading;
 mod linear;
 mod parameters;
+mod shares;
 mod trigonometry;
 mod wheels;
 
@@ -25,4 +30,5 @@ pub use embedding::{Accelerations, Tilt};
 pub use friction::{CREEP_SPEED, DriveFriction};
 pub use heading::Heading;
 pub use parameters::{Ballbot, Field, Geometry, LinearParameters, limits};
+pub use shares::PlaneTorques;
 pub use wheels::{BadZenithAngle, Wheels};

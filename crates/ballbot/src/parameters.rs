@@ -122,7 +122,7 @@ impl<T: Field> Ballbot<T> {
     }
 
     /// r_b / r_w: from the virtual wheel's torque to the ball's.
-    pub(crate) fn gear(&self) -> T {
+    pub fn gear(&self) -> T {
         self.geometry.ball_radius / self.geometry.wheel_radius
     }
 }

@@ -1,5 +1,6 @@
 //! From the three virtual torques to the three motors (eq. (6)), and back.
 
+use crate::shares::PlaneTorques;
 use crate::trigonometry::sin_cos;
 use lpvmpc::Scalar;
 use nalgebra::{Matrix3, Vector3, convert};
@@ -78,21 +79,16 @@ impl<T: Scalar> Wheels<T> {
         inverse * motors
     }
 
-    /// The largest B such that |tau_x| <= B, |tau_y| <= B and |tau_z| <= `yaw` (N m) keep every
-    /// motor within `motor` N m in every heading; not positive if the yaw torque alone takes all
-    /// of it.
-    ///
-    /// The motors allow a hexagon of plane torques, which turns with the robot. This is the
-    /// square in the circle that it always contains: each plane has a bound of its own, and the
-    /// planes' problems stay apart. Without turning, a square along the robot's axes could be
-    /// larger by 3.5 %; a single plane could have 1.41 times as much.
-    pub fn plane_limit(&self, motor: T, yaw: T) -> T {
+    /// What motors with the limit `motor` N m leave for the planes beside the yaw torque `yaw`
+    /// N m, in every heading.
+    pub fn plane_torques(&self, motor: T, yaw: T) -> PlaneTorques<T> {
         let matrix = self.matrix();
-        let limits = matrix.row_iter().map(|row| {
+        let radii = matrix.row_iter().map(|row| {
             let planes = (row[0] * row[0] + row[1] * row[1]).sqrt();
-            (motor - row[2].abs() * yaw.abs()) / (planes * convert::<f64, T>(2.0).sqrt())
+            (motor - row[2].abs() * yaw.abs()) / planes
         });
-        limits.fold(convert(f64::INFINITY), |least: T, limit| least.min(limit))
+        let least = |least: T, radius| least.min(radius);
+        PlaneTorques::new(radii.fold(convert(f64::INFINITY), least))
     }
 
     /// The torque map of eq. (6), 3 x 3.

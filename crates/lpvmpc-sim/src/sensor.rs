@@ -1,9 +1,10 @@
-//! What a sensor makes of the state: bias, noise, quantisation, missing samples.
+//! What a sensor makes of the state: bias, noise, quantisation, missing, late and stale samples.
 
 use nalgebra::SVector;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
+use std::collections::VecDeque;
 
 /// One measured quantity: a linear combination of the states, and what is wrong with it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,8 +19,13 @@ pub struct Sensor<const NX: usize> {
     pub resolution: f64,
     /// Probability from 0 to 1 that a sample is missing.
     pub dropout: f64,
-    /// It delivers every `every`-th sample of the world, at least 1.
+    /// It measures at every `every`-th sample of the world, at least 1.
     pub every: usize,
+    /// What it measures is delivered so many samples of the world later.
+    pub late: usize,
+    /// Probability from 0 to 1 that it delivers its last reading again, as a sensor or a bus does
+    /// that hangs.
+    pub stale: f64,
 }
 
 /// What the sensors deliver at one instant.
@@ -29,6 +35,8 @@ pub struct Measurement<const NY: usize> {
     pub t: f64,
     /// The readings, in the units of the measured quantities; `None` where one is missing.
     pub values: [Option<f64>; NY],
+    /// The time since each reading was taken, by its own time stamp, s.
+    pub ages: [f64; NY],
 }
 
 impl<const NX: usize> Sensor<NX> {
@@ -41,6 +49,8 @@ impl<const NX: usize> Sensor<NX> {
             resolution: 0.0,
             dropout: 0.0,
             every: 1,
+            late: 0,
+            stale: 0.0,
         }
     }
 
@@ -51,6 +61,16 @@ impl<const NX: usize> Sensor<NX> {
             row[i] = 1.0;
             Self::ideal(row)
         })
+    }
+
+    /// Its reading of the state `x`, with a standard normal `noise`.
+    fn reading(&self, x: &SVector<f64, NX>, noise: f64) -> f64 {
+        let value = self.row.dot(x) + self.bias + self.noise * noise;
+        if self.resolution > 0.0 {
+            (value / self.resolution).round() * self.resolution
+        } else {
+            value
+        }
     }
 
     /// What makes no sense about it: the quantity, its value, and what would be right.
@@ -67,6 +87,12 @@ impl<const NX: usize> Sensor<NX> {
             Some(("resolution", self.resolution, sizes))
         } else if !(0.0..=1.0).contains(&self.dropout) {
             Some(("dropout", self.dropout, "it must be a probability, 0 to 1"))
+        } else if !(0.0..=1.0 - self.dropout).contains(&self.stale) {
+            Some((
+                "stale",
+                self.stale,
+                "it must be a probability that leaves room for that of a missing sample",
+            ))
         } else if self.every == 0 {
             Some(("every", 0.0, "it must be at least 1"))
         } else {
@@ -81,36 +107,50 @@ impl<const NX: usize> Sensor<NX> {
 pub(crate) struct Channel<const NX: usize> {
     sensor: Sensor<NX>,
     random: ChaCha8Rng,
+    /// Measured, and not delivered yet: one entry per sample of the world.
+    travelling: VecDeque<Option<f64>>,
+    /// The reading that was delivered last, and the sample at which it was taken.
+    last: Option<(f64, u64)>,
 }
 
 impl<const NX: usize> Channel<NX> {
     pub(crate) fn new(sensor: Sensor<NX>, seed: u64, index: usize) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(index as u64);
-        Self { sensor, random }
+        Self {
+            sensor,
+            random,
+            travelling: VecDeque::new(),
+            last: None,
+        }
     }
 
-    /// The reading of the state `x` at the world's sample `k`.
-    pub(crate) fn read(&mut self, x: &SVector<f64, NX>, k: u64) -> Option<f64> {
+    /// What is delivered at the world's sample `k`, when the state is `x`: a reading and its age
+    /// in samples.
+    pub(crate) fn read(&mut self, x: &SVector<f64, NX>, k: u64) -> Option<(f64, u64)> {
         // Drawn in any case, so that a run with dropouts has the noise of the run without.
         let noise: f64 = StandardNormal.sample(&mut self.random);
         let chance: f64 = StandardUniform.sample(&mut self.random);
         let Sensor {
-            row,
-            bias,
-            resolution,
             dropout,
             every,
+            late,
+            stale,
             ..
-        } = &self.sensor;
-        if chance < *dropout || !k.is_multiple_of(*every as u64) {
-            return None;
-        }
-        let value = row.dot(x) + bias + self.sensor.noise * noise;
-        Some(if *resolution > 0.0 {
-            (value / resolution).round() * resolution
+        } = self.sensor;
+        let measures = chance >= dropout && k.is_multiple_of(every as u64);
+        self.travelling
+            .push_back(measures.then(|| self.sensor.reading(x, noise)));
+        let arrived = if self.travelling.len() > late {
+            self.travelling.pop_front().flatten()
         } else {
-            value
-        })
+            None
+        };
+        let hangs = (dropout..dropout + stale).contains(&chance);
+        if !hangs {
+            let value = arrived?;
+            self.last = Some((value, k - late as u64));
+        }
+        self.last.map(|(value, taken)| (value, k - taken))
     }
 }

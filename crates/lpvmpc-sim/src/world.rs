@@ -200,6 +200,7 @@ where
             measurement: Measurement {
                 t: 0.0,
                 values: [None; NY],
+                ages: [0.0; NY],
             },
         };
         world.measure();
@@ -297,8 +298,10 @@ where
 
     fn measure(&mut self) {
         self.measurement.t = self.time();
-        for (value, channel) in self.measurement.values.iter_mut().zip(&mut self.channels) {
-            *value = channel.read(&self.x, self.steps);
+        for (i, channel) in self.channels.iter_mut().enumerate() {
+            let reading = channel.read(&self.x, self.steps);
+            self.measurement.values[i] = reading.map(|(value, _)| value);
+            self.measurement.ages[i] = reading.map_or(0.0, |(_, age)| age as f64 * self.period);
         }
     }
 

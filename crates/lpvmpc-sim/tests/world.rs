@@ -249,6 +249,53 @@ fn readings_are_missing_rounded_and_rare_as_asked_for() {
 }
 
 #[test]
+fn a_late_sensor_delivers_what_it_measured_before() {
+    let mut settings = ideal();
+    settings.sensors[0].noise = 0.1;
+    settings.sensors[0].every = 2;
+    let in_time = readings(&settings, 100);
+    settings.sensors[0].late = 3;
+    let mut world = World::new(Sledge, Vector2::new(0.3, 0.0), settings.clone()).unwrap();
+    for (k, _) in in_time.iter().enumerate() {
+        forward(&mut world, 1);
+        // readings() begins with sample 1, after one step.
+        let before = k.checked_sub(3).and_then(|k| in_time[k][0]);
+        if k > 2 {
+            assert_eq!(world.measurement().values[0], before, "sample {}", k + 1);
+        }
+        if before.is_some() {
+            assert_near(world.measurement().ages[0], 3.0 * settings.period);
+        }
+        assert_eq!(world.measurement().ages[1], 0.0);
+    }
+}
+
+#[test]
+fn a_stale_reading_is_the_last_one_with_its_own_time() {
+    let mut settings = ideal();
+    settings.sensors[0].noise = 0.1;
+    let fresh = readings(&settings, 10_000);
+    settings.sensors[0].stale = 0.2;
+    let mut world = World::new(Sledge, Vector2::new(0.3, 0.0), settings.clone()).unwrap();
+    let (mut again, mut oldest) = (0, 0.0_f64);
+    for k in 0..fresh.len() {
+        forward(&mut world, 1);
+        let age = world.measurement().ages[0];
+        let samples = (age / settings.period).round() as usize;
+        assert_near(age, samples as f64 * settings.period);
+        again += usize::from(samples > 0);
+        oldest = oldest.max(age);
+        if samples <= k {
+            assert_eq!(world.measurement().values[0], fresh[k - samples][0]);
+        }
+    }
+    let part = again as f64 / fresh.len() as f64;
+    // Five standard errors of a fraction of 1/5.
+    assert!((part - 0.2).abs() < 5.0 * (0.16_f64 / 1e4).sqrt(), "{part}");
+    assert!(oldest > 3.0 * settings.period, "they can follow each other");
+}
+
+#[test]
 fn settings_that_make_no_sense_are_named() {
     let refused = |change: &dyn Fn(&mut Settings)| {
         let mut settings = ideal();

@@ -46,6 +46,7 @@ enum StepEnd {
 }
 
 impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T, NU, N, M> {
+    #[inline(always)]
     pub fn new() -> Self {
         Self {
             v: [SVector::zeros(); N],

@@ -2,10 +2,11 @@
 
 use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
-use crate::ocp::{Ocp, Stage};
+use crate::ocp::{Bounds, Ocp, Stage};
 use crate::relaxation::Relaxation;
 use crate::settings::{
     ControllerError, ControllerSettings, Scheduling, TerminalIngredient, Weights, check,
+    check_bounds,
 };
 use crate::solution::Solution;
 use crate::solver::{Solver, SolverSettings, WarmStart};
@@ -45,6 +46,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
     Workspace<T, NX, NU, N, M>
 {
     /// An empty workspace.
+    #[inline(always)]
     pub fn new() -> Self {
         Self {
             ocp: Ocp::default(),
@@ -154,6 +156,23 @@ where
         self.roll_out(x);
         self.iterate(x, workspace);
         &self.solution
+    }
+
+    /// Bounds of state and input from the next step on, over its whole horizon: for what is known
+    /// at run time only, such as the part of a motor that somebody else needs, or an estimated
+    /// disturbance of the input.
+    ///
+    /// # Errors
+    /// [`ControllerError::Bounds`]; the bounds are then as they were.
+    pub fn set_bounds(
+        &mut self,
+        x: Bounds<T, NX>,
+        u: Bounds<T, NU>,
+    ) -> Result<(), ControllerError> {
+        check_bounds(&x, "state")?;
+        check_bounds(&u, "input")?;
+        (self.settings.x, self.settings.u) = (x, u);
+        Ok(())
     }
 
     /// Forgets the past: the next step starts as the first one did.

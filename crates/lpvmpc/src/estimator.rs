@@ -1,140 +1,12 @@
 //! A Kalman filter on the LPV model, with disturbances for offset-free tracking.
 
+mod covariance;
+mod settings;
+
 use crate::model::{LpvModel, Scalar};
-use crate::predictor::Rk4;
-use core::fmt;
-use nalgebra::{SMatrix, SVector, convert};
-
-/// Everything that defines an [`Estimator`] besides its model.
-///
-/// A disturbance d shifts state and input of the model by constants that have to be found:
-///
-/// ```text
-/// x_dot = f(x + E_x d, u + E_u d),     y = C x + noise
-/// ```
-///
-/// With E_u = 1 it is a torque that acts besides u; with E_x = 1 at an angle it is the angle by
-/// which the sensor, or the centre of mass, is off. In the model's own coordinates
-/// z = x + E_x d, v = u + E_u d the motion is z_dot = f(z, v), without disturbance: a controller
-/// that is given z and whose answer is v tracks without offset.
-///
-/// `NX` states, `NU` inputs, `NY` measured quantities, `ND` disturbances. The pair of plant and
-/// disturbance must be observable: rank [I - A, -B_d; C, C_d] = `NX` + `ND` (Pannocchia and
-/// Rawlings 2003).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EstimatorSettings<T, const NX: usize, const NU: usize, const NY: usize, const ND: usize>
-{
-    /// Longest Runge-Kutta step of the prediction, s.
-    pub longest_step: T,
-    /// C, `NY` x `NX`.
-    pub c: SMatrix<T, NY, NX>,
-    /// E_x, `NX` x `ND`.
-    pub state_offset: SMatrix<T, NX, ND>,
-    /// E_u, `NU` x `ND`.
-    pub input_offset: SMatrix<T, NU, ND>,
-    /// Variance that the state gains per second, in squared state units per s, >= 0: what the
-    /// model does not know.
-    pub state_noise: SVector<T, NX>,
-    /// Variance that the disturbance gains per second, >= 0: how fast it may wander.
-    pub disturbance_noise: SVector<T, ND>,
-    /// Variances of the measurements, in squared units, > 0.
-    pub measurement_noise: SVector<T, NY>,
-    /// Variances of the state at the start, >= 0.
-    pub initial_state: SVector<T, NX>,
-    /// Variances of the disturbance at the start, >= 0.
-    pub initial_disturbance: SVector<T, ND>,
-    /// Which readings are not believed.
-    pub gate: Gate<T>,
-}
-
-/// When a reading is not believed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gate<T> {
-    /// A reading further from its prediction than this many standard deviations is an outlier;
-    /// infinite for none.
-    pub deviations: T,
-    /// After this many outliers of one sensor in a row it is the state that must be wrong, as
-    /// after a blow: the reading is believed, and the state's variance grows to fit it.
-    pub patience: usize,
-    /// A reading older than this is stale, s.
-    pub oldest: T,
-}
-
-/// A measured value.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reading<T> {
-    /// The value, in the unit of the measured quantity.
-    pub value: T,
-    /// Time since it was taken, s.
-    pub age: T,
-}
-
-impl<T: Scalar> Reading<T> {
-    /// A value of this instant.
-    pub fn fresh(value: T) -> Self {
-        Self {
-            value,
-            age: T::zero(),
-        }
-    }
-}
-
-/// What became of a reading.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// It has corrected the estimate.
-    Used,
-    /// It has corrected the estimate after the state's variance was raised.
-    UsedAfterBlow,
-    /// There was none, or no number.
-    Missing,
-    /// It was too old.
-    Stale,
-    /// It was too far from the prediction.
-    Outlier,
-}
-
-/// A mistake in the [`EstimatorSettings`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EstimatorError {
-    /// The longest step is not a positive number.
-    LongestStep,
-    /// C, E_x or E_u contains a number that is not finite: its name.
-    Matrix(&'static str),
-    /// A variance is negative (or zero, for a measurement) or not finite: what of, and its
-    /// component from 0.
-    Variance {
-        /// What it is the variance of.
-        quantity: &'static str,
-        /// Component, from 0.
-        component: usize,
-    },
-    /// The gate lets nothing through.
-    Gate,
-}
-
-impl fmt::Display for EstimatorError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::LongestStep => write!(f, "the longest step must be a positive number of seconds"),
-            Self::Matrix(name) => write!(f, "the matrix {name} must have finite entries"),
-            Self::Variance {
-                quantity,
-                component,
-            } => write!(
-                f,
-                "the variance of {quantity} {component} must be finite and not negative, that of \
-                 a measurement positive"
-            ),
-            Self::Gate => write!(
-                f,
-                "the gate's deviations must be positive, and its oldest age not negative"
-            ),
-        }
-    }
-}
-
-impl core::error::Error for EstimatorError {}
+pub use covariance::Covariance;
+use nalgebra::SVector;
+pub use settings::{EstimatorError, EstimatorSettings, Gate, Reading, Verdict};
 
 /// An extended Kalman filter whose covariance follows the LPV model at the estimated scheduling,
 /// updated one sensor at a time in Joseph's form (Bucy and Joseph 1968; Simon, Optimal State
@@ -157,18 +29,16 @@ pub struct Estimator<
     z: SVector<T, NX>,
     d: SVector<T, ND>,
     covariance: Covariance<T, NX, ND>,
+    /// The input of the last [`Estimator::advance`].
+    input: SVector<T, NU>,
     rejected: [usize; NY],
 }
 
-/// The covariance of (z, d) in blocks.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Covariance<T, const NX: usize, const ND: usize> {
-    /// Of z, `NX` x `NX`, symmetric positive semidefinite.
-    pub zz: SMatrix<T, NX, NX>,
-    /// Of z with d, `NX` x `ND`.
-    pub zd: SMatrix<T, NX, ND>,
-    /// Of d, `ND` x `ND`, symmetric positive semidefinite.
-    pub dd: SMatrix<T, ND, ND>,
+/// A reading as it is expected, and how it depends on the present z and on d.
+struct Expected<T, const NX: usize, const ND: usize> {
+    value: T,
+    c_z: SVector<T, NX>,
+    c_d: SVector<T, ND>,
 }
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize, const NY: usize, const ND: usize>
@@ -193,6 +63,7 @@ where
             z: x,
             d: SVector::zeros(),
             covariance: settings.initial_covariance(),
+            input: SVector::zeros(),
             rejected: [0; NY],
         })
     }
@@ -202,6 +73,7 @@ where
         self.z = x;
         self.d = SVector::zeros();
         self.covariance = self.settings.initial_covariance();
+        self.input = SVector::zeros();
         self.rejected = [0; NY];
     }
 
@@ -265,6 +137,7 @@ where
         moved.zd += wandered.zd;
         moved.dd += wandered.dd;
         self.z = self.predict(&self.z, u, duration);
+        self.input = *u;
         self.covariance = moved;
     }
 
@@ -281,6 +154,35 @@ where
         verdicts
     }
 
+    /// What sensor `i` would have read `age` s ago, as far as the estimate knows.
+    ///
+    /// The model is followed back from the present, under the last input. What the estimate has
+    /// learnt since is then learnt about the past, too; only what the model does not know counts as
+    /// certain in between.
+    fn expected(&self, i: usize, age: T) -> Expected<T, NX, ND> {
+        let settings = &self.settings;
+        let row = settings.c.row(i).transpose();
+        let offset = -(settings.state_offset.transpose() * row);
+        let now = Expected {
+            value: row.dot(&self.z) + offset.dot(&self.d),
+            c_z: row,
+            c_d: offset,
+        };
+        if !(age > T::zero()) {
+            return now;
+        }
+        let predictor = settings.predictor(age);
+        let v = self.input + self.input_disturbance();
+        let z = predictor.advance(&self.model, &self.z, &v, -age);
+        let (a, b) = self.model.matrices(&self.model.scheduling(&self.z));
+        let (a, b) = predictor.discretize(&a, &b, -age);
+        Expected {
+            value: row.dot(&z) + offset.dot(&self.d),
+            c_z: a.transpose() * row,
+            c_d: offset + (b * settings.input_offset).transpose() * row,
+        }
+    }
+
     /// Corrects with the reading of sensor `i`.
     fn correct(&mut self, i: usize, reading: &Reading<T>) -> Verdict {
         let gate = self.settings.gate;
@@ -288,10 +190,9 @@ where
         if !(reading.age <= gate.oldest) {
             return Verdict::Stale;
         }
-        let c_z = self.settings.c.row(i).transpose();
-        let c_d = -(self.settings.state_offset.transpose() * c_z);
+        let Expected { value, c_z, c_d } = self.expected(i, reading.age);
         let noise = self.settings.measurement_noise[i];
-        let error = reading.value - c_z.dot(&self.z) - c_d.dot(&self.d);
+        let error = reading.value - value;
         let variance = self.covariance.of(&c_z, &c_d) + noise;
         let excess = error * error / variance;
         let mut verdict = Verdict::Used;
@@ -314,135 +215,3 @@ where
         verdict
     }
 }
-
-impl<T: Scalar, const NX: usize, const ND: usize> Covariance<T, NX, ND> {
-    /// The variance of c_z'z + c_d'd.
-    fn of(&self, c_z: &SVector<T, NX>, c_d: &SVector<T, ND>) -> T {
-        let (p_z, p_d) = self.times(c_z, c_d);
-        c_z.dot(&p_z) + c_d.dot(&p_d)
-    }
-
-    /// P (c_z, c_d).
-    fn times(
-        &self,
-        c_z: &SVector<T, NX>,
-        c_d: &SVector<T, ND>,
-    ) -> (SVector<T, NX>, SVector<T, ND>) {
-        (
-            self.zz * c_z + self.zd * c_d,
-            self.zd.transpose() * c_z + self.dd * c_d,
-        )
-    }
-
-    /// Takes in a measurement of c_z'z + c_d'd with the variance `noise`, and returns the gain:
-    /// P <- (I - K c')P(I - K c')' + K noise K', which stays positive semidefinite whatever the
-    /// rounding of K.
-    fn correct(
-        &mut self,
-        c_z: &SVector<T, NX>,
-        c_d: &SVector<T, ND>,
-        noise: T,
-    ) -> (SVector<T, NX>, SVector<T, ND>) {
-        let (p_z, p_d) = self.times(c_z, c_d);
-        let variance = c_z.dot(&p_z) + c_d.dot(&p_d) + noise;
-        let (k_z, k_d) = (p_z / variance, p_d / variance);
-        // M = (I - K c') P, and then M (I - K c')' + K noise K' = M + (K noise - M c) K'.
-        let m_zz = self.zz - k_z * p_z.transpose();
-        let m_zd = self.zd - k_z * p_d.transpose();
-        let m_dz = self.zd.transpose() - k_d * p_z.transpose();
-        let m_dd = self.dd - k_d * p_d.transpose();
-        let rest_z = k_z * noise - m_zz * c_z - m_zd * c_d;
-        let rest_d = k_d * noise - m_dz * c_z - m_dd * c_d;
-        self.zz = symmetric(&(m_zz + rest_z * k_z.transpose()));
-        self.zd = m_zd + rest_z * k_d.transpose();
-        self.dd = symmetric(&(m_dd + rest_d * k_d.transpose()));
-        (k_z, k_d)
-    }
-}
-
-fn symmetric<T: Scalar, const K: usize>(matrix: &SMatrix<T, K, K>) -> SMatrix<T, K, K> {
-    (matrix + matrix.transpose()) * convert::<f64, T>(0.5)
-}
-
-impl<T: Scalar, const NX: usize, const NU: usize, const NY: usize, const ND: usize>
-    EstimatorSettings<T, NX, NU, NY, ND>
-{
-    /// Enough steps for `duration` s.
-    fn predictor(&self, duration: T) -> Rk4 {
-        let mut substeps = 1;
-        while convert::<f64, T>(substeps as f64) * self.longest_step < duration
-            && substeps < MOST_STEPS
-        {
-            substeps += 1;
-        }
-        Rk4 { substeps }
-    }
-
-    fn initial_covariance(&self) -> Covariance<T, NX, ND> {
-        self.spread(&self.initial_state, &self.initial_disturbance)
-    }
-
-    /// The covariance of (z, d) where x and d vary independently of each other. A disturbance
-    /// that wanders moves z = x + E_x d, and leaves the state x that the sensors see.
-    fn spread(
-        &self,
-        state: &SVector<T, NX>,
-        disturbance: &SVector<T, ND>,
-    ) -> Covariance<T, NX, ND> {
-        let offset = &self.state_offset;
-        let dd = SMatrix::from_diagonal(disturbance);
-        let zd = offset * dd;
-        Covariance {
-            zz: SMatrix::from_diagonal(state) + zd * offset.transpose(),
-            zd,
-            dd,
-        }
-    }
-
-    fn check(&self) -> Result<(), EstimatorError> {
-        if !(self.longest_step > T::zero() && self.longest_step.is_finite()) {
-            return Err(EstimatorError::LongestStep);
-        }
-        let finite = |entries: &[T]| entries.iter().all(|entry| entry.is_finite());
-        for (name, entries) in [
-            ("C", self.c.as_slice()),
-            ("E_x", self.state_offset.as_slice()),
-            ("E_u", self.input_offset.as_slice()),
-        ] {
-            if !finite(entries) {
-                return Err(EstimatorError::Matrix(name));
-            }
-        }
-        let variances: [(_, &[T]); 5] = [
-            ("the state's noise", self.state_noise.as_slice()),
-            ("the disturbance's noise", self.disturbance_noise.as_slice()),
-            ("the initial state", self.initial_state.as_slice()),
-            (
-                "the initial disturbance",
-                self.initial_disturbance.as_slice(),
-            ),
-            ("the measurement", self.measurement_noise.as_slice()),
-        ];
-        for (quantity, variances) in variances {
-            let least_allowed = |variance: &T| match quantity {
-                "the measurement" => *variance > T::zero(),
-                _ => *variance >= T::zero(),
-            };
-            let wrong = |variance: &T| !(least_allowed(variance) && variance.is_finite());
-            if let Some(component) = variances.iter().position(wrong) {
-                return Err(EstimatorError::Variance {
-                    quantity,
-                    component,
-                });
-            }
-        }
-        if self.gate.deviations > T::zero() && self.gate.oldest >= T::zero() {
-            Ok(())
-        } else {
-            Err(EstimatorError::Gate)
-        }
-    }
-}
-
-/// A prediction over more steps than this is not worth its time.
-const MOST_STEPS: usize = 1_000;

@@ -64,6 +64,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
     Solver<T, NX, NU, N, M>
 {
     /// A solver that has solved nothing yet.
+    #[inline(always)]
     pub fn new() -> Self {
         const { assert!(N > 0, "a horizon has at least one stage") };
         Self {

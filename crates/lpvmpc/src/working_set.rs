@@ -130,6 +130,8 @@ pub(crate) struct WorkingSet<T, const NU: usize, const N: usize, const M: usize>
 }
 
 impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, NU, N, M> {
+    // Inlined, here and where it is called: built in place, it takes its room on the stack once.
+    #[inline(always)]
     pub fn new() -> Self {
         Self {
             rows: [Terms::empty(); M],

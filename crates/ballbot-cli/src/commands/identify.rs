@@ -7,7 +7,8 @@ use crate::identification::{drawings, published, report, summary};
 use crate::input::{self, InputError};
 use crate::output;
 use crate::progress::Progress;
-use ballbot_identification::{Config, Identification, identify, log};
+use ballbot_identification::log::{self, Log, LogError};
+use ballbot_identification::{Config, Identification, identify};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -52,11 +53,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, CommandError> {
     }
     let mut config = configuration(arguments.config.as_deref())?;
     config.fit.physical &= !arguments.unphysical;
-    let logs = arguments
-        .logs
-        .iter()
-        .map(|path| log::read(path, &config.log));
-    let logs = logs.collect::<Result<Vec<_>, _>>()?;
+    let logs = read(&arguments.logs, &config)?;
     let choices = config
         .choices()
         .map_err(|error| InputError::Identification {
@@ -94,6 +91,18 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, CommandError> {
         arguments.out.display()
     ))
 }
+
+fn read(paths: &[PathBuf], config: &Config) -> Result<Vec<Log>, LogError> {
+    let progress = Progress::new("reading", paths.len() * PARTS);
+    let logs = paths.iter().enumerate().map(|(done, path)| {
+        let part = |part: f64| progress.set(done * PARTS + (part * PARTS as f64) as usize);
+        log::read(path, &config.log, &part)
+    });
+    logs.collect()
+}
+
+/// Steps of the progress per file.
+const PARTS: usize = 100;
 
 /// Steps of a usual identification: coarse fits of three starts, the fit with its noise, four
 /// structures.

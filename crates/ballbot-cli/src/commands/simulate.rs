@@ -8,9 +8,9 @@ use crate::pictures::{self, Shown};
 use crate::progress::Progress;
 use crate::recording::{self, Columns, Metrics};
 use crate::table::Table;
-use ballbot_scenario::{Prepared, Surroundings, words};
+use ballbot_scenario::{MotorSample, Prepared, Record, Surroundings, words};
 use clap::Args;
-use lpvmpc_sim::{Ending, LogRow, Recording, Trajectory};
+use lpvmpc_sim::{Ending, LogRow, Trajectory};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -70,11 +70,13 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
         Some(folder) => folder.clone(),
         None => Path::new("out").join(name),
     };
-    let (trajectories, logs): (Vec<_>, Vec<_>) = record(&prepared)?
+    let Record { planes, motors } = record(&prepared)?;
+    let (trajectories, logs): (Vec<_>, Vec<_>) = planes
         .into_iter()
         .map(|recording| (recording.trajectory, recording.log))
         .unzip();
-    write(&folder, &prepared, &trajectories)?;
+    let motors = motors.unwrap_or_else(|| motors_of_planes(&prepared, &trajectories));
+    write(&folder, &prepared, &trajectories, &motors)?;
     if let Some(path) = &arguments.log {
         write_logs(path, &logs)?;
     }
@@ -107,7 +109,7 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
 ///
 /// # Errors
 /// The controller refuses its settings.
-pub fn record(prepared: &Prepared) -> Result<Vec<Recording<4, 1, 4>>, CommandError> {
+pub fn record(prepared: &Prepared) -> Result<Record, CommandError> {
     let progress = Progress::new("simulating", prepared.total_samples());
     let start = Instant::now();
     let surroundings = Surroundings {
@@ -115,6 +117,20 @@ pub fn record(prepared: &Prepared) -> Result<Vec<Recording<4, 1, 4>>, CommandErr
         progress: &|done| progress.set(done),
     };
     Ok(prepared.record(&surroundings)?)
+}
+
+/// The motors of two planes that were run one after the other, at a heading of zero; none for
+/// one plane.
+fn motors_of_planes(prepared: &Prepared, trajectories: &[Trajectory<4, 1>]) -> Vec<MotorSample> {
+    let samples = trajectories.iter().take(1).flat_map(|run| &run.samples);
+    let torques = prepared.motor_torques(trajectories);
+    let samples = samples.zip(torques).map(|(sample, torques)| MotorSample {
+        t: sample.t,
+        heading: 0.0,
+        target: 0.0,
+        torques,
+    });
+    samples.collect()
 }
 
 /// Writes one log per plane.
@@ -157,6 +173,7 @@ fn write(
     folder: &Path,
     prepared: &Prepared,
     trajectories: &[Trajectory<4, 1>],
+    motors: &[MotorSample],
 ) -> Result<(), CommandError> {
     let mut files: Vec<(PathBuf, Vec<u8>)> = file_names(trajectories.len())
         .iter()
@@ -168,11 +185,11 @@ fn write(
             )
         })
         .collect();
-    if let [x, _] = trajectories {
-        let motors = recording::motors_csv(x, &prepared.motor_torques(trajectories));
-        files.push((folder.join("motors.csv"), motors.into_bytes()));
+    if trajectories.len() == 2 {
+        let text = recording::motors_csv(motors);
+        files.push((folder.join("motors.csv"), text.into_bytes()));
     }
-    for (name, figure) in figures(prepared, trajectories) {
+    for (name, figure) in figures(prepared, trajectories, motors) {
         files.push((
             folder.join(format!("{name}.svg")),
             figure.svg()?.into_bytes(),
@@ -211,7 +228,11 @@ const RESULTS: [&str; 16] = [
 ];
 
 /// The figures with their names; none when a plane has no sample to draw.
-fn figures(prepared: &Prepared, trajectories: &[Trajectory<4, 1>]) -> Vec<(&'static str, Figure)> {
+fn figures(
+    prepared: &Prepared,
+    trajectories: &[Trajectory<4, 1>],
+    motors: &[MotorSample],
+) -> Vec<(&'static str, Figure)> {
     if trajectories.iter().any(|run| run.samples.is_empty()) {
         return Vec::new();
     }
@@ -224,7 +245,7 @@ fn figures(prepared: &Prepared, trajectories: &[Trajectory<4, 1>]) -> Vec<(&'sta
     };
     match columns.as_slice() {
         [x, y] => {
-            let torques = prepared.motor_torques(trajectories);
+            let torques: Vec<_> = motors.iter().map(|sample| sample.torques).collect();
             let planes = [shown(x), shown(y)];
             vec![
                 ("figure", pictures::both_planes(title, prepared, planes)),

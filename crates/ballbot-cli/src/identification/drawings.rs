@@ -207,7 +207,7 @@ fn predictions(identification: &Identification) -> Option<Drawing> {
         name: "predictions",
         caption: "Errors of predictions on data that were held back, for each structure of friction. \
                   Over a long horizon an error of the state grows with the unstable mode, whatever the \
-                  structure: the shorter horizons and chi^2 tell structures apart."
+                  structure: the shorter horizons and \u{3c7}\u{b2} tell structures apart."
             .to_owned(),
         figure: figure("Predictions on data held back", vec![panel], 1, 420.0),
     })

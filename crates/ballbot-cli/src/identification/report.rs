@@ -27,10 +27,11 @@ pub fn html(identification: &Identification, drawings: &[Drawing]) -> Result<Str
         .collect();
     let body = format!(
         "<p>{fitted:.1} s of the log were fitted, {held_back:.1} s held back to judge the fit. \
-         {} of {} values.</p>\n\
+         {} The fit is to {} values.</p>\n\
          <h2>Verdict</h2>\n{}\n<h2>Parameters</h2>\n{}\n<p>{}</p>\n\
          <h2>Logs</h2>\n<ul>\n{logs}</ul>\n<h2>Figures</h2>\n{}\n\
-         <h2>Poles at the upright position</h2>\n{}\n<h2>Residuals</h2>\n{}\n\
+         <h2>Poles at the upright position</h2>\n<p>With the half-widths of their 95 % \
+         intervals.</p>\n{}\n<h2>Residuals</h2>\n{}\n\
          <h2>Structures of friction</h2>\n{}\n<h2>Correlations of the parameters</h2>\n{}\n\
          <h2>The published chain, to compare with</h2>\n{}\n<pre>{}</pre>\n",
         mechanics(identification),
@@ -51,9 +52,9 @@ pub fn html(identification: &Identification, drawings: &[Drawing]) -> Result<Str
 
 fn mechanics(identification: &Identification) -> &'static str {
     if identification.physical {
-        "A positive mass matrix and dissipating friction were imposed; the fit is to"
+        "A positive mass matrix and dissipating friction were imposed."
     } else {
-        "Mechanics was not imposed; the fit is to"
+        "Mechanics was not imposed."
     }
 }
 
@@ -76,7 +77,7 @@ fn verdicts(identification: &Identification) -> String {
         format!(
             "<li><span class=\"{class}\">{}</span> {}</li>\n",
             mark(verdict.weight()),
-            escape(&verdict.to_string()).replace('\n', "<br>")
+            typeset(&verdict.to_string()).replace('\n', "<br>")
         )
     });
     format!("<ul>\n{}</ul>", items.collect::<String>())
@@ -86,5 +87,17 @@ fn table(sheet: &Sheet) -> String {
     if sheet.rows.is_empty() {
         return "<p>None.</p>".to_owned();
     }
-    html::table(&sheet.headers, &sheet.rows)
+    typeset_signs(&html::table(&sheet.headers, &sheet.rows))
+}
+
+/// Text as a page shows it, with the signs that a terminal may not have.
+fn typeset(text: &str) -> String {
+    typeset_signs(&escape(text))
+}
+
+fn typeset_signs(html: &str) -> String {
+    html.replace("chi^2", "\u{3c7}\u{b2}")
+        .replace("^2", "\u{b2}")
+        .replace("+-", "\u{b1}")
+        .replace(">-", ">\u{2212}")
 }

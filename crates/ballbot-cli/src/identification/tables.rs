@@ -1,6 +1,6 @@
 //! The tables of an identification, for the screen and for the report.
 
-use crate::table::{Table, complex};
+use crate::table::Table;
 use ballbot_identification::{HORIZONS, Identification, OUTPUTS, Parameter, Status};
 use lpvmpc_design::NORMAL_95;
 
@@ -83,16 +83,21 @@ pub fn parameters(identification: &Identification) -> Sheet {
     sheet
 }
 
-/// The poles with 95 % intervals.
+/// The poles with the half-widths of their 95 % intervals.
 pub fn poles(identification: &Identification) -> Sheet {
-    let mut sheet = Sheet::new(&["pole [1/s]", "real part +-", "imaginary part +-"]);
+    let mut sheet = Sheet::new(&["real part [1/s]", "imaginary part [1/s]"]);
+    // The integrator of the ball's angle is at zero whatever the parameters are.
+    let part = |value: f64, deviation: f64| match rounded(value, deviation) {
+        text if deviation > 0.0 => {
+            format!("{text} +- {}", rounded(NORMAL_95 * deviation, deviation))
+        }
+        text => text,
+    };
     for pole in &identification.poles {
         let (re, im) = pole.standard_deviation;
-        sheet.rows.push(vec![
-            complex(pole.value),
-            format!("{:.3}", NORMAL_95 * re),
-            format!("{:.3}", NORMAL_95 * im),
-        ]);
+        sheet
+            .rows
+            .push(vec![part(pole.value.re, re), part(pole.value.im, im)]);
     }
     sheet
 }

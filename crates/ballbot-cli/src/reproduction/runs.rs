@@ -73,7 +73,7 @@ impl Run {
     /// The run of a scenario under a name.
     pub(super) fn of(name: &'static str, scenario: &Scenario) -> Result<Self, CommandError> {
         let prepared = scenario.prepare(Path::new("."))?;
-        let recordings = record(&prepared)?.into_iter();
+        let recordings = record(&prepared)?.planes.into_iter();
         let trajectories: Vec<_> = recordings.map(|recording| recording.trajectory).collect();
         let metrics = prepared
             .planes

@@ -117,10 +117,13 @@ pub fn complete(path: &Path, samples: usize, t_s: f64) -> (Vec<Row>, [f64; 4]) {
 pub fn motors(path: &Path) -> Vec<(f64, [f64; 3])> {
     let text = std::fs::read_to_string(path).unwrap();
     let (header, lines) = text.split_once('\n').unwrap();
-    assert_eq!(header, "t_s,motor_1_nm,motor_2_nm,motor_3_nm");
+    assert_eq!(
+        header,
+        "t_s,motor_1_nm,motor_2_nm,motor_3_nm,heading_rad,heading_ref_rad"
+    );
     let rows = lines.lines().map(|line| {
         let cells: Vec<f64> = line.split(',').map(number).collect();
-        let [t, first, second, third] = cells.try_into().unwrap();
+        let [t, first, second, third, _, _] = cells.try_into().unwrap();
         (t, [first, second, third])
     });
     rows.collect()

@@ -1,5 +1,6 @@
 //! Where a log's quantities stand, and in which units.
 
+use ballbot::Wheels;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -11,8 +12,11 @@ pub struct Columns {
     pub delimiter: char,
     /// Time stamps.
     pub time: Channel,
-    /// Ball angle, as the wheels' encoders give it.
+    /// Ball angle.
     pub phi: Channel,
+    /// The encoders of the three wheels, whose angles are put together to the ball angle; `phi` is
+    /// not read then.
+    pub wheels: Option<WheelEncoders>,
     /// Tilt, as the inertial unit gives it.
     pub theta: Channel,
     /// Tilt rate, as the gyroscope gives it. An empty column name says that there is none.
@@ -20,7 +24,7 @@ pub struct Columns {
     /// Torque of the virtual wheel. Without a column name it is `torque_applied_nm` if the file has
     /// that, otherwise `torque_commanded_nm`.
     pub torque: Channel,
-    /// What the ball angle is relative to.
+    /// What the ball angle in `phi` is relative to; that of `wheels` is relative to the body.
     pub ball_angle: BallAngle,
     /// Go on although the units look wrong.
     pub accept_suspicious_units: bool,
@@ -43,6 +47,62 @@ pub struct Channel {
 
 fn one() -> f64 {
     1.0
+}
+
+/// The encoders of three wheels. The angles m of the wheels against the body are those of the
+/// virtual wheels, psi = W' m with the torque map W of the paper's eq. (6) (virtual work), and a
+/// plane's ball angle against the body is r_w / r_b psi.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WheelEncoders {
+    /// Which plane of the robot is identified.
+    pub plane: WheelPlane,
+    /// Angle of the wheels' contact points from the top of the ball, degrees.
+    pub zenith_angle_deg: f64,
+    /// The wheels in the order of the torque map; each factor is r_w / r_b for an angle of the
+    /// wheel, over the gear's ratio for one of the motor, negative for the other sign.
+    pub encoders: [Channel; 3],
+}
+
+/// A plane of the robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WheelPlane {
+    /// The one whose ball angle moves the robot along x, towards the first wheel.
+    X,
+    /// The one that moves it along y.
+    Y,
+}
+
+impl Columns {
+    /// What the ball angle that is read is relative to.
+    pub fn ball_angle_read(&self) -> BallAngle {
+        match self.wheels {
+            Some(_) => BallAngle::RelativeToBody,
+            None => self.ball_angle,
+        }
+    }
+
+    /// What the ball angle is called in messages.
+    pub(super) fn phi_name(&self) -> &str {
+        match self.wheels {
+            Some(_) => "the ball angle of the wheels",
+            None => &self.phi.column,
+        }
+    }
+}
+
+impl WheelEncoders {
+    /// What each encoder contributes to the ball angle; `None` where the zenith angle is none.
+    pub(super) fn weights(&self) -> Option<[f64; 3]> {
+        let wheels = Wheels::new(self.zenith_angle_deg.to_radians()).ok()?;
+        let plane = match self.plane {
+            WheelPlane::X => 0,
+            WheelPlane::Y => 1,
+        };
+        let matrix = wheels.matrix();
+        Some([0, 1, 2].map(|wheel| matrix[(wheel, plane)]))
+    }
 }
 
 /// What the ball angle phi of a log is relative to.
@@ -181,6 +241,7 @@ impl Default for Columns {
             theta: Channel::new("theta_rad", Unit::Radian),
             theta_dot: Channel::new("theta_dot_rad_s", Unit::RadianPerSecond),
             torque: Channel::new("", Unit::NewtonMetre),
+            wheels: None,
             ball_angle: BallAngle::Inertial,
             accept_suspicious_units: false,
         }

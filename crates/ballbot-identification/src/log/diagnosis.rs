@@ -41,7 +41,7 @@ pub(super) fn run(
     };
     let names = Names([
         &columns.time.column,
-        &columns.phi.column,
+        columns.phi_name(),
         &columns.theta.column,
         &columns.theta_dot.column,
         torque_name,

@@ -66,6 +66,15 @@ pub enum Problem {
         /// The limit, bytes.
         limit: usize,
     },
+    /// A zenith angle of the wheels at which they do not turn the ball.
+    #[error(
+        "[log.wheels] zenith_angle_deg = {degrees}: it must be strictly between 0 and 90 degrees \
+         (the paper's robot has 45)"
+    )]
+    ZenithAngle {
+        /// The angle, degrees.
+        degrees: f64,
+    },
     /// The first line has numbers only.
     #[error(
         "line {line} holds numbers where the header is expected: put a line with the column names \

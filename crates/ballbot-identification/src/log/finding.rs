@@ -1,18 +1,24 @@
 //! What is odd about a log and yet no reason to refuse it.
 
-use std::fmt;
+use thiserror::Error;
 
-/// Something the builder should know. Lines are counted from 1, times are since the first row.
-#[derive(Clone, Debug, PartialEq)]
+/// Something the builder should know; its sentence is its `Display`. Lines are counted from 1,
+/// times are since the first row.
+#[derive(Clone, Debug, PartialEq, Error)]
 pub enum Finding {
     /// The text begins with a byte order mark.
+    #[error("the file begins with a byte order mark; it is skipped")]
     ByteOrderMark,
     /// The last line is cut off.
+    #[error("line {line}, the last, is cut off; it is left out")]
     IncompleteLastRow {
         /// Line.
         line: usize,
     },
     /// Empty fields, NaN or infinity.
+    #[error(
+        "`{column}` is missing or not finite in {count} rows, first in line {line}; they are not filled in"
+    )]
     MissingValues {
         /// The column.
         column: String,
@@ -22,6 +28,9 @@ pub enum Finding {
         line: usize,
     },
     /// Rows are missing.
+    #[error(
+        "{count} gap(s) in the time stamps, the longest of {longest:.3} s after {time:.3} s; the fit does not reach across"
+    )]
     Gaps {
         /// How many gaps.
         count: usize,
@@ -31,6 +40,9 @@ pub enum Finding {
         time: f64,
     },
     /// A time stamp like the one before.
+    #[error(
+        "{count} row(s) repeat the time stamp before, first in line {line}; the run is cut there"
+    )]
     DuplicateStamps {
         /// How many rows.
         count: usize,
@@ -38,6 +50,9 @@ pub enum Finding {
         line: usize,
     },
     /// A time stamp before the one before.
+    #[error(
+        "the time goes back {count} time(s), first in line {line} by {by:.4} s (rows out of order, or a restart of the clock); the run is cut there"
+    )]
     BackwardStamps {
         /// How many rows.
         count: usize,
@@ -47,6 +62,7 @@ pub enum Finding {
         by: f64,
     },
     /// The rows are not evenly spaced.
+    #[error("the rows are not evenly spaced: {:.3} ms in the middle, 99 % below {:.3} ms, at most {:.3} ms; the stamps are used as they are", median * 1e3, most * 1e3, longest * 1e3)]
     Jitter {
         /// Median interval, s.
         median: f64,
@@ -56,6 +72,7 @@ pub enum Finding {
         longest: f64,
     },
     /// A value that jumps: a reset, a wrap or a spike.
+    #[error("`{column}` jumps {count} time(s), first by {size:.3} in line {line} ({}); the run is cut there", kind_of_jump(*size))]
     Jumps {
         /// The column.
         column: String,
@@ -67,6 +84,9 @@ pub enum Finding {
         size: f64,
     },
     /// The sensor stands still for longer than a robot does.
+    #[error(
+        "`{column}` does not change for {duration:.2} s from line {line} on: a sensor that hangs?"
+    )]
     Frozen {
         /// The column.
         column: String,
@@ -76,6 +96,7 @@ pub enum Finding {
         line: usize,
     },
     /// The column has steps.
+    #[error("`{column}` has steps of {step:.2e}")]
     Quantised {
         /// The column.
         column: String,
@@ -83,6 +104,7 @@ pub enum Finding {
         step: f64,
     },
     /// The torque is at its limit.
+    #[error("the torque is at its limit of {limit:.3} N m in {:.1} % of the rows{}", 100.0 * part, if *commanded { COMMANDED_ONLY } else { "" })]
     Saturated {
         /// The limit, N m.
         limit: f64,
@@ -92,11 +114,17 @@ pub enum Finding {
         commanded: bool,
     },
     /// What acted is not what was asked for.
+    #[error(
+        "the applied torque differs from the commanded one by {difference:.3} N m (rms); the applied one is used"
+    )]
     CommandNotApplied {
         /// Root of the mean square difference, N m.
         difference: f64,
     },
     /// The robot leans more than a standing one.
+    #[error(
+        "the robot leans beyond 0.8 rad after {time:.2} s (line {line}): it fell, or was lifted; {count} rows are left out"
+    )]
     Fallen {
         /// Rows that are left out.
         count: usize,
@@ -106,130 +134,26 @@ pub enum Finding {
         line: usize,
     },
     /// The tilt hardly changes with its rate.
+    #[error(
+        "the tilt changes by {slope:.2} times the integral of its rate, where 1 is right; the robot moved too little to say why"
+    )]
     TiltAgainstRate {
         /// Slope; 1 is right.
         slope: f64,
     },
     /// Suspicious units that the builder accepts.
+    #[error("accepted although suspicious: {0}")]
     AcceptedUnits(super::error::Suspicion),
 }
 
-impl fmt::Display for Finding {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::ByteOrderMark => {
-                write!(f, "the file begins with a byte order mark; it is skipped")
-            }
-            Self::IncompleteLastRow { line } => {
-                write!(f, "line {line}, the last, is cut off; it is left out")
-            }
-            Self::MissingValues {
-                column,
-                count,
-                line,
-            } => write!(
-                f,
-                "`{column}` is missing or not finite in {count} rows, first in line {line}; they \
-                 are not filled in"
-            ),
-            Self::Gaps {
-                count,
-                longest,
-                time,
-            } => write!(
-                f,
-                "{count} gap(s) in the time stamps, the longest of {longest:.3} s after {time:.3} s; \
-                 the fit does not reach across"
-            ),
-            Self::DuplicateStamps { count, line } => write!(
-                f,
-                "{count} row(s) repeat the time stamp before, first in line {line}; the run is cut \
-                 there"
-            ),
-            Self::BackwardStamps { count, line, by } => write!(
-                f,
-                "the time goes back {count} time(s), first in line {line} by {by:.4} s (rows out of \
-                 order, or a restart of the clock); the run is cut there"
-            ),
-            Self::Jitter {
-                median,
-                most,
-                longest,
-            } => write!(
-                f,
-                "the rows are not evenly spaced: {:.3} ms in the middle, 99 % below {:.3} ms, at most \
-                 {:.3} ms; the stamps are used as they are",
-                median * 1e3,
-                most * 1e3,
-                longest * 1e3
-            ),
-            Self::Jumps {
-                column,
-                count,
-                line,
-                size,
-            } => {
-                let turns = size.abs() / std::f64::consts::TAU;
-                let kind = if (turns - turns.round()).abs() < 0.05 && turns > 0.5 {
-                    "an angle that wraps around"
-                } else {
-                    "a reset or a spike"
-                };
-                write!(
-                    f,
-                    "`{column}` jumps {count} time(s), first by {size:.3} in line {line} ({kind}); the \
-                     run is cut there"
-                )
-            }
-            Self::Frozen {
-                column,
-                duration,
-                line,
-            } => write!(
-                f,
-                "`{column}` does not change for {duration:.2} s from line {line} on: a sensor that \
-                 hangs?"
-            ),
-            Self::Quantised { column, step } => {
-                write!(f, "`{column}` has steps of {step:.2e}")
-            }
-            Self::Saturated {
-                limit,
-                part,
-                commanded,
-            } => {
-                write!(
-                    f,
-                    "the torque is at its limit of {limit:.3} N m in {:.1} % of the rows",
-                    100.0 * part
-                )?;
-                if *commanded {
-                    write!(
-                        f,
-                        "; it is the commanded one: if the motors gave less, friction and inertias \
-                         are wrong. Log the torque that was applied"
-                    )?;
-                }
-                Ok(())
-            }
-            Self::CommandNotApplied { difference } => write!(
-                f,
-                "the applied torque differs from the commanded one by {difference:.3} N m (rms); the \
-                 applied one is used"
-            ),
-            Self::Fallen { count, time, line } => write!(
-                f,
-                "the robot leans beyond 0.8 rad after {time:.2} s (line {line}): it fell, or was \
-                 lifted; {count} rows are left out"
-            ),
-            Self::TiltAgainstRate { slope } => write!(
-                f,
-                "the tilt changes by {slope:.2} times the integral of its rate, where 1 is right; \
-                 the robot moved too little to say why"
-            ),
-            Self::AcceptedUnits(suspicion) => {
-                write!(f, "accepted although suspicious: {suspicion}")
-            }
-        }
+const COMMANDED_ONLY: &str = "; it is the commanded one: if the motors gave less, friction and \
+    inertias are wrong. Log the torque that was applied";
+
+fn kind_of_jump(size: f64) -> &'static str {
+    let turns = size.abs() / std::f64::consts::TAU;
+    if (turns - turns.round()).abs() < 0.05 && turns > 0.5 {
+        "an angle that wraps around"
+    } else {
+        "a reset or a spike"
     }
 }

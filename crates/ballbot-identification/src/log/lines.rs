@@ -12,6 +12,8 @@ pub(super) struct Lines<R> {
     buffer: Vec<u8>,
     /// Number of the last line that was read.
     pub(super) number: usize,
+    /// Bytes that were read.
+    pub(super) bytes: u64,
     /// Whether the last line ended with a line feed.
     pub(super) ended: bool,
 }
@@ -22,6 +24,7 @@ impl<R: BufRead> Lines<R> {
             reader,
             buffer: Vec::new(),
             number: 0,
+            bytes: 0,
             ended: true,
         }
     }
@@ -34,6 +37,7 @@ impl<R: BufRead> Lines<R> {
             .read_until(b'\n', &mut self.buffer)
             .map_err(Problem::Read)?;
         self.number += 1;
+        self.bytes += read as u64;
         if self.buffer.len() > LONGEST {
             return Err(Problem::LongLine {
                 line: self.number,

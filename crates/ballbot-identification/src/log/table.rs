@@ -1,5 +1,6 @@
 //! From the text of a CSV file to columns of numbers.
 
+use super::Progress;
 use super::columns::{APPLIED, COMMANDED, Channel, Columns, Dimension};
 use super::error::Problem;
 use super::finding::Finding;
@@ -30,18 +31,27 @@ pub(super) fn read(
     path: &Path,
     columns: &Columns,
     findings: &mut Vec<Finding>,
+    progress: Progress<'_>,
 ) -> Result<Table, Problem> {
     let file = File::open(path).map_err(Problem::Read)?;
-    if file.metadata().is_ok_and(|metadata| metadata.is_dir()) {
+    let metadata = file.metadata().map_err(Problem::Read)?;
+    if metadata.is_dir() {
         return Err(Problem::Directory);
     }
-    parse(BufReader::with_capacity(1 << 20, file), columns, findings)
+    let length = metadata.len().max(1) as f64;
+    let progress = |bytes: u64| progress((bytes as f64 / length).min(1.0));
+    let reader = BufReader::with_capacity(1 << 20, file);
+    parse(reader, columns, findings, &progress)
 }
+
+/// Bytes between two reports of progress.
+const REPORT: u64 = 1 << 20;
 
 fn parse(
     reader: impl BufRead,
     columns: &Columns,
     findings: &mut Vec<Finding>,
+    progress: &dyn Fn(u64),
 ) -> Result<Table, Problem> {
     let mut lines = Lines::new(reader);
     let header = header(&mut lines, columns, findings)?;
@@ -53,7 +63,12 @@ fn parse(
         commanded: Vec::new(),
         torque,
     };
+    let mut reported = 0;
     while lines.advance()? {
+        if lines.bytes >= reported + REPORT {
+            reported = lines.bytes;
+            progress(reported);
+        }
         let (number, line) = (lines.number, lines.text()?);
         if skipped(line) {
             continue;
@@ -82,10 +97,7 @@ fn parse(
         }
         table.lines.push(number);
         for (column, source) in table.columns.iter_mut().zip(&sources) {
-            column.push(match source {
-                Some(source) => value(fields[source.place], source, number)?,
-                None => f64::NAN,
-            });
+            column.push(combined(&fields, source, number)?);
         }
         if let Some(source) = &commanded {
             let commanded = value(fields[source.place], source, number)?;
@@ -152,7 +164,8 @@ fn header(
     Ok(header)
 }
 
-type Sources = ([Option<Source>; 5], Option<Source>, Torque);
+/// What each quantity is the sum of.
+type Sources = ([Vec<Source>; 5], Option<Source>, Torque);
 
 /// Where each quantity stands.
 fn sources(header: &[String], columns: &Columns) -> Result<Sources, Problem> {
@@ -178,17 +191,35 @@ fn sources(header: &[String], columns: &Columns) -> Result<Sources, Problem> {
     };
     let rate = &columns.theta_dot;
     let sources = [
-        Some(source(header, &columns.time, Dimension::Time)?),
-        Some(source(header, &columns.phi, Dimension::Angle)?),
-        Some(source(header, &columns.theta, Dimension::Angle)?),
+        vec![source(header, &columns.time, Dimension::Time)?],
+        ball_angle(header, columns)?,
+        vec![source(header, &columns.theta, Dimension::Angle)?],
         if rate.column.is_empty() {
-            None
+            Vec::new()
         } else {
-            Some(source(header, rate, Dimension::Rate)?)
+            vec![source(header, rate, Dimension::Rate)?]
         },
-        Some(source(header, &torque, Dimension::Torque)?),
+        vec![source(header, &torque, Dimension::Torque)?],
     ];
     Ok((sources, commanded, kind))
+}
+
+/// The ball angle's column, or those of the three wheels.
+fn ball_angle(header: &[String], columns: &Columns) -> Result<Vec<Source>, Problem> {
+    let Some(wheels) = &columns.wheels else {
+        return Ok(vec![source(header, &columns.phi, Dimension::Angle)?]);
+    };
+    let weights = wheels.weights().ok_or(Problem::ZenithAngle {
+        degrees: wheels.zenith_angle_deg,
+    })?;
+    let encoders = wheels.encoders.iter().zip(weights);
+    encoders
+        .map(|(channel, weight)| {
+            let mut encoder = source(header, channel, Dimension::Angle)?;
+            encoder.scale *= weight;
+            Ok(encoder)
+        })
+        .collect()
 }
 
 fn source(header: &[String], channel: &Channel, dimension: Dimension) -> Result<Source, Problem> {
@@ -219,6 +250,15 @@ fn source(header: &[String], channel: &Channel, dimension: Dimension) -> Result<
         name: channel.column.clone(),
         scale: channel.scale(),
     })
+}
+
+/// The sum of a quantity's columns; NaN where one is missing or there is none.
+fn combined(fields: &[&str], sources: &[Source], line: usize) -> Result<f64, Problem> {
+    let mut sum = if sources.is_empty() { f64::NAN } else { 0.0 };
+    for source in sources {
+        sum += value(fields[source.place], source, line)?;
+    }
+    Ok(sum)
 }
 
 /// A number; NaN where the field is empty or says that there is none.

@@ -84,6 +84,15 @@ fn inertias_delay_and_offset_are_found_at_one_and_two_newton_metres() {
 }
 
 #[test]
+fn delays_are_found_to_a_millisecond() {
+    for delay in [0.0, 0.003, 0.02, 0.04] {
+        let laboratory = Laboratory { delay, ..real() };
+        let found = estimate(&laboratory, 2).values[Parameter::Delay];
+        assert!((found - delay).abs() < 1e-3, "{found} s for {delay} s");
+    }
+}
+
+#[test]
 fn coulomb_friction_is_found() {
     let laboratory = Laboratory {
         coulomb: 0.02,

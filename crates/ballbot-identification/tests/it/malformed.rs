@@ -20,7 +20,7 @@ fn read_with(content: &[u8], config: &str) -> Result<Log, LogError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");
     std::fs::write(&path, content).unwrap();
-    log::read(&path, &Config::parse(config).unwrap().log)
+    log::read(&path, &Config::parse(config).unwrap().log, &|_| ())
 }
 
 /// The log refused with all of these words.
@@ -88,10 +88,14 @@ fn files_that_are_no_text() {
     refused("7".repeat(1 << 20), &["line 1", "65536 bytes"]);
     let folder = tempfile::tempdir().unwrap();
     let columns = Config::default().log;
-    let message = log::read(folder.path(), &columns).unwrap_err().to_string();
+    let message = log::read(folder.path(), &columns, &|_| ())
+        .unwrap_err()
+        .to_string();
     assert!(message.contains("folder"), "{message}");
     let missing = folder.path().join("none.csv");
-    let message = log::read(&missing, &columns).unwrap_err().to_string();
+    let message = log::read(&missing, &columns, &|_| ())
+        .unwrap_err()
+        .to_string();
     assert!(
         message.contains("none.csv") && message.contains("cannot be read"),
         "{message}"
@@ -439,4 +443,29 @@ fn no_damage_to_a_file_makes_the_reader_panic() {
             Err(error) => assert!(error.to_string().len() > 20),
         }
     }
+}
+
+#[test]
+fn wheels_that_cannot_turn_the_ball_are_refused() {
+    let encoder = "{ column = \"phi_rad\", unit = \"rad\" }";
+    let config = |angle: &str, encoder: &str| {
+        format!(
+            "[log.wheels]\nplane = \"x\"\nzenith_angle_deg = {angle}\n\
+             encoders = [{encoder}, {encoder}, {encoder}]"
+        )
+    };
+    let message = |config: &str| {
+        read_with(good().as_bytes(), config)
+            .unwrap_err()
+            .to_string()
+    };
+    let said = message(&config("90.0", encoder));
+    assert!(said.contains("zenith_angle_deg = 90"), "{said}");
+    let said = message(&config("45.0", "{ column = \"wheel\", unit = \"rad\" }"));
+    assert!(said.contains("`wheel`"), "{said}");
+    let said = message(&config(
+        "45.0",
+        "{ column = \"phi_rad\", unit = \"rad/s\" }",
+    ));
+    assert!(said.contains("an angle: rad, deg or turn"), "{said}");
 }

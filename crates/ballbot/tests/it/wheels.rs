@@ -1,6 +1,6 @@
 //! The torque map of eq. (6).
 
-use ballbot::{Heading, Wheels};
+use ballbot::{Heading, PlaneTorques, Wheels};
 use nalgebra::{Matrix3, Vector2, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 
@@ -71,25 +71,123 @@ fn bad_zenith_angles_are_refused() {
     }
 }
 
+/// The largest motor torque over all headings.
+fn worst_heading(wheels: &Wheels<f64>, planes: &Vector2<f64>, yaw: f64) -> f64 {
+    let torques = (0..720).map(|step| {
+        let heading = Heading::new(f64::from(step) * PI / 360.0);
+        wheels.motors(&heading.to_robot(planes).push(yaw)).amax()
+    });
+    torques.fold(0.0, f64::max)
+}
+
 #[test]
-fn plane_limits_keep_every_motor_within_its_own_in_every_heading_and_use_one_up() {
+fn what_is_left_for_the_planes_uses_a_motor_up_in_some_heading_and_no_more() {
     for zenith_angle in [0.5, 0.8, 1.2] {
         let wheels = Wheels::new(zenith_angle).expect("within the open interval");
-        for yaw in [0.0, 0.3] {
-            let limit = wheels.plane_limit(1.0, yaw);
-            let mut most = 0.0_f64;
-            for (corner, step) in (0..4).flat_map(|corner| (0..720).map(move |step| (corner, step)))
-            {
-                let sign = |bit: u32| if corner & (1 << bit) == 0 { 1.0 } else { -1.0 };
-                let heading = Heading::new(f64::from(step) * PI / 360.0);
-                let planes = heading.to_robot(&Vector2::new(limit, sign(0) * limit));
-                let torques = Vector3::new(planes[0], planes[1], sign(1) * yaw);
-                most = most.max(wheels.motors(&torques).amax());
+        for yaw in [0.0, 0.3, -0.3] {
+            let left = wheels.plane_torques(1.0, yaw);
+            let both = left.equal();
+            for planes in [
+                Vector2::new(left.alone(), 0.0),
+                Vector2::new(0.0, left.alone()),
+                Vector2::new(both, both),
+                Vector2::new(-both, both),
+                Vector2::new(0.6, 0.8) * left.alone(),
+            ] {
+                let most = worst_heading(&wheels, &planes, yaw);
+                // Between two of the headings it can be more by (pi/720)^2 / 2.
+                assert!(most < 1.0 + 1e-12 && most > 1.0 - 1e-5, "{most}");
             }
-            assert!((most - 1.0).abs() < 1e-12, "{most} of the motors' limit");
         }
-        assert!(wheels.plane_limit(1.0, 10.0) < 0.0, "nothing is left");
+        let nothing = wheels.plane_torques(1.0, 10.0);
+        assert_eq!((nothing.alone(), nothing.equal()), (0.0, 0.0));
+        assert_eq!(nothing.first([0.3, 0.2]), (0, 0.0));
     }
+}
+
+#[test]
+fn a_bound_for_each_plane_alone_lets_a_motor_be_asked_for_more_than_it_has() {
+    let wheels = Wheels::<f64>::paper();
+    let alone = wheels.plane_torques(1.0, 0.0).alone();
+    // What each plane may have while the other one rests, in both at once.
+    let most = worst_heading(&wheels, &Vector2::new(alone, alone), 0.0);
+    assert!((most - SQRT_2).abs() < 1e-5, "{most}");
+}
+
+#[test]
+fn whatever_the_planes_ask_for_no_motor_gets_more_than_its_limit() {
+    let mut random = fastrand::Rng::with_seed(5);
+    let mut between = |lower: f64, upper: f64| lower + (upper - lower) * random.f64();
+    let mut contested = 0;
+    for _ in 0..20_000 {
+        let zenith_angle: f64 = between(0.2, 1.4);
+        let wheels = Wheels::new(zenith_angle).expect("within the open interval");
+        let limit: f64 = between(0.1, 3.0);
+        let yaw = between(-0.5, 0.5) * limit;
+        let left = wheels.plane_torques(limit, yaw);
+        let needs: [f64; 2] = std::array::from_fn(|_| {
+            let need = between(0.0, 3.0);
+            if need < 2.0 {
+                need * limit
+            } else {
+                f64::INFINITY
+            }
+        });
+        // What the planes would like to have now, which their last plans did not know.
+        let wishes: [f64; 2] = std::array::from_fn(|_| between(-3.0, 3.0) * limit);
+        let (first, bound) = left.first(needs);
+        let mut planes = Vector2::zeros();
+        planes[first] = wishes[first].clamp(-bound, bound);
+        let rest = left.rest(planes[first].abs());
+        let second = 1 - first;
+        planes[second] = wishes[second].clamp(-rest, rest);
+
+        let heading = Heading::new(between(-PI, PI));
+        let motors = wheels.motors(&heading.to_robot(&planes).push(yaw));
+        assert!(
+            motors.amax() <= limit * (1.0 + 1e-12),
+            "{motors} of {limit}"
+        );
+        assert!(
+            bound >= left.equal() * (1.0 - 1e-12),
+            "{bound} for the first"
+        );
+        let kept = needs[second].min(left.equal());
+        // The squares are taken off each other, so rounding is relative to the disc's.
+        let rounding = 4.0 * f64::EPSILON * left.alone() * left.alone();
+        assert!(
+            rest * rest >= kept * kept - rounding,
+            "{rest} for the second, {kept} kept"
+        );
+        contested += usize::from(planes.norm() > 0.999 * left.alone());
+    }
+    assert!(
+        contested > 5_000,
+        "the limit mattered in {contested} cases only"
+    );
+}
+
+#[test]
+fn a_plane_that_is_at_rest_leaves_everything_to_the_other() {
+    let left = Wheels::<f64>::paper().plane_torques(1.0, 0.0);
+    let most = left.alone();
+    assert_eq!(left.first([f64::INFINITY, 0.0]), (0, most));
+    assert_eq!(left.first([0.0, 0.1]), (1, most));
+    // Both cut off: equal shares, in any order.
+    let (_, bound) = left.first([f64::INFINITY; 2]);
+    assert!((bound - left.equal()).abs() < 1e-15, "{bound}");
+    assert!((left.rest(bound) - left.equal()).abs() < 1e-15);
+}
+
+#[test]
+fn a_plan_that_reaches_its_bound_needs_more_than_it_shows() {
+    assert_eq!(PlaneTorques::need([0.1, -0.4, 0.2], 0.5), 0.4);
+    assert_eq!(PlaneTorques::need([0.1, -0.5, 0.2], 0.5), f64::INFINITY);
+    assert_eq!(PlaneTorques::need([f64::NAN], 0.0), f64::INFINITY);
+    // What is not a number takes nothing from the limit.
+    let left = Wheels::<f64>::paper().plane_torques(1.0, 0.0);
+    assert_eq!(left.rest(f64::NAN), 0.0);
+    assert_eq!(left.rest(f64::INFINITY), 0.0);
 }
 
 #[test]

@@ -279,3 +279,50 @@ fn settings_that_make_no_sense_are_named() {
         assert!(message.contains(quantity), "{message}");
     }
 }
+
+/// Without anything that the model does not know, it is all one whether a reading is taken in
+/// when it is taken, or when it arrives with its age.
+#[test]
+fn a_late_reading_corrects_the_state_as_it_was() {
+    let settings = EstimatorSettings {
+        state_noise: Vector2::zeros(),
+        disturbance_noise: Vector1::zeros(),
+        ..mixed()
+    };
+    let start = Vector2::new(0.1, -0.2);
+    let mut in_time = Estimator::new(Linear, settings, start).unwrap();
+    let mut late = Estimator::new(Linear, settings, start).unwrap();
+    let u = Vector1::new(0.6);
+    for (i, age) in [0.01, 0.03, 0.05, 0.02].into_iter().enumerate() {
+        let value = 0.05 + 0.01 * i as f64;
+        in_time.update(&[Some(Reading::fresh(value))]);
+        in_time.advance(&u, age);
+        late.advance(&u, age);
+        assert_eq!(
+            late.update(&[Some(Reading { value, age })]),
+            [Verdict::Used]
+        );
+    }
+    // Runge-Kutta backward is the inverse of forward to (lambda h)^5.
+    let close = |a: f64, b: f64| (a - b).abs() < 1e-7 * a.abs().max(1e-3);
+    let pairs = in_time
+        .state()
+        .iter()
+        .zip(&late.state())
+        .all(|(a, b)| close(*a, *b));
+    assert!(pairs, "{} and {}", in_time.state(), late.state());
+    let (a, b) = (in_time.disturbance()[0], late.disturbance()[0]);
+    assert!(close(a, b), "{a} and {b}");
+    let (a, b) = (in_time.covariance(), late.covariance());
+    for (a, b) in a.zz.iter().chain(&a.zd).zip(b.zz.iter().chain(&b.zd)) {
+        assert!(close(*a, *b), "{a} and {b}");
+    }
+
+    // Taken for a fresh one, it is wrong by the way that the pendulum has gone since.
+    let mut deceived = in_time.clone();
+    in_time.update(&[Some(Reading::fresh(0.2))]);
+    in_time.advance(&u, 0.05);
+    deceived.advance(&u, 0.05);
+    deceived.update(&[Some(Reading::fresh(0.2))]);
+    assert!((in_time.state() - deceived.state()).norm() > 1e-3);
+}

@@ -3,10 +3,10 @@
 #![no_std]
 #![no_main]
 
-use ballbot::{Ballbot, Wheels};
+use ballbot::{Ballbot, PlaneTorques, Wheels};
 use core::hint::black_box;
-use lpvmpc::{Controller, Reference, Scalar, Workspace};
-use nalgebra::{Vector3, Vector4};
+use lpvmpc::{Bounds, Controller, Reference, Scalar, Workspace};
+use nalgebra::{Vector1, Vector3, Vector4};
 use no_panic as _;
 
 const N: usize = 20;
@@ -30,9 +30,21 @@ fn step<T: Scalar>() {
     if let (Some(controller), Some(workspace)) = (controller, workspace)
         && let (Some((x, reference)), Some(wheels)) = (inputs, wheels)
     {
+        // The motors' limit and the yaw torque, N m; what the other plane takes.
+        let [limit, yaw, taken] = black_box([T::one(); 3]);
+        let left = wheels.plane_torques(limit, yaw);
+        let share = Vector1::new(left.rest(taken));
+        let bounds = Bounds {
+            lower: -share,
+            upper: share,
+        };
+        let states = controller.settings().x;
+        black_box(controller.set_bounds(states, bounds).is_ok());
         let plan = controller.step(x, reference, workspace);
         let torque = plan.u[0][0];
+        let needed = PlaneTorques::need(plan.u.iter().map(|u| u[0]), taken);
         black_box(plan);
+        black_box(left.first([needed, taken]));
         black_box(wheels.motors(&Vector3::new(torque, torque, T::zero())));
     }
 }

@@ -2,6 +2,7 @@
 
 mod algorithm;
 mod failures;
+mod run_time_bounds;
 mod settings;
 
 use crate::plant::CartPole;

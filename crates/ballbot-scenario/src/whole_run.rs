@@ -1,0 +1,120 @@
+//! The run of a robot whose planes share three motors.
+
+use crate::error::ScenarioError;
+use crate::prepare::{Plane, Prepared};
+use crate::run::{Record, Surroundings};
+use crate::three_motors::{MotorSample, Motors, PlanesAndYaw};
+use crate::whole_robot::{HEADING, State, WholeRobot, plane, whole_world};
+use lpvmpc_sim::{ClosedLoop, Ending, Recording, Trajectory, World};
+
+type WholeLoop = ClosedLoop<PlanesAndYaw, WholeRobot, 10, 3, 10, 4>;
+
+impl Prepared {
+    /// Runs both planes together.
+    pub(crate) fn record_whole(
+        &self,
+        motors: &Motors,
+        planes: [&Plane; 2],
+        surroundings: &Surroundings<'_>,
+    ) -> Result<Record, ScenarioError> {
+        let reference = |t: f64| self.whole_reference(motors, planes, t);
+        let mut closed_loop = self.whole_loop(motors, planes)?;
+        let mut samples = [Vec::new(), Vec::new()];
+        let mut logs = [Vec::new(), Vec::new()];
+        let mut turns = Vec::with_capacity(self.samples);
+        let mut ending = Ending::Complete;
+        for k in 0..self.samples {
+            let mut rows = Vec::new();
+            let sample = closed_loop.sample(&reference, surroundings.clock, &mut |row| {
+                rows.push(row);
+            });
+            let sample = match sample {
+                Ok(sample) => sample,
+                Err(early) => {
+                    ending = early;
+                    break;
+                }
+            };
+            let regulator = &closed_loop.regulator;
+            for (index, (samples, log)) in samples.iter_mut().zip(&mut logs).enumerate() {
+                samples.extend(regulator.of_plane(index, &sample));
+                log.extend(rows.iter().map(|row| {
+                    let heading = sample.x[HEADING] + sample.x[HEADING + 1] * (row.t - sample.t);
+                    regulator.log_of_plane(index, row, heading)
+                }));
+            }
+            turns.push(MotorSample {
+                t: sample.t,
+                heading: sample.x[HEADING],
+                target: sample.x_ref[HEADING],
+                torques: sample.u,
+            });
+            (surroundings.progress)(planes.len() * (k + 1));
+        }
+        let final_time = closed_loop.world.time();
+        let (x, x_ref) = (closed_loop.world.state(), reference(final_time));
+        let of_plane = |(index, (samples, log))| Recording {
+            trajectory: Trajectory {
+                samples,
+                final_time,
+                final_state: plane(x, index),
+                final_reference: plane(&x_ref, index),
+                ending: of_plane(&ending),
+            },
+            log,
+        };
+        let planes = samples.into_iter().zip(logs).enumerate().map(of_plane);
+        Ok(Record {
+            planes: planes.collect(),
+            motors: Some(turns),
+        })
+    }
+
+    /// The state reference of the whole robot at the time `t` s.
+    fn whole_reference(&self, motors: &Motors, [x, y]: [&Plane; 2], t: f64) -> State {
+        let mut reference = State::zeros();
+        for (index, plane) in [x, y].into_iter().enumerate() {
+            let part = plane.state_reference(t);
+            reference.fixed_rows_mut::<4>(4 * index).copy_from(&part);
+        }
+        let target = motors.turning.target(t);
+        reference.fixed_rows_mut::<2>(HEADING).copy_from(&target);
+        reference
+    }
+
+    fn whole_loop(&self, motors: &Motors, [x, y]: [&Plane; 2]) -> Result<WholeLoop, ScenarioError> {
+        let period = x.world.settings.period;
+        let regulators = [self.sharing_plane(period)?, self.sharing_plane(period)?];
+        let (robot, settings) = whole_world(self, motors, [&x.world, &y.world]);
+        let mut start = State::zeros();
+        for (index, plane) in [x, y].into_iter().enumerate() {
+            start
+                .fixed_rows_mut::<4>(4 * index)
+                .copy_from(&plane.initial_state);
+        }
+        start[HEADING] = motors.turning.initial;
+        let world = World::new(robot, start, settings)?;
+        let regulator = PlanesAndYaw::new(regulators, self.wheels, *motors);
+        let mut closed_loop = ClosedLoop::new(regulator, world)?;
+        closed_loop.without_plan = x.world.without_plan;
+        for (index, plane) in [x, y].into_iter().enumerate() {
+            for i in 0..4 {
+                let range = &plane.world.range;
+                closed_loop.range.lower[4 * index + i] = range.lower[i];
+                closed_loop.range.upper[4 * index + i] = range.upper[i];
+            }
+        }
+        Ok(closed_loop)
+    }
+}
+
+/// How the run of a plane ended, for both planes: they end together.
+fn of_plane(ending: &Ending) -> Ending {
+    match ending {
+        Ending::OutOfRange { t, component } => Ending::OutOfRange {
+            t: *t,
+            component: component % 4,
+        },
+        ending => ending.clone(),
+    }
+}
