@@ -87,7 +87,7 @@ pub enum ClaimError {
 }
 
 /// Boxes that a proof may take.
-pub const MOST_BOXES: usize = 400_000;
+pub const MOST_BOXES: usize = 100_000;
 /// 2^3 time steps with a remainder of order 6: what proves the ballbot fastest.
 const HALVINGS: u8 = 3;
 
