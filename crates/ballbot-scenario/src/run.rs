@@ -152,7 +152,10 @@ impl Prepared {
             21..=50 => self.state_feedback::<50, 54>(),
             #[cfg(not(target_family = "wasm"))]
             51..=100 => self.state_feedback::<100, 104>(),
+            #[cfg(not(target_family = "wasm"))]
+            _ => self.state_feedback::<LONGEST_HORIZON, { LONGEST_HORIZON + 4 }>(),
             // As many rows as with the torque's own bounds below: one solver for both.
+            #[cfg(target_family = "wasm")]
             _ => self.state_feedback::<LONGEST_HORIZON, { 2 * LONGEST_HORIZON + 4 }>(),
         }
     }

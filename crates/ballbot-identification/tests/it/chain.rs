@@ -1,24 +1,8 @@
 //! From a file to a judged robot, and what a builder can do wrong on the way.
 
-use crate::laboratory::{Laboratory, Record, healthy};
+use crate::laboratory::{Laboratory, Record, csv, healthy};
 use ballbot_identification::{Config, Identification, Parameter, Verdict, identify, log};
 use std::fmt::Write as _;
-
-/// The log as `ballbot simulate --log` writes it.
-pub fn csv(record: &Record) -> String {
-    let mut text =
-        "t_s,phi_rad,theta_rad,theta_dot_rad_s,torque_commanded_nm,torque_applied_nm\n".to_owned();
-    for (row, time) in record.run.time.iter().enumerate() {
-        let outputs = record.run.outputs[row];
-        writeln!(
-            text,
-            "{time},{},{},{},{},{}",
-            outputs[0], outputs[1], outputs[2], record.commanded[row], record.run.torque[row]
-        )
-        .unwrap();
-    }
-    text
-}
 
 pub fn identified(laboratory: &Laboratory, seed: u64, config: &str) -> Identification {
     identified_from(&csv(&laboratory.record(seed)), config)
@@ -307,25 +291,6 @@ fn several_runs_are_one_fit_and_a_drawing_is_a_prior() {
     let error = percent(found.estimate.values[Parameter::B1], real().plant.b1);
     assert!(error < 5.0, "{error} %");
     assert!(warnings(&found).is_empty(), "{:?}", warnings(&found));
-}
-
-#[test]
-#[ignore = "takes a minute: cargo test -p ballbot-identification -- --ignored"]
-fn ten_minutes_at_one_kilohertz_are_identified_within_a_minute() {
-    let laboratory = Laboratory {
-        rate: 1000.0,
-        duration: 600.0,
-        ..real()
-    };
-    let text = csv(&laboratory.record(1));
-    assert_eq!(text.lines().count(), 600_001);
-    let clock = std::time::Instant::now();
-    let found = identified_from(&text, "");
-    let seconds = clock.elapsed().as_secs_f64();
-    assert!(seconds < 60.0, "{seconds} s");
-    assert!(warnings(&found).is_empty(), "{:?}", warnings(&found));
-    let error = percent(found.estimate.values[Parameter::B1], laboratory.plant.b1);
-    assert!(error < 0.5, "{error} %");
 }
 
 /// The log with three encoders of the wheels, in a unit each, in place of the ball angle.

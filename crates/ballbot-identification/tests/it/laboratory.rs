@@ -7,6 +7,7 @@ use fastrand::Rng;
 use lpvmpc_design::{linearize, lqr_continuous};
 use nalgebra::{DMatrix, SVector, Vector2, Vector3, Vector4};
 use std::f64::consts::TAU;
+use std::fmt::Write as _;
 
 /// A robot with its drive, its sensors, and the loop that holds it upright.
 #[derive(Clone, Debug)]
@@ -234,4 +235,20 @@ impl Laboratory {
         }
         record
     }
+}
+
+/// The log as `ballbot simulate --log` writes it.
+pub fn csv(record: &Record) -> String {
+    let mut text =
+        "t_s,phi_rad,theta_rad,theta_dot_rad_s,torque_commanded_nm,torque_applied_nm\n".to_owned();
+    for (row, time) in record.run.time.iter().enumerate() {
+        let outputs = record.run.outputs[row];
+        writeln!(
+            text,
+            "{time},{},{},{},{},{}",
+            outputs[0], outputs[1], outputs[2], record.commanded[row], record.run.torque[row]
+        )
+        .unwrap();
+    }
+    text
 }

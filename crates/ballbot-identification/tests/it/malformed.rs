@@ -1,6 +1,6 @@
 //! Logs as they should not be: each gets a message that says what is wrong, none a panic.
 
-use crate::chain::csv;
+use crate::laboratory::csv;
 use crate::laboratory::{Laboratory, healthy};
 use ballbot_identification::Config;
 use ballbot_identification::log::{self, Log, LogError};
