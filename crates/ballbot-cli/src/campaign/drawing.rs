@@ -40,7 +40,7 @@ fn style(index: usize) -> (Role, Dash) {
         Role::Member(0),
         Role::Nonlinear,
     ];
-    let dashes = [Dash::Solid, Dash::Dashed];
+    let dashes = [Dash::Solid, Dash::Dashed, Dash::Dotted];
     (
         roles[index % roles.len()],
         dashes[index / roles.len() % dashes.len()],

@@ -6,7 +6,7 @@ use crate::predictor::Rk4;
 use core::fmt;
 use nalgebra::{SMatrix, SVector, convert};
 
-/// Everything that defines an [`Estimator`] besides its model.
+/// Everything that defines an [`Estimator`](super::Estimator) besides its model.
 ///
 /// A disturbance d shifts state and input of the model by constants that have to be found:
 ///
