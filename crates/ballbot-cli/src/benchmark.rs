@@ -8,8 +8,8 @@ use crate::commands::CommandError;
 use ballbot::Ballbot;
 use ballbot_scenario::{GUARDED_ACTIVE, Prepared, Scenario, ScenarioError, number};
 use lpvmpc::{
-    Controller, GuardedController, GuardedIterations, GuardedWorkspace, Reference, Solution,
-    Solver, TerminalIngredient, Workspace,
+    Controller, GuardedController, GuardedIterations, GuardedWorkspace, Iterations, Reference,
+    Solution, Solver, TerminalIngredient, Workspace,
 };
 use lpvmpc_sim::advance;
 use nalgebra::Vector4;
@@ -105,6 +105,7 @@ pub fn time_guarded() -> Result<GuardedTimes, CommandError> {
     };
     let mut plain_settings = prepared.settings;
     plain_settings.terminal = TerminalIngredient::Cost(settings.terminal.p);
+    plain_settings.iterations = Iterations::Fixed(1);
     let refused = ScenarioError::from;
     let mut plain = Control::new(prepared.ballbot, plain_settings).map_err(refused)?;
     let mut guarded = Guarded::new(prepared.ballbot, settings).map_err(ScenarioError::from)?;
