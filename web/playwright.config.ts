@@ -10,7 +10,8 @@ export default defineConfig({
   reporter: [["list"]],
   use: {
     baseURL: `http://127.0.0.1:${port}/`,
-    viewport: { width: 1440, height: 900 },
+    // Not large, since the processor computes the pictures.
+    viewport: { width: 1100, height: 640 },
     launchOptions: {
       // The system's Chromium; WebGL is computed by the processor.
       executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium",

@@ -18,7 +18,9 @@ function run(program, args, env = {}) {
 const triple = "wasm32-unknown-unknown";
 run(join(root, ".ci", "cross-cargo.sh"),
   [triple, "build", "--locked", "--profile", "web", "-p", "ballbot-web"],
-  { CARGO_TARGET_DIR: target });
+  // Where in the sources a panic would have been: nobody would see it, it takes 3 kB, and the paths
+  // are those of the machine that builds. The option is unstable; the stable compiler takes it so.
+  { CARGO_TARGET_DIR: target, RUSTFLAGS: "-Zlocation-detail=none", RUSTC_BOOTSTRAP: "1" });
 rmSync(generated, { recursive: true, force: true });
 mkdirSync(generated, { recursive: true });
 run("cargo", ["run", "--locked", "--quiet", "--manifest-path", join(web, "bindgen", "Cargo.toml"), "--",
@@ -31,9 +33,11 @@ run(process.execPath, [join(web, "node_modules", "binaryen", "bin", "wasm-opt"),
   "--enable-multivalue", "--enable-mutable-globals", "--enable-nontrapping-float-to-int",
   "--enable-reference-types", "--enable-sign-ext",
   // Repeated code compresses well, inlined code does not: -Oz, which inlines, makes fewer bytes
-  // and a tenth more to load.
-  "-O2", "--always-inline-max-function-size", "1", "--flexible-inline-max-function-size", "1",
+  // and a tenth more to load. Instances of one generic function have almost one name, so sorting
+  // by names puts them side by side.
+  "--always-inline-max-function-size", "1", "--flexible-inline-max-function-size", "1",
   "--one-caller-inline-max-function-size", "1", "--partial-inlining-ifs", "0",
+  "--reorder-functions-by-name", "-O2", "--gufa-optimizing", "-O2", "--skip-pass=simplify-locals",
   "--strip-debug", "--strip-producers", "--strip-target-features", module, "-o", module]);
 
 /** A panic ends the module, and nobody would see its text: the functions that make it become the
@@ -41,6 +45,7 @@ run(process.execPath, [join(web, "node_modules", "binaryen", "bin", "wasm-opt"),
 function withoutPanicTexts(bytes) {
   const panics = new RegExp("^(core|alloc)[^ ]*::(panicking::|(option|result)::(unwrap|expect)_failed" +
     "|slice::.*_fail|str::slice_error_fail|cell::panic_already|raw_vec::handle_error)");
+  binaryen.setDebugInfo(true);
   const program = binaryen.readBinary(bytes);
   for (let i = 0; i < program.getNumFunctions(); i++) {
     const made = program.getFunctionByIndex(i);

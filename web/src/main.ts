@@ -57,6 +57,7 @@ function swatch(text: string, className: string): HTMLElement {
 }
 
 function restarted(): void {
+  redraw();
   plots.setRobots(app.histories.map((history, i) => ({ history, colour: colourOf(app.robots[i]) })), app.setup.bounds);
   byId("planes").hidden = app.planes === 1;
   pictures.forget();
@@ -67,6 +68,7 @@ function restarted(): void {
 }
 
 function setupShown(): void {
+  redraw();
   const { setup } = app;
   byId("title").textContent = app.playback ? `recorded: ${app.playbackName}` : setup.title;
   panel?.show(setup, app.preset, app.robots.map(({ name }) => name));
@@ -124,18 +126,27 @@ function showWords(time: number): void {
 }
 
 let lastSlow = 0;
+/** Something has happened that is not yet seen. */
+let stale = true;
+/** The picture moves by itself. */
+let moving = false;
+
+function redraw(): void {
+  stale = true;
+}
 
 function frame(now: number): void {
   requestAnimationFrame(frame);
-  if (app.histories.length === 0) return;
+  if (app.histories.length === 0 || !(app.isRunning || stale || moving)) return;
   const time = app.time();
   if (now - lastSlow > SLOW) {
     lastSlow = now;
+    stale = false;
     pictures.updateLines(time);
     plots.draw(time);
     showWords(time);
   }
-  view.draw({ ...pictures.at(time), stroke: pointer.stroke, strokeKind: pointer.strokeKind });
+  moving = view.draw({ ...pictures.at(time), stroke: pointer.stroke, strokeKind: pointer.strokeKind });
 }
 
 async function openFiles(files: File[]): Promise<void> {
@@ -167,6 +178,7 @@ async function copyLink(): Promise<void> {
 }
 
 function resized(): void {
+  redraw();
   view.resize();
   plots.resize();
 }
@@ -190,15 +202,20 @@ async function start(): Promise<void> {
     const { x, y } = pictures.firstTarget();
     sendTo({ x: x + dx, y: y + dy });
   };
-  connectControls({ app, view, plots, pointer, resized, moveTarget, openFiles: (files) => void openFiles(files) });
   new ResizeObserver(resized).observe(host);
   new ResizeObserver(resized).observe(byId("plots"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     view.setTheme(readTheme());
     restarted();
   });
+  app.onBatch = redraw;
+  for (const input of ["pointerdown", "pointermove", "pointerup", "wheel", "keydown", "change"]) {
+    window.addEventListener(input, redraw, { passive: true });
+  }
   await app.start(location.hash.slice(1));
   panel = makePanel();
+  connectControls({ app, view, plots, pointer, resized, moveTarget, openFiles: (files) => void openFiles(files) });
+  for (const id of ["play", "step", "reset"]) byId<HTMLButtonElement>(id).disabled = false;
   setupShown();
   runningShown();
   document.documentElement.dataset["ready"] = "true";

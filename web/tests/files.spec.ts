@@ -2,11 +2,11 @@
 
 import { readFileSync } from "node:fs";
 import { expect, test } from "@playwright/test";
-import { drop, fill, open, openFile, openSection, ready, saved, scenario, until } from "./page";
+import { drop, fill, open, openFlat, openFile, openSection, ready, saved, scenario, until } from "./page";
 
 test("a link holds the whole set-up", async ({ page, context }) => {
   await context.grantPermissions(["clipboard-read", "clipboard-write"]);
-  await open(page);
+  await openFlat(page);
   await scenario(page, "lissajous");
   await fill(page, "Horizon N", "33");
   await page.locator(".panel").getByLabel("LQR").check();
@@ -23,7 +23,7 @@ test("a link holds the whole set-up", async ({ page, context }) => {
 });
 
 test("a TOML file goes out and in", async ({ page }) => {
-  await open(page);
+  await openFlat(page);
   await scenario(page, "single-setpoint");
   await fill(page, "R", "321");
   const toml = await saved(page, "Save TOML");
@@ -34,7 +34,7 @@ test("a TOML file goes out and in", async ({ page }) => {
 });
 
 test("every built-in file goes in as it stands", async ({ page }) => {
-  await open(page);
+  await openFlat(page);
   for (const name of ["two-setpoints", "lissajous", "tight-bounds", "single-setpoint-terminal", "two-setpoints-linear", "far-setpoints"]) {
     const text = readFileSync(`../crates/ballbot-scenario/src/builtin/${name}.toml`, "utf8");
     await openFile(page, `${name}.toml`, text);
@@ -43,7 +43,7 @@ test("every built-in file goes in as it stands", async ({ page }) => {
 });
 
 test("a recorded run is played back", async ({ page }) => {
-  await open(page);
+  await openFlat(page);
   await scenario(page, "two-setpoints");
   await page.locator("#play").click();
   await until(page, 2);
@@ -90,7 +90,7 @@ const BROKEN: [name: string, text: string, message: string][] = [
 ];
 
 test("broken files get a message and change nothing", async ({ page }) => {
-  await open(page);
+  await openFlat(page);
   await fill(page, "R", "777");
   const before = await saved(page, "Save TOML");
   for (const [name, text, message] of BROKEN) {
@@ -111,7 +111,7 @@ test("a broken link gets a message and the page starts all the same", async ({ p
 });
 
 test("a set-up from a bad value in a link changes nothing", async ({ page }) => {
-  await open(page);
+  await openFlat(page);
   await openSection(page, "Controller");
   const before = await saved(page, "Save TOML");
   await openFile(page, "bad.toml", before.replace("horizon = 20", "horizon = 0"));

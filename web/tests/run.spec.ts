@@ -5,7 +5,7 @@ import { mkdtempSync, readFileSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { expect, test } from "@playwright/test";
-import { clock, fill, largest, open, openSection, saved, scenario, table, until } from "./page";
+import { clock, fill, largest, open, openFlat, openSection, saved, scenario, table, until } from "./page";
 
 const ballbot = process.env["BALLBOT"] ?? "../target/release/ballbot";
 
@@ -36,7 +36,7 @@ function expectSame(here: string, there: string): void {
 
 for (const name of ["two-setpoints", "tight-bounds", "single-setpoint-terminal"]) {
   test(`${name} is the same run as in the program`, async ({ page }) => {
-    const problems = await open(page);
+    const problems = await openFlat(page);
     await scenario(page, name);
     await page.locator("#play").click();
     await expect(page.locator("#message")).toContainText("End of the scenario", { timeout: 60_000 });
@@ -48,7 +48,7 @@ for (const name of ["two-setpoints", "tight-bounds", "single-setpoint-terminal"]
 }
 
 test("a saved set-up with noise, delay and slope runs the same in the program", async ({ page }) => {
-  await open(page);
+  await openFlat(page);
   await scenario(page, "two-setpoints");
   await openSection(page, "World");
   await fill(page, "Slope x", "1");
@@ -111,7 +111,7 @@ test("a push that is too large ends on the floor, with the reason", async ({ pag
 });
 
 test("in an ideal world a controller without a plan gives up, and says which bound", async ({ page }) => {
-  await open(page);
+  await openFlat(page);
   await scenario(page, "tight-bounds");
   await page.locator("#play").click();
   await until(page, 0.2);
@@ -153,7 +153,7 @@ test("a drawn path is followed", async ({ page }) => {
 });
 
 test("active bounds are named, with the time at which they begin", async ({ page }) => {
-  await open(page);
+  await openFlat(page);
   await scenario(page, "tight-bounds");
   await page.locator("#step").click();
   await expect(page.locator("#status")).toContainText(/\d+ active bounds? \(.*(theta|torque|phi_dot|theta_dot) (lower|upper) \d\.\d\d s ahead/);

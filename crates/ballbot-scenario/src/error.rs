@@ -1,6 +1,7 @@
 //! What can be wrong with a scenario, said to a person.
 
 use crate::builtin;
+use ballbot_control::RegulatorError;
 use std::fmt::Display;
 use std::io;
 use std::path::PathBuf;
@@ -91,6 +92,15 @@ pub enum ScenarioError {
     /// The guarded controller refuses its settings.
     #[error("controller: {0}")]
     Guarded(#[from] lpvmpc::GuardedError),
+}
+
+impl From<RegulatorError> for ScenarioError {
+    fn from(error: RegulatorError) -> Self {
+        match error {
+            RegulatorError::Estimator(error) => error.into(),
+            RegulatorError::Controller(error) => error.into(),
+        }
+    }
 }
 
 impl ScenarioError {

@@ -3,6 +3,7 @@
 use crate::error::ScenarioError;
 use crate::reference::SAME_TIME;
 use crate::time_series::TimeSeries;
+use lpvmpc::BoundId;
 use lpvmpc_sim::{Decision, Measurement, Regulator};
 use nalgebra::{Vector1, Vector4};
 use std::path::PathBuf;
@@ -91,5 +92,9 @@ impl Regulator<4, 1, 4> for Excited {
 
     fn prediction(&self) -> Vec<Vector4<f64>> {
         self.regulator.prediction()
+    }
+
+    fn active_bounds(&self) -> Vec<BoundId> {
+        self.regulator.active_bounds()
     }
 }

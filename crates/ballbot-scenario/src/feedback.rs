@@ -10,6 +10,7 @@ use crate::problem::dynamic;
 use crate::schema::{ControllerTable, TerminalTable};
 use crate::three_motors::Motors;
 use ballbot::{Ballbot, Wheels};
+use ballbot_control::Feedback;
 use lpvmpc::{
     Bounds, ControllerSettings, EstimatorSettings, Gate, LpvModel, MoveLimits, RampedInput,
     TerminalIngredient, Weights,
@@ -20,57 +21,38 @@ use nalgebra::{
 };
 use std::f64::consts::FRAC_PI_2;
 
-/// What a controller has around it: nothing but a delay of zero, unless the scenario says more.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Feedback {
-    /// The estimator on (phi, theta, theta_dot), with the disturbances (torque N m, angle of
-    /// the tilt rad).
-    pub estimator: Option<EstimatorSettings<f64, 4, 1, 3, 2>>,
-    /// Time from a measurement to the torque that answers it, s.
-    pub delay: f64,
-    /// The controller of the plant whose input is the torque's rate.
-    pub ramp: Option<ControllerSettings<f64, 5, 1, 3>>,
-    /// Whether the controller sees the reference before its time.
-    pub preview: bool,
-}
-
 /// Longest Runge-Kutta step of estimator and delay compensation, as |step * fastest pole|.
 const ESTIMATOR_STEP: f64 = 0.5;
 
-impl Feedback {
-    /// Whether the controller stands alone: on the readings, at once, with preview.
-    pub(crate) fn is_plain(&self) -> bool {
-        self.is_direct() && self.preview
-    }
-
-    /// Whether the controller decides for the measured state, and its torque is what is sent.
-    pub(crate) fn is_direct(&self) -> bool {
-        self.estimator.is_none() && self.delay == 0.0 && self.ramp.is_none()
-    }
-
-    /// Checks what the scenario says about it. `settings` are those of the plain controller.
-    pub(crate) fn new(
-        table: &ControllerTable,
-        ballbot: &Ballbot<f64>,
-        settings: &ControllerSettings<f64, 4, 1, 3>,
-    ) -> Result<Self, ScenarioError> {
-        let estimator = table.estimator.as_ref();
-        let ramp = table.torque_rate.as_ref();
-        Ok(Self {
+impl ControllerTable {
+    /// What stands around the controller.
+    pub(crate) fn feedback(&self, ballbot: &Ballbot<f64>) -> Result<Feedback, ScenarioError> {
+        let estimator = self.estimator.as_ref();
+        Ok(Feedback {
             estimator: estimator
                 .map(|estimator| estimator.settings(ballbot))
                 .transpose()?,
-            delay: not_negative("controller.delay_s", table.delay_s)?,
-            ramp: ramp
-                .map(|ramp| ramp.settings(&table.terminal, ballbot, settings))
-                .transpose()?,
-            preview: table.preview,
+            delay: not_negative("controller.delay_s", self.delay_s)?,
+            longest_step: longest_step(ballbot)?,
+            preview: self.preview,
         })
+    }
+
+    /// The controller of the plant whose input is the torque's rate, where that is bounded;
+    /// `settings` are those of the plain one.
+    pub(crate) fn ramp(
+        &self,
+        ballbot: &Ballbot<f64>,
+        settings: &ControllerSettings<f64, 4, 1, 3>,
+    ) -> Result<Option<ControllerSettings<f64, 5, 1, 3>>, ScenarioError> {
+        let ramp = self.torque_rate.as_ref();
+        ramp.map(|ramp| ramp.settings(&self.terminal, ballbot, settings))
+            .transpose()
     }
 }
 
 /// The longest step in s with which the estimator follows this robot.
-pub(crate) fn longest_step(ballbot: &Ballbot<f64>) -> Result<f64, ScenarioError> {
+fn longest_step(ballbot: &Ballbot<f64>) -> Result<f64, ScenarioError> {
     let (a, _) = ballbot.matrices(&Vector3::zeros());
     let poles = lpvmpc_design::poles(&dynamic(&a))
         .map_err(|error| ScenarioError::value("parameters", "(all)", error.to_string()))?;

@@ -5,7 +5,6 @@ use crate::certificate::TerminalCertificate;
 use crate::error::ScenarioError;
 use crate::files::Files;
 use crate::problem::dynamic;
-use crate::run::GUARDED_HORIZONS;
 use crate::schema::{CertifiedTable, ControllerTable, ModelKind, TerminalTable};
 use crate::{RobotTable, builtin};
 use ballbot::Ballbot;
@@ -44,18 +43,7 @@ impl ControllerTable {
                 "a guarantee needs the nonlinear prediction, \"lpv\"",
             ));
         }
-        let guarded = table.settings(ballbot, settings, files)?;
-        if !GUARDED_HORIZONS.contains(&self.horizon) {
-            return Err(ScenarioError::value(
-                "controller.horizon",
-                self.horizon,
-                format!(
-                    "with a certified terminal set it must be one of {GUARDED_HORIZONS:?} samples \
-                     (the library itself takes any compile-time size)"
-                ),
-            ));
-        }
-        Ok(Some(guarded))
+        table.settings(ballbot, settings, files).map(Some)
     }
 }
 
@@ -126,6 +114,7 @@ impl CertifiedTable {
         let stiffness = (terminal.p * direction).dot(&direction);
         Ok(GuardedSettings {
             t_s: plain.t_s,
+            horizon: plain.horizon,
             rk4,
             weights: plain.weights,
             terminal,
@@ -178,7 +167,7 @@ fn check_cost(
     weights: &Weights<f64, 4, 1>,
 ) -> Result<(), ScenarioError> {
     let rest = certificate.q - weights.q;
-    if rest.symmetric_eigenvalues().min() < 0.0 {
+    if dynamic(&rest).symmetric_eigenvalues().min() < 0.0 {
         return Err(ScenarioError::value(
             "controller.q",
             numbers(&weights.q.diagonal()),

@@ -35,7 +35,6 @@ mod heading;
 mod heading_table;
 mod load;
 pub mod number;
-mod output_feedback;
 mod parameters;
 mod prepare;
 mod problem;
@@ -52,10 +51,10 @@ pub mod words;
 mod world;
 mod world_table;
 
+pub use ballbot_control::{Feedback, GUARDED_ACTIVE, LONGEST_HORIZON};
 pub use certificate::{RobotTable, TerminalCertificate, ViscousBallbot};
 pub use error::ScenarioError;
 pub use excitation::Excitation;
-pub use feedback::Feedback;
 pub use feedback_table::{
     DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
 };
@@ -65,7 +64,7 @@ pub use heading_table::HeadingTable;
 pub use parameters::{KnownRobot, Parameters};
 pub use prepare::{Plane, Prepared};
 pub use reference::PhiReference;
-pub use run::{GUARDED_ACTIVE, GUARDED_HORIZONS, LONGEST_HORIZON, PlaneLoop, Record, Surroundings};
+pub use run::{PlaneLoop, Record, Surroundings};
 pub use schema::{
     BoundsTable, CertifiedTable, ControllerTable, CsvTable, IntegrationTable, IterationsTable,
     LinearModelTable, LissajousTable, ModelKind, ParameterTable, PointTable, PredictorTable,

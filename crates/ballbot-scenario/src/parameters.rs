@@ -43,6 +43,14 @@ impl<'de> Deserialize<'de> for Parameters {
                 let table = MapAccessDeserializer::new(map);
                 Ok(Parameters::Table(ParameterTable::deserialize(table)?))
             }
+
+            // From a format that reads a table field by field, and so must be told the fields.
+            fn visit_newtype_struct<D: Deserializer<'de>>(
+                self,
+                table: D,
+            ) -> Result<Parameters, D::Error> {
+                Ok(Parameters::Table(ParameterTable::deserialize(table)?))
+            }
         }
 
         deserializer.deserialize_any(TableOrFile)

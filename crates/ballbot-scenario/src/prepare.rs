@@ -1,7 +1,6 @@
 //! From the scenario file to controller, plant and references: every check a person may need.
 
 use crate::error::ScenarioError;
-use crate::feedback::Feedback;
 use crate::files::Files;
 use crate::heading::Turning;
 use crate::heading_table::HeadingTable;
@@ -13,6 +12,7 @@ use crate::three_motors::Motors;
 use crate::world::PlaneWorld;
 use crate::world_table::PlaneName;
 use ballbot::{Ballbot, Wheels};
+use ballbot_control::Feedback;
 use lpvmpc::{ControllerSettings, GuardedSettings};
 use lpvmpc_sim::Tolerances;
 use nalgebra::Vector4;
@@ -30,6 +30,8 @@ pub struct Prepared {
     pub settings: ControllerSettings<f64, 4, 1, 3>,
     /// What stands around the controller.
     pub feedback: Feedback,
+    /// Where the torque's rate is bounded: the settings of the controller that plans it.
+    pub ramp: Option<ControllerSettings<f64, 5, 1, 3>>,
     /// Where the terminal set is certified: the settings of the guarded controller, which then
     /// runs. `settings` are those of the same problem without guard.
     pub guarded: Option<GuardedSettings<f64, 4, 1>>,
@@ -92,8 +94,9 @@ impl Scenario {
         check_motion(&ballbot, &self.bounds)?;
         let settings = self.controller.settings(&ballbot, bounds)?;
         let guarded = self.controller.guarded(&ballbot, &settings, files)?;
-        let feedback = Feedback::new(&self.controller, &ballbot, &settings)?;
-        if guarded.is_some() && !feedback.is_direct() {
+        let feedback = self.controller.feedback(&ballbot)?;
+        let ramp = self.controller.ramp(&ballbot, &settings)?;
+        if guarded.is_some() && !(feedback.is_direct() && ramp.is_none()) {
             return Err(ScenarioError::value(
                 "controller.terminal.certified",
                 "(given)",
@@ -136,6 +139,7 @@ impl Scenario {
             wheels,
             settings,
             feedback,
+            ramp,
             planes: self.planes(references, &real, (settings.t_s, tolerances), files)?,
             guarded,
             motors,

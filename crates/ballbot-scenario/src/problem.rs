@@ -2,12 +2,12 @@
 
 use crate::error::ScenarioError;
 use crate::number::positive;
-use crate::run::LONGEST_HORIZON;
 use crate::schema::{
     BoundsTable, ControllerTable, IterationsTable, LinearModelTable, ModelKind, PredictorTable,
     TerminalTable,
 };
 use ballbot::{Ballbot, LinearParameters};
+use ballbot_control::LONGEST_HORIZON;
 use lpvmpc::{
     Bounds, ControllerSettings, Iterations, LpvModel, Predictor, Rk4, Scheduling, SolverSettings,
     TerminalIngredient, Weights,

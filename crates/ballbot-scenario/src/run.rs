@@ -1,36 +1,16 @@
-//! The run itself: horizons are known at run time, the method's sizes at compile time.
+//! The run itself.
 
 use crate::error::ScenarioError;
 use crate::excitation::Excited;
-use crate::feedback::longest_step;
-use crate::output_feedback::{Belief, Core, OutputFeedback};
 use crate::prepare::{Plane, Prepared};
-use crate::three_motors::{MotorSample, SharingPlane};
+use crate::three_motors::MotorSample;
 use crate::world::{PlaneWorld, Robot};
-use lpvmpc::{
-    Controller, DelayLine, Estimator, GuardedController, GuardedSettings, GuardedWorkspace,
-    RampedInput, Workspace,
+use ballbot_control::{
+    SharingPlane, guarded_feedback, output_feedback, ramped_feedback, state_feedback,
 };
-use lpvmpc_sim::{
-    ClosedLoop, Course, GuardedFeedback, Recording, Regulator, StateFeedback, Trajectory, World,
-};
-use nalgebra::{Vector1, Vector3, Vector4};
+use lpvmpc_sim::{ClosedLoop, Course, Recording, Regulator, Trajectory, World};
+use nalgebra::{Vector1, Vector3};
 use std::time::Duration;
-
-/// The longest horizon that is compiled in, samples.
-pub const LONGEST_HORIZON: usize = 200;
-
-/// The horizons that are compiled in for the guarded controller, samples.
-#[cfg(not(target_family = "wasm"))]
-pub const GUARDED_HORIZONS: &[usize] = &[10, 20, 30];
-/// The horizon that is compiled in for the guarded controller, samples: in a browser every size
-/// is code that has to be loaded.
-#[cfg(target_family = "wasm")]
-pub const GUARDED_HORIZONS: &[usize] = &[20];
-
-/// Bounds that the guarded controller's quadratic program may have active at once; soft bounds
-/// can be many.
-pub const GUARDED_ACTIVE: usize = 200;
 
 /// What the run reads and reports besides its results.
 pub struct Surroundings<'a> {
@@ -111,8 +91,10 @@ impl Prepared {
                  sample by sample",
             ));
         }
-        let regulator: Box<dyn Regulator<4, 1, 4>> = match &self.guarded {
-            None if self.feedback.is_plain() => self.plain_feedback()?,
+        let regulator: Box<dyn Regulator<4, 1, 4>> = match (&self.guarded, &self.ramp) {
+            (None, None) if self.feedback.is_plain() => {
+                state_feedback(&self.ballbot, &self.settings)?
+            }
             _ => self.sharing_plane(plane.world.settings.period)?,
         };
         let PlaneWorld {
@@ -138,138 +120,20 @@ impl Prepared {
         Ok(closed_loop)
     }
 
-    // Neither this nor what follows is inlined: each size builds its memory on the stack before it
-    // is boxed, and one frame for all sizes overflows the 2 MB of a thread.
-    #[inline(never)]
-    fn plain_feedback(&self) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
-        // Up to 4 rows of a terminal equality come on top of one row per input.
-        // In a browser the longest horizon must do for all: the time per step follows the horizon
-        // that is used, and every size is code that has to be loaded.
-        match self.settings.horizon {
-            #[cfg(not(target_family = "wasm"))]
-            ..=20 => self.state_feedback::<20, 24>(),
-            #[cfg(not(target_family = "wasm"))]
-            21..=50 => self.state_feedback::<50, 54>(),
-            #[cfg(not(target_family = "wasm"))]
-            51..=100 => self.state_feedback::<100, 104>(),
-            #[cfg(not(target_family = "wasm"))]
-            _ => self.state_feedback::<LONGEST_HORIZON, { LONGEST_HORIZON + 4 }>(),
-            // As many rows as with the torque's own bounds below: one solver for both.
-            #[cfg(target_family = "wasm")]
-            _ => self.state_feedback::<LONGEST_HORIZON, { 2 * LONGEST_HORIZON + 4 }>(),
-        }
-    }
-
     /// The regulator of a plane that may share its motors with another; `period` is that of the
     /// sensors, s.
-    #[inline(never)]
     pub(crate) fn sharing_plane(
         &self,
         period: f64,
     ) -> Result<Box<dyn SharingPlane>, ScenarioError> {
-        if let Some(settings) = &self.guarded {
-            return self.guarded_feedback(settings);
-        }
-        // The torque's own bounds come on top where its rate is the input.
-        match self.settings.horizon {
-            #[cfg(not(target_family = "wasm"))]
-            ..=20 => self.output_feedback::<20, 44>(period),
-            #[cfg(not(target_family = "wasm"))]
-            21..=50 => self.output_feedback::<50, 104>(period),
-            #[cfg(not(target_family = "wasm"))]
-            51..=100 => self.output_feedback::<100, 204>(period),
-            _ => self.output_feedback::<LONGEST_HORIZON, { 2 * LONGEST_HORIZON + 4 }>(period),
-        }
-    }
-
-    #[inline(never)]
-    fn guarded_feedback(
-        &self,
-        settings: &GuardedSettings<f64, 4, 1>,
-    ) -> Result<Box<dyn SharingPlane>, ScenarioError> {
-        // As many as GUARDED_HORIZONS; N + 2 stages each.
-        match self.settings.horizon {
-            #[cfg(not(target_family = "wasm"))]
-            ..=10 => self.guarded_sized::<10, 12>(settings),
-            #[cfg(not(target_family = "wasm"))]
-            21.. => self.guarded_sized::<30, 32>(settings),
-            _ => self.guarded_sized::<20, 22>(settings),
-        }
-    }
-
-    #[inline(never)]
-    fn guarded_sized<const N: usize, const NP: usize>(
-        &self,
-        settings: &GuardedSettings<f64, 4, 1>,
-    ) -> Result<Box<dyn SharingPlane>, ScenarioError> {
-        Ok(Box::new(GuardedFeedback::<
-            _,
-            4,
-            1,
-            3,
-            N,
-            5,
-            NP,
-            GUARDED_ACTIVE,
-        > {
-            controller: GuardedController::new(self.ballbot, *settings)?,
-            workspace: Box::new(GuardedWorkspace::new()),
-            x: Vector4::zeros(),
-        }))
-    }
-
-    #[inline(never)]
-    fn state_feedback<const N: usize, const M: usize>(
-        &self,
-    ) -> Result<Box<dyn Regulator<4, 1, 4>>, ScenarioError> {
-        let workspace = boxed_workspace::<4, N, M>();
-        let controller = Box::new(Controller::<_, f64, 4, 1, 3, N, M>::new(
-            self.ballbot,
-            self.settings,
-        )?);
-        Ok(Box::new(StateFeedback::new(controller, workspace)))
-    }
-
-    #[inline(never)]
-    fn output_feedback<const N: usize, const M: usize>(
-        &self,
-        period: f64,
-    ) -> Result<Box<dyn SharingPlane>, ScenarioError> {
-        let x = Vector4::zeros();
-        let belief = match self.feedback.estimator {
-            Some(settings) => {
-                let estimator = Estimator::new(self.ballbot, settings, x)?;
-                Belief::Estimated(Box::new(estimator))
+        let (ballbot, feedback) = (&self.ballbot, &self.feedback);
+        Ok(match (&self.guarded, &self.ramp) {
+            (Some(settings), _) => guarded_feedback(ballbot, settings)?,
+            (None, Some(ramp)) => {
+                ramped_feedback(ballbot, ramp, &self.settings.u, feedback, period)?
             }
-            None => Belief::Measured {
-                model: self.ballbot,
-                longest_step: longest_step(&self.ballbot)?,
-                x,
-            },
-        };
-        let core = match self.feedback.ramp {
-            Some(settings) => Core::Ramped {
-                controller: Box::new(Controller::new(RampedInput(self.ballbot), settings)?),
-                workspace: boxed_workspace(),
-                torque: 0.0,
-                rate: 0.0,
-            },
-            None => Core::Held {
-                controller: Box::new(Controller::new(self.ballbot, self.settings)?),
-                workspace: boxed_workspace(),
-            },
-        };
-        Ok(Box::new(OutputFeedback::<N, M> {
-            belief,
-            core,
-            delay: self.feedback.delay,
-            period,
-            preview: self.feedback.preview,
-            torque: self.settings.u,
-            share: f64::INFINITY,
-            line: DelayLine::default(),
-            time: 0.0,
-        }))
+            (None, None) => output_feedback(ballbot, &self.settings, feedback, period)?,
+        })
     }
 
     /// The motors' torques (tau_1, tau_2, tau_3) in N m at every sample that both planes have,
@@ -287,11 +151,4 @@ impl Prepared {
             _ => Vec::new(),
         }
     }
-}
-
-/// Not inlined, so that the largest thing there is has the stack for itself until it is boxed.
-#[inline(never)]
-fn boxed_workspace<const NX: usize, const N: usize, const M: usize>()
--> Box<Workspace<f64, NX, 1, N, M>> {
-    Box::new(Workspace::new())
 }

@@ -3,7 +3,8 @@
 use crate::heading::Turning;
 use crate::whole_robot::{HEADING, State, plane};
 use ballbot::{Heading, PlaneTorques, Wheels};
-use lpvmpc_sim::{Decision, GuardedFeedback, LogRow, Measurement, Regulator, Sample};
+use ballbot_control::SharingPlane;
+use lpvmpc_sim::{Decision, LogRow, Measurement, Regulator, Sample};
 use nalgebra::{Vector1, Vector2, Vector3};
 use std::time::Duration;
 
@@ -36,25 +37,6 @@ pub struct MotorSample {
     pub target: f64,
     /// The motors' torques (tau_1, tau_2, tau_3) from here on, N m.
     pub torques: Vector3<f64>,
-}
-
-/// A regulator of one plane that shares the motors with that of another.
-pub(crate) trait SharingPlane: Regulator<4, 1, 4> {
-    /// The largest torque of the last plan, N m; infinite for one that keeps to an equal share.
-    fn largest_torque(&self) -> f64 {
-        f64::INFINITY
-    }
-
-    /// Plans within this torque from now on, N m.
-    fn set_share(&mut self, _torque: f64) {}
-}
-
-/// The guarantee is for bounds that stay: it keeps to an equal share.
-impl<C, const NS: usize, const N: usize, const NA: usize, const NP: usize, const M: usize>
-    SharingPlane for GuardedFeedback<C, 4, 1, NS, N, NA, NP, M>
-where
-    C: lpvmpc::LpvModel<f64, 4, 1, NS>,
-{
 }
 
 /// Two planes' regulators and the law of the heading.

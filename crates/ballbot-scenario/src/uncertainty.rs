@@ -1,6 +1,7 @@
 //! How far identified parameters may be off, and robots drawn from that.
 
 use crate::error::ScenarioError;
+use crate::problem::dynamic;
 use ballbot::{Ballbot, limits};
 use nalgebra::{SMatrix, SVector};
 use rand_chacha::ChaCha8Rng;
@@ -97,7 +98,7 @@ impl Uncertainty {
             let expected = "a covariance is symmetric, and has no negative variances";
             return Err(refused("(given)".to_owned(), expected));
         }
-        let parts = correlations.symmetric_eigen();
+        let parts = dynamic(&correlations).symmetric_eigen();
         let smallest = parts.eigenvalues.min();
         // Negated, so that what is not a number fails.
         if !(smallest >= -TOLERANCE) {
@@ -106,9 +107,10 @@ impl Uncertainty {
                 "a covariance is positive semidefinite",
             ));
         }
-        let roots = parts.eigenvalues.map(|value| value.max(0.0).sqrt());
-        let factor = parts.eigenvectors * SMatrix::from_diagonal(&roots);
-        Ok(SMatrix::from_diagonal(&deviations) * factor)
+        Ok(SMatrix::from_fn(|i, j| {
+            let root = parts.eigenvalues[j].max(0.0).sqrt();
+            deviations[i] * parts.eigenvectors[(i, j)] * root
+        }))
     }
 
     /// The robot that this `seed` draws from the distribution around `ballbot`. One that mechanics

@@ -31,33 +31,26 @@ pub fn status(status: &Status<f64>) -> String {
 }
 
 /// Active bounds of a plan with samples of `t_s` seconds, by name, with the time ahead at which
-/// each begins to be active: "theta upper 0.35 s ahead".
+/// each begins to be active: "theta upper 0.35 s ahead". States first, in their order.
 pub fn active_bounds(bounds: &[BoundId], t_s: f64) -> String {
-    let mut first: Vec<BoundId> = Vec::new();
-    for bound in bounds {
-        let known = first
-            .iter_mut()
-            .find(|known| known.quantity == bound.quantity && known.side == bound.side);
-        match known {
-            Some(known) => known.stage = known.stage.min(bound.stage),
-            None => first.push(*bound),
+    let states = STATES.iter().enumerate();
+    let states = states.map(|(index, name)| (Quantity::State(index), *name));
+    let mut texts = Vec::new();
+    for (quantity, name) in states.chain([(Quantity::Input(0), "torque")]) {
+        for (side, word) in [
+            (Side::Lower, "lower"),
+            (Side::Upper, "upper"),
+            (Side::Equality, "terminal equality"),
+        ] {
+            let active = bounds.iter();
+            let active = active.filter(|bound| bound.quantity == quantity && bound.side == side);
+            if let Some(first) = active.map(|bound| bound.stage).min() {
+                let ahead = first as f64 * t_s;
+                texts.push(format!("{name} {word} {ahead:.2} s ahead"));
+            }
         }
     }
-    first.sort_unstable_by_key(|bound| bound.stage);
-    let texts = first.iter().map(|bound| {
-        let name = match bound.quantity {
-            Quantity::State(index) => STATES.get(index).copied().unwrap_or("state"),
-            Quantity::Input(_) => "torque",
-            Quantity::Row(_) => "row",
-        };
-        let side = match bound.side {
-            Side::Lower => "lower",
-            Side::Upper => "upper",
-            Side::Equality => "terminal equality",
-        };
-        format!("{name} {side} {:.2} s ahead", bound.stage as f64 * t_s)
-    });
-    texts.collect::<Vec<_>>().join(", ")
+    texts.join(", ")
 }
 
 #[cfg(test)]
@@ -78,7 +71,7 @@ mod tests {
         ];
         assert_eq!(
             active_bounds(&bounds, 0.05),
-            "torque lower 0.00 s ahead, theta upper 0.35 s ahead"
+            "theta upper 0.35 s ahead, torque lower 0.00 s ahead"
         );
     }
 }

@@ -134,7 +134,10 @@ fn a_certificate_of_something_else_is_refused() {
         },
         &["controller.iterations", "fixed"],
     );
-    refused(|s| s.controller.horizon = 25, &["controller.horizon", "20"]);
+    refused(
+        |s| s.controller.horizon = 201,
+        &["controller.horizon", "1 to 200"],
+    );
 }
 
 /// The certificate's digest is looked at, so that a patched number does not pass unseen.

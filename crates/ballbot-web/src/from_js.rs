@@ -86,7 +86,7 @@ impl Node {
     fn expected(&self, what: &str) -> Mistake {
         let found = match (&self.0, self.0.as_f64(), self.0.as_string()) {
             (_, Some(number), _) => format!("the number {number}"),
-            (_, _, Some(text)) => format!("the text {text:?}"),
+            (_, _, Some(text)) => format!("the text `{text}`"),
             (value, ..) if value.is_array() => "a list".to_owned(),
             (value, ..) if value.is_object() => "a table".to_owned(),
             _ if self.is_absent() => "nothing".to_owned(),
@@ -143,6 +143,28 @@ impl Node {
         read.map_err(|mistake| mistake.naming(names))
     }
 
+    /// A text that is the name of a choice, or a table with that name as its only key.
+    fn choice(self) -> Result<Choice, Mistake> {
+        if let Some(name) = self.0.as_string() {
+            return Ok(Choice {
+                name,
+                content: Node(JsValue::UNDEFINED),
+            });
+        }
+        if !self.is_table() {
+            return Err(self.expected("a table"));
+        }
+        let entries = Object::entries(self.0.unchecked_ref::<Object>());
+        let choice: Array = entries.get(0).unchecked_into();
+        match (entries.length(), choice.get(0).as_string()) {
+            (1, Some(name)) => Ok(Choice {
+                name,
+                content: Node(choice.get(1)),
+            }),
+            _ => Err(Mistake::custom("one choice is expected, as its only key")),
+        }
+    }
+
     fn list(self) -> Result<List, Mistake> {
         if self.0.is_array() {
             Ok(List {
@@ -158,9 +180,12 @@ impl Node {
 impl<'de> Deserializer<'de> for Node {
     type Error = Mistake;
 
-    /// Only what tells its own type is asked for; a scenario has nothing else.
-    fn deserialize_any<V: Visitor<'de>>(self, _visitor: V) -> Result<V::Value, Mistake> {
-        Err(self.expected("a value of known type"))
+    /// A text, or a table as a whole: read field by field, it must be told its fields.
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Mistake> {
+        match self.0.as_string() {
+            Some(text) => visitor.visit_string(text),
+            None => visitor.visit_newtype_struct(self),
+        }
     }
 
     fn deserialize_bool<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Mistake> {
@@ -237,24 +262,7 @@ impl<'de> Deserializer<'de> for Node {
         _variants: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Mistake> {
-        if let Some(name) = self.0.as_string() {
-            return visitor.visit_enum(Choice {
-                name,
-                content: Node(JsValue::UNDEFINED),
-            });
-        }
-        if !self.is_table() {
-            return Err(self.expected("a table"));
-        }
-        let entries = Object::entries(self.0.unchecked_ref::<Object>());
-        let choice: Array = entries.get(0).unchecked_into();
-        match (entries.length(), choice.get(0).as_string()) {
-            (1, Some(name)) => visitor.visit_enum(Choice {
-                name,
-                content: Node(choice.get(1)),
-            }),
-            _ => Err(Mistake::custom("one choice is expected, as its only key")),
-        }
+        visitor.visit_enum(self.choice()?)
     }
 
     fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Mistake> {
@@ -273,23 +281,27 @@ struct Table {
     read: usize,
 }
 
+impl Table {
+    /// The next field; `None` for one that is absent: what that means, the struct says.
+    fn next(&mut self) -> Option<(&'static str, Node)> {
+        let name = *self.names.get(self.read)?;
+        self.read += 1;
+        let value = Reflect::get(&self.object, &JsValue::from_str(name));
+        let value = Node(value.unwrap_or(JsValue::UNDEFINED));
+        (!value.is_absent()).then_some((name, value))
+    }
+}
+
 impl<'de> SeqAccess<'de> for Table {
     type Error = Mistake;
 
-    /// `None` for a field that is absent: what that means, the struct says.
     fn next_element_seed<S: DeserializeSeed<'de>>(
         &mut self,
         seed: S,
     ) -> Result<Option<S::Value>, Mistake> {
-        let Some(name) = self.names.get(self.read) else {
+        let Some((name, value)) = self.next() else {
             return Ok(None);
         };
-        self.read += 1;
-        let value = Reflect::get(&self.object, &JsValue::from_str(name));
-        let value = Node(value.unwrap_or(JsValue::UNDEFINED));
-        if value.is_absent() {
-            return Ok(None);
-        }
         let read = seed.deserialize(value);
         read.map(Some).map_err(|mistake| mistake.below(name))
     }

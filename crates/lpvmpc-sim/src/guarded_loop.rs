@@ -201,7 +201,6 @@ where
     }
 
     fn prediction(&self) -> Vec<SVector<f64, NX>> {
-        let rollout = self.controller.rollout();
-        rollout.map_or_else(Vec::new, |states| states.to_vec())
+        self.controller.rollout().to_vec()
     }
 }

@@ -56,6 +56,7 @@ fn controller() -> Guarded {
     let lqr = lqr_discrete(&a, &b, &q_d, &r_d).unwrap();
     let settings = GuardedSettings {
         t_s: T_S,
+        horizon: 10,
         rk4: Rk4 { substeps: 1 },
         weights: Weights { q, r },
         terminal: TerminalSet {

@@ -114,9 +114,9 @@ impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usiz
 
 /// LPV MPC to set points with guaranteed bounds and convergence.
 ///
-/// `NX` states, `NU` inputs, `NS` scheduling parameters, `N` stages. The quadratic program has
-/// the set point as a further state and two further stages: `NA` = `NX` + 1, `NP` = `N` + 2. At
-/// most `M` bounds are active at once; `N * NU + NX + 1` suffice while bounds are hard.
+/// `NX` states, `NU` inputs, `NS` scheduling parameters, horizons up to `N`. The quadratic program
+/// has the set point as a further state and two further stages: `NA` = `NX` + 1, `NP` = `N` + 2.
+/// At most `M` bounds are active at once; `N * NU + NX + 1` suffice while bounds are hard.
 #[derive(Clone, Debug)]
 pub struct GuardedController<
     P,
@@ -164,7 +164,7 @@ where
             assert!(NA == NX + 1, "NA must be NX + 1");
             assert!(NP == N + 2, "NP must be N + 2");
         }
-        settings.check(&model)?;
+        settings.check(&model, N)?;
         Ok(Self {
             model,
             settings,
@@ -228,18 +228,21 @@ where
         &self.settings
     }
 
-    /// The plan's states x_1 to x_N on the nonlinear model, if there is a plan.
-    pub fn rollout(&self) -> Option<&[SVector<T, NX>; N]> {
-        self.plan.as_ref().map(|plan| &plan.x)
+    /// The plan's states x_1 to x_N on the nonlinear model, as many as the horizon; none if there
+    /// is no plan.
+    pub fn rollout(&self) -> &[SVector<T, NX>] {
+        let plan = self.plan.as_ref();
+        plan.and_then(|plan| plan.x.get(..self.settings.horizon))
+            .unwrap_or_default()
     }
 
     /// The rest of the last plan, ended by the terminal law, from the measured state.
     fn shifted(&self, x: &SVector<T, NX>, wanted: T) -> Option<Plan<T, NX, NU, N>> {
         let last = self.plan.as_ref()?;
         let mut u = last.u;
-        u.rotate_left(1);
-        let end = last.x.last()?;
-        *u.last_mut()? = self.terminal_law(end, last.set_point);
+        let planned = u.get_mut(..self.settings.horizon)?;
+        planned.rotate_left(1);
+        *planned.last_mut()? = self.terminal_law(&last.end, last.set_point);
         Some(self.roll_out(x, u, last.set_point, wanted))
     }
 
@@ -378,7 +381,7 @@ where
     ) -> SVector<T, NX> {
         match decision {
             Decision::NewPlan | Decision::SoftBounds => {
-                plan.x[N - 1] - program::predicted_end(&workspace.solution)
+                plan.end - program::predicted_end(&workspace.solution, self.settings.horizon)
             }
             _ => SVector::zeros(),
         }

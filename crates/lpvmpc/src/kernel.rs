@@ -1,5 +1,5 @@
-//! Products of small matrices, written so that the compiler unrolls and vectorises them along
-//! columns.
+//! Products and sums of small matrices, written so that the compiler unrolls and vectorises them
+//! along columns, and so that they are plain loops where it optimises for size.
 //!
 //! nalgebra's own `tr_mul` takes one dot product per entry, which does not vectorise without
 //! reassociation; a transpose and a product by columns does.
@@ -44,6 +44,30 @@ pub(crate) fn add_product<T: Scalar, const R: usize, const K: usize, const C: us
                 *out += *a * *factor;
             }
         }
+    }
+}
+
+/// out *= factor
+#[inline(always)]
+pub(crate) fn scale<T: Scalar, const R: usize, const C: usize>(
+    out: &mut SMatrix<T, R, C>,
+    factor: T,
+) {
+    for out in out.data.0.as_flattened_mut() {
+        *out *= factor;
+    }
+}
+
+/// out += A factor
+#[inline(always)]
+pub(crate) fn add_scaled<T: Scalar, const R: usize, const C: usize>(
+    out: &mut SMatrix<T, R, C>,
+    a: &SMatrix<T, R, C>,
+    factor: T,
+) {
+    let a = a.data.0.as_flattened();
+    for (out, a) in out.data.0.as_flattened_mut().iter_mut().zip(a) {
+        *out += *a * factor;
     }
 }
 

@@ -5,7 +5,7 @@
 //! matrices (lines 2 to 8 of Algorithm 1); with the scheduling read off the state it is the
 //! nonlinear map of the rollout (eq. (5), step 4 of Algorithm 2).
 
-use crate::kernel::{add_product, product};
+use crate::kernel::{add_product, add_scaled, product, scale};
 use crate::model::{LpvModel, Scalar};
 use nalgebra::{SMatrix, SVector, convert};
 
@@ -130,17 +130,31 @@ impl Rk4 {
         let mut x = *x;
         for _ in 0..self.substeps {
             let (mut k, mut l) = model.matrices(&model.scheduling(&x));
-            let mut slope = k * x + l * u;
-            let (mut a_step, mut b_step) = (SMatrix::identity() + k * sixth, l * sixth);
+            let mut slope = product(&k, &x);
+            add_product(&mut slope, &l, u);
+            let (mut a_step, mut b_step) = (SMatrix::identity(), SMatrix::zeros());
+            add_scaled(&mut a_step, &k, sixth);
+            add_scaled(&mut b_step, &l, sixth);
             for (reach, weight) in [(half, third), (half, third), (h, sixth)] {
-                let (a, b) = model.matrices(&model.scheduling(&(x + slope * reach)));
-                (k, l) = (a + product(&a, &(k * reach)), b + product(&a, &(l * reach)));
-                slope = k * x + l * u;
-                a_step += k * weight;
-                b_step += l * weight;
+                let mut there = x;
+                add_scaled(&mut there, &slope, reach);
+                let (mut a, mut b) = model.matrices(&model.scheduling(&there));
+                // In place, since copies cost as much as the products where nothing is unrolled.
+                scale(&mut k, reach);
+                scale(&mut l, reach);
+                let (a_k, a_l) = (product(&a, &k), product(&a, &l));
+                add_scaled(&mut a, &a_k, T::one());
+                add_scaled(&mut b, &a_l, T::one());
+                (k, l) = (a, b);
+                slope = product(&k, &x);
+                add_product(&mut slope, &l, u);
+                add_scaled(&mut a_step, &k, weight);
+                add_scaled(&mut b_step, &l, weight);
             }
-            x = a_step * x + b_step * u;
-            b_d = product(&a_step, &b_d) + b_step;
+            x = product(&a_step, &x);
+            add_product(&mut x, &b_step, u);
+            b_d = product(&a_step, &b_d);
+            add_scaled(&mut b_d, &b_step, T::one());
             a_d = product(&a_step, &a_d);
         }
         (a_d, b_d)

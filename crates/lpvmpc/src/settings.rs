@@ -181,12 +181,7 @@ pub(crate) fn check<T: Scalar, const NX: usize, const NU: usize, const NS: usize
     if !(settings.t_s > T::zero() && settings.t_s.is_finite()) {
         return Err(ControllerError::SamplingTime);
     }
-    if settings.horizon == 0 || settings.horizon > largest {
-        return Err(ControllerError::Horizon {
-            given: settings.horizon,
-            largest,
-        });
-    }
+    check_horizon(settings.horizon, largest)?;
     if settings.predictor.rk4().substeps == 0 {
         return Err(ControllerError::Substeps);
     }
@@ -210,6 +205,13 @@ pub(crate) fn check<T: Scalar, const NX: usize, const NU: usize, const NS: usize
         }
         _ => Ok(()),
     }
+}
+
+pub(crate) fn check_horizon(given: usize, largest: usize) -> Result<(), ControllerError> {
+    if given == 0 || given > largest {
+        return Err(ControllerError::Horizon { given, largest });
+    }
+    Ok(())
 }
 
 /// Symmetric, finite, and positive definite after adding `shift` times its size.

@@ -26,9 +26,9 @@ export function controllerFields(form: Form): HTMLElement[] {
 const TERMINALS: [kind: string, text: string][] = [
   ["discrete_riccati", "cost of the LQR"],
   ["equality", "equality x_N = x_ref"],
-  ["certified", "certified set (guaranteed loop)"],
+  ["certified", "certified (guaranteed)"],
   ["none", "none"],
-  ["continuous_riccati", "continuous Riccati (paper)"],
+  ["continuous_riccati", "Riccati (paper)"],
   ["cost", "P of the file"],
 ];
 
@@ -41,7 +41,7 @@ function terminal(form: Form): HTMLElement {
   });
   return form.choice(
     "controller.terminal",
-    { label: "Terminal", title: "The certified set belongs to the built-in robot, to t_s = 50 ms and, in this page, to N = 20" },
+    { label: "Terminal", title: "The certified set belongs to the built-in robot and to t_s = 50 ms" },
     TERMINALS,
     (value) => kindOf(value as string | object | undefined) ?? "discrete_riccati",
     (kind) => known.get(kind) ?? kind,
@@ -49,9 +49,9 @@ function terminal(form: Form): HTMLElement {
 }
 
 const PREDICTORS: [kind: string, text: string][] = [
-  ["stage_consistent", "scheduling of every stage"],
-  ["exact", "scheduling frozen, exact"],
-  ["rk4", "scheduling frozen, RK4 (paper)"],
+  ["stage_consistent", "stage-consistent"],
+  ["exact", "frozen, exact"],
+  ["rk4", "frozen, RK4 (paper)"],
 ];
 
 /** The paper's predictor is the only one that does not choose its sub-steps itself. */
@@ -70,7 +70,7 @@ function predictor(form: Form): HTMLElement[] {
   });
   const choice = form.choice(
     "controller.predictor",
-    { label: "Predictor" },
+    { label: "Predictor", title: "Whose scheduling the prediction takes: that of every Runge-Kutta stage, or that of the sample's beginning, frozen" },
     PREDICTORS,
     (value) => kindOf(value as string | object | undefined) ?? "stage_consistent",
     (kind) => ({ [kind]: kind === "rk4" ? { substeps: 1 } : {} }),
@@ -89,7 +89,7 @@ export function feedbackFields(form: Form): HTMLElement[] {
     form.table("controller.torque_rate", { label: "Bounded torque rate" }, { limit_nm_s: 20, weight: 1 },
       form.number("controller.torque_rate.limit_nm_s", { label: "Rate limit", unit: "N m/s", min: 1, max: 200, logarithmic: true, whenEmpty: Infinity }),
       form.number("controller.torque_rate.weight", { label: "Rate weight", min: 0.001, max: 1000, logarithmic: true })),
-    form.table("controller.motors", { label: "Motor limits known" }, { limit_nm: 2 },
+    form.table("controller.motors", { label: "Motor limits known", title: "For one plane. Two planes on shared motors run in `ballbot simulate`" }, { limit_nm: 2 },
       form.number("controller.motors.limit_nm", { label: "Each motor", unit: "N m", min: 0.1, max: 5, step: 0.1 }),
       form.number("controller.motors.yaw_reserve_nm", { label: "Yaw reserve", unit: "N m", min: 0, max: 2, step: 0.1, absent: 0 })),
   ];

@@ -34,7 +34,7 @@ function row(spec: FieldSpec, ...controls: HTMLElement[]): HTMLElement {
 
 /** Text of a number field; an infinite bound is an empty field. */
 function shown(value: number): string {
-  return Number.isFinite(value) ? String(Number(value.toPrecision(6))) : "";
+  return Number.isFinite(value) ? String(Number(value.toPrecision(5))) : "";
 }
 
 /** Whether somebody is in the middle of typing into a field, which then must not be set. */

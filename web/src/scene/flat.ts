@@ -46,15 +46,17 @@ export class FlatView implements View {
     ];
   }
 
-  draw(picture: Picture): void {
-    this.centre.x += (picture.follow.x - this.centre.x) * 0.06;
-    this.centre.y += (picture.follow.y - this.centre.y) * 0.06;
+  draw(picture: Picture): boolean {
+    const [dx, dy] = [picture.follow.x - this.centre.x, picture.follow.y - this.centre.y];
+    this.centre.x += dx * 0.06;
+    this.centre.y += dy * 0.06;
     const { context, theme } = this;
     context.fillStyle = theme.background;
     context.fillRect(0, 0, this.host.clientWidth, this.host.clientHeight);
     this.drawGrid();
     for (const robot of picture.robots) this.drawRobot(robot);
     this.line(picture.stroke.length, (i) => picture.stroke[i] ?? this.centre, theme.ink, 2);
+    return Math.hypot(dx, dy) * this.scale > 0.5;
   }
 
   private drawGrid(): void {

@@ -12,6 +12,13 @@ import type { FloorPoint, Picture, Shape, Theme, View } from "./view";
 
 /** How fast the camera goes after the robots, 1/s. */
 const FOLLOW_RATE = 3.5;
+/** A camera that moves by less in a frame stands still, m. */
+const STILL = 1e-4;
+/** Frames further apart are too slow, ms; those further apart than IDLE do not belong together. */
+const SLOW_FRAME = 40;
+const IDLE = 1000;
+/** For how long frames may be slow, ms. */
+const PATIENCE = 1500;
 
 export class SolidView implements View {
   readonly kind = "3d";
@@ -29,7 +36,8 @@ export class SolidView implements View {
   private theme: Theme;
   private shape: Shape = { ballRadius: 0.12, wheelRadius: 0.05, zenith: Math.PI / 4, centreOfMass: 0.3 };
   private followed = new Vector3();
-  private slowFrames = 0;
+  private robots = 1;
+  private slowFor = 0;
   private lastFrame = 0;
 
   /** Throws where there is no WebGL. */
@@ -106,22 +114,31 @@ export class SolidView implements View {
     this.camera.updateProjectionMatrix();
   }
 
-  draw(picture: Picture): void {
+  draw(picture: Picture): boolean {
     const colours = picture.robots.map(({ colour }) => colour);
     if (colours.join() !== this.actors.map(({ colour }) => colour).join()) {
       this.clearActors();
+      this.makeRoom(colours.length);
       this.actors = colours.map((colour) => new Actor(this.scene, this.shape, this.theme, colour));
     }
     for (const [i, robot] of picture.robots.entries()) this.actors[i]?.draw(robot);
     this.stroke.set(picture.stroke.length, (i) => picture.stroke[i] ?? { x: 0, y: 0 }, 0);
-    this.follow(picture.follow);
-    this.controls.update();
+    const followed = this.follow(picture.follow);
+    const turned = this.controls.update();
     this.renderer.render(this.scene, this.camera);
     this.adapt();
+    return followed > STILL || turned;
   }
 
-  /** Camera, light and grid move along with the robots. */
-  private follow(point: FloorPoint): void {
+  /** The camera steps back for robots that come, and closer when they go. */
+  private makeRoom(robots: number): void {
+    const { position } = this.camera;
+    position.sub(this.controls.target).multiplyScalar((2 + robots) / (2 + this.robots)).add(this.controls.target);
+    this.robots = robots;
+  }
+
+  /** Camera, light and grid move along with the robots. Returns how far, m. */
+  private follow(point: FloorPoint): number {
     const goal = toScene(point.x, point.y);
     const elapsed = Math.min((performance.now() - this.lastFrame) / 1000, 0.2);
     const step = goal.sub(this.followed).multiplyScalar(1 - Math.exp(-elapsed * FOLLOW_RATE));
@@ -135,16 +152,19 @@ export class SolidView implements View {
       lines.position.z = Math.round(this.followed.z);
     }
     this.floor.position.set(this.followed.x, 0, this.followed.z);
+    return step.length();
   }
 
   /** Gives up shadows, then resolution, where the graphics cannot keep up. */
   private adapt(): void {
     const now = performance.now();
-    const slow = now - this.lastFrame > 40;
+    const gap = now - this.lastFrame;
     this.lastFrame = now;
-    this.slowFrames = slow ? this.slowFrames + 1 : Math.max(this.slowFrames - 1, 0);
-    if (this.slowFrames < 40) return;
-    this.slowFrames = 0;
+    // Nothing was to be drawn for a while.
+    if (gap > IDLE) return;
+    this.slowFor = gap > SLOW_FRAME ? this.slowFor + gap : Math.max(this.slowFor - gap, 0);
+    if (this.slowFor < PATIENCE) return;
+    this.slowFor = 0;
     if (this.renderer.shadowMap.enabled) {
       this.renderer.shadowMap.enabled = false;
       this.sun.castShadow = false;

@@ -54,7 +54,8 @@ export interface Theme {
 export interface View {
   readonly kind: "3d" | "2d";
   readonly element: HTMLElement;
-  draw(picture: Picture): void;
+  /** Returns whether the picture still moves by itself: the camera swings out or goes after a robot. */
+  draw(picture: Picture): boolean;
   setShape(shape: Shape): void;
   setTheme(theme: Theme): void;
   resize(): void;

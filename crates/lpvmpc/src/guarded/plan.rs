@@ -8,10 +8,12 @@ use nalgebra::{SVector, convert};
 /// Inputs with the states that the nonlinear model reaches under them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plan<T, const NX: usize, const NU: usize, const N: usize> {
-    /// u_0 to u_{N-1}.
+    /// u_0 to u_{N-1}; what lies beyond the horizon is zero.
     pub u: [SVector<T, NU>; N],
-    /// x_1 to x_N.
+    /// x_1 to x_N; what lies beyond the horizon is zero.
     pub x: [SVector<T, NX>; N],
+    /// x_N at the end of the horizon.
+    pub end: SVector<T, NX>,
     /// z: the plan ends near z d.
     pub set_point: T,
     /// Cost, the offset from the wanted set point included.
@@ -101,11 +103,13 @@ where
         let mut plan = Plan {
             u: [SVector::zeros(); N],
             x: [SVector::zeros(); N],
+            end: *x0,
             set_point,
             cost: settings.offset_weight * offset * offset,
         };
         let mut x = *x0;
-        for (u, x_next) in plan.u.iter_mut().zip(&mut plan.x) {
+        let steps = plan.u.iter_mut().zip(&mut plan.x);
+        for (u, x_next) in steps.take(settings.horizon) {
             *u = input(&x);
             let error = x - settings.direction * set_point;
             plan.cost += (settings.weights.q * error).dot(&error);
@@ -114,6 +118,7 @@ where
             *x_next = x;
         }
         plan.cost += self.terminal_value(&x, set_point);
+        plan.end = x;
         plan
     }
 
@@ -124,12 +129,14 @@ where
         let x = shrunk(&settings.x, margin);
         let [lower, upper] = settings.set_points;
         let level = settings.terminal.level * (T::one() - margin);
+        let mut states = plan.x.iter().take(settings.horizon);
+        let mut inputs = plan.u.iter().take(settings.horizon);
         plan.cost.is_finite()
-            && plan.x.iter().all(|state| x.contains(state, T::zero()))
-            && plan.u.iter().all(|u| settings.u.contains(u, T::zero()))
+            && states.all(|state| x.contains(state, T::zero()))
+            && inputs.all(|u| settings.u.contains(u, T::zero()))
             && plan.set_point >= lower
             && plan.set_point <= upper
-            && self.terminal_value(&plan.x[N - 1], plan.set_point) <= level
+            && self.terminal_value(&plan.end, plan.set_point) <= level
     }
 }
 

@@ -35,20 +35,24 @@ where
         along: &Plan<T, NX, NU, N>,
         ocp: &mut Ocp<T, NA, NU, NP>,
     ) {
-        ocp.horizon = NP;
+        // The last stage of the horizon follows its samples.
+        ocp.horizon = self.settings.horizon + 2;
         ocp.x0 = augmented(x0, T::zero());
         let bounds = shrunk(&self.settings.x, self.settings.margin);
         let states = core::iter::once(x0).chain(&along.x);
-        let samples = states.zip(&along.u).enumerate();
-        if let [first, stages @ .., last] = &mut ocp.stages[..] {
+        let samples = states.zip(&along.u).take(self.settings.horizon);
+        let mut stages = ocp.stages.iter_mut();
+        if let Some(first) = stages.next() {
             *first = self.set_point_stage(wanted, along.set_point);
-            for (stage, (i, (x, u))) in stages.iter_mut().zip(samples) {
-                *stage = self.sample_stage(x, u);
-                // The measured state is as it is; x_1 and later are bounded.
-                if i > 0 {
-                    stage.x = self.augmented_bounds(&bounds);
-                }
+        }
+        for ((i, (x, u)), stage) in samples.enumerate().zip(&mut stages) {
+            *stage = self.sample_stage(x, u);
+            // The measured state is as it is; x_1 and later are bounded.
+            if i > 0 {
+                stage.x = self.augmented_bounds(&bounds);
             }
+        }
+        if let Some(last) = stages.next() {
             *last = self.terminal_stage();
             last.x = self.augmented_bounds(&bounds);
         }
@@ -175,7 +179,7 @@ pub(super) fn answer<
     (u, solution.u[0][0])
 }
 
-/// x_N as the program predicts it.
+/// x_N as the program of this `horizon` predicts it.
 pub(super) fn predicted_end<
     T: Scalar,
     const NX: usize,
@@ -185,8 +189,9 @@ pub(super) fn predicted_end<
     const M: usize,
 >(
     solution: &Solution<T, NA, NU, NP, M>,
+    horizon: usize,
 ) -> SVector<T, NX> {
     // x_1 of the program is (x_0, z), so x_{N+1} of the program is (x_N, z).
-    let end = solution.x.iter().rev().nth(1);
+    let end = solution.x.get(horizon);
     SVector::from_fn(|i, _| end.and_then(|x| x.get(i)).copied().unwrap_or(T::zero()))
 }

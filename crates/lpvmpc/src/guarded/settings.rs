@@ -4,7 +4,7 @@ use crate::model::{LpvModel, Scalar};
 use crate::ocp::Bounds;
 use crate::predictor::Rk4;
 use crate::settings::ControllerError;
-use crate::settings::{Weights, check_bounds, check_weight};
+use crate::settings::{Weights, check_bounds, check_horizon, check_weight};
 use crate::solver::SolverSettings;
 use core::fmt;
 use nalgebra::{SMatrix, SVector};
@@ -44,6 +44,8 @@ pub struct GuardedIterations {
 pub struct GuardedSettings<T, const NX: usize, const NU: usize> {
     /// Sampling time in seconds.
     pub t_s: T,
+    /// Prediction horizon in samples, from 1 to the controller's `N`.
+    pub horizon: usize,
     /// Runge-Kutta steps of prediction and rollout.
     pub rk4: Rk4,
     /// Stage weights.
@@ -117,10 +119,16 @@ impl From<ControllerError> for GuardedError {
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
-    pub(super) fn check<P, const NS: usize>(&self, model: &P) -> Result<(), GuardedError>
+    /// `largest` is the longest horizon that there is memory for.
+    pub(super) fn check<P, const NS: usize>(
+        &self,
+        model: &P,
+        largest: usize,
+    ) -> Result<(), GuardedError>
     where
         P: LpvModel<T, NX, NU, NS>,
     {
+        check_horizon(self.horizon, largest)?;
         let positive = [
             (self.t_s, "the sampling time in seconds"),
             (self.terminal.level, "the level of the terminal set"),

@@ -47,6 +47,7 @@ fn settings() -> Settings {
     let limit = Vector4::new(f64::INFINITY, 0.6, 4.0, f64::INFINITY);
     Settings {
         t_s: base.t_s,
+        horizon: N,
         rk4: RK4,
         weights: base.weights,
         terminal: TerminalSet {
@@ -180,10 +181,38 @@ fn the_plan_happens() {
     let mut x = Vector4::zeros();
     for _ in 0..60 {
         let step = controller.step(&x, 20.0, &mut memory);
-        let promised = controller.rollout().unwrap()[0];
+        let promised = controller.rollout()[0];
         x = moves(&x, &step.u);
         assert!((x - promised).norm() <= 1e-12 * (1.0 + x.norm()));
     }
+}
+
+/// A horizon below the memory's size is that horizon, whatever the memory's size: sample for sample
+/// the controller that is made for it, on the way to a far set point and through a push.
+#[test]
+fn a_shorter_horizon_is_the_one_of_a_smaller_memory() {
+    const SHORT: usize = 13;
+    let mut short = settings();
+    short.horizon = SHORT;
+    let mut large = guarded(short);
+    let mut large_memory = Memory::new();
+    type Small = GuardedController<CartPole<f64>, f64, 4, 1, 2, SHORT, 5, { SHORT + 2 }>;
+    let mut small = Small::new(plant(), short).unwrap();
+    let mut small_memory = GuardedWorkspace::<f64, 1, 5, { SHORT + 2 }, 200>::new();
+    let mut x = Vector4::zeros();
+    let mut soft = 0;
+    for k in 0..200 {
+        if k == 100 {
+            x += Vector4::new(0.0, 0.65, 0.0, 0.0);
+        }
+        let step = large.step(&x, 20.0, &mut large_memory);
+        assert_eq!(step, small.step(&x, 20.0, &mut small_memory));
+        assert_eq!(large.rollout(), small.rollout());
+        assert!(large.rollout().is_empty() || large.rollout().len() == SHORT);
+        soft += usize::from(step.decision == Decision::SoftBounds);
+        x = moves(&x, &step.u);
+    }
+    assert!(soft > 0, "the push has no effect");
 }
 
 /// A push beyond the bounds: soft bounds bring the pole back into what is guaranteed.
@@ -260,6 +289,15 @@ fn settings_that_make_no_sense_are_refused() {
         refused(|s| s.iterations.known = 0),
         GuardedError::Iterations
     );
+    for horizon in [0, N + 1] {
+        let mut changed = settings();
+        changed.horizon = horizon;
+        let error = Guarded::new(plant(), changed).err().unwrap();
+        assert!(
+            error.to_string().contains("from 1 to 20 samples"),
+            "{error}"
+        );
+    }
     // The tilt is no direction of equilibria.
     let tilted = refused(|s| s.direction = Vector4::new(0.0, 1.0, 0.0, 0.0));
     assert_eq!(tilted, GuardedError::Direction);

@@ -1,0 +1,45 @@
+//! The guaranteed loop.
+
+use crate::regulators::{LONGEST_HORIZON, ROWS, STAGES};
+use crate::sharing::SharingPlane;
+use ballbot::Ballbot;
+use lpvmpc::{GuardedController, GuardedError, GuardedSettings, GuardedWorkspace};
+use lpvmpc_sim::GuardedFeedback;
+use nalgebra::Vector4;
+
+/// Rows that a guarded controller of up to 20 samples may have active: its soft bounds can be many.
+pub const GUARDED_ACTIVE: usize = 200;
+
+/// The guarded controller on the measured state itself.
+///
+/// # Errors
+/// The controller refuses its `settings`, or their horizon is longer than [`LONGEST_HORIZON`].
+pub fn guarded_feedback(
+    ballbot: &Ballbot<f64>,
+    settings: &GuardedSettings<f64, 4, 1>,
+) -> Result<Box<dyn SharingPlane>, GuardedError> {
+    match settings.horizon {
+        #[cfg(not(target_family = "wasm"))]
+        ..=20 => sized::<20, 22, GUARDED_ACTIVE>(ballbot, settings),
+        _ => sized::<LONGEST_HORIZON, STAGES, ROWS>(ballbot, settings),
+    }
+}
+
+// Neither of these is inlined: each builds its memory on the stack before it is boxed.
+#[inline(never)]
+fn sized<const N: usize, const NP: usize, const M: usize>(
+    ballbot: &Ballbot<f64>,
+    settings: &GuardedSettings<f64, 4, 1>,
+) -> Result<Box<dyn SharingPlane>, GuardedError> {
+    let controller = GuardedController::<_, f64, 4, 1, 3, N, 5, NP>::new(*ballbot, *settings)?;
+    Ok(Box::new(GuardedFeedback {
+        controller,
+        workspace: boxed_workspace::<NP, M>(),
+        x: Vector4::zeros(),
+    }))
+}
+
+#[inline(never)]
+fn boxed_workspace<const NP: usize, const M: usize>() -> Box<GuardedWorkspace<f64, 1, 5, NP, M>> {
+    Box::new(GuardedWorkspace::new())
+}

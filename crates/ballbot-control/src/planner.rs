@@ -1,0 +1,139 @@
+//! What plans the torque of a plane.
+
+use ballbot::Ballbot;
+use lpvmpc::{BoundId, Bounds, Controller, LpvModel, Reference, Solution, Workspace};
+use lpvmpc_sim::Decision;
+use nalgebra::{SVector, Vector1, Vector4};
+use std::time::Duration;
+
+/// Plans the torque of a plane from a state.
+pub(crate) trait Planner {
+    /// Sampling time, s.
+    fn t_s(&self) -> f64;
+
+    /// Plans from `z`, the state in the model's coordinates at which the torque will act. The
+    /// model's torque is the commanded one and the `disturbance` (N m), so the bounds of the
+    /// commanded one, `allowed`, are shifted. `reference` is that of the stages from 0 on, `clock`
+    /// a monotonic clock. Returns what is to be said about the plan, with torque, estimate and
+    /// reference left zero, and the torque to be commanded (N m) unless that is a ramp.
+    fn plan(
+        &mut self,
+        z: &Vector4<f64>,
+        disturbance: f64,
+        allowed: &Bounds<f64, 1>,
+        reference: &dyn Fn(usize) -> Vector4<f64>,
+        clock: &dyn Fn() -> Duration,
+    ) -> (Decision<4, 1>, Option<f64>);
+
+    /// The torque in the middle of the coming `period` s while it moves in a ramp, N m; `None`
+    /// while it is held.
+    fn next_of_ramp(&mut self, _period: f64) -> Option<f64> {
+        None
+    }
+
+    /// The states that the model reaches under the last plan, one per sample of the horizon.
+    fn prediction(&self) -> Vec<Vector4<f64>>;
+
+    /// The bounds that are active in the last plan, as those of the robot.
+    fn active_bounds(&self) -> Vec<BoundId>;
+
+    /// The largest torque that the last plan commands beside the `disturbance`, N m. `None` from
+    /// one whose bounds must not change from sample to sample.
+    fn largest_torque(&self, _disturbance: f64) -> Option<f64> {
+        None
+    }
+}
+
+/// The torque is held over a sample.
+pub(crate) struct Held<const N: usize, const M: usize> {
+    pub(crate) controller: Box<Controller<Ballbot<f64>, f64, 4, 1, 3, N, M>>,
+    pub(crate) workspace: Box<Workspace<f64, 4, 1, N, M>>,
+}
+
+impl<const N: usize, const M: usize> Planner for Held<N, M> {
+    fn t_s(&self) -> f64 {
+        self.controller.settings().t_s
+    }
+
+    fn plan(
+        &mut self,
+        z: &Vector4<f64>,
+        disturbance: f64,
+        allowed: &Bounds<f64, 1>,
+        reference: &dyn Fn(usize) -> Vector4<f64>,
+        clock: &dyn Fn() -> Duration,
+    ) -> (Decision<4, 1>, Option<f64>) {
+        let Self {
+            controller,
+            workspace,
+        } = self;
+        let x = controller.settings().x;
+        // Bounds that are not numbers are refused; the state is none either then, and the plan
+        // says so.
+        controller.set_bounds(x, shifted(allowed, disturbance)).ok();
+        let (input, decision) = step(controller, workspace, z, reference, clock);
+        (decision, Some(input - disturbance))
+    }
+
+    fn prediction(&self) -> Vec<Vector4<f64>> {
+        self.controller.rollout().to_vec()
+    }
+
+    fn active_bounds(&self) -> Vec<BoundId> {
+        let active = self.controller.solution().active.iter();
+        active.map(|row| row.bound).collect()
+    }
+
+    fn largest_torque(&self, disturbance: f64) -> Option<f64> {
+        let plan = self.controller.solution().u.iter();
+        let plan = plan.take(self.controller.settings().horizon);
+        Some(plan.fold(0.0, |most, u| most.max((u[0] - disturbance).abs())))
+    }
+}
+
+/// The bounds of the commanded torque as those of the model's, which has the `disturbance` on top.
+pub(crate) fn shifted(allowed: &Bounds<f64, 1>, disturbance: f64) -> Bounds<f64, 1> {
+    Bounds {
+        lower: allowed.lower.add_scalar(disturbance),
+        upper: allowed.upper.add_scalar(disturbance),
+    }
+}
+
+/// One step of `controller` from `x`: its first input, and what is to be said about the plan. What
+/// of the state lies beyond the robot's four is to be zero.
+pub(crate) fn step<P, const NX: usize, const N: usize, const M: usize>(
+    controller: &mut Controller<P, f64, NX, 1, 3, N, M>,
+    workspace: &mut Workspace<f64, NX, 1, N, M>,
+    x: &SVector<f64, NX>,
+    reference: &dyn Fn(usize) -> Vector4<f64>,
+    clock: &dyn Fn() -> Duration,
+) -> (f64, Decision<4, 1>)
+where
+    P: LpvModel<f64, NX, 1, 3>,
+{
+    let horizon = controller.settings().horizon;
+    let at = |i: usize| {
+        let robot = reference(i);
+        SVector::<f64, NX>::from_fn(|j, _| robot.get(j).copied().unwrap_or(0.0))
+    };
+    let mut window: Reference<f64, NX, N> = Reference::constant(at(horizon));
+    for (i, place) in window.stages.iter_mut().enumerate().take(horizon) {
+        *place = at(i);
+    }
+    let before = clock();
+    let plan: &Solution<f64, NX, 1, N, M> = controller.step(x, &window, workspace);
+    let step_time = clock().saturating_sub(before);
+    let (input, status, active_bounds) = (plan.u[0][0], plan.status, plan.active.len());
+    let decision = Decision {
+        u: Vector1::zeros(),
+        estimate: Vector4::zeros(),
+        x_ref: Vector4::zeros(),
+        cost: controller.tracking_cost(x, &window),
+        status,
+        active_bounds,
+        step_time,
+        gap: Vector4::zeros(),
+        guard: None,
+    };
+    (input, decision)
+}

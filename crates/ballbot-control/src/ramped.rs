@@ -1,0 +1,126 @@
+//! The torque as a fifth state, its rate as the input.
+
+use crate::feedback::Feedback;
+use crate::planner::{Planner, shifted, step};
+use crate::regulators::{ROWS, RegulatorError, STAGES, with_planner};
+use crate::sharing::SharingPlane;
+use ballbot::Ballbot;
+use lpvmpc::{BoundId, Bounds, Controller, ControllerSettings, Quantity, RampedInput, Workspace};
+use lpvmpc_sim::Decision;
+use nalgebra::{SVector, Vector1, Vector4};
+use std::time::Duration;
+
+/// Output feedback whose torque moves in ramps. `settings` are those of the plant with the torque
+/// as fifth state, `torque` the bounds of the commanded torque (N m); `period` is that of the
+/// sensors, s.
+///
+/// # Errors
+/// Estimator or controller refuses its settings, or the horizon is longer than
+/// [`LONGEST_HORIZON`](crate::LONGEST_HORIZON).
+pub fn ramped_feedback(
+    ballbot: &Ballbot<f64>,
+    settings: &ControllerSettings<f64, 5, 1, 3>,
+    torque: &Bounds<f64, 1>,
+    feedback: &Feedback,
+    period: f64,
+) -> Result<Box<dyn SharingPlane>, RegulatorError> {
+    let planner = match settings.horizon {
+        #[cfg(not(target_family = "wasm"))]
+        ..=20 => ramped::<20, 44>(ballbot, settings),
+        #[cfg(not(target_family = "wasm"))]
+        21..=50 => ramped::<50, 104>(ballbot, settings),
+        #[cfg(not(target_family = "wasm"))]
+        51..=100 => ramped::<100, 204>(ballbot, settings),
+        _ => ramped::<STAGES, ROWS>(ballbot, settings),
+    };
+    with_planner(planner?, ballbot, torque, feedback, period)
+}
+
+// Neither of these is inlined: each builds its memory on the stack before it is boxed.
+#[inline(never)]
+fn ramped<const N: usize, const M: usize>(
+    ballbot: &Ballbot<f64>,
+    settings: &ControllerSettings<f64, 5, 1, 3>,
+) -> Result<Box<dyn Planner>, RegulatorError> {
+    Ok(Box::new(Ramped::<N, M> {
+        controller: Box::new(Controller::new(RampedInput(*ballbot), *settings)?),
+        workspace: boxed_workspace(),
+        torque: 0.0,
+        rate: 0.0,
+    }))
+}
+
+#[inline(never)]
+fn boxed_workspace<const N: usize, const M: usize>() -> Box<Workspace<f64, 5, 1, N, M>> {
+    Box::new(Workspace::new())
+}
+
+struct Ramped<const N: usize, const M: usize> {
+    controller: Box<Controller<RampedInput<Ballbot<f64>, 4>, f64, 5, 1, 3, N, M>>,
+    workspace: Box<Workspace<f64, 5, 1, N, M>>,
+    /// The commanded torque, N m.
+    torque: f64,
+    /// Its rate, N m/s.
+    rate: f64,
+}
+
+impl<const N: usize, const M: usize> Planner for Ramped<N, M> {
+    fn t_s(&self) -> f64 {
+        self.controller.settings().t_s
+    }
+
+    fn plan(
+        &mut self,
+        z: &Vector4<f64>,
+        disturbance: f64,
+        allowed: &Bounds<f64, 1>,
+        reference: &dyn Fn(usize) -> Vector4<f64>,
+        clock: &dyn Fn() -> Duration,
+    ) -> (Decision<4, 1>, Option<f64>) {
+        let Self {
+            controller,
+            workspace,
+            ..
+        } = self;
+        let allowed = shifted(allowed, disturbance);
+        let ControllerSettings { mut x, u, .. } = *controller.settings();
+        (x.lower[4], x.upper[4]) = (allowed.lower[0], allowed.upper[0]);
+        // Bounds that are not numbers are refused; the state is none either then, and the plan
+        // says so.
+        controller.set_bounds(x, u).ok();
+        let torque = Vector1::new(self.torque + disturbance);
+        let joint = RampedInput::<Ballbot<f64>, 4>::join(z, &torque);
+        let (rate, decision) = step(controller, workspace, &joint, reference, clock);
+        self.rate = rate;
+        (decision, None)
+    }
+
+    fn next_of_ramp(&mut self, period: f64) -> Option<f64> {
+        let step = self.rate * period;
+        self.torque += step;
+        Some(self.torque - 0.5 * step)
+    }
+
+    fn prediction(&self) -> Vec<Vector4<f64>> {
+        let robot = |joint: &SVector<f64, 5>| joint.fixed_rows::<4>(0).into_owned();
+        self.controller.rollout().iter().map(robot).collect()
+    }
+
+    /// The bounds of the torque are those of an input; those of its rate are left out.
+    fn active_bounds(&self) -> Vec<BoundId> {
+        let active = self.controller.solution().active.iter();
+        active.filter_map(|row| of_the_robot(row.bound)).collect()
+    }
+}
+
+/// A bound of the plant with the torque as fifth state, as one of the robot.
+fn of_the_robot(bound: BoundId) -> Option<BoundId> {
+    match bound.quantity {
+        Quantity::State(4) => Some(BoundId {
+            quantity: Quantity::Input(0),
+            ..bound
+        }),
+        Quantity::State(_) => Some(bound),
+        Quantity::Input(_) | Quantity::Row(_) => None,
+    }
+}

@@ -1,0 +1,146 @@
+//! Regulators whose horizon is known at run time.
+
+use crate::feedback::Feedback;
+use crate::output_feedback::{Belief, OutputFeedback};
+use crate::planner::{Held, Planner};
+use crate::sharing::SharingPlane;
+use ballbot::Ballbot;
+use lpvmpc::{
+    Bounds, Controller, ControllerError, ControllerSettings, DelayLine, Estimator, EstimatorError,
+    Workspace,
+};
+use lpvmpc_sim::{Regulator, StateFeedback};
+use nalgebra::Vector4;
+
+/// The longest horizon that is compiled in, samples.
+pub const LONGEST_HORIZON: usize = 200;
+
+/// Stages of the largest quadratic program: that of a guarded controller has two more than samples.
+pub(crate) const STAGES: usize = LONGEST_HORIZON + 2;
+
+/// Rows that the largest quadratic program may have active: the bounds of the torque and, where its
+/// rate is the input, of the rate, and up to 4 rows of a terminal equality.
+pub(crate) const ROWS: usize = 2 * LONGEST_HORIZON + 4;
+
+/// A regulator refuses its settings.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum RegulatorError {
+    /// The estimator does.
+    #[error("estimator: {0}")]
+    Estimator(#[from] EstimatorError),
+    /// The controller does.
+    #[error("controller: {0}")]
+    Controller(#[from] ControllerError),
+}
+
+/// Calls a generic function with the smallest compiled size for a horizon: stages, and rows that
+/// may be active. A torque has two bounds, one of which is active, and a terminal equality 4 rows.
+///
+/// In a browser the largest size must do for all controllers: the time per step follows the horizon
+/// that is used, and every size is code that has to be loaded.
+macro_rules! sized {
+    ($horizon:expr, $function:ident($($argument:expr),*)) => {
+        match $horizon {
+            #[cfg(not(target_family = "wasm"))]
+            ..=20 => $function::<20, 24>($($argument),*),
+            #[cfg(not(target_family = "wasm"))]
+            21..=50 => $function::<50, 54>($($argument),*),
+            #[cfg(not(target_family = "wasm"))]
+            51..=100 => $function::<100, 104>($($argument),*),
+            #[cfg(not(target_family = "wasm"))]
+            101.. => $function::<LONGEST_HORIZON, { LONGEST_HORIZON + 4 }>($($argument),*),
+            #[cfg(target_family = "wasm")]
+            _ => $function::<STAGES, ROWS>($($argument),*),
+        }
+    };
+}
+
+/// The controller on the measured state itself.
+///
+/// # Errors
+/// The controller refuses its `settings`, or their horizon is longer than [`LONGEST_HORIZON`].
+pub fn state_feedback(
+    ballbot: &Ballbot<f64>,
+    settings: &ControllerSettings<f64, 4, 1, 3>,
+) -> Result<Box<dyn Regulator<4, 1, 4>>, ControllerError> {
+    sized!(settings.horizon, state_feedback_sized(ballbot, settings))
+}
+
+/// The controller with what stands around it; `period` is that of the sensors, s.
+///
+/// # Errors
+/// Estimator or controller refuses its settings, or the horizon is longer than
+/// [`LONGEST_HORIZON`].
+pub fn output_feedback(
+    ballbot: &Ballbot<f64>,
+    settings: &ControllerSettings<f64, 4, 1, 3>,
+    feedback: &Feedback,
+    period: f64,
+) -> Result<Box<dyn SharingPlane>, RegulatorError> {
+    let planner = sized!(settings.horizon, held(ballbot, settings))?;
+    with_planner(planner, ballbot, &settings.u, feedback, period)
+}
+
+/// Output feedback around any planner; `torque` are the bounds of the commanded torque, N m.
+///
+/// # Errors
+/// The estimator refuses its settings.
+pub(crate) fn with_planner(
+    planner: Box<dyn Planner>,
+    ballbot: &Ballbot<f64>,
+    torque: &Bounds<f64, 1>,
+    feedback: &Feedback,
+    period: f64,
+) -> Result<Box<dyn SharingPlane>, RegulatorError> {
+    let x = Vector4::zeros();
+    let belief = match feedback.estimator {
+        Some(settings) => {
+            let estimator = Estimator::new(*ballbot, settings, x)?;
+            Belief::Estimated(Box::new(estimator))
+        }
+        None => Belief::Measured {
+            model: *ballbot,
+            longest_step: feedback.longest_step,
+            x,
+        },
+    };
+    Ok(Box::new(OutputFeedback {
+        belief,
+        planner,
+        delay: feedback.delay,
+        period,
+        preview: feedback.preview,
+        torque: *torque,
+        share: f64::INFINITY,
+        line: DelayLine::default(),
+        time: 0.0,
+    }))
+}
+
+// Neither this nor what follows is inlined: each size builds its memory on the stack before it is
+// boxed, and one frame for all sizes overflows the 2 MB of a thread.
+#[inline(never)]
+fn state_feedback_sized<const N: usize, const M: usize>(
+    ballbot: &Ballbot<f64>,
+    settings: &ControllerSettings<f64, 4, 1, 3>,
+) -> Result<Box<dyn Regulator<4, 1, 4>>, ControllerError> {
+    let controller = Controller::<_, f64, 4, 1, 3, N, M>::new(*ballbot, *settings)?;
+    let (controller, workspace) = (Box::new(controller), boxed_workspace());
+    Ok(Box::new(StateFeedback::new(controller, workspace)))
+}
+
+#[inline(never)]
+fn held<const N: usize, const M: usize>(
+    ballbot: &Ballbot<f64>,
+    settings: &ControllerSettings<f64, 4, 1, 3>,
+) -> Result<Box<dyn Planner>, RegulatorError> {
+    Ok(Box::new(Held::<N, M> {
+        controller: Box::new(Controller::new(*ballbot, *settings)?),
+        workspace: boxed_workspace(),
+    }))
+}
+
+#[inline(never)]
+fn boxed_workspace<const N: usize, const M: usize>() -> Box<Workspace<f64, 4, 1, N, M>> {
+    Box::new(Workspace::new())
+}
