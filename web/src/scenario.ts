@@ -9,6 +9,8 @@ export interface Parameters {
   b2_m2: number;
   b3_m2: number;
   b4_m2_s: number;
+  drive_friction_m2_s?: number;
+  drive_coulomb_m2_s2?: number;
   centre_of_mass_m: number;
   ball_radius_m: number;
   wheel_radius_m: number;

@@ -136,6 +136,39 @@ test("the target can be dragged on the floor", async ({ page }) => {
   expect(phi * 0.12).toBeCloseTo(target, 1);
 });
 
+test("the camera turns, and the robot stays; the plots show either plane; the set-up folds away", async ({ page }) => {
+  const problems = await open(page);
+  const box = await page.locator("#scene").boundingBox();
+  if (!box) throw new Error("no scene");
+  // The floor's lines, beside words and robot.
+  const clip = { x: box.x, y: box.y + box.height * 0.3, width: box.width * 0.25, height: box.height * 0.4 };
+  await page.waitForTimeout(500);
+  const before = await page.screenshot({ clip });
+  await page.getByText("Camera", { exact: true }).click();
+  await page.mouse.move(box.x + box.width * 0.7, box.y + box.height * 0.7);
+  await page.mouse.down();
+  await page.mouse.move(box.x + box.width * 0.4, box.y + box.height * 0.6, { steps: 4 });
+  await page.mouse.up();
+  await page.waitForTimeout(500);
+  expect((await page.screenshot({ clip })).equals(before)).toBe(false);
+  await expect(page.getByLabel("Target X", { exact: true })).toHaveValue("0");
+  await expect(page.locator("#clock")).toHaveText("0.00 s");
+
+  await fill(page, "Target Y", "0.5");
+  await until(page, 4);
+  await page.locator("#play").click();
+  const phi = async () => parseFloat((await page.locator("#plots output").first().textContent()) ?? "");
+  expect(Math.abs(await phi())).toBeLessThan(0.1);
+  await page.getByText("y plane", { exact: true }).click();
+  await expect.poll(phi).toBeGreaterThan(3);
+
+  await page.getByRole("button", { name: "Set-up" }).click();
+  await expect(page.locator("#panel")).toBeHidden();
+  await page.getByRole("button", { name: "Set-up" }).click();
+  await expect(page.locator("#panel")).toBeVisible();
+  expect(problems).toEqual([]);
+});
+
 test("a drawn path is followed", async ({ page }) => {
   await open(page);
   await page.getByText("Draw path").click();

@@ -1,5 +1,6 @@
 //! The guaranteed loop.
 
+use crate::boxed::boxed;
 use crate::regulators::{LONGEST_HORIZON, ROWS, STAGES};
 use crate::sharing::SharingPlane;
 use ballbot::Ballbot;
@@ -25,7 +26,7 @@ pub fn guarded_feedback(
     }
 }
 
-// Neither of these is inlined: each builds its memory on the stack before it is boxed.
+// Not inlined: each size builds its controller on the stack before it is boxed.
 #[inline(never)]
 fn sized<const N: usize, const NP: usize, const M: usize>(
     ballbot: &Ballbot<f64>,
@@ -34,12 +35,7 @@ fn sized<const N: usize, const NP: usize, const M: usize>(
     let controller = GuardedController::<_, f64, 4, 1, 3, N, 5, NP>::new(*ballbot, *settings)?;
     Ok(Box::new(GuardedFeedback {
         controller,
-        workspace: boxed_workspace::<NP, M>(),
+        workspace: boxed(GuardedWorkspace::<f64, 1, 5, NP, M>::new),
         x: Vector4::zeros(),
     }))
-}
-
-#[inline(never)]
-fn boxed_workspace<const NP: usize, const M: usize>() -> Box<GuardedWorkspace<f64, 1, 5, NP, M>> {
-    Box::new(GuardedWorkspace::new())
 }

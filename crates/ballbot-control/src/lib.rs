@@ -4,6 +4,7 @@
 //! The method's sizes are known at compile time, a user's horizon at run time. Here is where they
 //! meet: a few sizes are compiled, and the smallest that the horizon fits in is taken.
 
+mod boxed;
 mod feedback;
 mod guarded;
 mod output_feedback;

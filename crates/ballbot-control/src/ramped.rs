@@ -1,5 +1,6 @@
 //! The torque as a fifth state, its rate as the input.
 
+use crate::boxed::boxed;
 use crate::feedback::Feedback;
 use crate::planner::{Planner, shifted, step};
 use crate::regulators::{ROWS, RegulatorError, STAGES, with_planner};
@@ -36,7 +37,7 @@ pub fn ramped_feedback(
     with_planner(planner?, ballbot, torque, feedback, period)
 }
 
-// Neither of these is inlined: each builds its memory on the stack before it is boxed.
+// Not inlined: each size builds its controller on the stack before it is boxed.
 #[inline(never)]
 fn ramped<const N: usize, const M: usize>(
     ballbot: &Ballbot<f64>,
@@ -44,15 +45,10 @@ fn ramped<const N: usize, const M: usize>(
 ) -> Result<Box<dyn Planner>, RegulatorError> {
     Ok(Box::new(Ramped::<N, M> {
         controller: Box::new(Controller::new(RampedInput(*ballbot), *settings)?),
-        workspace: boxed_workspace(),
+        workspace: boxed(Workspace::new),
         torque: 0.0,
         rate: 0.0,
     }))
-}
-
-#[inline(never)]
-fn boxed_workspace<const N: usize, const M: usize>() -> Box<Workspace<f64, 5, 1, N, M>> {
-    Box::new(Workspace::new())
 }
 
 struct Ramped<const N: usize, const M: usize> {

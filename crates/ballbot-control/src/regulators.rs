@@ -1,5 +1,6 @@
 //! Regulators whose horizon is known at run time.
 
+use crate::boxed::boxed;
 use crate::feedback::Feedback;
 use crate::output_feedback::{Belief, OutputFeedback};
 use crate::planner::{Held, Planner};
@@ -117,15 +118,15 @@ pub(crate) fn with_planner(
     }))
 }
 
-// Neither this nor what follows is inlined: each size builds its memory on the stack before it is
-// boxed, and one frame for all sizes overflows the 2 MB of a thread.
+// Neither this nor what follows is inlined: each size builds its controller on the stack before it
+// is boxed, and one frame for all sizes is too large.
 #[inline(never)]
 fn state_feedback_sized<const N: usize, const M: usize>(
     ballbot: &Ballbot<f64>,
     settings: &ControllerSettings<f64, 4, 1, 3>,
 ) -> Result<Box<dyn Regulator<4, 1, 4>>, ControllerError> {
     let controller = Controller::<_, f64, 4, 1, 3, N, M>::new(*ballbot, *settings)?;
-    let (controller, workspace) = (Box::new(controller), boxed_workspace());
+    let (controller, workspace) = (Box::new(controller), boxed(Workspace::new));
     Ok(Box::new(StateFeedback::new(controller, workspace)))
 }
 
@@ -136,11 +137,6 @@ fn held<const N: usize, const M: usize>(
 ) -> Result<Box<dyn Planner>, RegulatorError> {
     Ok(Box::new(Held::<N, M> {
         controller: Box::new(Controller::new(*ballbot, *settings)?),
-        workspace: boxed_workspace(),
+        workspace: boxed(Workspace::new),
     }))
-}
-
-#[inline(never)]
-fn boxed_workspace<const N: usize, const M: usize>() -> Box<Workspace<f64, 4, 1, N, M>> {
-    Box::new(Workspace::new())
 }

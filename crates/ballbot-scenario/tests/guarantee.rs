@@ -6,9 +6,11 @@
 )]
 
 use ballbot_scenario::{
-    IterationsTable, Parameters, Scenario, ScenarioError, Surroundings, builtin,
+    IterationsTable, LONGEST_HORIZON, Parameters, PointTable, ReferenceTable, Scenario,
+    ScenarioError, Surroundings, TerminalTable, TorqueRateTable, builtin,
 };
 use lpvmpc_sim::{Ending, Trajectory};
+use nalgebra::Vector4;
 use std::path::Path;
 use std::time::Duration;
 
@@ -67,6 +69,55 @@ fn more_programs_per_sample_arrive_earlier() {
     };
     let (one, three) = (arrival(1), arrival(3));
     assert!(three < 0.7 * one, "{three} s against {one} s");
+}
+
+/// Short and long horizons, in memories of either size: every input is backed and the set point is
+/// reached.
+#[test]
+fn every_horizon_keeps_the_promise() {
+    for horizon in [8, 13, 20, 21, 40] {
+        let mut scenario = Scenario::load("far-setpoints").unwrap();
+        scenario.reference = ReferenceTable::SetPoints {
+            points: vec![PointTable {
+                time_s: 0.0,
+                phi_rad: 3.0,
+            }],
+        };
+        scenario.duration_s = 10.0;
+        scenario.controller.horizon = horizon;
+        let trajectory = run(&scenario);
+        assert_eq!(trajectory.ending, Ending::Complete);
+        let mut guards = trajectory.samples.iter().map(|s| s.guard.unwrap());
+        assert!(guards.all(|guard| guard.decision.is_guaranteed()));
+        let off = trajectory.final_state - Vector4::new(3.0, 0.0, 0.0, 0.0);
+        assert!(off.amax() < 1e-2, "{horizon}: {off}");
+    }
+}
+
+/// The largest memories, in a thread with the stack that a thread has. The robot stands, since ten
+/// seconds of an unstable plant in one piece are beyond what numbers can follow.
+#[test]
+fn the_longest_horizons_fit_a_thread() {
+    let mut guaranteed = Scenario::load("far-setpoints").unwrap();
+    guaranteed.reference = ReferenceTable::SetPoints {
+        points: vec![PointTable {
+            time_s: 0.0,
+            phi_rad: 0.0,
+        }],
+    };
+    let mut ramped = guaranteed.clone();
+    ramped.controller.terminal = TerminalTable::DiscreteRiccati;
+    let mut plain = ramped.clone();
+    ramped.controller.torque_rate = Some(TorqueRateTable {
+        limit_nm_s: 20.0,
+        weight: 1.0,
+    });
+    for scenario in [&mut guaranteed, &mut ramped, &mut plain] {
+        scenario.controller.horizon = LONGEST_HORIZON;
+        scenario.duration_s = 0.15;
+        let trajectory = run(scenario);
+        assert_eq!(trajectory.samples.len(), 3, "{:?}", trajectory.ending);
+    }
 }
 
 /// A reference beyond the bounds of phi: the robot stops at the nearest admissible set point,

@@ -89,6 +89,7 @@ impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usiz
     GuardedWorkspace<T, NU, NA, NP, M>
 {
     /// An empty workspace.
+    #[inline(always)]
     pub fn new() -> Self {
         Self {
             ocp: Ocp::default(),
