@@ -18,5 +18,6 @@ export CHROMIUM=${CHROMIUM:-$(command -v chromium)}
 cd web
 npm ci --no-audit --no-fund
 npm run build
+node scripts/sizes.mjs --fail
 cargo build --locked --release --features page -p ballbot-cli
 BALLBOT=$CARGO_TARGET_DIR/release/ballbot npm test

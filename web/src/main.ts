@@ -130,6 +130,8 @@ let lastSlow = 0;
 let stale = true;
 /** The picture moves by itself. */
 let moving = false;
+/** The last frame was drawn. */
+let drawn = false;
 
 function redraw(): void {
   stale = true;
@@ -137,7 +139,9 @@ function redraw(): void {
 
 function frame(now: number): void {
   requestAnimationFrame(frame);
-  if (app.histories.length === 0 || !(app.isRunning || stale || moving)) return;
+  const inSequence = drawn;
+  drawn = app.histories.length > 0 && (app.isRunning || stale || moving);
+  if (!drawn) return;
   const time = app.time();
   if (now - lastSlow > SLOW) {
     lastSlow = now;
@@ -146,7 +150,8 @@ function frame(now: number): void {
     plots.draw(time);
     showWords(time);
   }
-  moving = view.draw({ ...pictures.at(time), stroke: pointer.stroke, strokeKind: pointer.strokeKind });
+  const picture = { ...pictures.at(time), stroke: pointer.stroke, strokeKind: pointer.strokeKind };
+  moving = view.draw(picture, inSequence);
 }
 
 async function openFiles(files: File[]): Promise<void> {
@@ -202,6 +207,7 @@ async function start(): Promise<void> {
     const { x, y } = pictures.firstTarget();
     sendTo({ x: x + dx, y: y + dy });
   };
+  connectControls({ app, view, plots, pointer, resized, moveTarget, openFiles: (files) => void openFiles(files) });
   new ResizeObserver(resized).observe(host);
   new ResizeObserver(resized).observe(byId("plots"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
@@ -209,12 +215,12 @@ async function start(): Promise<void> {
     restarted();
   });
   app.onBatch = redraw;
-  for (const input of ["pointerdown", "pointermove", "pointerup", "wheel", "keydown", "change"]) {
+  for (const input of ["pointerdown", "pointermove", "pointerup", "pointercancel", "wheel", "keydown", "change"]) {
     window.addEventListener(input, redraw, { passive: true });
   }
+  view.element.addEventListener("webglcontextrestored", redraw);
   await app.start(location.hash.slice(1));
   panel = makePanel();
-  connectControls({ app, view, plots, pointer, resized, moveTarget, openFiles: (files) => void openFiles(files) });
   for (const id of ["play", "step", "reset"]) byId<HTMLButtonElement>(id).disabled = false;
   setupShown();
   runningShown();

@@ -114,10 +114,12 @@ function tick(): void {
  *  steps, which nobody sees, the first ones of a run take three times as long as the later ones. */
 function warmUp({ setup }: RobotSetup): void {
   const simulation = new Simulation(setup, certificate);
-  const end = performance.now() + MOST_WARM_UP;
-  for (let k = 0; k < WARM_UP && performance.now() < end; k++) simulation.step();
-  simulation.free();
-  warm = true;
+  try {
+    const end = performance.now() + MOST_WARM_UP;
+    for (let k = 0; k < WARM_UP && performance.now() < end; k++) simulation.step();
+  } finally {
+    simulation.free();
+  }
 }
 
 function configure(setups: RobotSetup[], keep: boolean): RobotFacts[] {
@@ -135,7 +137,6 @@ function configure(setups: RobotSetup[], keep: boolean): RobotFacts[] {
     throw error;
   }
   for (const { simulation } of robots) simulation.free();
-  if (!warm && setups[0] !== undefined) warmUp(setups[0]);
   robots = next;
   referencesChanged = true;
   if (!keep) {
@@ -146,6 +147,11 @@ function configure(setups: RobotSetup[], keep: boolean): RobotFacts[] {
   }
   // After the answer, which tells the page how many robots there are.
   queueMicrotask(send);
+  const first = setups[0];
+  if (!warm && first !== undefined) {
+    warm = true;
+    setTimeout(() => warmUp(first));
+  }
   return robots.map(({ label, simulation }) => ({
     label,
     planes: simulation.planes(),

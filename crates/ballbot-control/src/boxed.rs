@@ -10,12 +10,14 @@ const LARGE: usize = 1 << 18;
 pub(crate) fn boxed<W: Send + 'static>(make: fn() -> W) -> Box<W> {
     #[cfg(not(target_family = "wasm"))]
     if size_of::<W>() > LARGE {
+        // Room for a copy or two that an unoptimised build makes on the way.
         let thread = std::thread::Builder::new().stack_size(4 * size_of::<W>());
         let made = thread.spawn(move || boxed_from_stack(make));
         if let Some(made) = made.ok().and_then(|thread| thread.join().ok()) {
             return made;
         }
     }
+    // Small, or there are no threads: then this stack has to do.
     boxed_from_stack(make)
 }
 

@@ -1,7 +1,7 @@
 //! The guaranteed loop.
 
 use crate::boxed::boxed;
-use crate::regulators::{LONGEST_HORIZON, ROWS, STAGES};
+use crate::regulators::{LONGEST_HORIZON, ROWS, STAGES, too_long};
 use crate::sharing::SharingPlane;
 use ballbot::Ballbot;
 use lpvmpc::{GuardedController, GuardedError, GuardedSettings, GuardedWorkspace};
@@ -22,7 +22,8 @@ pub fn guarded_feedback(
     match settings.horizon {
         #[cfg(not(target_family = "wasm"))]
         ..=20 => sized::<20, 22, GUARDED_ACTIVE>(ballbot, settings),
-        _ => sized::<LONGEST_HORIZON, STAGES, ROWS>(ballbot, settings),
+        ..=LONGEST_HORIZON => sized::<LONGEST_HORIZON, STAGES, ROWS>(ballbot, settings),
+        given => Err(too_long(given).into()),
     }
 }
 

@@ -134,12 +134,11 @@ impl OutputFeedback {
 
 impl SharingPlane for OutputFeedback {
     fn largest_torque(&self) -> f64 {
-        let largest = self.planner.largest_torque(self.belief.disturbance());
-        largest.unwrap_or(f64::INFINITY)
+        self.planner.largest_torque(self.belief.disturbance())
     }
 
     fn set_share(&mut self, torque: f64) {
-        if self.planner.largest_torque(0.0).is_some() {
+        if self.planner.can_share() {
             self.share = torque;
         }
     }

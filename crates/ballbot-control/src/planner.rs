@@ -37,10 +37,15 @@ pub(crate) trait Planner {
     /// The bounds that are active in the last plan, as those of the robot.
     fn active_bounds(&self) -> Vec<BoundId>;
 
-    /// The largest torque that the last plan commands beside the `disturbance`, N m. `None` from
-    /// one whose bounds must not change from sample to sample.
-    fn largest_torque(&self, _disturbance: f64) -> Option<f64> {
-        None
+    /// Whether its bounds may change from sample to sample.
+    fn can_share(&self) -> bool {
+        false
+    }
+
+    /// The largest torque that the last plan commands beside the `disturbance`, N m; infinite from
+    /// one that cannot share.
+    fn largest_torque(&self, _disturbance: f64) -> f64 {
+        f64::INFINITY
     }
 }
 
@@ -84,10 +89,14 @@ impl<const N: usize, const M: usize> Planner for Held<N, M> {
         active.map(|row| row.bound).collect()
     }
 
-    fn largest_torque(&self, disturbance: f64) -> Option<f64> {
+    fn can_share(&self) -> bool {
+        true
+    }
+
+    fn largest_torque(&self, disturbance: f64) -> f64 {
         let plan = self.controller.solution().u.iter();
         let plan = plan.take(self.controller.settings().horizon);
-        Some(plan.fold(0.0, |most, u| most.max((u[0] - disturbance).abs())))
+        plan.fold(0.0, |most, u| most.max((u[0] - disturbance).abs()))
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::boxed::boxed;
 use crate::feedback::Feedback;
 use crate::planner::{Planner, shifted, step};
-use crate::regulators::{ROWS, RegulatorError, STAGES, with_planner};
+use crate::regulators::{RegulatorError, sized, too_long, with_planner};
 use crate::sharing::SharingPlane;
 use ballbot::Ballbot;
 use lpvmpc::{BoundId, Bounds, Controller, ControllerSettings, Quantity, RampedInput, Workspace};
@@ -25,15 +25,8 @@ pub fn ramped_feedback(
     feedback: &Feedback,
     period: f64,
 ) -> Result<Box<dyn SharingPlane>, RegulatorError> {
-    let planner = match settings.horizon {
-        #[cfg(not(target_family = "wasm"))]
-        ..=20 => ramped::<20, 44>(ballbot, settings),
-        #[cfg(not(target_family = "wasm"))]
-        21..=50 => ramped::<50, 104>(ballbot, settings),
-        #[cfg(not(target_family = "wasm"))]
-        51..=100 => ramped::<100, 204>(ballbot, settings),
-        _ => ramped::<STAGES, ROWS>(ballbot, settings),
-    };
+    let planner: Result<_, RegulatorError> =
+        sized!(settings.horizon, 2 per sample, ramped(ballbot, settings));
     with_planner(planner?, ballbot, torque, feedback, period)
 }
 

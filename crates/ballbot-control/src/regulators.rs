@@ -19,8 +19,8 @@ pub const LONGEST_HORIZON: usize = 200;
 /// Stages of the largest quadratic program: that of a guarded controller has two more than samples.
 pub(crate) const STAGES: usize = LONGEST_HORIZON + 2;
 
-/// Rows that the largest quadratic program may have active: the bounds of the torque and, where its
-/// rate is the input, of the rate, and up to 4 rows of a terminal equality.
+/// Rows that the largest quadratic program may have active: a bound of the torque and, where its
+/// rate is the input, one of the rate per sample, and up to 4 rows of a terminal equality.
 pub(crate) const ROWS: usize = 2 * LONGEST_HORIZON + 4;
 
 /// A regulator refuses its settings.
@@ -34,26 +34,41 @@ pub enum RegulatorError {
     Controller(#[from] ControllerError),
 }
 
-/// Calls a generic function with the smallest compiled size for a horizon: stages, and rows that
-/// may be active. A torque has two bounds, one of which is active, and a terminal equality 4 rows.
+/// Calls a generic function with the smallest compiled size for a horizon: stages, and rows that may
+/// be active, `$rows` per sample and 4 of a terminal equality.
 ///
 /// In a browser the largest size must do for all controllers: the time per step follows the horizon
 /// that is used, and every size is code that has to be loaded.
 macro_rules! sized {
-    ($horizon:expr, $function:ident($($argument:expr),*)) => {
+    ($horizon:expr, $rows:literal per sample, $function:ident($($argument:expr),*)) => {{
+        use $crate::regulators::LONGEST_HORIZON;
         match $horizon {
             #[cfg(not(target_family = "wasm"))]
-            ..=20 => $function::<20, 24>($($argument),*),
+            ..=20 => $function::<20, { $rows * 20 + 4 }>($($argument),*),
             #[cfg(not(target_family = "wasm"))]
-            21..=50 => $function::<50, 54>($($argument),*),
+            21..=50 => $function::<50, { $rows * 50 + 4 }>($($argument),*),
             #[cfg(not(target_family = "wasm"))]
-            51..=100 => $function::<100, 104>($($argument),*),
+            51..=100 => $function::<100, { $rows * 100 + 4 }>($($argument),*),
             #[cfg(not(target_family = "wasm"))]
-            101.. => $function::<LONGEST_HORIZON, { LONGEST_HORIZON + 4 }>($($argument),*),
+            101..=LONGEST_HORIZON => {
+                $function::<LONGEST_HORIZON, { $rows * LONGEST_HORIZON + 4 }>($($argument),*)
+            }
             #[cfg(target_family = "wasm")]
-            _ => $function::<STAGES, ROWS>($($argument),*),
+            ..=LONGEST_HORIZON => {
+                use $crate::regulators::{ROWS, STAGES};
+                $function::<STAGES, ROWS>($($argument),*)
+            }
+            given => Err(too_long(given).into()),
         }
-    };
+    }};
+}
+pub(crate) use sized;
+
+pub(crate) fn too_long(given: usize) -> ControllerError {
+    ControllerError::Horizon {
+        given,
+        largest: LONGEST_HORIZON,
+    }
 }
 
 /// The controller on the measured state itself.
@@ -64,7 +79,7 @@ pub fn state_feedback(
     ballbot: &Ballbot<f64>,
     settings: &ControllerSettings<f64, 4, 1, 3>,
 ) -> Result<Box<dyn Regulator<4, 1, 4>>, ControllerError> {
-    sized!(settings.horizon, state_feedback_sized(ballbot, settings))
+    sized!(settings.horizon, 1 per sample, state_feedback_sized(ballbot, settings))
 }
 
 /// The controller with what stands around it; `period` is that of the sensors, s.
@@ -78,7 +93,7 @@ pub fn output_feedback(
     feedback: &Feedback,
     period: f64,
 ) -> Result<Box<dyn SharingPlane>, RegulatorError> {
-    let planner = sized!(settings.horizon, held(ballbot, settings))?;
+    let planner = sized!(settings.horizon, 1 per sample, held(ballbot, settings))?;
     with_planner(planner, ballbot, &settings.u, feedback, period)
 }
 

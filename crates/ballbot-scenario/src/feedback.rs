@@ -16,8 +16,8 @@ use lpvmpc::{
     TerminalIngredient, Weights,
 };
 use nalgebra::{
-    Matrix1, Matrix1x2, Matrix3x4, Matrix4x2, Matrix5, SMatrix, Vector1, Vector2, Vector3, Vector4,
-    Vector5,
+    Complex, Matrix1, Matrix1x2, Matrix3x4, Matrix4x2, Matrix5, SMatrix, Vector1, Vector2, Vector3,
+    Vector4, Vector5,
 };
 use std::f64::consts::FRAC_PI_2;
 
@@ -51,11 +51,16 @@ impl ControllerTable {
     }
 }
 
+/// The poles of this robot at the upright equilibrium, 1/s.
+pub(crate) fn poles(ballbot: &Ballbot<f64>) -> Result<Vec<Complex<f64>>, ScenarioError> {
+    let (a, _) = ballbot.matrices(&Vector3::zeros());
+    lpvmpc_design::poles(&dynamic(&a))
+        .map_err(|error| ScenarioError::value("parameters", "(all)", error.to_string()))
+}
+
 /// The longest step in s with which the estimator follows this robot.
 fn longest_step(ballbot: &Ballbot<f64>) -> Result<f64, ScenarioError> {
-    let (a, _) = ballbot.matrices(&Vector3::zeros());
-    let poles = lpvmpc_design::poles(&dynamic(&a))
-        .map_err(|error| ScenarioError::value("parameters", "(all)", error.to_string()))?;
+    let poles = poles(ballbot)?;
     let fastest = poles.iter().map(|pole| pole.norm()).fold(1.0, f64::max);
     Ok(ESTIMATOR_STEP / fastest)
 }

@@ -4,7 +4,9 @@
 use crate::plant::{self, PlantError, Tolerances};
 use crate::regulator::{Decision, Regulator};
 use crate::sensor::Measurement;
-use lpvmpc::{GuardedController, GuardedSettings, GuardedStep, GuardedWorkspace, LpvModel};
+use lpvmpc::{
+    BoundId, GuardedController, GuardedSettings, GuardedStep, GuardedWorkspace, LpvModel,
+};
 use nalgebra::SVector;
 use std::time::Duration;
 
@@ -202,5 +204,9 @@ where
 
     fn prediction(&self) -> Vec<SVector<f64, NX>> {
         self.controller.rollout().to_vec()
+    }
+
+    fn active_bounds(&self) -> Vec<BoundId> {
+        self.workspace.plant_bounds().collect()
     }
 }

@@ -57,8 +57,8 @@ pub trait Regulator<const NX: usize, const NU: usize, const NY: usize> {
     /// The states that the model reaches under the last plan, one per sample of the horizon.
     fn prediction(&self) -> Vec<SVector<f64, NX>>;
 
-    /// The bounds that are active in the last plan. None from a controller whose problem is not
-    /// stated in the plant's own states and inputs.
+    /// The bounds of the plant that are active in the last plan; none from a controller that does
+    /// not tell.
     fn active_bounds(&self) -> Vec<BoundId> {
         Vec::new()
     }

@@ -5,13 +5,13 @@
 )]
 
 use lpvmpc::{
-    Bounds, GuardedController, GuardedIterations, GuardedSettings, GuardedWorkspace, LpvModel, Rk4,
-    SolverSettings, TerminalSet, Weights,
+    BoundId, Bounds, GuardedController, GuardedIterations, GuardedSettings, GuardedWorkspace,
+    LpvModel, Quantity, Rk4, Side, SolverSettings, TerminalSet, Weights,
 };
 use lpvmpc_design::lqr_discrete;
 use lpvmpc_sim::{
-    Actuation, ClosedLoop, Course, Ending, GuardedFeedback, GuardedLoop, Tolerances, Unloaded,
-    World, record,
+    Actuation, ClosedLoop, Course, Ending, GuardedFeedback, GuardedLoop, Regulator, Tolerances,
+    Unloaded, World, record,
 };
 use nalgebra::{DMatrix, Matrix1, Matrix2, Matrix2x1, RowVector2, Vector1, Vector2};
 use std::time::Duration;
@@ -120,6 +120,49 @@ fn a_run_is_the_sequence_of_its_samples() {
         "{}",
         run.final_state
     );
+}
+
+/// The mass is linear, so the plan is the program's answer: it meets the bounds that are reported as
+/// active, speeds at their stages and the force that is applied, and no others.
+#[test]
+fn active_bounds_are_where_the_plan_meets_them() {
+    let mut regulator = GuardedFeedback {
+        controller: controller(),
+        workspace: Box::new(Workspace::new()),
+        x: Vector2::zeros(),
+    };
+    let (mut speeds, mut forces) = (0, 0);
+    for k in 0..60 {
+        let decision = regulator.decide(k, &|_| Vector2::new(20.0, 0.0), &|| Duration::ZERO);
+        let plan = regulator.prediction();
+        let active = regulator.active_bounds();
+        let upper_speed = |stage| {
+            active.contains(&BoundId {
+                stage,
+                quantity: Quantity::State(1),
+                side: Side::Upper,
+            })
+        };
+        for (i, x) in plan.iter().enumerate() {
+            // The margin is a thousandth of the bounds' width.
+            assert_eq!(upper_speed(i + 1), x[1] > 0.5 - 0.0011, "{k} {i} {x}");
+            speeds += usize::from(upper_speed(i + 1));
+        }
+        let upper_force = active.contains(&BoundId {
+            stage: 0,
+            quantity: Quantity::Input(0),
+            side: Side::Upper,
+        });
+        assert_eq!(
+            upper_force,
+            decision.u[0] > 1.0 - 1e-9,
+            "{k}: {}",
+            decision.u
+        );
+        forces += usize::from(upper_force);
+        regulator.x = plan[0];
+    }
+    assert!(speeds > 100 && forces > 0, "{speeds} {forces}");
 }
 
 /// Position and speed under a constant acceleration are known: the old input acts during the

@@ -16,7 +16,7 @@ mod settings;
 
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Ocp;
-use crate::solution::{Solution, Status};
+use crate::solution::{BoundId, Solution, Status};
 use crate::solver::{Solver, SolverSettings, WarmStart};
 use core::fmt;
 use nalgebra::{SVector, convert};
@@ -102,6 +102,12 @@ impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usiz
     /// region included.
     pub fn active_bounds(&self) -> usize {
         self.solution.active.len()
+    }
+
+    /// Those of them that are the plant's own, with the plant's stages: 0 is now.
+    pub fn plant_bounds(&self) -> impl Iterator<Item = BoundId> {
+        let active = self.solution.active.iter();
+        active.filter_map(|row| program::of_the_plant(row.bound, self.ocp.horizon))
     }
 }
 

@@ -114,12 +114,14 @@ export function rangeField(spec: FieldSpec, changed: (value: [number, number]) =
   const [lower, upper] = [make("lower bound"), make("upper bound")];
   const typing = [new Typing(lower), new Typing(upper)] as const;
   const read = (input: HTMLInputElement, empty: number) => (input.value.trim() === "" ? empty : Number(input.value));
-  for (const input of [lower, upper]) {
-    input.addEventListener("change", () => changed([read(lower, -Infinity), read(upper, Infinity)]));
-  }
+  // Only the side that was typed: the other one may have more digits than are shown.
+  let now: [number, number] = [-Infinity, Infinity];
+  lower.addEventListener("change", () => changed([read(lower, -Infinity), now[1]]));
+  upper.addEventListener("change", () => changed([now[0], read(upper, Infinity)]));
   return {
     element: row(spec, lower, upper),
     set([low, high]) {
+      now = [low, high];
       if (!typing[0].now) lower.value = shown(low);
       if (!typing[1].now) upper.value = shown(high);
     },

@@ -14,9 +14,10 @@ import type { FloorPoint, Picture, Shape, Theme, View } from "./view";
 const FOLLOW_RATE = 3.5;
 /** A camera that moves by less in a frame stands still, m. */
 const STILL = 1e-4;
-/** Frames further apart are too slow, ms; those further apart than IDLE do not belong together. */
+/** Time between two frames as a rule, ms. */
+const FRAME = 1000 / 60;
+/** Frames further apart are too slow, ms. */
 const SLOW_FRAME = 40;
-const IDLE = 1000;
 /** For how long frames may be slow, ms. */
 const PATIENCE = 1500;
 
@@ -114,7 +115,7 @@ export class SolidView implements View {
     this.camera.updateProjectionMatrix();
   }
 
-  draw(picture: Picture): boolean {
+  draw(picture: Picture, inSequence: boolean): boolean {
     const colours = picture.robots.map(({ colour }) => colour);
     if (colours.join() !== this.actors.map(({ colour }) => colour).join()) {
       this.clearActors();
@@ -123,10 +124,14 @@ export class SolidView implements View {
     }
     for (const [i, robot] of picture.robots.entries()) this.actors[i]?.draw(robot);
     this.stroke.set(picture.stroke.length, (i) => picture.stroke[i] ?? { x: 0, y: 0 }, 0);
-    const followed = this.follow(picture.follow);
+    const now = performance.now();
+    // After a pause nothing is known of how fast frames are.
+    const gap = inSequence ? now - this.lastFrame : FRAME;
+    this.lastFrame = now;
+    const followed = this.follow(picture.follow, gap);
     const turned = this.controls.update();
+    this.adapt(gap);
     this.renderer.render(this.scene, this.camera);
-    this.adapt();
     return followed > STILL || turned;
   }
 
@@ -137,10 +142,11 @@ export class SolidView implements View {
     this.robots = robots;
   }
 
-  /** Camera, light and grid move along with the robots. Returns how far, m. */
-  private follow(point: FloorPoint): number {
+  /** Camera, light and grid move along with the robots, `gap` ms after the last time. Returns how
+   *  far, m. */
+  private follow(point: FloorPoint, gap: number): number {
     const goal = toScene(point.x, point.y);
-    const elapsed = Math.min((performance.now() - this.lastFrame) / 1000, 0.2);
+    const elapsed = Math.min(gap / 1000, 0.2);
     const step = goal.sub(this.followed).multiplyScalar(1 - Math.exp(-elapsed * FOLLOW_RATE));
     this.followed.add(step);
     this.camera.position.add(step);
@@ -156,12 +162,7 @@ export class SolidView implements View {
   }
 
   /** Gives up shadows, then resolution, where the graphics cannot keep up. */
-  private adapt(): void {
-    const now = performance.now();
-    const gap = now - this.lastFrame;
-    this.lastFrame = now;
-    // Nothing was to be drawn for a while.
-    if (gap > IDLE) return;
+  private adapt(gap: number): void {
     this.slowFor = gap > SLOW_FRAME ? this.slowFor + gap : Math.max(this.slowFor - gap, 0);
     if (this.slowFor < PATIENCE) return;
     this.slowFor = 0;

@@ -54,8 +54,9 @@ export interface Theme {
 export interface View {
   readonly kind: "3d" | "2d";
   readonly element: HTMLElement;
-  /** Returns whether the picture still moves by itself: the camera swings out or goes after a robot. */
-  draw(picture: Picture): boolean;
+  /** `inSequence` says that the frame before this one was drawn, too. Returns whether the picture
+   *  still moves by itself: the camera swings out or goes after a robot. */
+  draw(picture: Picture, inSequence: boolean): boolean;
   setShape(shape: Shape): void;
   setTheme(theme: Theme): void;
   resize(): void;

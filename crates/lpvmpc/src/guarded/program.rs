@@ -10,7 +10,7 @@ use super::GuardedController;
 use super::plan::{Plan, shrunk, width};
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Bounds, Ocp, Penalty, Stage};
-use crate::solution::Solution;
+use crate::solution::{BoundId, Solution};
 use nalgebra::{Cholesky, Const, SMatrix, SVector, convert};
 
 impl<
@@ -159,6 +159,13 @@ fn augmented<T: Scalar, const NX: usize, const NA: usize>(
     z: T,
 ) -> SVector<T, NA> {
     SVector::from_fn(|i, _| x.get(i).copied().unwrap_or(z))
+}
+
+/// A bound of a program of `horizon` stages as one of the plant, whose stages begin one later. At
+/// the first stage there is the set point's trust region, at the end the terminal set.
+pub(super) fn of_the_plant(bound: BoundId, horizon: usize) -> Option<BoundId> {
+    let stage = bound.stage.checked_sub(1)?;
+    (bound.stage < horizon).then_some(BoundId { stage, ..bound })
 }
 
 /// The plant's inputs and the set point of a solved program.
