@@ -6,8 +6,7 @@ use crate::rng::Rng;
 use lpvmpc::riccati::{CostToGo, StageFactor};
 use lpvmpc::{
     Bounds, Decision, GuardedController, GuardedError, GuardedIterations, GuardedSettings,
-    GuardedStep, GuardedWorkspace, LpvModel, Quantity, Rk4, Scheduling, Side, SolverSettings,
-    Stage, TerminalSet,
+    GuardedStep, GuardedWorkspace, LpvModel, Rk4, Scheduling, SolverSettings, Stage, TerminalSet,
 };
 use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
 
