@@ -5,9 +5,12 @@ const port = 8018;
 export default defineConfig({
   testDir: "tests",
   timeout: 120_000,
-  fullyParallel: false,
-  workers: 1,
+  workers: 2,
   reporter: [["list"]],
+  projects: [
+    { name: "page", testIgnore: "timing.spec.ts", fullyParallel: true },
+    { name: "timing", testMatch: "timing.spec.ts", dependencies: ["page"] },
+  ],
   use: {
     baseURL: `http://127.0.0.1:${port}/`,
     // Not large, since the processor computes the pictures.
