@@ -38,8 +38,6 @@ export class Engine {
   private receive(message: FromWorker): void {
     if ("batch" in message) {
       this.onBatch(message.batch);
-    } else if ("failed" in message) {
-      this.onFailure(message.failed);
     } else {
       const waiting = this.waiting.get(message.id);
       this.waiting.delete(message.id);

@@ -109,5 +109,4 @@ export interface Batch {
 export type FromWorker =
   | { id: number; value: unknown }
   | { id: number; error: string }
-  | { batch: Batch }
-  | { failed: string };
+  | { batch: Batch };

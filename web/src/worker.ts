@@ -201,26 +201,25 @@ function answer(call: Call): unknown {
 async function start(): Promise<void> {
   try {
     await init({ module_or_path: wasmUrl });
-    lastTick = performance.now();
-    tick();
   } catch (error) {
-    post({ failed: `the controller's WebAssembly module cannot be loaded: ${error}` });
-    throw error;
+    throw new Error(`the controller's WebAssembly module cannot be loaded: ${error}`);
   }
+  lastTick = performance.now();
+  tick();
 }
 
 const started = start();
 
 self.onmessage = async ({ data }: MessageEvent<ToWorker>) => {
-  await started;
-  if ("run" in data) {
-    ({ running, speed } = data.run);
-    send();
-    return;
-  }
   try {
-    post({ id: data.id, value: answer(data.call) });
+    await started;
+    if ("run" in data) {
+      ({ running, speed } = data.run);
+      send();
+    } else {
+      post({ id: data.id, value: answer(data.call) });
+    }
   } catch (error) {
-    post({ id: data.id, error: error instanceof Error ? error.message : String(error) });
+    if ("id" in data) post({ id: data.id, error: error instanceof Error ? error.message : String(error) });
   }
 };

@@ -1,7 +1,7 @@
 // Every control does what it says: the set-up that is saved has its value, and the run shows it.
 
 import { expect, test } from "@playwright/test";
-import { clock, fill, largest, open, openFlat, openSection, saved, scenario, table, until } from "./page";
+import { clock, fill, largest, openFlat, openSection, saved, scenario, table, until } from "./page";
 
 const NUMBERS: [section: string, label: string, typed: string, key: string, value: number][] = [
   ["Controller", "Horizon N", "35", "horizon", 35],
@@ -145,7 +145,7 @@ test("a value that makes no sense is refused with a message, and nothing changes
 });
 
 test("the keyboard is enough", async ({ page }) => {
-  await open(page);
+  await openFlat(page);
   await page.locator("#scene").focus();
   await page.keyboard.press("ArrowRight");
   await expect(page.getByLabel("Target X", { exact: true })).toHaveValue("0.25");

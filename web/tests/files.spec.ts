@@ -2,7 +2,7 @@
 
 import { readFileSync } from "node:fs";
 import { expect, test } from "@playwright/test";
-import { drop, fill, open, openFlat, openFile, openSection, ready, saved, scenario, until } from "./page";
+import { drop, fill, openFlat, openFile, openSection, ready, saved, scenario, until } from "./page";
 
 test("a link holds the whole set-up", async ({ page, context }) => {
   await context.grantPermissions(["clipboard-read", "clipboard-write"]);
@@ -58,7 +58,7 @@ test("a recorded run is played back", async ({ page }) => {
 });
 
 test("a recorded run of two planes is dropped on the page and played back", async ({ page }) => {
-  await open(page);
+  await openFlat(page);
   await scenario(page, "lissajous");
   await page.locator("#play").click();
   await until(page, 2);

@@ -37,6 +37,13 @@ test("without WebGL the floor is shown from above, and the page says so", async 
   await until(page, 1);
 });
 
+test("without the module the page says so, and nothing can be started", async ({ page }) => {
+  await page.route("**/*.wasm", (route) => route.abort());
+  await page.goto("./?flat");
+  await expect(page.locator("#message")).toContainText("WebAssembly module cannot be loaded");
+  await expect(page.locator("#play")).toBeDisabled();
+});
+
 test("on a phone nothing sticks out and everything can be reached", async ({ browser }) => {
   const context = await browser.newContext({ viewport: { width: 390, height: 844 }, isMobile: true, hasTouch: true });
   const page = await context.newPage();

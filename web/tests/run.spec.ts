@@ -62,7 +62,7 @@ test("a saved set-up with noise, delay and slope runs the same in the program", 
 });
 
 test("run, pause, step, slow motion and reset", async ({ page }) => {
-  await open(page);
+  await openFlat(page);
   await scenario(page, "two-setpoints");
   await page.locator("#step").click();
   await page.locator("#step").click();
@@ -87,7 +87,7 @@ test("run, pause, step, slow motion and reset", async ({ page }) => {
 });
 
 test("a push within the limits is survived", async ({ page }) => {
-  await open(page);
+  await openFlat(page);
   await page.locator("#play").click();
   await until(page, 0.5);
   await fill(page, "Push", "5");

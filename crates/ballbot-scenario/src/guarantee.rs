@@ -225,7 +225,7 @@ fn check_bounds(
     terminal: &TerminalSet<f64, 4, 1>,
     plain: &ControllerSettings<f64, 4, 1, 3>,
 ) -> Result<Vector4<f64>, ScenarioError> {
-    let inverse = dynamic(&terminal.p).try_inverse().ok_or_else(|| {
+    let inverse = dynamic(&terminal.p).lu().try_inverse().ok_or_else(|| {
         ScenarioError::value(
             format!("{KEY}.certificate"),
             "P",

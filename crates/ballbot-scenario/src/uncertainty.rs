@@ -3,10 +3,8 @@
 use crate::error::ScenarioError;
 use crate::problem::dynamic;
 use ballbot::{Ballbot, limits};
+use lpvmpc_sim::Random;
 use nalgebra::{SMatrix, SVector};
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
 use serde::Deserialize;
 
 /// What of an identified robot is uncertain: its plant, in the order of [`values`]. Delay and
@@ -120,11 +118,11 @@ impl Uncertainty {
     /// The covariance is none, or there is no such robot within the uncertainty.
     pub fn draw(&self, ballbot: &Ballbot<f64>, seed: u64) -> Result<Ballbot<f64>, ScenarioError> {
         let factor = self.factor()?;
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut random = Random::new(seed, 0);
         let physical = |robot: &Ballbot<f64>| robot.consistency(limits::THETA).is_physical();
         let wanted = physical(ballbot);
         for _ in 0..MOST_DRAWS {
-            let normal = SVector::<f64, N>::from_fn(|_, _| StandardNormal.sample(&mut random));
+            let normal = SVector::<f64, N>::from_fn(|_, _| random.normal());
             let drawn = with(ballbot, &(values(ballbot) + factor * normal));
             let invertible = drawn.consistency(limits::THETA).mass_invertible;
             if drawn.geometry.wheel_radius > 0.0 && invertible && physical(&drawn) == wanted {

@@ -9,7 +9,7 @@
 use crate::parameters::{Ballbot, Field};
 use crate::trigonometry::sin_cos;
 use lpvmpc::{LpvModel, Scalar};
-use nalgebra::{Matrix4, Vector1, Vector3, Vector4};
+use nalgebra::{Matrix4, SMatrix, Vector1, Vector3, Vector4};
 
 /// The scheduling (theta, theta_dot), as the embedding's formulas need it.
 #[derive(Clone, Copy, Debug)]
@@ -118,6 +118,17 @@ impl<T: Scalar> LpvModel<T, 4, 1, 3> for Ballbot<T> {
             zero, body[0], body[1], body[2],
         );
         (a, Vector4::new(zero, zero, b[0], b[1]))
+    }
+
+    /// The upper half of A says that rates are rates, and nothing depends on phi.
+    #[inline(always)]
+    fn a_times<const C: usize>(&self, a: &Matrix4<T>, v: &SMatrix<T, 4, C>) -> SMatrix<T, 4, C> {
+        let mut out = SMatrix::<T, 4, C>::zeros();
+        for (out, v) in out.data.0.iter_mut().zip(&v.data.0) {
+            let row = |i| a[(i, 1)] * v[1] + a[(i, 2)] * v[2] + a[(i, 3)] * v[3];
+            *out = [v[2], v[3], row(2), row(3)];
+        }
+        out
     }
 
     #[inline(always)]

@@ -3,6 +3,8 @@
 use nalgebra::DMatrix;
 use thiserror::Error;
 
+use crate::modes::pivots;
+
 /// Disturbances that no measurement can tell apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum OffsetFreeError {
@@ -33,7 +35,7 @@ pub enum OffsetFreeError {
     },
 }
 
-/// A singular value below this share of the largest one counts as zero.
+/// A pivot below this share of the largest one counts as zero.
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// Checks the rank condition of offset-free tracking for x_dot = A x + B u + B_d d,
@@ -76,9 +78,9 @@ pub fn check_offset_free(
         let length = column.norm();
         column.unscale_mut(if length > 0.0 { length } else { 1.0 });
     }
-    let values = joint.singular_values_unordered();
-    let least = NEGLIGIBLE * values.max();
-    let rank = values.iter().filter(|value| **value > least).count();
+    let pivots = pivots(joint);
+    let least = NEGLIGIBLE * pivots.max();
+    let rank = pivots.iter().filter(|pivot| **pivot > least).count();
     if rank == n + n_d {
         Ok(())
     } else {

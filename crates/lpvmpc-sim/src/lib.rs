@@ -14,6 +14,7 @@ pub mod closed_loop;
 mod disturbance;
 mod guarded_loop;
 pub mod plant;
+mod random;
 mod regulator;
 mod sensor;
 mod world;
@@ -26,6 +27,7 @@ pub use closed_loop::{
 pub use disturbance::Disturbance;
 pub use guarded_loop::{Actuation, Guard, GuardedFeedback, GuardedLoop};
 pub use plant::{Plant, PlantError, Tolerances, Unloaded, advance};
+pub use random::Random;
 pub use regulator::{Decision, Regulator, StateFeedback};
 pub use sensor::{Measurement, Sensor};
 pub use world::{World, WorldError, WorldSettings};

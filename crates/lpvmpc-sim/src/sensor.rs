@@ -1,9 +1,7 @@
 //! What a sensor makes of the state: bias, noise, quantisation, missing, late and stale samples.
 
+use crate::random::Random;
 use nalgebra::SVector;
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use std::collections::VecDeque;
 
 /// One measured quantity: a linear combination of the states, and what is wrong with it.
@@ -106,7 +104,7 @@ impl<const NX: usize> Sensor<NX> {
 #[derive(Clone, Debug)]
 pub(crate) struct Channel<const NX: usize> {
     sensor: Sensor<NX>,
-    random: ChaCha8Rng,
+    random: Random,
     /// Measured, and not delivered yet: one entry per sample of the world.
     travelling: VecDeque<Option<f64>>,
     /// The reading that was delivered last, and the sample at which it was taken.
@@ -115,11 +113,9 @@ pub(crate) struct Channel<const NX: usize> {
 
 impl<const NX: usize> Channel<NX> {
     pub(crate) fn new(sensor: Sensor<NX>, seed: u64, index: usize) -> Self {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        random.set_stream(index as u64);
         Self {
             sensor,
-            random,
+            random: Random::new(seed, index),
             travelling: VecDeque::new(),
             last: None,
         }
@@ -129,8 +125,8 @@ impl<const NX: usize> Channel<NX> {
     /// in samples.
     pub(crate) fn read(&mut self, x: &SVector<f64, NX>, k: u64) -> Option<(f64, u64)> {
         // Drawn in any case, so that a run with dropouts has the noise of the run without.
-        let noise: f64 = StandardNormal.sample(&mut self.random);
-        let chance: f64 = StandardUniform.sample(&mut self.random);
+        let noise = self.random.normal();
+        let chance = self.random.uniform();
         let Sensor {
             dropout,
             every,

@@ -261,14 +261,12 @@ where
         let states = core::iter::once(x).chain(&self.rollout).skip(first);
         let inputs = inputs.iter().take(horizon);
         let window = states.zip(inputs.clone().skip(first).chain(inputs.last()));
+        let held = match &self.settings.scheduling {
+            Scheduling::Predicted => None,
+            Scheduling::Held(held) => Some(held),
+        };
         for (stage, (x, u)) in ocp.stages.iter_mut().zip(window).take(horizon) {
-            (stage.a, stage.b) = match &self.settings.scheduling {
-                Scheduling::Predicted => predictor.linearize(&self.model, x, u, *t_s),
-                Scheduling::Held(held) => {
-                    let (a, b) = self.model.matrices(held);
-                    predictor.discretize(&a, &b, *t_s)
-                }
-            };
+            (stage.a, stage.b) = predictor.linearize_along(&self.model, held, x, u, *t_s);
         }
     }
 

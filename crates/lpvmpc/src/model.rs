@@ -1,5 +1,6 @@
 //! What a plant must offer: a linear model whose matrices depend on a scheduling vector.
 
+use crate::kernel::product;
 use nalgebra::{RealField, SMatrix, SVector};
 
 /// The number type of the method: `f32` on a microcontroller, `f64` on a PC.
@@ -21,6 +22,19 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
 
     /// The continuous-time pair A (`NX` x `NX`, per second) and B (`NX` x `NU`) at `scheduling`.
     fn matrices(&self, scheduling: &SVector<T, NS>) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>);
+
+    /// A V, for the A that [`matrices`](Self::matrices) returned and a V of `C` columns.
+    ///
+    /// A plant in whose A many entries are always zero or one may override this with fewer
+    /// products: most of a predictor's work is here. It must return the same matrix.
+    #[inline(always)]
+    fn a_times<const C: usize>(
+        &self,
+        a: &SMatrix<T, NX, NX>,
+        v: &SMatrix<T, NX, C>,
+    ) -> SMatrix<T, NX, C> {
+        product(a, v)
+    }
 
     /// x_dot = f(x, u) = A(sigma(x)) x + B(sigma(x)) u, in state units per second.
     ///

@@ -47,12 +47,33 @@ impl Predictor {
         T: Scalar,
         P: LpvModel<T, NX, NU, NS>,
     {
+        self.linearize_along(model, None, x, u, t_s)
+    }
+
+    /// The same where the scheduling may be `held`, whatever the state.
+    #[inline(always)]
+    pub(crate) fn linearize_along<T, P, const NX: usize, const NU: usize, const NS: usize>(
+        self,
+        model: &P,
+        held: Option<&SVector<T, NS>>,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+        t_s: T,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>)
+    where
+        T: Scalar,
+        P: LpvModel<T, NX, NU, NS>,
+    {
+        if let (Self::StageConsistent(rk4), None) = (self, held) {
+            return rk4.linearize(model, x, u, t_s);
+        }
+        let scheduling = held.copied().unwrap_or_else(|| model.scheduling(x));
+        let (a, b) = model.matrices(&scheduling);
         match self {
-            Self::FrozenRk4(_) | Self::FrozenExact(_) => {
-                let (a, b) = model.matrices(&model.scheduling(x));
-                self.discretize(&a, &b, t_s)
+            Self::FrozenRk4(rk4) | Self::StageConsistent(rk4) => {
+                rk4.discretize_with(|a, v| model.a_times(a, v), &a, &b, t_s)
             }
-            Self::StageConsistent(rk4) => rk4.linearize(model, x, u, t_s),
+            Self::FrozenExact(_) => exact_hold(&a, &b, t_s),
         }
     }
 
@@ -93,7 +114,19 @@ impl Rk4 {
         b: &SMatrix<T, NX, NU>,
         t_s: T,
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-        let (a_step, b_step) = taylor_step(a, b, self.step_length(t_s));
+        self.discretize_with(product, a, b, t_s)
+    }
+
+    /// [`Rk4::discretize`] with its own way to multiply with `a`.
+    #[inline(always)]
+    fn discretize_with<T: Scalar, const NX: usize, const NU: usize>(
+        self,
+        a_times: impl Fn(&SMatrix<T, NX, NX>, &SMatrix<T, NX, NX>) -> SMatrix<T, NX, NX>,
+        a: &SMatrix<T, NX, NX>,
+        b: &SMatrix<T, NX, NU>,
+        t_s: T,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+        let (a_step, b_step) = taylor_step(|v| a_times(a, v), a, b, self.step_length(t_s));
         if self.substeps == 1 {
             return (a_step, b_step);
         }
@@ -142,7 +175,7 @@ impl Rk4 {
                 // In place, since copies cost as much as the products where nothing is unrolled.
                 scale(&mut k, reach);
                 scale(&mut l, reach);
-                let (a_k, a_l) = (product(&a, &k), product(&a, &l));
+                let (a_k, a_l) = (model.a_times(&a, &k), model.a_times(&a, &l));
                 add_scaled(&mut a, &a_k, T::one());
                 add_scaled(&mut b, &a_l, T::one());
                 (k, l) = (a, b);
@@ -192,26 +225,28 @@ impl Rk4 {
     }
 }
 
-/// One step of length `h` seconds for a constant pair: the Taylor polynomials of order four.
+/// One step of length `h` seconds for a constant pair, the Taylor polynomials of order four: with
+/// S = I + M/2 (I + M/3 (I + M/4)) they are A_h = I + M S and B_h = h S B.
 #[inline(always)]
 fn taylor_step<T: Scalar, const NX: usize, const NU: usize>(
+    a_times: impl Fn(&SMatrix<T, NX, NX>) -> SMatrix<T, NX, NX>,
     a: &SMatrix<T, NX, NX>,
     b: &SMatrix<T, NX, NU>,
     h: T,
 ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-    let [half, sixth, last] = [0.5, 1.0 / 6.0, 1.0 / 24.0].map(convert::<f64, T>);
-    let m = a * h;
-    let m2 = product(&m, &m);
-    let mut a_step = m + m2 * half;
-    for i in 0..NX {
-        a_step[(i, i)] += T::one();
-    }
-    add_product(&mut a_step, &m2, &(m * sixth + m2 * last));
-    let b = b * h;
-    let m_b = product(&m, &b);
-    let mut b_step = b + m_b * half;
-    add_product(&mut b_step, &m2, &(b * sixth + m_b * last));
-    (a_step, b_step)
+    let identity_plus = |mut v: SMatrix<T, NX, NX>, part: f64| {
+        scale(&mut v, h * convert::<f64, T>(part));
+        for i in 0..NX {
+            v[(i, i)] += T::one();
+        }
+        v
+    };
+    let s = identity_plus(*a, 0.25);
+    let s = identity_plus(a_times(&s), 1.0 / 3.0);
+    let s = identity_plus(a_times(&s), 0.5);
+    let mut b_step = product(&s, b);
+    scale(&mut b_step, h);
+    (identity_plus(a_times(&s), 1.0), b_step)
 }
 
 /// The matrix exponential's pair: Taylor polynomials of degree 14 for a step so short that what

@@ -65,6 +65,24 @@ where
         (joint_a, SMatrix::from_fn(integrate))
     }
 
+    #[inline(always)]
+    fn a_times<const C: usize>(
+        &self,
+        a: &SMatrix<T, NXU, NXU>,
+        v: &SMatrix<T, NXU, C>,
+    ) -> SMatrix<T, NXU, C> {
+        let plant_a = a.fixed_view::<NX, NX>(0, 0).into_owned();
+        let plant_v = v.fixed_view::<NX, C>(0, 0).into_owned();
+        let product = self.0.a_times(&plant_a, &plant_v);
+        SMatrix::from_fn(|i, j| {
+            let inputs = (NX..NXU).map(|k| a[(i, k)] * v[(k, j)]);
+            let plant = product.get((i, j)).copied();
+            plant.map_or(T::zero(), |plant| {
+                inputs.fold(plant, |sum, term| sum + term)
+            })
+        })
+    }
+
     fn derivative(&self, joint: &SVector<T, NXU>, rate: &SVector<T, NU>) -> SVector<T, NXU> {
         let (x, u) = Self::split::<T, NU, NXU>(joint);
         Self::join(&self.0.derivative(&x, &u), rate)

@@ -109,7 +109,7 @@ function estimator(form: Form): HTMLElement {
     form.optional(key("theta_noise_rad"), { label: "Noise theta", unit: "rad" }),
     form.optional(key("theta_dot_noise_rad_s"), { label: "Noise rate", unit: "rad/s" }),
     form.optional(key("phi_dot_drift_rad_s"), { label: "Drift phi_dot", unit: "rad/s" }),
-    form.optional(key("theta_dot_drift_rad_s"), { label: "Drift theta_dot", unit: "rad/s" }),
+    form.optional(key("theta_dot_drift_rad_s"), { label: "Drift rate", unit: "rad/s" }),
     form.optional(key("outlier_deviations"), { label: "Outliers", title: "Readings further off than this many standard deviations are not believed" }),
     disturbances,
   );

@@ -1,11 +1,11 @@
 //! One closed loop of a campaign.
 
-use super::variant::{Random, Variant};
+use super::variant::Variant;
 use crate::commands::CommandError;
 use ballbot::Ballbot;
 use ballbot_scenario::{GUARDED_ACTIVE, Prepared, ScenarioError};
 use lpvmpc::{Decision, GuardedController, GuardedSettings, GuardedWorkspace};
-use lpvmpc_sim::GuardedLoop;
+use lpvmpc_sim::{GuardedLoop, Random};
 use nalgebra::{Vector1, Vector4};
 use serde::Serialize;
 

@@ -5,11 +5,8 @@ use super::{Campaign, Scenarios, paper};
 use crate::commands::CommandError;
 use ballbot::Ballbot;
 use ballbot_scenario::Prepared;
-use lpvmpc_sim::Actuation;
+use lpvmpc_sim::{Actuation, Random};
 use nalgebra::{Vector1, Vector4};
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use std::fmt;
 
 /// The kinds of closed loops in a campaign.
@@ -140,32 +137,5 @@ impl fmt::Display for Variant {
             Self::Delay(delay) => write!(f, "torque {:.0} ms late", 1e3 * delay),
             Self::Paper(_) => f.write_str("the paper's scheme"),
         }
-    }
-}
-
-/// The random numbers of one run.
-#[derive(Debug)]
-pub struct Random(ChaCha8Rng);
-
-impl Random {
-    fn new(seed: u64, number: usize) -> Self {
-        let mut generator = ChaCha8Rng::seed_from_u64(seed);
-        generator.set_stream(number as u64);
-        Self(generator)
-    }
-
-    /// Uniform in [0, 1).
-    pub fn uniform(&mut self) -> f64 {
-        StandardUniform.sample(&mut self.0)
-    }
-
-    /// Uniform in [-1, 1).
-    pub fn symmetric(&mut self) -> f64 {
-        2.0 * self.uniform() - 1.0
-    }
-
-    /// Normally distributed with standard deviation 1.
-    pub fn normal(&mut self) -> f64 {
-        StandardNormal.sample(&mut self.0)
     }
 }

@@ -3,8 +3,8 @@
 use crate::robots;
 use ballbot::Ballbot;
 use fastrand::Rng;
-use lpvmpc::LpvModel;
-use nalgebra::{Matrix4, Vector1, Vector3, Vector4};
+use lpvmpc::{LpvModel, RampedInput};
+use nalgebra::{Matrix4, SMatrix, SVector, Vector1, Vector3, Vector4};
 use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
 fn assert_embeds(robot: &Ballbot<f64>, x: &Vector4<f64>, torque: f64) {
@@ -28,6 +28,33 @@ fn the_embedding_is_exact() {
         let (x, torque) = (robots::state(&mut rng), robots::torque(&mut rng));
         assert_embeds(&Ballbot::paper(), &x, torque);
         assert_embeds(&robots::rigid(&mut rng), &x, torque);
+    }
+}
+
+/// The model's own way to multiply with its A gives what A gives.
+fn assert_multiplies<const NX: usize>(model: &impl LpvModel<f64, NX, 1, 3>, rng: &mut Rng) {
+    let x = SVector::from_fn(|_, _| 10.0 * rng.f64() - 5.0);
+    let (a, _) = model.matrices(&model.scheduling(&x));
+    let v = SMatrix::<f64, NX, 3>::from_fn(|_, _| 2.0 * rng.f64() - 1.0);
+    let (found, expected) = (model.a_times(&a, &v), a * v);
+    let scale = a.abs() * v.abs();
+    for (i, found) in found.iter().enumerate() {
+        assert!(
+            (found - expected[i]).abs() <= 1e-14 * scale[i],
+            "at {x}: entry {i} is {found}, not {}",
+            expected[i]
+        );
+    }
+}
+
+#[test]
+fn products_with_the_matrices_leave_out_nothing() {
+    let mut rng = Rng::with_seed(5);
+    for _ in 0..1000 {
+        let mut robot = robots::rigid(&mut rng);
+        (robot.drive.viscous, robot.drive.coulomb) = (rng.f64(), rng.f64());
+        assert_multiplies(&robot, &mut rng);
+        assert_multiplies::<5>(&RampedInput::<_, 4>(robot), &mut rng);
     }
 }
 

@@ -65,7 +65,7 @@ impl Doubling {
         let n = a.nrows();
         let gamma = cayley_shift(&poles(&block(a, g, q)).ok()?);
         let shifted = a - DMatrix::identity(n, n) * gamma;
-        let t = block(&shifted, g, q).try_inverse()? * (2.0 * gamma);
+        let t = block(&shifted, g, q).lu().try_inverse()? * (2.0 * gamma);
         Some(Self {
             a: DMatrix::identity(n, n) + t.view((0, 0), (n, n)),
             g: symmetric_part(&-t.view((0, n), (n, n)).into_owned()),

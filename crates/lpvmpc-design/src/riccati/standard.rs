@@ -70,14 +70,13 @@ impl<'a> Standard<'a> {
         let Ok(open_loop) = poles(&self.a) else {
             return failure;
         };
-        let unreachable = |distance: Option<f64>| distance.is_some_and(|d| d < UNREACHABLE);
         let lasting: Vec<_> = open_loop
             .into_iter()
             .filter(|pole| !time.is_stable(*pole, &self.a))
             .collect();
         if let Some(pole) = lasting
             .iter()
-            .find(|pole| unreachable(distance_to_unreachable(&self.a, self.b, **pole)))
+            .find(|pole| distance_to_unreachable(&self.a, self.b, **pole) < UNREACHABLE)
         {
             return RiccatiError::NotStabilisable { pole: *pole };
         }
@@ -85,7 +84,7 @@ impl<'a> Standard<'a> {
         let transposed = self.a.transpose();
         if let Some(pole) = lasting
             .iter()
-            .find(|pole| unreachable(distance_to_unreachable(&transposed, &self.q, **pole)))
+            .find(|pole| distance_to_unreachable(&transposed, &self.q, **pole) < UNREACHABLE)
         {
             return RiccatiError::NotDetectable { pole: *pole };
         }
