@@ -56,10 +56,10 @@ export class App implements Source {
     this.engine.onFailure = (reason) => events.message(reason, "error");
   }
 
-  /** Opens the link in the address or the first preset. */
-  async start(fragment: string): Promise<void> {
-    if (fragment !== "" && (await this.openLink(fragment))) return;
-    await this.openPreset(PRESETS[0]?.name ?? "");
+  /** Opens the link in the address or the first preset; `false` if there is neither. */
+  async start(fragment: string): Promise<boolean> {
+    if (fragment !== "" && (await this.openLink(fragment))) return true;
+    return this.openPreset(PRESETS[0]?.name ?? "");
   }
 
   /** One thing after the other: a slider may move faster than its last value is taken in. */
@@ -106,9 +106,9 @@ export class App implements Source {
     this.events.restarted();
   }
 
-  async openPreset(name: string): Promise<void> {
+  async openPreset(name: string): Promise<boolean> {
     const preset = PRESETS.find((candidate) => candidate.name === name);
-    if (preset) await this.openToml(preset.text, name);
+    return preset !== undefined && this.openToml(preset.text, name);
   }
 
   openToml(toml: string, preset: string, robots?: string[]): Promise<boolean> {

@@ -219,7 +219,8 @@ async function start(): Promise<void> {
     window.addEventListener(input, redraw, { passive: true });
   }
   view.element.addEventListener("webglcontextrestored", redraw);
-  await app.start(location.hash.slice(1));
+  // Without a controller there is nothing to show; the page says why.
+  if (!(await app.start(location.hash.slice(1)))) return;
   panel = makePanel();
   for (const id of ["play", "step", "reset"]) byId<HTMLButtonElement>(id).disabled = false;
   setupShown();
@@ -228,5 +229,4 @@ async function start(): Promise<void> {
   requestAnimationFrame(frame);
 }
 
-// A browser whose controller cannot be loaded says so in the page.
 start().catch((error: unknown) => messages.show(String(error), "error"));

@@ -32,3 +32,16 @@ test("the time per step that is shown is the measured one, and below 100 us for 
   expect(middle).toBeLessThan(100);
   test.info().annotations.push({ type: "median time per step", description: `${middle} us` });
 });
+
+test("a step of the default predictor takes less than 100 us", async ({ page }) => {
+  await open(page);
+  await fill(page, "Target X", "0.5");
+  await until(page, 4);
+  await page.locator("#play").click();
+  const steps = (table(await saved(page, "Save CSV"))["step_us"] ?? []).filter(Number.isFinite).sort((a, b) => a - b);
+  expect(steps.length).toBeGreaterThan(70);
+  const middle = steps[Math.floor(steps.length / 2)] ?? NaN;
+  expect(middle).toBeGreaterThan(0);
+  expect(middle).toBeLessThan(100);
+  test.info().annotations.push({ type: "median time per step", description: `${middle} us` });
+});
