@@ -34,7 +34,8 @@ pub(crate) trait Planner {
     /// The states that the model reaches under the last plan, one per sample of the horizon.
     fn prediction(&self) -> Vec<Vector4<f64>>;
 
-    /// The bounds that are active in the last plan, as those of the robot.
+    /// The bounds that are active in the last plan, as those of the robot; the rate of the torque
+    /// counts as a second input.
     fn active_bounds(&self) -> Vec<BoundId>;
 
     /// Whether its bounds may change from sample to sample.

@@ -6,7 +6,9 @@ use crate::planner::{Planner, shifted, step};
 use crate::regulators::{RegulatorError, sized, too_long, with_planner};
 use crate::sharing::SharingPlane;
 use ballbot::Ballbot;
-use lpvmpc::{BoundId, Bounds, Controller, ControllerSettings, Quantity, RampedInput, Workspace};
+use lpvmpc::{
+    BoundId, Bounds, Controller, ControllerSettings, Quantity, RampedInput, Status, Workspace,
+};
 use lpvmpc_sim::Decision;
 use nalgebra::{SVector, Vector1, Vector4};
 use std::time::Duration;
@@ -79,8 +81,11 @@ impl<const N: usize, const M: usize> Planner for Ramped<N, M> {
         controller.set_bounds(x, u).ok();
         let torque = Vector1::new(self.torque + disturbance);
         let joint = RampedInput::<Ballbot<f64>, 4>::join(z, &torque);
-        let (rate, decision) = step(controller, workspace, &joint, reference, clock);
+        let (rate, mut decision) = step(controller, workspace, &joint, reference, clock);
         self.rate = rate;
+        if let Status::Infeasible(bound) = &mut decision.status {
+            *bound = of_the_robot(*bound);
+        }
         (decision, None)
     }
 
@@ -95,21 +100,19 @@ impl<const N: usize, const M: usize> Planner for Ramped<N, M> {
         self.controller.rollout().iter().map(robot).collect()
     }
 
-    /// The bounds of the torque are those of an input; those of its rate are left out.
     fn active_bounds(&self) -> Vec<BoundId> {
         let active = self.controller.solution().active.iter();
-        active.filter_map(|row| of_the_robot(row.bound)).collect()
+        active.map(|row| of_the_robot(row.bound)).collect()
     }
 }
 
-/// A bound of the plant with the torque as fifth state, as one of the robot.
-fn of_the_robot(bound: BoundId) -> Option<BoundId> {
-    match bound.quantity {
-        Quantity::State(4) => Some(BoundId {
-            quantity: Quantity::Input(0),
-            ..bound
-        }),
-        Quantity::State(_) => Some(bound),
-        Quantity::Input(_) | Quantity::Row(_) => None,
-    }
+/// A bound of the plant with the torque as fifth state, as one of the robot: the torque is its
+/// input 0, and the torque's rate counts as input 1.
+fn of_the_robot(bound: BoundId) -> BoundId {
+    let quantity = match bound.quantity {
+        Quantity::State(4) => Quantity::Input(0),
+        Quantity::Input(index) => Quantity::Input(index + 1),
+        robot => robot,
+    };
+    BoundId { quantity, ..bound }
 }

@@ -6,6 +6,9 @@ use lpvmpc_sim::Ending;
 /// Names of the states, in their order.
 pub const STATES: [&str; 4] = ["phi", "theta", "phi_dot", "theta_dot"];
 
+/// Names of what a regulator decides on: the torque, and its rate where that is bounded.
+const INPUTS: [&str; 2] = ["torque", "torque rate"];
+
 /// Why a run ended, with its time.
 pub fn ending(ending: &Ending) -> String {
     match ending {
@@ -27,7 +30,10 @@ pub fn status(status: &Status<f64>) -> String {
     for (index, name) in STATES.iter().enumerate() {
         text = text.replace(&format!("state {index}"), name);
     }
-    text.replace("input 0", "the torque")
+    for (index, name) in INPUTS.iter().enumerate() {
+        text = text.replace(&format!("input {index}"), &format!("the {name}"));
+    }
+    text
 }
 
 /// Active bounds of a plan with samples of `t_s` seconds, by name, with the time ahead at which
@@ -35,8 +41,10 @@ pub fn status(status: &Status<f64>) -> String {
 pub fn active_bounds(bounds: &[BoundId], t_s: f64) -> String {
     let states = STATES.iter().enumerate();
     let states = states.map(|(index, name)| (Quantity::State(index), *name));
+    let inputs = INPUTS.iter().enumerate();
+    let inputs = inputs.map(|(index, name)| (Quantity::Input(index), *name));
     let mut texts = Vec::new();
-    for (quantity, name) in states.chain([(Quantity::Input(0), "torque")]) {
+    for (quantity, name) in states.chain(inputs) {
         for (side, word) in [
             (Side::Lower, "lower"),
             (Side::Upper, "upper"),

@@ -1,6 +1,8 @@
 //! A scenario run step by step is the run at once, and a person can take part in it.
 
-use ballbot_scenario::{Phase, Prepared, Scenario, ScenarioError, Session, Surroundings};
+use ballbot_scenario::{
+    Phase, Prepared, Scenario, ScenarioError, Session, Surroundings, TerminalTable, TorqueRateTable,
+};
 use std::path::Path;
 use std::time::Duration;
 
@@ -90,6 +92,31 @@ fn a_push_that_cannot_be_held_ends_on_the_floor_with_its_reason() {
     let theta = session.states().next().unwrap()[1];
     assert!(theta.abs() > std::f64::consts::FRAC_PI_2, "{theta}");
     assert!(!session.step(&clock), "nothing moves any more");
+}
+
+#[test]
+fn where_the_torque_moves_in_ramps_it_and_its_rate_have_their_names() {
+    let mut scenario = Scenario::load("single-setpoint").unwrap();
+    scenario.controller.terminal = TerminalTable::DiscreteRiccati;
+    scenario.controller.torque_rate = Some(TorqueRateTable {
+        limit_nm_s: 5.0,
+        weight: 0.01,
+    });
+    let mut session = Session::new(prepared(&scenario).unwrap()).unwrap();
+    session.set_targets(&[20.0]);
+    assert!(session.step(&clock));
+    let active = session.active_bounds_in_words(0);
+    assert!(
+        active.contains("torque rate upper 0.00 s ahead"),
+        "{active}"
+    );
+    session.push(0, 0.0, 6.0).unwrap();
+    run_until(&mut session, 10.0);
+    let words = session.fall_in_words().unwrap();
+    assert!(words.contains("infeasible"), "{words}");
+    for number in ["state 4", "input 0", "input 1"] {
+        assert!(!words.contains(number), "{words}");
+    }
 }
 
 #[test]
