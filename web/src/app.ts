@@ -7,7 +7,7 @@ import * as link from "./link";
 import { Live, timedPath } from "./live";
 import { Playback } from "./playback";
 import { PRESETS } from "./presets";
-import type { Batch, Call, RobotFacts } from "./protocol";
+import type { Answers, Batch, Call, PhiPair, RobotFacts } from "./protocol";
 import { robotsNamed, type RobotKind } from "./robots";
 import { toToml, withValue, type Scenario } from "./scenario";
 import type { FloorPoint } from "./scene/view";
@@ -22,6 +22,8 @@ export interface AppEvents {
   running(): void;
 }
 
+/** Targets further away than this are slips of the pen, m. */
+const FARTHEST = 1000;
 /** Time between two predictions that are kept, s. */
 const FAN_INTERVAL = 0.4;
 
@@ -47,6 +49,8 @@ export class App implements Source {
   private facts: RobotFacts[] = [];
   private clock = 0;
   private clockAt = 0;
+  /** The last target; what the worker's batches say of it comes later. */
+  ordered: FloorPoint | undefined;
   private queue: Promise<unknown> = Promise.resolve();
 
   constructor(private readonly events: AppEvents) {
@@ -92,13 +96,15 @@ export class App implements Source {
     this.playback = undefined;
     [this.setup, this.robots, this.facts] = [setup, robots, facts];
     this.planes = facts[0]?.planes ?? 1;
-    if (!keep) this.live.clear();
+    if (!keep) {
+      this.live.clear();
+      this.ordered = undefined;
+    }
     if (!keep || this.planes !== planes || this.histories.length !== facts.length) this.renew();
     for (const [i, history] of this.histories.entries()) {
       history.samplingTime = facts[i]?.sampling_time ?? history.samplingTime;
     }
     this.events.setup();
-    if (keep) await this.repeatOrder();
   }
 
   private renew(): void {
@@ -152,43 +158,37 @@ export class App implements Source {
     return this.setup.parameters.ball_radius_m;
   }
 
-  private async tell(call: Call): Promise<void> {
+  /** Hands an order to the worker, and what it says of it to `taken`. */
+  private async tell<K extends Call["kind"]>(call: Extract<Call, { kind: K }>, taken: (answer: Answers[K]) => void): Promise<void> {
     try {
-      await this.engine.call(call);
+      taken(await this.engine.call<K>(call));
     } catch (error) {
       this.events.message(text(error), "error");
     }
   }
 
-  private async repeatOrder(): Promise<void> {
-    const { order } = this.live;
-    if (order?.kind === "target") await this.sendTarget(order.at);
-    if (order?.kind === "path") await this.sendPath(order.points);
-  }
-
-  private sendTarget(at: FloorPoint): Promise<void> {
-    return this.tell({ kind: "target", phi: { x: at.x / this.radius, y: at.y / this.radius } });
-  }
-
-  private sendPath(points: { x: number; y: number; time_s: number }[]): Promise<void> {
-    return this.tell({
-      kind: "path",
-      points: points.map(({ x, y, time_s }) => ({ time_s, phi: { x: x / this.radius, y: y / this.radius } })),
-    });
+  private phi({ x, y }: FloorPoint): PhiPair {
+    return { x: x / this.radius, y: y / this.radius };
   }
 
   target(at: FloorPoint): void {
     if (this.playback) return;
-    this.live.target(at, this.sampleTime());
-    void this.sendTarget(at);
+    if (!(Math.hypot(at.x, at.y) <= FARTHEST)) {
+      this.events.message(`A target must be numbers, at most ${FARTHEST} m away.`, "error");
+      return;
+    }
+    this.ordered = at;
+    void this.tell<"target">({ kind: "target", phi: this.phi(at) }, ({ time_s, replaced }) => this.live.target(at, time_s, replaced));
     this.runOn();
   }
 
   path(points: FloorPoint[], from: FloorPoint): void {
     if (this.playback) return;
-    const timed = timedPath(points, from, this.sampleTime());
-    this.live.path(timed);
-    void this.sendPath(timed);
+    this.ordered = undefined;
+    const timed = timedPath(points, from);
+    const called = timed.map((point) => ({ time_s: point.time_s, phi: this.phi(point) }));
+    void this.tell<"path">({ kind: "path", points: called }, (taken) =>
+      this.live.path(timed.map((point) => ({ ...point, time_s: taken.time_s + point.time_s }))));
     this.runOn();
   }
 
@@ -197,8 +197,7 @@ export class App implements Source {
     if (this.playback) return;
     // The body leans towards +x where theta is negative.
     const push = { x: -towards.x, y: -towards.y };
-    this.live.push(push.x, push.y, this.sampleTime());
-    void this.tell({ kind: "push", push });
+    void this.tell<"push">({ kind: "push", push }, ({ time_s }) => this.live.push(push.x, push.y, time_s));
     this.runOn();
   }
 
@@ -214,7 +213,7 @@ export class App implements Source {
 
   step(): void {
     if (this.playback) this.playback.step();
-    else void this.tell({ kind: "step" });
+    else void this.tell<"step">({ kind: "step" }, () => {});
   }
 
   reset(): void {
@@ -238,6 +237,7 @@ export class App implements Source {
       this.playback = playback;
       this.playbackName = sorted.map(({ name }) => name).join(", ");
       this.planes = planes.length;
+      this.ordered = undefined;
       this.robots = this.robots.slice(0, 1);
       this.histories = [new History(planes.length, playback.samplingTime, FAN_INTERVAL)];
       this.references = [planes.map(({ rows }) => Float64Array.from(rows, (row) => row[6] ?? 0))];
@@ -280,9 +280,14 @@ export class App implements Source {
     return Math.max(0, ...this.histories.map((history) => history.nowAt(0, 0)));
   }
 
+  /** The robots' planes, also while a recording of others is played. */
+  private withOrders(): Scenario {
+    return this.live.into(this.setup, this.facts[0]?.planes ?? 1);
+  }
+
   /** The set-up as a file for `ballbot simulate`: the first robot, with what was done to it. */
   toml(): string {
-    const setup = this.live.into(this.setup, this.planes);
+    const setup = this.withOrders();
     return toToml(this.robots[0]?.derive(setup) ?? setup);
   }
 
@@ -299,7 +304,7 @@ export class App implements Source {
   }
 
   async fragment(): Promise<string> {
-    const setup = this.live.into(this.setup, this.planes);
+    const setup = this.withOrders();
     return link.encode({ toml: toToml(setup), robots: this.robots.map(({ name }) => name) });
   }
 }

@@ -25,6 +25,12 @@ export interface Controlled {
   openFiles(files: File[]): void;
 }
 
+/** The set-up behind the #; empty if there is none, or a place of the page. */
+export function linkInAddress(): string {
+  const fragment = location.hash.slice(1);
+  return document.getElementById(fragment) ? "" : fragment;
+}
+
 export function connectControls(controlled: Controlled): void {
   const { app } = controlled;
   connectRun(app);
@@ -35,7 +41,10 @@ export function connectControls(controlled: Controlled): void {
     event.preventDefault();
     controlled.openFiles([...(event.dataTransfer?.files ?? [])]);
   });
-  window.addEventListener("hashchange", () => void app.openLink(location.hash.slice(1)));
+  window.addEventListener("hashchange", () => {
+    const link = linkInAddress();
+    if (link !== "") void app.openLink(link);
+  });
   connectKeys(byId("scene"), {
     toggle: () => app.run(!app.isRunning),
     step: () => app.step(),

@@ -21,7 +21,8 @@ export class Engine {
 
   constructor() {
     this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.receive(data);
-    this.worker.onerror = (event) => this.onFailure(event.message);
+    // A script that cannot be loaded leaves no message.
+    this.worker.onerror = ({ message }) => this.fail(message || "the controller's program cannot be loaded");
   }
 
   /** Asks the worker; rejects with its message. */
@@ -35,9 +36,18 @@ export class Engine {
     this.worker.postMessage({ run: { running, speed } });
   }
 
+  /** Nobody waits for answers that will not come. */
+  private fail(reason: string): void {
+    for (const { reject } of this.waiting.values()) reject(new Error(reason));
+    this.waiting.clear();
+    this.onFailure(reason);
+  }
+
   private receive(message: FromWorker): void {
     if ("batch" in message) {
       this.onBatch(message.batch);
+    } else if ("failed" in message) {
+      this.fail(message.failed);
     } else {
       const waiting = this.waiting.get(message.id);
       this.waiting.delete(message.id);

@@ -3,8 +3,10 @@
 import type { FloorPoint } from "./scene/view";
 import { withValue, type Point, type Reference, type Scenario } from "./scenario";
 
-/** More targets than this in one run are not kept. */
+/** So many targets or pushes of one run are kept: the first ones, and the last. */
 const MOST_EVENTS = 500;
+/** A step takes this long where it stands among lines, s. */
+const STEP = 1e-6;
 /** How fast a drawn path is followed, m/s. */
 const PATH_SPEED = 0.35;
 
@@ -12,11 +14,11 @@ interface TimedTarget extends FloorPoint {
   time_s: number;
 }
 
-/** A drawn path with times, from where the robot stands. */
-export function timedPath(points: FloorPoint[], from: FloorPoint, now: number): TimedTarget[] {
-  let time = now;
+/** A drawn path with times, from where the robot stands now. */
+export function timedPath(points: FloorPoint[], from: FloorPoint): TimedTarget[] {
+  let time = 0;
   let last = from;
-  const timed: TimedTarget[] = [{ ...from, time_s: now }];
+  const timed: TimedTarget[] = [{ ...from, time_s: 0 }];
   for (const point of points) {
     const way = Math.hypot(point.x - last.x, point.y - last.y);
     if (way < 1e-6) continue;
@@ -27,21 +29,23 @@ export function timedPath(points: FloorPoint[], from: FloorPoint, now: number): 
   return timed;
 }
 
+/** A target is a point, a drawn path are several; each holds until the next one. */
+type Order = TimedTarget[];
+
 export class Live {
-  /** The last order that the robot was given; none while it follows the scenario. */
-  order: { kind: "target"; at: FloorPoint } | { kind: "path"; points: TimedTarget[] } | undefined;
-  private targets: TimedTarget[] = [];
+  private orders: Order[] = [];
   private pushes: { time_s: number; x: number; y: number }[] = [];
 
-  target(at: FloorPoint, time_s: number): void {
-    this.order = { kind: "target", at };
+  /** `replaced`: it takes the place of the one before, which the robot never heard of. */
+  target(at: FloorPoint, time_s: number, replaced: boolean): void {
     // A drag is one target: where it ended.
-    if (this.targets.at(-1)?.time_s === time_s) this.targets.pop();
-    if (this.targets.length < MOST_EVENTS) this.targets.push({ ...at, time_s });
+    const last = this.orders.at(-1);
+    if (replaced || last?.[0]?.time_s === time_s || this.orders.length >= MOST_EVENTS) this.orders.pop();
+    this.orders.push([{ ...at, time_s }]);
   }
 
   path(points: TimedTarget[]): void {
-    this.order = { kind: "path", points };
+    this.orders.push(points);
   }
 
   /** A push: change of the tilt rates, rad/s. */
@@ -50,25 +54,17 @@ export class Live {
   }
 
   clear(): void {
-    this.order = undefined;
-    this.targets = [];
+    this.orders = [];
     this.pushes = [];
   }
 
   /** The set-up with what was done written into it. */
   into(setup: Scenario, planes: number): Scenario {
     let made = setup;
-    const { ball_radius_m } = setup.parameters;
-    const points = (axis: "x" | "y", timed: TimedTarget[]): Point[] =>
-      timed.map((point) => ({ time_s: point.time_s, phi_rad: point[axis] / ball_radius_m }));
-    const reference = (axis: "x" | "y"): Reference | undefined => {
-      if (this.order?.kind === "path") return { lines: { points: points(axis, this.order.points) } };
-      if (this.targets.length === 0) return undefined;
-      return { set_points: { points: this.withStart(setup, axis, points(axis, this.targets)) } };
-    };
-    const x = reference("x");
-    const y = reference("y");
-    if (x && y) made = { ...made, reference: planes === 2 ? { planes: { x, y } } : x };
+    if (this.orders.length > 0) {
+      const [x, y] = [this.reference(setup, "x"), this.reference(setup, "y")];
+      made = { ...made, reference: planes === 2 ? { planes: { x, y } } : x };
+    }
     if (this.pushes.length > 0) {
       const world = (made["world"] ?? {}) as { pushes?: unknown[] };
       const rates = this.pushes.flatMap(({ time_s, x: theta_x, y: theta_y }) => [
@@ -80,12 +76,39 @@ export class Live {
     return made;
   }
 
-  /** The set points of the scenario until the first order, then the orders. */
-  private withStart(setup: Scenario, axis: "x" | "y", orders: Point[]): Point[] {
+  /** The scenario's set points until the first order, then the orders. */
+  private reference(setup: Scenario, axis: "x" | "y"): Reference {
+    const { ball_radius_m } = setup.parameters;
+    const orders = this.orders.map((order) =>
+      order.map((point): Point => ({ time_s: point.time_s, phi_rad: point[axis] / ball_radius_m })));
     const { reference } = setup as { reference: { set_points?: { points: Point[] }; planes?: { x: Reference; y: Reference } } };
     const own = (reference.planes?.[axis] ?? (axis === "x" ? reference : {})) as { set_points?: { points: Point[] } };
-    const first = orders[0]?.time_s ?? 0;
+    const first = orders[0]?.[0]?.time_s ?? 0;
     const before = (own.set_points?.points ?? [{ time_s: 0, phi_rad: 0 }]).filter(({ time_s }) => time_s < first);
-    return [...before, ...orders];
+    const all = [...before.map((point) => [point]), ...orders];
+    return all.every(({ length }) => length === 1) ? { set_points: { points: all.flat() } } : { lines: { points: joined(all) } };
   }
+}
+
+/** Points and lines one after the other, as lines: each holds until the next one begins. */
+function joined(orders: Point[][]): Point[] {
+  let made: Point[] = [];
+  for (const order of orders) {
+    const begin = order[0]?.time_s ?? 0;
+    const end = begin - STEP;
+    const held = between(made, end);
+    made = made.filter(({ time_s }) => time_s < end);
+    if (held !== undefined) made.push({ time_s: end, phi_rad: held });
+    made.push(...order);
+  }
+  return made;
+}
+
+/** The value of lines between points at a time; `undefined` before the first one. */
+function between(points: Point[], time: number): number | undefined {
+  const next = points.findIndex(({ time_s }) => time_s > time);
+  const [from, to] = [points.at(next < 0 ? -1 : next - 1), points[next]];
+  if (next === 0 || from === undefined) return undefined;
+  if (to === undefined) return from.phi_rad;
+  return from.phi_rad + ((to.phi_rad - from.phi_rad) * (time - from.time_s)) / (to.time_s - from.time_s);
 }

@@ -2,7 +2,7 @@
 
 import "./style.css";
 import { App } from "./app";
-import { connectControls } from "./controls";
+import { connectControls, linkInAddress } from "./controls";
 import { choose, save } from "./files";
 import { CAPACITY } from "./history";
 import { MessageBox } from "./message";
@@ -91,6 +91,11 @@ function runningShown(): void {
   }
 }
 
+/** Where the first robot is to go: the last target before it is heard of from the worker. */
+function wanted(): FloorPoint {
+  return app.ordered ?? pictures.firstTarget();
+}
+
 function sendTo({ x, y }: FloorPoint): void {
   app.target({ x, y: app.planes === 2 ? y : 0 });
 }
@@ -102,9 +107,9 @@ function inLane({ x, y }: FloorPoint): FloorPoint {
 
 const pointer = new Pointer(view, {
   target: (point) => app.target(inLane(point)),
-  path: (points) => app.path(points.map(inLane), inLane(pictures.firstRobot())),
+  path: (points) => app.path(points.map(inLane), inLane(pictures.robots()[0] ?? { x: 0, y: 0 })),
   push: ({ x, y }) => app.push({ x: x * PUSH_PER_METRE, y: y * PUSH_PER_METRE }),
-  robot: () => pictures.firstRobot(),
+  robots: () => pictures.robots(),
 });
 
 /** Statuses, reasons of falls, target, clock. */
@@ -120,7 +125,7 @@ function showWords(time: number): void {
   if (alert.textContent !== text) alert.textContent = text;
   alert.hidden = text === "";
   const millimetres = (length: number) => Math.round(length * 1000) / 1000;
-  const target = pictures.firstTarget();
+  const target = wanted();
   panel?.showTarget(millimetres(target.x), millimetres(target.y));
   byId("clock").textContent = `${time.toFixed(2)} s`;
 }
@@ -204,7 +209,7 @@ function makePanel(): Panel {
 
 async function start(): Promise<void> {
   const moveTarget = (dx: number, dy: number) => {
-    const { x, y } = pictures.firstTarget();
+    const { x, y } = wanted();
     sendTo({ x: x + dx, y: y + dy });
   };
   connectControls({ app, view, plots, pointer, resized, moveTarget, openFiles: (files) => void openFiles(files) });
@@ -220,7 +225,7 @@ async function start(): Promise<void> {
   }
   view.element.addEventListener("webglcontextrestored", redraw);
   // Without a controller there is nothing to show; the page says why.
-  if (!(await app.start(location.hash.slice(1)))) return;
+  if (!(await app.start(linkInAddress()))) return;
   panel = makePanel();
   for (const id of ["play", "step", "reset"]) byId<HTMLButtonElement>(id).disabled = false;
   setupShown();

@@ -51,12 +51,12 @@ export class Pictures {
     return (index - (this.app.histories.length - 1) / 2) * LANE;
   }
 
-  /** Where the first robot stands. */
-  firstRobot(): FloorPoint {
-    const history = this.app.histories[0];
-    if (!history) return { x: 0, y: 0 };
-    const { x, y } = poseAt(history, this.app.time(), this.radius);
-    return { x, y: y + this.lane(0) };
+  /** Where the robots stand. */
+  robots(): FloorPoint[] {
+    return this.app.histories.map((history, i) => {
+      const { x, y } = poseAt(history, this.app.time(), this.radius);
+      return { x, y: y + this.lane(i) };
+    });
   }
 
   /** Where the first robot is to go. */

@@ -26,6 +26,7 @@ export type Call =
   | { kind: "configure"; robots: RobotSetup[]; keep: boolean }
   | { kind: "step" }
   | { kind: "target"; phi: PhiPair }
+  /** Times from when the worker takes it. */
   | { kind: "path"; points: { time_s: number; phi: PhiPair }[] }
   | { kind: "push"; push: Push };
 
@@ -34,9 +35,18 @@ export interface Answers {
   parse: Scenario;
   configure: RobotFacts[];
   step: null;
-  target: null;
-  path: null;
-  push: null;
+  target: Taken & {
+    /** It takes the place of a target whose smooth move had not begun. */
+    replaced: boolean;
+  };
+  path: Taken;
+  push: Taken;
+}
+
+/** When an order takes effect: the robots may be further than what the page has seen of them. */
+export interface Taken {
+  /** Simulated time, s. */
+  time_s: number;
 }
 
 /** What holds for a robot during a run. */
@@ -109,4 +119,6 @@ export interface Batch {
 export type FromWorker =
   | { id: number; value: unknown }
   | { id: number; error: string }
-  | { batch: Batch };
+  | { batch: Batch }
+  /** The control loop has ended for good. */
+  | { failed: string };

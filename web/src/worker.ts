@@ -95,6 +95,17 @@ function stopAtTheEnd(): void {
 }
 
 function tick(): void {
+  try {
+    advance();
+    setTimeout(tick, TICK);
+  } catch (error) {
+    // The module cannot be trusted any more.
+    [running, robots] = [false, []];
+    post({ failed: `the controller has stopped: ${error}. Load the page again.` });
+  }
+}
+
+function advance(): void {
   const now = performance.now();
   const elapsed = Math.min((now - lastTick) / 1000, MOST_BEHIND);
   lastTick = now;
@@ -107,7 +118,6 @@ function tick(): void {
     }
     if (now - lastBatch >= BATCH || !running) send();
   }
-  setTimeout(tick, TICK);
 }
 
 /** Browsers run a module's code as it comes, and optimise what is called often: without these
@@ -162,6 +172,11 @@ function configure(setups: RobotSetup[], keep: boolean): RobotFacts[] {
   }));
 }
 
+/** The file of a run is that of the first robot. */
+function timeOfOrder(): number {
+  return robots[0]?.simulation.time() ?? 0;
+}
+
 function answer(call: Call): unknown {
   switch (call.kind) {
     case "parse": {
@@ -178,23 +193,25 @@ function answer(call: Call): unknown {
       stopAtTheEnd();
       send();
       return null;
-    case "target":
-      for (const { simulation } of robots) simulation.set_target(call.phi.x, call.phi.y);
+    case "target": {
+      const taken = robots.map(({ simulation }) => simulation.set_target(call.phi.x, call.phi.y));
       referencesChanged = true;
       send();
-      return null;
+      return { time_s: timeOfOrder(), replaced: taken[0] ?? false };
+    }
     case "path": {
-      const times = Float64Array.from(call.points, ({ time_s }) => time_s);
+      const from = timeOfOrder();
+      const times = Float64Array.from(call.points, ({ time_s }) => from + time_s);
       const x = Float64Array.from(call.points, ({ phi }) => phi.x);
       const y = Float64Array.from(call.points, ({ phi }) => phi.y);
       for (const { simulation } of robots) simulation.set_path(times, x, y);
       referencesChanged = true;
       send();
-      return null;
+      return { time_s: from };
     }
     case "push":
       for (const { simulation } of robots) simulation.push(call.push.x, call.push.y);
-      return null;
+      return { time_s: timeOfOrder() };
   }
 }
 

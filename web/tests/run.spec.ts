@@ -1,38 +1,9 @@
 // The runs: the numbers are those of the program, and a person can take part.
 
-import { execFileSync } from "node:child_process";
-import { mkdtempSync, readFileSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
+import { readFileSync } from "node:fs";
 import { expect, test } from "@playwright/test";
 import { clock, fill, largest, open, openFlat, openSection, saved, scenario, table, until } from "./page";
-
-const ballbot = process.env["BALLBOT"] ?? "../target/release/ballbot";
-
-/** What the program writes for a scenario, file by file. */
-function simulated(toml: string): (file: string) => string {
-  const folder = mkdtempSync(join(tmpdir(), "ballbot-"));
-  const file = join(folder, "scenario.toml");
-  writeFileSync(file, toml);
-  execFileSync(ballbot, ["simulate", file, "--out", folder], { stdio: "ignore" });
-  return (name) => readFileSync(join(folder, name), "utf8");
-}
-
-const NUMBERS = ["t_s", "phi_rad", "theta_rad", "phi_dot_rad_s", "theta_dot_rad_s", "torque_nm", "phi_ref_rad", "cost"];
-
-function expectSame(here: string, there: string): void {
-  const [ours, theirs] = [table(here), table(there)];
-  for (const column of NUMBERS) {
-    const [a, b] = [ours[column] ?? [], theirs[column] ?? []];
-    expect(a.length, `rows of ${column}`).toBe(b.length);
-    for (const [i, value] of a.entries()) {
-      const other = b[i] ?? NaN;
-      if (Number.isNaN(value) && Number.isNaN(other)) continue;
-      const scale = column === "cost" ? Math.max(1, Math.abs(other)) : 1;
-      expect(Math.abs(value - other) / scale, `${column}, row ${i}: ${value} and ${other}`).toBeLessThan(1e-9);
-    }
-  }
-}
+import { expectSame, simulated } from "./program";
 
 for (const name of ["two-setpoints", "tight-bounds", "single-setpoint-terminal"]) {
   test(`${name} is the same run as in the program`, async ({ page }) => {

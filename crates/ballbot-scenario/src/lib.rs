@@ -72,7 +72,7 @@ pub use schema::{
 };
 pub use session::{Phase, Session, Trouble};
 pub use three_motors::{MotorSample, Motors};
-pub use uncertainty::Uncertainty;
+pub use uncertainty::{RobotDistribution, Uncertainty};
 pub use world::{PlaneWorld, Robot};
 pub use world_table::{
     ActuatorTable, AngleSensorTable, DelayTable, DeviationsTable, FloorTable, PlaneName, PushTable,

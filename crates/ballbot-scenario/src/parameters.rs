@@ -4,7 +4,7 @@ use crate::error::ScenarioError;
 use crate::files::Files;
 use crate::number::{finite, positive};
 use crate::schema::{BoundsTable, ParameterTable};
-use crate::uncertainty::Uncertainty;
+use crate::uncertainty::{RobotDistribution, Uncertainty};
 use ballbot::{Ballbot, DriveFriction, Geometry, Wheels};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, Visitor};
@@ -58,14 +58,14 @@ impl<'de> Deserialize<'de> for Parameters {
 }
 
 /// A robot whose parameters have been read and checked.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug)]
 pub struct KnownRobot {
     /// The plant.
     pub ballbot: Ballbot<f64>,
     /// The torque map to the motors.
     pub wheels: Wheels<f64>,
     /// How far the parameters may be off, where the file says so.
-    pub uncertainty: Option<Uncertainty>,
+    pub uncertainty: Option<Box<dyn RobotDistribution>>,
 }
 
 /// Other tables may stand beside these.
@@ -107,8 +107,9 @@ pub(crate) fn read(file: &Path, directory: &Path) -> Result<KnownRobot, Scenario
 fn robot_in(text: &str) -> Result<KnownRobot, ScenarioError> {
     let file: ParameterFile = toml::from_str(text)
         .map_err(|error| ScenarioError::ParameterFile(error.to_string().trim_end().to_owned()))?;
+    let uncertainty = file.identification;
     Ok(KnownRobot {
-        uncertainty: file.identification,
+        uncertainty: uncertainty.map(|known| Box::new(known) as Box<dyn RobotDistribution>),
         ..file.parameters.robot("parameters")?
     })
 }

@@ -13,7 +13,7 @@ use crate::world::PlaneWorld;
 use crate::world_table::PlaneName;
 use ballbot::{Ballbot, Wheels};
 use ballbot_control::Feedback;
-use lpvmpc::{ControllerSettings, GuardedSettings};
+use lpvmpc::{ControllerSettings, GuardedSettings, MoveLimits};
 use lpvmpc_sim::Tolerances;
 use nalgebra::Vector4;
 
@@ -39,6 +39,8 @@ pub struct Prepared {
     pub planes: Vec<Plane>,
     /// The three motors, where the planes share them.
     pub motors: Option<Motors>,
+    /// Where set points become smooth moves: what these may ask for.
+    pub moves: Option<MoveLimits<f64>>,
     /// Samples in the run.
     pub samples: usize,
     /// Tolerances of the plant.
@@ -112,13 +114,12 @@ impl Scenario {
                 format!("at most {MOST_SAMPLES} samples of controller.t_s can be recorded"),
             ));
         }
-        let references = match &self.controller.shaping {
-            Some(table) => {
-                let limits = table.limits(&ballbot)?;
-                references
-                    .into_iter()
-                    .map(|plane| plane.shaped(limits))
-                    .collect()
+        let shaping = self.controller.shaping.as_ref();
+        let moves = shaping.map(|table| table.limits(&ballbot)).transpose()?;
+        let references = match moves {
+            Some(limits) => {
+                let planes = references.into_iter();
+                planes.map(|plane| plane.shaped(limits)).collect()
             }
             None => references,
         };
@@ -143,6 +144,7 @@ impl Scenario {
             planes: self.planes(references, &real, (settings.t_s, tolerances), files)?,
             guarded,
             motors,
+            moves,
             samples: samples as usize,
             tolerances,
         })

@@ -14,6 +14,12 @@ use lpvmpc::{
 };
 use nalgebra::{DMatrix, Matrix1, Matrix4, Vector1, Vector3, Vector4};
 
+/// More Runge-Kutta steps per sample than this would be a slip of the pen, and a run without end.
+const MOST_SUBSTEPS: usize = 1000;
+
+/// The same for quadratic programs per sample.
+const MOST_PROGRAMS: usize = 1000;
+
 impl From<LinearModelTable> for LinearParameters<f64> {
     fn from(table: LinearModelTable) -> Self {
         let LinearModelTable {
@@ -129,19 +135,28 @@ impl ControllerTable {
             x,
             u,
             scheduling,
-            iterations: self.iterations(),
+            iterations: self.iterations()?,
             solver: SolverSettings::default(),
         })
     }
 
-    fn iterations(&self) -> Iterations<f64> {
-        match self.iterations {
-            None => Iterations::Fixed(1),
-            Some(IterationsTable::Fixed(most)) => Iterations::Fixed(most),
+    fn iterations(&self) -> Result<Iterations<f64>, ScenarioError> {
+        let (iterations, key, most) = match self.iterations {
+            None => return Ok(Iterations::Fixed(1)),
+            Some(IterationsTable::Fixed(most)) => (Iterations::Fixed(most), "fixed", most),
             Some(IterationsTable::UntilConverged { tolerance, most }) => {
-                Iterations::UntilConverged { tolerance, most }
+                let iterations = Iterations::UntilConverged { tolerance, most };
+                (iterations, "until_converged.most", most)
             }
+        };
+        if most > MOST_PROGRAMS {
+            return Err(ScenarioError::value(
+                format!("controller.iterations.{key}"),
+                most,
+                format!("at most {MOST_PROGRAMS} programs per sample can be solved"),
+            ));
         }
+        Ok(iterations)
     }
 
     fn predictor(&self, upright: &Matrix4<f64>) -> Result<Predictor, ScenarioError> {
@@ -161,6 +176,13 @@ impl ControllerTable {
                     format!("controller.predictor.{key}.substeps"),
                     0,
                     "at least one step per sample is needed",
+                ));
+            }
+            Some(substeps) if substeps > MOST_SUBSTEPS => {
+                return Err(ScenarioError::value(
+                    format!("controller.predictor.{key}.substeps"),
+                    substeps,
+                    format!("at most {MOST_SUBSTEPS} steps per sample can be taken"),
                 ));
             }
             Some(substeps) => substeps,

@@ -71,6 +71,29 @@ impl PhiReference {
         });
         Self::Moves(moves.collect())
     }
+
+    /// Makes `point` the goal from its time on: at once, or within `limits` by a smooth move that
+    /// begins when the one under way has ended. What was to come later is dropped; says whether a
+    /// move was.
+    pub(crate) fn redirect(&mut self, point: PointTable, limits: Option<MoveLimits<f64>>) -> bool {
+        let Some(limits) = limits else {
+            *self = Self::Steps(vec![point]);
+            return false;
+        };
+        let now = point.time_s;
+        let (mut from, mut free) = (self.at(now), now);
+        let begun = |(begin, _): &(f64, _)| *begin < now - SAME_TIME;
+        let (under_way, dropped) = match self {
+            Self::Moves(moves) => (moves.iter().copied().rfind(begun), !moves.iter().all(begun)),
+            _ => (None, false),
+        };
+        if let Some((begin, planned)) = under_way {
+            (from, free) = (planned.to, now.max(begin + planned.duration));
+        }
+        let planned = SmoothMove::within(from, point.phi_rad, limits);
+        *self = Self::Moves(under_way.into_iter().chain([(free, planned)]).collect());
+        dropped
+    }
 }
 
 /// The position of the move from 0 to 1 in 1 s.

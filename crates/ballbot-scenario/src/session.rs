@@ -2,6 +2,7 @@
 //! change while it runs. Sample for sample it is [`Prepared::run`].
 
 use crate::error::ScenarioError;
+use crate::number::finite;
 use crate::prepare::{Plane, Prepared};
 use crate::reference::PhiReference;
 use crate::run::PlaneLoop;
@@ -22,6 +23,8 @@ pub struct Session {
     samples: Vec<Sample<4, 1>>,
     phase: Phase,
     trouble: Trouble,
+    /// The planes follow what a person ordered, not the scenario.
+    ordered: bool,
 }
 
 /// Whether the robot still stands.
@@ -62,16 +65,22 @@ impl Session {
             samples: Vec::new(),
             phase: Phase::Running,
             trouble: Trouble::default(),
+            ordered: false,
         })
     }
 
-    /// The same robot where it stands, at the same time, under another scenario. A plane that
-    /// it did not have starts as that scenario says.
+    /// The same robot where it stands, at the same time, under another scenario. It goes on with
+    /// what it was ordered to do. A plane that it did not have starts as that scenario says.
     ///
     /// # Errors
     /// As [`new`](Self::new).
     pub fn reconfigured(&self, mut prepared: Prepared) -> Result<Self, ScenarioError> {
         let now = self.time();
+        for (plane, followed) in prepared.planes.iter_mut().zip(&self.prepared.planes) {
+            if self.ordered {
+                plane.reference = followed.reference.clone();
+            }
+        }
         for (plane, before) in prepared.planes.iter_mut().zip(&self.loops) {
             plane.initial_state = *before.world.state();
             plane.world.settings.disturbances = plane
@@ -86,6 +95,7 @@ impl Session {
             origin: now,
             phase: self.phase.clone(),
             trouble: self.trouble.clone(),
+            ordered: self.ordered,
             ..Self::new(prepared)?
         })
     }
@@ -154,6 +164,9 @@ impl Session {
     /// The bounds that are active in the last plan of a plane, for people; empty when there are
     /// none, or no such plane.
     pub fn active_bounds_in_words(&self, plane: usize) -> String {
+        if self.phase != Phase::Running {
+            return String::new();
+        }
         let regulator = self.loops.get(plane).map(|plane| &plane.regulator);
         let bounds = regulator.map_or_else(Vec::new, |regulator| regulator.active_bounds());
         words::active_bounds(&bounds, self.prepared.settings.t_s)
@@ -177,18 +190,20 @@ impl Session {
         Some(text)
     }
 
-    /// One sample of the control in all planes; `false` if the robot lies on the floor.
+    /// One sample in all planes; `false` if the robot lies on the floor, and there was none.
     /// `clock` is monotonic.
     pub fn step(&mut self, clock: &dyn Fn() -> Duration) -> bool {
         match self.phase {
             Phase::Running => self.sample(clock),
-            Phase::Falling(_) => self.fall(),
-            Phase::Down(_) => return false,
+            Phase::Falling(_) => {
+                self.go_on_without_torque(Vec::new());
+                true
+            }
+            Phase::Down(_) => false,
         }
-        true
     }
 
-    fn sample(&mut self, clock: &dyn Fn() -> Duration) {
+    fn sample(&mut self, clock: &dyn Fn() -> Duration) -> bool {
         let origin = self.origin;
         let mut samples = Vec::with_capacity(self.loops.len());
         for (closed_loop, plane) in self.loops.iter_mut().zip(&self.prepared.planes) {
@@ -198,14 +213,12 @@ impl Session {
                     sample.t += origin;
                     samples.push(sample);
                 }
-                Err(ending) => {
-                    self.give_up(ending);
-                    return;
-                }
+                Err(ending) => return self.give_up(shifted(ending, origin), samples),
             }
         }
         self.samples = samples;
         self.note_trouble();
+        true
     }
 
     fn note_trouble(&mut self) {
@@ -227,39 +240,49 @@ impl Session {
         }
     }
 
-    /// The planes that were not asked any more catch up with those that were.
-    fn give_up(&mut self, ending: Ending) {
-        let ending = shifted(ending, self.origin);
-        let latest = self.loops.iter().map(|plane| plane.world.time());
-        let latest = latest.fold(0.0, f64::max);
-        self.phase = match ending {
-            Ending::NoPlan { .. } => Phase::Falling(ending),
-            _ => Phase::Down(ending),
+    /// The planes up to the one that ended have a sample already; those after it were not asked.
+    fn give_up(&mut self, ending: Ending, samples: Vec<Sample<4, 1>>) -> bool {
+        let falls = matches!(ending, Ending::NoPlan { .. });
+        self.phase = if falls {
+            Phase::Falling(ending)
+        } else {
+            Phase::Down(ending)
         };
-        self.coast(latest);
+        let any = falls || !samples.is_empty();
+        if any {
+            self.go_on_without_torque(samples);
+        }
+        any
     }
 
-    fn fall(&mut self) {
-        let t = self.time();
-        let now = self.loops.first().map_or(0.0, |plane| plane.world.time());
-        for ((sample, plane), closed_loop) in self
-            .samples
-            .iter_mut()
-            .zip(&self.prepared.planes)
-            .zip(&self.loops)
-        {
-            *sample = Sample {
+    /// A sample without torque in the planes that have none among `samples`.
+    fn go_on_without_torque(&mut self, mut samples: Vec<Sample<4, 1>>) {
+        let falling = self.loops.get(samples.len());
+        let now = falling.map_or(0.0, |closed_loop| closed_loop.world.time());
+        let t = self.origin + now;
+        let status = match &self.phase {
+            Phase::Falling(Ending::NoPlan { status, .. })
+            | Phase::Down(Ending::NoPlan { status, .. }) => *status,
+            _ => Status::NotFinite,
+        };
+        let planes = self.loops.iter().zip(&self.prepared.planes);
+        for (closed_loop, plane) in planes.skip(samples.len()) {
+            let x = *closed_loop.world.state();
+            samples.push(Sample {
                 t,
-                x: *closed_loop.world.state(),
-                estimate: *closed_loop.world.state(),
+                x,
+                estimate: x,
                 u: Vector1::zeros(),
                 x_ref: plane.state_reference(t),
                 cost: f64::NAN,
+                status,
                 active_bounds: 0,
                 step_time: Duration::ZERO,
-                ..sample.clone()
-            };
+                gap: Vector4::zeros(),
+                guard: None,
+            });
         }
+        self.samples = samples;
         self.coast(now + self.prepared.settings.t_s);
     }
 
@@ -280,17 +303,28 @@ impl Session {
         }
     }
 
-    /// From now on phi of each plane has to go to these values, rad. What is beyond the
-    /// robot's planes is not heard.
-    pub fn set_targets(&mut self, targets: &[f64]) {
+    /// From now on phi of each plane has to go to these values, rad: at once, or by a smooth move
+    /// where the scenario asks for that. What is beyond the robot's planes is not heard. Says
+    /// whether this order takes the place of one whose move had not begun.
+    ///
+    /// # Errors
+    /// A target that is not a finite number.
+    pub fn set_targets(&mut self, targets: &[f64]) -> Result<bool, ScenarioError> {
+        for target in targets {
+            finite("target", *target)?;
+        }
         let time_s = self.time();
+        let mut dropped = false;
         for (plane, phi_rad) in self.prepared.planes.iter_mut().zip(targets) {
             let point = PointTable {
                 time_s,
                 phi_rad: *phi_rad,
             };
-            plane.reference = PhiReference::Steps(vec![point]);
+            dropped |= plane.reference.redirect(point, self.prepared.moves);
         }
+        let replaced = self.ordered && dropped;
+        self.ordered = true;
+        Ok(replaced)
     }
 
     /// From now on the planes follow these references; their times count from the beginning of
@@ -299,6 +333,7 @@ impl Session {
         for (plane, reference) in self.prepared.planes.iter_mut().zip(references) {
             plane.reference = reference;
         }
+        self.ordered = true;
     }
 
     /// Pushes a plane now: its rates change by (phi_dot, theta_dot), rad/s.

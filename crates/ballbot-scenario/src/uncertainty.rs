@@ -6,6 +6,7 @@ use ballbot::{Ballbot, limits};
 use lpvmpc_sim::Random;
 use nalgebra::{SMatrix, SVector};
 use serde::Deserialize;
+use std::fmt;
 
 /// What of an identified robot is uncertain: its plant, in the order of [`values`]. Delay and
 /// biases of the sensors are the world's.
@@ -26,6 +27,17 @@ const MOST_DRAWS: usize = 1000;
 
 /// Rounding that a correlation may show.
 const TOLERANCE: f64 = 1e-6;
+
+/// Robots around a known one.
+// An object, so that a page, which reads no such files, does not have to load how they are drawn.
+pub trait RobotDistribution: fmt::Debug {
+    /// The robot that this `seed` draws from the distribution around `ballbot`. One that mechanics
+    /// forbids is drawn again, unless `ballbot` itself is none that mechanics allows.
+    ///
+    /// # Errors
+    /// The distribution is none, or there is no such robot in it.
+    fn draw(&self, ballbot: &Ballbot<f64>, seed: u64) -> Result<Ballbot<f64>, ScenarioError>;
+}
 
 /// The errors of a robot's identified parameters: normally distributed around them. It is what
 /// `[identification]` of a `parameters.toml` says of it.
@@ -110,13 +122,10 @@ impl Uncertainty {
             deviations[i] * parts.eigenvectors[(i, j)] * root
         }))
     }
+}
 
-    /// The robot that this `seed` draws from the distribution around `ballbot`. One that mechanics
-    /// forbids is drawn again, unless `ballbot` itself is none that mechanics allows.
-    ///
-    /// # Errors
-    /// The covariance is none, or there is no such robot within the uncertainty.
-    pub fn draw(&self, ballbot: &Ballbot<f64>, seed: u64) -> Result<Ballbot<f64>, ScenarioError> {
+impl RobotDistribution for Uncertainty {
+    fn draw(&self, ballbot: &Ballbot<f64>, seed: u64) -> Result<Ballbot<f64>, ScenarioError> {
         let factor = self.factor()?;
         let mut random = Random::new(seed, 0);
         let physical = |robot: &Ballbot<f64>| robot.consistency(limits::THETA).is_physical();

@@ -1,7 +1,8 @@
 //! A scenario run step by step is the run at once, and a person can take part in it.
 
 use ballbot_scenario::{
-    Phase, Prepared, Scenario, ScenarioError, Session, Surroundings, TerminalTable, TorqueRateTable,
+    Phase, PointTable, Prepared, ReferenceTable, Scenario, ScenarioError, Session, ShapingTable,
+    Surroundings, TerminalTable, TorqueRateTable,
 };
 use std::path::Path;
 use std::time::Duration;
@@ -49,7 +50,7 @@ fn a_target_is_reached_from_where_the_robot_is() {
     let scenario = Scenario::load("single-setpoint").unwrap();
     let mut session = Session::new(prepared(&scenario).unwrap()).unwrap();
     run_until(&mut session, 1.0);
-    session.set_targets(&[-1.0]);
+    session.set_targets(&[-1.0]).unwrap();
     run_until(&mut session, 6.0);
     let phi = session.states().next().unwrap()[0];
     assert!((phi + 1.0).abs() < 0.01, "{phi}");
@@ -103,7 +104,7 @@ fn where_the_torque_moves_in_ramps_it_and_its_rate_have_their_names() {
         weight: 0.01,
     });
     let mut session = Session::new(prepared(&scenario).unwrap()).unwrap();
-    session.set_targets(&[20.0]);
+    session.set_targets(&[20.0]).unwrap();
     assert!(session.step(&clock));
     let active = session.active_bounds_in_words(0);
     assert!(
@@ -117,6 +118,96 @@ fn where_the_torque_moves_in_ramps_it_and_its_rate_have_their_names() {
     for number in ["state 4", "input 0", "input 1"] {
         assert!(!words.contains(number), "{words}");
     }
+}
+
+/// Steps until nothing moves any more; the times of all samples.
+fn times_until_down(session: &mut Session) -> Vec<f64> {
+    let mut times = Vec::new();
+    while session.step(&clock) {
+        let now: Vec<f64> = session.samples().iter().map(|sample| sample.t).collect();
+        assert_eq!(now.len(), session.planes().len());
+        assert!(now.iter().all(|t| *t == now[0]), "{now:?}");
+        times.push(now[0]);
+        assert!(times.len() < 1000);
+    }
+    times
+}
+
+#[test]
+fn a_fall_has_one_sample_per_period_in_every_plane() {
+    for (name, plane, push) in [
+        ("tight-bounds", 0, 8.0),
+        ("lissajous", 0, 20.0),
+        ("lissajous", 1, 20.0),
+    ] {
+        let scenario = Scenario::load(name).unwrap();
+        let t_s = scenario.controller.t_s;
+        let mut session = Session::new(prepared(&scenario).unwrap()).unwrap();
+        session.push(plane, 0.0, push).unwrap();
+        let times = times_until_down(&mut session);
+        assert!(times.len() > 2, "{name}: {times:?}");
+        for (k, t) in times.iter().enumerate() {
+            assert!((t - k as f64 * t_s).abs() < 1e-9, "{name}, sample {k}: {t}");
+        }
+    }
+}
+
+#[test]
+fn a_robot_whose_settings_change_while_it_falls_is_still_seen() {
+    let scenario = Scenario::load("tight-bounds").unwrap();
+    let mut session = Session::new(prepared(&scenario).unwrap()).unwrap();
+    run_until(&mut session, 0.2);
+    session.push(0, 0.0, 4.0).unwrap();
+    while *session.phase() == Phase::Running {
+        assert!(session.step(&clock));
+    }
+    assert!(matches!(session.phase(), Phase::Falling(_)));
+    let mut session = session.reconfigured(prepared(&scenario).unwrap()).unwrap();
+    assert!(times_until_down(&mut session).len() > 1);
+}
+
+/// The same orders by hand and in a file are the same run.
+#[test]
+fn targets_become_smooth_moves_where_the_scenario_asks_for_them() {
+    let mut scenario = Scenario::load("single-setpoint").unwrap();
+    scenario.controller.shaping = Some(ShapingTable {
+        tilt_rad: 0.05,
+        phi_dot_rad_s: 3.0,
+    });
+    scenario.controller.preview = false;
+    let points = |points: &[(f64, f64)]| {
+        let points = points
+            .iter()
+            .map(|&(time_s, phi_rad)| PointTable { time_s, phi_rad });
+        ReferenceTable::SetPoints {
+            points: points.collect(),
+        }
+    };
+    scenario.reference = points(&[(0.0, 0.0)]);
+    let mut by_hand = Session::new(prepared(&scenario).unwrap()).unwrap();
+    run_until(&mut by_hand, 1.0);
+    assert!(!by_hand.set_targets(&[2.0]).unwrap());
+    run_until(&mut by_hand, 1.5);
+    // The second one waits for the first move's end, the third takes its place.
+    assert!(!by_hand.set_targets(&[5.0]).unwrap());
+    run_until(&mut by_hand, 1.6);
+    assert!(by_hand.set_targets(&[-1.0]).unwrap());
+    scenario.reference = points(&[(0.0, 0.0), (1.0, 2.0), (1.6, -1.0)]);
+    let mut from_file = Session::new(prepared(&scenario).unwrap()).unwrap();
+    run_until(&mut from_file, 1.6);
+    while by_hand.time() < 8.0 {
+        assert!(by_hand.step(&clock) && from_file.step(&clock));
+        let (hand, file) = (&by_hand.samples()[0], &from_file.samples()[0]);
+        assert!((hand.x - file.x).amax() < 1e-9, "{hand:?} and {file:?}");
+        assert!((hand.x_ref[0] - file.x_ref[0]).abs() < 1e-12);
+    }
+    let phi = by_hand.states().next().unwrap()[0];
+    assert!((phi + 1.0).abs() < 0.05, "{phi}");
+    // New settings leave the order as it is.
+    let before = by_hand.targets().next().unwrap();
+    let after = by_hand.reconfigured(prepared(&scenario).unwrap()).unwrap();
+    assert_eq!(after.targets().next().unwrap(), before);
+    assert!(by_hand.set_targets(&[f64::NAN]).is_err());
 }
 
 #[test]

@@ -176,9 +176,14 @@ impl Simulation {
         matches!(self.session.phase(), Phase::Down(_))
     }
 
-    /// From now on the ball has to go to these angles.
-    pub fn set_target(&mut self, phi_x: f64, phi_y: f64) {
-        self.session.set_targets(&[phi_x, phi_y]);
+    /// From now on the ball has to go to these angles. Says whether this takes the place of an
+    /// order whose smooth move had not begun.
+    ///
+    /// # Errors
+    /// A number that is not finite.
+    pub fn set_target(&mut self, phi_x: f64, phi_y: f64) -> Result<bool, String> {
+        let replaced = self.session.set_targets(&[phi_x, phi_y]);
+        replaced.map_err(|error| error.to_string())
     }
 
     /// From now on the ball has to follow straight lines between these angles, at these times.

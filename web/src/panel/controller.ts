@@ -18,9 +18,24 @@ export function controllerFields(form: Form): HTMLElement[] {
     form.number("controller.r", { label: "R", min: 1, max: 100000, logarithmic: true }),
     terminal(form),
     ...predictor(form),
-    form.optional("controller.iterations.fixed", { label: "QPs", title: "Quadratic programs per sample, each along the rollout of the one before; empty: one", step: 1 }),
+    programs(form),
     form.check("controller.preview", { label: "Sees the reference ahead", absent: true }),
   ];
+}
+
+/** Quadratic programs per sample; a file may ask for convergence, which this field shows as empty. */
+function programs(form: Form): HTMLElement {
+  const field = numberField(
+    {
+      label: "QPs",
+      title: "Quadratic programs per sample, each along the rollout of the one before; empty: one, or as in the file",
+      step: 1,
+      cleared: () => form.change("controller.iterations", undefined),
+    },
+    (fixed) => form.change("controller.iterations", { fixed }),
+  );
+  form.watch(({ controller }) => field.set((controller["iterations"] as { fixed?: number } | undefined)?.fixed ?? NaN));
+  return field.element;
 }
 
 const TERMINALS: [kind: string, text: string][] = [

@@ -37,6 +37,12 @@ function shown(value: number): string {
   return Number.isFinite(value) ? String(Number(value.toPrecision(5))) : "";
 }
 
+/** What was typed; an empty field is `whenEmpty`, and what is no number is NaN, to be refused with a reason. */
+function typed(input: HTMLInputElement, whenEmpty: number): number {
+  if (input.validity.badInput) return NaN;
+  return input.value.trim() === "" ? whenEmpty : Number(input.value);
+}
+
 /** Whether somebody is in the middle of typing into a field, which then must not be set. */
 class Typing {
   now = false;
@@ -80,13 +86,12 @@ export function numberField(spec: NumberSpec, changed: (value: number) => void):
   if (spec.whenEmpty !== undefined) input.placeholder = "none";
   if (spec.cleared) input.placeholder = "default";
   input.addEventListener("change", () => {
-    if (input.value.trim() === "" && spec.cleared) {
+    if (input.value.trim() === "" && !input.validity.badInput && spec.cleared) {
       spec.cleared();
       return;
     }
-    const value = input.value.trim() === "" ? spec.whenEmpty : Number(input.value);
-    if (value === undefined || Number.isNaN(value)) return;
-    slider.value = String(toSlider(value));
+    const value = typed(input, spec.whenEmpty ?? NaN);
+    if (!Number.isNaN(value)) slider.value = String(toSlider(value));
     changed(value);
   });
   slider.addEventListener("input", () => {
@@ -95,9 +100,13 @@ export function numberField(spec: NumberSpec, changed: (value: number) => void):
     input.value = shown(value);
     changed(value);
   });
+  // Where it was let go, it shows what holds.
+  let now = NaN;
+  slider.addEventListener("change", () => (slider.value = String(toSlider(now))));
   return {
     element: slides ? row(spec, input, slider) : row(spec, input),
     set(value) {
+      now = value;
       if (!typing.now) input.value = shown(value);
       if (document.activeElement !== slider) slider.value = String(toSlider(value));
     },
@@ -113,11 +122,10 @@ export function rangeField(spec: FieldSpec, changed: (value: [number, number]) =
   };
   const [lower, upper] = [make("lower bound"), make("upper bound")];
   const typing = [new Typing(lower), new Typing(upper)] as const;
-  const read = (input: HTMLInputElement, empty: number) => (input.value.trim() === "" ? empty : Number(input.value));
   // Only the side that was typed: the other one may have more digits than are shown.
   let now: [number, number] = [-Infinity, Infinity];
-  lower.addEventListener("change", () => changed([read(lower, -Infinity), now[1]]));
-  upper.addEventListener("change", () => changed([now[0], read(upper, Infinity)]));
+  lower.addEventListener("change", () => changed([typed(lower, -Infinity), now[1]]));
+  upper.addEventListener("change", () => changed([now[0], typed(upper, Infinity)]));
   return {
     element: row(spec, lower, upper),
     set([low, high]) {

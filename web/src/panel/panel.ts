@@ -55,6 +55,7 @@ export class Panel {
   }
 
   private moveTarget(x: number, y: number): void {
+    if (Number.isFinite(x) && Number.isFinite(y)) this.target = { x, y };
     this.actions.target(x, y);
   }
 

@@ -175,7 +175,7 @@ export class SolidView implements View {
     }
   }
 
-  floorAt(clientX: number, clientY: number): FloorPoint | undefined {
+  floorAt(clientX: number, clientY: number, height = 0): FloorPoint | undefined {
     const box = this.element.getBoundingClientRect();
     const ray = new Raycaster();
     const place = new Vector2(
@@ -183,7 +183,7 @@ export class SolidView implements View {
       1 - ((clientY - box.top) / box.height) * 2,
     );
     ray.setFromCamera(place, this.camera);
-    const hit = ray.ray.intersectPlane(new Plane(new Vector3(0, 1, 0), 0), new Vector3());
+    const hit = ray.ray.intersectPlane(new Plane(new Vector3(0, 1, 0), -height), new Vector3());
     if (!hit || hit.distanceTo(this.camera.position) > 30) return undefined;
     return { x: hit.x, y: -hit.z };
   }

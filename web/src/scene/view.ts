@@ -62,8 +62,8 @@ export interface View {
   resize(): void;
   /** Lets the camera follow the pointer. */
   setCameraTool(on: boolean): void;
-  /** The point of the floor under a point of the window. */
-  floorAt(clientX: number, clientY: number): FloorPoint | undefined;
+  /** The point under a point of the window, on the floor or at a height above it (m). */
+  floorAt(clientX: number, clientY: number, height?: number): FloorPoint | undefined;
   /** Where a point above the floor appears in the window. */
   project(x: number, y: number, height: number): { clientX: number; clientY: number };
 }

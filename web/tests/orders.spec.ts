@@ -1,0 +1,190 @@
+// What a person orders: targets, paths and pushes arrive as they were meant, and stand in the file.
+
+import { expect, test, type Page } from "@playwright/test";
+import { fill, largest, open, openFlat, ready, saved, scenario, table, until } from "./page";
+import { expectSamePrefix, simulated } from "./program";
+
+/** Presses at a place of the scene (parts of its size), moves by pixels, lets go. */
+async function drag(page: Page, [left, top]: [number, number], [right, down]: [number, number]): Promise<void> {
+  const box = await page.locator("#scene").boundingBox();
+  if (!box) throw new Error("no scene");
+  const [x, y] = [box.x + box.width * left, box.y + box.height * top];
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.mouse.move(x + right / 2, y + down / 2);
+  await page.mouse.move(x + right, y + down);
+  await page.mouse.up();
+}
+
+/** The first tilt rates of the run that are not zero, in both planes. */
+async function tiltRates(page: Page): Promise<[number, number]> {
+  const files = new Map<string, Promise<string>>();
+  page.on("download", (download) => files.set(download.suggestedFilename(), download.createReadStream().then(async (stream) => {
+    const parts: Buffer[] = [];
+    for await (const part of stream) parts.push(part as Buffer);
+    return Buffer.concat(parts).toString();
+  })));
+  await page.getByRole("button", { name: "Save CSV" }).click();
+  await expect.poll(() => files.size).toBe(2);
+  const signed = async (name: string) => {
+    const values = table((await files.get(name)) ?? "")["theta_dot_rad_s"] ?? [];
+    return values.find((value) => Math.abs(value) > 1e-6) ?? 0;
+  };
+  return [await signed("trajectory_x.csv"), await signed("trajectory_y.csv")];
+}
+
+test("a body that is hardly dragged is hardly pushed", async ({ page }) => {
+  await open(page);
+  await drag(page, [0.5, 0.5], [3, 0]);
+  await until(page, 1);
+  await expect(page.locator("#alert")).toBeHidden();
+  const [x, y] = await tiltRates(page);
+  // It was pushed, not sent: the target is where it was.
+  await expect(page.getByLabel("Target X", { exact: true })).toHaveValue("0");
+  expect(Math.hypot(x, y)).toBeGreaterThan(0.01);
+  expect(Math.hypot(x, y)).toBeLessThan(1);
+});
+
+test("a body is pushed the way it is dragged", async ({ page }) => {
+  await openFlat(page);
+  await drag(page, [0.5, 0.5], [20, 0]);
+  await until(page, 1);
+  const [x, y] = await tiltRates(page);
+  // Towards +x it leans with a negative theta.
+  expect(x).toBeLessThan(-0.1);
+  expect(Math.abs(y)).toBeLessThan(0.05 * Math.abs(x));
+});
+
+test("a second finger turns the camera, and sends the robot nowhere", async ({ browser }) => {
+  const context = await browser.newContext({ viewport: { width: 390, height: 844 }, isMobile: true, hasTouch: true });
+  const page = await context.newPage();
+  await open(page);
+  await page.locator("#scene").evaluate((scene) => {
+    const element = scene.querySelector("canvas") ?? scene;
+    const box = element.getBoundingClientRect();
+    const send = (kind: string, pointerId: number, x: number) =>
+      element.dispatchEvent(new PointerEvent(kind, {
+        pointerId, pointerType: "touch", isPrimary: pointerId === 11, button: 0, bubbles: true,
+        clientX: box.left + box.width * x, clientY: box.top + box.height * 0.85,
+      }));
+    // A synthetic pointer cannot be captured.
+    element.setPointerCapture = () => {};
+    element.releasePointerCapture = () => {};
+    send("pointerdown", 11, 0.7);
+    send("pointermove", 11, 0.705);
+    send("pointerdown", 12, 0.3);
+    send("pointermove", 12, 0.1);
+    send("pointerup", 12, 0.1);
+    send("pointerup", 11, 0.705);
+  });
+  await page.waitForTimeout(300);
+  await expect(page.getByLabel("Target X", { exact: true })).toHaveValue("0");
+  await expect(page.locator("#play")).toHaveText("Run");
+  await context.close();
+});
+
+test("one target follows another at once", async ({ page }) => {
+  await openFlat(page);
+  await page.evaluate(() => {
+    const type = (label: string, value: string) => {
+      const labels = [...document.querySelectorAll<HTMLLabelElement>(".panel label")];
+      const input = labels.find(({ textContent }) => textContent === label)?.control as HTMLInputElement;
+      input.value = value;
+      input.dispatchEvent(new Event("input", { bubbles: true }));
+      input.dispatchEvent(new Event("change", { bubbles: true }));
+    };
+    type("Target X", "0.5");
+    type("Target Y", "-0.25");
+  });
+  await until(page, 0.5);
+  await expect(page.getByLabel("Target X", { exact: true })).toHaveValue("0.5");
+  await expect(page.getByLabel("Target Y", { exact: true })).toHaveValue("-0.25");
+});
+
+test("a target that is no place is refused", async ({ page }) => {
+  await openFlat(page);
+  await fill(page, "Target X", "1e300");
+  await expect(page.locator("#message")).toContainText("at most 1000 m");
+  await fill(page, "Target X", "");
+  await expect(page.locator("#message")).toContainText("at most 1000 m");
+  await expect(page.locator("#play")).toHaveText("Run");
+});
+
+/** Both robots see an order when it comes, not before. */
+async function blind(page: Page, name: string): Promise<void> {
+  await scenario(page, name);
+  await page.locator(".panel").getByLabel("Sees the reference ahead").uncheck();
+}
+
+test("targets stand in the file as they were given", async ({ page }) => {
+  await openFlat(page);
+  await blind(page, "two-setpoints");
+  await page.locator("#play").click();
+  await until(page, 0.4);
+  await fill(page, "Target X", "0.3");
+  await until(page, 1.2);
+  await fill(page, "Target X", "-0.1");
+  await fill(page, "Horizon N", "30");
+  await until(page, 2.5);
+  await page.locator("#play").click();
+  const csv = await saved(page, "Save CSV");
+  const toml = await saved(page, "Save TOML");
+  expect([...toml.matchAll(/time_s = /g)].length).toBeGreaterThanOrEqual(3);
+  // The horizon of the file is the last one: until then the run is that of the first one.
+  const first = simulated(toml.replace("horizon = 30", "horizon = 20"))("trajectory.csv");
+  expectSamePrefix(csv, first, 1.2);
+});
+
+test("smooth moves are those of the file", async ({ page }) => {
+  await openFlat(page);
+  await blind(page, "single-setpoint");
+  await page.locator(".panel").getByLabel("Terminal", { exact: true }).selectOption("discrete_riccati");
+  await page.evaluate(() => document.querySelectorAll("details").forEach((section) => (section.open = true)));
+  await page.locator(".panel").getByLabel("Set points as smooth moves", { exact: true }).check();
+  await page.locator("#play").click();
+  await until(page, 0.4);
+  await fill(page, "Target X", "0.4");
+  await until(page, 1);
+  await fill(page, "Target X", "0.2");
+  await fill(page, "Target X", "-0.2");
+  await until(page, 2.5);
+  await page.locator("#play").click();
+  const csv = await saved(page, "Save CSV");
+  const reference = table(csv)["phi_ref_rad"] ?? [];
+  const steepest = Math.max(...reference.slice(1).map((value, i) => Math.abs(value - (reference[i] ?? value))));
+  expect(steepest).toBeGreaterThan(0.05);
+  expect(steepest).toBeLessThan(0.45);
+  expectSamePrefix(csv, simulated(await saved(page, "Save TOML"))("trajectory.csv"), 2.4);
+});
+
+test("a path and a target after it stand in the file", async ({ page }) => {
+  await openFlat(page);
+  await scenario(page, "drive");
+  await page.locator(".panel").getByLabel("Sees the reference ahead").uncheck();
+  await page.getByText("Draw path").click();
+  await drag(page, [0.3, 0.7], [120, 30]);
+  await until(page, 1);
+  await fill(page, "Target X", "0.2");
+  await until(page, 2.2);
+  await page.locator("#play").click();
+  const toml = await saved(page, "Save TOML");
+  expect(toml).toContain("[reference.planes.x.lines]");
+  const program = simulated(toml);
+  for (const plane of ["x", "y"]) {
+    const theirs = table(program(`trajectory_${plane}.csv`));
+    expect(largest(theirs["phi_rad"])).toBeGreaterThan(0.1);
+  }
+  const csv = await saved(page, "Save CSV");
+  expectSamePrefix(csv, program("trajectory_x.csv"), 2.1);
+});
+
+test("the skip link goes to the set-up and says nothing", async ({ page }) => {
+  await openFlat(page);
+  await page.locator(".skip").focus();
+  await page.keyboard.press("Enter");
+  await expect(page.locator("#panel")).toBeFocused();
+  await expect(page.locator("#message")).toBeHidden();
+  await page.reload();
+  await ready(page);
+  await expect(page.locator("#message")).not.toContainText("link");
+});

@@ -1,0 +1,49 @@
+// What the program makes of a set-up, and whether the page makes the same.
+
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { expect } from "@playwright/test";
+import { table, type Table } from "./page";
+
+const ballbot = process.env["BALLBOT"] ?? "../target/release/ballbot";
+
+/** What the program writes for a scenario, file by file. */
+export function simulated(toml: string): (file: string) => string {
+  const folder = mkdtempSync(join(tmpdir(), "ballbot-"));
+  const file = join(folder, "scenario.toml");
+  writeFileSync(file, toml);
+  execFileSync(ballbot, ["simulate", file, "--out", folder], { stdio: "ignore" });
+  return (name) => readFileSync(join(folder, name), "utf8");
+}
+
+const NUMBERS = ["t_s", "phi_rad", "theta_rad", "phi_dot_rad_s", "theta_dot_rad_s", "torque_nm", "phi_ref_rad", "cost"];
+
+function expectRows(ours: Table, theirs: Table, rows: number): void {
+  for (const column of NUMBERS) {
+    const [a, b] = [ours[column] ?? [], theirs[column] ?? []];
+    for (let i = 0; i < rows; i++) {
+      const [value, other] = [a[i] ?? NaN, b[i] ?? NaN];
+      if (Number.isNaN(value) && Number.isNaN(other)) continue;
+      const scale = column === "cost" ? Math.max(1, Math.abs(other)) : 1;
+      expect(Math.abs(value - other) / scale, `${column}, row ${i}: ${value} and ${other}`).toBeLessThan(1e-9);
+    }
+  }
+}
+
+/** The same run from beginning to end. */
+export function expectSame(here: string, there: string): void {
+  const [ours, theirs] = [table(here), table(there)];
+  const rows = ours["t_s"]?.length ?? 0;
+  expect(rows).toBe(theirs["t_s"]?.length);
+  expectRows(ours, theirs, rows);
+}
+
+/** The same run up to a time, s. */
+export function expectSamePrefix(here: string, there: string, until: number): void {
+  const [ours, theirs] = [table(here), table(there)];
+  const rows = ours["t_s"]?.findIndex((time) => time > until) ?? -1;
+  expect(rows).toBeGreaterThan(5);
+  expectRows(ours, theirs, rows);
+}
