@@ -1,11 +1,10 @@
 #!/usr/bin/env bash
-# The browser page: WebAssembly module, page, program with the page inside, tests in Chromium.
-# Installs what it needs: the WebAssembly target (install-targets.sh), Chromium, npm packages.
+# The program with the page inside (page.sh makes it), and the page's tests in Chromium, which is
+# installed if it is not there.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}
 
-.ci/install-targets.sh
 if [[ -z ${CHROMIUM:-} ]] && ! command -v chromium >/dev/null; then
     as_root=()
     ((EUID == 0)) || as_root=(sudo)
@@ -15,9 +14,6 @@ if [[ -z ${CHROMIUM:-} ]] && ! command -v chromium >/dev/null; then
 fi
 export CHROMIUM=${CHROMIUM:-$(command -v chromium)}
 
-cd web
-npm ci --no-audit --no-fund
-npm run build
-node scripts/sizes.mjs --fail
 cargo build --locked --release --features page -p ballbot-cli
+cd web
 BALLBOT=$CARGO_TARGET_DIR/release/ballbot npm test
