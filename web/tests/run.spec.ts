@@ -157,7 +157,7 @@ test("the camera turns, and the robot stays; the plots show either plane; the se
   await fill(page, "Target Y", "0.5");
   await until(page, 4);
   await page.locator("#play").click();
-  const phi = async () => parseFloat((await page.locator("#plots output").first().textContent()) ?? "");
+  const phi = async () => parseFloat((await page.locator("#plots figcaption > span").first().textContent()) ?? "");
   expect(Math.abs(await phi())).toBeLessThan(0.1);
   await page.getByText("y plane", { exact: true }).click();
   await expect.poll(phi).toBeGreaterThan(3);

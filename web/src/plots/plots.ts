@@ -64,7 +64,7 @@ export class Plots {
       figure.className = "strip";
       const caption = document.createElement("figcaption");
       caption.textContent = strip.unit ? `${strip.title} [${strip.unit}]` : strip.title;
-      const value = document.createElement("output");
+      const value = document.createElement("span");
       caption.append(value);
       const plot = document.createElement("div");
       plot.setAttribute("role", "img");
@@ -188,13 +188,13 @@ export class Plots {
   /** Shows everything up to `time`, s. */
   draw(time: number): void {
     this.time = time;
-    const outputs = this.host.querySelectorAll<HTMLOutputElement>("figcaption > output");
+    const values = this.host.querySelectorAll("figcaption > span");
     for (const [index, strip] of STRIPS.entries()) {
       const chart = this.charts[index];
       if (!chart) continue;
       chart.setData(columns(strip, this.shown, this.plane, this.timeRange()[0]), true);
-      const output = outputs[index];
-      if (output) output.textContent = this.valueNow(strip);
+      const value = values[index];
+      if (value) value.textContent = this.valueNow(strip);
     }
   }
 
