@@ -5,7 +5,7 @@ import { mkdtempSync, readFileSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { expect, test } from "@playwright/test";
-import { clock, fill, largest, open, openFlat, openSection, saved, scenario, table, until } from "./page";
+import { clock, fill, largest, open, openFile, openFlat, openSection, saved, scenario, table, until } from "./page";
 
 const ballbot = process.env["BALLBOT"] ?? "../target/release/ballbot";
 
@@ -118,6 +118,17 @@ test("in an ideal world a controller without a plan gives up, and says which bou
   await fill(page, "Push", "40");
   await page.getByRole("button", { name: "\u2192" }).click();
   await expect(page.locator("#alert")).toContainText(/no plan at t = .* s: infeasible: .* bound of .* cannot be met/);
+  await expect(page.locator("#status")).toContainText("on the floor");
+  // Without a plan there is no cost: an empty cell. This file can be played, and the program's own.
+  const csv = await saved(page, "Save CSV");
+  expect(csv).not.toContain("NaN");
+  const costs = table(csv)["cost"] ?? [];
+  expect(costs.slice(0, -1).some(Number.isNaN)).toBe(true);
+  await openFile(page, "fallen.csv", csv);
+  await expect(page.locator("#title")).toHaveText("recorded: fallen.csv");
+  await scenario(page, "tight-bounds");
+  await openFile(page, "simulated.csv", simulated(await saved(page, "Save TOML"))("trajectory.csv"));
+  await expect(page.locator("#title")).toHaveText("recorded: simulated.csv");
 });
 
 test("the target can be dragged on the floor", async ({ page }) => {

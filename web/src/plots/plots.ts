@@ -21,6 +21,8 @@ function decades(low: number, high: number): number[] {
 /** Shown at once, s. */
 const WINDOW = 8;
 const AXIS_WIDTH = 52;
+/** In place of a value that there is not: a recording does not hold the motors' torques. */
+const UNKNOWN = "\u2013";
 
 interface Colours {
   ink: string;
@@ -202,9 +204,12 @@ export class Plots {
     const history = this.shown[0]?.history;
     if (!history || history.length === 0) return "";
     const last = history.length - 1;
-    if (strip.motors) return [0, 1, 2].map((i) => history.motor(last, i).toFixed(2)).join("  ");
+    if (strip.motors) {
+      const torques = [0, 1, 2].map((i) => history.motor(last, i));
+      return torques.every(Number.isFinite) ? torques.map((torque) => torque.toFixed(2)).join("  ") : UNKNOWN;
+    }
     const value = history.at(last, planeOf(history, this.plane), strip.column ?? 0);
-    if (!Number.isFinite(value)) return "";
+    if (!Number.isFinite(value)) return UNKNOWN;
     return strip.fromZero ? value.toFixed(0) : strip.logarithmic ? value.toPrecision(3) : value.toFixed(3);
   }
 }
