@@ -1,7 +1,7 @@
 // The page's state: one set-up, the robots derived from it, and what they did.
 
 import { Engine, type Source } from "./engine";
-import { readTrajectory, trajectoryCsv } from "./files";
+import { readRecording, trajectoryCsv } from "./files";
 import { History } from "./history";
 import * as link from "./link";
 import { Live, timedPath } from "./live";
@@ -229,18 +229,17 @@ export class App implements Source {
 
   play(files: { name: string; text: string }[]): void {
     try {
-      const sorted = files.toSorted((a, b) => a.name.localeCompare(b.name)).slice(0, 2);
-      const planes = sorted.map(({ name, text: csv }) => readTrajectory(csv, name));
+      const { planes, name } = readRecording(files);
       const playback = new Playback(planes);
       this.engine.run(false, this.speed);
       this.playback?.stop();
       this.playback = playback;
-      this.playbackName = sorted.map(({ name }) => name).join(", ");
+      this.playbackName = name;
       this.planes = planes.length;
       this.ordered = undefined;
       this.robots = this.robots.slice(0, 1);
       this.histories = [new History(planes.length, playback.samplingTime, FAN_INTERVAL)];
-      this.references = [planes.map(({ rows }) => Float64Array.from(rows, (row) => row[6] ?? 0))];
+      this.references = [playback.references()];
       this.events.setup();
       this.events.restarted();
       playback.onBatch = (batch) => this.receive(batch);

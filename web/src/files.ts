@@ -11,12 +11,14 @@ export const COLUMNS = [
 /** A row per sample, then the state at the end without a torque. */
 export function trajectoryCsv(history: History, plane: number): string {
   const lines: string[] = [COLUMNS.join(",")];
+  // What is unknown, as the cost without a plan, is an empty cell.
+  const cell = (value: number, text = String(value)) => (Number.isFinite(value) ? text : "");
   const plain = (text: string) => text.replaceAll(",", ";").replaceAll("\n", " ");
   for (let i = 0; i < history.length; i++) {
     const values = [ROW.time, ROW.phi, ROW.theta, ROW.phiDot, ROW.thetaDot, ROW.torque, ROW.phiReference, ROW.cost]
-      .map((column) => history.at(i, plane, column));
-    const step = history.at(i, plane, ROW.stepMicroseconds).toFixed(3);
-    lines.push(`${values.join(",")},${plain(history.statusAt(i))},${step}`);
+      .map((column) => cell(history.at(i, plane, column)));
+    const step = history.at(i, plane, ROW.stepMicroseconds);
+    lines.push(`${values.join(",")},${plain(history.statusAt(i))},${cell(step, step.toFixed(3))}`);
   }
   const now = [0, 1, 2, 3, 4].map((column) => history.nowAt(plane, column));
   lines.push(`${now.join(",")},,${history.nowAt(plane, 5)},,${plain(history.ending ?? "")},`);
@@ -68,6 +70,7 @@ export function readTrajectory(text: string, name: string): Recorded {
     } else {
       const row = new Float64Array(ROW_WIDTH);
       row.set(values);
+      row[ROW.activeBounds] = NaN;
       row[ROW.stepMicroseconds] = place("step_us") < 0 ? NaN : Number(cells[place("step_us")] || NaN);
       row.set(row.subarray(ROW.phi, ROW.phi + 4), ROW.estimate);
       rows.push(row);
@@ -75,6 +78,31 @@ export function readTrajectory(text: string, name: string): Recorded {
     }
   }
   return { rows, statuses, final: final ?? new Float64Array(NOW_WIDTH), ending };
+}
+
+/** Reads the one plane of a run, or its two. Throws with the file and the reason. */
+export function readRecording(files: { name: string; text: string }[]): { planes: Recorded[]; name: string } {
+  const sorted = files.toSorted((a, b) => a.name.localeCompare(b.name));
+  const name = sorted.map((file) => file.name).join(", ");
+  const [x, y] = sorted.map((file) => file.name.toLowerCase());
+  const arePlanes = x !== undefined && x.endsWith("_x.csv") && y === x.replace(/_x\.csv$/, "_y.csv");
+  if (files.length > 2 || (files.length === 2 && !arePlanes)) {
+    const right = "open one file, or the two planes of one run, named ..._x.csv and ..._y.csv";
+    throw new Error(`${name}: these are not one run; ${right}`);
+  }
+  const planes = sorted.map((file) => readTrajectory(file.text, file.name));
+  if (planes[0] && planes[1]) requireSameTimes(planes[0], planes[1], name);
+  return { planes, name };
+}
+
+function requireSameTimes(x: Recorded, y: Recorded, name: string): void {
+  const times = ({ rows, final }: Recorded) => [...rows, final].map((row) => row[0]);
+  const [ours, theirs] = [times(x), times(y)];
+  const rule = "the two planes of one run have the same times";
+  if (ours.length !== theirs.length) throw new Error(`${name}: ${ours.length} rows and ${theirs.length} rows; ${rule}`);
+  for (const [i, time] of ours.entries()) {
+    if (time !== theirs[i]) throw new Error(`${name}, row ${i + 1}: t_s = ${time} and t_s = ${theirs[i]}; ${rule}`);
+  }
 }
 
 /** Hands a file to the user. */
@@ -85,6 +113,16 @@ export function save(name: string, text: string, type: string): void {
   link.download = name;
   link.click();
   setTimeout(() => URL.revokeObjectURL(url), 1000);
+}
+
+/** The text of a file. Throws with its name. */
+export async function readText(file: File): Promise<{ name: string; text: string }> {
+  try {
+    return { name: file.name, text: await file.text() };
+  } catch {
+    // Browsers hand over a dropped folder as a file that cannot be read.
+    throw new Error(`${file.name}: this cannot be read; if it is a folder, choose the files in it`);
+  }
 }
 
 /** Lets the user choose files. */

@@ -1,4 +1,4 @@
-// The keyboard: everywhere but in a field.
+// The keyboard: everywhere but where a key means something else.
 
 export interface KeyActions {
   toggle(): void;
@@ -20,6 +20,11 @@ const ARROWS: Record<string, [number, number]> = {
   ArrowDown: [0, -1],
 };
 
+/** Here every key may be meant for the field. */
+const FIELDS = "select, textarea, input:not([type=radio], [type=checkbox], [type=range])";
+/** Here the space bar has a meaning of its own; a radio button that is chosen already has none for it. */
+const TAKE_SPACE = "button, summary, input[type=checkbox], input[type=radio]:not(:checked)";
+
 export function connectKeys(scene: HTMLElement, actions: KeyActions): void {
   scene.addEventListener("keydown", (event) => {
     const arrow = ARROWS[event.key];
@@ -31,11 +36,12 @@ export function connectKeys(scene: HTMLElement, actions: KeyActions): void {
   });
   document.addEventListener("keydown", (event) => {
     const { target } = event;
-    const elsewhere = target instanceof HTMLElement && target.closest("input, select, button, summary, a");
+    const key = event.key.toLowerCase();
+    const elsewhere = target instanceof HTMLElement && target.closest(key === " " ? `${FIELDS}, ${TAKE_SPACE}` : FIELDS);
     if (elsewhere || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.key === " ") actions.toggle();
-    else if (event.key === ".") actions.step();
-    else if (event.key === "r") actions.reset();
+    if (key === " ") actions.toggle();
+    else if (key === ".") actions.step();
+    else if (key === "r") actions.reset();
     else return;
     event.preventDefault();
   });

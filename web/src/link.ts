@@ -9,17 +9,39 @@ export interface Shared {
 const VERSION = "1";
 /** A set-up is a few kilobytes; more is not one. */
 const MOST_CHARACTERS = 200_000;
+/** Unpacked: a small link may expand to a thousand times its size. */
+const MOST_BYTES = 2_000_000;
+
+/** Breaks off what is longer than a set-up. */
+function limited(): TransformStream<Uint8Array<ArrayBuffer>, Uint8Array<ArrayBuffer>> {
+  let length = 0;
+  return new TransformStream({
+    transform(chunk, controller) {
+      length += chunk.length;
+      if (length > MOST_BYTES) controller.error(new Error(`more than ${MOST_BYTES} bytes`));
+      else controller.enqueue(chunk);
+    },
+  });
+}
 
 async function piped(bytes: Uint8Array<ArrayBuffer>, through: CompressionStream | DecompressionStream): Promise<Uint8Array<ArrayBuffer>> {
-  const stream = new Blob([bytes]).stream().pipeThrough(through);
+  const stream = new Blob([bytes]).stream().pipeThrough(through).pipeThrough(limited());
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
+/** Throws where `decode` would refuse the link. */
 export async function encode(shared: Shared): Promise<string> {
   const bytes = new TextEncoder().encode(JSON.stringify(shared));
+  if (bytes.length > MOST_BYTES) throw tooLarge(bytes.length, MOST_BYTES, "bytes");
   const packed = await piped(bytes, new CompressionStream("deflate-raw"));
-  const text = btoa(String.fromCharCode(...packed));
-  return `${VERSION}.${text.replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "")}`;
+  const binary = Array.from(packed, (byte) => String.fromCharCode(byte)).join("");
+  const text = btoa(binary).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "");
+  if (text.length > MOST_CHARACTERS) throw tooLarge(text.length, MOST_CHARACTERS, "characters");
+  return `${VERSION}.${text}`;
+}
+
+function tooLarge(size: number, most: number, unit: string): Error {
+  return new Error(`the set-up is too large for a link: ${size} ${unit}, at most ${most}; Save TOML keeps it in a file`);
 }
 
 /** Reads what `encode` wrote. Throws with a reason. */

@@ -3,7 +3,7 @@
 import "./style.css";
 import { App } from "./app";
 import { connectControls, linkInAddress } from "./controls";
-import { choose, save } from "./files";
+import { choose, readText, save } from "./files";
 import { CAPACITY } from "./history";
 import { MessageBox } from "./message";
 import { byId } from "./page";
@@ -87,7 +87,8 @@ function runningShown(): void {
   play.textContent = app.isRunning ? "Pause" : "Run";
   play.setAttribute("aria-pressed", String(app.isRunning));
   if (app.isComplete && !app.isRunning) {
-    messages.show(app.playback ? "End of the recording." : "End of the scenario. Run goes on from here, Reset starts again.", "info");
+    messages.show(app.playback ? "End of the recording. Run plays it again."
+      : "End of the scenario. Run goes on from here, Reset starts again.", "info");
   }
 }
 
@@ -160,12 +161,18 @@ function frame(now: number): void {
 }
 
 async function openFiles(files: File[]): Promise<void> {
-  const read = await Promise.all(files.map(async (file) => ({ name: file.name, text: await file.text() })));
-  const toml = read.find(({ name }) => name.toLowerCase().endsWith(".toml"));
-  const csv = read.filter(({ name }) => name.toLowerCase().endsWith(".csv"));
-  if (toml) await app.openToml(toml.text, "");
-  else if (csv.length > 0) app.play(csv);
-  else if (read.length > 0) messages.show(`${read[0]?.name}: this is neither a set-up (.toml) nor a recorded run (.csv)`, "error");
+  const named = (ending: string) => files.filter(({ name }) => name.toLowerCase().endsWith(ending));
+  const [[toml], csv] = [named(".toml"), named(".csv")];
+  try {
+    if (toml) await app.openToml((await readText(toml)).text, "");
+    else if (csv.length > 0) app.play(await Promise.all(csv.map(readText)));
+    else if (files[0]) {
+      const kinds = "neither a set-up (.toml) nor a recorded run (.csv); if it is a folder, choose the files in it";
+      messages.show(`${files[0].name}: this is ${kinds}`, "error");
+    }
+  } catch (error) {
+    messages.showError(error);
+  }
 }
 
 function saveCsv(): void {
@@ -177,8 +184,13 @@ function saveCsv(): void {
 
 async function copyLink(): Promise<void> {
   const address = new URL(location.href);
-  address.hash = await app.fragment();
-  history.replaceState(null, "", address);
+  try {
+    address.hash = await app.fragment();
+    history.replaceState(null, "", address);
+  } catch (error) {
+    messages.showError(error);
+    return;
+  }
   try {
     await navigator.clipboard.writeText(address.href);
     messages.show("The link is in the clipboard and in the address bar.", "info");

@@ -8,6 +8,10 @@ export class MessageBox {
 
   constructor(private readonly host: HTMLElement) {}
 
+  showError(error: unknown): void {
+    this.show(error instanceof Error ? error.message : String(error), "error");
+  }
+
   show(text: string, kind: "error" | "info"): void {
     this.host.textContent = text;
     this.host.className = `message ${kind}`;

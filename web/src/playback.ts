@@ -3,47 +3,75 @@
 import type { Recorded } from "./files";
 import { NOW_WIDTH, ROW, ROW_WIDTH, type Batch } from "./protocol";
 import type { Source } from "./engine";
+import { LINE_POINTS } from "./scene/lines";
 
 export class Playback implements Source {
   onBatch: (batch: Batch) => void = () => {};
   readonly samples: number;
   readonly samplingTime: number;
   private index = 0;
-  private clock = 0;
+  private clock: number;
   private running = false;
   private speed = 1;
   private lastTick = 0;
   private restarted = true;
-  private stopped = false;
+  private frame = 0;
 
   /** One recording, or those of the x plane and the y plane of one run. */
   constructor(private readonly planes: Recorded[]) {
     this.samples = Math.min(...planes.map(({ rows }) => rows.length));
     const [first, second] = [planes[0]?.rows[0], planes[0]?.rows[1] ?? planes[0]?.final];
     this.samplingTime = (second?.[0] ?? 0) - (first?.[0] ?? 0);
+    this.clock = this.timeOf(0);
+  }
+
+  /** Per plane: phi_ref over the recording, thinned evenly to what a line on the floor holds. */
+  references(): Float64Array[] {
+    const points = Math.min(this.samples, LINE_POINTS);
+    const stride = (this.samples - 1) / Math.max(points - 1, 1);
+    return this.planes.map(({ rows }) =>
+      Float64Array.from({ length: points }, (_, i) => rows[Math.round(i * stride)]?.[ROW.phiReference] ?? 0),
+    );
   }
 
   run(running: boolean, speed: number): void {
+    // At the end there is nothing left to play: it starts again.
+    if (running && this.atEnd()) this.rewind();
     [this.running, this.speed] = [running, speed];
     this.lastTick = performance.now();
     this.send();
-    if (running) requestAnimationFrame(() => this.tick());
+    if (running) this.nextFrame();
   }
 
   step(): void {
     this.running = false;
-    this.clock = this.timeOf(Math.min(this.index + 1, this.samples));
+    // `index` is the first row that is not shown yet.
+    this.clock = this.timeOf(this.index);
     this.send();
   }
 
   reset(): void {
-    [this.index, this.clock, this.restarted] = [0, this.timeOf(0), true];
+    this.rewind();
     this.send();
   }
 
   /** Ends the playback for good. */
   stop(): void {
-    this.stopped = true;
+    this.running = false;
+  }
+
+  private rewind(): void {
+    [this.index, this.clock, this.restarted] = [0, this.timeOf(0), true];
+  }
+
+  private atEnd(): boolean {
+    return this.index >= this.samples && this.clock >= this.timeOf(this.samples);
+  }
+
+  /** There is one frame to come, however often it is asked for. */
+  private nextFrame(): void {
+    cancelAnimationFrame(this.frame);
+    this.frame = requestAnimationFrame(() => this.tick());
   }
 
   private timeOf(index: number): number {
@@ -52,7 +80,7 @@ export class Playback implements Source {
   }
 
   private tick(): void {
-    if (!this.running || this.stopped) return;
+    if (!this.running) return;
     const now = performance.now();
     this.clock += ((now - this.lastTick) / 1000) * this.speed;
     this.lastTick = now;
@@ -61,11 +89,10 @@ export class Playback implements Source {
       this.running = false;
     }
     this.send();
-    requestAnimationFrame(() => this.tick());
+    this.nextFrame();
   }
 
   private send(): void {
-    if (this.stopped) return;
     const from = this.index;
     while (this.index < this.samples && this.timeOf(this.index) <= this.clock) this.index++;
     const count = this.index - from;
@@ -76,7 +103,7 @@ export class Playback implements Source {
         if (row) rows.set(row, (i * this.planes.length + plane) * ROW_WIDTH);
       }
     }
-    const complete = this.index >= this.samples && this.clock >= this.timeOf(this.samples);
+    const complete = this.atEnd();
     const ending = this.planes.find((plane) => plane.ending !== "")?.ending;
     const statuses = this.planes[0]?.statuses ?? [];
     this.onBatch({

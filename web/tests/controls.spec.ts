@@ -168,3 +168,40 @@ test("the keyboard is enough", async ({ page }) => {
   );
   expect(unnamed).toEqual([]);
 });
+
+test("shortcuts go on after a click, and a field keeps its keys", async ({ page }) => {
+  await openFlat(page);
+  const play = page.locator("#play");
+  await play.click();
+  await until(page, 0.2);
+  await page.keyboard.press("R");
+  await expect(page.locator("#clock")).toHaveText("0.00 s");
+  await page.keyboard.press(".");
+  await expect(page.locator("#clock")).toHaveText("0.05 s");
+  // The button has the focus: the space bar presses it, once.
+  await page.keyboard.press(" ");
+  await expect(play).toHaveText("Pause");
+  await page.getByText("Draw path", { exact: true }).click();
+  await page.keyboard.press(" ");
+  await expect(play).toHaveText("Run");
+  await page.keyboard.press("r");
+  await page.getByLabel("Horizon N, slider").focus();
+  await page.keyboard.press(".");
+  await expect(page.locator("#clock")).toHaveText("0.05 s");
+  await page.getByLabel("Target X", { exact: true }).focus();
+  for (const key of [".", "r", " "]) await page.keyboard.press(key);
+  await page.locator("#speed").focus();
+  await page.keyboard.press(".");
+  await page.waitForTimeout(300);
+  await expect(page.locator("#clock")).toHaveText("0.05 s");
+  await expect(play).toHaveText("Run");
+});
+
+test("what changes at every frame is not read out", async ({ page }) => {
+  await openFlat(page);
+  const live = "output, [aria-live]:not([aria-live=off]), [role=status], [role=alert], [role=log]";
+  const read = await page.locator(live).evaluateAll((elements) => elements.map(({ id }) => id));
+  expect(read).toEqual(["alert", "message"]);
+  await expect(page.getByRole("group", { name: "Controllers" })).toBeVisible();
+  await expect(page.getByRole("timer", { name: "Simulated time" })).toHaveText("0.00 s");
+});

@@ -1,8 +1,16 @@
 // Files and links: out and in again, and what happens with broken ones.
 
 import { readFileSync } from "node:fs";
-import { expect, test } from "@playwright/test";
-import { drop, fill, openFlat, openFile, openSection, ready, saved, scenario, until } from "./page";
+import { deflateRawSync } from "node:zlib";
+import { expect, test, type Page } from "@playwright/test";
+import { readTrajectory } from "../src/files";
+import { Playback } from "../src/playback";
+import { clock, drop, fill, openFlat, openFile, ready, saved, scenario, until } from "./page";
+
+/** What stands behind the # for a set-up. */
+function fragment(toml: string): string {
+  return `1.${deflateRawSync(JSON.stringify({ toml, robots: ["lpv"] })).toString("base64url")}`;
+}
 
 test("a link holds the whole set-up", async ({ page, context }) => {
   await context.grantPermissions(["clipboard-read", "clipboard-write"]);
@@ -80,6 +88,120 @@ test("a recorded run of two planes is dropped on the page and played back", asyn
   await expect(page.locator("#message")).toContainText("neither a set-up");
 });
 
+/** A recording of one plane: a sample every 0.05 s, at rest. */
+function recording(start: number, samples: number): string {
+  const header = "t_s,phi_rad,theta_rad,phi_dot_rad_s,theta_dot_rad_s,torque_nm,phi_ref_rad,cost,status,step_us";
+  const times = Array.from({ length: samples + 1 }, (_, i) => (start + 0.05 * i).toFixed(2));
+  return [header, ...times.map((time, i) => `${time},0,0,0,0,${i < samples ? 0 : ""},0,,,`)].join("\n");
+}
+
+test("a recording begins at its first row, goes on row by row and plays again from its end", async ({ page }) => {
+  await openFlat(page);
+  await page.locator("#speed").selectOption("0.02");
+  await openFile(page, "late.csv", recording(60, 8));
+  await expect(page.locator("#clock")).toHaveText(/^60\.0/);
+  await page.locator("#play").click();
+  await page.locator("#reset").click();
+  await expect(page.locator("#clock")).toHaveText("60.00 s");
+  for (const time of ["60.05 s", "60.10 s", "60.15 s"]) {
+    await page.locator("#step").click();
+    await expect(page.locator("#clock")).toHaveText(time);
+  }
+  for (let i = 0; i < 5; i++) await page.locator("#step").click();
+  await expect(page.locator("#clock")).toHaveText("60.40 s");
+  await expect(page.locator("#message")).toContainText("End of the recording");
+  await page.locator("#play").click();
+  await expect(page.locator("#play")).toHaveText("Pause");
+  await expect(page.locator("#clock")).toHaveText(/^60\.[01]/);
+});
+
+test("what a recording does not tell is a dash", async ({ page }) => {
+  await openFlat(page);
+  await openFile(page, "trajectory.csv", recording(0, 3));
+  await expect(page.locator("#message")).toContainText("End of the recording");
+  const values = page.locator("#plots figcaption > span");
+  await expect(values.first()).toHaveText("0.000");
+  for (const i of [5, 6, 7, 8]) await expect(values.nth(i)).toHaveText("\u2013");
+});
+
+test("the reference of a long recording reaches its end on the floor", () => {
+  const planes = [readTrajectory(recording(0, 10_000), "long.csv")];
+  for (const [i, row] of planes[0]?.rows.entries() ?? []) row[6] = i;
+  const [reference] = new Playback(planes).references();
+  expect(reference?.length).toBe(2048);
+  expect([reference?.[0], reference?.at(-1)]).toEqual([0, 9999]);
+  const gaps = [...(reference ?? [])].slice(1).map((value, i) => value - (reference?.[i] ?? NaN));
+  expect([Math.min(...gaps), Math.max(...gaps)]).toEqual([4, 5]);
+});
+
+/** Animation frames that are asked for between two frames of the screen. */
+function framesAskedFor(page: Page): Promise<number> {
+  return page.evaluate(async () => {
+    const ask = window.requestAnimationFrame;
+    const next = () => new Promise((resolve) => ask.call(window, resolve));
+    let asked = 0;
+    window.requestAnimationFrame = (callback) => {
+      asked++;
+      return ask.call(window, callback);
+    };
+    await next();
+    asked = 0;
+    for (let i = 0; i < 20; i++) await next();
+    window.requestAnimationFrame = ask;
+    return Math.round(asked / 20);
+  });
+}
+
+test("another speed does not make a recording's work more", async ({ page }) => {
+  await openFlat(page);
+  await openFile(page, "trajectory.csv", recording(0, 2000));
+  await until(page, 0.2);
+  const before = await framesAskedFor(page);
+  for (const speed of ["0.5", "0.25", "0.1", "0.5", "1"]) await page.locator("#speed").selectOption(speed);
+  expect(await framesAskedFor(page)).toBe(before);
+  const now = await clock(page);
+  await until(page, now + 0.5);
+});
+
+const NOT_ONE_RUN: [files: [name: string, text: string][], message: string][] = [
+  [[["trajectory_lpv.csv", recording(0, 3)], ["trajectory_linear.csv", recording(0, 3)]], "these are not one run"],
+  [[["lpv_x.csv", recording(0, 3)], ["linear_y.csv", recording(0, 3)]], "these are not one run"],
+  [[["a_x.csv", recording(0, 3)], ["a_y.csv", recording(0, 3)], ["b.csv", recording(0, 3)]], "these are not one run"],
+  [[["a_x.csv", recording(0, 3)], ["a_y.csv", recording(0, 4)]], "4 rows and 5 rows"],
+  [[["a_x.csv", recording(0, 3)], ["a_y.csv", recording(1, 3)]], "row 1: t_s = 0 and t_s = 1"],
+];
+
+test("recordings that are not one run get a message and change nothing", async ({ page }) => {
+  await openFlat(page);
+  const title = (await page.locator("#title").textContent()) ?? "";
+  for (const [files, message] of NOT_ONE_RUN) {
+    await drop(page, files);
+    await expect(page.locator("#message")).toContainText(message);
+    await expect(page.locator("#title")).toHaveText(title);
+  }
+  await drop(page, [["A_X.CSV", recording(0, 3)], ["a_y.csv", recording(0, 3)]]);
+  await expect(page.locator("#title")).toHaveText("recorded: A_X.CSV, a_y.csv");
+});
+
+test("what cannot be read gets a message, and what is no set-up or run is not read", async ({ page }) => {
+  const problems = await openFlat(page);
+  // As browsers do with a dropped folder.
+  await page.evaluate(() => {
+    Blob.prototype.text = function (this: Blob) {
+      document.body.dataset["read"] = `${document.body.dataset["read"] ?? ""}${(this as File).name};`;
+      return Promise.reject(new DOMException("not found", "NotFoundError"));
+    };
+  });
+  await drop(page, [["out", ""]]);
+  await expect(page.locator("#message")).toContainText("out: this is neither a set-up (.toml) nor a recorded run (.csv)");
+  await drop(page, [["film.mp4", ""], ["out.csv", ""]]);
+  await expect(page.locator("#message")).toContainText("out.csv: this cannot be read");
+  await drop(page, [["out.toml", ""], ["other.csv", ""]]);
+  await expect(page.locator("#message")).toContainText("out.toml: this cannot be read");
+  await expect(page.locator("body")).toHaveAttribute("data-read", "out.csv;out.toml;");
+  expect(problems).toEqual([]);
+});
+
 const BROKEN: [name: string, text: string, message: string][] = [
   ["broken.toml", "title = ", "Invalid TOML"],
   ["unknown.toml", "titel = 'x'", "unknown field"],
@@ -110,11 +232,36 @@ test("a broken link gets a message and the page starts all the same", async ({ p
   }
 });
 
-test("a set-up from a bad value in a link changes nothing", async ({ page }) => {
+test("a link with a bad value gets a message and changes nothing", async ({ page }) => {
   await openFlat(page);
-  await openSection(page, "Controller");
   const before = await saved(page, "Save TOML");
-  await openFile(page, "bad.toml", before.replace("horizon = 20", "horizon = 0"));
+  const go = (toml: string) => page.evaluate((hash) => (location.hash = hash), fragment(toml));
+  await go(before.replace("horizon = 20", "horizon = 0"));
   await expect(page.locator("#message")).toContainText("controller.horizon");
   expect(await saved(page, "Save TOML")).toBe(before);
+  await go(before.replace("horizon = 20", "horizon = 21"));
+  await expect(page.getByLabel("Horizon N", { exact: true })).toHaveValue("21");
+});
+
+test("a small link does not unpack to a large set-up", async ({ page }) => {
+  await openFlat(page);
+  const before = await saved(page, "Save TOML");
+  const large = fragment(`${before.replace("horizon = 20", "horizon = 21")}#${" ".repeat(20_000_000)}`);
+  expect(large.length).toBeLessThan(50_000);
+  await page.evaluate((hash) => (location.hash = hash), large);
+  await expect(page.locator("#message")).toContainText("does not hold a set-up");
+  expect(await saved(page, "Save TOML")).toBe(before);
+});
+
+test("a set-up that is too large for a link gets a message", async ({ page }) => {
+  await openFlat(page);
+  const toml = await saved(page, "Save TOML");
+  const address = page.url();
+  // Random digits do not become shorter.
+  const title = Array.from({ length: 100_000 }, () => Math.random().toString(36).slice(2, 6)).join("");
+  await openFile(page, "large.toml", toml.replace(/^title = .*$/m, `title = "${title}"`));
+  await expect(page.locator("#title")).toHaveText(title);
+  await page.getByRole("button", { name: "Copy link" }).click();
+  await expect(page.locator("#message")).toContainText(/too large for a link: \d+ characters, at most 200000/);
+  expect(page.url()).toBe(address);
 });

@@ -33,13 +33,13 @@ export function columns(strip: Strip, shown: Shown[], chosen: number, start: num
   const made: (number | null)[][] = [];
   for (const { history } of shown) {
     const offset = longest.total - longest.length - (history.total - history.length);
-    const column = (value: (i: number) => number, final: number | null) => {
+    const column = (value: (i: number) => number, final: number) => {
       const values = indices.map((i) => {
         const at = i + offset;
         const known = at >= 0 && at < history.length ? value(at) : NaN;
         return Number.isFinite(known) ? known : null;
       });
-      made.push([...values, history === longest ? final : null]);
+      made.push([...values, history === longest && Number.isFinite(final) ? final : null]);
     };
     const plane = planeOf(history, chosen);
     const last = history.length - 1;
@@ -48,7 +48,7 @@ export function columns(strip: Strip, shown: Shown[], chosen: number, start: num
     } else {
       const key = strip.column ?? ROW.phi;
       const final = strip.held ? history.at(last, plane, key) : history.nowAt(plane, key);
-      column((i) => history.at(i, plane, key), Number.isFinite(final) ? final : null);
+      column((i) => history.at(i, plane, key), final);
     }
   }
   if (strip.reference) {

@@ -21,6 +21,8 @@ function decades(low: number, high: number): number[] {
 /** Shown at once, s. */
 const WINDOW = 8;
 const AXIS_WIDTH = 52;
+/** In place of a value that there is not: a recording does not hold the motors' torques. */
+const UNKNOWN = "\u2013";
 
 interface Colours {
   ink: string;
@@ -64,7 +66,7 @@ export class Plots {
       figure.className = "strip";
       const caption = document.createElement("figcaption");
       caption.textContent = strip.unit ? `${strip.title} [${strip.unit}]` : strip.title;
-      const value = document.createElement("output");
+      const value = document.createElement("span");
       caption.append(value);
       const plot = document.createElement("div");
       plot.setAttribute("role", "img");
@@ -188,13 +190,13 @@ export class Plots {
   /** Shows everything up to `time`, s. */
   draw(time: number): void {
     this.time = time;
-    const outputs = this.host.querySelectorAll<HTMLOutputElement>("figcaption > output");
+    const values = this.host.querySelectorAll("figcaption > span");
     for (const [index, strip] of STRIPS.entries()) {
       const chart = this.charts[index];
       if (!chart) continue;
       chart.setData(columns(strip, this.shown, this.plane, this.timeRange()[0]), true);
-      const output = outputs[index];
-      if (output) output.textContent = this.valueNow(strip);
+      const value = values[index];
+      if (value) value.textContent = this.valueNow(strip);
     }
   }
 
@@ -202,9 +204,12 @@ export class Plots {
     const history = this.shown[0]?.history;
     if (!history || history.length === 0) return "";
     const last = history.length - 1;
-    if (strip.motors) return [0, 1, 2].map((i) => history.motor(last, i).toFixed(2)).join("  ");
+    if (strip.motors) {
+      const torques = [0, 1, 2].map((i) => history.motor(last, i));
+      return torques.every(Number.isFinite) ? torques.map((torque) => torque.toFixed(2)).join("  ") : UNKNOWN;
+    }
     const value = history.at(last, planeOf(history, this.plane), strip.column ?? 0);
-    if (!Number.isFinite(value)) return "";
+    if (!Number.isFinite(value)) return UNKNOWN;
     return strip.fromZero ? value.toFixed(0) : strip.logarithmic ? value.toPrecision(3) : value.toFixed(3);
   }
 }
