@@ -5,7 +5,8 @@ const port = 8018;
 export default defineConfig({
   testDir: "tests",
   timeout: 120_000,
-  workers: 2,
+  // Most of a test is waiting: for simulated time to pass.
+  workers: 3,
   reporter: [["list"]],
   projects: [
     { name: "page", testIgnore: "timing.spec.ts", fullyParallel: true },

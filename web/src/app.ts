@@ -171,8 +171,13 @@ export class App implements Source {
     return { x: x / this.radius, y: y / this.radius };
   }
 
+  /** There is a robot, and it is not a recording. */
+  private takesOrders(): boolean {
+    return this.facts.length > 0 && !this.playback;
+  }
+
   target(at: FloorPoint): void {
-    if (this.playback) return;
+    if (!this.takesOrders()) return;
     if (!(Math.hypot(at.x, at.y) <= FARTHEST)) {
       this.events.message(`A target must be numbers, at most ${FARTHEST} m away.`, "error");
       return;
@@ -183,7 +188,7 @@ export class App implements Source {
   }
 
   path(points: FloorPoint[], from: FloorPoint): void {
-    if (this.playback) return;
+    if (!this.takesOrders()) return;
     this.ordered = undefined;
     const timed = timedPath(points, from);
     const called = timed.map((point) => ({ time_s: point.time_s, phi: this.phi(point) }));
@@ -194,7 +199,7 @@ export class App implements Source {
 
   /** Pushes the bodies towards a direction: change of the lean's rates, rad/s. */
   push(towards: FloorPoint): void {
-    if (this.playback) return;
+    if (!this.takesOrders()) return;
     // The body leans towards +x where theta is negative.
     const push = { x: -towards.x, y: -towards.y };
     void this.tell<"push">({ kind: "push", push }, ({ time_s }) => this.live.push(push.x, push.y, time_s));

@@ -219,12 +219,8 @@ function makePanel(): Panel {
   });
 }
 
-async function start(): Promise<void> {
-  const moveTarget = (dx: number, dy: number) => {
-    const { x, y } = wanted();
-    sendTo({ x: x + dx, y: y + dy });
-  };
-  connectControls({ app, view, plots, pointer, resized, moveTarget, openFiles: (files) => void openFiles(files) });
+/** What makes a new picture necessary. */
+function connectDrawing(): void {
   new ResizeObserver(resized).observe(host);
   new ResizeObserver(resized).observe(byId("plots"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
@@ -236,8 +232,17 @@ async function start(): Promise<void> {
     window.addEventListener(input, redraw, { passive: true });
   }
   view.element.addEventListener("webglcontextrestored", redraw);
-  // Without a controller there is nothing to show; the page says why.
+}
+
+async function start(): Promise<void> {
+  // Without a controller there is nothing to show or to do; the page says why.
   if (!(await app.start(linkInAddress()))) return;
+  const moveTarget = (dx: number, dy: number) => {
+    const { x, y } = wanted();
+    sendTo({ x: x + dx, y: y + dy });
+  };
+  connectControls({ app, view, plots, pointer, resized, moveTarget, openFiles: (files) => void openFiles(files) });
+  connectDrawing();
   panel = makePanel();
   for (const id of ["play", "step", "reset"]) byId<HTMLButtonElement>(id).disabled = false;
   setupShown();

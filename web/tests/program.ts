@@ -40,9 +40,10 @@ export function expectSame(here: string, there: string): void {
   expectRows(ours, theirs, rows);
 }
 
-/** The same run up to a time, s. */
-export function expectSamePrefix(here: string, there: string, until: number): void {
-  const [ours, theirs] = [table(here), table(there)];
+/** The same run as that of the set-up, up to a time, s. */
+export function expectSameUntil(until: number, here: string, toml: string, file = "trajectory.csv"): void {
+  const short = toml.replace(/^duration_s = .*$/m, `duration_s = ${until + 1}`);
+  const [ours, theirs] = [table(here), table(simulated(short)(file))];
   const rows = ours["t_s"]?.findIndex((time) => time > until) ?? -1;
   expect(rows).toBeGreaterThan(5);
   expectRows(ours, theirs, rows);

@@ -2,13 +2,21 @@
 
 import { expect, test } from "@playwright/test";
 import { drop, fill, openFlat, saved, scenario, table, until } from "./page";
-import { expectSamePrefix, simulated } from "./program";
+import { expectSameUntil } from "./program";
 
 test("without the control loop's program the page says so", async ({ page }) => {
   await page.route("**/worker*.js", (route) => route.abort());
   await page.goto("./?flat");
   await expect(page.locator("#message")).toContainText("program cannot be loaded");
   await expect(page.locator("#play")).toBeDisabled();
+  const problems: string[] = [];
+  page.on("pageerror", (error) => problems.push(error.message));
+  await page.locator("#scene").click();
+  await page.keyboard.press("ArrowRight");
+  await page.keyboard.press("r");
+  await page.emulateMedia({ colorScheme: "dark" });
+  await page.waitForTimeout(200);
+  expect(problems).toEqual([]);
 });
 
 for (const name of ["tight-bounds", "lissajous"]) {
@@ -43,7 +51,7 @@ test("a push by hand stands in the file at its time", async ({ page }) => {
   const csv = await saved(page, "Save CSV");
   const toml = await saved(page, "Save TOML");
   expect(toml).toContain("theta_dot_rad_s = -1");
-  expectSamePrefix(csv, simulated(toml)("trajectory_x.csv"), 1.4);
+  expectSameUntil(1.4, csv, toml, "trajectory_x.csv");
 });
 
 test("an emptied field that needs a number is refused, and shows what holds", async ({ page }) => {
