@@ -57,7 +57,14 @@ export class App implements Source {
     this.engine.onBatch = (batch) => {
       if (!this.playback) this.receive(batch);
     };
-    this.engine.onFailure = (reason) => events.message(reason, "error");
+    this.engine.onFailure = (reason) => this.failed(reason);
+  }
+
+  /** There is no robot any more that would take orders. */
+  private failed(reason: string): void {
+    [this.facts, this.isRunning] = [[], false];
+    this.events.running();
+    this.events.message(reason, "error");
   }
 
   /** Opens the link in the address or the first preset; `false` if there is neither. */
@@ -200,6 +207,10 @@ export class App implements Source {
   /** Pushes the bodies towards a direction: change of the lean's rates, rad/s. */
   push(towards: FloorPoint): void {
     if (!this.takesOrders()) return;
+    if (!Number.isFinite(towards.x + towards.y)) {
+      this.events.message("A push must be a number, in rad/s.", "error");
+      return;
+    }
     // The body leans towards +x where theta is negative.
     const push = { x: -towards.x, y: -towards.y };
     void this.tell<"push">({ kind: "push", push }, ({ time_s }) => this.live.push(push.x, push.y, time_s));

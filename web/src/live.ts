@@ -3,7 +3,7 @@
 import type { FloorPoint } from "./scene/view";
 import { withValue, type Point, type Reference, type Scenario } from "./scenario";
 
-/** So many targets or pushes of one run are kept: the first ones, and the last. */
+/** So many targets of one run are kept: the first ones, and the last. So many pushes, too: the first. */
 const MOST_EVENTS = 500;
 /** A step takes this long where it stands among lines, s. */
 const STEP = 1e-6;
@@ -30,22 +30,26 @@ export function timedPath(points: FloorPoint[], from: FloorPoint): TimedTarget[]
 }
 
 /** A target is a point, a drawn path are several; each holds until the next one. */
-type Order = TimedTarget[];
+type Order = { time_s: number; place: number }[];
+type Axis = "x" | "y";
+const AXES: Axis[] = ["x", "y"];
 
 export class Live {
-  private orders: Order[] = [];
+  private orders: Record<Axis, Order[]> = { x: [], y: [] };
   private pushes: { time_s: number; x: number; y: number }[] = [];
 
-  /** `replaced`: it takes the place of the one before, which the robot never heard of. */
-  target(at: FloorPoint, time_s: number, replaced: boolean): void {
-    // A drag is one target: where it ended.
-    const last = this.orders.at(-1);
-    if (replaced || last?.[0]?.time_s === time_s || this.orders.length >= MOST_EVENTS) this.orders.pop();
-    this.orders.push([{ ...at, time_s }]);
+  /** `replaced`, per plane: it takes the place of the one before, whose move had not begun. */
+  target(at: FloorPoint, time_s: number, replaced: boolean[]): void {
+    for (const [plane, axis] of AXES.entries()) {
+      const orders = this.orders[axis];
+      // A drag is one target: where it ended.
+      if (replaced[plane] || orders.at(-1)?.[0]?.time_s === time_s || orders.length >= MOST_EVENTS) orders.pop();
+      orders.push([{ time_s, place: at[axis] }]);
+    }
   }
 
   path(points: TimedTarget[]): void {
-    this.orders.push(points);
+    for (const axis of AXES) this.orders[axis].push(points.map((point) => ({ time_s: point.time_s, place: point[axis] })));
   }
 
   /** A push: change of the tilt rates, rad/s. */
@@ -54,14 +58,14 @@ export class Live {
   }
 
   clear(): void {
-    this.orders = [];
+    this.orders = { x: [], y: [] };
     this.pushes = [];
   }
 
   /** The set-up with what was done written into it. */
   into(setup: Scenario, planes: number): Scenario {
     let made = setup;
-    if (this.orders.length > 0) {
+    if (this.orders.x.length > 0) {
       const [x, y] = [this.reference(setup, "x"), this.reference(setup, "y")];
       made = { ...made, reference: planes === 2 ? { planes: { x, y } } : x };
     }
@@ -77,10 +81,10 @@ export class Live {
   }
 
   /** The scenario's set points until the first order, then the orders. */
-  private reference(setup: Scenario, axis: "x" | "y"): Reference {
+  private reference(setup: Scenario, axis: Axis): Reference {
     const { ball_radius_m } = setup.parameters;
-    const orders = this.orders.map((order) =>
-      order.map((point): Point => ({ time_s: point.time_s, phi_rad: point[axis] / ball_radius_m })));
+    const orders = this.orders[axis].map((order) =>
+      order.map(({ time_s, place }): Point => ({ time_s, phi_rad: place / ball_radius_m })));
     const { reference } = setup as { reference: { set_points?: { points: Point[] }; planes?: { x: Reference; y: Reference } } };
     const own = (reference.planes?.[axis] ?? (axis === "x" ? reference : {})) as { set_points?: { points: Point[] } };
     const first = orders[0]?.[0]?.time_s ?? 0;

@@ -36,8 +36,8 @@ export interface Answers {
   configure: RobotFacts[];
   step: null;
   target: Taken & {
-    /** It takes the place of a target whose smooth move had not begun. */
-    replaced: boolean;
+    /** Per plane: it takes the place of a target whose smooth move had not begun. */
+    replaced: boolean[];
   };
   path: Taken;
   push: Taken;

@@ -38,6 +38,8 @@ let restarted = false;
 let referencesChanged = false;
 let completed = false;
 let warm = false;
+/** Why the control loop has ended for good. */
+let failure = "";
 
 function post(message: FromWorker, transfer: Transferable[] = []): void {
   self.postMessage(message, { transfer });
@@ -84,7 +86,7 @@ function endOfRun(): number {
 function stopAtTheEnd(): void {
   if (nextTime() === Infinity) {
     running = false;
-    clock = Math.max(...robots.map(({ simulation }) => simulation.time()));
+    clock = endOfTimes();
     return;
   }
   if (!completed && nextTime() > endOfRun() - 1e-9) {
@@ -101,7 +103,8 @@ function tick(): void {
   } catch (error) {
     // The module cannot be trusted any more.
     [running, robots] = [false, []];
-    post({ failed: `the controller has stopped: ${error}. Load the page again.` });
+    failure = `the controller has stopped: ${error}. Load the page again.`;
+    post({ failed: failure });
   }
 }
 
@@ -172,9 +175,14 @@ function configure(setups: RobotSetup[], keep: boolean): RobotFacts[] {
   }));
 }
 
-/** The file of a run is that of the first robot. */
+/** The time of the robots that can still hear of it. */
 function timeOfOrder(): number {
-  return robots[0]?.simulation.time() ?? 0;
+  const next = nextTime();
+  return next < Infinity ? next : endOfTimes();
+}
+
+function endOfTimes(): number {
+  return Math.max(...robots.map(({ simulation }) => simulation.time()));
 }
 
 function answer(call: Call): unknown {
@@ -197,7 +205,7 @@ function answer(call: Call): unknown {
       const taken = robots.map(({ simulation }) => simulation.set_target(call.phi.x, call.phi.y));
       referencesChanged = true;
       send();
-      return { time_s: timeOfOrder(), replaced: taken[0] ?? false };
+      return { time_s: timeOfOrder(), replaced: Array.from(taken[0] ?? [], (plane) => plane !== 0) };
     }
     case "path": {
       const from = timeOfOrder();
@@ -230,6 +238,7 @@ const started = start();
 self.onmessage = async ({ data }: MessageEvent<ToWorker>) => {
   try {
     await started;
+    if (failure !== "") throw new Error(failure);
     if ("run" in data) {
       ({ running, speed } = data.run);
       send();

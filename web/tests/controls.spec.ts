@@ -104,6 +104,19 @@ test("a slider does what its number does", async ({ page }) => {
   await page.getByLabel("Horizon N, slider").fill("42");
   await expect(page.getByLabel("Horizon N", { exact: true })).toHaveValue("42");
   expect(await saved(page, "Save TOML")).toContain("horizon = 42");
+  // By key, step by step, and it stays where it was moved to.
+  const slider = page.getByLabel("Horizon N, slider");
+  await slider.focus();
+  for (let i = 0; i < 3; i++) await page.keyboard.press("ArrowRight");
+  await expect(page.getByLabel("Horizon N", { exact: true })).toHaveValue("45");
+  await expect(slider).toHaveValue("45");
+  const push = page.getByLabel("Push, slider");
+  await push.fill("10");
+  await expect(push).toHaveValue("10");
+  const number = page.locator(".panel").getByLabel("Push", { exact: true });
+  await expect(number).toHaveValue("10");
+  await fill(page, "Push", "");
+  await expect(number).toHaveValue("10");
 });
 
 test("a tighter bound is kept while the robot goes on", async ({ page }) => {

@@ -25,6 +25,8 @@ pub struct Session {
     trouble: Trouble,
     /// The planes follow what a person ordered, not the scenario.
     ordered: bool,
+    /// Pushes that take effect with the next sample: plane, and change of its state.
+    pushes: Vec<(usize, Vector4<f64>)>,
 }
 
 /// Whether the robot still stands.
@@ -66,6 +68,7 @@ impl Session {
             phase: Phase::Running,
             trouble: Trouble::default(),
             ordered: false,
+            pushes: Vec::new(),
         })
     }
 
@@ -91,13 +94,17 @@ impl Session {
                 .filter_map(|push| after(push, now))
                 .collect();
         }
-        Ok(Self {
+        let mut session = Self {
             origin: now,
             phase: self.phase.clone(),
             trouble: self.trouble.clone(),
             ordered: self.ordered,
             ..Self::new(prepared)?
-        })
+        };
+        for (plane, change) in &self.pushes {
+            session.change(*plane, *change)?;
+        }
+        Ok(session)
     }
 
     /// The scenario.
@@ -193,6 +200,7 @@ impl Session {
     /// One sample in all planes; `false` if the robot lies on the floor, and there was none.
     /// `clock` is monotonic.
     pub fn step(&mut self, clock: &dyn Fn() -> Duration) -> bool {
+        self.pushes.clear();
         match self.phase {
             Phase::Running => self.sample(clock),
             Phase::Falling(_) => {
@@ -305,26 +313,23 @@ impl Session {
 
     /// From now on phi of each plane has to go to these values, rad: at once, or by a smooth move
     /// where the scenario asks for that. What is beyond the robot's planes is not heard. Says
-    /// whether this order takes the place of one whose move had not begun.
+    /// of each plane whether this order takes the place of one whose move had not begun.
     ///
     /// # Errors
     /// A target that is not a finite number.
-    pub fn set_targets(&mut self, targets: &[f64]) -> Result<bool, ScenarioError> {
+    pub fn set_targets(&mut self, targets: &[f64]) -> Result<Vec<bool>, ScenarioError> {
         for target in targets {
             finite("target", *target)?;
         }
         let time_s = self.time();
-        let mut dropped = false;
-        for (plane, phi_rad) in self.prepared.planes.iter_mut().zip(targets) {
-            let point = PointTable {
-                time_s,
-                phi_rad: *phi_rad,
-            };
-            dropped |= plane.reference.redirect(point, self.prepared.moves);
-        }
-        let replaced = self.ordered && dropped;
+        let (moves, ordered) = (self.prepared.moves, self.ordered);
         self.ordered = true;
-        Ok(replaced)
+        let planes = self.prepared.planes.iter_mut().zip(targets);
+        let replaced = planes.map(|(plane, &phi_rad)| {
+            let point = PointTable { time_s, phi_rad };
+            plane.reference.redirect(point, moves) && ordered
+        });
+        Ok(replaced.collect())
     }
 
     /// From now on the planes follow these references; their times count from the beginning of
@@ -341,16 +346,19 @@ impl Session {
     /// # Errors
     /// [`WorldError::Disturbance`] if the numbers are not finite.
     pub fn push(&mut self, plane: usize, phi_dot: f64, theta_dot: f64) -> Result<(), WorldError> {
-        match self.loops.get_mut(plane) {
-            Some(closed_loop) => {
-                let time = closed_loop.world.time();
-                closed_loop.world.disturb(Disturbance::Jump {
-                    time,
-                    change: Vector4::new(0.0, 0.0, phi_dot, theta_dot),
-                })
-            }
-            None => Ok(()),
-        }
+        self.change(plane, Vector4::new(0.0, 0.0, phi_dot, theta_dot))
+    }
+
+    fn change(&mut self, plane: usize, change: Vector4<f64>) -> Result<(), WorldError> {
+        let Some(closed_loop) = self.loops.get_mut(plane) else {
+            return Ok(());
+        };
+        let time = closed_loop.world.time();
+        closed_loop
+            .world
+            .disturb(Disturbance::Jump { time, change })?;
+        self.pushes.push((plane, change));
+        Ok(())
     }
 
     /// The planes, with what they have to follow.

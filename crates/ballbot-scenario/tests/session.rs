@@ -186,12 +186,12 @@ fn targets_become_smooth_moves_where_the_scenario_asks_for_them() {
     scenario.reference = points(&[(0.0, 0.0)]);
     let mut by_hand = Session::new(prepared(&scenario).unwrap()).unwrap();
     run_until(&mut by_hand, 1.0);
-    assert!(!by_hand.set_targets(&[2.0]).unwrap());
+    assert_eq!(by_hand.set_targets(&[2.0]).unwrap(), [false]);
     run_until(&mut by_hand, 1.5);
     // The second one waits for the first move's end, the third takes its place.
-    assert!(!by_hand.set_targets(&[5.0]).unwrap());
+    assert_eq!(by_hand.set_targets(&[5.0]).unwrap(), [false]);
     run_until(&mut by_hand, 1.6);
-    assert!(by_hand.set_targets(&[-1.0]).unwrap());
+    assert_eq!(by_hand.set_targets(&[-1.0]).unwrap(), [true]);
     scenario.reference = points(&[(0.0, 0.0), (1.0, 2.0), (1.6, -1.0)]);
     let mut from_file = Session::new(prepared(&scenario).unwrap()).unwrap();
     run_until(&mut from_file, 1.6);
@@ -208,6 +208,27 @@ fn targets_become_smooth_moves_where_the_scenario_asks_for_them() {
     let after = by_hand.reconfigured(prepared(&scenario).unwrap()).unwrap();
     assert_eq!(after.targets().next().unwrap(), before);
     assert!(by_hand.set_targets(&[f64::NAN]).is_err());
+}
+
+#[test]
+fn a_push_outlives_a_change_of_the_settings_before_the_next_sample() {
+    let scenario = Scenario::load("two-setpoints").unwrap();
+    let begun = || {
+        let mut session = Session::new(prepared(&scenario).unwrap()).unwrap();
+        run_until(&mut session, 0.5);
+        session
+    };
+    let changed = |session: &Session| session.reconfigured(prepared(&scenario).unwrap()).unwrap();
+    // New settings start the controller anew, with or without the push.
+    let tilt_rate = |mut session: Session| {
+        assert!(session.step(&clock));
+        session.states().next().unwrap()[3]
+    };
+    let alone = tilt_rate(changed(&begun()));
+    let mut pushed = begun();
+    pushed.push(0, 0.0, 1.0).unwrap();
+    let outlived = tilt_rate(changed(&pushed));
+    assert!(outlived - alone > 0.3, "{outlived} and {alone}");
 }
 
 #[test]

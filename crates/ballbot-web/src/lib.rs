@@ -176,14 +176,15 @@ impl Simulation {
         matches!(self.session.phase(), Phase::Down(_))
     }
 
-    /// From now on the ball has to go to these angles. Says whether this takes the place of an
-    /// order whose smooth move had not begun.
+    /// From now on the ball has to go to these angles. Says of each plane whether (1) or not (0) this
+    /// takes the place of an order whose smooth move had not begun.
     ///
     /// # Errors
     /// A number that is not finite.
-    pub fn set_target(&mut self, phi_x: f64, phi_y: f64) -> Result<bool, String> {
+    pub fn set_target(&mut self, phi_x: f64, phi_y: f64) -> Result<Vec<u8>, String> {
         let replaced = self.session.set_targets(&[phi_x, phi_y]);
-        replaced.map_err(|error| error.to_string())
+        let replaced = replaced.map_err(|error| error.to_string())?;
+        Ok(replaced.into_iter().map(u8::from).collect())
     }
 
     /// From now on the ball has to follow straight lines between these angles, at these times.

@@ -94,21 +94,25 @@ export function numberField(spec: NumberSpec, changed: (value: number) => void):
     if (!Number.isNaN(value)) slider.value = String(toSlider(value));
     changed(value);
   });
+  // While it is held it shows where it is, then what holds.
+  let [now, held, answered] = [NaN, false, true];
   slider.addEventListener("input", () => {
+    [held, answered] = [true, false];
     const at = Number(slider.value);
     const value = spec.logarithmic ? Number((10 ** at).toPrecision(2)) : at;
     input.value = shown(value);
     changed(value);
   });
-  // Where it was let go, it shows what holds.
-  let now = NaN;
-  slider.addEventListener("change", () => (slider.value = String(toSlider(now))));
+  slider.addEventListener("change", () => {
+    held = false;
+    if (answered) slider.value = String(toSlider(now));
+  });
   return {
     element: slides ? row(spec, input, slider) : row(spec, input),
     set(value) {
-      now = value;
+      [now, answered] = [value, true];
       if (!typing.now) input.value = shown(value);
-      if (document.activeElement !== slider) slider.value = String(toSlider(value));
+      if (!held) slider.value = String(toSlider(value));
     },
   };
 }

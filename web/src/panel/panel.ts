@@ -85,7 +85,8 @@ export class Panel {
 
   private pushes(): HTMLElement[] {
     const strength = numberField({ label: "Push", unit: "rad/s", title: "Change of the tilt rate at once", min: 0.5, max: 40, step: 0.5 }, (value) => {
-      this.pushBy = value;
+      if (value > 0) this.pushBy = value;
+      else strength.set(this.pushBy);
     });
     strength.set(this.pushBy);
     const push = (text: string, title: string, x: number, y: number) =>
