@@ -102,7 +102,7 @@ function requireSameTimes(x: Recorded, y: Recorded, name: string): void {
   // One plane may have ended before the other; then its last row says why.
   const shorter = ours.length < theirs.length ? x : y;
   if (ours.length !== theirs.length && shorter.ending === "") {
-    throw new Error(`${name}: ${ours.length} rows and ${theirs.length} rows; ${rule}`);
+    throw new Error(`${name}: ${ours.length} samples and ${theirs.length} samples; ${rule}`);
   }
   for (const [i, time] of ours.slice(0, theirs.length).entries()) {
     if (time !== theirs[i]) throw new Error(`${name}, row ${i + 1}: t_s = ${time} and t_s = ${theirs[i]}; ${rule}`);

@@ -167,7 +167,7 @@ const NOT_ONE_RUN: [files: [name: string, text: string][], message: string][] = 
   [[["trajectory_lpv.csv", recording(0, 3)], ["trajectory_linear.csv", recording(0, 3)]], "these are not one run"],
   [[["lpv_x.csv", recording(0, 3)], ["linear_y.csv", recording(0, 3)]], "these are not one run"],
   [[["a_x.csv", recording(0, 3)], ["a_y.csv", recording(0, 3)], ["b.csv", recording(0, 3)]], "these are not one run"],
-  [[["a_x.csv", recording(0, 3)], ["a_y.csv", recording(0, 4)]], "4 rows and 5 rows"],
+  [[["a_x.csv", recording(0, 3)], ["a_y.csv", recording(0, 4)]], "3 samples and 4 samples"],
   [[["a_x.csv", recording(0, 3)], ["a_y.csv", recording(1, 3)]], "row 1: t_s = 0 and t_s = 1"],
 ];
 
@@ -181,6 +181,10 @@ test("recordings that are not one run get a message and change nothing", async (
   }
   await drop(page, [["A_X.CSV", recording(0, 3)], ["a_y.csv", recording(0, 3)]]);
   await expect(page.locator("#title")).toHaveText("recorded: A_X.CSV, a_y.csv");
+  // A plane that ended before the other says why in its last row.
+  const short = recording(0, 3).replace(/,,,$/, ",,no plan,");
+  await drop(page, [["b_x.csv", short], ["b_y.csv", recording(0, 5)]]);
+  await expect(page.locator("#title")).toHaveText("recorded: b_x.csv, b_y.csv");
 });
 
 test("what cannot be read gets a message, and what is no set-up or run is not read", async ({ page }) => {
