@@ -51,6 +51,8 @@ export class App implements Source {
   private clockAt = 0;
   /** The last target; what the worker's batches say of it comes later. */
   ordered: FloorPoint | undefined;
+  /** Changes that are not taken in yet. */
+  private waiting = 0;
   private queue: Promise<unknown> = Promise.resolve();
 
   constructor(private readonly events: AppEvents) {
@@ -75,7 +77,8 @@ export class App implements Source {
 
   /** One thing after the other: a slider may move faster than its last value is taken in. */
   private inOrder<T>(work: () => Promise<T>): Promise<T> {
-    const result = this.queue.then(work, work);
+    this.waiting++;
+    const result = this.queue.then(work, work).finally(() => this.waiting--);
     this.queue = result.catch(() => {});
     return result;
   }
@@ -89,10 +92,15 @@ export class App implements Source {
       } catch (error) {
         this.events.message(text(error), "error");
         // Fields show what holds, not what was refused.
-        if (this.facts.length > 0) this.events.setup();
+        if (this.facts.length > 0) this.show();
         return false;
       }
     });
+  }
+
+  /** A field that goes on changing must not be set to what it was some changes ago. */
+  private show(): void {
+    if (this.waiting <= 1) this.events.setup();
   }
 
   private async configure(setup: Scenario, robots: RobotKind[], keep: boolean): Promise<void> {
@@ -111,7 +119,7 @@ export class App implements Source {
     for (const [i, history] of this.histories.entries()) {
       history.samplingTime = facts[i]?.sampling_time ?? history.samplingTime;
     }
-    this.events.setup();
+    this.show();
   }
 
   private renew(): void {
@@ -130,7 +138,7 @@ export class App implements Source {
       await this.configure(setup, robotsNamed(robots ?? [setup.controller.model]), false);
       this.preset = preset;
       this.run(false);
-      this.events.setup();
+      this.show();
     });
   }
 

@@ -229,7 +229,7 @@ test("broken files get a message and change nothing", async ({ page }) => {
 test("a broken link gets a message and the page starts all the same", async ({ page }) => {
   for (const fragment of ["1.AAAA", "nonsense", "2.abc", "1.%%%"]) {
     await page.goto("about:blank");
-    await page.goto(`./#${fragment}`);
+    await page.goto(`./?flat#${fragment}`);
     await ready(page);
     await expect(page.locator("#message")).toContainText("does not hold a set-up");
     await expect(page.locator("#title")).toContainText("Drive");

@@ -18,7 +18,7 @@ test("it works under any path of a host", async ({ page }) => {
     const response = await route.fetch({ url: `${url.origin}${url.pathname.replace("/some/where", "")}` });
     await route.fulfill({ response });
   });
-  await open(page, "./some/where/");
+  await open(page, "./some/where/?flat");
   await page.locator("#play").click();
   await until(page, 0.5);
 });

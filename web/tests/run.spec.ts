@@ -71,7 +71,7 @@ test("a push within the limits is survived", async ({ page }) => {
 });
 
 test("a push that is too large ends on the floor, with the reason", async ({ page }) => {
-  await open(page);
+  await openFlat(page);
   await page.locator("#play").click();
   await until(page, 0.5);
   await fill(page, "Push", "20");
@@ -213,7 +213,7 @@ function distanceFromLaw(run: Table): number {
 }
 
 test("three robots run side by side", async ({ page }) => {
-  const problems = await open(page);
+  const problems = await openFlat(page);
   await scenario(page, "two-setpoints");
   await page.locator(".panel").getByLabel("linear MPC").check();
   await page.locator(".panel").getByLabel("LQR").check();
