@@ -1,5 +1,5 @@
 // Builds crates/ballbot-web for WebAssembly into src/generated: module, JavaScript and types.
-import { execFileSync } from "node:child_process";
+import { execFileSync, spawn } from "node:child_process";
 import { mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -15,6 +15,14 @@ function run(program, args, env = {}) {
   execFileSync(program, args, { cwd: root, stdio: "inherit", env: { ...process.env, ...env } });
 }
 
+// Built beside the module, whose last step takes one core.
+const bindgen = ["--locked", "--quiet", "--manifest-path", join(web, "bindgen", "Cargo.toml")];
+const tool = spawn("cargo", ["build", ...bindgen], { cwd: root, stdio: "inherit" });
+const toolBuilt = new Promise((resolve, reject) => {
+  tool.on("error", reject);
+  tool.on("exit", (code) => (code === 0 ? resolve() : reject(new Error(`cargo build of web/bindgen: exit ${code}`))));
+});
+
 const triple = "wasm32-unknown-unknown";
 run(join(root, ".ci", "cross-cargo.sh"),
   [triple, "build", "--locked", "--profile", "web", "-p", "ballbot-web"],
@@ -23,7 +31,8 @@ run(join(root, ".ci", "cross-cargo.sh"),
   { CARGO_TARGET_DIR: target, RUSTFLAGS: "-Zlocation-detail=none", RUSTC_BOOTSTRAP: "1" });
 rmSync(generated, { recursive: true, force: true });
 mkdirSync(generated, { recursive: true });
-run("cargo", ["run", "--locked", "--quiet", "--manifest-path", join(web, "bindgen", "Cargo.toml"), "--",
+await toolBuilt;
+run("cargo", ["run", ...bindgen, "--",
   join(target, triple, "web", "ballbot_web.wasm"), generated]);
 const module = join(generated, "ballbot_web_bg.wasm");
 writeFileSync(module, withoutPanicTexts(readFileSync(module)));
