@@ -20,6 +20,8 @@ export interface AppEvents {
   restarted(): void;
   /** Running or not. */
   running(): void;
+  /** The scenario or the recording has come to its end. */
+  ended(): void;
 }
 
 /** Targets further away than this are slips of the pen, m. */
@@ -31,16 +33,18 @@ function text(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
-export class App implements Source {
+export class App {
   setup!: Scenario;
   preset = "";
   robots: RobotKind[] = robotsNamed([]);
   histories: History[] = [];
   references: Float64Array[][] = [];
   planes = 1;
+  /** As ordered last, until it ends by itself. */
   isRunning = false;
-  isComplete = false;
-  speed = 1;
+  private isComplete = false;
+  private speed = 1;
+  private runOrders = 0;
   playback: Playback | undefined;
   playbackName = "";
   onBatch: (batch: Batch) => void = () => {};
@@ -64,8 +68,8 @@ export class App implements Source {
 
   /** There is no robot any more that would take orders. */
   private failed(reason: string): void {
-    [this.facts, this.isRunning] = [[], false];
-    this.events.running();
+    this.facts = [];
+    this.setRunning(false);
     this.events.message(reason, "error");
   }
 
@@ -81,6 +85,12 @@ export class App implements Source {
     const result = this.queue.then(work, work).finally(() => this.waiting--);
     this.queue = result.catch(() => {});
     return result;
+  }
+
+  /** Hands on what was ordered when the changes before it are taken in: it is meant for what is
+   *  then there. */
+  private afterChanges(order: () => void): void {
+    void this.queue.then(order);
   }
 
   /** Does it, or says why not and changes nothing. */
@@ -114,6 +124,8 @@ export class App implements Source {
     if (!keep) {
       this.live.clear();
       this.ordered = undefined;
+      this.isComplete = false;
+      this.setRunning(false);
     }
     if (!keep || this.planes !== planes || this.histories.length !== facts.length) this.renew();
     for (const [i, history] of this.histories.entries()) {
@@ -137,7 +149,6 @@ export class App implements Source {
       const setup = await this.engine.call({ kind: "parse", toml });
       await this.configure(setup, robotsNamed(robots ?? [setup.controller.model]), false);
       this.preset = preset;
-      this.run(false);
       this.show();
     });
   }
@@ -192,6 +203,10 @@ export class App implements Source {
   }
 
   target(at: FloorPoint): void {
+    this.afterChanges(() => this.sendTarget(at));
+  }
+
+  private sendTarget(at: FloorPoint): void {
     if (!this.takesOrders()) return;
     if (!(Math.hypot(at.x, at.y) <= FARTHEST)) {
       this.events.message(`A target must be numbers, at most ${FARTHEST} m away.`, "error");
@@ -203,6 +218,10 @@ export class App implements Source {
   }
 
   path(points: FloorPoint[], from: FloorPoint): void {
+    this.afterChanges(() => this.sendPath(points, from));
+  }
+
+  private sendPath(points: FloorPoint[], from: FloorPoint): void {
     if (!this.takesOrders()) return;
     this.ordered = undefined;
     const timed = timedPath(points, from);
@@ -214,6 +233,10 @@ export class App implements Source {
 
   /** Pushes the bodies towards a direction: change of the lean's rates, rad/s. */
   push(towards: FloorPoint): void {
+    this.afterChanges(() => this.sendPush(towards));
+  }
+
+  private sendPush(towards: FloorPoint): void {
     if (!this.takesOrders()) return;
     if (!Number.isFinite(towards.x + towards.y)) {
       this.events.message("A push must be a number, in rad/s.", "error");
@@ -230,14 +253,34 @@ export class App implements Source {
     if (!this.isRunning) this.run(true);
   }
 
-  run(running: boolean, speed = this.speed): void {
+  /** Runs or stops. */
+  toggle(): void {
+    this.afterChanges(() => this.run(!this.isRunning));
+  }
+
+  setSpeed(speed: number): void {
     this.speed = speed;
-    (this.playback ?? this.engine).run(running, speed);
+    this.afterChanges(() => this.run(this.isRunning));
+  }
+
+  private run(running: boolean, source: Source = this.playback ?? this.engine): void {
+    if (!this.playback && this.facts.length === 0) return;
+    [this.clock, this.clockAt] = [this.time(), performance.now()];
+    this.setRunning(running);
+    source.run({ number: ++this.runOrders, running, speed: this.speed });
+  }
+
+  private setRunning(running: boolean): void {
+    if (running === this.isRunning) return;
+    this.isRunning = running;
+    this.events.running();
   }
 
   step(): void {
-    if (this.playback) this.playback.step();
-    else void this.tell<"step">({ kind: "step" }, () => {});
+    this.afterChanges(() => {
+      if (this.playback) this.playback.step();
+      else void this.tell<"step">({ kind: "step" }, () => {});
+    });
   }
 
   reset(): void {
@@ -245,17 +288,14 @@ export class App implements Source {
       this.playback.reset();
       return;
     }
-    void this.attempt(async () => {
-      await this.configure(this.setup, this.robots, false);
-      this.run(false);
-    });
+    void this.attempt(() => this.configure(this.setup, this.robots, false));
   }
 
-  play(files: { name: string; text: string }[]): void {
-    try {
+  play(files: { name: string; text: string }[]): Promise<boolean> {
+    return this.attempt(async () => {
       const { planes, name } = readRecording(files);
       const playback = new Playback(planes);
-      this.engine.run(false, this.speed);
+      this.run(false, this.engine);
       this.playback?.stop();
       this.playback = playback;
       this.playbackName = name;
@@ -264,13 +304,11 @@ export class App implements Source {
       this.robots = this.robots.slice(0, 1);
       this.histories = [new History(planes.length, playback.samplingTime, FAN_INTERVAL)];
       this.references = [playback.references()];
-      this.events.setup();
+      this.show();
       this.events.restarted();
       playback.onBatch = (batch) => this.receive(batch);
-      playback.run(true, this.speed);
-    } catch (error) {
-      this.events.message(text(error), "error");
-    }
+      this.run(true);
+    });
   }
 
   private receive(batch: Batch): void {
@@ -283,12 +321,9 @@ export class App implements Source {
     for (const [i, robot] of batch.robots.entries()) this.histories[i]?.add(robot);
     if (batch.references) this.references = batch.references;
     [this.clock, this.clockAt] = [batch.clock, performance.now()];
-    const ended = batch.complete && !this.isComplete;
+    if (batch.order === this.runOrders) this.setRunning(batch.running);
+    if (batch.complete && !this.isComplete) this.events.ended();
     this.isComplete = batch.complete;
-    if (batch.running !== this.isRunning || ended) {
-      this.isRunning = batch.running;
-      this.events.running();
-    }
     this.onBatch(batch);
   }
 

@@ -46,7 +46,7 @@ export function connectControls(controlled: Controlled): void {
     if (link !== "") void app.openLink(link);
   });
   connectKeys(byId("scene"), {
-    toggle: () => app.run(!app.isRunning),
+    toggle: () => app.toggle(),
     step: () => app.step(),
     reset: () => app.reset(),
     moveTarget: (dx, dy) => controlled.moveTarget(dx, dy),
@@ -55,12 +55,12 @@ export function connectControls(controlled: Controlled): void {
 }
 
 function connectRun(app: App): void {
-  byId("play").addEventListener("click", () => app.run(!app.isRunning));
+  byId("play").addEventListener("click", () => app.toggle());
   byId("step").addEventListener("click", () => app.step());
   byId("reset").addEventListener("click", () => app.reset());
   const speed = byId<HTMLSelectElement>("speed");
   for (const [value, text] of SPEEDS) speed.add(new Option(text, String(value)));
-  speed.addEventListener("change", () => app.run(app.isRunning, Number(speed.value)));
+  speed.addEventListener("change", () => app.setSpeed(Number(speed.value)));
 }
 
 function connectTools({ view, plots, pointer }: Controlled): void {

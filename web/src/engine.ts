@@ -1,18 +1,16 @@
 // The page's end of the worker.
 
-import type { Answers, Batch, Call, FromWorker } from "./protocol";
+import type { Answers, Batch, Call, FromWorker, RunOrder } from "./protocol";
 
 /** Whatever delivers batches: the simulation, or a recorded file. */
 export interface Source {
   onBatch: (batch: Batch) => void;
-  run(running: boolean, speed: number): void;
-  step(): void;
-  reset(): void;
+  run(order: RunOrder): void;
 }
 
 type Waiting = { resolve: (value: never) => void; reject: (error: Error) => void };
 
-export class Engine {
+export class Engine implements Source {
   onBatch: (batch: Batch) => void = () => {};
   onFailure: (text: string) => void = () => {};
   private readonly worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
@@ -32,8 +30,8 @@ export class Engine {
     return new Promise((resolve, reject) => this.waiting.set(id, { resolve, reject }));
   }
 
-  run(running: boolean, speed: number): void {
-    this.worker.postMessage({ run: { running, speed } });
+  run(order: RunOrder): void {
+    this.worker.postMessage({ run: order });
   }
 
   /** Nobody waits for answers that will not come. */

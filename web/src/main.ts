@@ -44,7 +44,7 @@ const view = makeView();
 document.body.classList.add(`view-${view.kind}`);
 const plots = new Plots(byId("plots"));
 const status = new StatusList(byId("status"));
-const app = new App({ message: (text, kind) => messages.show(text, kind), setup: setupShown, restarted, running: runningShown });
+const app = new App({ message: (text, kind) => messages.show(text, kind), setup: setupShown, restarted, running: runningShown, ended });
 const pictures = new Pictures(app);
 let panel: Panel | undefined;
 let shownShape = "";
@@ -86,10 +86,11 @@ function runningShown(): void {
   const play = byId("play");
   play.textContent = app.isRunning ? "Pause" : "Run";
   play.setAttribute("aria-pressed", String(app.isRunning));
-  if (app.isComplete && !app.isRunning) {
-    messages.show(app.playback ? "End of the recording. Run plays it again."
-      : "End of the scenario. Run goes on from here, Reset starts again.", "info");
-  }
+}
+
+function ended(): void {
+  messages.show(app.playback ? "End of the recording. Run plays it again."
+    : "End of the scenario. Run goes on from here, Reset starts again.", "info");
 }
 
 /** Where the first robot is to go: the last target before it is heard of from the worker. */
@@ -165,7 +166,7 @@ async function openFiles(files: File[]): Promise<void> {
   const [[toml], csv] = [named(".toml"), named(".csv")];
   try {
     if (toml) await app.openToml((await readText(toml)).text, "");
-    else if (csv.length > 0) app.play(await Promise.all(csv.map(readText)));
+    else if (csv.length > 0) await app.play(await Promise.all(csv.map(readText)));
     else if (files[0]) {
       const kinds = "neither a set-up (.toml) nor a recorded run (.csv); if it is a folder, choose the files in it";
       messages.show(`${files[0].name}: this is ${kinds}`, "error");

@@ -1,7 +1,7 @@
 // A recorded run, played as if it were running.
 
 import type { Recorded } from "./files";
-import { NOW_WIDTH, ROW, ROW_WIDTH, type Batch } from "./protocol";
+import { NOW_WIDTH, ROW, ROW_WIDTH, type Batch, type RunOrder } from "./protocol";
 import type { Source } from "./engine";
 import { LINE_POINTS } from "./scene/lines";
 
@@ -13,6 +13,7 @@ export class Playback implements Source {
   private clock: number;
   private running = false;
   private speed = 1;
+  private order = 0;
   private lastTick = 0;
   private restarted = true;
   private frame = 0;
@@ -34,10 +35,10 @@ export class Playback implements Source {
     );
   }
 
-  run(running: boolean, speed: number): void {
+  run({ running, speed, number }: RunOrder): void {
     // At the end there is nothing left to play: it starts again.
     if (running && this.atEnd()) this.rewind();
-    [this.running, this.speed] = [running, speed];
+    [this.running, this.speed, this.order] = [running, speed, number];
     this.lastTick = performance.now();
     this.send();
     if (running) this.nextFrame();
@@ -109,7 +110,7 @@ export class Playback implements Source {
     this.onBatch({
       clock: this.clock,
       running: this.running,
-      speed: this.speed,
+      order: this.order,
       restarted: this.restarted,
       complete,
       robots: [

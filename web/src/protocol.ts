@@ -60,9 +60,17 @@ export interface RobotFacts {
   zenith: number;
 }
 
+/** Run or stop, at so many times real time. */
+export interface RunOrder {
+  /** Counts the orders: what is said of `running` in batches from before the last one is void. */
+  number: number;
+  running: boolean;
+  speed: number;
+}
+
 export type ToWorker =
   | { id: number; call: Call }
-  | { run: { running: boolean; speed: number } };
+  | { run: RunOrder };
 
 /** Columns of a row: one sample in one plane. Times in s, angles in rad, torque in N m. */
 export const ROW = {
@@ -106,7 +114,8 @@ export interface Batch {
   /** Simulated time that the display has reached, s. */
   clock: number;
   running: boolean;
-  speed: number;
+  /** Number of the last order to run or stop. */
+  order: number;
   /** Set at the first batch of a run: what was shown before is void. */
   restarted: boolean;
   /** The run has reached the end of its scenario. */

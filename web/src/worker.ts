@@ -31,6 +31,7 @@ const { certificate } = builtin;
 let robots: Robot[] = [];
 let running = false;
 let speed = 1;
+let order = 0;
 let clock = 0;
 let lastTick = 0;
 let lastBatch = 0;
@@ -49,7 +50,7 @@ function send(): void {
   const batch: Batch = {
     clock,
     running,
-    speed,
+    order,
     restarted,
     complete: completed,
     robots: robots.map(({ recorder, simulation }): RobotBatch => recorder.take(simulation)),
@@ -240,7 +241,7 @@ self.onmessage = async ({ data }: MessageEvent<ToWorker>) => {
     await started;
     if (failure !== "") throw new Error(failure);
     if ("run" in data) {
-      ({ running, speed } = data.run);
+      ({ running, speed, number: order } = data.run);
       send();
     } else {
       post({ id: data.id, value: answer(data.call) });

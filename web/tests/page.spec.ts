@@ -3,7 +3,7 @@
 import { expect, test, type Page } from "@playwright/test";
 import { open, scenario, until } from "./page";
 
-test("the page loads without an error and only from its own host", async ({ page }) => {
+test("the page loads without an error and only from its own host", { tag: "@3d" }, async ({ page }) => {
   const problems = await open(page);
   await page.locator("#play").click();
   await until(page, 1);
@@ -44,7 +44,7 @@ test("without the module the page says so, and nothing can be started", async ({
   await expect(page.locator("#play")).toBeDisabled();
 });
 
-test("on a phone nothing sticks out and everything can be reached", async ({ browser }) => {
+test("on a phone nothing sticks out and everything can be reached", { tag: "@3d" }, async ({ browser }) => {
   const context = await browser.newContext({ viewport: { width: 390, height: 844 }, isMobile: true, hasTouch: true });
   const page = await context.newPage();
   const problems = await open(page);
@@ -69,8 +69,10 @@ async function memory(page: Page): Promise<number> {
   });
 }
 
-test("sixty seconds do not let the memory grow", async ({ page }) => {
+test("sixty seconds do not let the memory grow", { tag: "@3d" }, async ({ page }) => {
   test.setTimeout(200_000);
+  // Small: it is the time that counts, not the picture.
+  await page.setViewportSize({ width: 700, height: 420 });
   const problems = await open(page);
   await scenario(page, "lissajous");
   await page.locator("#play").click();

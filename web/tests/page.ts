@@ -41,7 +41,7 @@ export async function clock(page: Page): Promise<number> {
 
 /** Waits until the simulated time is at least `seconds`. */
 export async function until(page: Page, seconds: number): Promise<void> {
-  await expect.poll(() => clock(page), { timeout: 90_000 }).toBeGreaterThanOrEqual(seconds);
+  await expect.poll(() => clock(page), { timeout: 90_000, intervals: [100] }).toBeGreaterThanOrEqual(seconds);
 }
 
 export async function openSection(page: Page, title: string): Promise<void> {
