@@ -1,18 +1,25 @@
 #!/usr/bin/env bash
-# The program with the page inside (page.sh makes it), and the page's tests in Chromium, which is
+# The program with the page inside (page.sh makes it), and the page's tests in Chromium: in its
+# headless shell, which does the same with half the work, or else in the whole of it. Either is
 # installed if it is not there.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}
 
-if [[ -z ${CHROMIUM:-} ]] && ! command -v chromium >/dev/null; then
-    as_root=()
+install() {
+    local as_root=()
     ((EUID == 0)) || as_root=(sudo)
     "${as_root[@]}" apt-get -qq update
     "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-        apt-get -qq install -y --no-install-recommends chromium >/dev/null
+        apt-get -qq install -y --no-install-recommends "$1" >/dev/null
+}
+
+if [[ -z ${CHROMIUM:-} ]]; then
+    command -v chromium-headless-shell >/dev/null || install chromium-headless-shell ||
+        command -v chromium >/dev/null || install chromium
+    CHROMIUM=$(command -v chromium-headless-shell || command -v chromium)
 fi
-export CHROMIUM=${CHROMIUM:-$(command -v chromium)}
+export CHROMIUM
 
 cargo build --locked --release --features page -p ballbot-cli
 cd web

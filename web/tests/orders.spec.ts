@@ -33,7 +33,7 @@ async function tiltRates(page: Page): Promise<[number, number]> {
   return [await signed("trajectory_x.csv"), await signed("trajectory_y.csv")];
 }
 
-test("a body that is hardly dragged is hardly pushed", { tag: "@3d" }, async ({ page }) => {
+test("a body that is hardly dragged is hardly pushed", async ({ page }) => {
   await open(page);
   await drag(page, [0.5, 0.5], [3, 0]);
   await until(page, 1);
@@ -55,7 +55,7 @@ test("a body is pushed the way it is dragged", async ({ page }) => {
   expect(Math.abs(y)).toBeLessThan(0.05 * Math.abs(x));
 });
 
-test("a second finger turns the camera, and sends the robot nowhere", { tag: "@3d" }, async ({ browser }) => {
+test("a second finger turns the camera, and sends the robot nowhere", async ({ browser }) => {
   const context = await browser.newContext({ viewport: { width: 390, height: 844 }, isMobile: true, hasTouch: true });
   const page = await context.newPage();
   await open(page);

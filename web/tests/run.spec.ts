@@ -125,7 +125,7 @@ test("in an ideal world a controller without a plan gives up, and says which bou
   await expect(page.locator("#title")).toHaveText("recorded: simulated.csv");
 });
 
-test("the target can be dragged on the floor", { tag: "@3d" }, async ({ page }) => {
+test("the target can be dragged on the floor", async ({ page }) => {
   await open(page);
   const box = await page.locator("#scene").boundingBox();
   if (!box) throw new Error("no scene");
@@ -141,7 +141,7 @@ test("the target can be dragged on the floor", { tag: "@3d" }, async ({ page }) 
   expect(phi * 0.12).toBeCloseTo(target, 1);
 });
 
-test("the camera turns, and the robot stays; the plots show either plane; the set-up folds away", { tag: "@3d" }, async ({ page }) => {
+test("the camera turns, and the robot stays; the plots show either plane; the set-up folds away", async ({ page }) => {
   const problems = await open(page);
   const box = await page.locator("#scene").boundingBox();
   if (!box) throw new Error("no scene");
@@ -174,7 +174,7 @@ test("the camera turns, and the robot stays; the plots show either plane; the se
   expect(problems).toEqual([]);
 });
 
-test("a drawn path is followed", { tag: "@3d" }, async ({ page }) => {
+test("a drawn path is followed", async ({ page }) => {
   await open(page);
   await page.getByText("Draw path").click();
   const box = await page.locator("#scene").boundingBox();

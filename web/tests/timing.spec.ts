@@ -1,16 +1,20 @@
 // What depends on the clock of the machine: these run alone, after the others.
 
 import { expect, test } from "@playwright/test";
-import { fill, open, saved, scenario, table, until } from "./page";
+import { clock, fill, open, saved, scenario, table, until } from "./page";
 
 test("the loop runs at one kilohertz", async ({ page }) => {
   const problems = await open(page);
   await fill(page, "Sampling t_s", "1");
   await page.locator("#play").click();
-  const begun = Date.now();
-  await until(page, 3);
-  // Real time, but for what a busy machine holds it up.
-  expect(Date.now() - begun).toBeLessThan(4500);
+  const seen: [wall: number, simulated: number][] = [];
+  while ((seen.at(-1)?.[1] ?? 0) < 3) {
+    seen.push([Date.now() / 1000, await clock(page)]);
+    await page.waitForTimeout(50);
+  }
+  // A busy machine may hold it up now and then: in its best second it runs in real time.
+  const spans = seen.flatMap(([begin, from]) => seen.filter(([end]) => end - begin > 1).map(([end, to]) => (to - from) / (end - begin)));
+  expect(Math.max(...spans)).toBeGreaterThan(0.9);
   await page.locator("#play").click();
   const times = table(await saved(page, "Save CSV"))["t_s"] ?? [];
   expect(times.length).toBeGreaterThan(3000);

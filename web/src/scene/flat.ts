@@ -12,6 +12,9 @@ export class FlatView implements View {
   private shape: Shape = { ballRadius: 0.12, wheelRadius: 0.05, zenith: Math.PI / 4, centreOfMass: 0.3 };
   private centre: FloorPoint = { x: 0, y: 0 };
   private scale = 100;
+  /** Of the host, px: asked for once, since every question lets the browser lay out the page. */
+  private width = 0;
+  private height = 0;
 
   constructor(private readonly host: HTMLElement, private theme: Theme) {
     host.append(this.element);
@@ -33,16 +36,17 @@ export class FlatView implements View {
 
   resize(): void {
     const ratio = Math.min(window.devicePixelRatio, 2);
-    this.element.width = this.host.clientWidth * ratio;
-    this.element.height = this.host.clientHeight * ratio;
+    [this.width, this.height] = [this.host.clientWidth, this.host.clientHeight];
+    this.element.width = this.width * ratio;
+    this.element.height = this.height * ratio;
     this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    this.scale = Math.min(this.host.clientWidth, this.host.clientHeight) / SPAN;
+    this.scale = Math.min(this.width, this.height) / SPAN;
   }
 
   private toCanvas(x: number, y: number): [number, number] {
     return [
-      this.host.clientWidth / 2 + (x - this.centre.x) * this.scale,
-      this.host.clientHeight / 2 - (y - this.centre.y) * this.scale,
+      this.width / 2 + (x - this.centre.x) * this.scale,
+      this.height / 2 - (y - this.centre.y) * this.scale,
     ];
   }
 
@@ -52,22 +56,36 @@ export class FlatView implements View {
     this.centre.y += dy * 0.06;
     const { context, theme } = this;
     context.fillStyle = theme.background;
-    context.fillRect(0, 0, this.host.clientWidth, this.host.clientHeight);
+    context.fillRect(0, 0, this.width, this.height);
     this.drawGrid();
     for (const robot of picture.robots) this.drawRobot(robot);
     this.line(picture.stroke.length, (i) => picture.stroke[i] ?? this.centre, theme.ink, 2);
     return Math.hypot(dx, dy) * this.scale > 0.5;
   }
 
+  /** Lines at whole multiples of the step, over what is seen. */
   private drawGrid(): void {
+    const { context, scale, centre, width, height } = this;
     for (const [step, colour] of [[0.25, this.theme.grid], [1, this.theme.gridStrong]] as const) {
-      const reach = 20;
-      for (let at = -reach; at <= reach; at += step) {
-        const x = Math.round(this.centre.x) + at;
-        const y = Math.round(this.centre.y) + at;
-        this.line(2, (i) => ({ x, y: this.centre.y + (i ? reach : -reach) }), colour, 1);
-        this.line(2, (i) => ({ x: this.centre.x + (i ? reach : -reach), y }), colour, 1);
+      const multiples = (middle: number, pixels: number): number[] => {
+        const reach = pixels / 2 / scale;
+        const first = Math.ceil((middle - reach) / step);
+        return Array.from({ length: Math.floor((middle + reach) / step) - first + 1 }, (_, i) => (first + i) * step);
+      };
+      context.beginPath();
+      for (const x of multiples(centre.x, width)) {
+        const [left] = this.toCanvas(x, 0);
+        context.moveTo(left, 0);
+        context.lineTo(left, height);
       }
+      for (const y of multiples(centre.y, height)) {
+        const [, top] = this.toCanvas(0, y);
+        context.moveTo(0, top);
+        context.lineTo(width, top);
+      }
+      context.strokeStyle = colour;
+      context.lineWidth = 1;
+      context.stroke();
     }
   }
 

@@ -147,11 +147,11 @@ export class Robot {
 
   /** Two staggered rows of rollers, each free to turn about the rim's tangent. */
   private rollers(wheelRadius: number, material: Material): InstancedMesh {
-    const profile = Array.from({ length: 9 }, (_, i) => {
-      const along = (i / 8 - 0.5) * wheelRadius * 0.62;
+    const profile = Array.from({ length: 7 }, (_, i) => {
+      const along = (i / 6 - 0.5) * wheelRadius * 0.62;
       return new Vector2(Math.sqrt(Math.max(wheelRadius ** 2 - along ** 2, 0)) - wheelRadius * 0.78, along);
     });
-    const geometry = new LatheGeometry(profile, 14);
+    const geometry = new LatheGeometry(profile, 10);
     this.geometries.push(geometry);
     const mesh = new InstancedMesh(geometry, material, 2 * ROLLERS);
     const place = new Matrix4();

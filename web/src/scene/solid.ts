@@ -2,7 +2,7 @@
 
 import {
   CircleGeometry, Color, DirectionalLight, Fog, HemisphereLight, LineBasicMaterial, LineSegments, Mesh,
-  MeshStandardMaterial, PCFShadowMap, PerspectiveCamera, Plane, Raycaster, Scene, Vector2, Vector3, WebGLRenderer,
+  MeshLambertMaterial, PCFShadowMap, PerspectiveCamera, Plane, Raycaster, Scene, Vector2, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Actor } from "./actor";
@@ -30,7 +30,7 @@ export class SolidView implements View {
   private readonly controls: OrbitControls;
   private readonly sun = new DirectionalLight("#ffffff", 2.4);
   private readonly sky = new HemisphereLight("#ffffff", "#8a919c", 1.5);
-  private readonly floor: Mesh<CircleGeometry, MeshStandardMaterial>;
+  private readonly floor: Mesh<CircleGeometry, MeshLambertMaterial>;
   private grid: LineSegments[] = [];
   private actors: Actor[] = [];
   private stroke: FloorLine;
@@ -50,7 +50,7 @@ export class SolidView implements View {
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
-    this.floor = new Mesh(new CircleGeometry(40, 48), new MeshStandardMaterial({ roughness: 1 }));
+    this.floor = new Mesh(new CircleGeometry(40, 48), new MeshLambertMaterial());
     this.floor.rotation.x = -Math.PI / 2;
     this.floor.receiveShadow = true;
     this.sun.castShadow = true;
