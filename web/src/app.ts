@@ -61,7 +61,7 @@ export class App {
 
   constructor(private readonly events: AppEvents) {
     this.engine.onBatch = (batch) => {
-      if (!this.playback) this.receive(batch);
+      if (this.takesOrders()) this.receive(batch);
     };
     this.engine.onFailure = (reason) => this.failed(reason);
   }
@@ -69,7 +69,7 @@ export class App {
   /** There is no robot any more that would take orders. */
   private failed(reason: string): void {
     this.facts = [];
-    this.setRunning(false);
+    if (!this.playback) this.setRunning(false);
     this.events.message(reason, "error");
   }
 
@@ -87,10 +87,15 @@ export class App {
     return result;
   }
 
-  /** Hands on what was ordered when the changes before it are taken in: it is meant for what is
-   *  then there. */
-  private afterChanges(order: () => void): void {
-    void this.queue.then(order);
+  /** Does what was asked for when the changes before it are taken in: it is meant for what is then
+   *  there. */
+  afterChanges(work: () => void): void {
+    void this.queue.then(work);
+  }
+
+  /** No change is on its way. */
+  get isSettled(): boolean {
+    return this.waiting === 0;
   }
 
   /** Does it, or says why not and changes nothing. */
@@ -116,18 +121,18 @@ export class App {
   private async configure(setup: Scenario, robots: RobotKind[], keep: boolean): Promise<void> {
     const setups = robots.map((robot) => ({ label: robot.label, setup: robot.derive(setup) }));
     const planes = this.planes;
-    const facts = await this.engine.call({ kind: "configure", robots: setups, keep });
+    const { robots: facts, kept } = await this.engine.call({ kind: "configure", robots: setups, keep });
     this.playback?.stop();
     this.playback = undefined;
     [this.setup, this.robots, this.facts] = [setup, robots, facts];
     this.planes = facts[0]?.planes ?? 1;
-    if (!keep) {
+    if (!kept) {
       this.live.clear();
       this.ordered = undefined;
       this.isComplete = false;
       this.setRunning(false);
     }
-    if (!keep || this.planes !== planes || this.histories.length !== facts.length) this.renew();
+    if (!kept || this.planes !== planes || this.histories.length !== facts.length) this.renew();
     for (const [i, history] of this.histories.entries()) {
       history.samplingTime = facts[i]?.sampling_time ?? history.samplingTime;
     }
@@ -144,29 +149,28 @@ export class App {
     return preset !== undefined && this.openToml(preset.text, name);
   }
 
-  openToml(toml: string, preset: string, robots?: string[]): Promise<boolean> {
+  openToml(toml: string, preset: string): Promise<boolean> {
+    return this.attempt(() => this.takeIn(toml, preset));
+  }
+
+  openLink(fragment: string): Promise<boolean> {
     return this.attempt(async () => {
-      const setup = await this.engine.call({ kind: "parse", toml });
-      await this.configure(setup, robotsNamed(robots ?? [setup.controller.model]), false);
-      this.preset = preset;
-      this.show();
+      const { toml, robots } = await link.decode(fragment);
+      await this.takeIn(toml, "", robots);
     });
   }
 
-  async openLink(fragment: string): Promise<boolean> {
-    try {
-      const { toml, robots } = await link.decode(fragment);
-      return await this.openToml(toml, "", robots);
-    } catch (error) {
-      this.events.message(text(error), "error");
-      return false;
-    }
+  private async takeIn(toml: string, preset: string, robots?: string[]): Promise<void> {
+    const setup = await this.engine.call({ kind: "parse", toml });
+    await this.configure(setup, robotsNamed(robots ?? [setup.controller.model]), false);
+    this.preset = preset;
+    this.show();
   }
 
   change(path: string, value: unknown): Promise<boolean> {
     return this.attempt(async () => {
       const setup = withValue(this.setup, path, value);
-      await this.configure(setup, this.robots, this.time() > 0 && !this.playback);
+      await this.configure(setup, this.robots, !this.playback);
     });
   }
 
@@ -202,8 +206,10 @@ export class App {
     return this.facts.length > 0 && !this.playback;
   }
 
-  target(at: FloorPoint): void {
-    this.afterChanges(() => this.sendTarget(at));
+  /** Sends the robots to a place, which is asked for when the changes before it are taken in. Here
+   *  and below: whoever reaches into the scene wants to see what happens, so it runs from there on. */
+  target(place: () => FloorPoint): void {
+    this.afterChanges(() => this.sendTarget(place()));
   }
 
   private sendTarget(at: FloorPoint): void {
@@ -214,21 +220,22 @@ export class App {
     }
     this.ordered = at;
     void this.tell<"target">({ kind: "target", phi: this.phi(at) }, ({ time_s, replaced }) => this.live.target(at, time_s, replaced));
-    this.runOn();
+    this.run(true);
   }
 
-  path(points: FloorPoint[], from: FloorPoint): void {
-    this.afterChanges(() => this.sendPath(points, from));
+  /** Sends the robots along a line from where they stand. */
+  path(line: () => { points: FloorPoint[]; from: FloorPoint }): void {
+    this.afterChanges(() => this.sendPath(line()));
   }
 
-  private sendPath(points: FloorPoint[], from: FloorPoint): void {
+  private sendPath({ points, from }: { points: FloorPoint[]; from: FloorPoint }): void {
     if (!this.takesOrders()) return;
     this.ordered = undefined;
     const timed = timedPath(points, from);
     const called = timed.map((point) => ({ time_s: point.time_s, phi: this.phi(point) }));
     void this.tell<"path">({ kind: "path", points: called }, (taken) =>
       this.live.path(timed.map((point) => ({ ...point, time_s: taken.time_s + point.time_s }))));
-    this.runOn();
+    this.run(true);
   }
 
   /** Pushes the bodies towards a direction: change of the lean's rates, rad/s. */
@@ -245,29 +252,29 @@ export class App {
     // The body leans towards +x where theta is negative.
     const push = { x: -towards.x, y: -towards.y };
     void this.tell<"push">({ kind: "push", push }, ({ time_s }) => this.live.push(push.x, push.y, time_s));
-    this.runOn();
+    this.run(true);
   }
 
-  /** Whoever reaches into the scene wants to see what happens. */
-  private runOn(): void {
-    if (!this.isRunning) this.run(true);
-  }
-
-  /** Runs or stops. */
+  /** What the button says: a run that is seen stops at once. */
   toggle(): void {
-    this.afterChanges(() => this.run(!this.isRunning));
+    if (this.isRunning) this.run(false);
+    else this.afterChanges(() => this.run(!this.isRunning));
   }
 
   setSpeed(speed: number): void {
-    this.speed = speed;
-    this.afterChanges(() => this.run(this.isRunning));
+    this.order({ speed });
   }
 
-  private run(running: boolean, source: Source = this.playback ?? this.engine): void {
+  private run(running: boolean, source?: Source): void {
+    this.order({ running }, source);
+  }
+
+  private order(order: { running?: boolean; speed?: number }, source: Source = this.playback ?? this.engine): void {
     if (!this.playback && this.facts.length === 0) return;
     [this.clock, this.clockAt] = [this.time(), performance.now()];
-    this.setRunning(running);
-    source.run({ number: ++this.runOrders, running, speed: this.speed });
+    this.speed = order.speed ?? this.speed;
+    if (order.running !== undefined) this.setRunning(order.running);
+    source.run({ number: ++this.runOrders, ...order, speed: this.speed });
   }
 
   private setRunning(running: boolean): void {
@@ -278,17 +285,20 @@ export class App {
 
   step(): void {
     this.afterChanges(() => {
-      if (this.playback) this.playback.step();
-      else void this.tell<"step">({ kind: "step" }, () => {});
+      if (this.playback) {
+        this.playback.step();
+        return;
+      }
+      this.run(false);
+      void this.tell<"step">({ kind: "step" }, () => {});
     });
   }
 
   reset(): void {
-    if (this.playback) {
-      this.playback.reset();
-      return;
-    }
-    void this.attempt(() => this.configure(this.setup, this.robots, false));
+    void this.attempt(async () => {
+      if (this.playback) this.playback.reset();
+      else await this.configure(this.setup, this.robots, false);
+    });
   }
 
   play(files: { name: string; text: string }[]): Promise<boolean> {

@@ -98,8 +98,12 @@ function wanted(): FloorPoint {
   return app.ordered ?? pictures.firstTarget();
 }
 
-function sendTo({ x, y }: FloorPoint): void {
-  app.target({ x, y: app.planes === 2 ? y : 0 });
+/** Sends it to a place that is found from where it is to go already. */
+function sendTo(place: (target: FloorPoint) => FloorPoint): void {
+  app.target(() => {
+    const { x, y } = place(wanted());
+    return { x, y: app.planes === 2 ? y : 0 };
+  });
 }
 
 /** A point of the floor in the first robot's lane. */
@@ -108,8 +112,8 @@ function inLane({ x, y }: FloorPoint): FloorPoint {
 }
 
 const pointer = new Pointer(view, {
-  target: (point) => app.target(inLane(point)),
-  path: (points) => app.path(points.map(inLane), inLane(pictures.robots()[0] ?? { x: 0, y: 0 })),
+  target: (point) => app.target(() => inLane(point)),
+  path: (points) => app.path(() => ({ points: points.map(inLane), from: inLane(pictures.robots()[0] ?? { x: 0, y: 0 }) })),
   push: ({ x, y }) => app.push({ x: x * PUSH_PER_METRE, y: y * PUSH_PER_METRE }),
   robots: () => pictures.robots(),
 });
@@ -128,7 +132,8 @@ function showWords(time: number): void {
   alert.hidden = text === "";
   const millimetres = (length: number) => Math.round(length * 1000) / 1000;
   const target = wanted();
-  panel?.showTarget(millimetres(target.x), millimetres(target.y));
+  // A target that was typed may still wait for a change.
+  if (app.isSettled) panel?.showTarget(millimetres(target.x), millimetres(target.y));
   byId("clock").textContent = `${time.toFixed(2)} s`;
 }
 
@@ -211,12 +216,12 @@ function makePanel(): Panel {
     preset: (name) => void app.openPreset(name),
     change: (path, value) => void app.change(path, value),
     robots: (names) => void app.chooseRobots(names),
-    target: (x, y) => sendTo({ x, y }),
+    target: (typed) => sendTo((target) => ({ ...target, ...typed })),
     push: (x, y) => app.push({ x, y }),
     openFiles: () => void choose(".toml,.csv", true).then(openFiles),
-    saveToml: () => save("scenario.toml", app.toml(), "application/toml"),
-    saveCsv,
-    copyLink: () => void copyLink(),
+    saveToml: () => app.afterChanges(() => save("scenario.toml", app.toml(), "application/toml")),
+    saveCsv: () => app.afterChanges(saveCsv),
+    copyLink: () => app.afterChanges(() => void copyLink()),
   });
 }
 
@@ -238,10 +243,7 @@ function connectDrawing(): void {
 async function start(): Promise<void> {
   // Without a controller there is nothing to show or to do; the page says why.
   if (!(await app.start(linkInAddress()))) return;
-  const moveTarget = (dx: number, dy: number) => {
-    const { x, y } = wanted();
-    sendTo({ x: x + dx, y: y + dy });
-  };
+  const moveTarget = (dx: number, dy: number) => sendTo(({ x, y }) => ({ x: x + dx, y: y + dy }));
   connectControls({ app, view, plots, pointer, resized, moveTarget, openFiles: (files) => void openFiles(files) });
   connectDrawing();
   panel = makePanel();

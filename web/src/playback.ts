@@ -35,7 +35,7 @@ export class Playback implements Source {
     );
   }
 
-  run({ running, speed, number }: RunOrder): void {
+  run({ number, running = this.running, speed }: RunOrder): void {
     // At the end there is nothing left to play: it starts again.
     if (running && this.atEnd()) this.rewind();
     [this.running, this.speed, this.order] = [running, speed, number];

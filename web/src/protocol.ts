@@ -23,6 +23,7 @@ export interface PhiPair {
 /** Calls that are answered with a value or an error. */
 export type Call =
   | { kind: "parse"; toml: string }
+  /** `keep`: a run that has begun goes on with the new set-up. */
   | { kind: "configure"; robots: RobotSetup[]; keep: boolean }
   | { kind: "step" }
   | { kind: "target"; phi: PhiPair }
@@ -33,7 +34,11 @@ export type Call =
 /** What comes back from each call. */
 export interface Answers {
   parse: Scenario;
-  configure: RobotFacts[];
+  configure: {
+    robots: RobotFacts[];
+    /** The run goes on; otherwise it begins anew. */
+    kept: boolean;
+  };
   step: null;
   target: Taken & {
     /** Per plane: it takes the place of a target whose smooth move had not begun. */
@@ -64,7 +69,8 @@ export interface RobotFacts {
 export interface RunOrder {
   /** Counts the orders: what is said of `running` in batches from before the last one is void. */
   number: number;
-  running: boolean;
+  /** Left out: as it is. */
+  running?: boolean;
   speed: number;
 }
 

@@ -4,7 +4,7 @@ import init, { Simulation, check } from "./generated/ballbot_web.js";
 import wasmUrl from "./generated/ballbot_web_bg.wasm?url";
 import builtin from "../../crates/ballbot-scenario/src/builtin/terminal-certificate.json";
 import { parse } from "smol-toml";
-import type { Batch, Call, FromWorker, RobotBatch, RobotFacts, RobotSetup, ToWorker } from "./protocol";
+import type { Answers, Batch, Call, FromWorker, RobotBatch, RobotSetup, ToWorker } from "./protocol";
 import { Recorder } from "./recorder";
 
 interface Robot {
@@ -136,11 +136,12 @@ function warmUp({ setup }: RobotSetup): void {
   }
 }
 
-function configure(setups: RobotSetup[], keep: boolean): RobotFacts[] {
+function configure(setups: RobotSetup[], keep: boolean): Answers["configure"] {
+  const kept = keep && (running || robots.some(({ simulation }) => simulation.time() > 0));
   const next: Robot[] = [];
   try {
     for (const [index, { label, setup }] of setups.entries()) {
-      const before = keep ? robots[index] : undefined;
+      const before = kept ? robots[index] : undefined;
       const simulation = before
         ? before.simulation.reconfigured(setup, certificate)
         : new Simulation(setup, certificate);
@@ -153,7 +154,7 @@ function configure(setups: RobotSetup[], keep: boolean): RobotFacts[] {
   for (const { simulation } of robots) simulation.free();
   robots = next;
   referencesChanged = true;
-  if (!keep) {
+  if (!kept) {
     restarted = true;
     completed = false;
     running = false;
@@ -166,7 +167,7 @@ function configure(setups: RobotSetup[], keep: boolean): RobotFacts[] {
     warm = true;
     setTimeout(() => warmUp(first));
   }
-  return robots.map(({ label, simulation }) => ({
+  const facts = robots.map(({ label, simulation }) => ({
     label,
     planes: simulation.planes(),
     sampling_time: simulation.sampling_time(),
@@ -174,6 +175,7 @@ function configure(setups: RobotSetup[], keep: boolean): RobotFacts[] {
     samples: simulation.samples(),
     zenith: simulation.zenith_angle(),
   }));
+  return { robots: facts, kept };
 }
 
 /** The time of the robots that can still hear of it. */
@@ -241,7 +243,7 @@ self.onmessage = async ({ data }: MessageEvent<ToWorker>) => {
     await started;
     if (failure !== "") throw new Error(failure);
     if ("run" in data) {
-      ({ running, speed, number: order } = data.run);
+      ({ running = running, speed, number: order } = data.run);
       send();
     } else {
       post({ id: data.id, value: answer(data.call) });

@@ -1,7 +1,7 @@
 // What a person orders: targets, paths and pushes arrive as they were meant, and stand in the file.
 
 import { expect, test, type Page } from "@playwright/test";
-import { fill, largest, open, openFlat, ready, saved, scenario, table, until } from "./page";
+import { atOnce, fill, largest, open, openFlat, ready, saved, scenario, table, until } from "./page";
 import { expectSameUntil } from "./program";
 
 /** Presses at a place of the scene (parts of its size), moves by pixels, lets go. */
@@ -85,20 +85,34 @@ test("a second finger turns the camera, and sends the robot nowhere", async ({ b
 
 test("one target follows another at once", async ({ page }) => {
   await openFlat(page);
-  await page.evaluate(() => {
-    const type = (label: string, value: string) => {
-      const labels = [...document.querySelectorAll<HTMLLabelElement>(".panel label")];
-      const input = labels.find(({ textContent }) => textContent === label)?.control as HTMLInputElement;
-      input.value = value;
-      input.dispatchEvent(new Event("input", { bubbles: true }));
-      input.dispatchEvent(new Event("change", { bubbles: true }));
-    };
-    type("Target X", "0.5");
-    type("Target Y", "-0.25");
-  });
+  await atOnce(page, [["Target X", "0.5"], ["Target Y", "-0.25"]]);
   await until(page, 0.5);
   await expect(page.getByLabel("Target X", { exact: true })).toHaveValue("0.5");
   await expect(page.getByLabel("Target Y", { exact: true })).toHaveValue("-0.25");
+});
+
+test("targets that wait for a change are those that were meant", async ({ page }) => {
+  await openFlat(page);
+  await fill(page, "Target X", "1");
+  await until(page, 0.5);
+  await atOnce(page, [["#reset"], ["Target X", "0.5"], ["Target Y", "-0.25"]]);
+  await until(page, 0.2);
+  await expect(page.getByLabel("Target X", { exact: true })).toHaveValue("0.5");
+  await expect(page.getByLabel("Target Y", { exact: true })).toHaveValue("-0.25");
+  // Arrows count from where it is to go, and that is the origin after a reset.
+  await page.evaluate(() => {
+    document.getElementById("reset")?.click();
+    const arrow = () => document.getElementById("scene")?.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight", bubbles: true }));
+    arrow();
+    arrow();
+  });
+  await until(page, 0.2);
+  await expect(page.getByLabel("Target X", { exact: true })).toHaveValue("0.5");
+  // One plane has no y.
+  await atOnce(page, [["Scenario", "two-setpoints"], ["Target Y", "0.5"]]);
+  await expect(page.locator("#title")).toContainText("Two set points");
+  await until(page, 0.2);
+  await expect(page.getByLabel("Target Y", { exact: true })).toHaveValue("0");
 });
 
 test("a target that is no place is refused", async ({ page }) => {

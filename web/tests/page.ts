@@ -9,6 +9,7 @@ export async function open(page: Page): Promise<string[]> {
   await page.addInitScript(() => {
     const frame = window.requestAnimationFrame.bind(window);
     window.requestAnimationFrame = (callback) => window.setTimeout(() => frame(callback), 100);
+    window.cancelAnimationFrame = (id) => window.clearTimeout(id);
   });
   return openAt(page, "./");
 }
@@ -55,6 +56,23 @@ export async function clock(page: Page): Promise<number> {
 /** Waits until the simulated time is at least `seconds`. */
 export async function until(page: Page, seconds: number): Promise<void> {
   await expect.poll(() => clock(page), { timeout: 90_000, intervals: [100] }).toBeGreaterThanOrEqual(seconds);
+}
+
+/** Does several things in one go, before any of them can be answered: presses `#button`, or gives a
+ *  field of the panel a value. */
+export async function atOnce(page: Page, acts: [what: string, value?: string][]): Promise<void> {
+  await page.evaluate((all) => {
+    for (const [what, value] of all) {
+      if (value === undefined) {
+        document.querySelector<HTMLElement>(what)?.click();
+        continue;
+      }
+      const labels = [...document.querySelectorAll<HTMLLabelElement>(".panel label")];
+      const field = labels.find(({ textContent }) => textContent === what)?.control as HTMLInputElement;
+      field.value = value;
+      for (const kind of ["input", "change"]) field.dispatchEvent(new Event(kind, { bubbles: true }));
+    }
+  }, acts);
 }
 
 export async function openSection(page: Page, title: string): Promise<void> {

@@ -2,7 +2,7 @@
 
 import { readFileSync } from "node:fs";
 import { expect, test } from "@playwright/test";
-import { clock, fill, largest, open, openFile, openFlat, openSection, saved, scenario, table, until, type Table } from "./page";
+import { atOnce, clock, fill, largest, open, openFile, openFlat, openSection, saved, scenario, table, until, type Table } from "./page";
 import { expectSame, simulated } from "./program";
 
 for (const name of ["two-setpoints", "tight-bounds", "single-setpoint-terminal"]) {
@@ -49,8 +49,8 @@ test("run, pause, step, slow motion and reset", async ({ page }) => {
   const paused = await clock(page);
   await page.waitForTimeout(400);
   expect(await clock(page)).toBe(paused);
-  await page.locator("#play").click();
   const begun = Date.now();
+  await page.locator("#play").click();
   await until(page, paused + 0.1);
   expect(Date.now() - begun).toBeGreaterThan(600);
   await page.locator("#reset").click();
@@ -59,25 +59,38 @@ test("run, pause, step, slow motion and reset", async ({ page }) => {
 
 test("what is pressed right after a choice is for what was chosen", async ({ page }) => {
   await openFlat(page);
-  // In one go, while the worker still reads the scenario.
-  const press = (name: string, buttons: string[]) => page.evaluate(([value, ids]) => {
-    const choice = document.querySelector<HTMLSelectElement>(".panel select");
-    if (!choice) throw new Error("no scenarios");
-    choice.value = value;
-    choice.dispatchEvent(new Event("change", { bubbles: true }));
-    for (const id of ids) document.getElementById(id)?.click();
-  }, [name, buttons] as const);
   const clockAndPlay = () => Promise.all([clock(page), page.locator("#play").textContent()]);
-  await press("tight-bounds", ["step", "step"]);
+  await atOnce(page, [["Scenario", "tight-bounds"], ["#step"], ["#step"]]);
   await expect.poll(clockAndPlay).toEqual([0.1, "Run"]);
-  await press("two-setpoints", ["play"]);
+  await atOnce(page, [["Scenario", "two-setpoints"], ["#play"]]);
   await expect(page.locator("#message")).toContainText("End of the scenario", { timeout: 60_000 });
   await expect(page.locator("#title")).toContainText("Two set points, LPV MPC");
   expect(table(await saved(page, "Save CSV"))["t_s"]?.length).toBe(81);
-  // Pressed twice is once too often, also before the first press has had an effect.
-  await press("two-setpoints", ["play", "play"]);
+  await atOnce(page, [["Scenario", "lissajous"], ["#play"], ["#play"], ["#play"]]);
+  await until(page, 0.2);
+  await expect(page.locator("#play")).toHaveText("Pause");
+  // It runs, and the button says so: what is pressed now stops.
+  await atOnce(page, [["Scenario", "tight-bounds"], ["#play"]]);
+  await expect(page.locator("#title")).toContainText("tight bounds");
+  await expect.poll(clockAndPlay).toEqual([0, "Run"]);
+  await atOnce(page, [["#play"], ["#play"]]);
   await page.waitForTimeout(300);
   expect(await clockAndPlay()).toEqual([0, "Run"]);
+});
+
+test("a run that was ordered between two changes goes on with the second", async ({ page }) => {
+  await openFlat(page);
+  await atOnce(page, [["R", "500"], ["#play"], ["Horizon N", "25"]]);
+  await until(page, 0.2);
+  await expect(page.locator("#play")).toHaveText("Pause");
+  await atOnce(page, [["#step"], ["#play"]]);
+  const now = await clock(page);
+  await until(page, now + 0.2);
+  // The buttons stop it, however much there is to be taken in before.
+  await atOnce(page, [["R", "600"], ["#play"], ["R", "700"]]);
+  await expect(page.locator("#play")).toHaveText("Run");
+  await expect.poll(() => saved(page, "Save TOML")).toMatch(/^horizon = 25$[^]*^r = 700$/m);
+  expect(await clock(page)).toBeGreaterThan(now);
 });
 
 test("a push within the limits is survived", async ({ page }) => {
@@ -147,15 +160,18 @@ test("the camera turns, and the robot stays; the plots show either plane; the se
   if (!box) throw new Error("no scene");
   // The floor's lines, beside words and robot.
   const clip = { x: box.x, y: box.y + box.height * 0.3, width: box.width * 0.25, height: box.height * 0.4 };
-  await page.waitForTimeout(500);
-  const before = await page.screenshot({ clip });
+  let before = await page.screenshot({ clip });
+  await expect.poll(async () => {
+    const last = before;
+    before = await page.screenshot({ clip });
+    return before.equals(last);
+  }, { intervals: [500] }).toBe(true);
   await page.getByText("Camera", { exact: true }).click();
   await page.mouse.move(box.x + box.width * 0.7, box.y + box.height * 0.7);
   await page.mouse.down();
   await page.mouse.move(box.x + box.width * 0.4, box.y + box.height * 0.6, { steps: 4 });
   await page.mouse.up();
-  await page.waitForTimeout(500);
-  expect((await page.screenshot({ clip })).equals(before)).toBe(false);
+  await expect.poll(async () => (await page.screenshot({ clip })).equals(before)).toBe(false);
   await expect(page.getByLabel("Target X", { exact: true })).toHaveValue("0");
   await expect(page.locator("#clock")).toHaveText("0.00 s");
 

@@ -1,20 +1,23 @@
 // What depends on the clock of the machine: these run alone, after the others.
 
 import { expect, test } from "@playwright/test";
-import { clock, fill, open, saved, scenario, table, until } from "./page";
+import { fill, open, saved, scenario, table, until } from "./page";
 
 test("the loop runs at one kilohertz", async ({ page }) => {
   const problems = await open(page);
   await fill(page, "Sampling t_s", "1");
   await page.locator("#play").click();
-  const seen: [wall: number, simulated: number][] = [];
-  while ((seen.at(-1)?.[1] ?? 0) < 3) {
-    seen.push([Date.now() / 1000, await clock(page)]);
-    await page.waitForTimeout(50);
-  }
-  // A busy machine may hold it up now and then: in its best second it runs in real time.
-  const spans = seen.flatMap(([begin, from]) => seen.filter(([end]) => end - begin > 1).map(([end, to]) => (to - from) / (end - begin)));
-  expect(Math.max(...spans)).toBeGreaterThan(0.9);
+  const seen = await page.evaluate(async () => {
+    const readings: [wall: number, simulated: number][] = [];
+    while ((readings.at(-1)?.[1] ?? 0) < 4) {
+      readings.push([performance.now() / 1000, parseFloat(document.getElementById("clock")?.textContent ?? "")]);
+      await new Promise((resolve) => setTimeout(resolve, 50));
+    }
+    return readings;
+  });
+  // A busy machine may hold it up now and then: in its best two seconds it runs in real time.
+  const rates = seen.flatMap(([begin, from]) => seen.filter(([end]) => end - begin > 2).map(([end, to]) => (to - from) / (end - begin)));
+  expect(Math.max(...rates)).toBeGreaterThan(0.9);
   await page.locator("#play").click();
   const times = table(await saved(page, "Save CSV"))["t_s"] ?? [];
   expect(times.length).toBeGreaterThan(3000);

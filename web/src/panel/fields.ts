@@ -126,10 +126,11 @@ export function rangeField(spec: FieldSpec, changed: (value: [number, number]) =
   };
   const [lower, upper] = [make("lower bound"), make("upper bound")];
   const typing = [new Typing(lower), new Typing(upper)] as const;
-  // Only the side that was typed: the other one may have more digits than are shown.
+  // Only the side that was typed: the other one may have more digits than are shown. The second may
+  // be typed before it is shown what came of the first.
   let now: [number, number] = [-Infinity, Infinity];
-  lower.addEventListener("change", () => changed([typed(lower, -Infinity), now[1]]));
-  upper.addEventListener("change", () => changed([now[0], typed(upper, Infinity)]));
+  lower.addEventListener("change", () => changed(now = [typed(lower, -Infinity), now[1]]));
+  upper.addEventListener("change", () => changed(now = [now[0], typed(upper, Infinity)]));
   return {
     element: row(spec, lower, upper),
     set([low, high]) {

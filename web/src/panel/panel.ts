@@ -12,7 +12,8 @@ export interface PanelActions {
   /** A value of the set-up was changed; `undefined` leaves the key out. */
   change(path: string, value: unknown): void;
   robots(names: string[]): void;
-  target(x: number, y: number): void;
+  /** A coordinate of the target was typed, m. */
+  target(typed: { x: number } | { y: number }): void;
   push(x: number, y: number): void;
   openFiles(): void;
   saveToml(): void;
@@ -33,14 +34,13 @@ export class Panel {
   private chosen: string[] = [];
   private targetFields: [Field<number>, Field<number>];
   private pushBy = 3;
-  private target = { x: 0, y: 0 };
 
   constructor(host: HTMLElement, presets: [name: string, title: string][], private readonly actions: PanelActions) {
     this.form = new Form((path, value) => actions.change(path, value));
     this.presetField = choiceField({ label: "Scenario" }, presets, (name) => actions.preset(name));
     this.targetFields = [
-      numberField({ label: "Target X", unit: "m", min: -3, max: 3, step: 0.05 }, (x) => this.moveTarget(x, this.target.y)),
-      numberField({ label: "Target Y", unit: "m", min: -3, max: 3, step: 0.05 }, (y) => this.moveTarget(this.target.x, y)),
+      numberField({ label: "Target X", unit: "m", min: -3, max: 3, step: 0.05 }, (x) => actions.target({ x })),
+      numberField({ label: "Target Y", unit: "m", min: -3, max: 3, step: 0.05 }, (y) => actions.target({ y })),
     ];
     host.append(
       section("Scenario", true, this.presetField.element, this.files()),
@@ -52,11 +52,6 @@ export class Panel {
       section("World", false, ...worldFields(this.form), note("The controller knows nothing of these. With any of them set, a controller without a plan goes on with its best guess; in an ideal world it gives up.")),
       licences(),
     );
-  }
-
-  private moveTarget(x: number, y: number): void {
-    if (Number.isFinite(x) && Number.isFinite(y)) this.target = { x, y };
-    this.actions.target(x, y);
   }
 
   private files(): HTMLElement {
@@ -75,7 +70,9 @@ export class Panel {
         const names = new Set(this.chosen);
         if (on) names.add(name);
         else names.delete(name);
-        this.actions.robots([...names]);
+        // Until it is shown what holds: the next choice may come before.
+        this.chosen = [...names];
+        this.actions.robots(this.chosen);
       });
       field.element.classList.add("swatch", colour.slice(2));
       this.robotFields.set(name, field);
@@ -106,7 +103,6 @@ export class Panel {
   }
 
   showTarget(x: number, y: number): void {
-    this.target = { x, y };
     this.targetFields[0].set(x);
     this.targetFields[1].set(y);
   }

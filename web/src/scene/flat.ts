@@ -54,6 +54,8 @@ export class FlatView implements View {
     const [dx, dy] = [picture.follow.x - this.centre.x, picture.follow.y - this.centre.y];
     this.centre.x += dx * 0.06;
     this.centre.y += dy * 0.06;
+    // A window without height: there is nothing to draw on.
+    if (this.scale === 0) return false;
     const { context, theme } = this;
     context.fillStyle = theme.background;
     context.fillRect(0, 0, this.width, this.height);
