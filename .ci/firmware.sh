@@ -15,7 +15,8 @@ cross=$PWD/.ci/cross-cargo.sh
     CARGO_TARGET_DIR=$CARGO_TARGET_DIR/cross "$cross" "$target" build --locked --release \
         -p firmware --bins --examples
 )
-cargo build --locked --release -p ballbot-scenario --example firmware_check
+# With the program named, its dependencies are those that are built already.
+cargo build --locked --release -p ballbot-cli -p ballbot-scenario --example firmware_check
 
 # Flash: code, constants and initial data. The host's `size` counts sections by their flags,
 # whatever the processor.

@@ -8,7 +8,8 @@ shopt -s inherit_errexit
 cd "$(dirname "$0")/.."
 file=.ci/instructions.txt
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}
-cargo build --locked --release -p ballbot-scenario --example count_steps
+# With the program named, its dependencies are those that are built already.
+cargo build --locked --release -p ballbot-cli -p ballbot-scenario --example count_steps
 directory=$(mktemp -d)
 trap 'rm -rf "$directory"' EXIT
 
