@@ -1,7 +1,7 @@
 // The page itself: it loads, it fits, it does without WebGL, it does not grow.
 
 import { expect, test, type Page } from "@playwright/test";
-import { open, openAt, scenario, until } from "./page";
+import { clock, open, openAt, scenario, until } from "./page";
 
 test("the page loads without an error and only from its own host", async ({ page }) => {
   const problems = await open(page);
@@ -71,6 +71,11 @@ async function heap(send: Send): Promise<number> {
   return (usedSize ?? NaN) + (embedderHeapUsedSize ?? NaN) + (backingStorageSize ?? NaN);
 }
 
+/** The least of three readings: a collection may leave something for the next one. */
+async function least(read: () => Promise<number>): Promise<number> {
+  return Math.min(await read(), await read(), await read());
+}
+
 /** The memory of the page and of its worker, bytes. */
 async function memoryOf(page: Page): Promise<() => Promise<[page: number, worker: number]>> {
   const session = await page.context().newCDPSession(page);
@@ -88,7 +93,7 @@ async function memoryOf(page: Page): Promise<() => Promise<[page: number, worker
     waiting.set(++id, resolve);
     session.send("Target.sendMessageToTarget", { sessionId, message: JSON.stringify({ id, method }) }).catch(reject);
   });
-  return async () => [await heap((method) => session.send(method)), await heap(toWorker)];
+  return async () => [await least(() => heap((method) => session.send(method))), await least(() => heap(toWorker))];
 }
 
 test("sixty seconds do not let the memory grow", async ({ page }) => {
@@ -99,11 +104,13 @@ test("sixty seconds do not let the memory grow", async ({ page }) => {
   await until(page, 5);
   const memory = await memoryOf(page);
   const before = await memory();
-  await until(page, 65);
+  // Without looking: what a test looks at stays in the memory for a while.
+  await page.waitForTimeout(60_000);
   const after = await memory();
-  test.info().annotations.push({ type: "memory", description: `${before} bytes at 5 s, ${after} at 65 s` });
-  // The page keeps the words of every sample, some 10 kB a second; the worker keeps nothing.
+  test.info().annotations.push({ type: "memory", description: `${before} bytes at first, ${after} after a minute` });
+  // Room for what the engine compiles and what its collector leaves for later.
   expect(after[0] - before[0]).toBeLessThan(1_000_000);
   expect(after[1] - before[1]).toBeLessThan(500_000);
+  expect(await clock(page)).toBeGreaterThan(30);
   expect(problems).toEqual([]);
 });

@@ -83,10 +83,13 @@ test("a run that was ordered between two changes goes on with the second", async
   await atOnce(page, [["R", "500"], ["#play"], ["Horizon N", "25"]]);
   await until(page, 0.2);
   await expect(page.locator("#play")).toHaveText("Pause");
-  await atOnce(page, [["#step"], ["#play"]]);
+  // A step stops it, and the button says so at once: what is pressed next runs.
+  await atOnce(page, [["#step"]]);
+  await atOnce(page, [["#play"]]);
   const now = await clock(page);
-  await until(page, now + 0.2);
-  // The buttons stop it, however much there is to be taken in before.
+  await until(page, now + 0.5);
+  await expect(page.locator("#play")).toHaveText("Pause");
+  // The button stops it, however much there is to be taken in before.
   await atOnce(page, [["R", "600"], ["#play"], ["R", "700"]]);
   await expect(page.locator("#play")).toHaveText("Run");
   await expect.poll(() => saved(page, "Save TOML")).toMatch(/^horizon = 25$[^]*^r = 700$/m);
