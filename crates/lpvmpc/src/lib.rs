@@ -14,6 +14,7 @@ mod kernel;
 mod kkt;
 mod model;
 mod ocp;
+mod policy;
 mod predictor;
 mod ramp;
 mod relaxation;
