@@ -68,6 +68,7 @@ impl Recording {
                 upper: Vector4::from(self.state_upper),
             },
             u: Bounds { lower, upper },
+            soft_x: [None; 4],
             scheduling: Scheduling::Predicted,
             iterations: Iterations::Fixed(1),
             solver: SolverSettings::default(),

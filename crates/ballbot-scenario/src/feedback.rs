@@ -220,6 +220,8 @@ impl TorqueRateTable {
                 lower: Vector1::new(-limit),
                 upper: Vector1::new(limit),
             },
+            // The torque's bounds are the motors' own.
+            soft_x: [0, 1, 2, 3, 4].map(|i| plain.soft_x.get(i).copied().flatten()),
             scheduling: plain.scheduling,
             iterations: plain.iterations,
             solver: plain.solver,

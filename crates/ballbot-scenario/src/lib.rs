@@ -68,7 +68,7 @@ pub use run::{PlaneLoop, Record, Surroundings};
 pub use schema::{
     BoundsTable, CertifiedTable, ControllerTable, CsvTable, IntegrationTable, IterationsTable,
     LinearModelTable, LissajousTable, ModelKind, ParameterTable, PointTable, PredictorTable,
-    ReferenceTable, Scenario, SineTable, StateTable, TerminalTable,
+    ReferenceTable, Scenario, SineTable, StateBounds, StateTable, TerminalTable,
 };
 pub use session::{Phase, Session, Trouble};
 pub use three_motors::{MotorSample, Motors};

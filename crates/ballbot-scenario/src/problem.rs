@@ -4,13 +4,13 @@ use crate::error::ScenarioError;
 use crate::number::positive;
 use crate::schema::{
     BoundsTable, ControllerTable, IterationsTable, LinearModelTable, ModelKind, PredictorTable,
-    TerminalTable,
+    StateBounds, TerminalTable,
 };
 use ballbot::{Ballbot, LinearParameters};
 use ballbot_control::LONGEST_HORIZON;
 use lpvmpc::{
-    Bounds, ControllerSettings, Iterations, LpvModel, Predictor, Rk4, Scheduling, SolverSettings,
-    TerminalIngredient, Weights,
+    Bounds, ControllerSettings, Iterations, LpvModel, Penalty, Predictor, Rk4, Scheduling,
+    Softness, SolverSettings, TerminalIngredient, Weights,
 };
 use nalgebra::{DMatrix, Matrix1, Matrix4, Vector1, Vector3, Vector4};
 
@@ -19,6 +19,11 @@ const MOST_SUBSTEPS: usize = 1000;
 
 /// The same for quadratic programs per sample.
 const MOST_PROGRAMS: usize = 1000;
+
+/// Price of a state bound exceeded by its width, in terminal costs of a state at that width: of
+/// plans from rest to set points up to 10 m away no multiplier of a bound was larger
+/// (`testdata/nonlinear-mpc/multipliers.py`).
+const PRICE_OF_WIDTH: f64 = 20.0;
 
 impl From<LinearModelTable> for LinearParameters<f64> {
     fn from(table: LinearModelTable) -> Self {
@@ -126,6 +131,13 @@ impl ControllerTable {
             ModelKind::Lpv => Scheduling::Predicted,
             ModelKind::Linear => Scheduling::Held(Vector3::zeros()),
         };
+        let iterations = self.iterations(predictor)?;
+        let descent = matches!(iterations, Iterations::Descent { .. });
+        let soft_x = match self.state_bounds {
+            None if !descent => [None; 4],
+            Some(StateBounds::Hard) => [None; 4],
+            None | Some(StateBounds::Soft) => self.prices(upright, &weights, predictor, &x)?,
+        };
         Ok(ControllerSettings {
             t_s: self.t_s,
             horizon: self.horizon,
@@ -133,20 +145,41 @@ impl ControllerTable {
             weights,
             terminal,
             x,
+            soft_x,
             u,
             scheduling,
-            iterations: self.iterations()?,
+            iterations,
             solver: SolverSettings::default(),
         })
     }
 
-    fn iterations(&self) -> Result<Iterations<f64>, ScenarioError> {
-        let (iterations, key, most) = match self.iterations {
-            None => return Ok(Iterations::Fixed(1)),
-            Some(IterationsTable::Fixed(most)) => (Iterations::Fixed(most), "fixed", most),
-            Some(IterationsTable::UntilConverged { tolerance, most }) => {
+    /// Where nothing is said: one program per sample for the paper's predictor, as in the paper; for
+    /// linear MPC, whose programs are all the same; and with a certified terminal set.
+    fn iterations(&self, predictor: Predictor) -> Result<Iterations<f64>, ScenarioError> {
+        let paper = matches!(predictor, Predictor::FrozenRk4(_));
+        let certified = matches!(self.terminal, TerminalTable::Certified(_));
+        let linear = self.model == ModelKind::Linear;
+        let usual = if paper || certified || linear {
+            IterationsTable::Fixed(1)
+        } else {
+            IterationsTable::default()
+        };
+        let (iterations, key, most) = match self.iterations.unwrap_or(usual) {
+            IterationsTable::Fixed(most) => (Iterations::Fixed(most), "fixed", most),
+            IterationsTable::UntilConverged { tolerance, most } => {
                 let iterations = Iterations::UntilConverged { tolerance, most };
                 (iterations, "until_converged.most", most)
+            }
+            IterationsTable::Descent { .. } if linear => {
+                return Err(ScenarioError::value(
+                    "controller.iterations",
+                    "descent",
+                    "with model = \"linear\" all programs of a sample are the same; take fixed = 1",
+                ));
+            }
+            IterationsTable::Descent { tolerance, most } => {
+                let iterations = Iterations::Descent { tolerance, most };
+                (iterations, "descent.most", most)
             }
         };
         if most > MOST_PROGRAMS {
@@ -157,6 +190,45 @@ impl ControllerTable {
             ));
         }
         Ok(iterations)
+    }
+
+    /// Prices of soft state bounds, high enough to be exact, from the LQR's cost.
+    fn prices(
+        &self,
+        (a, b): (Matrix4<f64>, Vector4<f64>),
+        weights: &Weights<f64, 4, 1>,
+        predictor: Predictor,
+        x: &Bounds<f64, 4>,
+    ) -> Result<Softness<f64, 4>, ScenarioError> {
+        let lqr = self.lqr((a, b), weights, predictor)?;
+        Ok(std::array::from_fn(|j| {
+            let [lower, upper] = [x.lower[j], x.upper[j]];
+            let width = match (lower.is_finite(), upper.is_finite()) {
+                (true, true) => upper - lower,
+                (true, false) => lower.abs(),
+                (false, true) => upper.abs(),
+                (false, false) => return None,
+            };
+            // A bound of no width, or at zero, is as dear as one of a unit.
+            let width = if width > 0.0 { width } else { 1.0 };
+            Some(Penalty {
+                linear: PRICE_OF_WIDTH * lqr[(j, j)] * width,
+                quadratic: 0.0,
+            })
+        }))
+    }
+
+    /// The cost of the LQR of the sampled plant from a state on.
+    fn lqr(
+        &self,
+        (a, b): (Matrix4<f64>, Vector4<f64>),
+        weights: &Weights<f64, 4, 1>,
+        predictor: Predictor,
+    ) -> Result<Matrix4<f64>, ScenarioError> {
+        let (a_d, b_d) = predictor.discretize(&a, &b, self.t_s);
+        let (q, r) = (dynamic(&weights.q), dynamic(&weights.r));
+        let p = lpvmpc_design::lqr_discrete(&dynamic(&a_d), &dynamic(&b_d), &q, &r)?.p;
+        Ok(Matrix4::from_fn(|i, j| p[(i, j)]))
     }
 
     fn predictor(&self, upright: &Matrix4<f64>) -> Result<Predictor, ScenarioError> {
@@ -206,8 +278,7 @@ impl ControllerTable {
             TerminalTable::Equality => TerminalIngredient::Equality,
             // The certified cost is the guarded controller's; without guard it is as by default.
             TerminalTable::DiscreteRiccati | TerminalTable::Certified(_) => {
-                let (a_d, b_d) = predictor.discretize(&a, &b, self.t_s);
-                cost(lpvmpc_design::lqr_discrete(&dynamic(&a_d), &dynamic(&b_d), &q, &r)?.p)
+                TerminalIngredient::Cost(self.lqr((a, b), weights, predictor)?)
             }
             TerminalTable::ContinuousRiccati { linear_model } => {
                 let (a, b) = match linear_model {

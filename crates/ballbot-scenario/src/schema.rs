@@ -137,7 +137,11 @@ pub struct ControllerTable {
     /// The limits of the motors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motors: Option<MotorsTable>,
-    /// Quadratic programs per sample; one when absent.
+    /// What the bounds of the state are worth. When absent: soft in a descent, hard otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state_bounds: Option<StateBounds>,
+    /// Quadratic programs per sample. When absent: a descent; one program with the paper's
+    /// predictor `rk4`, with the linear model, and with a certified terminal set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub iterations: Option<IterationsTable>,
 }
@@ -155,6 +159,43 @@ pub enum IterationsTable {
         /// At most so many.
         most: usize,
     },
+    /// Each one an improvement: a descent on the cost of the nonlinear rollout.
+    Descent {
+        /// No more programs once one is expected to save less than this part of the cost.
+        #[serde(default = "descent_tolerance")]
+        tolerance: f64,
+        /// At most so many.
+        #[serde(default = "descent_programs")]
+        most: usize,
+    },
+}
+
+impl Default for IterationsTable {
+    /// The descent.
+    fn default() -> Self {
+        Self::Descent {
+            tolerance: descent_tolerance(),
+            most: descent_programs(),
+        }
+    }
+}
+
+fn descent_tolerance() -> f64 {
+    1e-3
+}
+
+fn descent_programs() -> usize {
+    8
+}
+
+/// What the bounds of the state are worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StateBounds {
+    /// They may be exceeded, at a price so high that it is paid only where they cannot be met.
+    Soft,
+    /// A plan that exceeds one is none.
+    Hard,
 }
 
 fn yes() -> bool {

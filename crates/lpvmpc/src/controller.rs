@@ -2,15 +2,16 @@
 
 use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
-use crate::ocp::{Bounds, Ocp, Stage};
+use crate::ocp::{Bounds, Ocp, Penalty, Softness, Stage};
+use crate::plan::{Policy, Trial};
 use crate::relaxation::Relaxation;
 use crate::settings::{
-    ControllerError, ControllerSettings, Scheduling, TerminalIngredient, Weights, check,
-    check_bounds,
+    ControllerError, ControllerSettings, Iterations, Scheduling, TerminalIngredient, Weights,
+    check, check_bounds,
 };
-use crate::solution::Solution;
+use crate::solution::{Solution, Status};
 use crate::solver::{Solver, SolverSettings, WarmStart};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{SMatrix, SVector, convert};
 
 /// The state reference along the horizon, in state units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,8 +39,10 @@ impl<T: Scalar, const NX: usize, const N: usize> Reference<T, NX, N> {
 /// simultaneously active bounds.
 #[derive(Clone, Debug)]
 pub struct Workspace<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
-    ocp: Ocp<T, NX, NU, N>,
-    solver: Solver<T, NX, NU, N, M>,
+    pub(crate) ocp: Ocp<T, NX, NU, N>,
+    pub(crate) solver: Solver<T, NX, NU, N, M>,
+    /// A rollout that may become the plan.
+    pub(crate) trial: Trial<T, NX, NU, N>,
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
@@ -51,6 +54,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         Self {
             ocp: Ocp::default(),
             solver: Solver::new(),
+            trial: Trial::new(),
         }
     }
 
@@ -63,17 +67,24 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
     /// the same at all stages.
     fn pose<const NS: usize>(&mut self, settings: &ControllerSettings<T, NX, NU, NS>) {
         let ControllerSettings { weights, x, u, .. } = settings;
+        let soft_x = halved(&settings.soft_x);
         let same = |stage: &Stage<T, NX, NU>| {
-            stage.q == weights.q && stage.r == weights.r && stage.x == *x && stage.u == *u
+            stage.q == weights.q
+                && stage.r == weights.r
+                && stage.x == *x
+                && stage.soft_x == soft_x
+                && stage.u == *u
         };
         if !self.ocp.stages.first().is_some_and(same) {
             for stage in &mut self.ocp.stages {
                 stage.q = weights.q;
                 stage.r = weights.r;
                 stage.x = *x;
+                stage.soft_x = soft_x;
                 stage.u = *u;
             }
             self.ocp.terminal.x = *x;
+            self.ocp.terminal.soft_x = soft_x;
         }
     }
 }
@@ -101,15 +112,23 @@ pub struct Controller<
     const N: usize,
     const M: usize,
 > {
-    model: P,
-    settings: ControllerSettings<T, NX, NU, NS>,
+    pub(crate) model: P,
+    pub(crate) settings: ControllerSettings<T, NX, NU, NS>,
     /// The nonlinear model's states under the last plan, x_1 to x_N: where the next sample's
     /// stages 0 to N - 1 are expected to be.
-    rollout: [SVector<T, NX>; N],
-    initialised: bool,
+    pub(crate) rollout: [SVector<T, NX>; N],
+    /// How the last plan is followed: of a descent only.
+    pub(crate) policy: Policy<T, NX, NU, N>,
+    /// Rolled-out minus predicted state at the end of the horizon.
+    pub(crate) gap: SVector<T, NX>,
+    pub(crate) initialised: bool,
     /// Quadratic programs that the last step solved.
-    problems: usize,
-    solution: Solution<T, NX, NU, N, M>,
+    pub(crate) problems: usize,
+    /// What came of factorising the program that is ready for [`Controller::feedback`].
+    prepared: Option<Result<(), Status<T>>>,
+    /// The state that the last feedback was given, while the rest of its step is to be made up for.
+    answered: Option<SVector<T, NX>>,
+    pub(crate) solution: Solution<T, NX, NU, N, M>,
 }
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize, const N: usize, const M: usize>
@@ -131,8 +150,12 @@ where
             model,
             settings,
             rollout: [SVector::zeros(); N],
+            policy: Policy::new(),
+            gap: SVector::zeros(),
             initialised: false,
             problems: 0,
+            prepared: None,
+            answered: None,
             solution: Solution::default(),
         })
     }
@@ -147,7 +170,12 @@ where
         reference: &Reference<T, NX, N>,
         workspace: &mut Workspace<T, NX, NU, N, M>,
     ) -> &Solution<T, NX, NU, N, M> {
+        self.make_up();
         workspace.pose(&self.settings);
+        if let Iterations::Descent { tolerance, .. } = self.settings.iterations {
+            self.descend(x, reference, tolerance, workspace);
+            return &self.solution;
+        }
         let Workspace { ocp, solver, .. } = workspace;
         self.initialise_scheduling(x);
         self.predict(x, ocp);
@@ -156,6 +184,70 @@ where
         self.roll_out(x);
         self.iterate(x, workspace);
         &self.solution
+    }
+
+    /// What a step can do before the state is measured: the rest of the last step, the program's
+    /// matrices, and the backward sweep. [`feedback`](Self::feedback) then takes little time.
+    ///
+    /// `reference` is that of the coming sample. Until the feedback the workspace is this
+    /// controller's alone. Without a past there is nothing to prepare.
+    pub fn prepare(
+        &mut self,
+        reference: &Reference<T, NX, N>,
+        workspace: &mut Workspace<T, NX, NU, N, M>,
+    ) {
+        self.prepared = None;
+        workspace.pose(&self.settings);
+        if let Iterations::Descent { .. } = self.settings.iterations {
+            let answered = self.answered.take();
+            if !self.initialised || !self.prepare_descent(answered, reference, workspace) {
+                self.initialised = false;
+                return;
+            }
+        } else {
+            self.make_up();
+            if !self.initialised {
+                return;
+            }
+            let x = self.rollout[0];
+            self.predict(&x, &mut workspace.ocp);
+            self.track(reference, &mut workspace.ocp);
+        }
+        self.prepared = Some(workspace.solver.factorize(&workspace.ocp));
+    }
+
+    /// The answer to the measured state `x` by the program that [`prepare`](Self::prepare) made
+    /// ready with this `reference`; a whole step where nothing is prepared.
+    ///
+    /// It is the answer of one program. Of a descent it is not known yet whether it is an
+    /// improvement; the next `prepare` goes on from the better plan. The inputs are finite and
+    /// within the input bounds, whatever the status says.
+    pub fn feedback(
+        &mut self,
+        x: &SVector<T, NX>,
+        reference: &Reference<T, NX, N>,
+        workspace: &mut Workspace<T, NX, NU, N, M>,
+    ) -> &Solution<T, NX, NU, N, M> {
+        let Some(factorized) = self.prepared.take() else {
+            return self.step(x, reference, workspace);
+        };
+        let Workspace { ocp, solver, .. } = workspace;
+        ocp.x0 = *x;
+        let settings = &self.settings.solver;
+        solver.solve_factorized(factorized, ocp, settings, &mut self.solution);
+        self.problems = 1;
+        self.take_gains(workspace);
+        self.answered = Some(*x);
+        &self.solution
+    }
+
+    /// The rollout that a feedback has left for later.
+    fn make_up(&mut self) {
+        self.prepared = None;
+        if let Some(x) = self.answered.take() {
+            self.roll_out(&x);
+            self.policy.u = self.solution.u;
+        }
     }
 
     /// Bounds of state and input from the next step on, over its whole horizon: for what is known
@@ -172,12 +264,14 @@ where
         check_bounds(&x, "state")?;
         check_bounds(&u, "input")?;
         (self.settings.x, self.settings.u) = (x, u);
+        self.prepared = None;
         Ok(())
     }
 
     /// Forgets the past: the next step starts as the first one did.
     pub fn reset(&mut self) {
         self.initialised = false;
+        (self.prepared, self.answered) = (None, None);
         self.solution = Solution::default();
     }
 
@@ -192,10 +286,9 @@ where
     }
 
     /// Rolled-out minus predicted state at the end of the last plan's horizon, in state units:
-    /// how far the nonlinear model ends from where the quadratic program expects it.
+    /// how far the nonlinear model ends from where the last quadratic program expects it.
     pub fn gap(&self) -> SVector<T, NX> {
-        let end = self.settings.horizon - 1;
-        self.rollout[end] - self.solution.x[end]
+        self.gap
     }
 
     /// The settings.
@@ -267,6 +360,7 @@ where
         };
         for (stage, (x, u)) in ocp.stages.iter_mut().zip(window).take(horizon) {
             (stage.a, stage.b) = predictor.linearize_along(&self.model, held, x, u, *t_s);
+            stage.c = SVector::zeros();
         }
     }
 
@@ -279,7 +373,7 @@ where
         if most == 1 || !self.solution.status.is_solved() {
             return;
         }
-        let Workspace { ocp, solver } = workspace;
+        let Workspace { ocp, solver, .. } = workspace;
         let settings = SolverSettings {
             warm_start: WarmStart::Same,
             ..self.settings.solver
@@ -306,11 +400,12 @@ where
 
     /// Algorithm 1, cost: the reference enters the linear terms.
     #[inline(never)]
-    fn track(&self, reference: &Reference<T, NX, N>, ocp: &mut Ocp<T, NX, NU, N>) {
+    pub(crate) fn track(&self, reference: &Reference<T, NX, N>, ocp: &mut Ocp<T, NX, NU, N>) {
         let q = -self.settings.weights.q;
         let stages = ocp.stages.iter_mut().zip(&reference.stages);
         for (stage, x_ref) in stages.take(self.settings.horizon) {
             stage.linear_x = product(&q, x_ref);
+            stage.linear_u = SVector::zeros();
         }
         let x_ref = reference.terminal;
         let (p, equality) = match self.settings.terminal {
@@ -332,7 +427,20 @@ where
             state = predictor.rk4().advance(&self.model, &state, u, *t_s);
             *place = state;
         }
-        // A rollout that left the numbers is no past to build on.
+        let end = self.settings.horizon - 1;
+        self.gap = state - self.solution.x[end];
+        // A rollout that has become non-finite is no past to build on.
         self.initialised = state.iter().all(|entry| entry.is_finite());
     }
+}
+
+/// Prices of the cost J as those of the quadratic program, whose cost is half of it.
+fn halved<T: Scalar, const NX: usize>(soft: &Softness<T, NX>) -> Softness<T, NX> {
+    let half: T = convert(0.5);
+    soft.map(|price| {
+        price.map(|Penalty { linear, quadratic }| Penalty {
+            linear: linear * half,
+            quadratic: quadratic * half,
+        })
+    })
 }

@@ -8,12 +8,14 @@
 mod active_set;
 mod controller;
 mod delay;
+mod descent;
 mod estimator;
 mod guarded;
 mod kernel;
 mod kkt;
 mod model;
 mod ocp;
+mod plan;
 mod policy;
 mod predictor;
 mod ramp;

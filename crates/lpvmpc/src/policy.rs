@@ -6,13 +6,13 @@ use crate::model::Scalar;
 use crate::ocp::Bounds;
 use nalgebra::{SMatrix, SVector};
 
-/// The input of a planned stage at the state `x`: `u_planned` + K (x - `x_planned`), moved into its
-/// bounds. K is `gain`, `NU` x `NX`, with the sign of u = K x.
+/// The input at the state `x` of a stage that is `planned` to be at (x_planned, u_planned):
+/// u_planned + K (x - x_planned), moved into its bounds. K is `gain`, `NU` x `NX`, with the sign of
+/// u = K x.
 #[inline(always)]
 pub(crate) fn input_at<T: Scalar, const NX: usize, const NU: usize>(
     x: &SVector<T, NX>,
-    x_planned: &SVector<T, NX>,
-    u_planned: &SVector<T, NU>,
+    (x_planned, u_planned): (&SVector<T, NX>, &SVector<T, NU>),
     gain: &SMatrix<T, NU, NX>,
     bounds: &Bounds<T, NU>,
 ) -> SVector<T, NU> {

@@ -1,7 +1,7 @@
 //! What defines a controller besides its model, and what can be wrong with it.
 
 use crate::model::Scalar;
-use crate::ocp::Bounds;
+use crate::ocp::{Bounds, Softness};
 use crate::predictor::Predictor;
 use crate::solver::SolverSettings;
 use core::fmt;
@@ -47,13 +47,23 @@ pub enum Iterations<T> {
         /// At most so many, at least 1.
         most: usize,
     },
+    /// Each one an improvement: a descent on the cost of the nonlinear rollout, in which the answer
+    /// of a program is taken as far as the cost falls, and not at all where it does not.
+    Descent {
+        /// No more programs once one is expected to lower the cost by less than this part of it.
+        tolerance: T,
+        /// At most so many, at least 1.
+        most: usize,
+    },
 }
 
 impl<T: Scalar> Iterations<T> {
     /// The largest number.
     pub(crate) fn most(&self) -> usize {
         match self {
-            Self::Fixed(most) | Self::UntilConverged { most, .. } => *most,
+            Self::Fixed(most) | Self::UntilConverged { most, .. } | Self::Descent { most, .. } => {
+                *most
+            }
         }
     }
 
@@ -61,14 +71,14 @@ impl<T: Scalar> Iterations<T> {
     pub(crate) fn tolerance(&self) -> T {
         match self {
             Self::Fixed(_) => -T::one(),
-            Self::UntilConverged { tolerance, .. } => *tolerance,
+            Self::UntilConverged { tolerance, .. } | Self::Descent { tolerance, .. } => *tolerance,
         }
     }
 
     fn make_sense(&self) -> bool {
         let tolerance = match self {
             Self::Fixed(_) => T::one(),
-            Self::UntilConverged { tolerance, .. } => *tolerance,
+            Self::UntilConverged { tolerance, .. } | Self::Descent { tolerance, .. } => *tolerance,
         };
         self.most() > 0 && tolerance > T::zero() && tolerance.is_finite()
     }
@@ -89,6 +99,8 @@ pub struct ControllerSettings<T, const NX: usize, const NU: usize, const NS: usi
     pub terminal: TerminalIngredient<T, NX>,
     /// State bounds, at the stages 1 to N.
     pub x: Bounds<T, NX>,
+    /// Which state bounds may be exceeded, and at what price in the unit of the cost.
+    pub soft_x: Softness<T, NX>,
     /// Input bounds, at the stages 0 to N - 1.
     pub u: Bounds<T, NU>,
     /// Where the scheduling comes from.

@@ -169,6 +169,15 @@ impl<T: Scalar, const M: usize> Default for ActiveSet<T, M> {
 pub enum Status<T> {
     /// The inputs are optimal and every bound holds.
     Solved,
+    /// The plan is a rollout of the nonlinear model, and no program lowers its cost by more than the
+    /// tolerance.
+    Converged,
+    /// The plan is a rollout of the nonlinear model that the programs of this sample have improved;
+    /// more of them may improve it further.
+    Improved,
+    /// The plan is a rollout of the nonlinear model, the rest of the last one as a rule: no program
+    /// of this sample has an answer with a lower cost.
+    NoImprovement,
     /// No input satisfies all hard bounds; this bound conflicts with the rest.
     Infeasible(BoundId),
     /// The cap on changes of the active set ended the search.
@@ -187,9 +196,13 @@ pub enum Status<T> {
 }
 
 impl<T: Scalar> Status<T> {
-    /// Whether the inputs are optimal.
+    /// Whether the inputs are a plan: the optimum of the quadratic program, or a rollout of the
+    /// nonlinear model that the programs confirm or improve.
     pub fn is_solved(&self) -> bool {
-        matches!(self, Self::Solved)
+        matches!(
+            self,
+            Self::Solved | Self::Converged | Self::Improved | Self::NoImprovement
+        )
     }
 }
 
@@ -197,6 +210,9 @@ impl<T: fmt::Display> fmt::Display for Status<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Solved => write!(f, "solved"),
+            Self::Converged => write!(f, "converged"),
+            Self::Improved => write!(f, "improved"),
+            Self::NoImprovement => write!(f, "no improvement found"),
             Self::Infeasible(bound) => write!(f, "infeasible: {bound} cannot be met"),
             Self::ChangeCap => write!(f, "cap on active-set changes reached"),
             Self::WorkingSetFull => write!(f, "more active bounds than the workspace holds"),

@@ -85,7 +85,26 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU, N, M>,
     ) {
-        let outcome = self.search(ocp, settings, solution);
+        let factorized = self.factorize(ocp);
+        self.solve_factorized(factorized, ocp, settings, solution);
+    }
+
+    /// [`Solver::solve`] with the factor that [`Solver::factorize`] left: of all of `ocp`, only `x0`
+    /// may have changed since.
+    #[inline(never)]
+    pub(crate) fn solve_factorized<const NG: usize>(
+        &mut self,
+        factorized: Result<(), Status<T>>,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+        settings: &SolverSettings<T>,
+        solution: &mut Solution<T, NX, NU, N, M>,
+    ) {
+        let tolerance = Some(settings.tolerance).filter(|t| *t > T::zero() && t.is_finite());
+        self.dual.reset(
+            tolerance.unwrap_or_else(default_tolerance),
+            settings.max_changes,
+        );
+        let outcome = factorized.and_then(|()| self.search(ocp, settings, solution));
         solution.changes = self.dual.changes;
         solution.status = match outcome {
             Ok(()) => Status::Solved,
@@ -102,12 +121,6 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU, N, M>,
     ) -> Result<(), Status<T>> {
-        let tolerance = Some(settings.tolerance).filter(|t| *t > T::zero() && t.is_finite());
-        self.dual.reset(
-            tolerance.unwrap_or_else(default_tolerance),
-            settings.max_changes,
-        );
-        self.factorize(ocp)?;
         self.roll_out(ocp, solution)?;
         if ocp.terminal.equality.is_some() {
             let x_n = terminal_state(ocp, solution);
@@ -138,8 +151,16 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         Ok(())
     }
 
-    /// Backward: the factor of every stage.
-    fn factorize<const NG: usize>(&mut self, ocp: &Ocp<T, NX, NU, N, NG>) -> Result<(), Status<T>> {
+    /// The factors of the stages of the last problem.
+    pub(crate) fn factors(&self) -> &[StageFactor<T, NX, NU>; N] {
+        &self.factors
+    }
+
+    /// Backward: the factor of every stage. It does not depend on `x0`.
+    pub(crate) fn factorize<const NG: usize>(
+        &mut self,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+    ) -> Result<(), Status<T>> {
         let mut cost_to_go = CostToGo {
             quadratic: ocp.terminal.p,
             linear: ocp.terminal.linear_x,
@@ -329,7 +350,7 @@ pub fn cost<
 }
 
 /// The price of the soft bounds that `value` exceeds.
-fn price<T: Scalar, const K: usize>(
+pub(crate) fn price<T: Scalar, const K: usize>(
     soft: &Softness<T, K>,
     value: &SVector<T, K>,
     bounds: &Bounds<T, K>,

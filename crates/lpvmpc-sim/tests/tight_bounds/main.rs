@@ -161,6 +161,7 @@ fn controller(x: [f64; 3], u: f64, terminal: TerminalIngredient<f64, NX>) -> Loo
             lower: -u,
             upper: u,
         },
+        soft_x: [None; 4],
         scheduling: Scheduling::Predicted,
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),

@@ -50,6 +50,7 @@ pub fn settings(
             lower: Vector1::new(-FORCE),
             upper: Vector1::new(FORCE),
         },
+        soft_x: [None; 4],
         scheduling,
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),

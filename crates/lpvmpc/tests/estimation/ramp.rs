@@ -61,6 +61,7 @@ fn rate_and_input_stay_within_bounds() {
             lower: Vector1::new(-rate_limit),
             upper: Vector1::new(rate_limit),
         },
+        soft_x: [None; 3],
         scheduling: Scheduling::Predicted,
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),

@@ -244,6 +244,7 @@ fn single(settings: &ControllerSettings<f64, 4, 1, 2>) -> ControllerSettings<f32
             lower: settings.u.lower.cast(),
             upper: settings.u.upper.cast(),
         },
+        soft_x: [None; 4],
         scheduling: Scheduling::Predicted,
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),

@@ -1,0 +1,511 @@
+//! A sample as a descent: each quadratic program is an improvement or is not taken.
+//!
+//! A plan is a policy (inputs, states, gains) that is rolled out on the nonlinear model, so that it
+//! stays together on an unstable plant. Its merit is the cost J of that rollout, the exact penalty
+//! of the state bounds included. A quadratic program along the plan proposes another one, and the
+//! plan is moved towards it as far as the merit falls: a line search (Nocedal and Wright, Numerical
+//! Optimization, ch. 18), with programs whose soft bounds have the very price of the merit
+//! (Fletcher, Practical Methods of Optimization, ch. 14.3). Where steps have to be short, the next
+//! programs are damped: what they change of the inputs costs extra, as in the method of Levenberg
+//! and Marquardt.
+//!
+//! Two linear models take turns. The embedding's matrices are good for long steps, far from where
+//! the plan has to go; but what repeats itself under them is not the optimum. The Jacobian's are
+//! exact to first order: what repeats itself under them is a stationary point of the nonlinear
+//! problem.
+
+use crate::controller::{Controller, Reference, Workspace};
+use crate::model::{LpvModel, Scalar};
+use crate::ocp::Ocp;
+use crate::plan::{Merit, Prices, Trial};
+use crate::policy::input_at;
+use crate::riccati::{CostToGo, StageFactor};
+use crate::settings::TerminalIngredient;
+use crate::solution::Status;
+use crate::solver::{SolverSettings, WarmStart};
+use nalgebra::{SMatrix, SVector, convert};
+
+/// Where the matrices of a program come from.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Along {
+    /// The embedding, at the scheduling along the plan.
+    Scheduling,
+    /// The derivatives of the rollout.
+    Jacobian,
+}
+
+/// What came of a program.
+enum Outcome<T> {
+    /// It has no answer.
+    Unsolved(Status<T>),
+    /// It expects to save next to nothing.
+    NothingToGain,
+    /// It expects to save something, but no step towards its answer lowers the merit.
+    NoStep,
+    /// The plan was moved.
+    Moved {
+        /// Part of the way to the program's answer.
+        step: T,
+        /// Part of the merit that it saves.
+        gain: T,
+    },
+}
+
+/// Parts of the way to a program's answer that are tried.
+const STEPS: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
+/// Part of the expected gain that a step has to bring (Armijo's condition).
+const SUFFICIENT: f64 = 1e-4;
+/// Damping is raised after shorter steps than this.
+const SHORT_STEP: f64 = 0.5;
+/// Damping goes up and down by this factor; the least is the largest entry of R.
+const DAMPING_FACTOR: f64 = 10.0;
+/// Parts of the way to the set point to which the regulator is sent where there is no plan.
+const PARTS: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.01, 0.0];
+/// A plan that costs so many times the last one is no longer the only candidate.
+const JUMP: f64 = 2.0;
+
+impl<P, T, const NX: usize, const NU: usize, const NS: usize, const N: usize, const M: usize>
+    Controller<P, T, NX, NU, NS, N, M>
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS>,
+{
+    /// The plan from `x`, as the controller's solution.
+    #[inline(never)]
+    pub(crate) fn descend(
+        &mut self,
+        x: &SVector<T, NX>,
+        reference: &Reference<T, NX, N>,
+        tolerance: T,
+        workspace: &mut Workspace<T, NX, NU, N, M>,
+    ) {
+        self.problems = 0;
+        self.track(reference, &mut workspace.ocp);
+        let mut along = if self.initialised {
+            Along::Jacobian
+        } else {
+            Along::Scheduling
+        };
+        if !self.first_plan(x, reference, workspace) {
+            return self.give_up();
+        }
+        let mut prices = Prices::none();
+        let mut status = Status::NoImprovement;
+        // Neither model has shown yet that it brings nothing.
+        let mut failed = false;
+        while self.problems < self.settings.iterations.most() {
+            self.linearize_plan(x, along, &mut workspace.ocp);
+            self.solve_program(workspace);
+            let outcome = self.improve(x, reference, tolerance, &mut prices, workspace);
+            let damped = self.policy.damping > T::zero();
+            self.adapt_damping(&outcome);
+            match outcome {
+                Outcome::NothingToGain if along == Along::Jacobian => {
+                    // A damped program expects little, whatever there is to gain.
+                    if !damped {
+                        status = Status::Converged;
+                        break;
+                    }
+                }
+                Outcome::Moved { step, gain } => {
+                    failed = false;
+                    status = Status::Improved;
+                    let settled = step == T::one() && gain <= tolerance;
+                    if settled && along == Along::Jacobian && !damped {
+                        status = Status::Converged;
+                        break;
+                    }
+                    if settled {
+                        along = Along::Jacobian;
+                    } else if step < convert(SHORT_STEP) || gain <= tolerance {
+                        along = along.other();
+                    }
+                }
+                Outcome::NothingToGain | Outcome::NoStep | Outcome::Unsolved(_) => {
+                    if let (Outcome::Unsolved(reason), Status::NoImprovement) = (outcome, status) {
+                        status = reason;
+                    }
+                    if failed {
+                        break;
+                    }
+                    failed = true;
+                    along = along.other();
+                }
+            }
+        }
+        self.publish(status);
+    }
+
+    /// The rest of the last plan from `x`; where there is none, or it has become dear, the best of
+    /// the regulator's own closed loops if that is cheaper. `false` if nothing is finite.
+    fn first_plan(
+        &mut self,
+        x: &SVector<T, NX>,
+        reference: &Reference<T, NX, N>,
+        workspace: &mut Workspace<T, NX, NU, N, M>,
+    ) -> bool {
+        let last = self.policy.cost;
+        let merit = self.merit(reference, Prices::none());
+        let mut best = None;
+        if self.initialised {
+            self.shift(reference);
+            best = self.roll_out_plan(x, &merit, &mut workspace.trial, |i, x| {
+                let policy = &self.policy;
+                let planned = (&self.rollout[i], &policy.u[i]);
+                input_at(x, planned, &policy.gain[i], &self.settings.u)
+            });
+            self.take_if_some(best, &workspace.trial);
+        }
+        if best.is_none_or(|cost| cost > last * convert(JUMP)) {
+            best = self.regulate(x, reference, best, workspace);
+        }
+        best.is_some()
+    }
+
+    /// The regulator's closed loops towards the set point and towards points on the way to it. The
+    /// plan becomes the cheapest of them, if it is cheaper than `best`; returns what it costs then.
+    #[inline(never)]
+    fn regulate(
+        &mut self,
+        x: &SVector<T, NX>,
+        reference: &Reference<T, NX, N>,
+        mut best: Option<T>,
+        workspace: &mut Workspace<T, NX, NU, N, M>,
+    ) -> Option<T> {
+        let (gain, indifferent) = self.regulator(&reference.terminal, &mut workspace.ocp);
+        let away = (x - reference.terminal).component_mul(&indifferent);
+        let merit = self.merit(reference, Prices::none());
+        let rest = SVector::zeros();
+        for part in PARTS {
+            let aim = reference.terminal + away * (T::one() - convert::<f64, T>(part));
+            let cost = self.roll_out_plan(x, &merit, &mut workspace.trial, |_, x| {
+                input_at(x, (&aim, &rest), &gain, &self.settings.u)
+            });
+            if let Some(found) = cost
+                && best.is_none_or(|best| found < best)
+            {
+                best = cost;
+                self.take_if_some(cost, &workspace.trial);
+                self.policy.gain = [gain; N];
+                self.policy.damping = T::zero();
+            }
+            if away.amax() == T::zero() {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The gain of the regulator at `x_ref` (u = K (x - x_ref)), the limit of the Riccati
+    /// recursion; and 1 for each state whose value is all the same to the plant (the position, as a
+    /// rule), 0 for the others. `ocp` lends a stage.
+    fn regulator(
+        &self,
+        x_ref: &SVector<T, NX>,
+        ocp: &mut Ocp<T, NX, NU, N>,
+    ) -> (SMatrix<T, NU, NX>, SVector<T, NX>) {
+        const MOST_STAGES: usize = 100;
+        let settings = &self.settings;
+        let mut factor = StageFactor::zeros();
+        let Some(stage) = ocp.stages.first_mut() else {
+            return (factor.gain, SVector::zeros());
+        };
+        let rest = SVector::zeros();
+        (stage.a, stage.b) = settings
+            .predictor
+            .linearize(&self.model, x_ref, &rest, settings.t_s);
+        stage.c = SVector::zeros();
+        stage.r = settings.weights.r;
+        let indifferent = SVector::from_fn(|j, _| {
+            let unit = SVector::<T, NX>::from_fn(|i, _| one_if(i == j));
+            one_if(stage.a.column(j) == unit)
+        });
+        let mut cost_to_go = CostToGo {
+            quadratic: match settings.terminal {
+                TerminalIngredient::Cost(p) => p,
+                TerminalIngredient::Equality => settings.weights.q,
+            },
+            linear: SVector::zeros(),
+        };
+        for _ in 0..MOST_STAGES {
+            let before = factor.gain;
+            let eliminated = factor.eliminate(stage, &mut cost_to_go);
+            let change = (factor.gain - before).amax();
+            if eliminated.is_err() || !(change > factor.gain.amax() * convert(1e-3)) {
+                break;
+            }
+        }
+        (factor.gain, indifferent)
+    }
+
+    /// The plan one sample on; its last stage is the regulator's.
+    pub(crate) fn shift(&mut self, reference: &Reference<T, NX, N>) {
+        let end = self.settings.horizon - 1;
+        let policy = &mut self.policy;
+        policy.u[..=end].rotate_left(1);
+        policy.gain[..end].rotate_left(usize::from(end > 0));
+        policy.u[end] = input_at(
+            &self.rollout[end],
+            (&reference.terminal, &SVector::zeros()),
+            &policy.gain[end],
+            &self.settings.u,
+        );
+    }
+
+    /// The matrices of the program along the plan from `x`. Their affine terms make the linear model
+    /// exact on the plan itself.
+    #[inline(never)]
+    fn linearize_plan(&self, x: &SVector<T, NX>, along: Along, ocp: &mut Ocp<T, NX, NU, N>) {
+        let settings = &self.settings;
+        ocp.horizon = settings.horizon;
+        ocp.x0 = *x;
+        let states = core::iter::once(x).chain(&self.rollout);
+        let samples = states.zip(&self.policy.u).zip(&self.rollout);
+        for (stage, ((x, u), next)) in ocp.stages.iter_mut().zip(samples).take(settings.horizon) {
+            let predictor = settings.predictor;
+            (stage.a, stage.b) = match along {
+                Along::Scheduling => predictor.linearize(&self.model, x, u, settings.t_s),
+                Along::Jacobian => predictor
+                    .rk4()
+                    .differentiate(&self.model, x, u, settings.t_s),
+            };
+            stage.c = next - stage.a * x - stage.b * u;
+            stage.r = settings.weights.r + SMatrix::identity() * self.policy.damping;
+            stage.linear_u = -*u * self.policy.damping;
+        }
+    }
+
+    fn solve_program(&mut self, workspace: &mut Workspace<T, NX, NU, N, M>) {
+        let warm_start = match self.problems {
+            0 => self.settings.solver.warm_start,
+            _ => WarmStart::Same,
+        };
+        let settings = SolverSettings {
+            warm_start,
+            ..self.settings.solver
+        };
+        workspace
+            .solver
+            .solve(&workspace.ocp, &settings, &mut self.solution);
+        self.problems += 1;
+        self.take_gains(workspace);
+    }
+
+    /// The plan is followed with the gains of the last program.
+    pub(crate) fn take_gains(&mut self, workspace: &Workspace<T, NX, NU, N, M>) {
+        if self.solution.status.is_solved() {
+            let factors = workspace.solver.factors();
+            for (gain, factor) in self.policy.gain.iter_mut().zip(factors) {
+                *gain = factor.gain;
+            }
+        }
+    }
+
+    /// Moves the plan towards the answer of the last program, if that lowers its merit.
+    fn improve(
+        &mut self,
+        x: &SVector<T, NX>,
+        reference: &Reference<T, NX, N>,
+        tolerance: T,
+        prices: &mut Prices<T, NX>,
+        workspace: &mut Workspace<T, NX, NU, N, M>,
+    ) -> Outcome<T> {
+        let answer = &self.solution;
+        if !answer.status.is_solved() {
+            return Outcome::Unsolved(answer.status);
+        }
+        prices.raise(&answer.active);
+        let merit = self.merit(reference, *prices);
+        let before = merit.of(x, &self.policy.u, &self.rollout);
+        let expected = before - merit.of(x, &answer.u, &answer.x);
+        self.gap = self.rollout[self.settings.horizon - 1] - answer.x[self.settings.horizon - 1];
+        self.policy.cost = before;
+        // Negated, so that a NaN ends the search. What a full step leaves is of second order.
+        if !(expected > tolerance * tolerance * before) {
+            return Outcome::NothingToGain;
+        }
+        let end = self.settings.horizon - 1;
+        let taken = self.search_line(x, &merit, expected, &mut workspace.trial, |i| {
+            let x_i = i.checked_sub(1).map_or(x, |j| &self.solution.x[j]);
+            (x_i, &self.solution.u[i])
+        });
+        let Some((step, cost)) = taken else {
+            return Outcome::NoStep;
+        };
+        self.take_if_some(Some(cost), &workspace.trial);
+        self.gap = self.rollout[end] - self.solution.x[end];
+        Outcome::Moved {
+            step,
+            gain: (before - cost) / before,
+        }
+    }
+
+    /// The longest step from the plan towards `answer` (state and input of a stage) that lowers the
+    /// merit enough, and the merit of the rollout that it leaves in `trial`.
+    fn search_line<'a>(
+        &'a self,
+        x: &SVector<T, NX>,
+        merit: &Merit<'_, T, NX, NU, N>,
+        expected: T,
+        trial: &mut Trial<T, NX, NU, N>,
+        answer: impl Fn(usize) -> (&'a SVector<T, NX>, &'a SVector<T, NU>),
+    ) -> Option<(T, T)>
+    where
+        P: 'a,
+    {
+        let Self {
+            policy, rollout, ..
+        } = self;
+        for step in STEPS {
+            let step: T = convert(step);
+            let cost = self.roll_out_plan(x, merit, trial, |i, x_i| {
+                let x_plan = i.checked_sub(1).map_or(x, |j| &rollout[j]);
+                let (x_answer, u_answer) = answer(i);
+                let planned = x_plan + (x_answer - x_plan) * step;
+                let u = policy.u[i] + (u_answer - policy.u[i]) * step;
+                input_at(x_i, (&planned, &u), &policy.gain[i], &self.settings.u)
+            });
+            let sufficient = policy.cost - expected * step * convert(SUFFICIENT);
+            if let Some(cost) = cost
+                && cost < policy.cost
+                && cost <= sufficient
+            {
+                return Some((step, cost));
+            }
+        }
+        None
+    }
+
+    /// Makes up for what [`Controller::feedback`] left: the plan, one sample after `x` was measured,
+    /// is the best of what was planned before and of what the program answered. Then the program
+    /// along it is made ready. `false` if nothing is finite.
+    pub(crate) fn prepare_descent(
+        &mut self,
+        answered: Option<SVector<T, NX>>,
+        reference: &Reference<T, NX, N>,
+        workspace: &mut Workspace<T, NX, NU, N, M>,
+    ) -> bool {
+        self.track(reference, &mut workspace.ocp);
+        let settings = &self.settings;
+        let end = settings.horizon - 1;
+        let rk4 = settings.predictor.rk4();
+        // Where the plant will be, as far as the model knows.
+        let x = match answered {
+            Some(x) => rk4.advance(&self.model, &x, &self.solution.u[0], settings.t_s),
+            None => self.rollout[0],
+        };
+        if !self.first_plan(&x, reference, workspace) {
+            return false;
+        }
+        if answered.is_some() && self.solution.status.is_solved() {
+            let mut prices = Prices::none();
+            prices.raise(&self.solution.active);
+            let merit = self.merit(reference, prices);
+            self.policy.cost = merit.of(&x, &self.policy.u, &self.rollout);
+            let trial = &mut workspace.trial;
+            let taken = self.search_line(&x, &merit, T::zero(), trial, |i| {
+                let u = if i < end {
+                    &self.solution.u[i + 1]
+                } else {
+                    &self.policy.u[i]
+                };
+                (&self.solution.x[i], u)
+            });
+            self.take_if_some(taken.map(|(_, cost)| cost), &workspace.trial);
+            self.adapt_damping(&match taken {
+                Some((step, _)) => Outcome::Moved {
+                    step,
+                    gain: T::zero(),
+                },
+                None => Outcome::NothingToGain,
+            });
+        }
+        self.linearize_plan(&x, Along::Jacobian, &mut workspace.ocp);
+        true
+    }
+
+    /// Long steps need no damping, short ones more.
+    fn adapt_damping(&mut self, outcome: &Outcome<T>) {
+        let least = self.settings.weights.r.amax();
+        let factor: T = convert(DAMPING_FACTOR);
+        let damping = &mut self.policy.damping;
+        *damping = match outcome {
+            Outcome::NothingToGain => T::zero(),
+            Outcome::Moved { step, .. } if *step == T::one() => *damping / factor,
+            Outcome::Moved { step, .. } if *step >= convert(SHORT_STEP) => *damping,
+            _ => (*damping * factor).max(least),
+        };
+        if *damping < least {
+            *damping = T::zero();
+        }
+    }
+
+    fn merit<'a>(
+        &self,
+        reference: &'a Reference<T, NX, N>,
+        prices: Prices<T, NX>,
+    ) -> Merit<'a, T, NX, NU, N> {
+        Merit::new(&self.settings, reference, prices)
+    }
+
+    /// Rolls the nonlinear model out from `x` into `trial`, with the inputs that `input` gives for a
+    /// stage and its state. Returns the merit; `None` if it is not finite.
+    #[inline(always)]
+    fn roll_out_plan(
+        &self,
+        x: &SVector<T, NX>,
+        merit: &Merit<'_, T, NX, NU, N>,
+        trial: &mut Trial<T, NX, NU, N>,
+        input: impl Fn(usize, &SVector<T, NX>) -> SVector<T, NU>,
+    ) -> Option<T> {
+        let rk4 = self.settings.predictor.rk4();
+        let mut state = *x;
+        let mut total = T::zero();
+        let places = trial.u.iter_mut().zip(&mut trial.x);
+        for (i, (u, next)) in places.enumerate().take(self.settings.horizon) {
+            *u = input(i, &state);
+            total += merit.stage(i, &state, u);
+            state = rk4.advance(&self.model, &state, u, self.settings.t_s);
+            *next = state;
+        }
+        total += merit.end(&state);
+        total.is_finite().then_some(total)
+    }
+
+    /// The trial becomes the plan, if it has a cost.
+    fn take_if_some(&mut self, cost: Option<T>, trial: &Trial<T, NX, NU, N>) {
+        if let Some(cost) = cost {
+            self.policy.u = trial.u;
+            self.rollout = trial.x;
+            self.policy.cost = cost;
+            self.initialised = true;
+        }
+    }
+
+    /// The plan becomes the answer.
+    fn publish(&mut self, status: Status<T>) {
+        self.solution.u = self.policy.u;
+        self.solution.x = self.rollout;
+        self.solution.status = status;
+    }
+
+    /// The state is not finite, or nothing that follows from it is.
+    fn give_up(&mut self) {
+        self.reset();
+        self.solution.u = [self.settings.u.project(&SVector::zeros()); N];
+        self.solution.status = Status::NotFinite;
+    }
+}
+
+impl Along {
+    fn other(self) -> Self {
+        match self {
+            Self::Scheduling => Self::Jacobian,
+            Self::Jacobian => Self::Scheduling,
+        }
+    }
+}
+
+fn one_if<T: Scalar>(condition: bool) -> T {
+    if condition { T::one() } else { T::zero() }
+}

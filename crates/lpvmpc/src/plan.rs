@@ -1,0 +1,176 @@
+//! Plans as policies, their rollouts on the nonlinear model, and what a rollout costs.
+
+use crate::controller::Reference;
+use crate::kernel::product;
+use crate::model::Scalar;
+use crate::ocp::{Bounds, Softness};
+use crate::settings::{ControllerSettings, TerminalIngredient, Weights};
+use crate::solution::{ActiveSet, Quantity, Side};
+use crate::solver::price;
+use nalgebra::{SMatrix, SVector, convert};
+
+/// How a plan is followed: stage i has the input u_i + K_i (x - x_i). The states x_i are the
+/// controller's rollout.
+#[derive(Clone, Debug)]
+pub(crate) struct Policy<T, const NX: usize, const NU: usize, const N: usize> {
+    /// u_0 to u_{N-1}.
+    pub u: [SVector<T, NU>; N],
+    /// K_0 to K_{N-1}.
+    pub gain: [SMatrix<T, NU, NX>; N],
+    /// The merit of the plan.
+    pub cost: T,
+    /// Extra cost of (u - u_i)^2 in the next program along the plan.
+    pub damping: T,
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Policy<T, NX, NU, N> {
+    pub fn new() -> Self {
+        Self {
+            u: [SVector::zeros(); N],
+            gain: [SMatrix::zeros(); N],
+            cost: T::zero(),
+            damping: T::zero(),
+        }
+    }
+}
+
+/// A rollout that may become the plan: inputs, and the states x_1 to x_N that follow.
+#[derive(Clone, Debug)]
+pub(crate) struct Trial<T, const NX: usize, const NU: usize, const N: usize> {
+    pub u: [SVector<T, NU>; N],
+    pub x: [SVector<T, NX>; N],
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Trial<T, NX, NU, N> {
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self {
+            u: [SVector::zeros(); N],
+            x: [SVector::zeros(); N],
+        }
+    }
+}
+
+/// Prices per unit of what must not be: an exact penalty has them above the multipliers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Prices<T, const NX: usize> {
+    /// Of exceeding a hard state bound.
+    pub bounds: SVector<T, NX>,
+    /// Of missing the terminal equality.
+    pub end: SVector<T, NX>,
+}
+
+impl<T: Scalar, const NX: usize> Prices<T, NX> {
+    pub fn none() -> Self {
+        Self {
+            bounds: SVector::zeros(),
+            end: SVector::zeros(),
+        }
+    }
+
+    /// Raises them above the multipliers of a program, whose cost is half of J.
+    pub fn raise<const M: usize>(&mut self, active: &ActiveSet<T, M>) {
+        const FACTOR: f64 = 4.0;
+        for row in active.iter() {
+            let Quantity::State(j) = row.bound.quantity else {
+                continue;
+            };
+            let prices = match row.bound.side {
+                Side::Equality => &mut self.end,
+                Side::Lower | Side::Upper => &mut self.bounds,
+            };
+            prices[j] = prices[j].max(row.multiplier.abs() * convert(FACTOR));
+        }
+    }
+}
+
+/// The merit of a trajectory: the cost J, with an exact penalty for what must not be.
+pub(crate) struct Merit<'a, T, const NX: usize, const NU: usize, const N: usize> {
+    weights: Weights<T, NX, NU>,
+    terminal: TerminalIngredient<T, NX>,
+    bounds: Bounds<T, NX>,
+    soft: Softness<T, NX>,
+    horizon: usize,
+    reference: &'a Reference<T, NX, N>,
+    prices: Prices<T, NX>,
+}
+
+impl<'a, T: Scalar, const NX: usize, const NU: usize, const N: usize> Merit<'a, T, NX, NU, N> {
+    pub fn new<const NS: usize>(
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        reference: &'a Reference<T, NX, N>,
+        prices: Prices<T, NX>,
+    ) -> Self {
+        Self {
+            weights: settings.weights,
+            terminal: settings.terminal,
+            bounds: settings.x,
+            soft: settings.soft_x,
+            horizon: settings.horizon,
+            reference,
+            prices,
+        }
+    }
+
+    /// Of the input `u` at the state `x` at stage `i`. The state at stage 0 is given: its bounds
+    /// count nothing.
+    #[inline(always)]
+    pub fn stage(&self, i: usize, x: &SVector<T, NX>, u: &SVector<T, NU>) -> T {
+        let reference = self.reference;
+        let error = x - reference.stages.get(i).unwrap_or(&reference.terminal);
+        let cost = squared(&self.weights.q, &error) + squared(&self.weights.r, u);
+        if i > 0 { cost + self.excess(x) } else { cost }
+    }
+
+    /// Of the state `x` at the end of the horizon.
+    #[inline(always)]
+    pub fn end(&self, x: &SVector<T, NX>) -> T {
+        let error = x - self.reference.terminal;
+        let cost = match &self.terminal {
+            TerminalIngredient::Cost(p) => squared(p, &error),
+            TerminalIngredient::Equality => error.abs().dot(&self.prices.end),
+        };
+        cost + self.excess(x)
+    }
+
+    /// Of the inputs `u` and the states `x`_1 to `x`_N that follow `x0`.
+    pub fn of(&self, x0: &SVector<T, NX>, u: &[SVector<T, NU>; N], x: &[SVector<T, NX>; N]) -> T {
+        let mut before = x0;
+        let mut total = T::zero();
+        for (i, (u, next)) in u.iter().zip(x).enumerate().take(self.horizon) {
+            total += self.stage(i, before, u);
+            before = next;
+        }
+        total + self.end(before)
+    }
+
+    /// The price of the state bounds that `x` exceeds.
+    #[inline(always)]
+    fn excess(&self, x: &SVector<T, NX>) -> T {
+        if self.bounds.hold_at(x) {
+            T::zero()
+        } else {
+            self.price_of_excess(x)
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn price_of_excess(&self, x: &SVector<T, NX>) -> T {
+        let Bounds { lower, upper } = &self.bounds;
+        let mut total = price(&self.soft, x, &self.bounds);
+        for (j, soft) in self.soft.iter().enumerate() {
+            if soft.is_none() {
+                let excess = (lower[j] - x[j]).max(x[j] - upper[j]).max(T::zero());
+                total += self.prices.bounds[j] * excess;
+            }
+        }
+        total
+    }
+}
+
+/// v'Wv
+#[inline(always)]
+fn squared<T: Scalar, const K: usize>(weight: &SMatrix<T, K, K>, v: &SVector<T, K>) -> T {
+    product(weight, v).dot(v)
+}
