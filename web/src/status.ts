@@ -5,6 +5,8 @@ import { ROW } from "./protocol";
 
 /** Steps over which the time is taken. */
 const STEPS = 400;
+/** What a controller says of a plan that needs no attention; nothing before the first. */
+const GOOD = new Set(["", "solved", "converged", "improved", "no improvement found"]);
 
 export function median(values: number[]): number {
   if (values.length === 0) return NaN;
@@ -60,7 +62,7 @@ export class StatusList {
       words.textContent = (history.status || "ready") + activeBounds(history);
       const step = medianStep(history);
       time.textContent = Number.isFinite(step) ? `${step.toFixed(1)} \u00b5s per step (median)` : "";
-      line.classList.toggle("bad", history.status !== "" && history.status !== "solved");
+      line.classList.toggle("bad", !GOOD.has(history.status));
     }
   }
 

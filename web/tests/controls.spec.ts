@@ -19,7 +19,7 @@ const NUMBERS: [section: string, label: string, typed: string, key: string, valu
   ["World", "l factor", "0.98", "centre_of_mass_factor", 0.98],
   ["World", "Torque limit", "2", "limit_nm", 2],
   ["On a real robot", "Known delay", "15", "delay_s", 0.015],
-  ["Controller", "QPs", "2", "fixed", 2],
+  ["Controller", "QPs", "2", "most", 2],
   ["World", "Seed", "7", "seed", 7],
 ];
 

@@ -7,7 +7,7 @@ test("the page loads without an error and only from its own host", async ({ page
   const problems = await open(page);
   await page.locator("#play").click();
   await until(page, 1);
-  await expect(page.locator("#status")).toContainText("solved");
+  await expect(page.locator("#status")).toContainText("converged");
   expect(problems).toEqual([]);
 });
 

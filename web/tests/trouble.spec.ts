@@ -67,11 +67,11 @@ test("an emptied field that needs a number is refused, and shows what holds", as
 test("programs per sample go in and out of the set-up", async ({ page }) => {
   await openFlat(page);
   await fill(page, "QPs", "3");
-  expect(await saved(page, "Save TOML")).toContain("fixed = 3");
+  expect(await saved(page, "Save TOML")).toContain("most = 3");
   await fill(page, "QPs", "");
   expect(await saved(page, "Save TOML")).not.toContain("iterations");
   await fill(page, "QPs", "1000000");
-  await expect(page.locator("#message")).toContainText("controller.iterations.fixed = 1000000: at most 1000");
+  await expect(page.locator("#message")).toContainText("controller.iterations.descent.most = 1000000: at most 1000");
   await fill(page, "Sub-steps", "1000000000");
   await expect(page.locator("#message")).toContainText("substeps = 1000000000: at most 1000");
   await expect(page.locator("#message")).not.toBeHidden();

@@ -3,7 +3,7 @@
 use crate::commands::{
     bench::BenchArguments, campaign::CampaignArguments, certify::CertifyArguments,
     completions::CompletionsArguments, excite::ExciteArguments, identify::IdentifyArguments,
-    linearize::LinearizeArguments, lqr::LqrArguments, refine::RefineArguments,
+    linearize::LinearizeArguments, lqr::LqrArguments, optimality::OptimalityArguments, refine::RefineArguments,
     rehearse::RehearseArguments, reproduce::ReproduceArguments, scenario::ScenarioArguments,
     simulate::SimulateArguments, verify::VerifyArguments, view::ViewArguments,
 };
@@ -61,6 +61,8 @@ pub enum Command {
     View(ViewArguments),
     /// Run many closed loops and count what is guaranteed, and where that ends
     Campaign(CampaignArguments),
+    /// Compare closed-loop costs with those of nonlinear MPC, converged by IPOPT
+    Optimality(OptimalityArguments),
     /// Print the completions for a shell
     Completions(CompletionsArguments),
 }

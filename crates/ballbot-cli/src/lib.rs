@@ -16,6 +16,7 @@ pub mod identification;
 pub mod input;
 pub mod json;
 pub mod linear_model;
+pub mod optimality;
 pub mod output;
 pub mod pictures;
 pub mod progress;
@@ -49,6 +50,7 @@ pub fn run(arguments: Arguments) -> Result<String, CommandError> {
         Command::Verify(arguments) => commands::verify::run(&arguments),
         Command::View(arguments) => commands::view::run(&arguments),
         Command::Campaign(arguments) => commands::campaign::run(&arguments),
+        Command::Optimality(arguments) => commands::optimality::run(&arguments),
         Command::Completions(arguments) => commands::completions::run(&arguments),
     }
 }

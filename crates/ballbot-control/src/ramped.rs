@@ -28,7 +28,7 @@ pub fn ramped_feedback(
     period: f64,
 ) -> Result<Box<dyn SharingPlane>, RegulatorError> {
     let planner: Result<_, RegulatorError> =
-        sized!(settings.horizon, 2 per sample, ramped(ballbot, settings));
+        sized!(settings.horizon, 3 per sample, ramped(ballbot, settings));
     with_planner(planner?, ballbot, torque, feedback, period)
 }
 

@@ -19,9 +19,10 @@ pub const LONGEST_HORIZON: usize = 200;
 /// Stages of the largest quadratic program: that of a guarded controller has two more than samples.
 pub(crate) const STAGES: usize = LONGEST_HORIZON + 2;
 
-/// Rows that the largest quadratic program may have active: a bound of the torque and, where its
-/// rate is the input, one of the rate per sample, and up to 4 rows of a terminal equality.
-pub(crate) const ROWS: usize = 2 * LONGEST_HORIZON + 4;
+/// Rows that the largest quadratic program may have active: a bound of the torque, one of its rate
+/// where that is the input, and a soft bound of the state that is exceeded per sample, and up to 4
+/// rows of a terminal equality.
+pub(crate) const ROWS: usize = 3 * LONGEST_HORIZON + 4;
 
 /// A regulator refuses its settings.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -79,7 +80,7 @@ pub fn state_feedback(
     ballbot: &Ballbot<f64>,
     settings: &ControllerSettings<f64, 4, 1, 3>,
 ) -> Result<Box<dyn Regulator<4, 1, 4>>, ControllerError> {
-    sized!(settings.horizon, 1 per sample, state_feedback_sized(ballbot, settings))
+    sized!(settings.horizon, 2 per sample, state_feedback_sized(ballbot, settings))
 }
 
 /// The controller with what stands around it; `period` is that of the sensors, s.
@@ -93,7 +94,7 @@ pub fn output_feedback(
     feedback: &Feedback,
     period: f64,
 ) -> Result<Box<dyn SharingPlane>, RegulatorError> {
-    let planner = sized!(settings.horizon, 1 per sample, held(ballbot, settings))?;
+    let planner = sized!(settings.horizon, 2 per sample, held(ballbot, settings))?;
     with_planner(planner, ballbot, &settings.u, feedback, period)
 }
 

@@ -170,13 +170,7 @@ impl ControllerTable {
                 let iterations = Iterations::UntilConverged { tolerance, most };
                 (iterations, "until_converged.most", most)
             }
-            IterationsTable::Descent { .. } if linear => {
-                return Err(ScenarioError::value(
-                    "controller.iterations",
-                    "descent",
-                    "with model = \"linear\" all programs of a sample are the same; take fixed = 1",
-                ));
-            }
+            IterationsTable::Descent { .. } if linear => return Ok(Iterations::Fixed(1)),
             IterationsTable::Descent { tolerance, most } => {
                 let iterations = Iterations::Descent { tolerance, most };
                 (iterations, "descent.most", most)

@@ -159,7 +159,8 @@ pub enum IterationsTable {
         /// At most so many.
         most: usize,
     },
-    /// Each one an improvement: a descent on the cost of the nonlinear rollout.
+    /// Each one an improvement: a descent on the cost of the nonlinear rollout. With the linear
+    /// model, whose programs are all the same, it is one program.
     Descent {
         /// No more programs once one is expected to save less than this part of the cost.
         #[serde(default = "descent_tolerance")]

@@ -23,18 +23,24 @@ export function controllerFields(form: Form): HTMLElement[] {
   ];
 }
 
-/** Quadratic programs per sample; a file may ask for convergence, which this field shows as empty. */
+/** Quadratic programs per sample: at most so many where each is an improvement, exactly so many with the paper's predictor. */
 function programs(form: Form): HTMLElement {
+  let frozen = false;
   const field = numberField(
     {
       label: "QPs",
-      title: "Quadratic programs per sample, each along the rollout of the one before; empty: one, or as in the file",
+      title:
+        "Quadratic programs per sample. Each one improves the plan or is not taken, and the search ends when little is left to gain: then this is the most. With the paper's predictor and with a certified set it is their number. Empty: as usual, or as in the file",
       step: 1,
       cleared: () => form.change("controller.iterations", undefined),
     },
-    (fixed) => form.change("controller.iterations", { fixed }),
+    (count) => form.change("controller.iterations", frozen ? { fixed: count } : { descent: { most: count } }),
   );
-  form.watch(({ controller }) => field.set((controller["iterations"] as { fixed?: number } | undefined)?.fixed ?? NaN));
+  form.watch(({ controller }) => {
+    frozen = kindOf(controller["predictor"]) === "rk4" || kindOf(controller.terminal) === "certified";
+    const { fixed, descent } = (controller["iterations"] ?? {}) as { fixed?: number; descent?: { most?: number } };
+    field.set(fixed ?? descent?.most ?? NaN);
+  });
   return field.element;
 }
 

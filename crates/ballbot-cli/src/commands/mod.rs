@@ -9,6 +9,7 @@ pub mod identify;
 pub mod linearize;
 pub mod lqr;
 pub mod model;
+pub mod optimality;
 pub mod refine;
 pub mod rehearse;
 pub mod reproduce;

@@ -58,6 +58,41 @@ fn products_with_the_matrices_leave_out_nothing() {
     }
 }
 
+/// Against central differences of the equations of motion, whose error is 1e-9 here.
+fn assert_differentiates<const NX: usize>(model: &impl LpvModel<f64, NX, 1, 3>, rng: &mut Rng) {
+    let x = SVector::<f64, NX>::from_fn(|_, _| 2.0 * rng.f64() - 1.0);
+    let u = Vector1::new(2.0 * rng.f64() - 1.0);
+    let step = 1e-5;
+    let (a, b) = model.jacobian(&x, &u);
+    let slope = |dx: SVector<f64, NX>, du: Vector1<f64>| {
+        (model.derivative(&(x + dx), &(u + du)) - model.derivative(&(x - dx), &(u - du)))
+            / (2.0 * step)
+    };
+    let close = |found: &SVector<f64, NX>, expected: &SVector<f64, NX>| {
+        let error = (found - expected).amax();
+        assert!(error <= 1e-5 * (1.0 + expected.amax()), "{found}, not {expected}");
+    };
+    for j in 0..NX {
+        let column = slope(SVector::ith(j, step), Vector1::zeros());
+        close(&a.column(j).into_owned(), &column);
+    }
+    close(&b, &slope(SVector::zeros(), Vector1::new(step)));
+}
+
+#[test]
+fn the_jacobian_is_that_of_the_equations_of_motion() {
+    let mut rng = Rng::with_seed(6);
+    for k in 0..300 {
+        let mut robot = robots::rigid(&mut rng);
+        if k % 2 == 0 {
+            (robot.drive.viscous, robot.drive.coulomb) = (rng.f64(), 0.01 * rng.f64());
+        }
+        assert_differentiates(&robot, &mut rng);
+        assert_differentiates::<5>(&RampedInput::<_, 4>(robot), &mut rng);
+    }
+    assert_differentiates(&Ballbot::paper(), &mut rng);
+}
+
 #[test]
 fn the_embedding_is_exact_at_the_smallest_tilts() {
     // sin(theta)/theta where theta is zero of either sign, denormal, or so small that its sine

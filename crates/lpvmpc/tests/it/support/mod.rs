@@ -39,7 +39,7 @@ pub fn solve<const NX: usize, const NU: usize, const N: usize, const M: usize, c
 /// The kind of a status, without its details.
 pub fn kind<T>(status: &Status<T>) -> &'static str {
     match status {
-        Status::Solved => "solved",
+        Status::Solved | Status::Converged | Status::Improved | Status::NoImprovement => "solved",
         Status::Infeasible(_) => "infeasible",
         Status::ChangeCap => "change cap",
         Status::WorkingSetFull => "working set full",

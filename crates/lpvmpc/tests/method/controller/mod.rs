@@ -1,6 +1,7 @@
 //! The controller: Algorithm 2, its settings, and what it does when a sample goes wrong.
 
 mod algorithm;
+mod descent;
 mod failures;
 mod run_time_bounds;
 mod settings;

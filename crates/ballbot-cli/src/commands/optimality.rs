@@ -1,0 +1,216 @@
+//! `ballbot optimality`.
+
+use super::CommandError;
+use crate::commands::simulate::PNG_SCALE;
+use crate::json;
+use crate::optimality::{
+    Case, CostOverDistance, Outcome, cost_over_distance, distances, guaranteed_cost, long_horizon,
+    quantile, random_starts, run_all,
+};
+use crate::output;
+use crate::table::Table;
+use clap::Args;
+use rayon::prelude::*;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Arguments of `ballbot optimality`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  ballbot optimality                 every case
+  ballbot optimality --programs 4    with at most four quadratic programs per sample
+
+The LPV controller with its defaults, from rest and from random starts, with set points from 0.2 m to
+10 m away that are given at t = 0, horizons of 10 to 80 samples and sampling times of 10 to 50 ms. Its
+closed-loop costs are divided by those of nonlinear MPC on the same problem, which another program
+(testdata/nonlinear-mpc, IPOPT) has solved to convergence at every sample. Writes a row per case and
+figures.")]
+pub struct OptimalityArguments {
+    /// Quadratic programs per sample, at most; the default of scenarios if not given
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub programs: Option<u32>,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/optimality")]
+    pub out: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Runs the cases and writes the results.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
+    let programs = arguments.programs.map(|programs| programs as usize);
+    let sets = [
+        ("from rest", distances()?),
+        ("random starts", random_starts()?),
+    ];
+    let mut table = Table::new([
+        "cost / cost of nonlinear MPC",
+        "runs",
+        "median",
+        "95 %",
+        "99 %",
+        "worst",
+        "linear MPC, median",
+        "worst against linear",
+        "programs per sample",
+        "most",
+        "without plan",
+    ]);
+    let mut rows = CSV_HEADER.to_owned();
+    let mut documents = Vec::new();
+    let mut contents = Vec::new();
+    for (name, cases) in &sets {
+        let outcomes = run_all(cases, programs)?;
+        let summary = Summary::of(cases, &outcomes);
+        table.row(summary.cells(name));
+        documents.push(summary.document(name));
+        for (case, outcome) in cases.iter().zip(&outcomes) {
+            rows += &csv_row(name, case, outcome);
+        }
+        if *name == "from rest" {
+            contents.extend(figures(cases, &outcomes)?);
+        }
+    }
+    contents.push(("optimality.csv", rows.into_bytes()));
+    let files: Vec<_> = contents
+        .iter()
+        .map(|(name, content)| (arguments.out.join(name), content))
+        .collect();
+    let files: Vec<_> = files
+        .iter()
+        .map(|(path, content)| (path.as_path(), content.as_slice()))
+        .collect();
+    output::write_files(&files)?;
+    if arguments.json {
+        return Ok(json::text(&json!({ "sets": documents })));
+    }
+    Ok(format!("{table}written to {}\n", arguments.out.display()))
+}
+
+/// Figures of the cases from rest.
+fn figures(
+    cases: &[Case],
+    outcomes: &[Outcome],
+) -> Result<Vec<(&'static str, Vec<u8>)>, CommandError> {
+    let shown = |case: &&(&Case, &Outcome)| case.0.horizon == 20 && case.0.t_s == 0.05;
+    let pairs: Vec<_> = cases.iter().zip(outcomes).collect();
+    let shown: Vec<_> = pairs.iter().filter(shown).collect();
+    let over = |cost: fn(&Case, &Outcome) -> f64| -> Vec<f64> {
+        let ratio = |(case, outcome): &&(&Case, &Outcome)| cost(case, outcome) / case.nonlinear;
+        shown.iter().map(|pair| ratio(pair)).collect()
+    };
+    let guaranteed = shown
+        .par_iter()
+        .map(|(case, _)| Ok(guaranteed_cost(case)? / case.nonlinear))
+        .collect::<Result<Vec<_>, CommandError>>()?;
+    let costs = cost_over_distance(&CostOverDistance {
+        distance: shown.iter().map(|(case, _)| case.distance).collect(),
+        linear: over(|case, _| case.linear),
+        lpv: over(|_, outcome| outcome.cost),
+        guaranteed,
+    });
+    let mut files = vec![
+        ("cost-over-distance.svg", costs.svg()?.into_bytes()),
+        ("cost-over-distance.png", costs.png(PNG_SCALE)?),
+    ];
+    let long = pairs
+        .iter()
+        .find(|(case, _)| case.horizon == 60 && case.distance == 2.5 && case.t_s == 0.05);
+    if let Some((case, outcome)) = long {
+        let figure = long_horizon(case, outcome);
+        files.push(("long-horizon.svg", figure.svg()?.into_bytes()));
+        files.push(("long-horizon.png", figure.png(PNG_SCALE)?));
+    }
+    Ok(files)
+}
+
+/// What the runs of a set amount to.
+struct Summary {
+    /// Cost over that of nonlinear MPC, from the smallest on.
+    ratios: Vec<f64>,
+    /// The same of linear MPC.
+    linear: Vec<f64>,
+    /// Cost over that of linear MPC, from the smallest on.
+    against_linear: Vec<f64>,
+    mean_programs: f64,
+    most_programs: usize,
+    without_plan: usize,
+}
+
+impl Summary {
+    fn of(cases: &[Case], outcomes: &[Outcome]) -> Self {
+        let sorted = |mut values: Vec<f64>| {
+            values.sort_by(f64::total_cmp);
+            values
+        };
+        let pairs = || cases.iter().zip(outcomes);
+        let mean = outcomes.iter().map(|outcome| outcome.mean_programs).sum::<f64>();
+        Self {
+            ratios: sorted(pairs().map(|(case, run)| run.cost / case.nonlinear).collect()),
+            linear: sorted(cases.iter().map(|case| case.linear / case.nonlinear).collect()),
+            against_linear: sorted(pairs().map(|(case, run)| run.cost / case.linear).collect()),
+            mean_programs: mean / outcomes.len() as f64,
+            most_programs: outcomes.iter().map(|run| run.most_programs).max().unwrap_or(0),
+            without_plan: outcomes.iter().map(|run| run.without_plan).sum(),
+        }
+    }
+
+    fn cells(&self, name: &str) -> Vec<String> {
+        let ratio = |value: f64| format!("{value:.4}");
+        let at = |share| ratio(quantile(&self.ratios, share));
+        vec![
+            name.to_owned(),
+            self.ratios.len().to_string(),
+            at(0.5),
+            at(0.95),
+            at(0.99),
+            at(1.0),
+            ratio(quantile(&self.linear, 0.5)),
+            ratio(quantile(&self.against_linear, 1.0)),
+            format!("{:.2}", self.mean_programs),
+            self.most_programs.to_string(),
+            self.without_plan.to_string(),
+        ]
+    }
+
+    fn document(&self, name: &str) -> serde_json::Value {
+        let at = |share| quantile(&self.ratios, share);
+        json!({
+            "set": name,
+            "runs": self.ratios.len(),
+            "cost_over_nonlinear": { "median": at(0.5), "p95": at(0.95), "p99": at(0.99), "worst": at(1.0) },
+            "linear_over_nonlinear_median": quantile(&self.linear, 0.5),
+            "cost_over_linear_worst": quantile(&self.against_linear, 1.0),
+            "programs_per_sample_mean": self.mean_programs,
+            "programs_per_sample_most": self.most_programs,
+            "samples_without_plan": self.without_plan,
+        })
+    }
+}
+
+const CSV_HEADER: &str = "set,horizon,t_s_s,distance_m,theta0_rad,phi_dot0_rad_s,theta_dot0_rad_s,\
+                          cost,cost_nonlinear,cost_linear,programs_mean,programs_most,\
+                          without_plan,largest_excess,largest_excess_nonlinear\n";
+
+fn csv_row(set: &str, case: &Case, run: &Outcome) -> String {
+    let [_, theta, phi_dot, theta_dot] = case.start.into();
+    format!(
+        "{set},{},{},{},{theta},{phi_dot},{theta_dot},{},{},{},{:.4},{},{},{},{}\n",
+        case.horizon,
+        case.t_s,
+        case.distance,
+        run.cost,
+        case.nonlinear,
+        case.linear,
+        run.mean_programs,
+        run.most_programs,
+        run.without_plan,
+        run.excess,
+        case.nonlinear_excess,
+    )
+}

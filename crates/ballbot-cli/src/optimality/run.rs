@@ -1,0 +1,145 @@
+//! The LPV controller with its defaults in the closed loops of the cases.
+
+use super::Case;
+use crate::commands::CommandError;
+use ballbot::Ballbot;
+use ballbot_scenario::{
+    CertifiedTable, PointTable, Prepared, ReferenceTable, Scenario, ScenarioError, Surroundings,
+    TerminalTable,
+};
+use lpvmpc::{Controller, Iterations, Reference, Workspace};
+use nalgebra::Vector4;
+use rayon::prelude::*;
+use std::path::Path;
+use std::time::Duration;
+
+/// The longest horizon of the cases.
+const N: usize = 80;
+/// Torque bounds, and soft bounds that are exceeded.
+const M: usize = 2 * N + 4;
+
+/// What a closed loop amounts to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// Closed-loop cost; infinite where the robot fell.
+    pub cost: f64,
+    /// Quadratic programs per sample, mean.
+    pub mean_programs: f64,
+    /// Most of them in one sample.
+    pub most_programs: usize,
+    /// Samples without a plan.
+    pub without_plan: usize,
+    /// Largest part by which a state bound was exceeded at a sample.
+    pub excess: f64,
+    /// States at the samples.
+    pub states: Vec<Vector4<f64>>,
+    /// Torques, N m.
+    pub torques: Vec<f64>,
+}
+
+/// The scenario of a case.
+fn scenario(case: &Case) -> Result<Scenario, ScenarioError> {
+    let mut scenario = Scenario::load("single-setpoint")?;
+    scenario.controller.predictor = None;
+    scenario.controller.terminal = TerminalTable::default();
+    scenario.controller.horizon = case.horizon;
+    scenario.controller.t_s = case.t_s;
+    scenario.duration_s = case.duration;
+    let robot = scenario.prepare(Path::new("."))?.ballbot;
+    let phi_rad = robot.geometry.ball_angle(case.distance);
+    scenario.reference = ReferenceTable::SetPoints {
+        points: vec![PointTable {
+            time_s: 0.0,
+            phi_rad,
+        }],
+    };
+    Ok(scenario)
+}
+
+/// Runs all of them, with at most so many `programs` per sample if given.
+///
+/// # Errors
+/// A scenario is not valid.
+pub fn run_all(cases: &[Case], programs: Option<usize>) -> Result<Vec<Outcome>, CommandError> {
+    cases.par_iter().map(|case| run(case, programs)).collect()
+}
+
+/// Runs one.
+///
+/// # Errors
+/// The scenario is not valid.
+pub fn run(case: &Case, programs: Option<usize>) -> Result<Outcome, CommandError> {
+    let Prepared {
+        ballbot,
+        mut settings,
+        planes,
+        samples,
+        tolerances,
+        ..
+    } = scenario(case)?.prepare(Path::new("."))?;
+    if let (Iterations::Descent { most, .. }, Some(programs)) = (&mut settings.iterations, programs)
+    {
+        *most = programs;
+    }
+    let controller = Controller::<Ballbot<f64>, f64, 4, 1, 3, N, M>::new(ballbot, settings);
+    let mut controller = Box::new(controller.map_err(ScenarioError::from)?);
+    let mut workspace = Box::new(Workspace::new());
+    let goal = planes[0].state_reference(0.0);
+    let reference = Reference::constant(goal);
+    let limits = settings.x.upper;
+    let mut x = case.start;
+    let mut outcome = Outcome {
+        cost: 0.0,
+        mean_programs: 0.0,
+        most_programs: 0,
+        without_plan: 0,
+        excess: 0.0,
+        states: vec![x],
+        torques: Vec::with_capacity(samples),
+    };
+    for _ in 0..samples {
+        let plan = controller.step(&x, &reference, &mut workspace);
+        let (u, solved) = (plan.u[0], plan.status.is_solved());
+        let error = x - goal;
+        outcome.cost += (settings.weights.q * error).dot(&error);
+        outcome.cost += (settings.weights.r * u).dot(&u);
+        outcome.without_plan += usize::from(!solved);
+        outcome.mean_programs += controller.problems() as f64 / samples as f64;
+        outcome.most_programs = outcome.most_programs.max(controller.problems());
+        outcome.torques.push(u[0]);
+        match lpvmpc_sim::advance(&ballbot, &x, &u, settings.t_s, tolerances) {
+            Ok(next) if next[1].abs() < std::f64::consts::FRAC_PI_2 => x = next,
+            _ => {
+                outcome.cost = f64::INFINITY;
+                break;
+            }
+        }
+        outcome.states.push(x);
+        for (value, limit) in x.iter().zip(limits.iter()) {
+            outcome.excess = outcome.excess.max(value.abs() / limit - 1.0);
+        }
+    }
+    Ok(outcome)
+}
+
+/// Closed-loop cost of the guaranteed loop with one program per sample.
+///
+/// # Errors
+/// The scenario is not valid.
+pub fn guaranteed_cost(case: &Case) -> Result<f64, CommandError> {
+    let mut scenario = scenario(case)?;
+    scenario.controller.terminal = TerminalTable::Certified(CertifiedTable::default());
+    let prepared = scenario.prepare(Path::new("."))?;
+    let trajectories = prepared.run(&Surroundings {
+        clock: &|| Duration::ZERO,
+        progress: &|_| (),
+    })?;
+    let weights = &prepared.settings.weights;
+    let samples = trajectories.iter().flat_map(|run| &run.samples);
+    Ok(samples
+        .map(|sample| {
+            let error = sample.x - sample.x_ref;
+            (weights.q * error).dot(&error) + (weights.r * sample.u).dot(&sample.u)
+        })
+        .sum())
+}
