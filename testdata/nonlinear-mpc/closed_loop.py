@@ -23,18 +23,20 @@ PLANT = plant()
 class Controller:
     """MPC by IPOPT with the predictor that it is given, from the former plan and from cold starts."""
 
-    def __init__(self, design, predict, horizon):
+    def __init__(self, design, predict, horizon, **options):
         self.design, self.predict, self.horizon = design, predict, horizon
-        self.problem = Problem(design, predict, horizon)
+        self.problem = Problem(design, predict, horizon, **options)
         self.plan, self.not_converged, self.better_cold = None, 0, 0
 
-    def converge(self, x, goal, cold):
+    def converge(self, x, goal, cold, all_starts=False):
+        """The torque at state x, from the former plan and, if asked for, from cold starts."""
         plans = []
         if self.plan is not None:
             plans.append(self.problem.solve(x, goal, self.plan.moved_on(), self.plan))
         missed = not plans or not plans[0].converged
         if cold or missed:
-            starts = cold_starts(self.design, self.predict, x, goal, self.horizon, missed)
+            every = missed or all_starts
+            starts = cold_starts(self.design, self.predict, x, goal, self.horizon, every)
             plans += [self.problem.solve(x, goal, start) for start in starts]
         self.plan = best(plans)
         self.not_converged += not self.plan.converged
@@ -46,8 +48,8 @@ class Controller:
 class Nonlinear(Controller):
     """Nonlinear MPC, converged at every sample."""
 
-    def __init__(self, design, horizon):
-        super().__init__(design, design.predict, horizon)
+    def __init__(self, design, horizon, **options):
+        super().__init__(design, design.predict, horizon, **options)
 
     def torque(self, x, goal, sample, remaining):
         return self.converge(x, goal, sample % COLD_EVERY == 0 and remaining > COLD_ABOVE)

@@ -9,7 +9,6 @@ OPTIONS = {
     "error_on_fail": False,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
-    "ipopt.tol": 1e-8,
     "ipopt.max_iter": 300,
 }
 # A start that is a shifted solution is close to the new one: begin with a small barrier, and keep
@@ -51,7 +50,7 @@ class Problem:
     phi_dot and theta_dot over their upper and lower bounds.
     """
 
-    def __init__(self, design, predict, horizon, soft=True):
+    def __init__(self, design, predict, horizon, soft=True, tolerance=1e-8):
         self.design, self.horizon, self.soft = design, horizon, soft
         x0, goal = ca.SX.sym("x0", 4), ca.SX.sym("goal", 4)
         x, variables, rows, cost = x0, [], [], 0
@@ -75,13 +74,13 @@ class Problem:
             "f": cost,
             "g": ca.vertcat(*rows),
         }
-        free, inf = np.full(4, np.inf), np.inf
+        # Of the variables and of the rows of one stage.
         if soft:
-            lower = np.concatenate([[-TORQUE_BOUND], -free, np.zeros(6)])
-            upper = np.concatenate([[TORQUE_BOUND], free, np.full(6, inf)])
+            upper = np.concatenate([[TORQUE_BOUND], np.full(10, np.inf)])
+            lower = np.concatenate([-upper[:5], np.zeros(6)])
             row = np.concatenate([np.zeros(4), STATE_BOUND])
         else:
-            upper = np.concatenate([[TORQUE_BOUND, inf], STATE_BOUND])
+            upper = np.concatenate([[TORQUE_BOUND, np.inf], STATE_BOUND])
             lower = -upper
             row = np.zeros(4)
         self.limits = {
@@ -90,15 +89,17 @@ class Problem:
             "lbg": np.tile(-row, horizon),
             "ubg": np.tile(row, horizon),
         }
-        self.cold = ca.nlpsol("cold", "ipopt", problem, OPTIONS)
+        options = {**OPTIONS, "ipopt.tol": tolerance}
+        self.cold = ca.nlpsol("cold", "ipopt", problem, options)
         derivatives = {
             "grad_f": self.cold.get_function("nlp_grad_f"),
             "jac_g": self.cold.get_function("nlp_jac_g"),
             "hess_lag": self.cold.get_function("nlp_hess_l"),
         }
-        self.warm = ca.nlpsol("warm", "ipopt", problem, {**OPTIONS, **WARM, **derivatives})
+        self.warm = ca.nlpsol("warm", "ipopt", problem, {**options, **WARM, **derivatives})
 
     def pack(self, x, u):
+        """The variables of a trajectory."""
         stages = [u[None], x[:, 1:]]
         if self.soft:
             bound = STATE_BOUND[:, None]
