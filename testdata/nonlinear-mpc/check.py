@@ -1,0 +1,33 @@
+"""How far rows of random-starts.csv are from the same loops computed with more effort.
+
+    python check.py INDEX...
+
+The loops are computed again with a tolerance of 1e-10 and all cold starts at every sample.
+"""
+import csv
+import sys
+
+import numpy as np
+
+from closed_loop import Loop, Nonlinear
+from model import R_BALL, Design
+from random_starts import DURATION, TABLE
+
+
+class Thorough(Nonlinear):
+    """Nonlinear MPC from every start that there is, at every sample."""
+
+    def torque(self, x, goal, sample, remaining):
+        return self.converge(x, goal, True, all_starts=True)
+
+
+if __name__ == "__main__":
+    with open(TABLE) as table:
+        rows = list(csv.DictReader(table))
+    for row in (rows[int(index)] for index in sys.argv[1:]):
+        start = [0.0, *(float(row[k]) for k in ("theta0_rad", "phi_dot0_rad_s", "theta_dot0_rad_s"))]
+        goal = np.array([float(row["distance_m"]) / R_BALL, 0.0, 0.0, 0.0])
+        controller = Thorough(Design(float(row["t_s_s"])), int(row["horizon"]), tolerance=1e-10)
+        loop = Loop(controller, start, goal, DURATION)
+        change = loop.cost / float(row["cost_nonlinear"]) - 1
+        print(f"{row['index']}: {change:+.1e}, better from cold {loop.better_cold}", flush=True)
