@@ -3,9 +3,10 @@
 use crate::commands::{
     bench::BenchArguments, campaign::CampaignArguments, certify::CertifyArguments,
     completions::CompletionsArguments, excite::ExciteArguments, identify::IdentifyArguments,
-    linearize::LinearizeArguments, lqr::LqrArguments, optimality::OptimalityArguments, refine::RefineArguments,
-    rehearse::RehearseArguments, reproduce::ReproduceArguments, scenario::ScenarioArguments,
-    simulate::SimulateArguments, verify::VerifyArguments, view::ViewArguments,
+    linearize::LinearizeArguments, lqr::LqrArguments, optimality::OptimalityArguments,
+    refine::RefineArguments, rehearse::RehearseArguments, reproduce::ReproduceArguments,
+    scenario::ScenarioArguments, simulate::SimulateArguments, verify::VerifyArguments,
+    view::ViewArguments,
 };
 use clap::{Parser, Subcommand};
 

@@ -69,22 +69,18 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         let ControllerSettings { weights, x, u, .. } = settings;
         let soft_x = halved(&settings.soft_x);
         let same = |stage: &Stage<T, NX, NU>| {
-            stage.q == weights.q
-                && stage.r == weights.r
-                && stage.x == *x
-                && stage.soft_x == soft_x
-                && stage.u == *u
+            stage.q == weights.q && stage.r == weights.r && stage.x == *x && stage.u == *u
         };
+        self.ocp.soft_x = soft_x;
+        self.ocp.terminal.soft_x = soft_x;
         if !self.ocp.stages.first().is_some_and(same) {
             for stage in &mut self.ocp.stages {
                 stage.q = weights.q;
                 stage.r = weights.r;
                 stage.x = *x;
-                stage.soft_x = soft_x;
                 stage.u = *u;
             }
             self.ocp.terminal.x = *x;
-            self.ocp.terminal.soft_x = soft_x;
         }
     }
 }
@@ -417,15 +413,21 @@ where
         ocp.terminal.equality = equality;
     }
 
+    /// The nonlinear model's state one sample after `x` under the input `u`.
+    // Once in the machine code.
+    #[inline(never)]
+    pub(crate) fn next_state(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NX> {
+        let ControllerSettings { t_s, predictor, .. } = &self.settings;
+        predictor.rk4().advance(&self.model, x, u, *t_s)
+    }
+
     /// Algorithm 2, step 4: the nonlinear model under the plan.
     #[inline(never)]
     fn roll_out(&mut self, x: &SVector<T, NX>) {
-        let ControllerSettings { t_s, predictor, .. } = &self.settings;
         let mut state = *x;
-        let places = self.rollout.iter_mut().zip(&self.solution.u);
-        for (place, u) in places.take(self.settings.horizon) {
-            state = predictor.rk4().advance(&self.model, &state, u, *t_s);
-            *place = state;
+        for i in 0..self.settings.horizon {
+            state = self.next_state(&state, &self.solution.u[i]);
+            self.rollout[i] = state;
         }
         let end = self.settings.horizon - 1;
         self.gap = state - self.solution.x[end];

@@ -19,8 +19,7 @@ use crate::model::{LpvModel, Scalar};
 use crate::ocp::Ocp;
 use crate::plan::{Merit, Prices, Trial};
 use crate::policy::input_at;
-use crate::riccati::{CostToGo, StageFactor};
-use crate::settings::TerminalIngredient;
+use crate::settings::ControllerSettings;
 use crate::solution::Status;
 use crate::solver::{SolverSettings, WarmStart};
 use nalgebra::{SMatrix, SVector, convert};
@@ -149,7 +148,7 @@ where
         let mut best = None;
         if self.initialised {
             self.shift(reference);
-            best = self.roll_out_plan(x, &merit, &mut workspace.trial, |i, x| {
+            best = self.roll_out_plan(x, &merit, &mut workspace.trial, &|i, x| {
                 let policy = &self.policy;
                 let planned = (&self.rollout[i], &policy.u[i]);
                 input_at(x, planned, &policy.gain[i], &self.settings.u)
@@ -172,13 +171,13 @@ where
         mut best: Option<T>,
         workspace: &mut Workspace<T, NX, NU, N, M>,
     ) -> Option<T> {
-        let (gain, indifferent) = self.regulator(&reference.terminal, &mut workspace.ocp);
+        let (gain, indifferent) = self.regulator(&reference.terminal, workspace);
         let away = (x - reference.terminal).component_mul(&indifferent);
         let merit = self.merit(reference, Prices::none());
         let rest = SVector::zeros();
         for part in PARTS {
             let aim = reference.terminal + away * (T::one() - convert::<f64, T>(part));
-            let cost = self.roll_out_plan(x, &merit, &mut workspace.trial, |_, x| {
+            let cost = self.roll_out_plan(x, &merit, &mut workspace.trial, &|_, x| {
                 input_at(x, (&aim, &rest), &gain, &self.settings.u)
             });
             if let Some(found) = cost
@@ -196,46 +195,32 @@ where
         best
     }
 
-    /// The gain of the regulator at `x_ref` (u = K (x - x_ref)), the limit of the Riccati
-    /// recursion; and 1 for each state whose value is all the same to the plant (the position, as a
-    /// rule), 0 for the others. `ocp` lends a stage.
+    /// The gain of the regulator at `x_ref` (u = K (x - x_ref)), that of the first of `N` equal
+    /// stages; and 1 for each state whose value is all the same to the plant (the position, as a
+    /// rule), 0 for the others. The program in the workspace is overwritten.
     fn regulator(
         &self,
         x_ref: &SVector<T, NX>,
-        ocp: &mut Ocp<T, NX, NU, N>,
+        workspace: &mut Workspace<T, NX, NU, N, M>,
     ) -> (SMatrix<T, NU, NX>, SVector<T, NX>) {
-        const MOST_STAGES: usize = 100;
-        let settings = &self.settings;
-        let mut factor = StageFactor::zeros();
-        let Some(stage) = ocp.stages.first_mut() else {
-            return (factor.gain, SVector::zeros());
-        };
+        let Workspace { ocp, solver, .. } = workspace;
         let rest = SVector::zeros();
-        (stage.a, stage.b) = settings
-            .predictor
-            .linearize(&self.model, x_ref, &rest, settings.t_s);
-        stage.c = SVector::zeros();
-        stage.r = settings.weights.r;
-        let indifferent = SVector::from_fn(|j, _| {
-            let unit = SVector::<T, NX>::from_fn(|i, _| one_if(i == j));
-            one_if(stage.a.column(j) == unit)
-        });
-        let mut cost_to_go = CostToGo {
-            quadratic: match settings.terminal {
-                TerminalIngredient::Cost(p) => p,
-                TerminalIngredient::Equality => settings.weights.q,
-            },
-            linear: SVector::zeros(),
-        };
-        for _ in 0..MOST_STAGES {
-            let before = factor.gain;
-            let eliminated = factor.eliminate(stage, &mut cost_to_go);
-            let change = (factor.gain - before).amax();
-            if eliminated.is_err() || !(change > factor.gain.amax() * convert(1e-3)) {
-                break;
-            }
+        let (a, b) = self.sample_matrices(x_ref, &rest, Along::Scheduling);
+        for stage in &mut ocp.stages {
+            (stage.a, stage.b) = (a, b);
+            stage.c = SVector::zeros();
+            stage.r = self.settings.weights.r;
         }
-        (factor.gain, indifferent)
+        ocp.horizon = N;
+        let indifferent = SVector::from_fn(|j, _| {
+            let column = (0..NX).all(|i| a[(i, j)] == one_if(i == j));
+            one_if(column)
+        });
+        let gain = match solver.factorize(ocp) {
+            Ok(()) => solver.factors()[0].gain,
+            Err(_) => SMatrix::zeros(),
+        };
+        (gain, indifferent)
     }
 
     /// The plan one sample on; its last stage is the regulator's.
@@ -262,16 +247,26 @@ where
         let states = core::iter::once(x).chain(&self.rollout);
         let samples = states.zip(&self.policy.u).zip(&self.rollout);
         for (stage, ((x, u), next)) in ocp.stages.iter_mut().zip(samples).take(settings.horizon) {
-            let predictor = settings.predictor;
-            (stage.a, stage.b) = match along {
-                Along::Scheduling => predictor.linearize(&self.model, x, u, settings.t_s),
-                Along::Jacobian => predictor
-                    .rk4()
-                    .differentiate(&self.model, x, u, settings.t_s),
-            };
+            (stage.a, stage.b) = self.sample_matrices(x, u, along);
             stage.c = next - stage.a * x - stage.b * u;
             stage.r = settings.weights.r + SMatrix::identity() * self.policy.damping;
             stage.linear_u = -*u * self.policy.damping;
+        }
+    }
+
+    /// The matrices of one sample from `x` with the input `u`.
+    // Once in the machine code.
+    #[inline(never)]
+    fn sample_matrices(
+        &self,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+        along: Along,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+        let ControllerSettings { t_s, predictor, .. } = &self.settings;
+        match along {
+            Along::Scheduling => predictor.linearize(&self.model, x, u, *t_s),
+            Along::Jacobian => predictor.rk4().differentiate(&self.model, x, u, *t_s),
         }
     }
 
@@ -325,7 +320,7 @@ where
             return Outcome::NothingToGain;
         }
         let end = self.settings.horizon - 1;
-        let taken = self.search_line(x, &merit, expected, &mut workspace.trial, |i| {
+        let taken = self.search_line(x, &merit, expected, &mut workspace.trial, &|i| {
             let x_i = i.checked_sub(1).map_or(x, |j| &self.solution.x[j]);
             (x_i, &self.solution.u[i])
         });
@@ -342,13 +337,14 @@ where
 
     /// The longest step from the plan towards `answer` (state and input of a stage) that lowers the
     /// merit enough, and the merit of the rollout that it leaves in `trial`.
+    #[inline(never)]
     fn search_line<'a>(
         &'a self,
         x: &SVector<T, NX>,
         merit: &Merit<'_, T, NX, NU, N>,
         expected: T,
         trial: &mut Trial<T, NX, NU, N>,
-        answer: impl Fn(usize) -> (&'a SVector<T, NX>, &'a SVector<T, NU>),
+        answer: &dyn Fn(usize) -> (&'a SVector<T, NX>, &'a SVector<T, NU>),
     ) -> Option<(T, T)>
     where
         P: 'a,
@@ -358,7 +354,7 @@ where
         } = self;
         for step in STEPS {
             let step: T = convert(step);
-            let cost = self.roll_out_plan(x, merit, trial, |i, x_i| {
+            let cost = self.roll_out_plan(x, merit, trial, &|i, x_i| {
                 let x_plan = i.checked_sub(1).map_or(x, |j| &rollout[j]);
                 let (x_answer, u_answer) = answer(i);
                 let planned = x_plan + (x_answer - x_plan) * step;
@@ -386,12 +382,10 @@ where
         workspace: &mut Workspace<T, NX, NU, N, M>,
     ) -> bool {
         self.track(reference, &mut workspace.ocp);
-        let settings = &self.settings;
-        let end = settings.horizon - 1;
-        let rk4 = settings.predictor.rk4();
+        let end = self.settings.horizon - 1;
         // Where the plant will be, as far as the model knows.
         let x = match answered {
-            Some(x) => rk4.advance(&self.model, &x, &self.solution.u[0], settings.t_s),
+            Some(x) => self.next_state(&x, &self.solution.u[0]),
             None => self.rollout[0],
         };
         if !self.first_plan(&x, reference, workspace) {
@@ -403,7 +397,7 @@ where
             let merit = self.merit(reference, prices);
             self.policy.cost = merit.of(&x, &self.policy.u, &self.rollout);
             let trial = &mut workspace.trial;
-            let taken = self.search_line(&x, &merit, T::zero(), trial, |i| {
+            let taken = self.search_line(&x, &merit, T::zero(), trial, &|i| {
                 let u = if i < end {
                     &self.solution.u[i + 1]
                 } else {
@@ -450,22 +444,22 @@ where
 
     /// Rolls the nonlinear model out from `x` into `trial`, with the inputs that `input` gives for a
     /// stage and its state. Returns the merit; `None` if it is not finite.
-    #[inline(always)]
+    // Once in the machine code: a call per stage is nothing beside a Runge-Kutta step.
+    #[inline(never)]
     fn roll_out_plan(
         &self,
         x: &SVector<T, NX>,
         merit: &Merit<'_, T, NX, NU, N>,
         trial: &mut Trial<T, NX, NU, N>,
-        input: impl Fn(usize, &SVector<T, NX>) -> SVector<T, NU>,
+        input: &dyn Fn(usize, &SVector<T, NX>) -> SVector<T, NU>,
     ) -> Option<T> {
-        let rk4 = self.settings.predictor.rk4();
         let mut state = *x;
         let mut total = T::zero();
         let places = trial.u.iter_mut().zip(&mut trial.x);
         for (i, (u, next)) in places.enumerate().take(self.settings.horizon) {
             *u = input(i, &state);
             total += merit.stage(i, &state, u);
-            state = rk4.advance(&self.model, &state, u, self.settings.t_s);
+            state = self.next_state(&state, u);
             *next = state;
         }
         total += merit.end(&state);

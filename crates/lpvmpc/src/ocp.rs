@@ -109,8 +109,6 @@ pub struct Stage<T, const NX: usize, const NU: usize, const NG: usize = 0> {
     pub linear_u: SVector<T, NU>,
     /// Bounds on the state.
     pub x: Bounds<T, NX>,
-    /// Which state bounds are soft.
-    pub soft_x: Softness<T, NX>,
     /// Bounds on the input, always hard.
     pub u: Bounds<T, NU>,
     /// State part of the general rows, `NG` x `NX`.
@@ -151,6 +149,8 @@ pub struct Ocp<T, const NX: usize, const NU: usize, const N: usize, const NG: us
     pub x0: SVector<T, NX>,
     /// The stages; those from `horizon` on are not read.
     pub stages: [Stage<T, NX, NU, NG>; N],
+    /// Which state bounds of the stages are soft, at the same price at all of them.
+    pub soft_x: Softness<T, NX>,
     /// The end of the horizon.
     pub terminal: Terminal<T, NX, NG>,
     /// Stages in use; values above `N` count as `N`, 0 counts as 1.
@@ -170,7 +170,6 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NG: usize> Stage<T, NX, 
             linear_x: SVector::zeros(),
             linear_u: SVector::zeros(),
             x: Bounds::none(),
-            soft_x: [None; NX],
             u: Bounds::none(),
             row_x: SMatrix::zeros(),
             row_u: SMatrix::zeros(),
@@ -212,6 +211,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usiz
         Self {
             x0: SVector::zeros(),
             stages: [Stage::new(); N],
+            soft_x: [None; NX],
             terminal: Terminal::default(),
             horizon: N,
         }

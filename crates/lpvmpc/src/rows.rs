@@ -93,7 +93,7 @@ pub(crate) fn violated_bounds<
     let steps = trajectory.x.iter().zip(trajectory.u.iter());
     for (i, (stage, (x_next, u))) in ocp.stages.iter().zip(steps).enumerate().take(n) {
         if i > 0 {
-            violated_sides(&stage.x, &stage.soft_x, x, i, Quantity::State, visit);
+            violated_sides(&stage.x, &ocp.soft_x, x, i, Quantity::State, visit);
         }
         violated_sides(&stage.u, &[None; NU], u, i, Quantity::Input, visit);
         if NG > 0 {
@@ -362,7 +362,7 @@ pub(crate) fn soft_price<
         None
     };
     match (bound.quantity, stage) {
-        (Quantity::State(j), Some(stage)) => stage.soft_x.get(j),
+        (Quantity::State(j), Some(_)) => ocp.soft_x.get(j),
         (Quantity::State(j), None) => ocp.terminal.soft_x.get(j),
         (Quantity::Row(j), Some(stage)) => stage.soft_rows.get(j),
         (Quantity::Row(j), None) => ocp.terminal.soft_rows.get(j),

@@ -333,7 +333,7 @@ pub fn cost<
         total += (stage.q * x * half + stage.linear_x).dot(x);
         total += (stage.s * x + stage.r * u * half + stage.linear_u).dot(u);
         if i > 0 {
-            total += price(&stage.soft_x, x, &stage.x);
+            total += price(&ocp.soft_x, x, &stage.x);
         }
         if NG > 0 {
             let value = stage.row_x * x + stage.row_u * u;

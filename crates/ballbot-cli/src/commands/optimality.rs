@@ -149,13 +149,29 @@ impl Summary {
             values
         };
         let pairs = || cases.iter().zip(outcomes);
-        let mean = outcomes.iter().map(|outcome| outcome.mean_programs).sum::<f64>();
+        let mean = outcomes
+            .iter()
+            .map(|outcome| outcome.mean_programs)
+            .sum::<f64>();
         Self {
-            ratios: sorted(pairs().map(|(case, run)| run.cost / case.nonlinear).collect()),
-            linear: sorted(cases.iter().map(|case| case.linear / case.nonlinear).collect()),
+            ratios: sorted(
+                pairs()
+                    .map(|(case, run)| run.cost / case.nonlinear)
+                    .collect(),
+            ),
+            linear: sorted(
+                cases
+                    .iter()
+                    .map(|case| case.linear / case.nonlinear)
+                    .collect(),
+            ),
             against_linear: sorted(pairs().map(|(case, run)| run.cost / case.linear).collect()),
             mean_programs: mean / outcomes.len() as f64,
-            most_programs: outcomes.iter().map(|run| run.most_programs).max().unwrap_or(0),
+            most_programs: outcomes
+                .iter()
+                .map(|run| run.most_programs)
+                .max()
+                .unwrap_or(0),
             without_plan: outcomes.iter().map(|run| run.without_plan).sum(),
         }
     }

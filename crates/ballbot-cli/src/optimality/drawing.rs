@@ -30,7 +30,12 @@ pub fn cost_over_distance(costs: &CostOverDistance) -> Figure {
     let one = vec![1.0; distance.len()];
     let all = vec![
         series("linear MPC", linear, Dash::Dashed, Role::Linear),
-        series("guaranteed LPV MPC", guaranteed, Dash::Solid, Role::RungeKutta),
+        series(
+            "guaranteed LPV MPC",
+            guaranteed,
+            Dash::Solid,
+            Role::RungeKutta,
+        ),
         series("LPV MPC", lpv, Dash::Solid, Role::Lpv),
         series("nonlinear MPC (IPOPT)", &one, Dash::Dotted, Role::Nonlinear),
     ];
@@ -52,7 +57,9 @@ pub fn cost_over_distance(costs: &CostOverDistance) -> Figure {
 
 /// States and torque of a closed loop.
 pub fn long_horizon(case: &Case, outcome: &Outcome) -> Figure {
-    let time: Vec<f64> = (0..outcome.states.len()).map(|k| k as f64 * case.t_s).collect();
+    let time: Vec<f64> = (0..outcome.states.len())
+        .map(|k| k as f64 * case.t_s)
+        .collect();
     let state = |i: usize| -> Vec<f64> { outcome.states.iter().map(|x| x[i]).collect() };
     let band = |limit: f64| {
         Some(Band {
@@ -69,12 +76,20 @@ pub fn long_horizon(case: &Case, outcome: &Outcome) -> Figure {
     };
     let line = Style::Line(Dash::Solid);
     Figure {
-        title: format!("{} m with a horizon of {} samples", case.distance, case.horizon),
+        title: format!(
+            "{} m with a horizon of {} samples",
+            case.distance, case.horizon
+        ),
         panels: vec![
             panel("ball angle φ [rad]", &state(0), line, None),
             panel("tilt θ [rad]", &state(1), line, band(FRAC_PI_3)),
             panel("dφ/dt [rad/s]", &state(2), line, band(10.0 * PI)),
-            panel("torque [N m]", &outcome.torques, Style::Steps(Dash::Solid), band(1.5)),
+            panel(
+                "torque [N m]",
+                &outcome.torques,
+                Style::Steps(Dash::Solid),
+                band(1.5),
+            ),
         ],
         columns: 2,
         width: 1000.0,

@@ -12,5 +12,8 @@ pub use run::{Outcome, guaranteed_cost, run, run_all};
 /// The value below which the part `share` of the `sorted` values lies; NaN without values.
 pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     let index = (share * sorted.len() as f64).ceil() as usize;
-    sorted.get(index.saturating_sub(1)).copied().unwrap_or(f64::NAN)
+    sorted
+        .get(index.saturating_sub(1))
+        .copied()
+        .unwrap_or(f64::NAN)
 }

@@ -48,7 +48,7 @@ impl Dense {
         let mut map = Map::<NX>::zeros(n);
         let mut free = ocp.x0;
         for (i, stage) in ocp.stages.iter().enumerate().take(n) {
-            assert!(stage.s.amax() == 0.0 && stage.soft_x == [None; NX]);
+            assert!(stage.s.amax() == 0.0 && ocp.soft_x == [None; NX]);
             dense.h += map.tr_mul(&(stage.q * &map));
             dense.g += map.tr_mul(&(stage.q * free + stage.linear_x));
             dense.h[(i, i)] += stage.r[0];

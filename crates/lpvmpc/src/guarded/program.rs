@@ -116,6 +116,7 @@ where
         ocp.terminal.p = SMatrix::identity();
         ocp.terminal.p[(NX, NX)] = T::zero();
         ocp.terminal.x = Bounds::none();
+        ocp.soft_x = [None; NA];
         ocp.terminal.soft_x = [None; NA];
         for i in 0..NX {
             ocp.terminal.x.lower[i] = -half_edge * inside;
@@ -141,10 +142,8 @@ where
                 quadratic: self.settings.soft_price / (width * width),
             })
         };
-        for stage in &mut ocp.stages {
-            for (soft, width) in stage.soft_x.iter_mut().zip(width.iter()) {
-                *soft = penalty(*width);
-            }
+        for (soft, width) in ocp.soft_x.iter_mut().zip(width.iter()) {
+            *soft = penalty(*width);
         }
         let edge = self.settings.terminal.level.sqrt();
         for soft in ocp.terminal.soft_x.iter_mut().take(NX) {

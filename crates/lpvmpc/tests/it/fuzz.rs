@@ -72,7 +72,7 @@ fn spoil_problem(rng: &mut Rng, largest: f64, ocp: &mut Problem) {
         11 => spoil(rng, largest, &mut stage.row_x),
         12 => spoil(rng, largest, &mut stage.row_u),
         13 => {
-            stage.soft_x[rng.index(NX)] = Some(Penalty {
+            ocp.soft_x[rng.index(NX)] = Some(Penalty {
                 linear: nonsense(rng, largest).abs(),
                 quadratic: nonsense(rng, largest).abs(),
             });

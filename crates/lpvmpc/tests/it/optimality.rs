@@ -63,9 +63,7 @@ fn multiplier_above_the_price_is_seen() {
         linear: 1e-3,
         quadratic: 0.0,
     });
-    for stage in &mut ocp.stages {
-        stage.soft_x = [price; 3];
-    }
+    ocp.soft_x = [price; 3];
     ocp.terminal.soft_x = [price; 3];
     assert!(kkt_residual(&ocp, &solution).dual > 1e-4);
 }

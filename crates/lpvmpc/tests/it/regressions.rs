@@ -35,7 +35,7 @@ fn warm_start_from_a_bound_that_has_become_soft() {
     };
     solver.solve(&ocp, &same, &mut solution);
     assert_eq!(solution.active.len(), 1);
-    ocp.stages[1].soft_x[0] = Some(Penalty {
+    ocp.soft_x[0] = Some(Penalty {
         linear: 0.01,
         quadratic: 0.0,
     });

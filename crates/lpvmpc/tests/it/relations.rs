@@ -91,9 +91,9 @@ fn dearer(ocp: &Problem, factor: f64) -> Problem {
         stage.s *= factor;
         stage.linear_x *= factor;
         stage.linear_u *= factor;
-        stage.soft_x = stage.soft_x.map(price);
         stage.soft_rows = stage.soft_rows.map(price);
     }
+    scaled.soft_x = scaled.soft_x.map(price);
     scaled.terminal.p *= factor;
     scaled.terminal.linear_x *= factor;
     scaled.terminal.soft_x = scaled.terminal.soft_x.map(price);

@@ -59,7 +59,6 @@ impl<A: Scalar, B: Scalar> Into<'_, A, B> {
             linear_u: self.matrix(&stage.linear_u),
             x: self.bounds(&stage.x),
             u: self.bounds(&stage.u),
-            soft_x: self.prices(&stage.soft_x),
             row_x: self.matrix(&stage.row_x),
             row_u: self.matrix(&stage.row_u),
             rows: self.bounds(&stage.rows),
@@ -75,6 +74,7 @@ impl<A: Scalar, B: Scalar> Into<'_, A, B> {
         Ocp {
             x0: self.matrix(&ocp.x0),
             stages: ocp.stages.map(|stage| self.stage(&stage)),
+            soft_x: self.prices(&ocp.soft_x),
             terminal: Terminal {
                 p: self.matrix(&end.p),
                 linear_x: self.matrix(&end.linear_x),

@@ -242,7 +242,7 @@ fn add_stage<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
         for j in 0..NX {
             program.linear[state + j] += stage.linear_x[j];
         }
-        program.bounds(x, &stage.x, &stage.soft_x);
+        program.bounds(x, &stage.x, &ocp.soft_x);
     } else {
         let x0 = &ocp.x0;
         program.constant += (stage.q * x0 * 0.5 + stage.linear_x).dot(x0);

@@ -44,12 +44,7 @@ pub fn condense<const NX: usize, const NU: usize, const N: usize, const NG: usiz
         let (row_x, row_u) = (dynamic(&stage.row_x), dynamic(&stage.row_u));
         let rows = &row_x * &map + &row_u * &select;
         dense.bound(&rows, &(&row_x * &free), &stage.rows);
-        if stage
-            .soft_x
-            .iter()
-            .chain(&stage.soft_rows)
-            .any(Option::is_some)
-        {
+        if stage.soft_rows.iter().any(Option::is_some) {
             return None;
         }
         let (a, b) = (dynamic(&stage.a), dynamic(&stage.b));
@@ -70,7 +65,8 @@ pub fn condense<const NX: usize, const NU: usize, const N: usize, const NG: usiz
         };
         dense.bound(&map, &free, &pinned);
     }
-    let soft = end.soft_x.iter().chain(&end.soft_rows).any(Option::is_some);
+    let soft_x = ocp.soft_x.iter().chain(&end.soft_x);
+    let soft = soft_x.chain(&end.soft_rows).any(Option::is_some);
     (!soft).then_some(dense)
 }
 

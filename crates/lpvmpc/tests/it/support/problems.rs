@@ -261,9 +261,9 @@ fn soften<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
     };
     let price = Some(Penalty { linear, quadratic });
     for stage in &mut ocp.stages {
-        stage.soft_x = [price; NX];
         stage.soft_rows = [price; NG];
     }
+    ocp.soft_x = [price; NX];
     ocp.terminal.soft_x = [price; NX];
     ocp.terminal.soft_rows = [price; NG];
 }
