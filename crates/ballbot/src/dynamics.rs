@@ -4,7 +4,7 @@
 use crate::parameters::Ballbot;
 use crate::trigonometry::sin_cos;
 use lpvmpc::Scalar;
-use nalgebra::{Matrix2, Vector2, Vector4, convert};
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4, convert};
 
 impl<T: Scalar> Ballbot<T> {
     /// Mass matrix M(q), 2 x 2, m^2 (eq. (2)).
@@ -59,6 +59,53 @@ impl<T: Scalar> Ballbot<T> {
         Vector4::new(phi_dot, theta_dot, phi_ddot, theta_ddot)
     }
 
+    /// (df/dx, df/du): 4 x 4 per second, and 4 x 1.
+    ///
+    /// From M q_ddot = force: M dq_ddot = dforce - dM q_ddot.
+    #[inline(always)]
+    pub(crate) fn jacobian_of_f(&self, x: &Vector4<T>, torque: T) -> (Matrix4<T>, Vector4<T>) {
+        let (theta, phi_dot, theta_dot) = (x[1], x[2], x[3]);
+        let (sin_theta, cos_theta) = sin_cos(theta);
+        let Self { geometry, .. } = self;
+        let (zero, one) = (T::zero(), T::one());
+        let arm = geometry.centre_of_mass * geometry.ball_radius;
+        let pull = geometry.centre_of_mass * geometry.gravity;
+        let coupling = self.coupling(cos_theta);
+        let speed = phi_dot - theta_dot;
+        let drive = self.driving_force(torque, speed);
+        let swing = arm * theta_dot;
+        let inverse = one / self.determinant(coupling);
+        let accelerate = |force_phi, force_theta| {
+            self.accelerate_with(inverse, coupling, force_phi, force_theta)
+        };
+        let [phi_ddot, theta_ddot] = accelerate(
+            drive + swing * theta_dot * sin_theta - self.b4 * phi_dot,
+            pull * sin_theta - drive,
+        );
+        // The coupling stands in M with a minus sign, and moves by arm sin(theta) per theta.
+        let shift = arm * sin_theta;
+        let by_theta = accelerate(
+            swing * theta_dot * cos_theta + shift * theta_ddot,
+            pull * cos_theta + shift * phi_ddot,
+        );
+        let friction = if self.drive.is_none() {
+            zero
+        } else {
+            self.drive.slope(speed)
+        };
+        let by_phi_dot = accelerate(-self.b4 - friction, friction);
+        let by_theta_dot = accelerate(swing * (sin_theta + sin_theta) + friction, -friction);
+        let by_torque = accelerate(self.gear(), -self.gear());
+        #[rustfmt::skip]
+        let a = Matrix4::new(
+            zero, zero,        one,           zero,
+            zero, zero,        zero,          one,
+            zero, by_theta[0], by_phi_dot[0], by_theta_dot[0],
+            zero, by_theta[1], by_phi_dot[1], by_theta_dot[1],
+        );
+        (a, Vector4::new(zero, zero, by_torque[0], by_torque[1]))
+    }
+
     /// What the drive does to the ball, and the opposite to the body, m^2/s^2: torque (N m) less
     /// friction at the speed phi_dot - theta_dot (rad/s).
     #[inline(always)]
@@ -75,6 +122,12 @@ impl<T: Scalar> Ballbot<T> {
     #[inline(always)]
     pub(crate) fn accelerate(&self, coupling: T, force_phi: T, force_theta: T) -> [T; 2] {
         let inverse = T::one() / self.determinant(coupling);
+        self.accelerate_with(inverse, coupling, force_phi, force_theta)
+    }
+
+    /// The same with the `inverse` of det M, 1/m^4.
+    #[inline(always)]
+    fn accelerate_with(&self, inverse: T, coupling: T, force_phi: T, force_theta: T) -> [T; 2] {
         [
             (self.b3 * force_phi + coupling * force_theta) * inverse,
             (coupling * force_phi + self.b1 * force_theta) * inverse,

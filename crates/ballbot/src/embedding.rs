@@ -135,6 +135,11 @@ impl<T: Scalar> LpvModel<T, 4, 1, 3> for Ballbot<T> {
     fn derivative(&self, x: &Vector4<T>, u: &Vector1<T>) -> Vector4<T> {
         self.f(x, u[0])
     }
+
+    #[inline(always)]
+    fn jacobian(&self, x: &Vector4<T>, u: &Vector1<T>) -> (Matrix4<T>, Vector4<T>) {
+        self.jacobian_of_f(x, u[0])
+    }
 }
 
 /// sin(x)/x, 1 at x = 0.

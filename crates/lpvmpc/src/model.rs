@@ -1,7 +1,7 @@
 //! What a plant must offer: a linear model whose matrices depend on a scheduling vector.
 
 use crate::kernel::product;
-use nalgebra::{RealField, SMatrix, SVector};
+use nalgebra::{RealField, SMatrix, SVector, convert};
 
 /// The number type of the method: `f32` on a microcontroller, `f64` on a PC.
 pub trait Scalar: RealField + Copy {}
@@ -23,7 +23,8 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
     /// The continuous-time pair A (`NX` x `NX`, per second) and B (`NX` x `NU`) at `scheduling`.
     fn matrices(&self, scheduling: &SVector<T, NS>) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>);
 
-    /// A V, for the A that [`matrices`](Self::matrices) returned and a V of `C` columns.
+    /// A V, for an A that [`matrices`](Self::matrices) or [`jacobian`](Self::jacobian) returned and
+    /// a V of `C` columns.
     ///
     /// A plant in whose A many entries are always zero or one may override this with fewer
     /// products: most of a predictor's work is here. It must return the same matrix.
@@ -42,5 +43,31 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
     fn derivative(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NX> {
         let (a, b) = self.matrices(&self.scheduling(x));
         a * x + b * u
+    }
+
+    /// (df/dx, df/du) at `x` and `u`: `NX` x `NX` per second, and `NX` x `NU`.
+    ///
+    /// By central differences of [`derivative`](Self::derivative) with respect to x; f is affine in
+    /// u, so that df/du is B. A plant with a closed form should override this: it is faster, and in
+    /// `f32` more accurate.
+    fn jacobian(
+        &self,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+        // The cube root of epsilon balances rounding and the differences' own error.
+        let relative = T::default_epsilon().powf(convert(1.0 / 3.0));
+        let mut a = SMatrix::<T, NX, NX>::zeros();
+        for j in 0..NX {
+            let (mut above, mut below) = (*x, *x);
+            let step = relative * (T::one() + x[j].abs());
+            above[j] += step;
+            below[j] -= step;
+            let change = self.derivative(&above, u) - self.derivative(&below, u);
+            // What was really added: x + step is rounded.
+            a.set_column(j, &(change / (above[j] - below[j])));
+        }
+        let (_, b) = self.matrices(&self.scheduling(x));
+        (a, b)
     }
 }

@@ -140,9 +140,6 @@ impl Rk4 {
 
     /// A_d x + B_d u = [`Rk4::advance`] at the given `x` and `u`: the steps' matrices with the
     /// scheduling that the nonlinear steps have at each of their stages.
-    ///
-    /// With A_j, B_j at the scheduling of stage j, the stages' slopes are K_j x + L_j u:
-    /// K_1 = A_1, L_1 = B_1, K_2 = A_2 (I + h/2 K_1), L_2 = B_2 + h/2 A_2 L_1, and so on.
     // Not inlined, so that the frozen kinds keep the registers.
     #[inline(never)]
     pub fn linearize<T, P, const NX: usize, const NU: usize, const NS: usize>(
@@ -156,22 +153,77 @@ impl Rk4 {
         T: Scalar,
         P: LpvModel<T, NX, NU, NS>,
     {
+        let embedding = |x: &SVector<T, NX>| model.matrices(&model.scheduling(x));
+        // The embedding is exact, so the products that are at hand anyway are the slopes.
+        let slope = |from: &SVector<T, NX>, _: &SVector<T, NX>, k: &_, l: &_| {
+            let mut slope = product(k, from);
+            add_product(&mut slope, l, u);
+            slope
+        };
+        self.compose(model, x, t_s, embedding, slope)
+    }
+
+    /// The derivatives of [`Rk4::advance`] with respect to `x` and `u`: the same recursion with the
+    /// Jacobian of f in place of the embedding's matrices.
+    #[inline(never)]
+    pub fn differentiate<T, P, const NX: usize, const NU: usize, const NS: usize>(
+        self,
+        model: &P,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+        t_s: T,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>)
+    where
+        T: Scalar,
+        P: LpvModel<T, NX, NU, NS>,
+    {
+        let jacobian = |x: &SVector<T, NX>| model.jacobian(x, u);
+        let slope =
+            |_: &SVector<T, NX>, there: &SVector<T, NX>, _: &_, _: &_| model.derivative(there, u);
+        self.compose(model, x, t_s, jacobian, slope)
+    }
+
+    /// The steps' matrices from the continuous-time pairs `at` each Runge-Kutta stage.
+    ///
+    /// With A_j, B_j at stage j, the stages' slopes are K_j x + L_j u (up to a constant where the
+    /// pairs are Jacobians): K_1 = A_1, L_1 = B_1, K_2 = A_2 (I + h/2 K_1),
+    /// L_2 = B_2 + h/2 A_2 L_1, and so on. `slope` is the slope of a stage, from the state where the
+    /// step began, the state of the stage, K_j and L_j.
+    #[inline(always)]
+    fn compose<T, P, const NX: usize, const NU: usize, const NS: usize>(
+        self,
+        model: &P,
+        x: &SVector<T, NX>,
+        t_s: T,
+        at: impl Fn(&SVector<T, NX>) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>),
+        slope: impl Fn(
+            &SVector<T, NX>,
+            &SVector<T, NX>,
+            &SMatrix<T, NX, NX>,
+            &SMatrix<T, NX, NU>,
+        ) -> SVector<T, NX>,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>)
+    where
+        T: Scalar,
+        P: LpvModel<T, NX, NU, NS>,
+    {
         let h = self.step_length(t_s);
         let [half, third, sixth] =
             [0.5, 1.0 / 3.0, 1.0 / 6.0].map(|part| h * convert::<f64, T>(part));
         let (mut a_d, mut b_d) = (SMatrix::identity(), SMatrix::zeros());
         let mut x = *x;
         for _ in 0..self.substeps {
-            let (mut k, mut l) = model.matrices(&model.scheduling(&x));
-            let mut slope = product(&k, &x);
-            add_product(&mut slope, &l, u);
+            let (mut k, mut l) = at(&x);
+            let mut rate = slope(&x, &x, &k, &l);
             let (mut a_step, mut b_step) = (SMatrix::identity(), SMatrix::zeros());
+            let mut next = x;
             add_scaled(&mut a_step, &k, sixth);
             add_scaled(&mut b_step, &l, sixth);
+            add_scaled(&mut next, &rate, sixth);
             for (reach, weight) in [(half, third), (half, third), (h, sixth)] {
                 let mut there = x;
-                add_scaled(&mut there, &slope, reach);
-                let (mut a, mut b) = model.matrices(&model.scheduling(&there));
+                add_scaled(&mut there, &rate, reach);
+                let (mut a, mut b) = at(&there);
                 // In place, since copies cost as much as the products where nothing is unrolled.
                 scale(&mut k, reach);
                 scale(&mut l, reach);
@@ -179,13 +231,12 @@ impl Rk4 {
                 add_scaled(&mut a, &a_k, T::one());
                 add_scaled(&mut b, &a_l, T::one());
                 (k, l) = (a, b);
-                slope = product(&k, &x);
-                add_product(&mut slope, &l, u);
+                rate = slope(&x, &there, &k, &l);
                 add_scaled(&mut a_step, &k, weight);
                 add_scaled(&mut b_step, &l, weight);
+                add_scaled(&mut next, &rate, weight);
             }
-            x = product(&a_step, &x);
-            add_product(&mut x, &b_step, u);
+            x = next;
             b_d = product(&a_step, &b_d);
             add_scaled(&mut b_d, &b_step, T::one());
             a_d = product(&a_step, &a_d);

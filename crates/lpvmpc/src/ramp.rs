@@ -41,6 +41,19 @@ impl<P, const NX: usize> RampedInput<P, NX> {
             SVector::from_iterator(joint.iter().copied().skip(NX)),
         )
     }
+
+    /// The plant's pair (A, B) as that of the plant with its inputs as states.
+    fn join_matrices<T: Scalar, const NU: usize, const NXU: usize>(
+        (a, b): (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>),
+    ) -> (SMatrix<T, NXU, NXU>, SMatrix<T, NXU, NU>) {
+        let joint_a = SMatrix::from_fn(|i, j| match (i < NX, j < NX) {
+            (true, true) => a[(i, j)],
+            (true, false) => b[(i, j - NX)],
+            (false, _) => T::zero(),
+        });
+        let integrate = |i: usize, j: usize| if i == NX + j { T::one() } else { T::zero() };
+        (joint_a, SMatrix::from_fn(integrate))
+    }
 }
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize, const NXU: usize>
@@ -55,14 +68,7 @@ where
     }
 
     fn matrices(&self, scheduling: &SVector<T, NS>) -> (SMatrix<T, NXU, NXU>, SMatrix<T, NXU, NU>) {
-        let (a, b) = self.0.matrices(scheduling);
-        let joint_a = SMatrix::from_fn(|i, j| match (i < NX, j < NX) {
-            (true, true) => a[(i, j)],
-            (true, false) => b[(i, j - NX)],
-            (false, _) => T::zero(),
-        });
-        let integrate = |i: usize, j: usize| if i == NX + j { T::one() } else { T::zero() };
-        (joint_a, SMatrix::from_fn(integrate))
+        Self::join_matrices(self.0.matrices(scheduling))
     }
 
     #[inline(always)]
@@ -86,5 +92,14 @@ where
     fn derivative(&self, joint: &SVector<T, NXU>, rate: &SVector<T, NU>) -> SVector<T, NXU> {
         let (x, u) = Self::split::<T, NU, NXU>(joint);
         Self::join(&self.0.derivative(&x, &u), rate)
+    }
+
+    fn jacobian(
+        &self,
+        joint: &SVector<T, NXU>,
+        _rate: &SVector<T, NU>,
+    ) -> (SMatrix<T, NXU, NXU>, SMatrix<T, NXU, NU>) {
+        let (x, u) = Self::split::<T, NU, NXU>(joint);
+        Self::join_matrices(self.0.jacobian(&x, &u))
     }
 }
