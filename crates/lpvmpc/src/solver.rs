@@ -138,6 +138,11 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         Ok(())
     }
 
+    /// The factors of the stages of the last problem.
+    pub(crate) fn factors(&self) -> &[StageFactor<T, NX, NU>; N] {
+        &self.factors
+    }
+
     /// Backward: the factor of every stage.
     fn factorize<const NG: usize>(&mut self, ocp: &Ocp<T, NX, NU, N, NG>) -> Result<(), Status<T>> {
         let mut cost_to_go = CostToGo {

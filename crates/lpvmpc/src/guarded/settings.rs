@@ -33,9 +33,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> TerminalSet<T, NX, NU> {
 /// Quadratic programs per sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GuardedIterations {
-    /// With a plan that works at hand, at least 1.
+    /// With the rest of a plan at hand, at least 1.
     pub known: usize,
-    /// Without one (at the start, after a push), at least 1.
+    /// Without one (at the start, after a push), at least 1: they look for a plan, and go on to the
+    /// best one.
     pub unknown: usize,
 }
 

@@ -161,7 +161,14 @@ fn a_bad_solver_costs_time_and_nothing_else() {
 
 #[test]
 fn the_nearest_admissible_position_is_reached() {
-    for (wanted, reached) in [(3.0, 3.0), (-70.0, -50.0), (f64::INFINITY, 0.0)] {
+    for (wanted, reached) in [
+        (3.0, 3.0),
+        (-70.0, -50.0),
+        (1e300, 50.0),
+        (f64::NEG_INFINITY, -50.0),
+        // Before anything was wanted, where it stands.
+        (f64::NAN, 0.0),
+    ] {
         let mut controller = guarded(settings());
         let mut memory = Memory::new();
         let mut x = Vector4::zeros();
