@@ -104,9 +104,9 @@ fn the_longest_horizons_fit_a_thread() {
     let prepared = ramped.prepare(Path::new(".")).unwrap();
     let mut settings = prepared.guarded.unwrap();
     settings.horizon = LONGEST_HORIZON;
-    guarded_feedback(&prepared.ballbot, &settings).unwrap();
+    guarded_feedback(&prepared.ballbot, &settings, true).unwrap();
     settings.horizon += 1;
-    let refused = guarded_feedback(&prepared.ballbot, &settings)
+    let refused = guarded_feedback(&prepared.ballbot, &settings, true)
         .err()
         .unwrap();
     assert!(refused.to_string().contains("1 to 200"), "{refused}");

@@ -94,6 +94,7 @@ fn a_run_is_the_sequence_of_its_samples() {
         controller: controller(),
         workspace: Box::new(Workspace::new()),
         x: Vector2::zeros(),
+        preview: false,
     };
     let course = Course {
         samples: 120,
@@ -130,6 +131,7 @@ fn active_bounds_are_where_the_plan_meets_them() {
         controller: controller(),
         workspace: Box::new(Workspace::new()),
         x: Vector2::zeros(),
+        preview: false,
     };
     let (mut speeds, mut forces) = (0, 0);
     for k in 0..60 {

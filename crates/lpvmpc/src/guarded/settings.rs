@@ -33,7 +33,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> TerminalSet<T, NX, NU> {
 /// Quadratic programs per sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GuardedIterations {
-    /// With the rest of a plan at hand, at least 1.
+    /// With the rest of a plan at hand; with 0 the rest is what is applied.
     pub known: usize,
     /// Without one (at the start, after a push), at least 1: they look for a plan, and go on to the
     /// best one.
@@ -89,7 +89,7 @@ pub enum GuardedError {
     Direction,
     /// The lower set point is above the upper one, or one is not a number.
     SetPoints,
-    /// At least one quadratic program per sample is needed.
+    /// Without a plan, at least one quadratic program per sample is needed.
     Iterations,
 }
 
@@ -106,7 +106,10 @@ impl fmt::Display for GuardedError {
             Self::SetPoints => {
                 write!(f, "the lower set point must not exceed the upper one")
             }
-            Self::Iterations => write!(f, "a sample needs at least one quadratic program"),
+            Self::Iterations => write!(
+                f,
+                "a sample without a plan needs at least one quadratic program"
+            ),
         }
     }
 }
@@ -158,7 +161,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
         if !(lower <= upper) {
             return Err(GuardedError::SetPoints);
         }
-        if self.iterations.known == 0 || self.iterations.unknown == 0 {
+        if self.iterations.unknown == 0 {
             return Err(GuardedError::Iterations);
         }
         self.check_direction(model)

@@ -293,7 +293,7 @@ fn settings_that_make_no_sense_are_refused() {
         GuardedError::SetPoints
     );
     assert_eq!(
-        refused(|s| s.iterations.known = 0),
+        refused(|s| s.iterations.unknown = 0),
         GuardedError::Iterations
     );
     for horizon in [0, N + 1] {
