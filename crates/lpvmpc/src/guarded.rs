@@ -14,6 +14,7 @@ mod aim;
 mod plan;
 mod program;
 mod settings;
+mod tube;
 
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Ocp;
@@ -24,7 +25,7 @@ use core::fmt;
 use nalgebra::{SVector, convert};
 use plan::Plan;
 use program::Slope;
-pub use settings::{GuardedError, GuardedIterations, GuardedSettings, TerminalSet};
+pub use settings::{GuardedError, GuardedIterations, GuardedSettings, Rollout, TerminalSet};
 
 /// What the applied input is backed by, from the strongest to the weakest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -150,6 +151,10 @@ pub struct GuardedController<
     damping: T,
     /// What the next program is linear by: what served last.
     slope: Slope,
+    /// How far the plant may be from the plans of the last program, at x_1 to x_N.
+    drift: [SVector<T, NX>; N],
+    /// The same at the end, in the norm of P.
+    end_drift: T,
     /// Multiplier of the terminal set in the last program.
     pressure: T,
     /// Where the last program met the terminal set's edge, as y of the program.
@@ -193,6 +198,8 @@ where
             wanted: None,
             damping: T::zero(),
             slope: Slope::Jacobian,
+            drift: [SVector::zeros(); N],
+            end_drift: T::zero(),
             pressure: T::zero(),
             touch: None,
         })
@@ -273,6 +280,7 @@ where
         self.wanted = None;
         self.damping = T::zero();
         self.slope = Slope::Jacobian;
+        (self.drift, self.end_drift) = ([SVector::zeros(); N], T::zero());
         self.pressure = T::zero();
         self.touch = None;
     }
@@ -298,13 +306,13 @@ where
         rest: Option<&Plan<T, NX, NU, N>>,
     ) -> Option<(Plan<T, NX, NU, N>, Decision)> {
         let candidate = rest
-            .filter(|plan| self.is_feasible(plan, T::zero()))
+            .filter(|plan| self.is_feasible(plan))
             .map(|plan| (*plan, Decision::Candidate));
         if candidate.is_some() {
             return candidate;
         }
         let plan = self.under_terminal_law(x, aims);
-        self.is_feasible(&plan, T::zero())
+        self.is_feasible(&plan)
             .then_some((plan, Decision::TerminalLaw))
     }
 
@@ -317,13 +325,8 @@ where
     ) -> Option<Plan<T, NX, NU, N>> {
         let ((known, _), last) = (guaranteed?, self.plan.as_ref()?);
         let plan = self.repeated(x, last, aims);
-        let cheaper = plan.cost < known.cost && self.is_feasible(&plan, self.kept());
+        let cheaper = plan.cost < known.cost && self.is_robust(&plan);
         cheaper.then_some(plan)
-    }
-
-    /// The part of the bounds' width that a new plan keeps away from them.
-    fn kept(&self) -> T {
-        self.settings.margin * convert::<f64, T>(0.05)
     }
 
     /// Quadratic programs along `along`, each answer confirmed by the rollout. Returns the best
@@ -361,6 +364,9 @@ where
             } else {
                 Outcome::Nothing
             };
+            if workspace.solution.status.is_solved() {
+                (self.drift, self.end_drift) = self.tube(&along, workspace);
+            }
             let found = match outcome {
                 Outcome::Found(found) => found,
                 Outcome::Settled => {
@@ -416,7 +422,7 @@ where
         let mut nearer = None;
         for fraction in FRACTIONS {
             let plan = self.between(x, aims, along, &towards, convert(fraction));
-            let found = self.judge(plan, fraction, &predicted);
+            let found = self.judge(plan, fraction, &predicted, workspace);
             if self.is_better(&found, along, is_known) {
                 return Outcome::Found(found);
             }
@@ -431,17 +437,23 @@ where
     }
 
     /// A rollout with what it is worth; `predicted` is where the program expected its end.
-    fn judge(
+    fn judge<const M: usize>(
         &self,
-        plan: Plan<T, NX, NU, N>,
+        mut plan: Plan<T, NX, NU, N>,
         fraction: f64,
         predicted: &SVector<T, NX>,
+        workspace: &GuardedWorkspace<T, NU, NA, NP, M>,
     ) -> Found<T, NX, NU, N> {
+        let gap = plan.end - predicted;
+        let feasible = self.is_feasible(&plan) && {
+            (plan.drift, plan.end_drift) = self.tube(&plan, workspace);
+            self.is_robust(&plan)
+        };
         Found {
             plan,
             fraction,
-            feasible: self.is_feasible(&plan, self.kept()),
-            gap: plan.end - predicted,
+            feasible,
+            gap,
         }
     }
 

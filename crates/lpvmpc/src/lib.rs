@@ -34,7 +34,7 @@ pub use estimator::{
 };
 pub use guarded::{
     Decision, GuardedController, GuardedError, GuardedIterations, GuardedSettings, GuardedStep,
-    GuardedWorkspace, SetPoints, TerminalSet,
+    GuardedWorkspace, Rollout, SetPoints, TerminalSet,
 };
 pub use kkt::{KktResidual, kkt_residual};
 pub use model::{LpvModel, Scalar};

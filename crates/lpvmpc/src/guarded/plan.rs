@@ -5,6 +5,7 @@ use super::aim::SetPoints;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Bounds;
 use crate::policy::input_at;
+use crate::predictor::Rk4;
 use nalgebra::{SMatrix, SVector, convert};
 
 /// Inputs with the states that the nonlinear model reaches under them, and the feedback with which
@@ -19,6 +20,14 @@ pub(super) struct Plan<T, const NX: usize, const NU: usize, const N: usize> {
     pub x: [SVector<T, NX>; N],
     /// K_0 to K_{N-1}: at the state x, stage i has the input u_i + K_i (x - x_i).
     pub gain: [SMatrix<T, NU, NX>; N],
+    /// The largest values of the states from sample to sample, at the Runge-Kutta steps.
+    pub highest: [SVector<T, NX>; N],
+    /// The smallest ones.
+    pub lowest: [SVector<T, NX>; N],
+    /// How far the plant may be from x_1 to x_N when it follows the plan to there.
+    pub drift: [SVector<T, NX>; N],
+    /// The same at the end, in the norm of P.
+    pub end_drift: T,
     /// x_N at the end of the horizon.
     pub end: SVector<T, NX>,
     /// z: the plan ends near z d.
@@ -68,12 +77,13 @@ where
         let end = self.settings.horizon - 1;
         let planned = last.x.iter().zip(last.u.iter().zip(&last.gain).skip(1));
         let mut planned = planned.take(end);
-        let plan = self.simulate(x0, |x| match planned.next() {
+        let mut plan = self.simulate(x0, |x| match planned.next() {
             Some((x_planned, (u, gain))) => {
                 (input_at(x, x_planned, u, gain, &self.settings.u), *gain)
             }
             None => self.terminal_law(x, last.set_point),
         });
+        (plan.drift, plan.end_drift) = (last.drift, last.end_drift);
         self.aimed_as_surely(x0, plan, last.set_point, aims)
     }
 
@@ -88,7 +98,8 @@ where
     ) -> Plan<T, NX, NU, N> {
         let level = self.settings.terminal.level;
         let edge = self.terminal_value(&plan.end, near).min(level);
-        self.aimed(x0, plan, near, edge.max(level * self.almost()), aims)
+        let almost = self.almost(self.end_drift);
+        self.aimed(x0, plan, near, edge.max(almost), aims)
     }
 
     /// The whole of `last` once more, from where the plant has gone since: the best plan of a plant
@@ -110,14 +121,25 @@ where
             }
             None => (SVector::zeros(), SMatrix::zeros()),
         });
-        let level = self.settings.terminal.level * self.almost();
-        self.aimed(x0, plan, last.set_point + gone, level, aims)
+        let level = self.almost(self.end_drift);
+        let mut plan = self.aimed(x0, plan, last.set_point + gone, level, aims);
+        (plan.drift, plan.end_drift) = (last.drift, last.end_drift);
+        plan
     }
 
-    /// What a new plan is aimed for in the terminal set, between what is asked of programs and what
-    /// is asked of their rollout.
-    fn almost(&self) -> T {
-        T::one() - self.settings.margin * convert::<f64, T>(0.75)
+    /// The terminal value that a new plan may reach when the plant ends as far from it as from a plan
+    /// with this `end_drift`.
+    fn almost(&self, end_drift: T) -> T {
+        let radius = self.settings.terminal.level.sqrt();
+        let inside = radius * (T::one() - self.settings.margin * convert::<f64, T>(0.5));
+        let inside = inside - self.reserve(end_drift);
+        inside * inside
+    }
+
+    /// What is left free at the edge of the terminal set for a drift such as this one.
+    pub(super) fn reserve(&self, end_drift: T) -> T {
+        let most = self.settings.terminal.level.sqrt() * convert::<f64, T>(0.2);
+        (end_drift * convert::<f64, T>(1.2)).min(most)
     }
 
     /// The plan that follows the terminal law around the admissible set point nearest to `x`.
@@ -168,7 +190,7 @@ where
             }
             None => (SVector::zeros(), SMatrix::zeros()),
         });
-        let level = self.settings.terminal.level * self.almost();
+        let level = self.almost(self.end_drift);
         self.aimed(x0, plan, along.set_point, level, aims)
     }
 
@@ -184,16 +206,27 @@ where
             u: [SVector::zeros(); N],
             x: [SVector::zeros(); N],
             gain: [SMatrix::zeros(); N],
+            highest: [SVector::zeros(); N],
+            lowest: [SVector::zeros(); N],
+            drift: [SVector::zeros(); N],
+            end_drift: T::zero(),
             end: *x0,
             set_point: T::zero(),
             cost: T::zero(),
         };
         let places = plan.u.iter_mut().zip(&mut plan.gain).zip(&mut plan.x);
-        for ((u, gain), x_next) in places.take(settings.horizon) {
+        let extremes = plan.highest.iter_mut().zip(&mut plan.lowest);
+        let substeps = settings.rollout.rk4.substeps;
+        let step = settings.t_s / convert::<f64, T>(substeps as f64);
+        for (((u, gain), x_next), (highest, lowest)) in places.zip(extremes).take(settings.horizon)
+        {
             (*u, *gain) = input(&plan.end);
-            plan.end = settings
-                .rk4
-                .advance(&self.model, &plan.end, u, settings.t_s);
+            (*highest, *lowest) = (plan.end, plan.end);
+            for _ in 0..substeps {
+                plan.end = Rk4 { substeps: 1 }.advance(&self.model, &plan.end, u, step);
+                *highest = highest.sup(&plan.end);
+                *lowest = lowest.inf(&plan.end);
+            }
             *x_next = plan.end;
         }
         plan
@@ -270,21 +303,56 @@ where
         cost + self.terminal_value(&plan.end, plan.set_point)
     }
 
-    /// Whether the plan keeps all bounds by `margin` times their width, and ends in the terminal
-    /// set as clearly; false for numbers that are none.
-    pub(super) fn is_feasible(&self, plan: &Plan<T, NX, NU, N>, margin: T) -> bool {
+    /// Whether the plan keeps all bounds, between the samples, too, and ends in the terminal set;
+    /// false for numbers that are none.
+    pub(super) fn is_feasible(&self, plan: &Plan<T, NX, NU, N>) -> bool {
+        let none = core::iter::repeat(SVector::zeros());
+        self.holds(plan, none, T::zero(), T::zero())
+    }
+
+    /// Whether it does so wherever the plant can be that follows it.
+    pub(super) fn is_robust(&self, plan: &Plan<T, NX, NU, N>) -> bool {
+        // A sample begins as far from the plan as the one before ends.
+        let before = core::iter::once(SVector::zeros()).chain(plan.drift);
+        let drift = before
+            .zip(&plan.drift)
+            .map(|(before, after)| before.sup(after));
+        let rounding = self.settings.margin * convert::<f64, T>(0.01);
+        self.holds(plan, drift, plan.end_drift, rounding)
+    }
+
+    /// Whether the plan keeps away from all bounds by `drift` and `margin` times their width.
+    fn holds(
+        &self,
+        plan: &Plan<T, NX, NU, N>,
+        drift: impl Iterator<Item = SVector<T, NX>>,
+        end_drift: T,
+        margin: T,
+    ) -> bool {
         let settings = &self.settings;
         let x = shrunk(&settings.x, margin);
         let [lower, upper] = settings.set_points;
+        let reached = self.terminal_value(&plan.end, plan.set_point).sqrt() + end_drift;
         let level = settings.terminal.level * (T::one() - margin);
-        let mut states = plan.x.iter().take(settings.horizon);
+        let between = settings.rollout.between;
+        let extremes = plan.highest.iter().zip(&plan.lowest).zip(drift);
+        let mut extremes = extremes.take(settings.horizon);
         let mut inputs = plan.u.iter().take(settings.horizon);
+        // Where nothing drifts, the end is compared as it is: a root rounds.
+        let inside = if end_drift > T::zero() {
+            reached * reached <= level
+        } else {
+            self.terminal_value(&plan.end, plan.set_point) <= level
+        };
         plan.cost.is_finite()
-            && states.all(|state| x.contains(state, T::zero()))
+            && extremes.all(|((highest, lowest), drift)| {
+                let room = between + drift;
+                x.hold_at(&(highest + room)) && x.hold_at(&(lowest - room))
+            })
             && inputs.all(|u| settings.u.contains(u, T::zero()))
             && plan.set_point >= lower
             && plan.set_point <= upper
-            && self.terminal_value(&plan.end, plan.set_point) <= level
+            && inside
     }
 
     /// Cost and price of what a plan exceeds, by which plans are compared while none is feasible.
@@ -293,8 +361,9 @@ where
         let bounds = shrunk(&settings.x, settings.margin);
         let width = width(&settings.x);
         let mut excess = T::zero();
-        for x in plan.x.iter().take(settings.horizon) {
-            let over = (x - bounds.upper).sup(&(bounds.lower - x));
+        let extremes = plan.highest.iter().zip(&plan.lowest);
+        for (highest, lowest) in extremes.take(settings.horizon) {
+            let over = (highest - bounds.upper).sup(&(bounds.lower - lowest));
             for (over, width) in over.iter().zip(width.iter()) {
                 if *over > T::zero() && *width > T::zero() {
                     excess += *over / *width;

@@ -46,19 +46,14 @@ where
         let origin = settings.direction * along.set_point;
         ocp.x0 = augmented(&(x0 - origin), T::zero());
         let tight = shrunk(&settings.x, settings.margin);
-        // The measured state is as it is; x_1 and later are bounded.
-        let bounds = |x: &SVector<T, NX>| {
-            let kept = settings.x.hold_at(x);
-            let lower = if kept {
-                tight.lower.inf(x)
-            } else {
-                tight.lower
-            };
-            let upper = if kept {
-                tight.upper.sup(x)
-            } else {
-                tight.upper
-            };
+        // The measured state is as it is; x_1 and later are bounded, as far from the bounds as the
+        // plan goes beyond its samples.
+        let bounds = |i: usize, x: &SVector<T, NX>| {
+            let (above, below) = self.beyond_samples(along, x0, i);
+            let (lower, upper) = (tight.lower + below, tight.upper - above);
+            let kept = settings.x.hold_at(&(x + above)) && settings.x.hold_at(&(x - below));
+            let lower = if kept { lower.inf(x) } else { lower };
+            let upper = if kept { upper.sup(x) } else { upper };
             let infinity: T = convert(f64::INFINITY);
             Bounds {
                 lower: augmented(&(lower - origin), -infinity),
@@ -78,7 +73,7 @@ where
             let (x_here, x_next) = (x - origin, x_next - origin);
             *stage = self.sample_stage(slope, x, &x_here, u, &x_next, aim);
             if i > 0 {
-                stage.x = bounds(x);
+                stage.x = bounds(i, x);
             }
         }
         let end = self.root() * (along.end - origin);
@@ -87,9 +82,11 @@ where
         let touch = self.touch.unwrap_or(end);
         if let Some(last) = stages.next() {
             *last = self.terminal_stage(&touch);
-            last.x = bounds(&along.end);
+            last.x = bounds(settings.horizon, &along.end);
         }
-        self.pose_end(end.norm() <= radius, radius, touch[0] < T::zero(), ocp);
+        let edge = radius * (T::one() - settings.margin) - self.reserve(self.end_drift);
+        let widest = if end.norm() <= radius { radius } else { edge };
+        self.pose_end(edge, widest, touch[0] < T::zero(), ocp);
     }
 
     /// Where the solved program ended as y, and the multiplier of the terminal set: what the next
@@ -111,6 +108,37 @@ where
         let end = predicted_end(solution, self.settings.horizon, &from);
         let y = self.root() * (end - origin);
         self.touch = (self.pressure > T::zero() && y.norm() > T::zero()).then_some(y);
+    }
+
+    /// How far the plan goes above and below x_i in the samples on both sides of it, but no farther
+    /// than both ends of them.
+    fn beyond_samples(
+        &self,
+        along: &Plan<T, NX, NU, N>,
+        x0: &SVector<T, NX>,
+        i: usize,
+    ) -> (SVector<T, NX>, SVector<T, NX>) {
+        let between = self.settings.rollout.between;
+        let (mut above, mut below) = (between, between);
+        let widest = width(&self.settings.x) * convert::<f64, T>(0.1);
+        for sample in [i.checked_sub(1), Some(i)].into_iter().flatten() {
+            if sample >= self.settings.horizon {
+                continue;
+            }
+            let before = sample.checked_sub(1);
+            let from = before.map_or(Some(x0), |before| along.x.get(before));
+            let ends = (from, along.x.get(sample));
+            let extremes = (along.highest.get(sample), along.lowest.get(sample));
+            if let ((Some(from), Some(to)), (Some(highest), Some(lowest))) = (ends, extremes) {
+                above = above.sup(&(highest - from.sup(to) + between));
+                below = below.sup(&(from.inf(to) - lowest + between));
+            }
+        }
+        if let Some(drift) = i.checked_sub(1).and_then(|before| self.drift.get(before)) {
+            (above, below) = (above + drift, below + drift);
+        }
+        // A plan that is far from good must not close the bounds.
+        (above.inf(&widest), below.inf(&widest))
     }
 
     /// (x, 0) becomes (x, z): the first input is z, with the offset cost. Both `wanted` and z are
@@ -189,16 +217,12 @@ where
         stage
     }
 
-    /// The terminal cost |y|^2, the tangent plane of the terminal set, and the curvature of the
-    /// ball behind it, with the multiplier that it had. The plan's own end is `inside` or not; the
+    /// The terminal cost |y|^2, the tangent plane of the terminal set at the `edge`, and the curvature
+    /// of the ball behind it, with the multiplier that it had; no y beyond the `widest`. The
     /// reflection takes the place where the plane touches to the `upper` or the lower end.
-    fn pose_end(&self, inside: bool, radius: T, upper: bool, ocp: &mut Ocp<T, NA, NU, NP>) {
-        let edge = radius * (T::one() - self.settings.margin);
-        let pressure = if self.touch.is_some() {
-            self.pressure
-        } else {
-            T::zero()
-        };
+    fn pose_end(&self, edge: T, widest: T, upper: bool, ocp: &mut Ocp<T, NA, NU, NP>) {
+        let touches = self.touch.is_some();
+        let pressure = if touches { self.pressure } else { T::zero() };
         ocp.terminal.p = SMatrix::identity() * (T::one() + pressure);
         ocp.terminal.p[(NX, NX)] = T::zero();
         ocp.terminal.linear_x = SVector::zeros();
@@ -206,8 +230,6 @@ where
         ocp.terminal.linear_x[0] = -pressure * place;
         ocp.terminal.x = Bounds::none();
         ocp.terminal.soft_x = [None; NA];
-        // A plan that ends within the set may stay where it is.
-        let widest = if inside { radius } else { edge };
         for i in 0..NX {
             ocp.terminal.x.lower[i] = -widest;
             ocp.terminal.x.upper[i] = widest;

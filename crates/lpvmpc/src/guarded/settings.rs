@@ -40,6 +40,19 @@ pub struct GuardedIterations {
     pub unknown: usize,
 }
 
+/// How plans are rolled out, and what is known of it. The bounds are for motions within the bounds of
+/// states and inputs; what they rest on is for whoever computes them to say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rollout<T, const NX: usize> {
+    /// Runge-Kutta steps of a sample.
+    pub rk4: Rk4,
+    /// Largest difference of plant and rollout after one sample, in state units, not negative.
+    pub error: SVector<T, NX>,
+    /// How far a state may lie beyond its values at both ends of a Runge-Kutta step, in state units,
+    /// not negative.
+    pub between: SVector<T, NX>,
+}
+
 /// Everything that defines a guarded controller besides its model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuardedSettings<T, const NX: usize, const NU: usize> {
@@ -47,8 +60,10 @@ pub struct GuardedSettings<T, const NX: usize, const NU: usize> {
     pub t_s: T,
     /// Prediction horizon in samples, from 1 to the controller's `N`.
     pub horizon: usize,
-    /// Runge-Kutta steps of prediction and rollout.
+    /// Runge-Kutta steps of the prediction, along which quadratic programs are made.
     pub rk4: Rk4,
+    /// The rollout by which plans are judged.
+    pub rollout: Rollout<T, NX>,
     /// Stage weights.
     pub weights: Weights<T, NX, NU>,
     /// Terminal law and set.
@@ -65,8 +80,8 @@ pub struct GuardedSettings<T, const NX: usize, const NU: usize> {
     /// Cost of (z - wanted)^2, > 0. Large against the stage weights, so that the set point
     /// moves on as fast as the bounds allow.
     pub offset_weight: T,
-    /// Part of the bounds' width that plans keep away from them, so that rounding and the
-    /// integration error of the prediction do not cost the guarantee; 1e-3, say.
+    /// Part of the bounds' width that programs keep away from them, so that their rollouts hold
+    /// with what is added for the integration error; 4e-3, say.
     pub margin: T,
     /// Quadratic programs per sample.
     pub iterations: GuardedIterations,
@@ -85,6 +100,8 @@ pub enum GuardedError {
     NotPositive(&'static str),
     /// The gain contains a number that is not finite.
     Gain,
+    /// The rollout has no steps, or its bounds are negative or not finite.
+    Rollout,
     /// The direction is zero, not finite, or no direction of equilibria: A d is not zero.
     Direction,
     /// The lower set point is above the upper one, or one is not a number.
@@ -99,6 +116,10 @@ impl fmt::Display for GuardedError {
             Self::Controller(error) => error.fmt(f),
             Self::NotPositive(name) => write!(f, "{name} must be a positive number"),
             Self::Gain => write!(f, "the gain of the terminal law must be finite"),
+            Self::Rollout => write!(
+                f,
+                "the rollout needs a step, and bounds that are finite and not negative"
+            ),
             Self::Direction => write!(
                 f,
                 "the direction of the set points must be a finite, nonzero d with A d = 0"
@@ -156,6 +177,15 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
         check_bounds(&self.u, "input")?;
         if !self.terminal.gain.iter().all(|entry| entry.is_finite()) {
             return Err(GuardedError::Gain);
+        }
+        let Rollout {
+            rk4,
+            error,
+            between,
+        } = &self.rollout;
+        let mut known = error.iter().chain(between.iter());
+        if rk4.substeps == 0 || !known.all(|v| *v >= T::zero() && v.is_finite()) {
+            return Err(GuardedError::Rollout);
         }
         let [lower, upper] = self.set_points;
         if !(lower <= upper) {

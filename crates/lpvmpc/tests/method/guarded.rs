@@ -6,7 +6,8 @@ use crate::rng::Rng;
 use lpvmpc::riccati::{CostToGo, StageFactor};
 use lpvmpc::{
     Bounds, Decision, GuardedController, GuardedError, GuardedIterations, GuardedSettings,
-    GuardedStep, GuardedWorkspace, LpvModel, Rk4, Scheduling, SolverSettings, Stage, TerminalSet,
+    GuardedStep, GuardedWorkspace, LpvModel, Rk4, Rollout, Scheduling, SolverSettings, Stage,
+    TerminalSet,
 };
 use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
 
@@ -49,6 +50,12 @@ fn settings() -> Settings {
         t_s: base.t_s,
         horizon: N,
         rk4: RK4,
+        // The plant of these tests is the rollout itself.
+        rollout: Rollout {
+            rk4: RK4,
+            error: Vector4::zeros(),
+            between: Vector4::zeros(),
+        },
         weights: base.weights,
         terminal: TerminalSet {
             gain: -factor.gain,
