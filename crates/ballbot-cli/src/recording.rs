@@ -160,6 +160,8 @@ pub struct Metrics {
     pub largest_error_rad: f64,
     /// Samples at which the plant's state was outside its bounds.
     pub violations: usize,
+    /// Samples whose torque was not backed by a guarantee, where the loop has one.
+    pub not_guaranteed: Option<usize>,
     /// Most bounds active in one plan.
     pub most_active_bounds: usize,
     /// Closed-loop cost: the sum of ||x - x_ref||_Q^2 + ||u||_R^2 over the run.
@@ -214,6 +216,13 @@ impl Metrics {
             rms_error_rad: (squares / errors.len() as f64).sqrt(),
             largest_error_rad: errors.iter().fold(0.0, |most, error| most.max(error.abs())),
             violations: outside.count(),
+            not_guaranteed: prepared.guarded.map(|_| {
+                let guards = samples.iter().filter_map(|sample| sample.guard);
+                samples.len()
+                    - guards
+                        .filter(|guard| guard.decision.is_guaranteed())
+                        .count()
+            }),
             most_active_bounds: active.max().unwrap_or(0),
             closed_loop_cost: cost.sum(),
             mean_step_us: mean,

@@ -39,6 +39,7 @@ mod parameters;
 mod prepare;
 mod problem;
 mod reference;
+mod rollout;
 mod run;
 mod schema;
 mod session;

@@ -166,10 +166,6 @@ impl ControllerTable {
         };
         let (iterations, key, most) = match self.iterations.unwrap_or(usual) {
             IterationsTable::Fixed(most) => (Iterations::Fixed(most), "fixed", most),
-            IterationsTable::UntilConverged { tolerance, most } => {
-                let iterations = Iterations::UntilConverged { tolerance, most };
-                (iterations, "until_converged.most", most)
-            }
             IterationsTable::Descent { .. } if linear => return Ok(Iterations::Fixed(1)),
             IterationsTable::Descent { tolerance, most } => {
                 let iterations = Iterations::Descent { tolerance, most };

@@ -128,7 +128,7 @@ impl Prepared {
     ) -> Result<Box<dyn SharingPlane>, ScenarioError> {
         let (ballbot, feedback) = (&self.ballbot, &self.feedback);
         Ok(match (&self.guarded, &self.ramp) {
-            (Some(settings), _) => guarded_feedback(ballbot, settings)?,
+            (Some(settings), _) => guarded_feedback(ballbot, settings, feedback.preview)?,
             (None, Some(ramp)) => {
                 ramped_feedback(ballbot, ramp, &self.settings.u, feedback, period)?
             }

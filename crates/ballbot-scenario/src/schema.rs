@@ -152,13 +152,6 @@ pub struct ControllerTable {
 pub enum IterationsTable {
     /// So many.
     Fixed(usize),
-    /// Until the plan repeats itself.
-    UntilConverged {
-        /// No torque of the plan changes by more than this, relative to the largest.
-        tolerance: f64,
-        /// At most so many.
-        most: usize,
-    },
     /// Each one an improvement: a descent on the cost of the nonlinear rollout. With the linear
     /// model, whose programs are all the same, it is one program.
     Descent {

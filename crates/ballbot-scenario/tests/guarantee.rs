@@ -41,7 +41,9 @@ fn far_set_points_are_reached_with_every_bound_kept() {
         let [before, after] = pair else { continue };
         assert!(after.guard.unwrap().decision.is_guaranteed());
         assert!(prepared.settings.u.contains(&after.u, 0.0));
-        if before.x_ref == after.x_ref {
+        // What is wanted at the end of the horizon, and beyond.
+        let end = |t: f64| prepared.planes[0].state_reference(t + 1.0);
+        if end(before.t) == end(after.t) {
             assert!(after.cost <= before.cost * (1.0 + 1e-12) + 1e-9);
         }
     }
@@ -51,9 +53,10 @@ fn far_set_points_are_reached_with_every_bound_kept() {
     }
 }
 
-/// One program per sample keeps every promise, too; three go faster.
+/// One program per sample keeps every promise, too, and drives as fast as three. It once took twice as
+/// long: proposals were rolled out without feedback and refused.
 #[test]
-fn more_programs_per_sample_arrive_earlier() {
+fn one_program_per_sample_arrives_as_early_as_three() {
     let arrival = |programs: usize| {
         let mut scenario = Scenario::load("far-setpoints").unwrap();
         scenario.duration_s = 20.0;
@@ -69,14 +72,14 @@ fn more_programs_per_sample_arrive_earlier() {
         near.unwrap().t
     };
     let (one, three) = (arrival(1), arrival(3));
-    assert!(three < 0.7 * one, "{three} s against {one} s");
+    assert!(one.max(three) < 4.5, "{three} s against {one} s");
 }
 
 /// Short and long horizons, in memories of either size: every input is backed and the set point is
 /// reached.
 #[test]
 fn every_horizon_keeps_the_promise() {
-    for horizon in [8, 20, 21, 60] {
+    for horizon in [5, 20, 21, 60, 100] {
         let mut scenario = Scenario::load("far-setpoints").unwrap();
         scenario.reference = ReferenceTable::SetPoints {
             points: vec![PointTable {
@@ -104,9 +107,9 @@ fn the_longest_horizons_fit_a_thread() {
     let prepared = ramped.prepare(Path::new(".")).unwrap();
     let mut settings = prepared.guarded.unwrap();
     settings.horizon = LONGEST_HORIZON;
-    guarded_feedback(&prepared.ballbot, &settings).unwrap();
+    guarded_feedback(&prepared.ballbot, &settings, true).unwrap();
     settings.horizon += 1;
-    let refused = guarded_feedback(&prepared.ballbot, &settings)
+    let refused = guarded_feedback(&prepared.ballbot, &settings, true)
         .err()
         .unwrap();
     assert!(refused.to_string().contains("1 to 200"), "{refused}");
@@ -187,19 +190,13 @@ fn a_certificate_of_something_else_is_refused() {
         &["bounds.phi_rad", "fit"],
     );
     refused(
-        |s| {
-            s.controller.iterations = Some(IterationsTable::UntilConverged {
-                tolerance: 1e-6,
-                most: 10,
-            });
-        },
-        &["controller.iterations", "fixed"],
-    );
-    refused(
         |s| s.controller.horizon = 201,
         &["controller.horizon", "1 to 200"],
     );
-    refused(|s| s.controller.horizon = 61, &["controller.horizon", "60"]);
+    refused(
+        |s| s.bounds.theta_dot_rad_s = [f64::NEG_INFINITY, f64::INFINITY],
+        &["bounds.theta_dot_rad_s", "finite"],
+    );
 }
 
 /// The certificate's digest is looked at, so that a patched number does not pass unseen.
@@ -221,6 +218,25 @@ fn a_changed_certificate_is_refused() {
     std::fs::remove_dir_all(&folder).unwrap();
     assert!(matches!(error, ScenarioError::Value { .. }));
     assert!(error.to_string().contains("digest"), "{error}");
+}
+
+/// A jump of 2 pi that is known a second before costs, guaranteed, what it costs without the guarantee
+/// (12 822.1 for the plain loop with two Runge-Kutta steps). Without preview it costs 16 times as much.
+#[test]
+fn preview_costs_no_more_than_without_the_guarantee() {
+    let mut scenario = Scenario::load("two-setpoints").unwrap();
+    scenario.controller.predictor = None;
+    scenario.controller.terminal = TerminalTable::Certified(Default::default());
+    let prepared = scenario.prepare(Path::new(".")).unwrap();
+    let trajectory = run(&scenario);
+    let weights = prepared.settings.weights;
+    let mut cost = 0.0;
+    for sample in &trajectory.samples {
+        assert!(sample.guard.unwrap().decision.is_guaranteed());
+        let error = sample.x - sample.x_ref;
+        cost += (weights.q * error).dot(&error) + (weights.r * sample.u).dot(&sample.u);
+    }
+    assert!(cost < 1.02 * 12_822.1, "{cost}");
 }
 
 /// Several programs per sample close the gap that one leaves at the first sample of a jump.

@@ -5,7 +5,7 @@ use crate::plant::{self, PlantError, Tolerances};
 use crate::regulator::{Decision, Regulator};
 use crate::sensor::Measurement;
 use lpvmpc::{
-    BoundId, GuardedController, GuardedSettings, GuardedStep, GuardedWorkspace, LpvModel,
+    BoundId, GuardedController, GuardedSettings, GuardedStep, GuardedWorkspace, LpvModel, SetPoints,
 };
 use nalgebra::SVector;
 use std::time::Duration;
@@ -130,8 +130,8 @@ pub struct Guard {
 }
 
 /// A guarded controller on the measured state itself. A reading that is missing keeps its last
-/// value (zero before the first). The wanted set point is the reference's coordinate along the
-/// direction of the set points, without preview.
+/// value (zero before the first). The wanted set points are the reference's coordinates along the
+/// direction of the set points.
 #[derive(Debug)]
 pub struct GuardedFeedback<
     C,
@@ -149,6 +149,8 @@ pub struct GuardedFeedback<
     pub workspace: Box<GuardedWorkspace<f64, NU, NA, NP, M>>,
     /// The measured state.
     pub x: SVector<f64, NX>,
+    /// Whether the controller sees the reference before its time, over the whole horizon.
+    pub preview: bool,
 }
 
 impl<
@@ -180,11 +182,27 @@ where
         reference: &dyn Fn(f64) -> SVector<f64, NX>,
         clock: &dyn Fn() -> Duration,
     ) -> Decision<NX, NU> {
-        let GuardedSettings { t_s, direction, .. } = *self.controller.settings();
+        let GuardedSettings {
+            t_s,
+            direction,
+            horizon,
+            ..
+        } = *self.controller.settings();
         let x_ref = reference(k as f64 * t_s);
-        let wanted = x_ref.dot(&direction) / direction.norm_squared();
+        let coordinate = |x: &SVector<f64, NX>| x.dot(&direction) / direction.norm_squared();
+        let mut wanted = SetPoints::constant(coordinate(&x_ref));
+        if self.preview {
+            let at = |i: usize| coordinate(&reference((k + i) as f64 * t_s));
+            for (i, place) in wanted.stages.iter_mut().enumerate().take(horizon) {
+                *place = at(i);
+            }
+            wanted.end = at(horizon);
+        }
         let before = clock();
-        let step = self.controller.step(&self.x, wanted, &mut self.workspace);
+        let workspace = &mut self.workspace;
+        let step = self
+            .controller
+            .step_with_preview(&self.x, &wanted, workspace);
         let step_time = clock().saturating_sub(before);
         Decision {
             u: step.u,

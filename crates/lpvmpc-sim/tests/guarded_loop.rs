@@ -6,7 +6,7 @@
 
 use lpvmpc::{
     BoundId, Bounds, GuardedController, GuardedIterations, GuardedSettings, GuardedWorkspace,
-    LpvModel, Quantity, Rk4, Side, SolverSettings, TerminalSet, Weights,
+    LpvModel, Quantity, Rk4, Rollout, Side, SolverSettings, TerminalSet, Weights,
 };
 use lpvmpc_design::lqr_discrete;
 use lpvmpc_sim::{
@@ -58,6 +58,12 @@ fn controller() -> Guarded {
         t_s: T_S,
         horizon: 10,
         rk4: Rk4 { substeps: 1 },
+        // The plant of these tests is the rollout itself.
+        rollout: Rollout {
+            rk4: Rk4 { substeps: 1 },
+            error: Vector2::zeros(),
+            between: Vector2::zeros(),
+        },
         weights: Weights { q, r },
         terminal: TerminalSet {
             gain: RowVector2::from_row_slice(lqr.k.as_slice()),
@@ -94,6 +100,7 @@ fn a_run_is_the_sequence_of_its_samples() {
         controller: controller(),
         workspace: Box::new(Workspace::new()),
         x: Vector2::zeros(),
+        preview: false,
     };
     let course = Course {
         samples: 120,
@@ -130,6 +137,7 @@ fn active_bounds_are_where_the_plan_meets_them() {
         controller: controller(),
         workspace: Box::new(Workspace::new()),
         x: Vector2::zeros(),
+        preview: false,
     };
     let (mut speeds, mut forces) = (0, 0);
     for k in 0..60 {

@@ -81,28 +81,31 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
         trajectory: &Trajectory<'_, T, NX, NU, N>,
     ) -> Option<Candidate<T>> {
         let mut worst: Option<Candidate<T>> = None;
-        let mut least = self.tolerance;
+        let mut least = -T::one();
         rows::violated_bounds(ocp, trajectory, &mut |candidate| {
             // Negated, so that a violation that is not a number counts; it stays the worst.
             if worst.is_none_or(|worst| worst.slack.is_finite())
-                && !(candidate.violation <= least)
+                && !(candidate.violation <= self.tolerance)
+                && !(candidate.rank <= least)
                 && let Some(part) = self.free_part(&candidate)
             {
-                least = candidate.violation;
+                least = candidate.rank;
                 worst = Some(Candidate { part, ..candidate });
             }
         });
         for row in self.resting.iter().filter(|row| row.exceeded) {
             let slack = rows::slack(ocp, trajectory, &row.bound);
             let violation = slack / rows::size(ocp, &row.bound);
-            if violation > least {
-                least = violation;
+            let rank = slack / rows::room(ocp, &row.bound);
+            if violation > self.tolerance && rank > least {
+                least = rank;
                 worst = Some(Candidate {
                     bound: row.bound,
                     part: row.part,
                     soft: rows::soft_price(ocp, &row.bound),
                     slack,
                     violation,
+                    rank,
                 });
             }
         }

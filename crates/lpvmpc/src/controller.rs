@@ -4,7 +4,6 @@ use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Bounds, Ocp, Penalty, Softness, Stage};
 use crate::plan::{Policy, Trial};
-use crate::relaxation::Relaxation;
 use crate::settings::{
     ControllerError, ControllerSettings, Iterations, Scheduling, TerminalIngredient, Weights,
     check, check_bounds,
@@ -360,38 +359,24 @@ where
         }
     }
 
-    /// The further quadratic programs of the sample, each along the relaxed plan of the one
-    /// before. The plan is the last program's.
+    /// The further quadratic programs of the sample, each along the plan of the one before.
     #[inline(never)]
     fn iterate(&mut self, x: &SVector<T, NX>, workspace: &mut Workspace<T, NX, NU, N, M>) {
         self.problems = 1;
-        let most = self.settings.iterations.most();
-        if most == 1 || !self.solution.status.is_solved() {
-            return;
-        }
         let Workspace { ocp, solver, .. } = workspace;
         let settings = SolverSettings {
             warm_start: WarmStart::Same,
             ..self.settings.solver
         };
-        let mut relaxation = Relaxation::new();
-        let mut inputs = self.solution.u;
-        while self.problems < most {
-            self.linearize(x, &inputs, 0, ocp);
+        while self.problems < self.settings.iterations.most()
+            && self.initialised
+            && self.solution.status.is_solved()
+        {
+            self.linearize(x, &self.solution.u, 0, ocp);
             solver.solve(ocp, &settings, &mut self.solution);
-            self.problems += 1;
-            let change = relaxation.advance(&mut inputs, &self.solution.u);
-            let largest = inputs.iter().fold(T::zero(), |m, u| m.max(u.amax()));
-            if change <= self.settings.iterations.tolerance() * largest
-                || !self.solution.status.is_solved()
-            {
-                break;
-            }
-            let plan = core::mem::replace(&mut self.solution.u, inputs);
             self.roll_out(x);
-            self.solution.u = plan;
+            self.problems += 1;
         }
-        self.roll_out(x);
     }
 
     /// Algorithm 1, cost: the reference enters the linear terms.

@@ -1,27 +1,31 @@
 //! The loop that keeps its promise: LPV MPC with an artificial set point and a terminal set, in
 //! which no plan is applied that the nonlinear model does not confirm.
 //!
-//! Every sample begins with a plan that is known to work: the rest of the last one, ended by the
-//! terminal law. A quadratic program along it, with the set point as one more unknown, proposes
-//! a better one. Only if the nonlinear rollout of the proposal keeps all bounds, ends in the
+//! Every sample begins with a plan that is known to work: the rest of the last one, with feedback
+//! towards its states, ended by the terminal law. A quadratic program along it, with the set point as
+//! one more unknown, proposes a better one. Only if the nonlinear rollout of the proposal keeps all bounds, ends in the
 //! terminal set and costs no more, it takes the place of the candidate (suboptimal MPC: Scokaert,
 //! Mayne and Rawlings 1999; Allan, Bates, Risbeck and Rawlings 2017; artificial set point: Limon,
 //! Alvarado, Alamo and Camacho 2008). So once there is a plan, there is one at every later sample,
 //! and its cost never grows while the set point stays, whatever the solver does. `docs/guarantees.md`
 //! states the theorem and what it rests on.
 
+mod aim;
 mod plan;
 mod program;
 mod settings;
+mod tube;
 
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Ocp;
 use crate::solution::{BoundId, Solution, Status};
 use crate::solver::{Solver, SolverSettings, WarmStart};
+pub use aim::SetPoints;
 use core::fmt;
 use nalgebra::{SVector, convert};
 use plan::Plan;
-pub use settings::{GuardedError, GuardedIterations, GuardedSettings, TerminalSet};
+use program::Slope;
+pub use settings::{GuardedError, GuardedIterations, GuardedSettings, Rollout, TerminalSet};
 
 /// What the applied input is backed by, from the strongest to the weakest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -30,7 +34,8 @@ pub enum Decision {
     NewPlan,
     /// The rest of the last plan, ended by the terminal law: no proposal was better.
     Candidate,
-    /// The terminal law, whose set the state lies in: there was no plan.
+    /// The terminal law, under which the bounds hold and the terminal set is reached: there was no
+    /// plan.
     TerminalLaw,
     /// No plan keeps the bounds: the quadratic program with soft state bounds and terminal set.
     SoftBounds,
@@ -139,11 +144,25 @@ pub struct GuardedController<
     settings: GuardedSettings<T, NX, NU>,
     /// The last plan, if there is one to go on from; feasible or not.
     plan: Option<Plan<T, NX, NU, N>>,
-    /// How far a program may move the set point: a trust region. Far along, the linear model is
-    /// that of another motion.
-    reach: T,
+    /// The last wanted set point that was a number.
+    wanted: Option<T>,
+    /// Weight of the inputs' distance from the plan that a program is made along, in units of R:
+    /// far along, the linear model is that of another motion.
+    damping: T,
+    /// What the next program is linear by: what served last.
+    slope: Slope,
+    /// How far the plant may be from the plans of the last program, at x_1 to x_N.
+    drift: [SVector<T, NX>; N],
+    /// The same at the end, in the norm of P.
+    end_drift: T,
+    /// Multiplier of the terminal set in the last program.
+    pressure: T,
+    /// Where the last program met the terminal set's edge, as y of the program.
+    touch: Option<SVector<T, NX>>,
 }
 
+/// Relative decrease of the cost below which more programs of a sample are not worth their time.
+const WORTHWHILE: f64 = 1e-7;
 /// Fractions of the way to the quadratic program's answer that are tried.
 const FRACTIONS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 
@@ -176,7 +195,13 @@ where
             model,
             settings,
             plan: None,
-            reach: settings.terminal.extent(&settings.direction),
+            wanted: None,
+            damping: T::zero(),
+            slope: Slope::Jacobian,
+            drift: [SVector::zeros(); N],
+            end_drift: T::zero(),
+            pressure: T::zero(),
+            touch: None,
         })
     }
 
@@ -188,35 +213,40 @@ where
         wanted: T,
         workspace: &mut GuardedWorkspace<T, NU, NA, NP, M>,
     ) -> GuardedStep<T, NX, NU> {
-        let wanted = if wanted.is_finite() {
-            wanted
-        } else {
-            self.plan.as_ref().map_or(T::zero(), |plan| plan.set_point)
-        };
-        let shifted = self.shifted(x, wanted);
-        let guaranteed = self.guaranteed(x, wanted, shifted.as_ref());
-        let along = guaranteed.map(|(plan, _)| plan).or(shifted);
-        let along = along.unwrap_or_else(|| self.under_terminal_law(x, wanted));
+        self.step_with_preview(x, &SetPoints::constant(wanted), workspace)
+    }
 
-        let improved = self.improve(
-            x,
-            wanted,
-            &along,
-            guaranteed.map(|(plan, _)| plan),
-            workspace,
-        );
+    /// One sample where it is known what will be wanted along the horizon. Wanted set points that
+    /// are not admissible count as the nearest ones that are; NaN repeats the one before.
+    pub fn step_with_preview<const M: usize>(
+        &mut self,
+        x: &SVector<T, NX>,
+        wanted: &SetPoints<T, N>,
+        workspace: &mut GuardedWorkspace<T, NU, NA, NP, M>,
+    ) -> GuardedStep<T, NX, NU> {
+        let aims = &self.admissible(x, wanted);
+        let rest = self.plan.as_ref().map(|last| self.rest(x, last, aims));
+        let guaranteed = self.guaranteed(x, aims, rest.as_ref());
+        let along = guaranteed.map(|(plan, _)| plan).or(rest);
+        let along = along.unwrap_or_else(|| self.under_terminal_law(x, aims));
+
+        let again = self.cheaper(x, aims, guaranteed.as_ref());
+        let along = again.unwrap_or(along);
+        let known = guaranteed.map(|(_, decision)| decision);
+        let improved = self.improve(x, aims, &along, known, workspace);
+        let improved = improved.or(again.map(|plan| (plan, SVector::zeros())));
         let status = workspace.solution.status;
-        let (plan, decision) = match (improved, guaranteed) {
-            (Some(plan), _) => (plan, Decision::NewPlan),
-            (None, Some(known)) => known,
-            (None, None) => self.last_resort(x, wanted, &along, workspace),
+        let (plan, decision, gap) = match (improved, guaranteed) {
+            (Some((plan, gap)), _) => (plan, Decision::NewPlan, gap),
+            (None, Some((plan, decision))) => (plan, decision, SVector::zeros()),
+            (None, None) => self.last_resort(x, aims, &along, workspace),
         };
         let step = GuardedStep {
             u: self.settings.u.project(&plan.u[0]),
             decision,
             set_point: plan.set_point,
             cost: plan.cost,
-            gap: self.gap(&plan, decision, workspace),
+            gap,
             status,
         };
         let usable = plan.cost.is_finite() && decision != Decision::SaturatedLqr;
@@ -224,10 +254,35 @@ where
         step
     }
 
+    /// What is wanted, as admissible numbers.
+    fn admissible(&mut self, x: &SVector<T, NX>, wanted: &SetPoints<T, N>) -> SetPoints<T, N> {
+        let GuardedSettings {
+            direction,
+            set_points: [lower, upper],
+            terminal,
+            ..
+        } = &self.settings;
+        let farthest = aim::farthest(terminal.extent(direction));
+        let lower = if lower.is_finite() { *lower } else { -farthest };
+        let upper = if upper.is_finite() { *upper } else { farthest };
+        // Before anything was wanted, the plant may stay where it is.
+        let here = x.dot(direction) / direction.norm_squared();
+        let here = if here.is_finite() { here } else { T::zero() };
+        let last = self.wanted.unwrap_or(here.max(lower).min(upper));
+        let aims = wanted.clamped(last, [lower, upper]);
+        self.wanted = aims.stages.first().copied();
+        aims
+    }
+
     /// Forgets the past: the next step starts as the first one did.
     pub fn reset(&mut self) {
         self.plan = None;
-        self.reach = self.settings.terminal.extent(&self.settings.direction);
+        self.wanted = None;
+        self.damping = T::zero();
+        self.slope = Slope::Jacobian;
+        (self.drift, self.end_drift) = ([SVector::zeros(); N], T::zero());
+        self.pressure = T::zero();
+        self.touch = None;
     }
 
     /// The settings.
@@ -243,127 +298,226 @@ where
             .unwrap_or_default()
     }
 
-    /// The rest of the last plan, ended by the terminal law, from the measured state.
-    fn shifted(&self, x: &SVector<T, NX>, wanted: T) -> Option<Plan<T, NX, NU, N>> {
-        let last = self.plan.as_ref()?;
-        let mut u = last.u;
-        let planned = u.get_mut(..self.settings.horizon)?;
-        planned.rotate_left(1);
-        *planned.last_mut()? = self.terminal_law(&last.end, last.set_point);
-        Some(self.roll_out(x, u, last.set_point, wanted))
-    }
-
-    /// The cheaper one of what is known to work: the shifted plan or the terminal law.
+    /// What is known to work: the rest of the last plan, else the terminal law.
     fn guaranteed(
         &self,
         x: &SVector<T, NX>,
-        wanted: T,
-        shifted: Option<&Plan<T, NX, NU, N>>,
+        aims: &SetPoints<T, N>,
+        rest: Option<&Plan<T, NX, NU, N>>,
     ) -> Option<(Plan<T, NX, NU, N>, Decision)> {
-        let candidate = shifted
-            .filter(|plan| self.is_feasible(plan, T::zero()))
+        let candidate = rest
+            .filter(|plan| self.is_feasible(plan))
             .map(|plan| (*plan, Decision::Candidate));
         if candidate.is_some() {
             return candidate;
         }
-        let plan = self.under_terminal_law(x, wanted);
-        let inside = self.terminal_value(x, plan.set_point) <= self.settings.terminal.level;
-        (inside && self.is_feasible(&plan, T::zero())).then_some((plan, Decision::TerminalLaw))
+        let plan = self.under_terminal_law(x, aims);
+        self.is_feasible(&plan)
+            .then_some((plan, Decision::TerminalLaw))
+    }
+
+    /// The last plan once more, where that is feasible and cheaper than what is known to work.
+    fn cheaper(
+        &self,
+        x: &SVector<T, NX>,
+        aims: &SetPoints<T, N>,
+        guaranteed: Option<&(Plan<T, NX, NU, N>, Decision)>,
+    ) -> Option<Plan<T, NX, NU, N>> {
+        let ((known, _), last) = (guaranteed?, self.plan.as_ref()?);
+        let plan = self.repeated(x, last, aims);
+        let cheaper = plan.cost < known.cost && self.is_robust(&plan);
+        cheaper.then_some(plan)
     }
 
     /// Quadratic programs along `along`, each answer confirmed by the rollout. Returns the best
-    /// confirmed plan that costs no more than the guaranteed one.
+    /// confirmed plan that costs less than the known one, with its gap, and goes on after a first
+    /// one as long as there are programs left and the cost falls.
     fn improve<const M: usize>(
         &mut self,
         x: &SVector<T, NX>,
-        wanted: T,
+        aims: &SetPoints<T, N>,
         along: &Plan<T, NX, NU, N>,
-        guaranteed: Option<Plan<T, NX, NU, N>>,
+        known: Option<Decision>,
         workspace: &mut GuardedWorkspace<T, NU, NA, NP, M>,
-    ) -> Option<Plan<T, NX, NU, N>> {
+    ) -> Option<(Plan<T, NX, NU, N>, SVector<T, NX>)> {
         let GuardedSettings { iterations, .. } = self.settings;
-        let most = if guaranteed.is_some() {
-            iterations.known
-        } else {
-            iterations.unknown
+        let most = match known {
+            Some(Decision::Candidate) => iterations.known,
+            _ => iterations.unknown,
         };
-        let margin: T = self.settings.margin * convert::<f64, T>(0.5);
         let mut along = *along;
-        let mut best = guaranteed;
+        let mut is_known = known.is_some();
         let mut improved = None;
+        let mut in_vain = 0;
+        let mut warm_start = WarmStart::Same;
         for _ in 0..most {
-            self.pose(x, wanted, &along, &mut workspace.ocp);
-            self.solve(workspace, WarmStart::Shifted);
-            if !workspace.solution.status.is_solved() {
-                self.scale_reach(0.5);
-                break;
+            self.pose(x, aims, &along, self.slope, &mut workspace.ocp);
+            self.solve(workspace, warm_start);
+            warm_start = WarmStart::Same;
+            if !is_known && !workspace.solution.status.is_solved() {
+                self.soften(&mut workspace.ocp);
+                self.solve(workspace, WarmStart::Cold);
             }
-            let (u, set_point) = program::answer(&workspace.solution);
-            let found = FRACTIONS.iter().find_map(|fraction| {
-                let part = convert(*fraction);
-                let plan = self.between(x, wanted, &along, &u, set_point, part);
-                let cheaper = best.as_ref().is_none_or(|best| plan.cost <= best.cost);
-                (cheaper && self.is_feasible(&plan, margin)).then_some((plan, *fraction))
-            });
-            // The trust region grows when its edge was reached and the whole step held.
-            let half: T = convert(0.5);
-            let at_edge = (set_point - along.set_point).abs() > self.reach * half;
-            self.scale_reach(match found {
-                Some((_, fraction)) if fraction == 1.0 && at_edge => 2.0,
-                Some(_) => 1.0,
-                None => 0.5,
-            });
-            match found {
-                Some((plan, _)) => {
-                    along = plan;
-                    best = Some(plan);
-                    improved = Some(plan);
-                    if guaranteed.is_none() {
+            let outcome = if workspace.solution.status.is_solved() {
+                self.learn(workspace, &along);
+                self.search(x, aims, &along, is_known, workspace)
+            } else {
+                Outcome::Nothing
+            };
+            if workspace.solution.status.is_solved() {
+                (self.drift, self.end_drift) = self.tube(&along, workspace);
+            }
+            let found = match outcome {
+                Outcome::Found(found) => found,
+                Outcome::Settled => {
+                    self.damp(Some(1.0));
+                    break;
+                }
+                Outcome::Nothing => {
+                    // What does not serve far from the plan may serve close to it, and the other
+                    // way round.
+                    self.damp(None);
+                    self.slope = self.slope.other();
+                    in_vain += 1;
+                    if in_vain == 3 {
                         break;
                     }
+                    continue;
                 }
-                // Without a plan that works, half steps lead to one; with one, it is kept.
-                None if guaranteed.is_none() => {
-                    along = self.between(x, wanted, &along, &u, set_point, half);
-                    if !along.cost.is_finite() {
-                        break;
-                    }
-                }
-                None => break,
+            };
+            self.damp(Some(found.fraction));
+            in_vain = 0;
+            self.slope = Slope::Jacobian;
+            let settled = is_known && !self.is_worthwhile(along.cost - found.plan.cost, &along);
+            along = found.plan;
+            if found.feasible {
+                is_known = true;
+                improved = Some((found.plan, found.gap));
+            }
+            if settled {
+                break;
             }
         }
         improved
     }
 
-    /// Not below a thousandth of the terminal set: a smaller trust region would never be seen to
-    /// hold, and so never grow again.
-    fn scale_reach(&mut self, factor: f64) {
-        let extent = self.settings.terminal.extent(&self.settings.direction);
-        let least = extent * convert(1e-3);
-        self.reach = (self.reach * convert(factor)).max(least);
+    /// The first part of the way to the program's answer that costs less and is feasible; while no
+    /// feasible plan is known, the first that is feasible, or else nearer to it.
+    fn search<const M: usize>(
+        &self,
+        x: &SVector<T, NX>,
+        aims: &SetPoints<T, N>,
+        along: &Plan<T, NX, NU, N>,
+        is_known: bool,
+        workspace: &GuardedWorkspace<T, NU, NA, NP, M>,
+    ) -> Outcome<T, NX, NU, N> {
+        let horizon = self.settings.horizon;
+        let origin = self.settings.direction * along.set_point;
+        let GuardedWorkspace {
+            solution, solver, ..
+        } = workspace;
+        let towards = program::answer(solution, solver, &origin);
+        let predicted = program::predicted_end(solution, horizon, &origin);
+        let before = self.merit(along);
+        let mut nearer = None;
+        for fraction in FRACTIONS {
+            let plan = self.between(x, aims, along, &towards, convert(fraction));
+            let found = self.judge(plan, fraction, &predicted, workspace);
+            if self.is_better(&found, along, is_known) {
+                return Outcome::Found(found);
+            }
+            if is_known && fraction == 1.0 && !self.is_worthwhile(plan.cost - along.cost, along) {
+                return Outcome::Settled;
+            }
+            if !is_known && nearer.is_none() && self.merit(&plan) < before {
+                nearer = Some(found);
+            }
+        }
+        nearer.map_or(Outcome::Nothing, Outcome::Found)
+    }
+
+    /// A rollout with what it is worth; `predicted` is where the program expected its end.
+    fn judge<const M: usize>(
+        &self,
+        mut plan: Plan<T, NX, NU, N>,
+        fraction: f64,
+        predicted: &SVector<T, NX>,
+        workspace: &GuardedWorkspace<T, NU, NA, NP, M>,
+    ) -> Found<T, NX, NU, N> {
+        let gap = plan.end - predicted;
+        let feasible = self.is_feasible(&plan) && {
+            (plan.drift, plan.end_drift) = self.tube(&plan, workspace);
+            self.is_robust(&plan)
+        };
+        Found {
+            plan,
+            fraction,
+            feasible,
+            gap,
+        }
+    }
+
+    /// Whether a change of the cost by so much, up or down, is worth another program.
+    fn is_worthwhile(&self, change: T, along: &Plan<T, NX, NU, N>) -> bool {
+        let relative = along.cost * convert::<f64, T>(WORTHWHILE);
+        let absolute = self.settings.terminal.level * T::default_epsilon().powf(convert(0.75));
+        !(change.abs() <= relative + absolute)
+    }
+
+    fn is_better(
+        &self,
+        found: &Found<T, NX, NU, N>,
+        along: &Plan<T, NX, NU, N>,
+        is_known: bool,
+    ) -> bool {
+        found.feasible && (!is_known || found.plan.cost < along.cost)
+    }
+
+    /// More damping where a program's answer did not hold, less where all of it did.
+    fn damp(&mut self, fraction: Option<f64>) {
+        let least: T = convert(0.1);
+        let factor = match fraction {
+            Some(1.0) => 0.2,
+            Some(0.5) => 1.5,
+            Some(_) => 3.0,
+            None => 10.0,
+        };
+        let damping = self.damping.max(least) * convert(factor);
+        self.damping = if damping < least {
+            T::zero()
+        } else {
+            damping.min(convert(1e6))
+        };
     }
 
     /// Outside of what is guaranteed: soft bounds, then the saturated terminal law.
     fn last_resort<const M: usize>(
         &self,
         x: &SVector<T, NX>,
-        wanted: T,
+        aims: &SetPoints<T, N>,
         along: &Plan<T, NX, NU, N>,
         workspace: &mut GuardedWorkspace<T, NU, NA, NP, M>,
-    ) -> (Plan<T, NX, NU, N>, Decision) {
+    ) -> (Plan<T, NX, NU, N>, Decision, SVector<T, NX>) {
         if along.cost.is_finite() {
-            self.pose(x, wanted, along, &mut workspace.ocp);
+            self.pose(x, aims, along, self.slope, &mut workspace.ocp);
             self.soften(&mut workspace.ocp);
             self.solve(workspace, WarmStart::Cold);
             if workspace.solution.status.is_solved() {
-                let (u, set_point) = program::answer(&workspace.solution);
-                let plan = self.between(x, wanted, along, &u, set_point, T::one());
+                let GuardedWorkspace {
+                    solution, solver, ..
+                } = workspace;
+                let origin = self.settings.direction * along.set_point;
+                let towards = program::answer(solution, solver, &origin);
+                let plan = self.between(x, aims, along, &towards, T::one());
                 if plan.cost.is_finite() {
-                    return (plan, Decision::SoftBounds);
+                    let predicted =
+                        program::predicted_end(solution, self.settings.horizon, &origin);
+                    return (plan, Decision::SoftBounds, plan.end - predicted);
                 }
             }
         }
-        (self.under_terminal_law(x, wanted), Decision::SaturatedLqr)
+        let plan = self.under_terminal_law(x, aims);
+        (plan, Decision::SaturatedLqr, SVector::zeros())
     }
 
     fn solve<const M: usize>(
@@ -379,18 +533,26 @@ where
             .solver
             .solve(&workspace.ocp, &settings, &mut workspace.solution);
     }
+}
 
-    fn gap<const M: usize>(
-        &self,
-        plan: &Plan<T, NX, NU, N>,
-        decision: Decision,
-        workspace: &GuardedWorkspace<T, NU, NA, NP, M>,
-    ) -> SVector<T, NX> {
-        match decision {
-            Decision::NewPlan | Decision::SoftBounds => {
-                plan.end - program::predicted_end(&workspace.solution, self.settings.horizon)
-            }
-            _ => SVector::zeros(),
-        }
-    }
+/// What a program's answer is good for.
+#[derive(Clone, Copy)]
+enum Outcome<T, const NX: usize, const NU: usize, const N: usize> {
+    /// A plan to go on from.
+    Found(Found<T, NX, NU, N>),
+    /// It is the plan that there is, up to what is not worth its time.
+    Settled,
+    /// No part of the way is better.
+    Nothing,
+}
+
+/// A part of the way to a program's answer, rolled out.
+#[derive(Clone, Copy)]
+struct Found<T, const NX: usize, const NU: usize, const N: usize> {
+    plan: Plan<T, NX, NU, N>,
+    /// Part of the way.
+    fraction: f64,
+    feasible: bool,
+    /// Rolled-out minus predicted state at the end.
+    gap: SVector<T, NX>,
 }

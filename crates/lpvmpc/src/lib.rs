@@ -19,7 +19,6 @@ mod plan;
 mod policy;
 mod predictor;
 mod ramp;
-mod relaxation;
 pub mod riccati;
 mod rows;
 mod settings;
@@ -36,7 +35,7 @@ pub use estimator::{
 };
 pub use guarded::{
     Decision, GuardedController, GuardedError, GuardedIterations, GuardedSettings, GuardedStep,
-    GuardedWorkspace, TerminalSet,
+    GuardedWorkspace, Rollout, SetPoints, TerminalSet,
 };
 pub use kkt::{KktResidual, kkt_residual};
 pub use model::{LpvModel, Scalar};

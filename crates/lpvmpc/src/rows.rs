@@ -22,8 +22,21 @@ pub(crate) struct Candidate<T> {
     pub soft: Option<Penalty<T>>,
     /// Distance inside the bound; negative outside.
     pub slack: T,
-    /// `-slack` in units of the bound's own size.
+    /// `-slack` in units of the bound's own size: what is compared with the tolerance.
     pub violation: T,
+    /// `-slack` in units of the bound's room: by what candidates are ranked.
+    pub rank: T,
+}
+
+/// The size by which violations are ranked: half the width of the bound, which does not depend on
+/// where zero is; where one side is infinite, the bound's own size.
+fn room_of_bound<T: Scalar>(lower: T, upper: T) -> T {
+    let half = (upper - lower) * convert::<f64, T>(0.5);
+    if half > T::zero() && half.is_finite() {
+        half
+    } else {
+        size_of_bound(lower, upper)
+    }
 }
 
 /// The size against which a violation is measured: the larger finite limit, or 1.
@@ -71,6 +84,7 @@ fn violated_sides<T: Scalar, const K: usize>(
                 soft: *soft,
                 slack,
                 violation: -slack / size_of_bound(*lower, *upper),
+                rank: -slack / room_of_bound(*lower, *upper),
             });
         }
     }
@@ -199,6 +213,15 @@ pub(crate) fn size<T: Scalar, const NX: usize, const NU: usize, const N: usize, 
 ) -> T {
     let (lower, upper) = limits(ocp, bound);
     size_of_bound(lower, upper)
+}
+
+/// The size by which a violation of `bound` is ranked.
+pub(crate) fn room<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    bound: &BoundId,
+) -> T {
+    let (lower, upper) = limits(ocp, bound);
+    room_of_bound(lower, upper)
 }
 
 /// Lower and upper limit of the bounded quantity, both the target for an equality.

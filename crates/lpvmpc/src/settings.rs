@@ -38,15 +38,8 @@ pub enum Scheduling<T, const NS: usize> {
 /// before; the first, along the last sample's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Iterations<T> {
-    /// So many, at least 1; the paper takes 1.
+    /// So many, at least 1, each answer taken as it is; the paper takes 1.
     Fixed(usize),
-    /// Until the plan repeats itself.
-    UntilConverged {
-        /// No input changes by more than this, relative to the largest input of the plan.
-        tolerance: T,
-        /// At most so many, at least 1.
-        most: usize,
-    },
     /// Each one an improvement: a descent on the cost of the nonlinear rollout, in which the answer
     /// of a program is taken as far as the cost falls, and not at all where it does not.
     Descent {
@@ -59,26 +52,16 @@ pub enum Iterations<T> {
 
 impl<T: Scalar> Iterations<T> {
     /// The largest number.
-    pub(crate) fn most(&self) -> usize {
+    pub fn most(&self) -> usize {
         match self {
-            Self::Fixed(most) | Self::UntilConverged { most, .. } | Self::Descent { most, .. } => {
-                *most
-            }
-        }
-    }
-
-    /// The tolerance; without one, no change is small enough.
-    pub(crate) fn tolerance(&self) -> T {
-        match self {
-            Self::Fixed(_) => -T::one(),
-            Self::UntilConverged { tolerance, .. } | Self::Descent { tolerance, .. } => *tolerance,
+            Self::Fixed(most) | Self::Descent { most, .. } => *most,
         }
     }
 
     fn make_sense(&self) -> bool {
         let tolerance = match self {
             Self::Fixed(_) => T::one(),
-            Self::UntilConverged { tolerance, .. } | Self::Descent { tolerance, .. } => *tolerance,
+            Self::Descent { tolerance, .. } => *tolerance,
         };
         self.most() > 0 && tolerance > T::zero() && tolerance.is_finite()
     }

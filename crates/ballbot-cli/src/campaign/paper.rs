@@ -1,11 +1,14 @@
 //! The negative control: the paper's scheme to the letter.
 
-use super::run::{N, Record, Wanted, has_fallen};
+use super::run::{Record, Wanted, has_fallen};
 use crate::commands::CommandError;
 use ballbot::Ballbot;
 use ballbot_scenario::{Prepared, ScenarioError};
 use lpvmpc::{Controller, Reference, Workspace};
 use nalgebra::Vector4;
+
+/// Horizon of the paper's scenario.
+const N: usize = 20;
 
 /// Runs the controller of `prepared` until it has no plan, for then the scheme has no torque.
 pub(super) fn run(

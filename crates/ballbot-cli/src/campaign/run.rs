@@ -5,12 +5,17 @@ use crate::commands::CommandError;
 use ballbot::Ballbot;
 use ballbot_scenario::{GUARDED_ACTIVE, Prepared, ScenarioError};
 use lpvmpc::{Decision, GuardedController, GuardedSettings, GuardedWorkspace};
-use lpvmpc_sim::{GuardedLoop, Random};
+use lpvmpc_sim::{GuardedLoop, Random, Tolerances};
 use nalgebra::{Vector1, Vector4};
 use serde::Serialize;
 
-/// Horizon of the campaign's controllers.
-pub(super) const N: usize = 20;
+/// The longest horizon of the campaign's controllers.
+pub(super) const N: usize = 60;
+/// How the plant is integrated: as exactly as it makes sense.
+const TOLERANCES: Tolerances = Tolerances {
+    relative: 1e-12,
+    absolute: 1e-12,
+};
 type Guarded = GuardedController<Ballbot<f64>, f64, 4, 1, 3, N, 5, { N + 2 }>;
 type Workspace = GuardedWorkspace<f64, 1, 5, { N + 2 }, GUARDED_ACTIVE>;
 
@@ -23,6 +28,8 @@ pub struct Record {
     pub infeasible: usize,
     /// States outside the bounds, at samples.
     pub violations: usize,
+    /// Samples between which a state was outside the bounds.
+    pub violations_between: usize,
     /// How often each decision was taken, from [`Decision::NewPlan`] on.
     pub decisions: [usize; 5],
     /// Samples at which the cost of the plan grew though the set point stayed.
@@ -37,6 +44,19 @@ pub struct Record {
     pub largest_gap: f64,
     /// Cost of the closed loop: the stage costs of states and torques, about the wanted set point.
     pub cost: f64,
+}
+
+/// Set points that a robot cannot follow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Course {
+    /// Another one at every sample.
+    EverySample,
+    /// From one side to the other at every sample.
+    Alternating,
+    /// Farther away at every sample, faster than the robot drives.
+    RunningAway,
+    /// 1e300, infinite, NaN and others in turn.
+    Huge,
 }
 
 /// Set points and when they are given.
@@ -58,6 +78,22 @@ impl Wanted {
         Self(points.collect())
     }
 
+    /// What a `course` of set points asks for.
+    pub(super) fn of(course: Course, random: &mut Random, samples: usize, farthest: f64) -> Self {
+        let size = farthest * random.symmetric();
+        let at = |k: usize, random: &mut Random| match course {
+            Course::EverySample => farthest * random.symmetric(),
+            Course::Alternating if k % 2 == 0 => size,
+            Course::Alternating => -size,
+            Course::RunningAway => size * k as f64,
+            Course::Huge => {
+                let beyond = [1e300, -1e300, f64::INFINITY, f64::NAN, size];
+                beyond[(5.0 * random.uniform()) as usize % beyond.len()]
+            }
+        };
+        Self((0..samples).map(|k| at(k, random)).collect())
+    }
+
     /// The set points, one per sample.
     pub fn points(&self) -> &[f64] {
         &self.0
@@ -72,36 +108,41 @@ pub(super) struct Loop<'a> {
 }
 
 impl<'a> Loop<'a> {
-    /// A state drawn evenly from the certified set around phi = 0.
-    pub fn start(prepared: &Prepared, random: &mut Random) -> Result<Vector4<f64>, CommandError> {
+    /// A state drawn evenly from the certified set around phi = 0, or from its `edge`.
+    pub fn start(
+        prepared: &Prepared,
+        edge: bool,
+        random: &mut Random,
+    ) -> Result<Vector4<f64>, CommandError> {
         let GuardedSettings { terminal, .. } = settings(prepared)?;
         let direction = Vector4::from_fn(|_, _| random.normal()).normalize();
-        let radius = terminal.level.sqrt() * random.uniform().powf(0.25);
+        let part = random.uniform().powf(0.25);
+        let radius = terminal.level.sqrt() * if edge { 1.0 } else { part };
         // With P = L L', x = L^-T y has x'Px = |y|^2.
         let factor = terminal.p.cholesky().map(|factor| factor.l().transpose());
         let state = factor.and_then(|root| root.solve_upper_triangular(&(direction * radius)));
         state.ok_or_else(|| no_certificate().into())
     }
 
-    /// The loop of `prepared`, with so many programs per sample if given, around the plant that
-    /// `plant` draws.
+    /// The loop of `prepared` with the changes of `variant`.
     pub fn new(
         prepared: &'a Prepared,
-        programs: Option<usize>,
-        plant: impl FnOnce(&mut Random) -> Ballbot<f64>,
+        variant: &Variant,
         random: &mut Random,
     ) -> Result<Self, CommandError> {
         let mut settings = *settings(prepared)?;
-        if let Some(known) = programs {
-            settings.iterations.known = known;
+        match *variant {
+            Variant::Candidates => settings.iterations.known = 0,
+            Variant::Horizon(horizon) => settings.horizon = horizon,
+            _ => {}
         }
         let controller = Guarded::new(prepared.ballbot, settings);
         let controller = controller.map_err(ScenarioError::from)?;
-        let start = Self::start(prepared, random)?;
-        let plant = plant(random);
+        let start = Self::start(prepared, *variant == Variant::Edge, random)?;
+        let plant = variant.plant(prepared, random);
         Ok(Self {
             prepared,
-            guarded: GuardedLoop::new(controller, plant, start, prepared.tolerances),
+            guarded: GuardedLoop::new(controller, plant, start, TOLERANCES),
             workspace: Box::new(Workspace::new()),
         })
     }
@@ -141,7 +182,11 @@ impl<'a> Loop<'a> {
                 .then_some((*wanted, step.cost));
             record.pay(self.guarded.state(), *wanted, &step.u, self.prepared);
             let actuation = variant.actuation(random);
+            let before = *self.guarded.state();
             let moved = self.guarded.advance(&step.u, &actuation);
+            if variant.is_nominal() {
+                record.look_between(&before, &step.u, self.prepared);
+            }
             if moved.is_err() || has_fallen(self.guarded.state()) {
                 record.fell = true;
                 break;
@@ -158,6 +203,23 @@ impl Record {
         self.largest_tilt_rad = self.largest_tilt_rad.max(x[1].abs());
         if !prepared.settings.x.contains(x, 0.0) {
             self.violations += 1;
+        }
+    }
+
+    /// Takes the states between two samples into account, under the input `u` from `x` on.
+    fn look_between(&mut self, x: &Vector4<f64>, u: &Vector1<f64>, prepared: &Prepared) {
+        const PARTS: usize = 8;
+        let part = prepared.settings.t_s / PARTS as f64;
+        let mut x = *x;
+        for _ in 1..PARTS {
+            let moved = lpvmpc_sim::advance(&prepared.ballbot, &x, u, part, TOLERANCES);
+            match moved {
+                Ok(next) if prepared.settings.x.contains(&next, 0.0) => x = next,
+                _ => {
+                    self.violations_between += 1;
+                    return;
+                }
+            }
         }
     }
 

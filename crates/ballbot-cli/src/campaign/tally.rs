@@ -19,6 +19,18 @@ pub struct Tally {
 }
 
 impl Tally {
+    /// How often something happened that is guaranteed not to.
+    pub fn broken_promises(&self) -> usize {
+        let Record {
+            infeasible,
+            violations,
+            violations_between,
+            cost_growths,
+            ..
+        } = self.total;
+        infeasible + violations + violations_between + cost_growths + self.runs_fallen
+    }
+
     /// Counts the runs.
     pub fn of(records: &[Record]) -> Self {
         let mut tally = Self::default();
@@ -31,13 +43,15 @@ impl Tally {
     fn add(&mut self, record: &Record) {
         self.runs += 1;
         self.runs_feasible += usize::from(record.infeasible == 0);
-        let kept = record.infeasible == 0 && record.violations == 0;
+        let outside = record.violations + record.violations_between;
+        let kept = record.infeasible == 0 && outside == 0;
         self.runs_within_bounds += usize::from(kept);
         self.runs_fallen += usize::from(record.fell);
         let total = &mut self.total;
         total.samples += record.samples;
         total.infeasible += record.infeasible;
         total.violations += record.violations;
+        total.violations_between += record.violations_between;
         total.cost_growths += record.cost_growths;
         for (total, count) in total.decisions.iter_mut().zip(record.decisions) {
             *total += count;

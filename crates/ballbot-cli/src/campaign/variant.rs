@@ -1,6 +1,6 @@
 //! What differs from the nominal closed loop.
 
-use super::run::{Loop, Record, Wanted};
+use super::run::{Course, Loop, Record, Wanted};
 use super::{Campaign, Scenarios, paper};
 use crate::commands::CommandError;
 use ballbot::Ballbot;
@@ -14,9 +14,14 @@ use std::fmt;
 pub enum Variant {
     /// The plant is the model, the torque acts as commanded.
     Nominal,
-    /// The same with up to so many programs per sample, until none improves the plan any more:
-    /// nonlinear MPC to convergence, as the measure of the cost.
-    Converged(usize),
+    /// The same from the edge of the certified set.
+    Edge,
+    /// The same with set points that a robot cannot follow.
+    Unfollowable(Course),
+    /// The same with no programs but for the first plan: the rest of it is all there is.
+    Candidates,
+    /// The same with this horizon.
+    Horizon(usize),
     /// Now and then a push changes the rates by up to so much of their bounds.
     Pushes(f64),
     /// b1, b2 and b3 of the plant differ by up to this part of their values, each for itself. A
@@ -33,9 +38,18 @@ pub enum Variant {
 
 impl Variant {
     /// All of them, in the order of the table.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 20] = [
         Self::Nominal,
-        Self::Converged(30),
+        Self::Edge,
+        Self::Unfollowable(Course::EverySample),
+        Self::Unfollowable(Course::Alternating),
+        Self::Unfollowable(Course::RunningAway),
+        Self::Unfollowable(Course::Huge),
+        Self::Candidates,
+        Self::Horizon(5),
+        Self::Horizon(10),
+        Self::Horizon(40),
+        Self::Horizon(60),
         Self::Pushes(0.1),
         Self::Pushes(0.4),
         Self::Parameters(0.05),
@@ -58,24 +72,36 @@ impl Variant {
         let prepared = &scenarios.guaranteed;
         match self {
             Self::Paper(farthest) => {
-                let start = Loop::start(prepared, &mut random)?;
+                let start = Loop::start(prepared, false, &mut random)?;
                 let wanted = Wanted::draw(&mut random, campaign.samples, *farthest);
                 paper::run(&scenarios.paper, start, &wanted, campaign.samples)
             }
             _ => {
-                let programs = match *self {
-                    Self::Converged(programs) => Some(programs),
-                    _ => None,
+                let mut run = Loop::new(prepared, self, &mut random)?;
+                let wanted = match *self {
+                    Self::Unfollowable(course) => {
+                        Wanted::of(course, &mut random, campaign.samples, FARTHEST)
+                    }
+                    _ => Wanted::draw(&mut random, campaign.samples, FARTHEST),
                 };
-                let plant = |random: &mut Random| self.plant(prepared, random);
-                let mut run = Loop::new(prepared, programs, plant, &mut random)?;
-                let wanted = Wanted::draw(&mut random, campaign.samples, FARTHEST);
                 Ok(run.record(self, &wanted, campaign.samples, &mut random))
             }
         }
     }
 
-    fn plant(&self, prepared: &Prepared, random: &mut Random) -> Ballbot<f64> {
+    /// Whether the plant is the model, so that what is guaranteed must hold.
+    pub fn is_nominal(&self) -> bool {
+        matches!(
+            self,
+            Self::Nominal
+                | Self::Edge
+                | Self::Unfollowable(_)
+                | Self::Candidates
+                | Self::Horizon(_)
+        )
+    }
+
+    pub(super) fn plant(&self, prepared: &Prepared, random: &mut Random) -> Ballbot<f64> {
         let nominal = prepared.ballbot;
         let Self::Parameters(part) = *self else {
             return nominal;
@@ -130,7 +156,19 @@ impl fmt::Display for Variant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Nominal => f.write_str("nominal"),
-            Self::Converged(_) => f.write_str("nominal, nonlinear MPC"),
+            Self::Edge => f.write_str("nominal, from the set's edge"),
+            Self::Unfollowable(Course::EverySample) => {
+                f.write_str("nominal, new set points at every sample")
+            }
+            Self::Unfollowable(Course::Alternating) => {
+                f.write_str("nominal, alternating set points")
+            }
+            Self::Unfollowable(Course::RunningAway) => {
+                f.write_str("nominal, set points that run away")
+            }
+            Self::Unfollowable(Course::Huge) => f.write_str("nominal, set points to 1e300, NaN"),
+            Self::Candidates => f.write_str("nominal, candidates only"),
+            Self::Horizon(horizon) => write!(f, "nominal, {horizon} samples"),
             Self::Pushes(part) => write!(f, "pushes, {:.0} % of the rates' bounds", 100.0 * part),
             Self::Parameters(part) => write!(f, "b1 to b3 ±{:.0} %", 100.0 * part),
             Self::TorqueNoise(deviation) => write!(f, "torque noise {deviation} N m"),

@@ -100,6 +100,14 @@ pub enum CommandError {
         /// Where the recorded part is.
         folder: PathBuf,
     },
+    /// A guarantee that did not hold on the plant that it is for.
+    #[error("{broken} times something happened that is guaranteed not to:\n{table}")]
+    BrokenPromise {
+        /// How often.
+        broken: usize,
+        /// All counts.
+        table: String,
+    },
     /// Published numbers that were not reproduced.
     #[error(
         "{differing} of the published statements do not agree:\n{table}\nsee {}",

@@ -284,7 +284,7 @@ fn summary(prepared: &Prepared, trajectories: &[Trajectory<4, 1>], folder: &Path
         .zip(trajectories)
         .map(|(plane, run)| Metrics::new(prepared, plane, run))
         .collect();
-    let rows: [Line; 8] = [
+    let rows: [Line; 9] = [
         ("largest tilt [rad]", |m| {
             format!("{:.4}", m.largest_tilt_rad)
         }),
@@ -298,6 +298,11 @@ fn summary(prepared: &Prepared, trajectories: &[Trajectory<4, 1>], folder: &Path
             format!("{:.4}", m.largest_error_rad)
         }),
         ("samples outside the bounds", |m| m.violations.to_string()),
+        ("samples not backed by a guarantee", |m| {
+            let none = || "no guarantee".to_owned();
+            m.not_guaranteed
+                .map_or_else(none, |count| count.to_string())
+        }),
         ("most active bounds", |m| m.most_active_bounds.to_string()),
         ("time per step, mean [us]", |m| {
             format!("{:.1}", m.mean_step_us)

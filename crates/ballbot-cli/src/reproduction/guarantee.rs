@@ -50,8 +50,8 @@ impl Guarantee {
             scenario.controller.iterations = Some(iterations);
             Ok(scenario)
         };
-        let converged = IterationsTable::UntilConverged {
-            tolerance: 1e-10,
+        let converged = IterationsTable::Descent {
+            tolerance: 1e-6,
             most: 100,
         };
         let mut fine = Scenario::load("two-setpoints")?;

@@ -1,6 +1,6 @@
 //! A small campaign: what is guaranteed holds, and the negative control fails.
 
-use ballbot_cli::campaign::{Campaign, Outcome, Scenarios, Variant, cost_ratios};
+use ballbot_cli::campaign::{Campaign, Outcome, Scenarios, Variant};
 
 const SMALL: Campaign = Campaign {
     runs: 200,
@@ -30,10 +30,13 @@ fn the_nominal_loop_keeps_its_promise_and_the_paper_s_scheme_does_not() {
     // The search for something better is no formality.
     assert!(nominal.total.decisions[0] > nominal.total.samples / 2);
 
-    // The measure of the cost: with more programs the same loops do not cost much less.
-    let ratios = cost_ratios(&outcomes);
-    assert_eq!(ratios.len(), 20);
-    assert!(ratios[10] > 0.98 && ratios[10] < 1.2, "{ratios:?}");
+    // Whatever the set points and the horizon.
+    for Outcome { variant, tally, .. } in &outcomes {
+        assert!(
+            !variant.is_nominal() || tally.broken_promises() == 0,
+            "{variant}: {tally:?}"
+        );
+    }
 
     let paper = of(&outcomes, |variant| matches!(variant, Variant::Paper(_))).tally;
     assert!(paper.total.infeasible > 0, "{paper:?}");

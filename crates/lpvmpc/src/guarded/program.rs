@@ -1,16 +1,20 @@
 //! The quadratic program of a guarded sample.
 //!
-//! Its state is (x, z) with the set point z, which stays as it is. Two stages are added to the
-//! horizon: at the first, whose input is z, the state is given its set point; at the last, the
-//! state becomes y = L'(x_N - z d) with P = L L', so that the terminal cost is |y|^2 and the
-//! terminal set the ball |y|^2 <= level. The program asks for the cube |y_i| <= sqrt(level / NX)
-//! inside that ball; the acceptance test asks for the ball.
+//! Its state is (x, z) with the set point z, which stays as it is, both seen from the set point of
+//! the plan that it is made along: so it does not matter where the plant stands. Two stages are
+//! added to the horizon: at the first, whose input is z, the state is given its set point; at the
+//! last, the state becomes y = H L'(x_N - z d) with P = L L', so that the terminal cost is |y|^2 and
+//! the terminal set the ball |y|^2 <= level. The reflection H puts the plan's own y on the first
+//! axis, where the program asks for the ball's tangent plane; the ball's curvature is in the cost,
+//! with the multiplier of the program before. The acceptance test asks for the ball itself.
 
-use super::GuardedController;
-use super::plan::{Plan, shrunk, width};
+use super::aim::SetPoints;
+use super::plan::{Plan, Policy, shrunk, width};
+use super::{GuardedController, GuardedWorkspace};
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Bounds, Ocp, Penalty, Stage};
-use crate::solution::{BoundId, Solution};
+use crate::solution::{ActiveRow, BoundId, Quantity, Solution};
+use crate::solver::Solver;
 use nalgebra::{Cholesky, Const, SMatrix, SVector, convert};
 
 impl<
@@ -27,39 +31,118 @@ where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
-    /// The program along the plan `along`.
+    /// The program along the plan `along`, whose states it lets be where they keep the bounds.
     pub(super) fn pose(
         &self,
         x0: &SVector<T, NX>,
-        wanted: T,
+        aims: &SetPoints<T, N>,
         along: &Plan<T, NX, NU, N>,
+        slope: Slope,
         ocp: &mut Ocp<T, NA, NU, NP>,
     ) {
+        let settings = &self.settings;
         // The last stage of the horizon follows its samples.
-        ocp.horizon = self.settings.horizon + 2;
-        ocp.x0 = augmented(x0, T::zero());
-        let bounds = shrunk(&self.settings.x, self.settings.margin);
+        ocp.horizon = settings.horizon + 2;
+        let origin = settings.direction * along.set_point;
+        ocp.x0 = augmented(&(x0 - origin), T::zero());
+        let tight = shrunk(&settings.x, settings.margin);
+        // The measured state is as it is; x_1 and later are bounded, as far from the bounds as the
+        // plan goes beyond its samples.
+        let bounds = |i: usize, x: &SVector<T, NX>| {
+            let (above, below) = self.beyond_samples(along, x0, i);
+            let (lower, upper) = (tight.lower + below, tight.upper - above);
+            let kept = settings.x.hold_at(&(x + above)) && settings.x.hold_at(&(x - below));
+            let lower = if kept { lower.inf(x) } else { lower };
+            let upper = if kept { upper.sup(x) } else { upper };
+            let infinity: T = convert(f64::INFINITY);
+            Bounds {
+                lower: augmented(&(lower - origin), -infinity),
+                upper: augmented(&(upper - origin), infinity),
+            }
+        };
+        let changes = aims.before_last_change(settings.horizon);
         let states = core::iter::once(x0).chain(&along.x);
-        let samples = states.zip(&along.u).take(self.settings.horizon);
+        let samples = states.zip(&along.u).zip(&along.x).zip(&aims.stages);
         let mut stages = ocp.stages.iter_mut();
         if let Some(first) = stages.next() {
-            *first = self.set_point_stage(wanted, along.set_point);
+            *first = self.set_point_stage(aims.end - along.set_point, along.set_point);
         }
-        for ((i, (x, u)), stage) in samples.enumerate().zip(&mut stages) {
-            *stage = self.sample_stage(x, u);
-            // The measured state is as it is; x_1 and later are bounded.
+        let samples = samples.take(settings.horizon).enumerate();
+        for ((i, (((x, u), x_next), wanted)), stage) in samples.zip(&mut stages) {
+            let aim = (i < changes).then_some(*wanted - along.set_point);
+            let (x_here, x_next) = (x - origin, x_next - origin);
+            *stage = self.sample_stage(slope, x, &x_here, u, &x_next, aim);
             if i > 0 {
-                stage.x = self.augmented_bounds(&bounds);
+                stage.x = bounds(i, x);
             }
         }
+        let end = self.root() * (along.end - origin);
+        let radius = self.settings.terminal.level.sqrt();
+        // The tangent plane touches the ball where the last program ended, or this plan does.
+        let touch = self.touch.unwrap_or(end);
         if let Some(last) = stages.next() {
-            *last = self.terminal_stage();
-            last.x = self.augmented_bounds(&bounds);
+            *last = self.terminal_stage(&touch);
+            last.x = bounds(settings.horizon, &along.end);
         }
-        self.pose_end(ocp);
+        let edge = radius * (T::one() - settings.margin) - self.reserve(self.end_drift);
+        let widest = if end.norm() <= radius { radius } else { edge };
+        self.pose_end(edge, widest, touch[0] < T::zero(), ocp);
     }
 
-    /// (x, 0) becomes (x, z): the first input is z, with the offset cost.
+    /// Where the solved program ended as y, and the multiplier of the terminal set: what the next
+    /// one is posed with.
+    pub(super) fn learn<const M: usize>(
+        &mut self,
+        workspace: &GuardedWorkspace<T, NU, NA, NP, M>,
+        along: &Plan<T, NX, NU, N>,
+    ) {
+        let GuardedWorkspace { ocp, solution, .. } = workspace;
+        let at_end = |row: &&ActiveRow<T>| {
+            row.bound.stage == ocp.horizon && row.bound.quantity == Quantity::State(0)
+        };
+        let radius = self.settings.terminal.level.sqrt();
+        let row = solution.active.iter().find(at_end);
+        self.pressure = row.map_or(T::zero(), |row| row.multiplier.max(T::zero()) / radius);
+        let origin = self.settings.direction * (along.set_point + set_point_move(solution));
+        let from = self.settings.direction * along.set_point;
+        let end = predicted_end(solution, self.settings.horizon, &from);
+        let y = self.root() * (end - origin);
+        self.touch = (self.pressure > T::zero() && y.norm() > T::zero()).then_some(y);
+    }
+
+    /// How far the plan goes above and below x_i in the samples on both sides of it, but no farther
+    /// than both ends of them.
+    fn beyond_samples(
+        &self,
+        along: &Plan<T, NX, NU, N>,
+        x0: &SVector<T, NX>,
+        i: usize,
+    ) -> (SVector<T, NX>, SVector<T, NX>) {
+        let between = self.settings.rollout.between;
+        let (mut above, mut below) = (between, between);
+        let widest = width(&self.settings.x) * convert::<f64, T>(0.1);
+        for sample in [i.checked_sub(1), Some(i)].into_iter().flatten() {
+            if sample >= self.settings.horizon {
+                continue;
+            }
+            let before = sample.checked_sub(1);
+            let from = before.map_or(Some(x0), |before| along.x.get(before));
+            let ends = (from, along.x.get(sample));
+            let extremes = (along.highest.get(sample), along.lowest.get(sample));
+            if let ((Some(from), Some(to)), (Some(highest), Some(lowest))) = (ends, extremes) {
+                above = above.sup(&(highest - from.sup(to) + between));
+                below = below.sup(&(from.inf(to) - lowest + between));
+            }
+        }
+        if let Some(drift) = i.checked_sub(1).and_then(|before| self.drift.get(before)) {
+            (above, below) = (above + drift, below + drift);
+        }
+        // A plan that is far from good must not close the bounds.
+        (above.inf(&widest), below.inf(&widest))
+    }
+
+    /// (x, 0) becomes (x, z): the first input is z, with the offset cost. Both `wanted` and z are
+    /// seen from the plan's set point.
     fn set_point_stage(&self, wanted: T, along: T) -> Stage<T, NA, NU> {
         let mut stage = Stage::<T, NA, NU>::new();
         stage.a = SMatrix::identity();
@@ -69,66 +152,88 @@ where
         stage.r[(0, 0)] = self.settings.offset_weight;
         stage.linear_u[0] = -self.settings.offset_weight * wanted;
         let [lower, upper] = self.settings.set_points;
-        stage.u.lower[0] = lower.max(along - self.reach);
-        stage.u.upper[0] = upper.min(along + self.reach);
+        stage.u.lower[0] = lower - along;
+        stage.u.upper[0] = upper - along;
         stage
     }
 
-    /// One sample of the plant, linearised along (x, u).
-    fn sample_stage(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> Stage<T, NA, NU> {
+    /// One sample of the plant, linear along (x, u) by `slope`, exact at the plan itself: it leads
+    /// from `x_here` to `x_next`. With an `aim` the stage cost is about it, else about z.
+    fn sample_stage(
+        &self,
+        slope: Slope,
+        x: &SVector<T, NX>,
+        x_here: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+        x_next: &SVector<T, NX>,
+        aim: Option<T>,
+    ) -> Stage<T, NA, NU> {
         let settings = &self.settings;
-        let (a, b) = settings.rk4.linearize(&self.model, x, u, settings.t_s);
+        let (a, b) = match slope {
+            Slope::Jacobian => settings.rk4.differentiate(&self.model, x, u, settings.t_s),
+            Slope::Embedding => settings.rk4.linearize(&self.model, x, u, settings.t_s),
+        };
         let mut stage = Stage::<T, NA, NU>::new();
         stage.a.view_mut((0, 0), (NX, NX)).copy_from(&a);
         stage.a[(NX, NX)] = T::one();
         stage.b.view_mut((0, 0), (NX, NU)).copy_from(&b);
-        // ||x - z d||_Q^2 in terms of (x, z).
+        stage.c = augmented(&(x_next - a * x_here - b * u), T::zero());
         let q_d = settings.weights.q * settings.direction;
         let q = &mut stage.q;
         q.view_mut((0, 0), (NX, NX)).copy_from(&settings.weights.q);
-        q.view_mut((0, NX), (NX, 1)).copy_from(&-q_d);
-        q.view_mut((NX, 0), (1, NX)).copy_from(&-q_d.transpose());
-        q[(NX, NX)] = q_d.dot(&settings.direction);
-        stage.r = settings.weights.r;
+        match aim {
+            // ||x - aim d||_Q^2
+            Some(aim) => stage.linear_x = augmented(&(q_d * -aim), T::zero()),
+            // ||x - z d||_Q^2 in terms of (x, z).
+            None => {
+                q.view_mut((0, NX), (NX, 1)).copy_from(&-q_d);
+                q.view_mut((NX, 0), (1, NX)).copy_from(&-q_d.transpose());
+                q[(NX, NX)] = q_d.dot(&settings.direction);
+            }
+        }
+        // Damped towards the plan's input.
+        stage.r = settings.weights.r * (T::one() + self.damping);
+        stage.linear_u = settings.weights.r * u * -self.damping;
         stage.u = settings.u;
         stage
     }
 
-    /// y = L'(x - z d), without input.
-    fn terminal_stage(&self) -> Stage<T, NA, NU> {
+    /// L', where P = L L'.
+    fn root(&self) -> SMatrix<T, NX, NX> {
+        let factor = Cholesky::<T, Const<NX>>::new(self.settings.terminal.p);
+        factor.map_or_else(SMatrix::zeros, |factor| factor.l().transpose())
+    }
+
+    /// y = H L'(x - z d), without input; `end` is the plan's own L'(x - z d).
+    fn terminal_stage(&self, end: &SVector<T, NX>) -> Stage<T, NA, NU> {
         let mut stage = Stage::<T, NA, NU>::new();
         stage.a = SMatrix::zeros();
         stage.b = SMatrix::zeros();
         stage.r = SMatrix::identity();
-        if let Some(factor) = Cholesky::<T, Const<NX>>::new(self.settings.terminal.p) {
-            let root = factor.l().transpose();
-            let shift = -(root * self.settings.direction);
-            stage.a.view_mut((0, 0), (NX, NX)).copy_from(&root);
-            stage.a.view_mut((0, NX), (NX, 1)).copy_from(&shift);
-        }
+        let root = reflected(end, &self.root());
+        let shift = -(root * self.settings.direction);
+        stage.a.view_mut((0, 0), (NX, NX)).copy_from(&root);
+        stage.a.view_mut((0, NX), (NX, 1)).copy_from(&shift);
         stage
     }
 
-    /// The terminal cost |y|^2 and the cube in the terminal set.
-    fn pose_end(&self, ocp: &mut Ocp<T, NA, NU, NP>) {
-        let inside = T::one() - self.settings.margin;
-        let half_edge = (self.settings.terminal.level / convert::<f64, T>(NX as f64)).sqrt();
-        ocp.terminal.p = SMatrix::identity();
+    /// The terminal cost |y|^2, the tangent plane of the terminal set at the `edge`, and the curvature
+    /// of the ball behind it, with the multiplier that it had; no y beyond the `widest`. The
+    /// reflection takes the place where the plane touches to the `upper` or the lower end.
+    fn pose_end(&self, edge: T, widest: T, upper: bool, ocp: &mut Ocp<T, NA, NU, NP>) {
+        let touches = self.touch.is_some();
+        let pressure = if touches { self.pressure } else { T::zero() };
+        ocp.terminal.p = SMatrix::identity() * (T::one() + pressure);
         ocp.terminal.p[(NX, NX)] = T::zero();
+        ocp.terminal.linear_x = SVector::zeros();
+        let place = if upper { edge } else { -edge };
+        ocp.terminal.linear_x[0] = -pressure * place;
         ocp.terminal.x = Bounds::none();
         ocp.soft_x = [None; NA];
         ocp.terminal.soft_x = [None; NA];
         for i in 0..NX {
-            ocp.terminal.x.lower[i] = -half_edge * inside;
-            ocp.terminal.x.upper[i] = half_edge * inside;
-        }
-    }
-
-    fn augmented_bounds(&self, x: &Bounds<T, NX>) -> Bounds<T, NA> {
-        let infinity: T = convert(f64::INFINITY);
-        Bounds {
-            lower: augmented(&x.lower, -infinity),
-            upper: augmented(&x.upper, infinity),
+            ocp.terminal.x.lower[i] = -widest;
+            ocp.terminal.x.upper[i] = widest;
         }
     }
 
@@ -152,6 +257,25 @@ where
     }
 }
 
+/// What the quadratic program is linear along a plan by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Slope {
+    /// The derivatives of the rollout: right close to the plan.
+    Jacobian,
+    /// The embedding's own matrices, the scheduling of the plan: better far from it.
+    Embedding,
+}
+
+impl Slope {
+    /// The other one.
+    pub(super) fn other(self) -> Self {
+        match self {
+            Self::Jacobian => Self::Embedding,
+            Self::Embedding => Self::Jacobian,
+        }
+    }
+}
+
 /// (x, z)
 fn augmented<T: Scalar, const NX: usize, const NA: usize>(
     x: &SVector<T, NX>,
@@ -167,9 +291,11 @@ pub(super) fn of_the_plant(bound: BoundId, horizon: usize) -> Option<BoundId> {
     (bound.stage < horizon).then_some(BoundId { stage, ..bound })
 }
 
-/// The plant's inputs and the set point of a solved program.
+/// The plan of a solved program as a policy, from the plant's own origin; `from` is the set point
+/// of the plan that the program was made along, times the direction.
 pub(super) fn answer<
     T: Scalar,
+    const NX: usize,
     const NU: usize,
     const N: usize,
     const NA: usize,
@@ -177,15 +303,44 @@ pub(super) fn answer<
     const M: usize,
 >(
     solution: &Solution<T, NA, NU, NP, M>,
-) -> ([SVector<T, NU>; N], T) {
-    let mut u = [SVector::zeros(); N];
-    for (u, planned) in u.iter_mut().zip(solution.u.iter().skip(1)) {
-        *u = *planned;
+    solver: &Solver<T, NA, NU, NP, M>,
+    from: &SVector<T, NX>,
+) -> Policy<T, NX, NU, N> {
+    let mut policy = Policy {
+        x: [SVector::zeros(); N],
+        u: [SVector::zeros(); N],
+        gain: [SMatrix::zeros(); N],
+    };
+    let states = policy.x.iter_mut().zip(&solution.x);
+    let inputs = policy.u.iter_mut().zip(solution.u.iter().skip(1));
+    let gains = policy.gain.iter_mut().zip(solver.factors().iter().skip(1));
+    for ((x, planned), ((u, input), (gain, factor))) in states.zip(inputs.zip(gains)) {
+        *x = plant_state::<T, NX, NA>(planned) + from;
+        *u = *input;
+        gain.copy_from(&factor.gain.fixed_columns::<NX>(0));
     }
-    (u, solution.u[0][0])
+    policy
 }
 
-/// x_N as the program of this `horizon` predicts it.
+/// How far a solved program moves the set point.
+pub(super) fn set_point_move<
+    T: Scalar,
+    const NU: usize,
+    const NA: usize,
+    const NP: usize,
+    const M: usize,
+>(
+    solution: &Solution<T, NA, NU, NP, M>,
+) -> T {
+    let first = solution.u.first().and_then(|u| u.get(0));
+    first.copied().unwrap_or(T::zero())
+}
+
+fn plant_state<T: Scalar, const NX: usize, const NA: usize>(x: &SVector<T, NA>) -> SVector<T, NX> {
+    SVector::from_fn(|i, _| x.get(i).copied().unwrap_or(T::zero()))
+}
+
+/// x_N as the program of this `horizon` predicts it; `from` as in [`answer`].
 pub(super) fn predicted_end<
     T: Scalar,
     const NX: usize,
@@ -196,8 +351,28 @@ pub(super) fn predicted_end<
 >(
     solution: &Solution<T, NA, NU, NP, M>,
     horizon: usize,
+    from: &SVector<T, NX>,
 ) -> SVector<T, NX> {
     // x_1 of the program is (x_0, z), so x_{N+1} of the program is (x_N, z).
     let end = solution.x.get(horizon);
-    SVector::from_fn(|i, _| end.and_then(|x| x.get(i)).copied().unwrap_or(T::zero()))
+    end.map_or(*from, |x| plant_state::<T, NX, NA>(x) + from)
+}
+
+/// H `m` with the reflection H that takes `v` to the first axis.
+fn reflected<T: Scalar, const K: usize>(
+    v: &SVector<T, K>,
+    m: &SMatrix<T, K, K>,
+) -> SMatrix<T, K, K> {
+    let size = v.norm();
+    let mut normal = *v;
+    if K > 0 {
+        // The sign that does not cancel.
+        normal[0] += if v[0] < T::zero() { -size } else { size };
+    }
+    let square = normal.norm_squared();
+    if !(square > T::zero() && square.is_finite()) {
+        return *m;
+    }
+    let two: T = convert(2.0);
+    m - normal * (normal.transpose() * m) * (two / square)
 }

@@ -33,10 +33,24 @@ impl<T: Scalar, const NX: usize, const NU: usize> TerminalSet<T, NX, NU> {
 /// Quadratic programs per sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GuardedIterations {
-    /// With a plan that works at hand, at least 1.
+    /// With the rest of a plan at hand; with 0 the rest is what is applied.
     pub known: usize,
-    /// Without one (at the start, after a push), at least 1.
+    /// Without one (at the start, after a push), at least 1: they look for a plan, and go on to the
+    /// best one.
     pub unknown: usize,
+}
+
+/// How plans are rolled out, and what is known of it. The bounds are for motions within the bounds of
+/// states and inputs; what they rest on is for whoever computes them to say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rollout<T, const NX: usize> {
+    /// Runge-Kutta steps of a sample.
+    pub rk4: Rk4,
+    /// Largest difference of plant and rollout after one sample, in state units, not negative.
+    pub error: SVector<T, NX>,
+    /// How far a state may lie beyond its values at both ends of a Runge-Kutta step, in state units,
+    /// not negative.
+    pub between: SVector<T, NX>,
 }
 
 /// Everything that defines a guarded controller besides its model.
@@ -46,8 +60,10 @@ pub struct GuardedSettings<T, const NX: usize, const NU: usize> {
     pub t_s: T,
     /// Prediction horizon in samples, from 1 to the controller's `N`.
     pub horizon: usize,
-    /// Runge-Kutta steps of prediction and rollout.
+    /// Runge-Kutta steps of the prediction, along which quadratic programs are made.
     pub rk4: Rk4,
+    /// The rollout by which plans are judged.
+    pub rollout: Rollout<T, NX>,
     /// Stage weights.
     pub weights: Weights<T, NX, NU>,
     /// Terminal law and set.
@@ -64,8 +80,8 @@ pub struct GuardedSettings<T, const NX: usize, const NU: usize> {
     /// Cost of (z - wanted)^2, > 0. Large against the stage weights, so that the set point
     /// moves on as fast as the bounds allow.
     pub offset_weight: T,
-    /// Part of the bounds' width that plans keep away from them, so that rounding and the
-    /// integration error of the prediction do not cost the guarantee; 1e-3, say.
+    /// Part of the bounds' width that programs keep away from them, so that their rollouts hold
+    /// with what is added for the integration error; 4e-3, say.
     pub margin: T,
     /// Quadratic programs per sample.
     pub iterations: GuardedIterations,
@@ -84,11 +100,13 @@ pub enum GuardedError {
     NotPositive(&'static str),
     /// The gain contains a number that is not finite.
     Gain,
+    /// The rollout has no steps, or its bounds are negative or not finite.
+    Rollout,
     /// The direction is zero, not finite, or no direction of equilibria: A d is not zero.
     Direction,
     /// The lower set point is above the upper one, or one is not a number.
     SetPoints,
-    /// At least one quadratic program per sample is needed.
+    /// Without a plan, at least one quadratic program per sample is needed.
     Iterations,
 }
 
@@ -98,6 +116,10 @@ impl fmt::Display for GuardedError {
             Self::Controller(error) => error.fmt(f),
             Self::NotPositive(name) => write!(f, "{name} must be a positive number"),
             Self::Gain => write!(f, "the gain of the terminal law must be finite"),
+            Self::Rollout => write!(
+                f,
+                "the rollout needs a step, and bounds that are finite and not negative"
+            ),
             Self::Direction => write!(
                 f,
                 "the direction of the set points must be a finite, nonzero d with A d = 0"
@@ -105,7 +127,10 @@ impl fmt::Display for GuardedError {
             Self::SetPoints => {
                 write!(f, "the lower set point must not exceed the upper one")
             }
-            Self::Iterations => write!(f, "a sample needs at least one quadratic program"),
+            Self::Iterations => write!(
+                f,
+                "a sample without a plan needs at least one quadratic program"
+            ),
         }
     }
 }
@@ -153,11 +178,20 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
         if !self.terminal.gain.iter().all(|entry| entry.is_finite()) {
             return Err(GuardedError::Gain);
         }
+        let Rollout {
+            rk4,
+            error,
+            between,
+        } = &self.rollout;
+        let mut known = error.iter().chain(between.iter());
+        if rk4.substeps == 0 || !known.all(|v| *v >= T::zero() && v.is_finite()) {
+            return Err(GuardedError::Rollout);
+        }
         let [lower, upper] = self.set_points;
         if !(lower <= upper) {
             return Err(GuardedError::SetPoints);
         }
-        if self.iterations.known == 0 || self.iterations.unknown == 0 {
+        if self.iterations.unknown == 0 {
             return Err(GuardedError::Iterations);
         }
         self.check_direction(model)

@@ -6,7 +6,8 @@ use crate::rng::Rng;
 use lpvmpc::riccati::{CostToGo, StageFactor};
 use lpvmpc::{
     Bounds, Decision, GuardedController, GuardedError, GuardedIterations, GuardedSettings,
-    GuardedStep, GuardedWorkspace, LpvModel, Rk4, Scheduling, SolverSettings, Stage, TerminalSet,
+    GuardedStep, GuardedWorkspace, LpvModel, Rk4, Rollout, Scheduling, SolverSettings, Stage,
+    TerminalSet,
 };
 use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
 
@@ -49,6 +50,12 @@ fn settings() -> Settings {
         t_s: base.t_s,
         horizon: N,
         rk4: RK4,
+        // The plant of these tests is the rollout itself.
+        rollout: Rollout {
+            rk4: RK4,
+            error: Vector4::zeros(),
+            between: Vector4::zeros(),
+        },
         weights: base.weights,
         terminal: TerminalSet {
             gain: -factor.gain,
@@ -161,7 +168,14 @@ fn a_bad_solver_costs_time_and_nothing_else() {
 
 #[test]
 fn the_nearest_admissible_position_is_reached() {
-    for (wanted, reached) in [(3.0, 3.0), (-70.0, -50.0), (f64::INFINITY, 0.0)] {
+    for (wanted, reached) in [
+        (3.0, 3.0),
+        (-70.0, -50.0),
+        (1e300, 50.0),
+        (f64::NEG_INFINITY, -50.0),
+        // Before anything was wanted, where it stands.
+        (f64::NAN, 0.0),
+    ] {
         let mut controller = guarded(settings());
         let mut memory = Memory::new();
         let mut x = Vector4::zeros();
@@ -286,7 +300,7 @@ fn settings_that_make_no_sense_are_refused() {
         GuardedError::SetPoints
     );
     assert_eq!(
-        refused(|s| s.iterations.known = 0),
+        refused(|s| s.iterations.unknown = 0),
         GuardedError::Iterations
     );
     for horizon in [0, N + 1] {
