@@ -243,7 +243,7 @@ fn preview_costs_no_more_than_without_the_guarantee() {
 #[test]
 fn iterations_are_a_key_of_the_scenario() {
     let text = builtin::find("single-setpoint").unwrap().text;
-    let key = "until_converged = { tolerance = 1e-10, most = 60 }";
+    let key = "descent = { tolerance = 1e-7, most = 60 }";
     let text = text.replacen(
         "[controller.predictor.rk4]\nsubsteps = 1",
         &format!("[controller.iterations]\n{key}\n[controller.predictor.stage_consistent]"),

@@ -116,7 +116,8 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
     fn free_part(&self, candidate: &Candidate<T>) -> Option<Part> {
         let held = |part| {
             let same = |row: &ActiveRow<T>| row.bound == candidate.bound && row.part == part;
-            self.working.rows().iter().any(|row| same(&row.active)) || self.resting.iter().any(same)
+            self.working.rows().iter().any(|row| same(&row.active))
+                || self.resting.iter().any(|row| same(&row))
         };
         match candidate.soft {
             None => (!held(Part::Hard)).then_some(Part::Hard),
@@ -335,7 +336,7 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
     /// The active rows, with multipliers in the bounds' own direction.
     pub(crate) fn active(&self) -> impl Iterator<Item = ActiveRow<T>> {
         let working = self.working.rows().iter().map(Terms::reported);
-        working.chain(self.resting.iter().copied())
+        working.chain(self.resting.iter())
     }
 
     /// Hands over the active rows.

@@ -3,7 +3,7 @@
 use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Bounds, Ocp, Penalty, Softness, Stage};
-use crate::plan::{Policy, Trial};
+use crate::plan::{Policy, Trial, at};
 use crate::settings::{
     ControllerError, ControllerSettings, Iterations, Scheduling, TerminalIngredient, Weights,
     check, check_bounds,
@@ -204,7 +204,7 @@ where
             if !self.initialised {
                 return;
             }
-            let x = self.rollout[0];
+            let x = *at(&self.rollout, 0);
             self.predict(&x, &mut workspace.ocp);
             self.track(reference, &mut workspace.ocp);
         }
@@ -398,6 +398,12 @@ where
         ocp.terminal.equality = equality;
     }
 
+    /// The last stage of the horizon.
+    #[inline(always)]
+    pub(crate) fn last_stage(&self) -> usize {
+        self.settings.horizon.saturating_sub(1)
+    }
+
     /// The nonlinear model's state one sample after `x` under the input `u`.
     // Once in the machine code.
     #[inline(never)]
@@ -411,11 +417,12 @@ where
     fn roll_out(&mut self, x: &SVector<T, NX>) {
         let mut state = *x;
         for i in 0..self.settings.horizon {
-            state = self.next_state(&state, &self.solution.u[i]);
-            self.rollout[i] = state;
+            state = self.next_state(&state, at(&self.solution.u, i));
+            if let Some(place) = self.rollout.get_mut(i) {
+                *place = state;
+            }
         }
-        let end = self.settings.horizon - 1;
-        self.gap = state - self.solution.x[end];
+        self.gap = state - at(&self.solution.x, self.last_stage());
         // A rollout that has become non-finite is no past to build on.
         self.initialised = state.iter().all(|entry| entry.is_finite());
     }

@@ -17,7 +17,7 @@
 use crate::controller::{Controller, Reference, Workspace};
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Ocp;
-use crate::plan::{Merit, Prices, Trial};
+use crate::plan::{Merit, Prices, Trial, at};
 use crate::policy::input_at;
 use crate::settings::ControllerSettings;
 use crate::solution::Status;
@@ -150,8 +150,8 @@ where
             self.shift(reference);
             best = self.roll_out_plan(x, &merit, &mut workspace.trial, &|i, x| {
                 let policy = &self.policy;
-                let planned = (&self.rollout[i], &policy.u[i]);
-                input_at(x, planned, &policy.gain[i], &self.settings.u)
+                let planned = (at(&self.rollout, i), at(&policy.u, i));
+                input_at(x, planned, at(&policy.gain, i), &self.settings.u)
             });
             self.take_if_some(best, &workspace.trial);
         }
@@ -217,24 +217,28 @@ where
             one_if(column)
         });
         let gain = match solver.factorize(ocp) {
-            Ok(()) => solver.factors()[0].gain,
+            Ok(()) => at(solver.factors(), 0).gain,
             Err(_) => SMatrix::zeros(),
         };
         (gain, indifferent)
     }
 
     /// The plan one sample on; its last stage is the regulator's.
-    pub(crate) fn shift(&mut self, reference: &Reference<T, NX, N>) {
-        let end = self.settings.horizon - 1;
-        let policy = &mut self.policy;
-        policy.u[..=end].rotate_left(1);
-        policy.gain[..end].rotate_left(usize::from(end > 0));
-        policy.u[end] = input_at(
-            &self.rollout[end],
-            (&reference.terminal, &SVector::zeros()),
-            &policy.gain[end],
-            &self.settings.u,
-        );
+    fn shift(&mut self, reference: &Reference<T, NX, N>) {
+        let last = self.last_stage();
+        let gain = *at(&self.policy.gain, last);
+        let planned = (&reference.terminal, &SVector::zeros());
+        let end = at(&self.rollout, last);
+        let u = input_at(end, planned, &gain, &self.settings.u);
+        // What comes in from beyond the horizon is overwritten.
+        self.policy.u.rotate_left(1);
+        self.policy.gain.rotate_left(1);
+        if let Some(place) = self.policy.u.get_mut(last) {
+            *place = u;
+        }
+        if let Some(place) = self.policy.gain.get_mut(last) {
+            *place = gain;
+        }
     }
 
     /// The matrices of the program along the plan from `x`. Their affine terms make the linear model
@@ -254,9 +258,8 @@ where
         }
     }
 
-    /// The matrices of one sample from `x` with the input `u`.
-    // Once in the machine code.
-    #[inline(never)]
+    /// The matrices of one sample from `x` with the input `u`. They follow the scheduling within the
+    /// sample, whatever the predictor.
     fn sample_matrices(
         &self,
         x: &SVector<T, NX>,
@@ -265,7 +268,7 @@ where
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
         let ControllerSettings { t_s, predictor, .. } = &self.settings;
         match along {
-            Along::Scheduling => predictor.linearize(&self.model, x, u, *t_s),
+            Along::Scheduling => predictor.rk4().linearize(&self.model, x, u, *t_s),
             Along::Jacobian => predictor.rk4().differentiate(&self.model, x, u, *t_s),
         }
     }
@@ -305,6 +308,7 @@ where
         prices: &mut Prices<T, NX>,
         workspace: &mut Workspace<T, NX, NU, N, M>,
     ) -> Outcome<T> {
+        let last = self.last_stage();
         let answer = &self.solution;
         if !answer.status.is_solved() {
             return Outcome::Unsolved(answer.status);
@@ -313,22 +317,21 @@ where
         let merit = self.merit(reference, *prices);
         let before = merit.of(x, &self.policy.u, &self.rollout);
         let expected = before - merit.of(x, &answer.u, &answer.x);
-        self.gap = self.rollout[self.settings.horizon - 1] - answer.x[self.settings.horizon - 1];
+        self.gap = at(&self.rollout, last) - at(&answer.x, last);
         self.policy.cost = before;
         // Negated, so that a NaN ends the search. What a full step leaves is of second order.
         if !(expected > tolerance * tolerance * before) {
             return Outcome::NothingToGain;
         }
-        let end = self.settings.horizon - 1;
         let taken = self.search_line(x, &merit, expected, &mut workspace.trial, &|i| {
-            let x_i = i.checked_sub(1).map_or(x, |j| &self.solution.x[j]);
-            (x_i, &self.solution.u[i])
+            let x_i = i.checked_sub(1).map_or(x, |j| at(&self.solution.x, j));
+            (x_i, at(&self.solution.u, i))
         });
         let Some((step, cost)) = taken else {
             return Outcome::NoStep;
         };
         self.take_if_some(Some(cost), &workspace.trial);
-        self.gap = self.rollout[end] - self.solution.x[end];
+        self.gap = at(&self.rollout, last) - at(&self.solution.x, last);
         Outcome::Moved {
             step,
             gain: (before - cost) / before,
@@ -355,11 +358,12 @@ where
         for step in STEPS {
             let step: T = convert(step);
             let cost = self.roll_out_plan(x, merit, trial, &|i, x_i| {
-                let x_plan = i.checked_sub(1).map_or(x, |j| &rollout[j]);
+                let x_plan = i.checked_sub(1).map_or(x, |j| at(rollout, j));
                 let (x_answer, u_answer) = answer(i);
                 let planned = x_plan + (x_answer - x_plan) * step;
-                let u = policy.u[i] + (u_answer - policy.u[i]) * step;
-                input_at(x_i, (&planned, &u), &policy.gain[i], &self.settings.u)
+                let u_plan = at(&policy.u, i);
+                let u = u_plan + (u_answer - u_plan) * step;
+                input_at(x_i, (&planned, &u), at(&policy.gain, i), &self.settings.u)
             });
             let sufficient = policy.cost - expected * step * convert(SUFFICIENT);
             if let Some(cost) = cost
@@ -382,11 +386,11 @@ where
         workspace: &mut Workspace<T, NX, NU, N, M>,
     ) -> bool {
         self.track(reference, &mut workspace.ocp);
-        let end = self.settings.horizon - 1;
+        let last = self.last_stage();
         // Where the plant will be, as far as the model knows.
         let x = match answered {
-            Some(x) => self.next_state(&x, &self.solution.u[0]),
-            None => self.rollout[0],
+            Some(x) => self.next_state(&x, at(&self.solution.u, 0)),
+            None => *at(&self.rollout, 0),
         };
         if !self.first_plan(&x, reference, workspace) {
             return false;
@@ -398,12 +402,12 @@ where
             self.policy.cost = merit.of(&x, &self.policy.u, &self.rollout);
             let trial = &mut workspace.trial;
             let taken = self.search_line(&x, &merit, T::zero(), trial, &|i| {
-                let u = if i < end {
-                    &self.solution.u[i + 1]
+                let u = if i < last {
+                    at(&self.solution.u, i + 1)
                 } else {
-                    &self.policy.u[i]
+                    at(&self.policy.u, i)
                 };
-                (&self.solution.x[i], u)
+                (at(&self.solution.x, i), u)
             });
             self.take_if_some(taken.map(|(_, cost)| cost), &workspace.trial);
             self.adapt_damping(&match taken {

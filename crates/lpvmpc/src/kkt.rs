@@ -95,9 +95,8 @@ fn stationarity<
     let mut largest_term = T::one();
     let mut largest = T::zero();
     let x_n = state(ocp, trajectory, n);
-    let mut costate = ocp.terminal.p * x_n
-        + ocp.terminal.linear_x
-        + rows::gradient(ocp, active.iter().copied(), n).0;
+    let mut costate =
+        ocp.terminal.p * x_n + ocp.terminal.linear_x + rows::gradient(ocp, active.iter(), n).0;
     for (i, (stage, u)) in ocp
         .stages
         .iter()
@@ -107,7 +106,7 @@ fn stationarity<
         .rev()
     {
         let x = state(ocp, trajectory, i);
-        let (rows_x, rows_u) = rows::gradient(ocp, active.iter().copied(), i);
+        let (rows_x, rows_u) = rows::gradient(ocp, active.iter(), i);
         let through_dynamics = stage.b.tr_mul(&costate);
         let weights = stage.r * u + stage.s * x + stage.linear_u;
         let gradient = weights + through_dynamics + rows_u;
@@ -189,11 +188,11 @@ fn multipliers<
             continue;
         }
         // A row that is listed twice acts with the sum.
-        let same = |other: &&ActiveRow<T>| other.bound == row.bound && other.part == row.part;
+        let same = |other: &ActiveRow<T>| other.bound == row.bound && other.part == row.part;
         let rows = active.iter().filter(same);
         let multiplier = rows.fold(T::zero(), |sum, other| sum + other.multiplier);
         let slack = rows::slack(ocp, trajectory, &row.bound);
-        let (distance, defect) = conditions(row, multiplier, slack, ocp);
+        let (distance, defect) = conditions(&row, multiplier, slack, ocp);
         outside = larger(outside, larger(-row.multiplier, distance));
         let size = rows::size(ocp, &row.bound).max(T::one());
         slackness = larger(slackness, defect / size);
@@ -245,7 +244,7 @@ fn unpaid_excess<
         };
         let paid = |part: Part, free: bool| {
             let listed = |row: &ActiveRow<T>| row.bound == candidate.bound && row.part == part;
-            free || active.iter().any(listed)
+            free || active.iter().any(|row| listed(&row))
         };
         let linear = paid(Part::Linear, price.linear <= T::zero());
         let quadratic = paid(Part::Quadratic, price.quadratic <= T::zero());

@@ -51,6 +51,13 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Trial<T, NX, N
     }
 }
 
+/// The entry of stage `i`. Beyond the last there is none, and the last is taken: so the machine code
+/// has no path to a panic.
+#[inline(always)]
+pub(crate) fn at<V, const N: usize>(list: &[V; N], i: usize) -> &V {
+    &list[i.min(N - 1)]
+}
+
 /// Prices per unit of what must not be: an exact penalty has them above the multipliers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Prices<T, const NX: usize> {
@@ -79,7 +86,9 @@ impl<T: Scalar, const NX: usize> Prices<T, NX> {
                 Side::Equality => &mut self.end,
                 Side::Lower | Side::Upper => &mut self.bounds,
             };
-            prices[j] = prices[j].max(row.multiplier.abs() * convert(FACTOR));
+            if let Some(price) = prices.get_mut(j) {
+                *price = price.max(row.multiplier.abs() * convert(FACTOR));
+            }
         }
     }
 }
@@ -154,18 +163,28 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize, const N: usize> Merit<'a, 
         }
     }
 
+    /// The `limits` where they are hard, the value of `x` itself elsewhere.
+    fn hard(&self, limits: &SVector<T, NX>, x: &SVector<T, NX>) -> SVector<T, NX> {
+        let sides = self.soft.iter().zip(limits.iter().zip(x.iter()));
+        let mut hard = *x;
+        for (place, (soft, (limit, _))) in hard.iter_mut().zip(sides) {
+            if soft.is_none() {
+                *place = *limit;
+            }
+        }
+        hard
+    }
+
     #[cold]
     #[inline(never)]
     fn price_of_excess(&self, x: &SVector<T, NX>) -> T {
-        let Bounds { lower, upper } = &self.bounds;
-        let mut total = price(&self.soft, x, &self.bounds);
-        for (j, soft) in self.soft.iter().enumerate() {
-            if soft.is_none() {
-                let excess = (lower[j] - x[j]).max(x[j] - upper[j]).max(T::zero());
-                total += self.prices.bounds[j] * excess;
-            }
-        }
-        total
+        let hard = Bounds {
+            lower: self.hard(&self.bounds.lower, x),
+            upper: self.hard(&self.bounds.upper, x),
+        };
+        let below = (hard.lower - x).sup(&SVector::zeros());
+        let above = (x - hard.upper).sup(&SVector::zeros());
+        price(&self.soft, x, &self.bounds) + (below + above).dot(&self.prices.bounds)
     }
 }
 

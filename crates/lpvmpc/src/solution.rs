@@ -99,22 +99,87 @@ impl<T: Scalar> ActiveRow<T> {
 /// The active bounds, at most `M`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ActiveSet<T, const M: usize> {
-    rows: [ActiveRow<T>; M],
+    rows: [PackedRow<T>; M],
     len: usize,
+}
+
+/// An [`ActiveRow`] in a third of its memory, of which a microcontroller has little.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct PackedRow<T> {
+    multiplier: T,
+    stage: u16,
+    /// Component of the quantity.
+    index: u8,
+    /// Quantity, side, part (two bits each), and whether the soft bound is exceeded.
+    kind: u8,
+}
+
+impl<T: Scalar> PackedRow<T> {
+    fn empty() -> Self {
+        Self {
+            multiplier: T::zero(),
+            stage: 0,
+            index: 0,
+            kind: 0,
+        }
+    }
+
+    /// `None` for stages beyond 65 535 and components beyond 255.
+    fn pack(row: &ActiveRow<T>) -> Option<Self> {
+        let (quantity, index) = match row.bound.quantity {
+            Quantity::State(index) => (0, index),
+            Quantity::Input(index) => (1, index),
+            Quantity::Row(index) => (2, index),
+        };
+        let (side, part) = (row.bound.side as u8, row.part as u8);
+        Some(Self {
+            multiplier: row.multiplier,
+            stage: u16::try_from(row.bound.stage).ok()?,
+            index: u8::try_from(index).ok()?,
+            kind: quantity | side << 2 | part << 4 | u8::from(row.exceeded) << 6,
+        })
+    }
+
+    fn unpack(&self) -> ActiveRow<T> {
+        let index = usize::from(self.index);
+        let two_bits = |shift: u8| self.kind >> shift & 3;
+        ActiveRow {
+            bound: BoundId {
+                stage: usize::from(self.stage),
+                quantity: match two_bits(0) {
+                    0 => Quantity::State(index),
+                    1 => Quantity::Input(index),
+                    _ => Quantity::Row(index),
+                },
+                side: match two_bits(2) {
+                    0 => Side::Lower,
+                    1 => Side::Upper,
+                    _ => Side::Equality,
+                },
+            },
+            part: match two_bits(4) {
+                0 => Part::Hard,
+                1 => Part::Linear,
+                _ => Part::Quadratic,
+            },
+            multiplier: self.multiplier,
+            exceeded: self.kind >> 6 == 1,
+        }
+    }
 }
 
 impl<T: Scalar, const M: usize> ActiveSet<T, M> {
     /// An empty set.
     pub fn new() -> Self {
         Self {
-            rows: [ActiveRow::empty(); M],
+            rows: [PackedRow::empty(); M],
             len: 0,
         }
     }
 
     /// The active rows, in no particular order.
-    pub fn iter(&self) -> impl ExactSizeIterator<Item = &ActiveRow<T>> {
-        self.rows.iter().take(self.len)
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = ActiveRow<T>> {
+        self.rows.iter().take(self.len).map(PackedRow::unpack)
     }
 
     /// How many rows are active.
@@ -137,7 +202,8 @@ impl<T: Scalar, const M: usize> ActiveSet<T, M> {
         let mut kept = 0;
         for place in 0..self.len {
             let row = self.rows.get(place).copied();
-            if let (Some(row), Some(free)) = (row.filter(&wanted), self.rows.get_mut(kept)) {
+            let row = row.filter(|row| wanted(&row.unpack()));
+            if let (Some(row), Some(free)) = (row, self.rows.get_mut(kept)) {
                 *free = row;
                 kept += 1;
             }
@@ -147,13 +213,13 @@ impl<T: Scalar, const M: usize> ActiveSet<T, M> {
 
     /// Adds a row; `false` if the set is full.
     pub(crate) fn push(&mut self, row: ActiveRow<T>) -> bool {
-        match self.rows.get_mut(self.len) {
-            Some(place) => {
+        match (self.rows.get_mut(self.len), PackedRow::pack(&row)) {
+            (Some(place), Some(row)) => {
                 *place = row;
                 self.len += 1;
                 true
             }
-            None => false,
+            _ => false,
         }
     }
 }

@@ -97,7 +97,7 @@ where
         along: &Plan<T, NX, NU, N>,
     ) {
         let GuardedWorkspace { ocp, solution, .. } = workspace;
-        let at_end = |row: &&ActiveRow<T>| {
+        let at_end = |row: &ActiveRow<T>| {
             row.bound.stage == ocp.horizon && row.bound.quantity == Quantity::State(0)
         };
         let radius = self.settings.terminal.level.sqrt();
