@@ -19,6 +19,7 @@ pub mod linear_model;
 pub mod output;
 pub mod pictures;
 pub mod progress;
+pub mod proofs;
 pub mod recording;
 pub mod refinement;
 pub mod refinement_file;
