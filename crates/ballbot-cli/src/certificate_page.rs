@@ -80,16 +80,17 @@ pub fn html(
     let body = format!(
         "<p>For: {}. Robot, weights and bounds are in certificate.json; \
          <code>ballbot verify</code> proves every claim again.</p>\
-         <p>For <b>every</b> state with x'Px ≤ {:.3}, the nonlinear robot under the torque \
-         u = −K x, held over each sample of {} s,</p><ul>\
+         <p>For <b>every</b> state with x'Px ≤ {:.3}, the model with exactly these parameters, under \
+         the torque u = −K x of the exact state, without delay, held over each sample of {} s,</p><ul>\
          <li>has x'Px smaller after the sample by at least the stage cost x'Qx + u'Ru and {:.2e} \
          of itself, so it never leaves the set,</li>\
-         <li>stays within the bounds of torque and states, also between the samples.</li></ul>\
+         <li>stays within the limits of torque and states, those of the states also between the \
+         samples.</li></ul>\
          <p>And A − BK is quadratically stable (rate {} 1/s) for every motion of \
          |θ| ≤ {:.4} rad, |θ'| ≤ {:.4} rad/s in continuous time.</p>\
          <figure>{svg}</figure>\
          <div class=\"scroll\"><table><tr><th>state</th><th>in the set, at most</th>\
-         <th>between samples, below</th><th>bound</th></tr>{rows}</table></div>\
+         <th>between samples, below</th><th>limit</th></tr>{rows}</table></div>\
          <p>K = {:.6?}, for u = −K x. Proved on {} boxes of states and {} of schedulings.</p>\n",
         html::escape(title),
         terminal.level,

@@ -20,6 +20,7 @@ pub mod optimality;
 pub mod output;
 pub mod pictures;
 pub mod progress;
+pub mod proofs;
 pub mod recording;
 pub mod refinement;
 pub mod refinement_file;

@@ -1,7 +1,7 @@
 //! `[controller.terminal.certified]`: from the certificate of a terminal set to the guarded
 //! controller.
 
-use crate::certificate::TerminalCertificate;
+use crate::certificate::{TerminalCertificate, read_certificate};
 use crate::error::ScenarioError;
 use crate::files::Files;
 use crate::problem::dynamic;
@@ -11,7 +11,9 @@ use ballbot::Ballbot;
 use lpvmpc::{
     ControllerSettings, GuardedIterations, GuardedSettings, Predictor, TerminalSet, Weights,
 };
+use lpvmpc_design::is_at_most;
 use nalgebra::{SMatrix, Vector4};
+use std::fmt;
 use std::path::Path;
 
 const KEY: &str = "controller.terminal.certified";
@@ -24,14 +26,56 @@ const SEARCH: usize = 30;
 /// Price of a state bound exceeded by its width, in largest terminal costs of the set.
 const SOFT_PRICE: f64 = 1e3;
 
+/// What is known of a certificate that a scenario relies on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Standing {
+    /// The program's own ([`crate::builtin::TERMINAL_CERTIFICATE`]), which its tests prove.
+    BuiltIn,
+    /// Proved by this version of the program, now or before.
+    Proved,
+    /// Taken at its word.
+    NotProved,
+}
+
+impl fmt::Display for Standing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::BuiltIn => "built in; the tests of this version prove it",
+            Self::Proved => "proved by this version of the program",
+            Self::NotProved => "not proved here, taken at its word",
+        })
+    }
+}
+
+/// What a certified terminal set makes of a controller.
+pub(crate) struct Guarantee {
+    /// The guarded controller's settings.
+    pub settings: GuardedSettings<f64, 4, 1>,
+    certificate: TerminalCertificate,
+    file: Option<String>,
+}
+
+impl Guarantee {
+    /// What is known of the certificate: to be asked last of all, since a proof may take minutes.
+    ///
+    /// # Errors
+    /// A claim is false, or could not be shown.
+    pub fn standing(&self, files: &dyn Files) -> Result<Standing, ScenarioError> {
+        let Some(file) = &self.file else {
+            return Ok(Standing::BuiltIn);
+        };
+        files.prove(file, &self.certificate)
+    }
+}
+
 impl ControllerTable {
-    /// The guarded controller's settings, where the terminal set is certified.
+    /// The guarded controller, where the terminal set is certified.
     pub(crate) fn guarded(
         &self,
         ballbot: &Ballbot<f64>,
         settings: &ControllerSettings<f64, 4, 1, 3>,
         files: &dyn Files,
-    ) -> Result<Option<GuardedSettings<f64, 4, 1>>, ScenarioError> {
+    ) -> Result<Option<Guarantee>, ScenarioError> {
         let TerminalTable::Certified(table) = &self.terminal else {
             return Ok(None);
         };
@@ -42,11 +86,12 @@ impl ControllerTable {
                 "a guarantee needs the nonlinear prediction, \"lpv\"",
             ));
         }
-        table.settings(ballbot, settings, files).map(Some)
+        table.guarantee(ballbot, settings, files).map(Some)
     }
 }
 
-/// A certificate, as it was written. It is not proved again here: `ballbot verify` does.
+/// A certificate, as it was written, with numbers that can be. It is not proved here: see
+/// [`Files::prove`].
 pub(crate) fn read(
     file: Option<&str>,
     directory: &Path,
@@ -58,7 +103,7 @@ pub(crate) fn read(
         ),
         Some(file) => {
             let path = directory.join(file);
-            let text = std::fs::read_to_string(&path);
+            let text = read_certificate(&path);
             let text = text.map_err(|source| ScenarioError::Read {
                 path: path.clone(),
                 source,
@@ -66,26 +111,28 @@ pub(crate) fn read(
             (path.display().to_string(), text)
         }
     };
-    let certificate = TerminalCertificate::from_json(&text);
+    let refused = |error: &dyn fmt::Display| {
+        ScenarioError::value(format!("{KEY}.certificate"), &origin, error.to_string())
+    };
+    let certificate = TerminalCertificate::from_json(&text).map_err(|error| refused(&error))?;
+    TerminalCertificate::check_digest(&text).map_err(|error| refused(&error))?;
     certificate
-        .and_then(|read| TerminalCertificate::check_digest(&text).map(|()| read))
-        .map_err(|error| {
-            let key = format!("{KEY}.certificate");
-            ScenarioError::value(key, origin, error.to_string())
-        })
+        .check_numbers()
+        .map_err(|error| refused(&error))?;
+    Ok(certificate)
 }
 
 impl CertifiedTable {
-    /// The guarded controller's settings for the problem of `plain`.
+    /// The guarded controller for the problem of `plain`.
     ///
     /// # Errors
     /// The certificate cannot be read, or is none of this robot, cost and bounds.
-    fn settings(
+    fn guarantee(
         &self,
         ballbot: &Ballbot<f64>,
         plain: &ControllerSettings<f64, 4, 1, 3>,
         files: &dyn Files,
-    ) -> Result<GuardedSettings<f64, 4, 1>, ScenarioError> {
+    ) -> Result<Guarantee, ScenarioError> {
         let Predictor::StageConsistent(rk4) = plain.predictor else {
             return Err(ScenarioError::value(
                 "controller.predictor",
@@ -101,10 +148,10 @@ impl CertifiedTable {
             p: certificate.terminal.p,
             level: certificate.terminal.level,
         };
-        let semi_axes = check_bounds(&terminal, plain)?;
+        let room = check_bounds(&terminal, &certificate.state_limits, plain)?;
         let direction = Vector4::x();
         let stiffness = (terminal.p * direction).dot(&direction);
-        Ok(GuardedSettings {
+        let settings = GuardedSettings {
             t_s: plain.t_s,
             horizon: plain.horizon,
             rk4,
@@ -114,10 +161,7 @@ impl CertifiedTable {
             x: plain.x,
             u: plain.u,
             direction,
-            set_points: [
-                plain.x.lower[0] + semi_axes[0],
-                plain.x.upper[0] - semi_axes[0],
-            ],
+            set_points: [plain.x.lower[0] + room, plain.x.upper[0] - room],
             offset_weight: self.offset_weight.unwrap_or(stiffness),
             margin: MARGIN,
             iterations: GuardedIterations {
@@ -126,6 +170,11 @@ impl CertifiedTable {
             },
             soft_price: SOFT_PRICE * terminal.level,
             solver: plain.solver,
+        };
+        Ok(Guarantee {
+            settings,
+            certificate,
+            file: self.certificate.clone(),
         })
     }
 }
@@ -154,23 +203,23 @@ fn check_plant(
     Ok(())
 }
 
-/// The certified decrease must pay for the stage cost: Q and R at most the certificate's.
+/// The certified decrease must pay for the stage cost: Q and R at most the certificate's, as
+/// matrices.
 fn check_cost(
     certificate: &TerminalCertificate,
     weights: &Weights<f64, 4, 1>,
 ) -> Result<(), ScenarioError> {
-    let rest = certificate.q - weights.q;
-    if dynamic(&rest).symmetric_eigenvalues().min() < 0.0 {
+    if !is_at_most(&weights.q, &certificate.q) {
         return Err(ScenarioError::value(
             "controller.q",
             numbers(&weights.q.diagonal()),
             format!(
                 "the certificate is for q = {}, and for less",
-                numbers(&certificate.q.diagonal())
+                rows(&certificate.q)
             ),
         ));
     }
-    if weights.r[0] > certificate.r[0] {
+    if !is_at_most(&weights.r, &certificate.r) {
         return Err(ScenarioError::value(
             "controller.r",
             weights.r[0],
@@ -183,12 +232,14 @@ fn check_cost(
     Ok(())
 }
 
-/// The set and the law in it must lie within the bounds. Returns the set's semi-axes: its
-/// largest |x_i|.
+/// The set, the motions between samples that start in it, and the law must lie within the bounds.
+/// Returns how far the ball gets from the set point on either side: infinite where the certificate
+/// does not say, and the bounds do not ask.
 fn check_bounds(
     terminal: &TerminalSet<f64, 4, 1>,
+    between_samples: &Vector4<f64>,
     plain: &ControllerSettings<f64, 4, 1, 3>,
-) -> Result<Vector4<f64>, ScenarioError> {
+) -> Result<f64, ScenarioError> {
     let inverse = dynamic(&terminal.p).lu().try_inverse().ok_or_else(|| {
         ScenarioError::value(
             format!("{KEY}.certificate"),
@@ -200,55 +251,66 @@ fn check_bounds(
         let square = terminal.level * (row * &inverse * row.transpose())[0];
         square.sqrt()
     };
-    let semi_axes = Vector4::from_fn(|i, _| reach(&Vector4::ith(i, 1.0).transpose()));
     let torque = reach(&terminal.gain);
+    let (x, u) = (&plain.x, &plain.u);
     let rows = [
-        (
-            "theta_rad",
-            semi_axes[1],
-            plain.x.lower[1],
-            plain.x.upper[1],
-        ),
-        (
-            "phi_dot_rad_s",
-            semi_axes[2],
-            plain.x.lower[2],
-            plain.x.upper[2],
-        ),
+        ("theta_rad", between_samples[1], x.lower[1], x.upper[1]),
+        ("phi_dot_rad_s", between_samples[2], x.lower[2], x.upper[2]),
         (
             "theta_dot_rad_s",
-            semi_axes[3],
-            plain.x.lower[3],
-            plain.x.upper[3],
+            between_samples[3],
+            x.lower[3],
+            x.upper[3],
         ),
-        ("torque_nm", torque, plain.u.lower[0], plain.u.upper[0]),
+        ("torque_nm", torque, u.lower[0], u.upper[0]),
     ];
     for (key, reach, lower, upper) in rows {
-        if -reach < lower || reach > upper {
+        // Negated, so that a number that is not one fails.
+        if !(lower <= -reach && reach <= upper) {
             return Err(ScenarioError::value(
                 format!("bounds.{key}"),
                 format!("[{lower}, {upper}]"),
                 format!(
-                    "the certified set reaches from {:.4} to {reach:.4}; certify a smaller one \
+                    "what starts in the certified set reaches from {:.4} to {reach:.4}, as far as \
+                     the certificate says; certify again within these bounds, or a smaller set \
                      with `ballbot certify --size`",
                     -reach
                 ),
             ));
         }
     }
-    if plain.x.upper[0] - plain.x.lower[0] < 2.0 * semi_axes[0] {
+    let (lower, upper) = (x.lower[0], x.upper[0]);
+    let room = between_samples[0];
+    if !(lower.is_finite() || upper.is_finite()) {
+        return Ok(room.min(reach(&Vector4::x().transpose())));
+    }
+    if !(room.is_finite() && upper - lower >= 2.0 * room) {
         return Err(ScenarioError::value(
             "bounds.phi_rad",
-            format!("[{}, {}]", plain.x.lower[0], plain.x.upper[0]),
+            format!("[{lower}, {upper}]"),
             format!(
-                "the certified set around a set point is {:.4} rad wide and must fit in",
-                2.0 * semi_axes[0]
+                "what starts in the certified set around a set point is within {room:.4} rad of \
+                 it, as far as the certificate says, and must fit in; `ballbot certify` writes \
+                 certificates that say how far"
             ),
         ));
     }
-    Ok(semi_axes)
+    Ok(room)
 }
 
 fn numbers(values: &Vector4<f64>) -> String {
     format!("{:?}", values.as_slice())
+}
+
+/// The diagonal alone where there is nothing beside it.
+fn rows(matrix: &SMatrix<f64, 4, 4>) -> String {
+    let diagonal = matrix.diagonal();
+    if *matrix == SMatrix::from_diagonal(&diagonal) {
+        return numbers(&diagonal);
+    }
+    let rows: Vec<String> = matrix
+        .row_iter()
+        .map(|row| numbers(&row.transpose()))
+        .collect();
+    format!("[{}]", rows.join(", "))
 }

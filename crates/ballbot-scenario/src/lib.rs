@@ -53,13 +53,14 @@ mod world;
 mod world_table;
 
 pub use ballbot_control::{Feedback, GUARDED_ACTIVE, LONGEST_HORIZON};
-pub use certificate::{RobotTable, TerminalCertificate, ViscousBallbot};
+pub use certificate::{RobotTable, TerminalCertificate, ViscousBallbot, read_certificate};
 pub use error::ScenarioError;
 pub use excitation::Excitation;
 pub use feedback_table::{
     DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
 };
 pub use files::Files;
+pub use guarantee::Standing;
 pub use heading::Turning;
 pub use heading_table::HeadingTable;
 pub use parameters::{KnownRobot, Parameters};

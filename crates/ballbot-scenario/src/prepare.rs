@@ -2,6 +2,7 @@
 
 use crate::error::ScenarioError;
 use crate::files::Files;
+use crate::guarantee::Standing;
 use crate::heading::Turning;
 use crate::heading_table::HeadingTable;
 use crate::number::{finite, positive};
@@ -35,6 +36,8 @@ pub struct Prepared {
     /// Where the terminal set is certified: the settings of the guarded controller, which then
     /// runs. `settings` are those of the same problem without guard.
     pub guarded: Option<GuardedSettings<f64, 4, 1>>,
+    /// What is known of the certificate that this rests on.
+    pub certificate: Option<Standing>,
     /// One plane, or x and y.
     pub planes: Vec<Plane>,
     /// The three motors, where the planes share them.
@@ -134,6 +137,9 @@ impl Scenario {
                 error.to_string(),
             )
         })?;
+        let planes = self.planes(references, &real, (settings.t_s, tolerances), files)?;
+        // After all that is cheap to check.
+        let certificate = guarded.as_ref().map(|found| found.standing(files));
         Ok(Prepared {
             title: self.title.clone(),
             ballbot,
@@ -141,8 +147,9 @@ impl Scenario {
             settings,
             feedback,
             ramp,
-            planes: self.planes(references, &real, (settings.t_s, tolerances), files)?,
-            guarded,
+            planes,
+            guarded: guarded.map(|found| found.settings),
+            certificate: certificate.transpose()?,
             motors,
             moves,
             samples: samples as usize,

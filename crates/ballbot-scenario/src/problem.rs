@@ -277,9 +277,51 @@ impl ControllerTable {
                 };
                 cost(lpvmpc_design::lqr_continuous(&dynamic(&a), &dynamic(&b), &q, &r)?.p)
             }
-            TerminalTable::Cost { p } => TerminalIngredient::Cost(Matrix4::from_fn(|i, j| p[i][j])),
+            TerminalTable::Cost { p } => TerminalIngredient::Cost(terminal_cost(p)?),
         })
     }
+}
+
+/// P of a file: its symmetric part, once mirrored entries agree up to the digits that a file may
+/// leave out, and no eigenvalue is negative by more than that.
+fn terminal_cost(p: &[[f64; 4]; 4]) -> Result<Matrix4<f64>, ScenarioError> {
+    const ROUNDING: f64 = 1e-10;
+    const KEY: &str = "controller.terminal.cost.p";
+    let given = Matrix4::from_fn(|i, j| p[i][j]);
+    for (i, row) in p.iter().enumerate() {
+        for (j, entry) in row.iter().enumerate() {
+            if !entry.is_finite() {
+                let key = format!("{KEY}[{i}][{j}]");
+                return Err(ScenarioError::value(
+                    key,
+                    entry,
+                    "it must be a finite number",
+                ));
+            }
+        }
+    }
+    let rounding = ROUNDING * given.amax();
+    let below = (0..4).flat_map(|i| (0..i).map(move |j| (i, j)));
+    for (i, j) in below {
+        let (entry, mirrored) = (given[(i, j)], given[(j, i)]);
+        if (entry - mirrored).abs() > rounding {
+            return Err(ScenarioError::value(
+                format!("{KEY}[{i}][{j}]"),
+                entry,
+                format!("P must be symmetric, and p[{j}][{i}] is {mirrored}"),
+            ));
+        }
+    }
+    let symmetric = given * 0.5 + given.transpose() * 0.5;
+    let smallest = dynamic(&symmetric).symmetric_eigenvalues().min();
+    if !(smallest >= -rounding) {
+        return Err(ScenarioError::value(
+            KEY,
+            format!("(smallest eigenvalue {smallest:.3e})"),
+            "P must be positive semidefinite",
+        ));
+    }
+    Ok(symmetric)
 }
 
 pub(crate) fn dynamic<const R: usize, const C: usize>(

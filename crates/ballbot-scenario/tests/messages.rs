@@ -173,23 +173,35 @@ fn indefinite_terminal_cost() {
             &text[end..]
         )
     };
-    let refuse = |p: &str| {
-        // The controller is made when the run begins.
-        let scenario = Scenario::parse(&with(p), "my.toml").expect("valid TOML");
-        let prepared = scenario.prepare(Path::new(".")).expect("valid so far");
-        let surroundings = ballbot_scenario::Surroundings {
-            clock: &|| std::time::Duration::ZERO,
-            progress: &|_| (),
-        };
-        prepared
-            .run(&surroundings)
-            .expect_err("refused")
-            .to_string()
+    let prepare = |rows: &str| {
+        let rest = "[0.0,0.0,1.0,0.0],[0.0,0.0,0.0,1.0]";
+        let text = with(&format!("[{rows},{rest}]"));
+        let scenario = Scenario::parse(&text, "my.toml").expect("valid TOML");
+        scenario.prepare(Path::new("."))
     };
-    let said = refuse("[[1.0,0.0,0.0,0.0],[0.0,-1.0,0.0,0.0],[0.0,0.0,1.0,0.0],[0.0,0.0,0.0,1.0]]");
-    assert_says(&said, &["P", "semidefinite"]);
-    let said = refuse("[[1.0,5.0,0.0,0.0],[0.0,1.0,0.0,0.0],[0.0,0.0,1.0,0.0],[0.0,0.0,0.0,1.0]]");
-    assert_says(&said, &["P", "symmetric"]);
+    let refuse = |rows| prepare(rows).expect_err("refused").to_string();
+    prepare("[1.0,0.5,0.0,0.0],[0.5,1.0,0.0,0.0]").expect("positive definite");
+    assert_says(
+        &refuse("[1.0,0.0,0.0,0.0],[0.0,-1.0,0.0,0.0]"),
+        &["controller.terminal.cost.p", "-1.000e0", "semidefinite"],
+    );
+    assert_says(
+        &refuse("[1.0,2.0,0.0,0.0],[2.0,1.0,0.0,0.0]"),
+        &["controller.terminal.cost.p", "semidefinite"],
+    );
+    // One triangle of it is definite.
+    assert_says(
+        &refuse("[1.0,5.0,0.0,0.0],[0.0,1.0,0.0,0.0]"),
+        &[
+            "controller.terminal.cost.p[1][0]",
+            "symmetric",
+            "p[0][1] is 5",
+        ],
+    );
+    assert_says(
+        &refuse("[nan,0.0,0.0,0.0],[0.0,1.0,0.0,0.0]"),
+        &["controller.terminal.cost.p[0][0]", "finite"],
+    );
 }
 
 #[test]

@@ -7,8 +7,8 @@
 use ballbot_scenario::{RobotTable, Scenario, TerminalCertificate, builtin};
 use lpvmpc::LpvModel;
 use lpvmpc_design::{
-    AnalyticModel, CertificateProblem, Interval, SchedulingGrid, TerminalProblem, certify_terminal,
-    synthesize_terminal, zero_order_hold,
+    AnalyticModel, CertificateProblem, Interval, MOST_BOXES, SchedulingGrid, TaylorModel,
+    TerminalProblem, certify_terminal, synthesize_terminal, zero_order_hold,
 };
 use lpvmpc_sim::{Tolerances, advance};
 use nalgebra::{DMatrix, Vector1, Vector2, Vector4};
@@ -75,6 +75,35 @@ fn the_true_motion_decreases_the_cost_and_stays_in_the_set() {
     }
 }
 
+/// The program takes its own certificate to be proved: this is where it is.
+#[test]
+fn the_built_in_certificate_is_proved() {
+    let found = certificate();
+    let proof = found.prove(&found.plant, MOST_BOXES, &|_| ()).unwrap();
+    assert_eq!(proof.boxes, found.record.boxes);
+}
+
+/// Assumption 4 of docs/guarantees.md, for every state, whatever the parameters: phi and its Taylor
+/// coefficient enter the scheduling with exactly zero, and A's column of phi is exactly zero for all
+/// schedulings of the box.
+#[test]
+fn the_robot_does_not_notice_where_it_stands() {
+    let mut table = certificate().plant;
+    for friction in [0.0, 1e-3] {
+        table.drive_friction_m2_s = friction;
+        let x: [TaylorModel<4>; 4] = std::array::from_fn(|i| TaylorModel::symbol(0.0, 1e3, i));
+        for entry in AnalyticModel::scheduling(&table, &x) {
+            assert_eq!(
+                (entry.slopes[0], entry.squares[0], entry.error),
+                (0.0, [0.0; 4], 0.0)
+            );
+        }
+        let schedulings = [FRAC_PI_3, 2.0 * PI].map(|limit| Interval::new(-limit, limit));
+        let (a, _) = AnalyticModel::matrices(&table, &schedulings);
+        assert!(a.iter().all(|row| row[0] == Interval::point(0.0)));
+    }
+}
+
 #[test]
 fn the_certificate_is_of_the_built_in_robot() {
     let found = certificate();
@@ -121,7 +150,7 @@ fn problem(size: f64, contraction: f64) -> CertificateProblem<4, 1, 2> {
             contraction,
             level: 2000.0,
         },
-        state_limits: found.state_limits,
+        state_limits: Vector4::repeat(f64::INFINITY),
         scheduling_limits: limits,
         written_by: "test".to_owned(),
     }

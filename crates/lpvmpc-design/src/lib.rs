@@ -85,7 +85,8 @@ pub use stability::{
     check_rk4_step, frozen_stability,
 };
 pub use terminal::{
-    Certificate, CertificateProblem, CertifyError, ClaimError, DocumentError, MOST_BOXES, Proof,
-    QuadraticClaim, Record, SynthesisError, TerminalClaim, TerminalIngredients, TerminalProblem,
-    certify_terminal, synthesize_terminal,
+    Certificate, CertificateProblem, CertifyError, ClaimError, DocumentError, Effort, MOST_BOXES,
+    MOST_BYTES, PROOF_REVISION, Proof, QuadraticClaim, Record, SynthesisError, TerminalClaim,
+    TerminalIngredients, TerminalProblem, certify_terminal, is_at_most, raise_level,
+    synthesize_terminal,
 };

@@ -1,6 +1,8 @@
 //! Terminal law, cost and set of a predictive controller.
 
 mod certificate;
+mod claim;
+mod counterexample;
 mod cover;
 mod decrease;
 mod design;
@@ -8,11 +10,16 @@ mod document;
 mod ellipsoid;
 mod lmi;
 mod normalised;
+mod numbers;
 mod proof;
 mod quadratic;
 mod synthesis;
 
-pub use certificate::{Certificate, DocumentError, QuadraticClaim, Record, TerminalClaim};
-pub use design::{CertificateProblem, CertifyError, certify_terminal};
-pub use proof::{ClaimError, MOST_BOXES, Proof};
+pub use certificate::{
+    Certificate, DocumentError, MOST_BYTES, QuadraticClaim, Record, TerminalClaim,
+};
+pub use claim::ClaimError;
+pub use design::{CertificateProblem, CertifyError, Effort, certify_terminal, raise_level};
+pub use numbers::is_at_most;
+pub use proof::{MOST_BOXES, PROOF_REVISION, Proof};
 pub use synthesis::{SynthesisError, TerminalIngredients, TerminalProblem, synthesize_terminal};

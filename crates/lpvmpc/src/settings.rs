@@ -209,23 +209,27 @@ pub(crate) fn check_horizon(given: usize, largest: usize) -> Result<(), Controll
     Ok(())
 }
 
-/// Symmetric, finite, and positive definite after adding `shift` times its size.
+/// Symmetric up to rounding, finite, and positive definite after adding `shift` times its size.
+/// Rounding is 10 K units of the largest entry, which an eigenvalue of a semidefinite matrix may
+/// be off by, too. Definiteness is that of the symmetric part, all that x'Wx depends on, and not
+/// of the triangle that a factorisation happens to read.
 pub(crate) fn check_weight<T: Scalar, const K: usize>(
     weight: &SMatrix<T, K, K>,
     name: &'static str,
     shift: T,
 ) -> Result<(), ControllerError> {
     let size = weight.amax();
+    let roundings: T = convert::<f64, T>(10.0 * K as f64);
     let asymmetry = (weight - weight.transpose()).amax();
-    let rounding: T = convert::<f64, T>(1e3) * T::default_epsilon() * size;
     let finite = weight.iter().all(|entry| entry.is_finite());
-    if !(finite && asymmetry <= rounding) {
+    if !(finite && asymmetry <= roundings * T::default_epsilon() * size) {
         return Err(ControllerError::WeightEntries(name));
     }
+    let half: T = convert(0.5);
+    let symmetric = weight * half + weight.transpose() * half;
     // Semidefinite up to rounding: a tiny multiple of the identity makes it definite.
     let scale = if size > T::zero() { size } else { T::one() };
-    let lifted =
-        weight + SMatrix::identity() * (shift * scale * convert::<f64, T>(10.0 * K as f64));
+    let lifted = symmetric + SMatrix::identity() * (shift * scale * roundings);
     match Cholesky::<T, Const<K>>::new(lifted) {
         Some(_) => Ok(()),
         None => Err(ControllerError::WeightSign(name)),

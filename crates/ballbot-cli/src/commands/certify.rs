@@ -6,11 +6,14 @@ use crate::arguments::positive;
 use crate::certificate_page;
 use crate::output;
 use crate::progress::Progress;
+use crate::proofs::{self, STEPS};
 use crate::table::{Table, number};
-use ballbot_scenario::{Prepared, RobotTable, TerminalCertificate};
+use ballbot_scenario::{Prepared, RobotTable, TerminalCertificate, TerminalTable};
 use clap::Args;
 use lpvmpc::Bounds;
-use lpvmpc_design::{CertificateProblem, CertifyError, Proof, TerminalProblem, certify_terminal};
+use lpvmpc_design::{
+    CertificateProblem, CertifyError, Effort, Proof, TerminalProblem, certify_terminal, raise_level,
+};
 use nalgebra::{SVector, Vector2, Vector4};
 use std::path::PathBuf;
 
@@ -24,7 +27,8 @@ Examples:
 
 Finds K, P and the set x'Px <= level, and proves for the sampled nonlinear robot that the law
 u = -K x, held over each sample, keeps the state in the set, within all bounds, and decreases the
-cost. Writes certificate.json and a page with the set (certificate.html).")]
+cost. The level is raised as far as limits and proof allow. Writes certificate.json and a page with
+the set (certificate.html).")]
 pub struct CertifyArguments {
     /// A built-in scenario or a TOML file: robot, sampling time, weights and bounds
     #[arg(default_value = "two-setpoints")]
@@ -35,7 +39,7 @@ pub struct CertifyArguments {
     /// Share of the bounds of tilt and tilt rate that the set may use; searched for if not given
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub size: Option<f64>,
-    /// Level of the set x'Px <= LEVEL, in units of the cost
+    /// Level of the designed set x'Px <= LEVEL, in units of the cost
     #[arg(long, default_value = "2000", value_parser = positive)]
     pub level: f64,
     /// Share of the cost by which the design decreases it beyond the stage cost; more makes the
@@ -45,6 +49,10 @@ pub struct CertifyArguments {
     /// Boxes of states that one proof may look at
     #[arg(long, default_value = "40000")]
     pub boxes: usize,
+    /// Higher levels that are tried for the same K and P after the design, each a proof; 0 keeps
+    /// the level
+    #[arg(long, value_name = "TRIALS", default_value = "3", value_parser = clap::value_parser!(u8).range(0..=20))]
+    pub raise: u8,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/certificate")]
     pub out: PathBuf,
@@ -69,12 +77,19 @@ type Certified = (TerminalCertificate, Proof<4>);
 /// # Errors
 /// The scenario is not valid, no set could be proved, or a file cannot be written.
 pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
-    let prepared = arguments.robot.prepare(&arguments.scenario)?;
+    let (mut scenario, folder) = arguments.robot.load(&arguments.scenario)?;
+    // Its certificate, where it has one, is about to be replaced.
+    if let TerminalTable::Certified(_) = scenario.controller.terminal {
+        scenario.controller.terminal = TerminalTable::DiscreteRiccati;
+    }
+    let prepared = scenario.prepare(folder.as_path())?;
     let robot = RobotTable::try_from(&prepared.ballbot)?;
-    let (certificate, proof) = match arguments.size {
-        Some(size) => certify(arguments, &prepared, robot, size)?,
+    let (size, certified) = match arguments.size {
+        Some(size) => (size, certify(arguments, &prepared, robot, size)?),
         None => search(arguments, &prepared, robot)?,
     };
+    let (certificate, proof) = raise(arguments, &prepared, robot, size, certified);
+    proofs::remember(&certificate);
     let json = certificate.to_json()?;
     let page = certificate_page::html(&prepared.title, &certificate, &proof)?;
     let paths = ["certificate.json", "certificate.html"].map(|name| arguments.out.join(name));
@@ -94,7 +109,7 @@ fn search(
     arguments: &CertifyArguments,
     prepared: &Prepared,
     robot: RobotTable,
-) -> Result<Certified, CommandError> {
+) -> Result<(f64, Certified), CommandError> {
     let sizes = (1..=SIZES).map(|i| i as f64 / SIZES as f64);
     let designed: Vec<(f64, f64)> = sizes
         .map(|size| {
@@ -117,7 +132,7 @@ fn search(
         match certify(arguments, prepared, robot, designed[middle].0) {
             Ok(found) => {
                 low = middle + 1;
-                best = Some(found);
+                best = Some((designed[middle].0, found));
             }
             Err(error) => {
                 high = middle;
@@ -175,8 +190,29 @@ fn certify(
     )
 }
 
-/// Steps of the progress bar of a proof.
-pub(super) const STEPS: usize = 1000;
+/// The certificate with the highest level that was tried and proved.
+fn raise(
+    arguments: &CertifyArguments,
+    prepared: &Prepared,
+    robot: RobotTable,
+    size: f64,
+    certified: Certified,
+) -> Certified {
+    let trials = usize::from(arguments.raise);
+    let effort = Effort {
+        trials,
+        most_boxes: arguments.boxes,
+    };
+    let progress = Progress::new("raising the level", trials * STEPS);
+    let problem = problem(arguments, prepared, size);
+    raise_level(
+        &robot.ballbot(),
+        &problem,
+        certified,
+        effort,
+        &|trial, done| progress.set(trial * STEPS + (done * STEPS as f64) as usize),
+    )
+}
 
 /// The limit of |value| that the bounds leave on both sides.
 fn symmetric<const N: usize>(bounds: &Bounds<f64, N>) -> SVector<f64, N> {
@@ -209,10 +245,12 @@ pub(super) fn summary(certificate: &TerminalCertificate, proof: &Proof<4>) -> St
             },
         );
     format!(
-        "Proved for the nonlinear robot under u = -K x, held over {t_s} s, for every x with x'Px <= {}:\n  \
+        "Proved for the model with exactly the parameters in the file, the exact state and no delay,\n\
+         under u = -K x, held over {t_s} s, for every x with x'Px <= {}:\n  \
          x'Px decreases per sample by the stage cost and {} of itself, at least\n  \
-         all bounds hold, those of the states also between samples\n\
-         Proved in continuous time, |theta| <= {} deg, |theta_dot| <= {} rad/s, however they move:\n  \
+         all limits in the file hold, those of the states also between samples\n\
+         Proved for the same model in continuous time, without sampling, for |theta| <= {} deg and\n\
+         |theta_dot| <= {} rad/s, however they move:\n  \
          A - BK is quadratically stable with the rate {} 1/s\n\n\
          Gain for u = -K x\n{}\n{}\n\
          {} boxes of states, {} of schedulings\n",

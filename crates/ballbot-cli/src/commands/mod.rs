@@ -69,8 +69,8 @@ pub enum CommandError {
     /// No set could be certified.
     #[error("no certificate: {0}")]
     Certify(#[from] CertifyError),
-    /// A claim of a certificate does not hold.
-    #[error("the certificate does not hold: {0}")]
+    /// A claim of a certificate is false, or could not be shown.
+    #[error("the certificate {verdict}: {0}", verdict = .0.verdict())]
     Claim(#[from] ClaimError),
     /// A certificate that cannot be read, or was changed.
     #[error(transparent)]

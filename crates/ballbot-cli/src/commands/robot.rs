@@ -1,6 +1,7 @@
 //! Which robot: the option that all commands with a robot have.
 
 use super::CommandError;
+use crate::proofs::ProvedFiles;
 use ballbot::Ballbot;
 use ballbot_scenario::{Parameters, Prepared, Scenario};
 use clap::Args;
@@ -31,18 +32,28 @@ impl RobotArguments {
     }
 
     /// A built-in scenario or a scenario file with this robot, checked. Files that it names are
-    /// looked for beside it.
+    /// looked for beside it; a certificate among them is proved, the first time.
     ///
     /// # Errors
     /// The scenario or the robot's file cannot be read or makes no sense.
     pub fn prepare(&self, scenario: &str) -> Result<Prepared, CommandError> {
+        let (loaded, folder) = self.load(scenario)?;
+        let files = ProvedFiles { folder: &folder };
+        Ok(loaded.prepare(files)?)
+    }
+
+    /// A scenario with this robot, and the folder for files that it names; not checked yet.
+    ///
+    /// # Errors
+    /// The scenario cannot be read.
+    pub fn load(&self, scenario: &str) -> Result<(Scenario, PathBuf), CommandError> {
         let mut loaded = Scenario::load(scenario)?;
         if let Some(path) = &self.parameters {
             // Relative to where the command was given, not to the scenario.
             let path = std::path::absolute(path).unwrap_or_else(|_| path.clone());
             loaded.parameters = Parameters::File(path);
         }
-        let directory = Path::new(scenario).parent().unwrap_or(Path::new("."));
-        Ok(loaded.prepare(directory)?)
+        let folder = Path::new(scenario).parent().unwrap_or(Path::new("."));
+        Ok((loaded, folder.to_owned()))
     }
 }

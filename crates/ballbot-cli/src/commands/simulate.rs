@@ -314,8 +314,11 @@ fn summary(prepared: &Prepared, trajectories: &[Trajectory<4, 1>], folder: &Path
     for (name, value) in rows {
         table.row(std::iter::once(name.to_owned()).chain(metrics.iter().map(value)));
     }
+    let certificate = prepared.certificate.map_or(String::new(), |standing| {
+        format!("terminal certificate: {standing}\n")
+    });
     format!(
-        "{}: {} samples of {} s\n{table}written to {}\n",
+        "{}: {} samples of {} s\n{table}{certificate}written to {}\n",
         prepared.title,
         prepared.samples,
         prepared.settings.t_s,

@@ -1,12 +1,11 @@
 //! `ballbot verify`.
 
 use super::CommandError;
-use super::certify::{STEPS, summary};
+use super::certify::summary;
 use crate::input::InputError;
-use crate::progress::Progress;
-use ballbot_scenario::TerminalCertificate;
+use crate::proofs;
+use ballbot_scenario::{TerminalCertificate, read_certificate};
 use clap::Args;
-use lpvmpc_design::MOST_BOXES;
 use std::path::PathBuf;
 
 /// Arguments of `ballbot verify`.
@@ -15,8 +14,10 @@ use std::path::PathBuf;
 Example:
   ballbot verify out/certificate/certificate.json
 
-Proves every claim again from the numbers in the file, without an optimiser. Exits with 1 and
-names the claim if one does not hold, or if the file is not as it was written.")]
+Proves every claim again from the numbers in the file, without an optimiser: for the model with
+these numbers, the exact state and no delay. Exits with 1 and names the claim if one is false, which
+is said with a state that shows it, if one could not be shown, which leaves open whether it is true,
+or if the file is not as it was written.")]
 pub struct VerifyArguments {
     /// A file written by `ballbot certify`
     pub certificate: PathBuf,
@@ -25,22 +26,19 @@ pub struct VerifyArguments {
 /// Proves the claims of a certificate again.
 ///
 /// # Errors
-/// The file cannot be read, a claim does not hold, or the file was changed.
+/// The file cannot be read, a claim is false or could not be shown, or the file was changed.
 pub fn run(arguments: &VerifyArguments) -> Result<String, CommandError> {
     let path = &arguments.certificate;
-    let text = std::fs::read_to_string(path).map_err(|source| InputError::Read {
+    let text = read_certificate(path).map_err(|source| InputError::Read {
         path: path.clone(),
         source,
     })?;
     let certificate = TerminalCertificate::from_json(&text)?;
-    let progress = Progress::new("verifying", STEPS);
-    let proof = certificate.prove(&certificate.plant, MOST_BOXES, &|done| {
-        progress.set((done * STEPS as f64) as usize);
-    })?;
+    let proof = proofs::prove("verifying", &certificate)?;
     // After the proof, so that a false claim is told by what it claims.
     TerminalCertificate::check_digest(&text)?;
     Ok(format!(
-        "{}\nThe certificate holds.\n",
+        "{}\nThe certificate holds, for the model, the exact state and no delay.\n",
         summary(&certificate, &proof)
     ))
 }

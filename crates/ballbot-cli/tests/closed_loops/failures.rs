@@ -182,7 +182,7 @@ fn broken_scenarios_leave_no_folder_behind() {
         assert_eq!(files(here), ["my.toml"], "after {to}");
         assert!(!here.join("out").exists(), "after {to}");
     }
-    // What only the controller finds: an indefinite P.
+    // A matrix without any single wrong entry: an indefinite P.
     let indefinite = with_section(
         &good,
         "[controller.terminal.continuous_riccati.linear_model]",
@@ -192,7 +192,7 @@ fn broken_scenarios_leave_no_folder_behind() {
     );
     std::fs::write(here.join("my.toml"), indefinite).unwrap();
     let message = fail(here, &["simulate", "my.toml"], 1);
-    assert_says(&message, &["weight P", "semidefinite"]);
+    assert_says(&message, &["controller.terminal.cost.p", "semidefinite"]);
     for missing in ["nothing.toml", "no/such/file"] {
         assert_says(
             &fail(here, &["simulate", missing], 1),

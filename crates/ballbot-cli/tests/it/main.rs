@@ -18,6 +18,7 @@ use std::process::{Command, Output};
 fn ballbot(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_ballbot"))
         .args(arguments)
+        .env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"))
         .output()
         .unwrap()
 }

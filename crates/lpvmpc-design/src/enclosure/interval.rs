@@ -139,7 +139,9 @@ impl Mul for Interval {
     fn mul(self, other: Self) -> Self {
         let zero = Self::point(0.0);
         if self == zero || other == zero {
-            return zero;
+            // What has no bound may have no value, 1/0, and then neither has the product.
+            let bounded = self.magnitude().is_finite() && other.magnitude().is_finite();
+            return if bounded { zero } else { Self::EVERYTHING };
         }
         let products = [
             self.lower * other.lower,

@@ -170,6 +170,20 @@ impl<const R: usize, const C: usize, const D: usize> TaylorMap<R, C, D> {
         })
     }
 
+    /// All values of the linear part over the box, without the error.
+    pub fn range(&self) -> [[Interval; C]; R] {
+        let sign = Interval::new(-1.0, 1.0);
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                let middle = Interval::point(self.middle[(i, j)]);
+                let slopes = self.slopes.iter();
+                slopes.fold(middle, |sum, slope| {
+                    sum + Interval::point(slope[(i, j)]) * sign
+                })
+            })
+        })
+    }
+
     /// How much the matrix depends on z_`symbol`.
     pub fn weight(&self, symbol: usize) -> f64 {
         let squares = self.upper().filter(|(i, j)| *i == symbol || *j == symbol);

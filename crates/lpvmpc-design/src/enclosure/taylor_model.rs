@@ -171,7 +171,12 @@ impl<const D: usize> Mul for TaylorModel<D> {
 
     fn mul(self, other: Self) -> Self {
         if self.is_zero() || other.is_zero() {
-            return Self::constant(0.0);
+            // What has no bound may have no value, 1/0, and then neither has the product.
+            let unknown = !(self.error.is_finite() && other.error.is_finite());
+            return Self {
+                error: if unknown { f64::INFINITY } else { 0.0 },
+                ..Self::constant(0.0)
+            };
         }
         let (p, q) = (&self.slopes, &other.slopes);
         let (a, b) = (self.middle, other.middle);

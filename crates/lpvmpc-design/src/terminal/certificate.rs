@@ -26,10 +26,10 @@ pub struct Certificate<Plant, const NX: usize, const NU: usize, const NS: usize>
     pub plant: Plant,
     /// Sampling time, s.
     pub t_s: f64,
-    /// Q of the stage cost x'Qx + u'Ru.
+    /// Q of the stage cost x'Qx + u'Ru, symmetric, positive semidefinite.
     #[serde(with = "rows")]
     pub q: SMatrix<f64, NX, NX>,
-    /// R of the stage cost.
+    /// R of the stage cost, symmetric, positive definite.
     #[serde(with = "rows")]
     pub r: SMatrix<f64, NU, NU>,
     /// |x_i| <= `state_limits[i]`, state units; `null` in the file, infinite here, for none.
@@ -91,10 +91,16 @@ pub struct Record {
     pub scheduling_boxes: usize,
 }
 
+/// A longer file is no certificate: that of a plant with 20 states has some 50 kB.
+pub const MOST_BYTES: usize = 256 * 1024;
+
 /// A certificate file that cannot be read.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum DocumentError {
-    /// Not JSON, an unknown or missing key, or a value of the wrong type.
+    /// More text than a certificate can have.
+    #[error("not a certificate: it has more than {MOST_BYTES} bytes")]
+    TooLong,
+    /// Not JSON, an unknown, missing or repeated key, or a value of the wrong type.
     #[error("not a certificate: {0}")]
     Syntax(String),
     /// The numbers are not those that were written.
@@ -139,10 +145,9 @@ where
     /// [`Self::check_digest`]. A changed claim is so told by what it claims.
     ///
     /// # Errors
-    /// [`DocumentError::Syntax`].
+    /// [`DocumentError::TooLong`] or [`DocumentError::Syntax`].
     pub fn from_json(text: &str) -> Result<Self, DocumentError> {
-        let document: Document<Self> = serde_json::from_str(text).map_err(DocumentError::syntax)?;
-        Ok(document.certificate)
+        Ok(Self::document(text)?.certificate)
     }
 
     /// Whether the text is as it was written. The digest has no key: it finds a slip or a patched
@@ -151,7 +156,7 @@ where
     /// # Errors
     /// [`DocumentError`].
     pub fn check_digest(text: &str) -> Result<(), DocumentError> {
-        let document: Document<Self> = serde_json::from_str(text).map_err(DocumentError::syntax)?;
+        let document = Self::document(text)?;
         let computed = document.certificate.digest()?;
         if computed == document.digest {
             Ok(())
@@ -161,6 +166,13 @@ where
                 computed,
             })
         }
+    }
+
+    fn document(text: &str) -> Result<Document<Self>, DocumentError> {
+        if text.len() > MOST_BYTES {
+            return Err(DocumentError::TooLong);
+        }
+        serde_json::from_str(text).map_err(DocumentError::syntax)
     }
 
     /// FNV-1a (Fowler, Noll, Vo), 64 bits, of the compact JSON text of the content.

@@ -43,11 +43,10 @@ pub(super) enum Finding {
         /// Estimated distance to where it would not.
         spare: f64,
     },
-    /// The statement is false at the centre.
-    Fails {
-        /// By so much, estimated.
-        excess: f64,
-    },
+    /// The statement is false at the centre, for certain.
+    Fails,
+    /// This way of proof cannot succeed here, whether the statement is true or not.
+    Hopeless,
     /// Not decided; a cut across this component promises most.
     Open {
         /// Component, counted from 0.
@@ -68,8 +67,9 @@ pub(super) struct Covered {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Uncovered<const N: usize> {
     /// It is false here.
-    False { at: SVector<f64, N>, excess: f64 },
-    /// It could not be decided near here, in spite of so many cells.
+    False { at: SVector<f64, N> },
+    /// It could not be decided near here: the way of proof cannot succeed, or not with so many
+    /// cells.
     Undecided { at: SVector<f64, N>, cells: usize },
 }
 
@@ -100,7 +100,13 @@ pub(super) fn cover<const N: usize>(
             examined += 1;
             let at = cell.centre;
             match finding {
-                Finding::Fails { excess } => return Err(Uncovered::False { at, excess }),
+                Finding::Fails => return Err(Uncovered::False { at }),
+                Finding::Hopeless => {
+                    return Err(Uncovered::Undecided {
+                        at,
+                        cells: examined,
+                    });
+                }
                 Finding::Open { .. } if cuts == MOST_CUTS || examined >= most_cells => {
                     return Err(Uncovered::Undecided {
                         at,

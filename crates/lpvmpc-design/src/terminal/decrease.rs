@@ -4,8 +4,8 @@ use super::cover::{Cell, Finding};
 use super::ellipsoid::Ellipsoid;
 use super::normalised::{Normaliser, Square, corners, from_fn, transposed};
 use crate::enclosure::{
-    AnalyticModel, Arithmetic, Interval, SampledLaw, is_positive_definite, product,
-    smallest_eigenvalue,
+    AnalyticModel, Arithmetic, Interval, SampleEnclosure, SampledLaw, is_positive_definite,
+    product, smallest_eigenvalue,
 };
 use nalgebra::{DMatrix, SMatrix, SVector, SymmetricEigen};
 use std::sync::{Mutex, PoisonError};
@@ -54,15 +54,68 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
                 spare: spare.fold(f64::INFINITY, f64::min),
             };
         }
+        // The matrix inequality is more than the claim: where it is violated, the claim may hold.
         let highest = smallest_eigenvalue(&self.rest(&middle, &spread, -1.0));
         if highest < 0.0 && !self.ellipsoid.misses(&cell.middle()) {
-            return Finding::Fails { excess: -highest };
+            return Finding::Hopeless;
         }
         let weights = sample.dependence;
         let across = (0..NX).max_by(|a, b| weights[*a].total_cmp(&weights[*b]));
         Finding::Open {
             across: across.unwrap_or(0),
         }
+    }
+
+    /// By how much V(x+) exceeds what is claimed, as a share of V(x), at exactly this state and
+    /// for certain: the motion is enclosed, and so is all rounding. `None` if it does not, if that
+    /// is not certain, or if the state is not in the set.
+    pub fn violation<const NS: usize>(&self, x: &SVector<f64, NX>) -> Option<f64>
+    where
+        M: AnalyticModel<NX, NU, NS> + Sync,
+    {
+        if !self.ellipsoid.holds(x) {
+            return None;
+        }
+        let x_column: [[Interval; 1]; NX] = from_fn(|i, _| Interval::point(x[i]));
+        let y = product(&self.normaliser.frame.inverse, &x_column);
+        let centre = SVector::from_fn(|i, _| y[i][0].middle());
+        let half_widths = SVector::from_fn(|i, _| y[i][0].radius());
+        let sample = self.enclose_finely(&centre, &half_widths)?;
+        // y+ = (G + E) y with |E y|^2 <= y'Sy.
+        let end = product(&sample.transition.range(), &y);
+        let error: Square<NX> = from_fn(|i, j| Interval::point(sample.error_square[(i, j)]));
+        let form = |m: &Square<NX>| product(&transposed(&y), &product(m, &y))[0][0];
+        let norm = end
+            .iter()
+            .fold(Interval::point(0.0), |sum, [entry]| sum + entry.square())
+            .square_root();
+        let least = (norm - form(&error).square_root()).lower.max(0.0);
+        let unit = self.normaliser.unit;
+        let next = Interval::point(least).square() * Interval::point(unit.lower);
+        let allowed = form(&self.allowed) * Interval::point(unit.upper);
+        let excess = (next - allowed).lower;
+        (excess > 0.0).then(|| excess / self.ellipsoid.value(x).upper)
+    }
+
+    /// The motions from a tiny box, in as many time steps as it takes, within reason: a long sample
+    /// may have no enclosure in those that suit a proof.
+    pub fn enclose_finely<const NS: usize>(
+        &self,
+        centre: &SVector<f64, NX>,
+        half_widths: &SVector<f64, NX>,
+    ) -> Option<SampleEnclosure<NX>>
+    where
+        M: AnalyticModel<NX, NU, NS> + Sync,
+    {
+        const MORE_HALVINGS: u8 = 5;
+        let frame = &self.normaliser.frame;
+        (0..=MORE_HALVINGS).find_map(|more| {
+            let law = SampledLaw {
+                halvings: self.law.halvings + more,
+                ..self.law
+            };
+            law.enclose(self.model, frame, centre, half_widths).ok()
+        })
     }
 
     /// The split that costs least where the inequality is tightest, roughly.

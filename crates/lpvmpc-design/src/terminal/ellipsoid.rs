@@ -1,8 +1,8 @@
 //! The set x'Px <= level.
 
 use super::cover::Cell;
-use super::normalised::{Normaliser, from_fn};
-use crate::enclosure::{Arithmetic, Interval, is_positive_definite};
+use super::normalised::{Normaliser, from_fn, transposed};
+use crate::enclosure::{Arithmetic, Interval, is_positive_definite, product};
 use nalgebra::{SMatrix, SVector};
 
 /// The set x'Px <= level, with rigorous answers about it.
@@ -20,6 +20,10 @@ impl<const NX: usize> Ellipsoid<NX> {
             level,
             normaliser,
         }
+    }
+
+    pub fn level(&self) -> f64 {
+        self.level
     }
 
     /// Whether |row x| <= limit in the whole set: limit^2 P - level row'row > 0.
@@ -47,6 +51,37 @@ impl<const NX: usize> Ellipsoid<NX> {
         } else {
             f64::INFINITY
         }
+    }
+
+    /// A state of the set with |row x| > limit, rounding included; `None` if none was found.
+    pub fn beyond(&self, row: &SVector<f64, NX>, limit: f64) -> Option<SVector<f64, NX>> {
+        const INSIDE: f64 = 1.0 - 1e-9;
+        let state = self.farthest(row)? * INSIDE;
+        let value = (0..NX).fold(Interval::point(0.0), |sum, i| {
+            sum + Interval::point(row[i]) * Interval::point(state[i])
+        });
+        (self.holds(&state) && value.lower > limit).then_some(state)
+    }
+
+    /// The state of the set with the largest row x, rounded.
+    pub fn farthest(&self, row: &SVector<f64, NX>) -> Option<SVector<f64, NX>> {
+        let inverse =
+            nalgebra::DMatrix::from_column_slice(NX, NX, self.p.as_slice()).try_inverse()?;
+        let along = inverse * nalgebra::DVector::from_column_slice(row.as_slice());
+        let along = SVector::from_column_slice(along.as_slice());
+        Some(along * (self.level / row.dot(&along)).sqrt())
+    }
+
+    /// Whether the state is in the set, for certain.
+    pub fn holds(&self, state: &SVector<f64, NX>) -> bool {
+        self.value(state).upper <= self.level
+    }
+
+    /// x'Px.
+    pub fn value(&self, state: &SVector<f64, NX>) -> Interval {
+        let x: [[Interval; 1]; NX] = from_fn(|i, _| Interval::point(state[i]));
+        let [[value]] = product(&transposed(&x), &product(self.normaliser.p(), &x));
+        value
     }
 
     /// The largest |row x| in the set, rounded.

@@ -1,7 +1,8 @@
 //! The proof of a certificate's claims, from its numbers alone.
 
 use super::certificate::Certificate;
-use super::cover::{Uncovered, cover};
+use super::claim::ClaimError;
+use super::cover::{Covered, Uncovered, cover};
 use super::decrease::{Decrease, allowed};
 use super::ellipsoid::Ellipsoid;
 use super::normalised::{Normaliser, from_fn};
@@ -9,7 +10,6 @@ use super::quadratic;
 use crate::enclosure::{AnalyticModel, Interval, SampledLaw};
 use nalgebra::SVector;
 use std::sync::{Mutex, PoisonError};
-use thiserror::Error;
 
 /// What a proof found, beyond that the claims hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,68 +24,9 @@ pub struct Proof<const NX: usize> {
     pub reach: SVector<f64, NX>,
 }
 
-/// A claim that is false, or was not proved.
-#[derive(Debug, Clone, PartialEq, Error)]
-pub enum ClaimError {
-    /// A number that cannot be.
-    #[error("{name} = {value}: it must be {expected}")]
-    Value {
-        /// The key in the file.
-        name: String,
-        /// Its value.
-        value: f64,
-        /// What would be right.
-        expected: &'static str,
-    },
-    /// A matrix that is not positive definite.
-    #[error("{name} is not symmetric and positive definite")]
-    NotPositive {
-        /// The key in the file.
-        name: &'static str,
-    },
-    /// The set is larger than a limit.
-    #[error("{name}: the set reaches {reach}, the claimed limit is {limit}")]
-    Limit {
-        /// Key and component of the limit.
-        name: String,
-        /// The largest value in the set.
-        reach: f64,
-        /// The limit.
-        limit: f64,
-    },
-    /// The decrease is false.
-    #[error(
-        "terminal: the claimed decrease of x'Px does not hold with this K, P, contraction and \
-         plant: at the state {state:?} it misses by {excess:.1e} of x'Px"
-    )]
-    NoDecrease {
-        /// The state, whose matrix inequality is violated.
-        state: Vec<f64>,
-        /// By so much.
-        excess: f64,
-    },
-    /// The decrease was not decided.
-    #[error(
-        "terminal: the claimed decrease of x'Px could not be decided near the state {state:?} in \
-         {boxes} boxes; a smaller set or more contraction in the design may help"
-    )]
-    Undecided {
-        /// A state nearby.
-        state: Vec<f64>,
-        /// Boxes that were looked at.
-        boxes: usize,
-    },
-    /// Quadratic stability is false or was not decided.
-    #[error(
-        "continuous: (A - BK)'P + P(A - BK) <= -2 rate P was not proved at the scheduling \
-         {scheduling:?}"
-    )]
-    NotQuadraticallyStable {
-        /// The scheduling.
-        scheduling: Vec<f64>,
-    },
-}
-
+/// Changes whenever a proof could come to another answer than before: what was proved by another
+/// revision is to be proved again.
+pub const PROOF_REVISION: u32 = 1;
 /// Boxes that a proof may take.
 pub const MOST_BOXES: usize = 100_000;
 /// 2^3 time steps with a remainder of order 6: what proves the ballbot fastest.
@@ -97,7 +38,7 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
     /// `progress` hears which share is done; at most `most_boxes` boxes are looked at.
     ///
     /// # Errors
-    /// The first claim that does not hold or could not be proved.
+    /// The first claim that is false or could not be shown.
     pub fn prove<M>(
         &self,
         model: &M,
@@ -108,50 +49,37 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
         M: AnalyticModel<NX, NU, NS> + Sync,
     {
         self.check_numbers()?;
-        let positive = |name| move || ClaimError::NotPositive { name };
-        let normaliser = Normaliser::of(&self.terminal.p).ok_or_else(positive("terminal.p"))?;
-        let ellipsoid = Ellipsoid::new(self.terminal.p, self.terminal.level, normaliser);
+        let (ellipsoid, normaliser) = self.set()?;
         self.check_limits(model, &ellipsoid)?;
-        let common = Normaliser::of(&self.continuous.p).ok_or_else(positive("continuous.p"))?;
-        let stable = quadratic::prove(
-            model,
-            &self.terminal.k,
-            &common,
-            self.continuous.rate_1_s,
-            &self.scheduling_limits,
-        );
-        let stable = stable.map_err(|open| match open {
-            Uncovered::False { at, .. } | Uncovered::Undecided { at, .. } => {
-                ClaimError::NotQuadraticallyStable {
-                    scheduling: at.as_slice().to_vec(),
-                }
-            }
-        })?;
+        let stable = self.prove_quadratic_stability(model)?;
         let decrease = self.decrease(model, normaliser, ellipsoid);
+        // First of all, so that what is false does not wait for the boxes to run out.
+        refute(&decrease, &[])?;
         let whole = decrease.ellipsoid.bounding_cell();
         let covered = cover(whole, most_boxes, |cell| decrease.examine(cell), progress);
-        let state = |y: SVector<f64, NX>| decrease.normaliser.state(&y).as_slice().to_vec();
-        let covered = covered.map_err(|open| match open {
-            Uncovered::False { at, excess } => ClaimError::NoDecrease {
-                state: state(at),
-                excess,
-            },
-            Uncovered::Undecided { at, cells } => ClaimError::Undecided {
-                state: state(at),
-                boxes: cells,
-            },
-        })?;
+        let covered = match covered {
+            Ok(covered) => covered,
+            Err(Uncovered::False { at }) => return Err(not_shown(&decrease, at, 0)),
+            Err(Uncovered::Undecided { at, cells }) => {
+                refute(&decrease, &[at])?;
+                return Err(not_shown(&decrease, at, cells));
+            }
+        };
         let during = decrease
             .states
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner);
         let reach = SVector::from_fn(|i, _| during[i].magnitude());
         for i in 0..NX {
-            check_limit(
-                format!("state_limits[{i}], between samples"),
-                reach[i],
-                self.state_limits[i],
-            )?;
+            let limit = self.state_limits[i];
+            let kept = reach[i] <= limit;
+            if !kept {
+                return Err(ClaimError::LimitNotShown {
+                    name: format!("state_limits[{i}], between samples"),
+                    reach: reach[i],
+                    limit,
+                });
+            }
         }
         Ok(Proof {
             boxes: covered.cells,
@@ -161,34 +89,67 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
         })
     }
 
-    fn check_numbers(&self) -> Result<(), ClaimError> {
-        let numbers = [
-            ("t_s".to_owned(), self.t_s),
-            ("terminal.level".to_owned(), self.terminal.level),
-            ("continuous.rate_1_s".to_owned(), self.continuous.rate_1_s),
-        ];
-        let limits = self.scheduling_limits.iter().enumerate();
-        let limits = limits.map(|(i, limit)| (format!("scheduling_limits[{i}]"), *limit));
-        for (name, value) in numbers.into_iter().chain(limits) {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(ClaimError::Value {
-                    name,
-                    value,
-                    expected: "positive",
-                });
-            }
-        }
-        let contraction = self.terminal.contraction;
-        if !(0.0..1.0).contains(&contraction) {
-            return Err(ClaimError::Value {
-                name: "terminal.contraction".to_owned(),
-                value: contraction,
-                expected: "from 0 to below 1",
-            });
-        }
-        Normaliser::of(&self.r)
-            .map(|_| ())
-            .ok_or(ClaimError::NotPositive { name: "r" })
+    /// The set, and coordinates for it.
+    fn set(&self) -> Result<(Ellipsoid<NX>, Normaliser<NX>), ClaimError> {
+        let normaliser = Normaliser::of(&self.terminal.p)
+            .ok_or(ClaimError::NotPositive { name: "terminal.p" })?;
+        let set = Ellipsoid::new(self.terminal.p, self.terminal.level, normaliser);
+        Ok((set, normaliser))
+    }
+
+    /// The largest |u_i| in the set; infinite where it could not be shown.
+    pub(super) fn input_reach(&self) -> SVector<f64, NU> {
+        let set = self.set();
+        SVector::from_fn(|i, _| match &set {
+            Ok((set, _)) => set.bound(&self.terminal.k.row(i).transpose()),
+            Err(_) => f64::INFINITY,
+        })
+    }
+
+    /// The smallest box of schedulings that the set was shown to lie in.
+    pub(super) fn scheduling_reach<M>(&self, model: &M) -> Result<SVector<f64, NS>, ClaimError>
+    where
+        M: AnalyticModel<NX, NU, NS> + Sync,
+    {
+        let (set, _) = self.set()?;
+        let states = std::array::from_fn(|i| {
+            let reach = set.bound(&axis(i));
+            Interval::new(-reach, reach)
+        });
+        let scheduling = model.scheduling(&states);
+        Ok(SVector::from_fn(|i, _| scheduling[i].magnitude()))
+    }
+
+    /// The largest violation of the matrix inequality that samples of the set show, were `level` its
+    /// level; below zero where there is none.
+    pub(super) fn tightest_at(&self, level: f64) -> Option<f64>
+    where
+        Plant: AnalyticModel<NX, NU, NS> + Sync,
+    {
+        let (_, normaliser) = self.set().ok()?;
+        let set = Ellipsoid::new(self.terminal.p, level, normaliser);
+        Some(self.decrease(&self.plant, normaliser, set).tightest())
+    }
+
+    fn prove_quadratic_stability<M>(&self, model: &M) -> Result<Covered, ClaimError>
+    where
+        M: AnalyticModel<NX, NU, NS> + Sync,
+    {
+        let common = Normaliser::of(&self.continuous.p).ok_or(ClaimError::NotPositive {
+            name: "continuous.p",
+        })?;
+        let rate = self.continuous.rate_1_s;
+        let limits = &self.scheduling_limits;
+        quadratic::prove(model, &self.terminal.k, &common, rate, limits).map_err(
+            |open| match open {
+                Uncovered::False { at } => ClaimError::NotQuadraticallyStable {
+                    scheduling: at.as_slice().to_vec(),
+                },
+                Uncovered::Undecided { at, .. } => ClaimError::QuadraticStabilityNotShown {
+                    scheduling: at.as_slice().to_vec(),
+                },
+            },
+        )
     }
 
     /// The limits hold wherever x'Px <= level.
@@ -198,25 +159,30 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
     {
         let mut box_of_states = [Interval::EVERYTHING; NX];
         for (i, range) in box_of_states.iter_mut().enumerate() {
-            let reach = ellipsoid.bound(&axis(i));
-            check_limit(format!("state_limits[{i}]"), reach, self.state_limits[i])?;
+            let name = || format!("state_limits[{i}]");
+            let reach = check_row(ellipsoid, &axis(i), self.state_limits[i], &name)?;
             *range = Interval::new(-reach, reach);
         }
         for i in 0..NU {
             let row = self.terminal.k.row(i).transpose();
-            check_limit(
-                format!("input_limits[{i}]"),
-                ellipsoid.bound(&row),
-                self.input_limits[i],
-            )?;
+            let name = || format!("input_limits[{i}]");
+            check_row(ellipsoid, &row, self.input_limits[i], &name)?;
         }
         let scheduling = model.scheduling(&box_of_states);
-        for (i, (range, limit)) in scheduling
-            .iter()
-            .zip(self.scheduling_limits.iter())
-            .enumerate()
-        {
-            check_limit(format!("scheduling_limits[{i}]"), range.magnitude(), *limit)?;
+        for (i, range) in scheduling.iter().enumerate() {
+            let (reach, limit) = (range.magnitude(), self.scheduling_limits[i]);
+            if reach <= limit {
+                continue;
+            }
+            let name = format!("scheduling_limits[{i}]");
+            let farthest = (0..NX).filter_map(|j| ellipsoid.farthest(&axis(j)));
+            let inside = farthest.map(|state| state * (1.0 - 1e-9));
+            let mut beyond = inside.filter(|state| {
+                let scheduling = model.scheduling(&point(state))[i];
+                let least = scheduling.lower.max(-scheduling.upper);
+                ellipsoid.holds(state) && least > limit
+            });
+            return Err(limit_error(name, reach, limit, beyond.next()));
         }
         Ok(())
     }
@@ -257,10 +223,66 @@ fn axis<const N: usize>(i: usize) -> SVector<f64, N> {
     SVector::from_fn(|j, _| if i == j { 1.0 } else { 0.0 })
 }
 
-fn check_limit(name: String, reach: f64, limit: f64) -> Result<(), ClaimError> {
+fn point<const N: usize>(state: &SVector<f64, N>) -> [Interval; N] {
+    std::array::from_fn(|i| Interval::point(state[i]))
+}
+
+/// Whether |row x| <= limit in the whole set; if so, what |row x| is at most.
+fn check_row<const NX: usize>(
+    ellipsoid: &Ellipsoid<NX>,
+    row: &SVector<f64, NX>,
+    limit: f64,
+    name: &dyn Fn() -> String,
+) -> Result<f64, ClaimError> {
+    let reach = ellipsoid.bound(row);
     if reach <= limit {
-        Ok(())
-    } else {
-        Err(ClaimError::Limit { name, reach, limit })
+        return Ok(reach);
+    }
+    let beyond = ellipsoid.beyond(row, limit);
+    Err(limit_error(name(), reach, limit, beyond))
+}
+
+fn limit_error<const NX: usize>(
+    name: String,
+    reach: f64,
+    limit: f64,
+    beyond: Option<SVector<f64, NX>>,
+) -> ClaimError {
+    match beyond {
+        Some(state) => ClaimError::Limit {
+            name,
+            reach,
+            limit,
+            state: state.as_slice().to_vec(),
+        },
+        None => ClaimError::LimitNotShown { name, reach, limit },
+    }
+}
+
+/// An error if a state refutes the claimed decrease.
+fn refute<M, const NX: usize, const NU: usize, const NS: usize>(
+    decrease: &Decrease<'_, M, NX, NU>,
+    near: &[SVector<f64, NX>],
+) -> Result<(), ClaimError>
+where
+    M: AnalyticModel<NX, NU, NS> + Sync,
+{
+    match decrease.counterexample(near) {
+        Some((state, excess)) => Err(ClaimError::NoDecrease {
+            state: state.as_slice().to_vec(),
+            excess,
+        }),
+        None => Ok(()),
+    }
+}
+
+fn not_shown<M, const NX: usize, const NU: usize>(
+    decrease: &Decrease<'_, M, NX, NU>,
+    at: SVector<f64, NX>,
+    boxes: usize,
+) -> ClaimError {
+    ClaimError::DecreaseNotShown {
+        state: decrease.normaliser.state(&at).as_slice().to_vec(),
+        boxes,
     }
 }

@@ -9,7 +9,7 @@ use crate::enclosure::{
 };
 use crate::stability::SchedulingGrid;
 use lpvmpc::LpvModel;
-use nalgebra::{DMatrix, SMatrix, SVector};
+use nalgebra::{DMatrix, SMatrix, SVector, SymmetricEigen};
 
 /// Rates of decay that are tried, 1/s.
 const RATES: [f64; 8] = [4.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02];
@@ -80,9 +80,9 @@ where
                 spare: spare.fold(f64::INFINITY, f64::min),
             };
         }
-        let highest = smallest_eigenvalue(&decay.at(&[0.0; NS])) + decay.error;
-        if highest < 0.0 {
-            return Finding::Fails { excess: -highest };
+        let middle = self::decay(model, k, normaliser, rate, &cell.middle()).affine();
+        if is_false(&middle) {
+            return Finding::Fails;
         }
         let weight = |i: usize| decay.weight(i);
         let across = (0..NS).max_by(|a, b| weight(*a).total_cmp(&weight(*b)));
@@ -114,8 +114,28 @@ where
         from_fn(|i, j| TaylorModel::from(normaliser.frame.t[i][j]));
     let half = product(&transposed(&t), &product(&p, &product(&closed, &t)));
     let unit = product(&transposed(&t), &product(&p, &t));
-    let twice = TaylorModel::constant(2.0 * rate);
+    let rate = TaylorModel::constant(rate);
+    // Symmetric to the bit, so that one triangle says what the other one does.
     TaylorMap::of(&from_fn(|i, j| {
-        -(half[i][j] + half[j][i]) - twice * unit[i][j]
+        -(half[i][j] + half[j][i]) - rate * (unit[i][j] + unit[j][i])
     }))
+}
+
+/// Whether the matrix is not positive definite, for certain: a vector v with v'Mv < 0.
+fn is_false<const N: usize, const NS: usize>(decay: &TaylorMap<N, N, NS>) -> bool {
+    let middle = decay.at(&[0.0; NS]);
+    let middles = DMatrix::from_fn(N, N, |i, j| middle[i.max(j)][i.min(j)].middle());
+    if middles.iter().any(|entry| !entry.is_finite()) {
+        return false;
+    }
+    let eigen = SymmetricEigen::new(middles);
+    let lowest = eigen
+        .eigenvectors
+        .column(eigen.eigenvalues.imin())
+        .clone_owned();
+    let v: [[Interval; 1]; N] = from_fn(|i, _| Interval::point(lowest[i]));
+    let [[form]] = product(&transposed(&v), &product(&middle, &v));
+    let [[square]] = product(&transposed(&v), &v);
+    let within = Interval::point(decay.error) * Interval::new(-1.0, 1.0) * square;
+    (form + within).upper < 0.0
 }

@@ -3,7 +3,9 @@
 use super::lmi::{AffineMatrix, LmiFailure, maximise_log_det};
 use crate::discretize::{DiscretizeError, zero_order_hold};
 use crate::lqr::lqr_discrete;
-use crate::matrix_check::{MatrixError, check_finite};
+use crate::matrix_check::{
+    MatrixError, check_positive_definite, check_positive_semidefinite, checked_symmetric,
+};
 use crate::riccati::RiccatiError;
 use crate::stability::SchedulingGrid;
 use lpvmpc::LpvModel;
@@ -15,9 +17,9 @@ use thiserror::Error;
 pub struct TerminalProblem<const NX: usize, const NU: usize> {
     /// Sampling time, s.
     pub t_s: f64,
-    /// Q of the stage cost x'Qx + u'Ru, positive semidefinite.
+    /// Q of the stage cost x'Qx + u'Ru, symmetric, positive semidefinite.
     pub q: SMatrix<f64, NX, NX>,
-    /// R of the stage cost, positive definite.
+    /// R of the stage cost, symmetric, positive definite.
     pub r: SMatrix<f64, NU, NU>,
     /// |x_i| <= `state_limits[i]` in the set, state units; infinite for none.
     pub state_limits: SVector<f64, NX>,
@@ -181,9 +183,10 @@ impl<const NX: usize, const NU: usize> TerminalProblem<NX, NU> {
                 return refuse("input_limits", *limit, "positive and finite");
             }
         }
-        check_finite("Q", &dynamic(&self.q))?;
-        check_finite("R", &dynamic(&self.r))?;
-        Ok(())
+        let q = checked_symmetric("Q", &dynamic(&self.q))?;
+        check_positive_semidefinite("Q", &q)?;
+        let r = checked_symmetric("R", &dynamic(&self.r))?;
+        Ok(check_positive_definite("R", &r)?)
     }
 
     /// From the limits, and the semi-axes of the regulator's set where there is no limit.

@@ -5,6 +5,7 @@ mod pendulum;
 
 mod ballbot_parameters;
 mod enclosure;
+mod forgeries;
 mod frozen_stability;
 mod least_squares_failures;
 mod linearize;

@@ -44,9 +44,9 @@ fn problem() -> CertificateProblem<2, 1, 1> {
 /// What is done to a certificate.
 type Change = fn(&mut PendulumCertificate);
 
-type PendulumCertificate = Certificate<Pendulum, 2, 1, 1>;
+pub type PendulumCertificate = Certificate<Pendulum, 2, 1, 1>;
 
-fn certificate() -> PendulumCertificate {
+pub fn certificate() -> PendulumCertificate {
     certify_terminal((&Pendulum, Pendulum), &problem(), MOST_BOXES, &|_| ())
         .unwrap()
         .0

@@ -7,7 +7,7 @@ use crate::settings::ControllerError;
 use crate::settings::{Weights, check_bounds, check_horizon, check_weight};
 use crate::solver::SolverSettings;
 use core::fmt;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{SMatrix, SVector, convert};
 
 /// A terminal law with a set that it keeps: for every state with (x - z d)'P (x - z d) <= level,
 /// u = -K (x - z d) held for one sample stays within all bounds, leads into the set again, and
@@ -72,7 +72,8 @@ pub struct GuardedSettings<T, const NX: usize, const NU: usize> {
     pub x: Bounds<T, NX>,
     /// Input bounds.
     pub u: Bounds<T, NU>,
-    /// d, with A(scheduling) d = 0: every state z d, without input, is an equilibrium.
+    /// d, with A(scheduling) d = 0 and sigma(x + z d) = sigma(x): every state z d, without input,
+    /// is an equilibrium, and the plant is the same around each of them.
     pub direction: SVector<T, NX>,
     /// The admissible set points z, [lower, upper]; infinite where there is no bound. The
     /// terminal set around each of them must lie within the state bounds.
@@ -102,7 +103,8 @@ pub enum GuardedError {
     Gain,
     /// The rollout has no steps, or its bounds are negative or not finite.
     Rollout,
-    /// The direction is zero, not finite, or no direction of equilibria: A d is not zero.
+    /// The direction is zero, not finite, or the plant notices where along it it stands: somewhere
+    /// within the state bounds A d is not zero, or the scheduling moves with z d.
     Direction,
     /// The lower set point is above the upper one, or one is not a number.
     SetPoints,
@@ -122,7 +124,8 @@ impl fmt::Display for GuardedError {
             ),
             Self::Direction => write!(
                 f,
-                "the direction of the set points must be a finite, nonzero d with A d = 0"
+                "the direction of the set points must be a finite, nonzero d with A d = 0 and a \
+                 scheduling that is the same at x and x + z d, everywhere within the state bounds"
             ),
             Self::SetPoints => {
                 write!(f, "the lower set point must not exceed the upper one")
@@ -197,18 +200,65 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
         self.check_direction(model)
     }
 
+    /// A d = 0 and sigma(x + z d) = sigma(x), at points spread over the state bounds: the plant does
+    /// not notice where along d it stands (assumption 4 of `docs/guarantees.md`). Samples, no proof.
     fn check_direction<P, const NS: usize>(&self, model: &P) -> Result<(), GuardedError>
     where
         P: LpvModel<T, NX, NU, NS>,
     {
         let d = &self.direction;
-        let (a, _) = model.matrices(&model.scheduling(d));
-        let rest = (a * d).amax();
-        let rounding = a.amax() * d.amax() * T::default_epsilon();
-        // Negated, so that a number that is not one fails.
-        if !(d.amax() > T::zero() && d.amax().is_finite() && rest <= rounding) {
-            return Err(GuardedError::Direction);
+        let size = d.amax();
+        let finite = d.iter().all(|entry| entry.is_finite());
+        let mut holds = finite && size > T::zero();
+        let extent = self.terminal.extent(d);
+        let [lower, upper] = self.set_points;
+        let moves = [lower, upper, extent, extent * convert(-1.618)];
+        for point in 0..CORNERS + INNER_POINTS {
+            let x = sample(&self.x, point);
+            let scheduling = model.scheduling(&x);
+            let (a, _) = model.matrices(&scheduling);
+            let rounding = a.amax() * size * T::default_epsilon();
+            // So that a number that is not one fails.
+            holds &= (a * d).iter().all(|rate| rate.abs() <= rounding);
+            for z in moves.into_iter().filter(|z| z.is_finite()) {
+                let moved = model.scheduling(&(x + d * z)) - scheduling;
+                let largest = x.amax() + z.abs() * size + scheduling.amax();
+                let rounding = largest * T::default_epsilon() * convert(16.0);
+                holds &= moved.iter().all(|change| change.abs() <= rounding);
+            }
         }
-        Ok(())
+        if holds {
+            Ok(())
+        } else {
+            Err(GuardedError::Direction)
+        }
     }
+}
+
+/// Corners of the state bounds that are looked at: all of them, up to six states.
+const CORNERS: usize = 64;
+/// Points between them.
+const INNER_POINTS: usize = 64;
+
+/// A point of the box: the corners by their number in binary, then others by multiples of the golden
+/// ratio (Weyl). A side without bound is taken to be 2 units from the other one, or from -1 to 1.
+fn sample<T: Scalar, const NX: usize>(bounds: &Bounds<T, NX>, point: usize) -> SVector<T, NX> {
+    let width: T = convert(2.0);
+    SVector::from_fn(|i, _| {
+        let (lower, upper) = (bounds.lower[i], bounds.upper[i]);
+        let (lower, upper) = match (lower.is_finite(), upper.is_finite()) {
+            (true, true) => (lower, upper),
+            (true, false) => (lower, lower + width),
+            (false, true) => (upper - width, upper),
+            (false, false) => (-T::one(), T::one()),
+        };
+        let share = if point < CORNERS {
+            f64::from((point >> (i % 6)) as u32 & 1)
+        } else {
+            let turns = 0x9e37_79b9_u32.wrapping_mul(2 * i as u32 + 1);
+            f64::from(turns.wrapping_mul(point as u32)) / f64::from(u32::MAX)
+        };
+        let share: T = convert(share);
+        lower * (T::one() - share) + upper * share
+    })
 }

@@ -9,6 +9,7 @@
 
 mod cart_pole;
 mod controller;
+mod direction;
 mod guarded;
 mod horizon;
 mod predictor;

@@ -69,6 +69,22 @@ fn weights_with_entries_that_make_no_sense() {
     assert_refused(r, ControllerError::WeightEntries("R"), &["R", "finite"]);
 }
 
+/// The triangle that a factorisation reads is definite; x'Qx, which the controller minimises, is not.
+#[test]
+fn weights_whose_one_triangle_is_definite() {
+    let q = |s: &mut Settings| {
+        s.weights.q = Matrix4::identity();
+        s.weights.q[(0, 1)] = 4.0;
+    };
+    assert_refused(q, ControllerError::WeightEntries("Q"), &["Q", "symmetric"]);
+    // The difference that counts as rounding is that of a few numbers of double precision.
+    let q = |s: &mut Settings| {
+        s.weights.q = Matrix4::identity();
+        s.weights.q[(0, 1)] = 1e-13;
+    };
+    assert_refused(q, ControllerError::WeightEntries("Q"), &["Q", "symmetric"]);
+}
+
 #[test]
 fn weights_of_the_wrong_sign() {
     let q = |s: &mut Settings| s.weights.q[(2, 2)] = -1e-6;
