@@ -3,7 +3,7 @@
 use crate::{N, Reference};
 use ballbot::Ballbot;
 use lpvmpc::{
-    Bounds, ControllerSettings, Iterations, Predictor, Rk4, Scheduling, SolverSettings,
+    Bounds, ControllerSettings, Iterations, Penalty, Predictor, Rk4, Scheduling, SolverSettings,
     TerminalIngredient, Weights,
 };
 use nalgebra::{Matrix1, Matrix4, Vector1, Vector4};
@@ -72,6 +72,24 @@ impl Recording {
             scheduling: Scheduling::Predicted,
             iterations: Iterations::Fixed(1),
             solver: SolverSettings::default(),
+        }
+    }
+
+    /// The same problem with what is default in scenarios: a descent with `programs` quadratic
+    /// programs at most, four Runge-Kutta steps per sample, and soft state bounds.
+    pub fn descent(&self, programs: usize) -> ControllerSettings<f32, 4, 1, 3> {
+        let price = Some(Penalty {
+            linear: 1e5,
+            quadratic: 0.0,
+        });
+        ControllerSettings {
+            predictor: Predictor::StageConsistent(Rk4 { substeps: 4 }),
+            soft_x: [None, price, price, price],
+            iterations: Iterations::Descent {
+                tolerance: 1e-3,
+                most: programs,
+            },
+            ..self.settings()
         }
     }
 

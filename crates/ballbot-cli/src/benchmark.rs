@@ -8,8 +8,8 @@ use crate::commands::CommandError;
 use ballbot::Ballbot;
 use ballbot_scenario::{GUARDED_ACTIVE, Prepared, Scenario, ScenarioError, number};
 use lpvmpc::{
-    Controller, GuardedController, GuardedIterations, GuardedWorkspace, Iterations, Reference,
-    Solution, Solver, TerminalIngredient, Workspace,
+    Controller, ControllerSettings, GuardedController, GuardedIterations, GuardedWorkspace,
+    Iterations, Reference, Solution, Solver, TerminalIngredient, Workspace,
 };
 use lpvmpc_sim::advance;
 use nalgebra::Vector4;
@@ -84,6 +84,12 @@ impl Times {
 pub struct GuardedTimes {
     /// Without guarantee: terminal cost, the same predictor.
     pub plain_us: Times,
+    /// The same as a descent, the default of scenarios.
+    pub descent_us: Times,
+    /// Of a descent, from the measured state to its answer, with everything else prepared.
+    pub feedback_us: Times,
+    /// A descent towards a set point 2.5 m away, given at once: several programs per sample.
+    pub far_descent_us: Times,
     /// With artificial set point, certified terminal set and acceptance test; one quadratic
     /// program.
     pub guarded_us: Times,
@@ -134,11 +140,72 @@ pub fn time_guarded() -> Result<GuardedTimes, CommandError> {
         }));
         x = advance(&prepared.ballbot, &x, &u, settings.t_s, prepared.tolerances)?;
     }
+    let descent_settings = ControllerSettings {
+        iterations: DESCENT,
+        ..plain_settings
+    };
+    let near = |k: usize| [1.0, -0.5, 2.0, -2.0, 0.0][k / HOLD % 5];
+    let far = |_: usize| prepared.ballbot.geometry.ball_angle(2.5);
+    let descent = DescentTimes::of(&prepared, descent_settings, GUARDED_SAMPLES, near)?;
+    let far = DescentTimes::of(&prepared, descent_settings, HOLD, far)?;
     Ok(GuardedTimes {
         plain_us: Times::new(plain_us),
+        descent_us: descent.step,
+        feedback_us: descent.feedback,
+        far_descent_us: far.step,
         guarded_us: Times::new(guarded_us),
     })
 }
+
+/// The times of a descent in a closed loop.
+struct DescentTimes {
+    step: Times,
+    feedback: Times,
+}
+
+impl DescentTimes {
+    /// From rest, towards the ball angle (rad) that is `wanted` at each sample.
+    fn of(
+        prepared: &Prepared,
+        settings: ControllerSettings<f64, 4, 1, 3>,
+        samples: usize,
+        wanted: impl Fn(usize) -> f64,
+    ) -> Result<Self, CommandError> {
+        let controller = Control::new(prepared.ballbot, settings).map_err(ScenarioError::from)?;
+        let mut controller = Box::new(controller);
+        let mut workspace = Box::new(Workspace::<f64, 4, 1, N, M>::new());
+        let (mut step, mut feedback) = (Vec::new(), Vec::new());
+        let mut x = Vector4::zeros();
+        for k in 0..samples {
+            let reference = Reference::constant(Vector4::new(wanted(k), 0.0, 0.0, 0.0));
+            let before = controller.clone();
+            feedback.push(shortest(|| {
+                controller.clone_from(&before);
+                controller.prepare(&reference, &mut workspace);
+                let start = Instant::now();
+                black_box(controller.feedback(black_box(&x), &reference, &mut workspace));
+                start.elapsed()
+            }));
+            step.push(shortest(|| {
+                controller.clone_from(&before);
+                let start = Instant::now();
+                black_box(controller.step(black_box(&x), &reference, &mut workspace));
+                start.elapsed()
+            }));
+            x = next(prepared, &x, &controller)?;
+        }
+        Ok(Self {
+            step: Times::new(step),
+            feedback: Times::new(feedback),
+        })
+    }
+}
+
+/// The default of scenarios.
+const DESCENT: Iterations<f64> = Iterations::Descent {
+    tolerance: 1e-3,
+    most: 8,
+};
 
 /// Times the controller of a scenario, without what stands around it, on the scenario's robot
 /// in an ideal world.

@@ -42,6 +42,12 @@ fn main() -> Result<(), Failure> {
     for name in ["lissajous", "tight-bounds"] {
         check_scenario(name, &output)?;
     }
+    let programs = output.descents.iter().map(|step| step.programs);
+    println!(
+        "descent: {} steps, {} programs at most",
+        output.descents.len(),
+        programs.max().ok_or("no descent")?
+    );
     check_costs(&limits, compiler, &output.costs(flash.parse()?))
 }
 
@@ -65,8 +71,15 @@ struct Motors {
     torques: Vector3<f64>,
 }
 
+/// One line `descent SAMPLE PROGRAMS INSTRUCTIONS SOLVED`.
+struct Descent {
+    programs: u64,
+    instructions: u64,
+}
+
 struct Output {
     steps: Vec<Step>,
+    descents: Vec<Descent>,
     motors: Vec<Motors>,
     controller: u64,
     workspace: u64,
@@ -76,6 +89,7 @@ struct Output {
 impl Output {
     fn parse(text: &str) -> Result<Self, Failure> {
         let (mut steps, mut motors, mut sizes) = (Vec::new(), Vec::new(), Vec::new());
+        let mut descents = Vec::new();
         for line in text.lines() {
             let words: Vec<&str> = line.split_whitespace().collect();
             match words.as_slice() {
@@ -107,6 +121,10 @@ impl Output {
                     sample: sample.parse()?,
                     torques: Vector3::new(x.parse()?, y.parse()?, z.parse()?),
                 }),
+                ["descent", _, programs, instructions, "1"] => descents.push(Descent {
+                    programs: programs.parse()?,
+                    instructions: instructions.parse()?,
+                }),
                 ["bytes", name, bytes] => sizes.push(((*name).to_owned(), bytes.parse()?)),
                 _ => return Err(format!("the firmware printed: {line}").into()),
             }
@@ -121,12 +139,13 @@ impl Output {
             workspace: size("workspace")?,
             stack: size("stack")?,
             steps,
+            descents,
             motors,
         })
     }
 
     /// What a step and the controllers cost, by the names of `firmware/limits.toml`.
-    fn costs(&self, flash: u64) -> [(&'static str, u64); 6] {
+    fn costs(&self, flash: u64) -> [(&'static str, u64); 8] {
         let of = |active: fn(usize) -> bool| {
             let steps = self.steps.iter().filter(move |step| active(step.active));
             let mut sorted: Vec<u64> = steps.map(|step| step.instructions).collect();
@@ -135,7 +154,17 @@ impl Output {
         };
         let (free, all) = (of(|active| active == 0), of(|_| true));
         let at = |sorted: &[u64], place: usize| sorted.get(place).copied().unwrap_or(0);
+        let mut descents: Vec<u64> = self.descents.iter().map(|step| step.instructions).collect();
+        descents.sort_unstable();
         [
+            (
+                "instructions_descent_median",
+                at(&descents, descents.len() / 2),
+            ),
+            (
+                "instructions_descent_worst",
+                at(&descents, descents.len().saturating_sub(1)),
+            ),
             (
                 "instructions_without_active_bounds",
                 at(&free, free.len().saturating_sub(1)),

@@ -59,7 +59,9 @@ impl<T: Scalar> Ballbot<T> {
         Vector4::new(phi_dot, theta_dot, phi_ddot, theta_ddot)
     }
 
-    /// (df/dx, df/du): 4 x 4 per second, and 4 x 1.
+    /// (df/dx, df/du): 4 x 4 per second, and 4 x 1. Of Coulomb friction it has the secant F(v)/v in
+    /// place of the derivative: that is next to zero while the drive moves, so that a linear model
+    /// with it has friction push on where the motion turns round, and its plans chatter.
     ///
     /// From M q_ddot = force: M dq_ddot = dforce - dM q_ddot.
     #[inline(always)]
@@ -91,7 +93,7 @@ impl<T: Scalar> Ballbot<T> {
         let friction = if self.drive.is_none() {
             zero
         } else {
-            self.drive.slope(speed)
+            self.drive.coefficient(speed)
         };
         let by_phi_dot = accelerate(-self.b4 - friction, friction);
         let by_theta_dot = accelerate(swing * (sin_theta + sin_theta) + friction, -friction);

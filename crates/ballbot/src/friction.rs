@@ -51,13 +51,4 @@ impl<T: Scalar> DriveFriction<T> {
         let creep: T = convert(CREEP_SPEED);
         self.viscous + self.coulomb / (speed * speed + creep * creep).sqrt()
     }
-
-    /// dF/dv at the speed `speed` = phi_dot - theta_dot in rad/s: m^2/s.
-    #[cold]
-    #[inline(never)]
-    pub fn slope(self, speed: T) -> T {
-        let creep: T = convert(CREEP_SPEED);
-        let square = speed * speed + creep * creep;
-        self.viscous + self.coulomb * creep * creep / (square * square.sqrt())
-    }
 }

@@ -225,6 +225,6 @@ where
     }
 
     fn active_bounds(&self) -> Vec<BoundId> {
-        self.workspace.plant_bounds().collect()
+        self.controller.active_bounds().collect()
     }
 }

@@ -321,7 +321,7 @@ fn ballbot_controller() -> Controller<Ballbot<f64>, f64, 4, 1, 3, 20, 24> {
             lower: Vector1::new(-0.5),
             upper: Vector1::new(0.5),
         },
-        soft_x: [None; 2],
+        soft_x: [None; 4],
         scheduling: Scheduling::Predicted,
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),

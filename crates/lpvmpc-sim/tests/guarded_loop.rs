@@ -129,8 +129,8 @@ fn a_run_is_the_sequence_of_its_samples() {
     );
 }
 
-/// The mass is linear, so the plan is the program's answer: it meets the bounds that are reported as
-/// active, speeds at their stages and the force that is applied, and no others.
+/// The plan meets the bounds that are reported as active, speeds at their stages and the force that is
+/// applied, and no others.
 #[test]
 fn active_bounds_are_where_the_plan_meets_them() {
     let mut regulator = GuardedFeedback {

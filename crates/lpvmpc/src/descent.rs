@@ -50,6 +50,8 @@ enum Outcome<T> {
     },
 }
 
+/// A difference of two merits is known to so many roundings of one of them.
+const ROUNDINGS: f64 = 100.0;
 /// Parts of the way to a program's answer that are tried.
 const STEPS: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
 /// Part of the expected gain that a step has to bring (Armijo's condition).
@@ -319,8 +321,10 @@ where
         let expected = before - merit.of(x, &answer.u, &answer.x);
         self.gap = at(&self.rollout, last) - at(&answer.x, last);
         self.policy.cost = before;
-        // Negated, so that a NaN ends the search. What a full step leaves is of second order.
-        if !(expected > tolerance * tolerance * before) {
+        // What a full step leaves is of second order; what is less than rounding is nothing.
+        let rounding = T::default_epsilon() * convert(ROUNDINGS);
+        // Negated, so that a NaN ends the search.
+        if !(expected > (tolerance * tolerance).max(rounding) * before) {
             return Outcome::NothingToGain;
         }
         let taken = self.search_line(x, &merit, expected, &mut workspace.trial, &|i| {

@@ -18,7 +18,7 @@ mod tube;
 
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Ocp;
-use crate::solution::{BoundId, Solution, Status};
+use crate::solution::{BoundId, Quantity, Side, Solution, Status};
 use crate::solver::{Solver, SolverSettings, WarmStart};
 pub use aim::SetPoints;
 use core::fmt;
@@ -107,12 +107,6 @@ impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usiz
     /// region included.
     pub fn active_bounds(&self) -> usize {
         self.solution.active.len()
-    }
-
-    /// Those of them that are the plant's own, with the plant's stages: 0 is now.
-    pub fn plant_bounds(&self) -> impl Iterator<Item = BoundId> {
-        let active = self.solution.active.iter();
-        active.filter_map(|row| program::of_the_plant(row.bound, self.ocp.horizon))
     }
 }
 
@@ -296,6 +290,35 @@ where
         let plan = self.plan.as_ref();
         plan.and_then(|plan| plan.x.get(..self.settings.horizon))
             .unwrap_or_default()
+    }
+
+    /// The bounds that the last plan meets: those of an input to rounding, those of a state to the
+    /// margin that plans keep away from them.
+    pub fn active_bounds(&self) -> impl Iterator<Item = BoundId> {
+        let GuardedSettings { x, u, margin, .. } = &self.settings;
+        // A tenth more than the margin, for what rounding leaves.
+        let room_x = plan::width(x) * (*margin * convert(1.1));
+        let room_u = plan::width(u) * T::default_epsilon().sqrt();
+        let horizon = self.settings.horizon;
+        self.plan.iter().flat_map(move |plan| {
+            let states = plan.x.iter().take(horizon).enumerate();
+            let inputs = plan.u.iter().take(horizon).enumerate();
+            let at_state = move |(i, state): (usize, &SVector<T, NX>)| {
+                let state = *state;
+                (0..NX).filter_map(move |j| {
+                    let sides = (x.lower[j] + room_x[j], x.upper[j] - room_x[j]);
+                    met(i + 1, Quantity::State(j), state[j], sides)
+                })
+            };
+            let at_input = move |(i, input): (usize, &SVector<T, NU>)| {
+                let input = *input;
+                (0..NU).filter_map(move |j| {
+                    let sides = (u.lower[j] + room_u[j], u.upper[j] - room_u[j]);
+                    met(i, Quantity::Input(j), input[j], sides)
+                })
+            };
+            inputs.flat_map(at_input).chain(states.flat_map(at_state))
+        })
     }
 
     /// What is known to work: the rest of the last plan, else the terminal law.
@@ -555,4 +578,23 @@ struct Found<T, const NX: usize, const NU: usize, const N: usize> {
     feasible: bool,
     /// Rolled-out minus predicted state at the end.
     gap: SVector<T, NX>,
+}
+
+/// The bound of the `quantity` at `stage` that its `value` meets, if it meets one.
+fn met<T: Scalar>(
+    stage: usize,
+    quantity: Quantity,
+    value: T,
+    (lower, upper): (T, T),
+) -> Option<BoundId> {
+    let side = match (value <= lower, value >= upper) {
+        (true, _) => Side::Lower,
+        (_, true) => Side::Upper,
+        _ => return None,
+    };
+    Some(BoundId {
+        stage,
+        quantity,
+        side,
+    })
 }

@@ -223,8 +223,11 @@ impl Record {
         }
     }
 
-    /// Adds the stage cost.
+    /// Adds the stage cost, where it is known what is wanted.
     fn pay(&mut self, x: &Vector4<f64>, wanted: f64, u: &Vector1<f64>, prepared: &Prepared) {
+        if wanted.is_nan() {
+            return;
+        }
         let weights = &prepared.settings.weights;
         let error = x - Vector4::x() * wanted;
         self.cost += (weights.q * error).dot(&error) + (weights.r * u).dot(u);

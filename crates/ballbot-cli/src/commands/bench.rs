@@ -79,7 +79,10 @@ pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
 fn guarded_table(times: &GuardedTimes) -> Table {
     let mut table = Table::new(["far-setpoints, step in us", "median", "p99", "max"]);
     let rows = [
-        ("plain, the same predictor", times.plain_us),
+        ("plain, the same predictor, one program", times.plain_us),
+        ("plain, descent", times.descent_us),
+        ("plain, descent: feedback alone", times.feedback_us),
+        ("plain, descent, 2.5 m at once", times.far_descent_us),
         ("guaranteed", times.guarded_us),
     ];
     for (name, times) in rows {

@@ -28,6 +28,8 @@ pub struct Case {
     pub nonlinear_fell: bool,
     /// Largest part by which nonlinear MPC exceeded a state bound at a sample.
     pub nonlinear_excess: f64,
+    /// The same of linear MPC.
+    pub linear_excess: f64,
 }
 
 /// From rest, by distance, horizon and sampling time.
@@ -74,6 +76,7 @@ fn read(text: &str) -> Result<Vec<Case>, CommandError> {
             linear: value("cost_linear")?,
             nonlinear_fell: value("fell_nonlinear")? > 0.0,
             nonlinear_excess: value("largest_excess_nonlinear")?,
+            linear_excess: value("largest_excess_linear")?,
         })
     });
     cases.collect()

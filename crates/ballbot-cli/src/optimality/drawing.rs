@@ -39,21 +39,22 @@ pub fn cost_over_distance(costs: &CostOverDistance) -> Figure {
         series("LPV MPC", lpv, Dash::Solid, Role::Lpv),
         series("nonlinear MPC (IPOPT)", &one, Dash::Dotted, Role::Nonlinear),
     ];
-    let mut near = Panel::new(
+    let panel = Panel::new(
         "distance of the set point [m]",
         "cost / cost of nonlinear MPC",
-        all.clone(),
+        all,
     );
-    near.y_range = Some((0.98, 1.25));
-    let whole = Panel::new("", "the same, in full", all);
     Figure {
         title: "Closed-loop cost by distance, N = 20".to_owned(),
-        panels: vec![whole, near],
+        panels: vec![panel],
         columns: 1,
         width: 900.0,
-        height: 720.0,
+        height: 460.0,
     }
 }
+
+/// What is shown of a run, s: the rest of it is rest.
+const SHOWN: f64 = 4.0;
 
 /// States and torque of a closed loop.
 pub fn long_horizon(case: &Case, outcome: &Outcome) -> Figure {
@@ -72,6 +73,7 @@ pub fn long_horizon(case: &Case, outcome: &Outcome) -> Figure {
         let series = Series::new("LPV MPC", &time[..length], values, style, Role::Lpv);
         let mut panel = Panel::new("time [s]", label, vec![series]);
         panel.band = band;
+        panel.x_range = Some((0.0, SHOWN));
         panel
     };
     let line = Style::Line(Dash::Solid);

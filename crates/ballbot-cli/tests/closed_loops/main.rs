@@ -8,6 +8,7 @@
 
 mod campaign;
 mod failures;
+mod optimality;
 mod recorded;
 mod rehearsal;
 mod reproduce;

@@ -13,7 +13,7 @@ use super::plan::{Plan, Policy, shrunk, width};
 use super::{GuardedController, GuardedWorkspace};
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Bounds, Ocp, Penalty, Stage};
-use crate::solution::{ActiveRow, BoundId, Quantity, Solution};
+use crate::solution::{ActiveRow, Quantity, Solution};
 use crate::solver::Solver;
 use nalgebra::{Cholesky, Const, SMatrix, SVector, convert};
 
@@ -282,13 +282,6 @@ fn augmented<T: Scalar, const NX: usize, const NA: usize>(
     z: T,
 ) -> SVector<T, NA> {
     SVector::from_fn(|i, _| x.get(i).copied().unwrap_or(z))
-}
-
-/// A bound of a program of `horizon` stages as one of the plant, whose stages begin one later. At
-/// the first stage there is the set point's trust region, at the end the terminal set.
-pub(super) fn of_the_plant(bound: BoundId, horizon: usize) -> Option<BoundId> {
-    let stage = bound.stage.checked_sub(1)?;
-    (bound.stage < horizon).then_some(BoundId { stage, ..bound })
 }
 
 /// The plan of a solved program as a policy, from the plant's own origin; `from` is the set point

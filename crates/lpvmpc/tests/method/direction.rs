@@ -2,7 +2,7 @@
 
 use lpvmpc::{
     Bounds, GuardedController, GuardedError, GuardedIterations, GuardedSettings, LpvModel, Rk4,
-    SolverSettings, TerminalSet, Weights,
+    Rollout, SolverSettings, TerminalSet, Weights,
 };
 use nalgebra::{Matrix1, Matrix1x2, Matrix2, Vector1, Vector2};
 
@@ -29,6 +29,11 @@ fn check(cart: Cart, x: Bounds<f64, 2>) -> Result<(), GuardedError> {
         t_s: 0.1,
         horizon: 4,
         rk4: Rk4 { substeps: 1 },
+        rollout: Rollout {
+            rk4: Rk4 { substeps: 1 },
+            error: Vector2::zeros(),
+            between: Vector2::zeros(),
+        },
         weights: Weights {
             q: Matrix2::identity(),
             r: Matrix1::new(1.0),

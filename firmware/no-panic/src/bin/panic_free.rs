@@ -40,6 +40,8 @@ fn step<T: Scalar>() {
         };
         let states = controller.settings().x;
         black_box(controller.set_bounds(states, bounds).is_ok());
+        controller.prepare(reference, workspace);
+        black_box(controller.feedback(x, reference, workspace));
         let plan = controller.step(x, reference, workspace);
         let torque = plan.u[0][0];
         let needed = PlaneTorques::need(plan.u.iter().map(|u| u[0]), taken);

@@ -13,6 +13,7 @@ use cortex_m_rt::entry;
 use cortex_m_semihosting::{debug, hprintln};
 use firmware::{Controller, Recording, Workspace, recorded};
 use instructions::InstructionCounter;
+use lpvmpc::ControllerSettings;
 use nalgebra::{Vector3, Vector4};
 
 type Planes = [Option<Controller>; 2];
@@ -38,16 +39,64 @@ fn main() -> ! {
         set_up(recording, planes);
         deepest = deepest.max(replay(recording, planes, workspace, &mut counter));
     }
+    deepest = deepest.max(descend(
+        &recorded::LISSAJOUS,
+        planes,
+        workspace,
+        &mut counter,
+    ));
     hprintln!("bytes stack {deepest}");
     debug::exit(debug::EXIT_SUCCESS);
     failure::stop()
 }
 
+/// The first plane as a descent, on the recorded states. Returns the deepest stack of a step, bytes.
+#[inline(never)]
+fn descend(
+    recording: &Recording,
+    planes: &mut Planes,
+    workspace: &mut Workspace,
+    counter: &mut InstructionCounter,
+) -> u32 {
+    set_up_with(recording, &recording.descent(8), planes);
+    let ([Some(controller), _], Some(plane)) = (planes, recording.planes.first()) else {
+        failure::stop()
+    };
+    let mut deepest = 0;
+    for (k, state) in plane.states.iter().enumerate() {
+        let (x, reference) = (Vector4::from(*state), plane.reference(k));
+        let mut instructions = None;
+        let stack = stack::depth(&mut || {
+            (instructions, _) = counter.count(|| {
+                controller.step(&x, &reference, workspace);
+            });
+        });
+        deepest = deepest.max(stack);
+        let Some(instructions) = instructions else {
+            hprintln!("the instruction counter wrapped");
+            failure::stop()
+        };
+        let (problems, plan) = (controller.problems(), controller.solution());
+        let solved = u8::from(plan.status.is_solved());
+        hprintln!("descent {k} {problems} {instructions} {solved}");
+    }
+    deepest
+}
+
 /// New controllers with the recording's settings.
 #[inline(never)]
 fn set_up(recording: &Recording, planes: &mut Planes) {
+    set_up_with(recording, &recording.settings(), planes);
+}
+
+#[inline(never)]
+fn set_up_with(
+    recording: &Recording,
+    settings: &ControllerSettings<f32, 4, 1, 3>,
+    planes: &mut Planes,
+) {
     for place in planes {
-        match Controller::new(recording.ballbot, recording.settings()) {
+        match Controller::new(recording.ballbot, *settings) {
             Ok(controller) => *place = Some(controller),
             Err(error) => {
                 hprintln!("{}: {error}", recording.name);
