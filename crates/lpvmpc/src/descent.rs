@@ -56,6 +56,8 @@ const ROUNDINGS: f64 = 100.0;
 const STEPS: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
 /// Part of the expected gain that a step has to bring (Armijo's condition).
 const SUFFICIENT: f64 = 1e-4;
+/// The search ends after so many programs in a row that bring nothing; each is damped more.
+const MOST_FAILURES: usize = 8;
 /// Damping is raised after shorter steps than this.
 const SHORT_STEP: f64 = 0.5;
 /// Damping goes up and down by this factor; the least is the largest entry of R.
@@ -92,8 +94,8 @@ where
         }
         let mut prices = Prices::none();
         let mut status = Status::NoImprovement;
-        // Neither model has shown yet that it brings nothing.
-        let mut failed = false;
+        // Programs in a row that have brought nothing.
+        let mut failures = 0;
         while self.problems < self.settings.iterations.most() {
             self.linearize_plan(x, along, &mut workspace.ocp);
             self.solve_program(workspace);
@@ -109,7 +111,7 @@ where
                     }
                 }
                 Outcome::Moved { step, gain } => {
-                    failed = false;
+                    failures = 0;
                     status = Status::Improved;
                     let settled = step == T::one() && gain <= tolerance;
                     if settled && along == Along::Jacobian && !damped {
@@ -126,10 +128,10 @@ where
                     if let (Outcome::Unsolved(reason), Status::NoImprovement) = (outcome, status) {
                         status = reason;
                     }
-                    if failed {
+                    failures += 1;
+                    if failures >= MOST_FAILURES {
                         break;
                     }
-                    failed = true;
                     along = along.other();
                 }
             }
