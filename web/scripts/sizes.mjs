@@ -5,7 +5,7 @@ import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { brotliCompressSync, gzipSync } from "node:zlib";
 
-const LIMITS_KB = { wasm: 150, all: 400 };
+const LIMITS_KB = { wasm: 220, all: 500 };
 
 const dist = join(dirname(dirname(fileURLToPath(import.meta.url))), "dist");
 const files = readdirSync(dist, { recursive: true, withFileTypes: true }).filter((f) => f.isFile());

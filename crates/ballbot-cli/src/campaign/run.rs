@@ -83,7 +83,7 @@ impl Wanted {
         let size = farthest * random.symmetric();
         let at = |k: usize, random: &mut Random| match course {
             Course::EverySample => farthest * random.symmetric(),
-            Course::Alternating if k % 2 == 0 => size,
+            Course::Alternating if k.is_multiple_of(2) => size,
             Course::Alternating => -size,
             Course::RunningAway => size * k as f64,
             Course::Huge => {

@@ -102,7 +102,7 @@ fn figures(
     let shown: Vec<_> = pairs.iter().filter(shown).collect();
     let over = |cost: fn(&Case, &Outcome) -> f64| -> Vec<f64> {
         let ratio = |(case, outcome): &&(&Case, &Outcome)| cost(case, outcome) / case.nonlinear;
-        shown.iter().map(|pair| ratio(pair)).collect()
+        shown.iter().map(ratio).collect()
     };
     let guaranteed = shown
         .par_iter()
