@@ -117,7 +117,8 @@ test("a push that is too large ends on the floor, with the reason", async ({ pag
   await page.getByRole("button", { name: "\u2192" }).click();
   await expect(page.locator("#alert")).toContainText("the robot has fallen: theta", { timeout: 30_000 });
   await expect(page.locator("#alert")).toContainText("LPV MPC");
-  await expect(page.locator("#alert")).toContainText(/no plan from t = .* s on: infeasible: .* bound of/);
+  // Soft bounds leave a plan as long as the robot stands; what was not enough is the torque.
+  await expect(page.locator("#alert")).toContainText(/the torque had been at its bound for .* s/);
 });
 
 test("in an ideal world a controller without a plan gives up, and says which bound", async ({ page }) => {

@@ -42,6 +42,8 @@ pub struct Workspace<T, const NX: usize, const NU: usize, const N: usize, const 
     pub(crate) solver: Solver<T, NX, NU, N, M>,
     /// A rollout that may become the plan.
     pub(crate) trial: Trial<T, NX, NU, N>,
+    /// Whether the stages have the affine terms and the damping of a descent.
+    pub(crate) along_plan: bool,
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
@@ -54,6 +56,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
             ocp: Ocp::default(),
             solver: Solver::new(),
             trial: Trial::new(),
+            along_plan: false,
         }
     }
 
@@ -72,6 +75,12 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         };
         self.ocp.soft_x = soft_x;
         self.ocp.terminal.soft_x = soft_x;
+        if core::mem::take(&mut self.along_plan) {
+            for stage in &mut self.ocp.stages {
+                stage.c = SVector::zeros();
+                stage.linear_u = SVector::zeros();
+            }
+        }
         if !self.ocp.stages.first().is_some_and(same) {
             for stage in &mut self.ocp.stages {
                 stage.q = weights.q;
@@ -355,7 +364,6 @@ where
         };
         for (stage, (x, u)) in ocp.stages.iter_mut().zip(window).take(horizon) {
             (stage.a, stage.b) = predictor.linearize_along(&self.model, held, x, u, *t_s);
-            stage.c = SVector::zeros();
         }
     }
 
@@ -386,7 +394,6 @@ where
         let stages = ocp.stages.iter_mut().zip(&reference.stages);
         for (stage, x_ref) in stages.take(self.settings.horizon) {
             stage.linear_x = product(&q, x_ref);
-            stage.linear_u = SVector::zeros();
         }
         let x_ref = reference.terminal;
         let (p, equality) = match self.settings.terminal {
@@ -404,28 +411,36 @@ where
         self.settings.horizon.saturating_sub(1)
     }
 
-    /// The nonlinear model's state one sample after `x` under the input `u`.
-    // Once in the machine code.
-    #[inline(never)]
-    pub(crate) fn next_state(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NX> {
-        let ControllerSettings { t_s, predictor, .. } = &self.settings;
-        predictor.rk4().advance(&self.model, x, u, *t_s)
-    }
-
     /// Algorithm 2, step 4: the nonlinear model under the plan.
     #[inline(never)]
     fn roll_out(&mut self, x: &SVector<T, NX>) {
         let mut state = *x;
-        for i in 0..self.settings.horizon {
-            state = self.next_state(&state, at(&self.solution.u, i));
-            if let Some(place) = self.rollout.get_mut(i) {
-                *place = state;
-            }
+        let places = self.rollout.iter_mut().zip(&self.solution.u);
+        for (place, u) in places.take(self.settings.horizon) {
+            state = next_state(&self.model, &self.settings, &state, u);
+            *place = state;
         }
         self.gap = state - at(&self.solution.x, self.last_stage());
         // A rollout that has become non-finite is no past to build on.
         self.initialised = state.iter().all(|entry| entry.is_finite());
     }
+}
+
+/// The nonlinear model's state one sample after `x` under the input `u`.
+// Once in the machine code of a microcontroller, for its flash; elsewhere in every loop, for speed.
+#[cfg_attr(target_arch = "arm", inline(never))]
+#[cfg_attr(not(target_arch = "arm"), inline(always))]
+pub(crate) fn next_state<P, T, const NX: usize, const NU: usize, const NS: usize>(
+    model: &P,
+    settings: &ControllerSettings<T, NX, NU, NS>,
+    x: &SVector<T, NX>,
+    u: &SVector<T, NU>,
+) -> SVector<T, NX>
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS>,
+{
+    settings.predictor.rk4().advance(model, x, u, settings.t_s)
 }
 
 /// Prices of the cost J as those of the quadratic program, whose cost is half of it.

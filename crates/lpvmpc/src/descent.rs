@@ -14,9 +14,8 @@
 //! exact to first order: what repeats itself under them is a stationary point of the nonlinear
 //! problem.
 
-use crate::controller::{Controller, Reference, Workspace};
+use crate::controller::{Controller, Reference, Workspace, next_state};
 use crate::model::{LpvModel, Scalar};
-use crate::ocp::Ocp;
 use crate::plan::{Merit, Prices, Trial, at};
 use crate::policy::input_at;
 use crate::settings::ControllerSettings;
@@ -97,7 +96,7 @@ where
         // Programs in a row that have brought nothing.
         let mut failures = 0;
         while self.problems < self.settings.iterations.most() {
-            self.linearize_plan(x, along, &mut workspace.ocp);
+            self.linearize_plan(x, along, workspace);
             self.solve_program(workspace);
             let outcome = self.improve(x, reference, tolerance, &mut prices, workspace);
             let damped = self.policy.damping > T::zero();
@@ -248,7 +247,14 @@ where
     /// The matrices of the program along the plan from `x`. Their affine terms make the linear model
     /// exact on the plan itself.
     #[inline(never)]
-    fn linearize_plan(&self, x: &SVector<T, NX>, along: Along, ocp: &mut Ocp<T, NX, NU, N>) {
+    fn linearize_plan(
+        &self,
+        x: &SVector<T, NX>,
+        along: Along,
+        workspace: &mut Workspace<T, NX, NU, N, M>,
+    ) {
+        workspace.along_plan = true;
+        let ocp = &mut workspace.ocp;
         let settings = &self.settings;
         ocp.horizon = settings.horizon;
         ocp.x0 = *x;
@@ -395,7 +401,10 @@ where
         let last = self.last_stage();
         // Where the plant will be, as far as the model knows.
         let x = match answered {
-            Some(x) => self.next_state(&x, at(&self.solution.u, 0)),
+            Some(x) => {
+                let u = at(&self.solution.u, 0);
+                next_state(&self.model, &self.settings, &x, u)
+            }
             None => *at(&self.rollout, 0),
         };
         if !self.first_plan(&x, reference, workspace) {
@@ -424,7 +433,7 @@ where
                 None => Outcome::NothingToGain,
             });
         }
-        self.linearize_plan(&x, Along::Jacobian, &mut workspace.ocp);
+        self.linearize_plan(&x, Along::Jacobian, workspace);
         true
     }
 
@@ -469,7 +478,7 @@ where
         for (i, (u, next)) in places.enumerate().take(self.settings.horizon) {
             *u = input(i, &state);
             total += merit.stage(i, &state, u);
-            state = self.next_state(&state, u);
+            state = next_state(&self.model, &self.settings, &state, u);
             *next = state;
         }
         total += merit.end(&state);
