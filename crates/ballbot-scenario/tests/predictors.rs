@@ -115,7 +115,7 @@ fn far_set_points_converge() {
             "{phi} rad: {}",
             solution.status
         );
-        assert!(end.amax() < 1e-5, "{phi} rad: {end}");
+        assert!(end.amax() < 1e-6, "{phi} rad: {end}");
     }
 }
 
