@@ -3,7 +3,7 @@
 use crate::{N, Reference};
 use ballbot::Ballbot;
 use lpvmpc::{
-    Bounds, ControllerSettings, Iterations, Penalty, Predictor, Rk4, Scheduling, SolverSettings,
+    Bounds, ControllerSettings, InputReference, Iterations, Penalty, Predictor, Rk4, Scheduling, SolverSettings,
     TerminalIngredient, Weights,
 };
 use nalgebra::{Matrix1, Matrix4, Vector1, Vector4};
@@ -69,6 +69,7 @@ impl Recording {
             },
             u: Bounds { lower, upper },
             soft_x: [None; 4],
+            input_reference: InputReference::SteadyState,
             scheduling: Scheduling::Predicted,
             iterations: Iterations::Fixed(1),
             solver: SolverSettings::default(),

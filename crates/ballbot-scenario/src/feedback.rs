@@ -12,8 +12,8 @@ use crate::three_motors::Motors;
 use ballbot::{Ballbot, Wheels};
 use ballbot_control::Feedback;
 use lpvmpc::{
-    Bounds, ControllerSettings, EstimatorSettings, Gate, LpvModel, MoveLimits, RampedInput,
-    TerminalIngredient, Weights,
+    Bounds, ControllerSettings, EstimatorSettings, Gate, InputReference, LpvModel, MoveLimits,
+    RampedInput, TerminalIngredient, Weights,
 };
 use nalgebra::{
     Complex, Matrix1, Matrix1x2, Matrix3x4, Matrix4x2, Matrix5, SMatrix, Vector1, Vector2, Vector3,
@@ -222,6 +222,7 @@ impl TorqueRateTable {
             },
             // The torque's bounds are the motors' own.
             soft_x: [0, 1, 2, 3, 4].map(|i| plain.soft_x.get(i).copied().flatten()),
+            input_reference: InputReference::SteadyState,
             scheduling: plain.scheduling,
             iterations: plain.iterations,
             solver: plain.solver,

@@ -9,8 +9,8 @@ use crate::schema::{
 use ballbot::{Ballbot, LinearParameters};
 use ballbot_control::LONGEST_HORIZON;
 use lpvmpc::{
-    Bounds, ControllerSettings, Iterations, LpvModel, Penalty, Predictor, Rk4, Scheduling,
-    Softness, SolverSettings, TerminalIngredient, Weights,
+    Bounds, ControllerSettings, InputReference, Iterations, LpvModel, Penalty, Predictor, Rk4,
+    Scheduling, Softness, SolverSettings, TerminalIngredient, Weights,
 };
 use nalgebra::{DMatrix, Matrix1, Matrix4, Vector1, Vector3, Vector4};
 
@@ -147,6 +147,7 @@ impl ControllerTable {
             x,
             soft_x,
             u,
+            input_reference: InputReference::SteadyState,
             scheduling,
             iterations,
             solver: SolverSettings::default(),

@@ -8,7 +8,7 @@
 
 use crate::parameters::{Ballbot, Field};
 use crate::trigonometry::sin_cos;
-use lpvmpc::{LpvModel, Scalar};
+use lpvmpc::{LpvModel, Scalar, SteadyState, SteadyStateProblem};
 use nalgebra::{Matrix4, SMatrix, Vector1, Vector3, Vector4};
 
 /// The scheduling (theta, theta_dot), as the embedding's formulas need it.
@@ -139,6 +139,22 @@ impl<T: Scalar> LpvModel<T, 4, 1, 3> for Ballbot<T> {
     #[inline(always)]
     fn jacobian(&self, x: &Vector4<T>, u: &Vector1<T>) -> (Matrix4<T>, Vector4<T>) {
         self.jacobian_of_f(x, u[0])
+    }
+
+    /// Upright and at rest without torque, wherever the ball is; nowhere else.
+    fn steady_state(&self, problem: &SteadyStateProblem<T, 4, 1>) -> Option<SteadyState<T, 4, 1>> {
+        let zero = T::zero();
+        let upright = Vector4::new(problem.x_ref[0], zero, zero, zero);
+        let (x, u) = (
+            problem.x.project(&upright),
+            problem.u.project(&Vector1::zeros()),
+        );
+        let stands = x[1] == zero && x[2] == zero && x[3] == zero && u[0] == zero;
+        stands.then_some(SteadyState {
+            x,
+            u,
+            reached: x == problem.x_ref,
+        })
     }
 }
 

@@ -6,8 +6,9 @@
 
 use ballbot::{Ballbot, limits};
 use lpvmpc::{
-    Bounds, Controller, ControllerSettings, Iterations, LpvModel, Predictor, Quantity, Rk4,
-    Scheduling, Side, SolverSettings, Status, TerminalIngredient, Weights, Workspace,
+    Bounds, Controller, ControllerSettings, InputReference, Iterations, LpvModel, Predictor,
+    Quantity, Rk4, Scheduling, Side, SolverSettings, Status, TerminalIngredient, Weights,
+    Workspace,
 };
 use lpvmpc_sim::{Ending, Experiment, PlantError, Tolerances, Trajectory, run};
 use nalgebra::{Matrix1, Matrix2, Matrix4, Vector1, Vector2, Vector4};
@@ -82,6 +83,7 @@ fn run_mass<P: LpvModel<f64, 2, 1, 1>>(
             upper: Vector1::new(2.0),
         },
         soft_x: [None; 2],
+        input_reference: InputReference::SteadyState,
         scheduling: Scheduling::Predicted,
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),
@@ -322,6 +324,7 @@ fn ballbot_controller() -> Controller<Ballbot<f64>, f64, 4, 1, 3, 20, 24> {
             upper: Vector1::new(0.5),
         },
         soft_x: [None; 4],
+        input_reference: InputReference::SteadyState,
         scheduling: Scheduling::Predicted,
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),

@@ -33,6 +33,8 @@ pub(crate) struct DualActiveSet<T, const NU: usize, const N: usize, const M: usi
     max_changes: usize,
     /// Refinements that are left.
     pub(crate) refinements: usize,
+    /// Sign of the candidate's multiplier where it contradicts the working set; zero before.
+    contradicting: T,
 }
 
 /// Why a step along the direction ends.
@@ -59,6 +61,7 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
             changes: 0,
             max_changes: 0,
             refinements: 0,
+            contradicting: T::zero(),
         }
     }
 
@@ -72,6 +75,7 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
         self.changes = 0;
         self.max_changes = max_changes;
         self.refinements = 3;
+        self.contradicting = T::zero();
     }
 
     /// The bound that is violated most, if any is.
@@ -162,7 +166,7 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
                 self.advance(-slack / self.direction.slope);
                 self.working.append(&self.candidate, &self.direction);
             } else if !(slack.abs() <= self.loosest * (T::one() + target.abs())) {
-                return Err(Status::Infeasible(bound));
+                return Err(self.conflict(bound, -slack));
             }
         }
         Ok(())
@@ -183,7 +187,8 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
         if !slack.is_finite() {
             // The trajectory is finite: a bound at plus or minus infinity, or no number at all.
             return Err(if slack < T::zero() {
-                Status::Infeasible(bound)
+                self.direction.dual = [T::zero(); M];
+                self.conflict(bound, T::one())
             } else {
                 Status::NotFinite
             });
@@ -317,8 +322,41 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
         if violation <= self.loosest && violated.part == Part::Hard {
             self.rest(self.candidate.terms.reported())
         } else {
-            Err(Status::Infeasible(violated.bound))
+            Err(self.conflict(violated.bound, T::one()))
         }
+    }
+
+    /// The candidate, the row of `bound`, contradicts the working set as far as the numbers can tell;
+    /// whether that is a proof is for the caller to check. Its multiplier counts in the direction of `sign`.
+    fn conflict(&mut self, bound: BoundId, sign: T) -> Status<T> {
+        self.contradicting = T::one().copysign(sign);
+        Status::Inaccurate(bound)
+    }
+
+    /// Leaves in `proof` the multipliers of the last conflict, if there was one: those of the working
+    /// set move with the candidate's so that the rows cancel out.
+    pub fn report_conflict(&self, proof: &mut ActiveSet<T, M>) -> bool {
+        let sign = self.contradicting;
+        proof.clear();
+        if sign == T::zero() {
+            return false;
+        }
+        let rates = self.direction.dual.iter();
+        let working = self.working.rows().iter().zip(rates).map(|(row, rate)| {
+            let multiplier = -*rate * sign;
+            let kept = row.equality || multiplier > T::zero();
+            let multiplier = if kept { multiplier } else { T::zero() };
+            ActiveRow {
+                multiplier,
+                ..row.active
+            }
+        });
+        let candidate = ActiveRow {
+            multiplier: sign,
+            ..self.candidate.terms.active
+        };
+        let mut rows = working.filter(|row| row.multiplier != T::zero());
+        proof.push(candidate) && rows.all(|row| proof.push(row))
     }
 
     /// One step along the direction.

@@ -3,13 +3,14 @@
 use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Bounds, Ocp, Penalty, Softness, Stage};
-use crate::plan::{Policy, Trial, at};
+use crate::plan::{Aim, Policy, Trial, at};
 use crate::settings::{
-    ControllerError, ControllerSettings, Iterations, Scheduling, TerminalIngredient, Weights,
-    check, check_bounds,
+    ControllerError, ControllerSettings, InputReference, Iterations, Scheduling,
+    TerminalIngredient, Weights, check, check_bounds,
 };
 use crate::solution::{Solution, Status};
 use crate::solver::{Solver, SolverSettings, WarmStart};
+use crate::steady_state::{SteadyState, SteadyStateProblem};
 use nalgebra::{SMatrix, SVector, convert};
 
 /// The state reference along the horizon, in state units.
@@ -78,7 +79,6 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         if core::mem::take(&mut self.along_plan) {
             for stage in &mut self.ocp.stages {
                 stage.c = SVector::zeros();
-                stage.linear_u = SVector::zeros();
             }
         }
         if !self.ocp.stages.first().is_some_and(same) {
@@ -128,6 +128,9 @@ pub struct Controller<
     pub(crate) initialised: bool,
     /// Quadratic programs that the last step solved.
     pub(crate) problems: usize,
+    /// The end of the reference for which `target` was worked out.
+    aimed_at: Option<SVector<T, NX>>,
+    target: Option<SteadyState<T, NX, NU>>,
     /// What came of factorising the program that is ready for [`Controller::feedback`].
     prepared: Option<Result<(), Status<T>>>,
     /// The state that the last feedback was given, while the rest of its step is to be made up for.
@@ -158,6 +161,8 @@ where
             gap: SVector::zeros(),
             initialised: false,
             problems: 0,
+            aimed_at: None,
+            target: None,
             prepared: None,
             answered: None,
             solution: Solution::default(),
@@ -176,14 +181,15 @@ where
     ) -> &Solution<T, NX, NU, N, M> {
         self.make_up();
         workspace.pose(&self.settings);
+        let aim = &self.aim(reference);
         if let Iterations::Descent { tolerance, .. } = self.settings.iterations {
-            self.descend(x, reference, tolerance, workspace);
+            self.descend(x, aim, tolerance, workspace);
             return &self.solution;
         }
         let Workspace { ocp, solver, .. } = workspace;
         self.initialise_scheduling(x);
         self.predict(x, ocp);
-        self.track(reference, ocp);
+        self.track(aim, ocp);
         solver.solve(ocp, &self.settings.solver, &mut self.solution);
         self.roll_out(x);
         self.iterate(x, workspace);
@@ -202,9 +208,10 @@ where
     ) {
         self.prepared = None;
         workspace.pose(&self.settings);
+        let aim = &self.aim(reference);
         if let Iterations::Descent { .. } = self.settings.iterations {
             let answered = self.answered.take();
-            if !self.initialised || !self.prepare_descent(answered, reference, workspace) {
+            if !self.initialised || !self.prepare_descent(answered, aim, workspace) {
                 self.initialised = false;
                 return;
             }
@@ -215,7 +222,7 @@ where
             }
             let x = *at(&self.rollout, 0);
             self.predict(&x, &mut workspace.ocp);
-            self.track(reference, &mut workspace.ocp);
+            self.track(aim, &mut workspace.ocp);
         }
         self.prepared = Some(workspace.solver.factorize(&workspace.ocp));
     }
@@ -268,8 +275,51 @@ where
         check_bounds(&x, "state")?;
         check_bounds(&u, "input")?;
         (self.settings.x, self.settings.u) = (x, u);
-        self.prepared = None;
+        (self.prepared, self.aimed_at) = (None, None);
         Ok(())
+    }
+
+    /// The steady state that the last step headed for: the end of its reference, or, where the plant
+    /// cannot stand there, the nearest place where it can (`reached` tells which). `None` with a given
+    /// input reference, and where no steady state was found; the reference is then taken as it is.
+    pub fn target(&self) -> Option<&SteadyState<T, NX, NU>> {
+        self.target.as_ref()
+    }
+
+    /// What to follow: the target where the reference is at rest, the reference where it moves.
+    fn aim<'a>(&mut self, reference: &'a Reference<T, NX, N>) -> Aim<'a, T, NX, NU, N> {
+        self.find_target(&reference.terminal);
+        let mut stages = reference.stages.iter().take(self.settings.horizon);
+        let rests = stages.all(|x_ref| *x_ref == reference.terminal);
+        Aim {
+            reference,
+            rest: self.target.filter(|_| rests).map(|target| target.x),
+            u_ref: self.u_ref(),
+        }
+    }
+
+    /// The input that costs nothing.
+    fn u_ref(&self) -> SVector<T, NU> {
+        match (&self.settings.input_reference, &self.target) {
+            (InputReference::Given(u), _) | (_, Some(SteadyState { u, .. })) => *u,
+            (InputReference::SteadyState, None) => SVector::zeros(),
+        }
+    }
+
+    fn find_target(&mut self, x_ref: &SVector<T, NX>) {
+        let known = self.aimed_at == Some(*x_ref);
+        if known || self.settings.input_reference != InputReference::SteadyState {
+            return;
+        }
+        let Weights { q, r } = &self.settings.weights;
+        self.aimed_at = Some(*x_ref);
+        self.target = self.model.steady_state(&SteadyStateProblem {
+            x_ref: *x_ref,
+            q: q.diagonal(),
+            r: r.diagonal(),
+            x: self.settings.x,
+            u: self.settings.u,
+        });
     }
 
     /// Forgets the past: the next step starts as the first one did.
@@ -309,12 +359,14 @@ where
     /// states predicted from `x`, for the arguments of the last step.
     pub fn tracking_cost(&self, x: &SVector<T, NX>, reference: &Reference<T, NX, N>) -> T {
         let Weights { q, r } = &self.settings.weights;
+        let u_ref = self.u_ref();
         let mut total = T::zero();
         let mut x = x;
         let steps = self.solution.u.iter().zip(self.solution.x.iter());
         for ((u, x_next), x_ref) in steps.zip(&reference.stages).take(self.settings.horizon) {
             let error = x - x_ref;
-            total += (q * error).dot(&error) + (r * u).dot(u);
+            let input = u - u_ref;
+            total += (q * error).dot(&error) + (r * input).dot(&input);
             x = x_next;
         }
         match &self.settings.terminal {
@@ -389,19 +441,21 @@ where
 
     /// Algorithm 1, cost: the reference enters the linear terms.
     #[inline(never)]
-    pub(crate) fn track(&self, reference: &Reference<T, NX, N>, ocp: &mut Ocp<T, NX, NU, N>) {
+    pub(crate) fn track(&self, aim: &Aim<'_, T, NX, NU, N>, ocp: &mut Ocp<T, NX, NU, N>) {
         let q = -self.settings.weights.q;
-        let stages = ocp.stages.iter_mut().zip(&reference.stages);
-        for (stage, x_ref) in stages.take(self.settings.horizon) {
-            stage.linear_x = product(&q, x_ref);
+        let linear_u = -product(&self.settings.weights.r, &aim.u_ref);
+        let stages = ocp.stages.iter_mut().enumerate();
+        for (i, stage) in stages.take(self.settings.horizon) {
+            stage.linear_x = linear_term(&q, aim.at(i));
+            stage.linear_u = linear_u;
         }
-        let x_ref = reference.terminal;
+        let x_ref = *aim.end();
         let (p, equality) = match self.settings.terminal {
             TerminalIngredient::Cost(p) => (p, None),
             TerminalIngredient::Equality => (SMatrix::zeros(), Some(x_ref)),
         };
         ocp.terminal.p = p;
-        ocp.terminal.linear_x = -(p * x_ref);
+        ocp.terminal.linear_x = -linear_term(&p, &x_ref);
         ocp.terminal.equality = equality;
     }
 
@@ -441,6 +495,16 @@ where
     P: LpvModel<T, NX, NU, NS>,
 {
     settings.predictor.rk4().advance(model, x, u, settings.t_s)
+}
+
+/// W x, the linear term that a reference leaves in the cost.
+#[cfg_attr(target_arch = "arm", inline(never))]
+#[cfg_attr(not(target_arch = "arm"), inline(always))]
+fn linear_term<T: Scalar, const NX: usize>(
+    weight: &SMatrix<T, NX, NX>,
+    x: &SVector<T, NX>,
+) -> SVector<T, NX> {
+    product(weight, x)
 }
 
 /// Prices of the cost J as those of the quadratic program, whose cost is half of it.

@@ -14,9 +14,10 @@
 //! exact to first order: what repeats itself under them is a stationary point of the nonlinear
 //! problem.
 
-use crate::controller::{Controller, Reference, Workspace, next_state};
+use crate::controller::{Controller, Workspace, next_state};
+use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
-use crate::plan::{Merit, Prices, Trial, at};
+use crate::plan::{Aim, Merit, Prices, Trial, at};
 use crate::policy::input_at;
 use crate::settings::ControllerSettings;
 use crate::solution::Status;
@@ -77,18 +78,18 @@ where
     pub(crate) fn descend(
         &mut self,
         x: &SVector<T, NX>,
-        reference: &Reference<T, NX, N>,
+        aim: &Aim<'_, T, NX, NU, N>,
         tolerance: T,
         workspace: &mut Workspace<T, NX, NU, N, M>,
     ) {
         self.problems = 0;
-        self.track(reference, &mut workspace.ocp);
+        self.track(aim, &mut workspace.ocp);
         let mut along = if self.initialised {
             Along::Jacobian
         } else {
             Along::Scheduling
         };
-        if !self.first_plan(x, reference, workspace) {
+        if !self.first_plan(x, aim, workspace) {
             return self.give_up();
         }
         let mut prices = Prices::none();
@@ -96,9 +97,9 @@ where
         // Programs in a row that have brought nothing.
         let mut failures = 0;
         while self.problems < self.settings.iterations.most() {
-            self.linearize_plan(x, along, workspace);
+            self.linearize_plan(x, aim, along, workspace);
             self.solve_program(workspace);
-            let outcome = self.improve(x, reference, tolerance, &mut prices, workspace);
+            let outcome = self.improve(x, aim, tolerance, &mut prices, workspace);
             let damped = self.policy.damping > T::zero();
             self.adapt_damping(&outcome);
             match outcome {
@@ -143,14 +144,14 @@ where
     fn first_plan(
         &mut self,
         x: &SVector<T, NX>,
-        reference: &Reference<T, NX, N>,
+        aim: &Aim<'_, T, NX, NU, N>,
         workspace: &mut Workspace<T, NX, NU, N, M>,
     ) -> bool {
         let last = self.policy.cost;
-        let merit = self.merit(reference, Prices::none());
+        let merit = self.merit(aim, Prices::none());
         let mut best = None;
         if self.initialised {
-            self.shift(reference);
+            self.shift(aim);
             best = self.roll_out_plan(x, &merit, &mut workspace.trial, &|i, x| {
                 let policy = &self.policy;
                 let planned = (at(&self.rollout, i), at(&policy.u, i));
@@ -159,7 +160,7 @@ where
             self.take_if_some(best, &workspace.trial);
         }
         if best.is_none_or(|cost| cost > last * convert(JUMP)) {
-            best = self.regulate(x, reference, best, workspace);
+            best = self.regulate(x, aim, best, workspace);
         }
         best.is_some()
     }
@@ -170,18 +171,17 @@ where
     fn regulate(
         &mut self,
         x: &SVector<T, NX>,
-        reference: &Reference<T, NX, N>,
+        aim: &Aim<'_, T, NX, NU, N>,
         mut best: Option<T>,
         workspace: &mut Workspace<T, NX, NU, N, M>,
     ) -> Option<T> {
-        let (gain, indifferent) = self.regulator(&reference.terminal, workspace);
-        let away = (x - reference.terminal).component_mul(&indifferent);
-        let merit = self.merit(reference, Prices::none());
-        let rest = SVector::zeros();
+        let (gain, indifferent) = self.regulator(aim, workspace);
+        let away = (x - aim.end()).component_mul(&indifferent);
+        let merit = self.merit(aim, Prices::none());
         for part in PARTS {
-            let aim = reference.terminal + away * (T::one() - convert::<f64, T>(part));
+            let x_aim = aim.end() + away * (T::one() - convert::<f64, T>(part));
             let cost = self.roll_out_plan(x, &merit, &mut workspace.trial, &|_, x| {
-                input_at(x, (&aim, &rest), &gain, &self.settings.u)
+                input_at(x, (&x_aim, &aim.u_ref), &gain, &self.settings.u)
             });
             if let Some(found) = cost
                 && best.is_none_or(|best| found < best)
@@ -198,17 +198,16 @@ where
         best
     }
 
-    /// The gain of the regulator at `x_ref` (u = K (x - x_ref)), that of the first of `N` equal
+    /// The gain of the regulator at the end of the reference (u = u_ref + K (x - x_ref)), that of the first of `N` equal
     /// stages; and 1 for each state whose value is all the same to the plant (the position, as a
     /// rule), 0 for the others. The program in the workspace is overwritten.
     fn regulator(
         &self,
-        x_ref: &SVector<T, NX>,
+        aim: &Aim<'_, T, NX, NU, N>,
         workspace: &mut Workspace<T, NX, NU, N, M>,
     ) -> (SMatrix<T, NU, NX>, SVector<T, NX>) {
         let Workspace { ocp, solver, .. } = workspace;
-        let rest = SVector::zeros();
-        let (a, b) = self.sample_matrices(x_ref, &rest, Along::Scheduling);
+        let (a, b) = self.sample_matrices(aim.end(), &aim.u_ref, Along::Jacobian);
         for stage in &mut ocp.stages {
             (stage.a, stage.b) = (a, b);
             stage.c = SVector::zeros();
@@ -227,10 +226,10 @@ where
     }
 
     /// The plan one sample on; its last stage is the regulator's.
-    fn shift(&mut self, reference: &Reference<T, NX, N>) {
+    fn shift(&mut self, aim: &Aim<'_, T, NX, NU, N>) {
         let last = self.last_stage();
         let gain = *at(&self.policy.gain, last);
-        let planned = (&reference.terminal, &SVector::zeros());
+        let planned = (aim.end(), &aim.u_ref);
         let end = at(&self.rollout, last);
         let u = input_at(end, planned, &gain, &self.settings.u);
         // What comes in from beyond the horizon is overwritten.
@@ -250,12 +249,14 @@ where
     fn linearize_plan(
         &self,
         x: &SVector<T, NX>,
+        aim: &Aim<'_, T, NX, NU, N>,
         along: Along,
         workspace: &mut Workspace<T, NX, NU, N, M>,
     ) {
         workspace.along_plan = true;
         let ocp = &mut workspace.ocp;
         let settings = &self.settings;
+        let linear_u = -product(&settings.weights.r, &aim.u_ref);
         ocp.horizon = settings.horizon;
         ocp.x0 = *x;
         let states = core::iter::once(x).chain(&self.rollout);
@@ -264,7 +265,7 @@ where
             (stage.a, stage.b) = self.sample_matrices(x, u, along);
             stage.c = next - stage.a * x - stage.b * u;
             stage.r = settings.weights.r + SMatrix::identity() * self.policy.damping;
-            stage.linear_u = -*u * self.policy.damping;
+            stage.linear_u = linear_u - u * self.policy.damping;
         }
     }
 
@@ -313,7 +314,7 @@ where
     fn improve(
         &mut self,
         x: &SVector<T, NX>,
-        reference: &Reference<T, NX, N>,
+        aim: &Aim<'_, T, NX, NU, N>,
         tolerance: T,
         prices: &mut Prices<T, NX>,
         workspace: &mut Workspace<T, NX, NU, N, M>,
@@ -324,7 +325,7 @@ where
             return Outcome::Unsolved(answer.status);
         }
         prices.raise(&answer.active);
-        let merit = self.merit(reference, *prices);
+        let merit = self.merit(aim, *prices);
         let before = merit.of(x, &self.policy.u, &self.rollout);
         let expected = before - merit.of(x, &answer.u, &answer.x);
         self.gap = at(&self.rollout, last) - at(&answer.x, last);
@@ -394,10 +395,10 @@ where
     pub(crate) fn prepare_descent(
         &mut self,
         answered: Option<SVector<T, NX>>,
-        reference: &Reference<T, NX, N>,
+        aim: &Aim<'_, T, NX, NU, N>,
         workspace: &mut Workspace<T, NX, NU, N, M>,
     ) -> bool {
-        self.track(reference, &mut workspace.ocp);
+        self.track(aim, &mut workspace.ocp);
         let last = self.last_stage();
         // Where the plant will be, as far as the model knows.
         let x = match answered {
@@ -407,13 +408,13 @@ where
             }
             None => *at(&self.rollout, 0),
         };
-        if !self.first_plan(&x, reference, workspace) {
+        if !self.first_plan(&x, aim, workspace) {
             return false;
         }
         if answered.is_some() && self.solution.status.is_solved() {
             let mut prices = Prices::none();
             prices.raise(&self.solution.active);
-            let merit = self.merit(reference, prices);
+            let merit = self.merit(aim, prices);
             self.policy.cost = merit.of(&x, &self.policy.u, &self.rollout);
             let trial = &mut workspace.trial;
             let taken = self.search_line(&x, &merit, T::zero(), trial, &|i| {
@@ -433,7 +434,7 @@ where
                 None => Outcome::NothingToGain,
             });
         }
-        self.linearize_plan(&x, Along::Jacobian, workspace);
+        self.linearize_plan(&x, aim, Along::Jacobian, workspace);
         true
     }
 
@@ -455,10 +456,10 @@ where
 
     fn merit<'a>(
         &self,
-        reference: &'a Reference<T, NX, N>,
+        aim: &'a Aim<'a, T, NX, NU, N>,
         prices: Prices<T, NX>,
     ) -> Merit<'a, T, NX, NU, N> {
-        Merit::new(&self.settings, reference, prices)
+        Merit::new(&self.settings, aim, prices)
     }
 
     /// Rolls the nonlinear model out from `x` into `trial`, with the inputs that `input` gives for a

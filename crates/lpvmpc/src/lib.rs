@@ -10,6 +10,7 @@ mod controller;
 mod delay;
 mod descent;
 mod estimator;
+mod farkas;
 mod guarded;
 mod kernel;
 mod kkt;
@@ -26,6 +27,7 @@ mod settle;
 mod shaping;
 mod solution;
 mod solver;
+mod steady_state;
 mod working_set;
 
 pub use controller::{Controller, Reference, Workspace};
@@ -33,6 +35,7 @@ pub use delay::DelayLine;
 pub use estimator::{
     Covariance, Estimator, EstimatorError, EstimatorSettings, Gate, Reading, Verdict,
 };
+pub use farkas::infeasibility_margin;
 pub use guarded::{
     Decision, GuardedController, GuardedError, GuardedIterations, GuardedSettings, GuardedStep,
     GuardedWorkspace, Rollout, SetPoints, TerminalSet,
@@ -43,8 +46,10 @@ pub use ocp::{Bounds, Ocp, Penalty, Softness, Stage, Terminal};
 pub use predictor::{Predictor, Rk4};
 pub use ramp::RampedInput;
 pub use settings::{
-    ControllerError, ControllerSettings, Iterations, Scheduling, TerminalIngredient, Weights,
+    ControllerError, ControllerSettings, InputReference, Iterations, Scheduling,
+    TerminalIngredient, Weights,
 };
 pub use shaping::{Motion, MoveLimits, SmoothMove};
 pub use solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
 pub use solver::{Solver, SolverSettings, WarmStart, cost};
+pub use steady_state::{SteadyState, SteadyStateProblem};

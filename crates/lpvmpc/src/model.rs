@@ -1,6 +1,7 @@
 //! What a plant must offer: a linear model whose matrices depend on a scheduling vector.
 
 use crate::kernel::product;
+use crate::steady_state::{self, SteadyState, SteadyStateProblem};
 use nalgebra::{RealField, SMatrix, SVector, convert};
 
 /// The number type of the method: `f32` on a microcontroller, `f64` on a PC.
@@ -69,5 +70,17 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
         }
         let (_, b) = self.matrices(&self.scheduling(x));
         (a, b)
+    }
+
+    /// The steady state, f(x, u) = 0 within bounds, that is nearest to a reference; `None` where
+    /// none is found.
+    ///
+    /// By Newton's method from the reference. A plant that knows its steady states in closed form
+    /// may say so.
+    fn steady_state(
+        &self,
+        problem: &SteadyStateProblem<T, NX, NU>,
+    ) -> Option<SteadyState<T, NX, NU>> {
+        steady_state::nearest(self, problem)
     }
 }

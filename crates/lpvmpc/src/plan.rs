@@ -9,6 +9,36 @@ use crate::solution::{ActiveSet, Quantity, Side};
 use crate::solver::price;
 use nalgebra::{SMatrix, SVector, convert};
 
+/// What a sample's cost draws state and input to.
+pub(crate) struct Aim<'a, T, const NX: usize, const NU: usize, const N: usize> {
+    /// As it was given.
+    pub reference: &'a Reference<T, NX, N>,
+    /// The steady state in its place, where it is the same at all stages.
+    pub rest: Option<SVector<T, NX>>,
+    /// The input that costs nothing.
+    pub u_ref: SVector<T, NU>,
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Aim<'_, T, NX, NU, N> {
+    /// x_ref at stage `i`.
+    #[inline(always)]
+    pub fn at(&self, i: usize) -> &SVector<T, NX> {
+        let moving = || {
+            self.reference
+                .stages
+                .get(i)
+                .unwrap_or(&self.reference.terminal)
+        };
+        self.rest.as_ref().unwrap_or_else(moving)
+    }
+
+    /// x_ref at the end of the horizon.
+    #[inline(always)]
+    pub fn end(&self) -> &SVector<T, NX> {
+        self.rest.as_ref().unwrap_or(&self.reference.terminal)
+    }
+}
+
 /// How a plan is followed: stage i has the input u_i + K_i (x - x_i). The states x_i are the
 /// controller's rollout.
 #[derive(Clone, Debug)]
@@ -100,14 +130,14 @@ pub(crate) struct Merit<'a, T, const NX: usize, const NU: usize, const N: usize>
     bounds: Bounds<T, NX>,
     soft: Softness<T, NX>,
     horizon: usize,
-    reference: &'a Reference<T, NX, N>,
+    aim: &'a Aim<'a, T, NX, NU, N>,
     prices: Prices<T, NX>,
 }
 
 impl<'a, T: Scalar, const NX: usize, const NU: usize, const N: usize> Merit<'a, T, NX, NU, N> {
     pub fn new<const NS: usize>(
         settings: &ControllerSettings<T, NX, NU, NS>,
-        reference: &'a Reference<T, NX, N>,
+        aim: &'a Aim<'a, T, NX, NU, N>,
         prices: Prices<T, NX>,
     ) -> Self {
         Self {
@@ -116,25 +146,27 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize, const N: usize> Merit<'a, 
             bounds: settings.x,
             soft: settings.soft_x,
             horizon: settings.horizon,
-            reference,
+            aim,
             prices,
         }
     }
 
     /// Of the input `u` at the state `x` at stage `i`. The state at stage 0 is given: its bounds
     /// count nothing.
-    #[inline(always)]
+    // Once in the machine code of a microcontroller, for its flash.
+    #[cfg_attr(target_arch = "arm", inline(never))]
+    #[cfg_attr(not(target_arch = "arm"), inline(always))]
     pub fn stage(&self, i: usize, x: &SVector<T, NX>, u: &SVector<T, NU>) -> T {
-        let reference = self.reference;
-        let error = x - reference.stages.get(i).unwrap_or(&reference.terminal);
-        let cost = squared(&self.weights.q, &error) + squared(&self.weights.r, u);
+        let (error, input) = (x - self.aim.at(i), u - self.aim.u_ref);
+        let cost = squared(&self.weights.q, &error) + squared(&self.weights.r, &input);
         if i > 0 { cost + self.excess(x) } else { cost }
     }
 
     /// Of the state `x` at the end of the horizon.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "arm", inline(never))]
+    #[cfg_attr(not(target_arch = "arm"), inline(always))]
     pub fn end(&self, x: &SVector<T, NX>) -> T {
-        let error = x - self.reference.terminal;
+        let error = x - self.aim.end();
         let cost = match &self.terminal {
             TerminalIngredient::Cost(p) => squared(p, &error),
             TerminalIngredient::Equality => error.abs().dot(&self.prices.end),

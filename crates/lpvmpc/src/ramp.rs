@@ -1,6 +1,8 @@
 //! The rate of the input as the input: bounds and costs on how fast it may change.
 
 use crate::model::{LpvModel, Scalar};
+use crate::ocp::Bounds;
+use crate::steady_state::{SteadyState, SteadyStateProblem};
 use nalgebra::{SMatrix, SVector};
 
 /// A plant of `NX` states and `NU` inputs whose inputs have become states: it is driven by
@@ -101,5 +103,36 @@ where
     ) -> (SMatrix<T, NXU, NXU>, SMatrix<T, NXU, NU>) {
         let (x, u) = Self::split::<T, NU, NXU>(joint);
         Self::join_matrices(self.0.jacobian(&x, &u))
+    }
+
+    /// That of the plant, with its input as the rest of the state; it changes no more.
+    fn steady_state(
+        &self,
+        problem: &SteadyStateProblem<T, NXU, NU>,
+    ) -> Option<SteadyState<T, NXU, NU>> {
+        let (x_ref, _) = Self::split::<T, NU, NXU>(&problem.x_ref);
+        let (q, r) = Self::split::<T, NU, NXU>(&problem.q);
+        let (lower, upper) = (problem.x.lower, problem.x.upper);
+        let (x_lower, u_lower) = Self::split::<T, NU, NXU>(&lower);
+        let (x_upper, u_upper) = Self::split::<T, NU, NXU>(&upper);
+        let plant = self.0.steady_state(&SteadyStateProblem {
+            x_ref,
+            q,
+            // An input without weight has to have one here.
+            r: r.map(|r| r.max(T::default_epsilon())),
+            x: Bounds {
+                lower: x_lower,
+                upper: x_upper,
+            },
+            u: Bounds {
+                lower: u_lower,
+                upper: u_upper,
+            },
+        })?;
+        Some(SteadyState {
+            x: Self::join(&plant.x, &plant.u),
+            u: SVector::zeros(),
+            reached: plant.reached,
+        })
     }
 }

@@ -225,7 +225,13 @@ pub(crate) fn room<T: Scalar, const NX: usize, const NU: usize, const N: usize, 
 }
 
 /// Lower and upper limit of the bounded quantity, both the target for an equality.
-fn limits<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+pub(crate) fn limits<
+    T: Scalar,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const NG: usize,
+>(
     ocp: &Ocp<T, NX, NU, N, NG>,
     bound: &BoundId,
 ) -> (T, T) {

@@ -7,7 +7,8 @@ use crate::solver::SolverSettings;
 use core::fmt;
 use nalgebra::{Cholesky, Const, SMatrix, SVector, convert};
 
-/// Weights of the cost sum ||x - x_ref||_Q^2 + ||u||_R^2 (eq. (7) of the paper).
+/// Weights of the cost sum ||x - x_ref||_Q^2 + ||u - u_ref||_R^2 (eq. (7) of the paper, whose u_ref
+/// is zero).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weights<T, const NX: usize, const NU: usize> {
     /// Q, `NX` x `NX`, symmetric positive semidefinite.
@@ -34,6 +35,20 @@ pub enum Scheduling<T, const NS: usize> {
     Held(SVector<T, NS>),
 }
 
+/// The input u_ref that costs nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum InputReference<T, const NU: usize> {
+    /// The input that holds the plant at the end of the reference, from the nonlinear model
+    /// ([`LpvModel::steady_state`](crate::LpvModel::steady_state)), worked out whenever that changes.
+    /// Where the plant cannot stand there within its bounds, a reference that is constant along the
+    /// horizon is replaced by the nearest steady state; [`Controller::target`](crate::Controller::target)
+    /// tells it. Without any, u_ref is zero.
+    #[default]
+    SteadyState,
+    /// This one; zero in the paper.
+    Given(SVector<T, NU>),
+}
+
 /// How many quadratic programs a sample gets. Each one is built along the plan of the one
 /// before; the first, along the last sample's.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +63,16 @@ pub enum Iterations<T> {
         /// At most so many, at least 1.
         most: usize,
     },
+}
+
+impl<T: Scalar> Default for Iterations<T> {
+    /// A descent of at most eight programs to a thousandth of the cost.
+    fn default() -> Self {
+        Self::Descent {
+            tolerance: convert(1e-3),
+            most: 8,
+        }
+    }
 }
 
 impl<T: Scalar> Iterations<T> {
@@ -90,6 +115,8 @@ pub struct ControllerSettings<T, const NX: usize, const NU: usize, const NS: usi
     pub scheduling: Scheduling<T, NS>,
     /// Quadratic programs per sample.
     pub iterations: Iterations<T>,
+    /// The input that costs nothing.
+    pub input_reference: InputReference<T, NU>,
     /// Settings of the solver.
     pub solver: SolverSettings<T>,
 }
@@ -121,6 +148,8 @@ pub enum ControllerError {
     },
     /// The constant scheduling contains a number that is not finite.
     HeldScheduling,
+    /// The given input reference contains a number that is not finite.
+    InputReference,
     /// No quadratic program per sample, or a tolerance of the iteration that is not a positive
     /// number.
     Iterations,
@@ -156,6 +185,7 @@ impl fmt::Display for ControllerError {
                 "the lower bound of {quantity} {component} must not exceed its upper bound"
             ),
             Self::HeldScheduling => write!(f, "the held scheduling must be finite"),
+            Self::InputReference => write!(f, "the input reference must be finite"),
             Self::Iterations => write!(
                 f,
                 "a sample needs at least one quadratic program, and their tolerance must be a \
@@ -194,6 +224,11 @@ pub(crate) fn check<T: Scalar, const NX: usize, const NU: usize, const NS: usize
     }
     check_bounds(&settings.x, "state")?;
     check_bounds(&settings.u, "input")?;
+    if let InputReference::Given(u) = &settings.input_reference
+        && !u.iter().all(|entry| entry.is_finite())
+    {
+        return Err(ControllerError::InputReference);
+    }
     match settings.scheduling {
         Scheduling::Held(held) if !held.iter().all(|entry| entry.is_finite()) => {
             Err(ControllerError::HeldScheduling)

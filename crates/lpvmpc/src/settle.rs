@@ -54,8 +54,7 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
     /// After the last violated bound: removes what rounding has left in the optimality
     /// conditions. Returns whether anything was moved.
     ///
-    /// Where a bound cannot be met because v has become so large that its rounding is larger
-    /// than the bound, the bound is in conflict with the rest as far as the numbers can tell.
+    /// Where v has become so large that its rounding is larger than a bound, the answer is inaccurate.
     pub fn refine<const NX: usize, const NG: usize>(
         &mut self,
         ocp: &Ocp<T, NX, NU, N, NG>,
@@ -81,7 +80,7 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
         if defect <= self.loosest {
             Ok(false)
         } else {
-            Err(Status::Infeasible(bound))
+            Err(Status::Inaccurate(bound))
         }
     }
 

@@ -244,8 +244,13 @@ pub enum Status<T> {
     /// The plan is a rollout of the nonlinear model, the rest of the last one as a rule: no program
     /// of this sample has an answer with a lower cost.
     NoImprovement,
-    /// No input satisfies all hard bounds; this bound conflicts with the rest.
+    /// No input satisfies all hard bounds. The active rows of the solution are the proof
+    /// ([`infeasibility_margin`](crate::infeasibility_margin)); this bound is the earliest of them.
     Infeasible(BoundId),
+    /// Rounding keeps this bound from being met as closely as asked for, and nothing proves that it
+    /// cannot be: the numbers of the problem are too far apart for the number type. The inputs are the
+    /// best that were found.
+    Inaccurate(BoundId),
     /// The cap on changes of the active set ended the search.
     ChangeCap,
     /// More bounds are active at once than the workspace has places for.
@@ -280,6 +285,9 @@ impl<T: fmt::Display> fmt::Display for Status<T> {
             Self::Improved => write!(f, "improved"),
             Self::NoImprovement => write!(f, "no improvement found"),
             Self::Infeasible(bound) => write!(f, "infeasible: {bound} cannot be met"),
+            Self::Inaccurate(bound) => {
+                write!(f, "inaccurate: rounding keeps the {bound} from being met")
+            }
             Self::ChangeCap => write!(f, "cap on active-set changes reached"),
             Self::WorkingSetFull => write!(f, "more active bounds than the workspace holds"),
             Self::NumericalFailure { stage, pivot } => write!(

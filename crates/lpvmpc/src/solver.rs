@@ -2,11 +2,12 @@
 //! violated, the dual active-set method on the cached factor.
 
 use crate::active_set::DualActiveSet;
+use crate::farkas::infeasibility_margin;
 use crate::model::Scalar;
 use crate::ocp::{Bounds, Ocp, Penalty, Softness};
 use crate::riccati::{CostToGo, StageFactor};
 use crate::rows::Trajectory;
-use crate::solution::{Solution, Status};
+use crate::solution::{ActiveRow, ActiveSet, Quantity, Solution, Status};
 use nalgebra::{SVector, convert};
 
 /// Settings of the solver.
@@ -53,7 +54,9 @@ impl<T: Scalar> Default for SolverSettings<T> {
 /// simultaneously active bounds. Nothing in it outlives a solve; one solver serves any number of
 /// problems.
 ///
-/// `M = N * NU` always suffices without soft bounds, plus `NX` with a terminal equality.
+/// `M = N * NU` rows fill the space of the inputs; without soft bounds more (`NX` with a terminal
+/// equality) are needed only where rounding makes rows rest on each other. Where it is not enough,
+/// the answer says [`Status::WorkingSetFull`].
 #[derive(Clone, Debug)]
 pub struct Solver<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
     factors: [StageFactor<T, NX, NU>; N],
@@ -104,15 +107,55 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
             tolerance.unwrap_or_else(default_tolerance),
             settings.max_changes,
         );
-        let outcome = factorized.and_then(|()| self.search(ocp, settings, solution));
-        solution.changes = self.dual.changes;
+        let mut spent = 0;
+        let outcome = loop {
+            let warm = settings.warm_start != WarmStart::Cold && !solution.active.is_empty();
+            let outcome = factorized.and_then(|()| self.search(ocp, settings, solution));
+            spent += self.dual.changes;
+            if !(warm && matches!(outcome, Err(Status::Inaccurate(_)))) {
+                break outcome;
+            }
+            // A start must not decide whether there is an answer.
+            solution.active.clear();
+            let left = settings.max_changes.saturating_sub(spent);
+            self.dual.reset(self.dual.tolerance, left);
+        };
+        solution.changes = spent;
         solution.status = match outcome {
             Ok(()) => Status::Solved,
             Err(status) => {
                 fall_back(ocp, solution);
-                status
+                self.prove(ocp, solution).unwrap_or(status)
             }
         };
+    }
+
+    /// The verdict that the problem is infeasible, with its proof in the active rows, if the search
+    /// ended in a conflict that is one.
+    #[cold]
+    #[inline(never)]
+    fn prove<const NG: usize>(
+        &self,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+        solution: &mut Solution<T, NX, NU, N, M>,
+    ) -> Option<Status<T>> {
+        let proof = &mut solution.active;
+        let attempts = [DualActiveSet::report_conflict, DualActiveSet::report];
+        let proves = |proof: &ActiveSet<T, M>| infeasibility_margin(ocp, proof) > T::zero();
+        if !attempts
+            .iter()
+            .any(|attempt| attempt(&self.dual, proof) && proves(proof))
+        {
+            proof.clear();
+            return None;
+        }
+        // The bounds of inputs can be met by themselves: the earliest other bound is the cause.
+        let earliest = |row: &ActiveRow<T>| match row.bound.quantity {
+            Quantity::Input(_) => (1, row.bound.stage),
+            Quantity::State(_) | Quantity::Row(_) => (0, row.bound.stage),
+        };
+        let cause = proof.iter().min_by_key(earliest)?;
+        Some(Status::Infeasible(cause.bound))
     }
 
     fn search<const NG: usize>(
@@ -208,7 +251,9 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
             WarmStart::Same => 0,
             WarmStart::Shifted => 1,
         };
-        let needed = !solution.active.is_empty()
+        // After a failure the active rows are none, or a proof.
+        let needed = solution.status.is_solved()
+            && !solution.active.is_empty()
             && self
                 .dual
                 .most_violated(ocp, &trajectory(solution))

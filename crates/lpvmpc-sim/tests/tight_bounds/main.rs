@@ -15,8 +15,9 @@ mod dense;
 use ballbot::{Ballbot, limits};
 use dense::{Dense, Optimum};
 use lpvmpc::{
-    BoundId, Bounds, Controller, ControllerSettings, Iterations, Ocp, Predictor, Reference, Rk4,
-    Scheduling, Solution, SolverSettings, Status, TerminalIngredient, Weights, Workspace,
+    BoundId, Bounds, Controller, ControllerSettings, InputReference, Iterations, Ocp, Predictor,
+    Reference, Rk4, Scheduling, Solution, SolverSettings, Status, TerminalIngredient, Weights,
+    Workspace,
 };
 use lpvmpc_sim::{Tolerances, advance};
 use nalgebra::{Matrix1, Matrix4, Vector1, Vector4};
@@ -162,6 +163,7 @@ fn controller(x: [f64; 3], u: f64, terminal: TerminalIngredient<f64, NX>) -> Loo
             upper: u,
         },
         soft_x: [None; 4],
+        input_reference: InputReference::SteadyState,
         scheduling: Scheduling::Predicted,
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),

@@ -3,8 +3,8 @@
 use crate::plant::CartPole;
 use lpvmpc::riccati::{BadPivot, CostToGo, StageFactor};
 use lpvmpc::{
-    Bounds, Controller, ControllerSettings, Iterations, LpvModel, Predictor, Rk4, Scheduling,
-    SolverSettings, Stage, TerminalIngredient, Weights,
+    Bounds, Controller, ControllerSettings, InputReference, Iterations, LpvModel, Predictor, Rk4,
+    Scheduling, SolverSettings, Stage, TerminalIngredient, Weights,
 };
 use nalgebra::{Matrix1, Matrix4, Vector1, Vector2, Vector4};
 
@@ -51,6 +51,7 @@ pub fn settings(
             upper: Vector1::new(FORCE),
         },
         soft_x: [None; 4],
+        input_reference: InputReference::SteadyState,
         scheduling,
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),

@@ -1,4 +1,4 @@
-//! Estimator, delay line, ramped input and smooth moves.
+//! Estimator, delay line, ramped input, set points and smooth moves.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -10,6 +10,7 @@ mod estimator;
 mod gate;
 mod pendulum;
 mod ramp;
+mod set_points;
 mod shaping;
 
 #[allow(dead_code, reason = "the tests of the solver use more of it")]

@@ -2,8 +2,9 @@
 
 use crate::pendulum::Pendulum;
 use lpvmpc::{
-    Bounds, Controller, ControllerSettings, Iterations, LpvModel, Predictor, RampedInput,
-    Reference, Rk4, Scheduling, SolverSettings, TerminalIngredient, Weights, Workspace,
+    Bounds, Controller, ControllerSettings, InputReference, Iterations, LpvModel, Predictor,
+    RampedInput, Reference, Rk4, Scheduling, SolverSettings, TerminalIngredient, Weights,
+    Workspace,
 };
 use nalgebra::{Matrix1, Matrix3, Vector1, Vector2, Vector3};
 
@@ -62,6 +63,7 @@ fn rate_and_input_stay_within_bounds() {
             upper: Vector1::new(rate_limit),
         },
         soft_x: [None; 3],
+        input_reference: InputReference::SteadyState,
         scheduling: Scheduling::Predicted,
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),

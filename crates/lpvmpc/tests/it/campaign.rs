@@ -64,6 +64,9 @@ impl Campaign {
             let few = 1 + findings.changes.len() / 1000;
             assert!(findings.verdicts.of(NO_INTERIOR) <= few);
             assert!(findings.verdicts.of(LOOSE_COST) <= few);
+            // Without a proof it is not called infeasible: one in twenty at most.
+            let unproved = findings.verdicts.of("inaccurate");
+            assert!(unproved <= 1 + findings.verdicts.of("infeasible") / 20);
         });
     }
 }
@@ -86,8 +89,12 @@ fn examine<const NX: usize, const NU: usize, const N: usize, const M: usize, con
             findings.verdicts.add(NO_INTERIOR);
         }
         Some(true) => assert_eq!(verdict, "solved", "{place}"),
-        Some(false) => assert_eq!(verdict, "infeasible", "{place}"),
-        None => assert!(matches!(verdict, "solved" | "infeasible"), "{place}"),
+        // Unproved, it is not called infeasible: counted, and limited at the end.
+        Some(false) => assert!(matches!(verdict, "infeasible" | "inaccurate"), "{place}"),
+        None => assert!(
+            matches!(verdict, "solved" | "infeasible" | "inaccurate"),
+            "{place}"
+        ),
     }
     for (stage, u) in ocp.stages.iter().zip(&solution.u).take(ocp.length()) {
         assert!(stage.u.contains(u, 0.0), "{place}: {u} outside its bounds");

@@ -14,3 +14,4 @@ mod optimality;
 mod regressions;
 mod relations;
 mod single_precision;
+mod verdicts;

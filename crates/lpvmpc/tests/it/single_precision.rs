@@ -146,9 +146,19 @@ fn measure<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
 
 impl Findings {
     fn same_verdict(&self) -> f64 {
-        let pairs = ["solved -> solved", "infeasible -> infeasible"];
+        let pairs = [
+            "solved -> solved",
+            "infeasible -> infeasible",
+            "inaccurate -> inaccurate",
+        ];
         let same: usize = pairs.iter().map(|pair| self.verdicts.of(pair)).sum();
         same as f64 / COUNT as f64
+    }
+
+    fn unproved(&self) -> f64 {
+        let pairs = ["infeasible -> inaccurate", "inaccurate -> infeasible"];
+        let unproved: usize = pairs.iter().map(|pair| self.verdicts.of(pair)).sum();
+        unproved as f64 / COUNT as f64
     }
 }
 
@@ -175,7 +185,10 @@ fn bounds_with_room() {
         ];
         for (measure, family) in SIZES.iter().flat_map(|size| families.map(|f| (size, f))) {
             let findings = measure(family);
-            assert!(findings.same_verdict() >= 0.99);
+            // Of what is infeasible, one of the two may lack the proof.
+            let unproved = findings.unproved();
+            assert!(findings.same_verdict() + unproved >= 0.99);
+            assert!(unproved <= 0.025);
             assert!(findings.inputs.quantile(0.5) <= 1e-6);
             assert!(findings.inputs.quantile(0.99) <= 1e-4);
             assert!(findings.residual.quantile(0.99) <= 1e-4);
@@ -207,7 +220,8 @@ fn a_terminal_state_with_little_room() {
         for measure in SIZES {
             let findings = measure(Family::TerminalEquality);
             let feasible = findings.verdicts.of("solved -> solved");
-            let refused = findings.verdicts.of("solved -> infeasible");
+            let refused = findings.verdicts.of("solved -> infeasible")
+                + findings.verdicts.of("solved -> inaccurate");
             assert!(33 * refused <= refused + feasible);
             assert!(findings.inputs.quantile(0.5) <= 1e-5);
             assert!(findings.inputs.quantile(0.95) <= 1e-2);

@@ -41,6 +41,7 @@ pub fn kind<T>(status: &Status<T>) -> &'static str {
     match status {
         Status::Solved | Status::Converged | Status::Improved | Status::NoImprovement => "solved",
         Status::Infeasible(_) => "infeasible",
+        Status::Inaccurate(_) => "inaccurate",
         Status::ChangeCap => "change cap",
         Status::WorkingSetFull => "working set full",
         Status::NumericalFailure { .. } => "numerical failure",

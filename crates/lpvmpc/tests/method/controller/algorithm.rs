@@ -6,8 +6,8 @@ use crate::cart_pole::textbook;
 use crate::plant::CartPole;
 use crate::runge_kutta::integrate;
 use lpvmpc::{
-    Bounds, Controller, ControllerSettings, Iterations, LpvModel, Reference, Rk4, Scheduling,
-    SolverSettings, Status, TerminalIngredient, Weights, Workspace, kkt_residual,
+    Bounds, Controller, ControllerSettings, InputReference, Iterations, LpvModel, Reference, Rk4,
+    Scheduling, SolverSettings, Status, TerminalIngredient, Weights, Workspace, kkt_residual,
 };
 use nalgebra::{Vector1, Vector2, Vector4};
 
@@ -245,6 +245,7 @@ fn single(settings: &ControllerSettings<f64, 4, 1, 2>) -> ControllerSettings<f32
             upper: settings.u.upper.cast(),
         },
         soft_x: [None; 4],
+        input_reference: InputReference::SteadyState,
         scheduling: Scheduling::Predicted,
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),

@@ -1,0 +1,95 @@
+//! Proof that a problem is infeasible: multipliers under which its hard bounds contradict each
+//! other (Farkas' lemma).
+
+use crate::model::Scalar;
+use crate::ocp::Ocp;
+use crate::rows;
+use crate::solution::{ActiveSet, Part, Side};
+use nalgebra::{SVector, convert};
+
+/// By how much the hard bounds of `ocp` contradict each other under the multipliers of `proof`, less
+/// an estimate of rounding: above zero, no inputs satisfy them all.
+///
+/// The multiplied violations sum up to a function that is linear in the inputs,
+///
+/// ```text
+/// V(u) = sum of multiplier * violation = constant + sum g_k'u_k
+/// ```
+///
+/// which would be at most zero at a feasible point. The result is its least value over the inputs
+/// within their bounds; where an input has no bound, its g must vanish, up to
+/// eps^(2/3) of its terms. After
+/// [`Status::Infeasible`](crate::Status::Infeasible) the solution's active rows are such a proof.
+/// A `proof` with a soft bound or a multiplier of the wrong sign proves nothing: minus infinity.
+#[inline(never)]
+pub fn infeasibility_margin<
+    T: Scalar,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const M: usize,
+    const NG: usize,
+>(
+    ocp: &Ocp<T, NX, NU, N, NG>,
+    proof: &ActiveSet<T, M>,
+) -> T {
+    let nothing: T = convert(f64::NEG_INFINITY);
+    let eps = T::default_epsilon() * convert(4.0);
+    // What the multipliers themselves are off by, from the search.
+    let rounding = T::default_epsilon().powf(convert(2.0 / 3.0));
+    // V, the sum of the sizes of its terms, and the largest sum of terms of an entry of g.
+    let (mut least, mut size, mut largest) = (T::zero(), T::zero(), T::zero());
+    for row in proof.iter().filter(|row| row.multiplier != T::zero()) {
+        let equality = row.bound.side == Side::Equality;
+        let hard = row.part == Part::Hard && rows::soft_price(ocp, &row.bound).is_none();
+        if !(hard && (equality || row.multiplier >= T::zero())) {
+            return nothing;
+        }
+        let (lower, upper) = rows::limits(ocp, &row.bound);
+        let term = match row.bound.side {
+            Side::Lower | Side::Equality => row.multiplier * lower,
+            Side::Upper => -(row.multiplier * upper),
+        };
+        least += term;
+        size += term.abs();
+    }
+    let n = ocp.length();
+    let (mut costate, _) = rows::gradient(ocp, proof.iter(), n);
+    for (i, stage) in ocp.stages.iter().enumerate().take(n).rev() {
+        let (rows_x, rows_u) = rows::gradient(ocp, proof.iter(), i);
+        let (sum, sizes) = sum_and_size(&stage.c, &costate);
+        least += sum;
+        size += sizes;
+        for j in 0..NU {
+            let b: SVector<T, NX> = stage.b.column(j).into_owned();
+            let (sum, sizes) = sum_and_size(&b, &costate);
+            let (slope, terms) = (sum + rows_u[j], sizes + rows_u[j].abs());
+            let limit = if slope > T::zero() {
+                stage.u.lower[j]
+            } else {
+                stage.u.upper[j]
+            };
+            largest = largest.max(terms);
+            if limit.is_finite() {
+                least += slope * limit;
+                size += terms * limit.abs();
+            } else if !(slope.abs() <= rounding * largest) {
+                return nothing;
+            }
+        }
+        costate = stage.a.tr_mul(&costate) + rows_x;
+    }
+    let (sum, sizes) = sum_and_size(&ocp.x0, &costate);
+    least += sum;
+    size += sizes;
+    least - eps * convert((n + NX + NU) as f64) * size
+}
+
+/// a'b, and the sum of the sizes of its terms.
+#[inline(never)]
+fn sum_and_size<T: Scalar, const K: usize>(a: &SVector<T, K>, b: &SVector<T, K>) -> (T, T) {
+    let terms = a.iter().zip(b.iter()).map(|(a, b)| *a * *b);
+    terms.fold((T::zero(), T::zero()), |(sum, size), term| {
+        (sum + term, size + term.abs())
+    })
+}
