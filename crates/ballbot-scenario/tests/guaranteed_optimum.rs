@@ -65,7 +65,9 @@ fn the_first_plan_is_the_optimum() {
 }
 
 /// Closed loops of 5 s against nonlinear MPC that IPOPT converges at every sample. With horizons of a
-/// quarter of a second some cost half as much again with one program.
+/// quarter of a second some once cost half as much again with one program: every second set point at
+/// the edge of the terminal set was refused for rounding, and a search that had come to its end damped
+/// the samples after it.
 #[test]
 fn closed_loops_cost_what_converged_nonlinear_mpc_costs() {
     let prepared = prepared();
@@ -88,6 +90,6 @@ fn closed_loops_cost_what_converged_nonlinear_mpc_costs() {
         let mut ratios: Vec<f64> = rows("loops.csv").iter().map(ratio).collect();
         assert_eq!(ratios.len(), 90);
         assert!(quantile(&mut ratios, 0.5) < 1.02, "{programs}: {ratios:?}");
-        assert!(quantile(&mut ratios, 0.9) < 1.1, "{programs}: {ratios:?}");
+        assert!(quantile(&mut ratios, 1.0) < 1.1, "{programs}: {ratios:?}");
     }
 }

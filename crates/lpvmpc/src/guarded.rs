@@ -372,6 +372,7 @@ where
         let mut is_known = known.is_some();
         let mut improved = None;
         let mut in_vain = 0;
+        let mut served = self.damping;
         let mut warm_start = WarmStart::Same;
         for _ in 0..most {
             self.pose(x, aims, &along, self.slope, &mut workspace.ocp);
@@ -403,12 +404,16 @@ where
                     self.slope = self.slope.other();
                     in_vain += 1;
                     if in_vain == 3 {
+                        // At a plan that nothing improves on, damping says nothing of the next
+                        // sample's.
+                        self.damping = served;
                         break;
                     }
                     continue;
                 }
             };
             self.damp(Some(found.fraction));
+            served = self.damping;
             in_vain = 0;
             self.slope = Slope::Jacobian;
             let settled = is_known && !self.is_worthwhile(along.cost - found.plan.cost, &along);
@@ -500,16 +505,16 @@ where
     fn damp(&mut self, fraction: Option<f64>) {
         let least: T = convert(0.1);
         let factor = match fraction {
-            Some(1.0) => 0.2,
+            Some(1.0) => 0.1,
             Some(0.5) => 1.5,
             Some(_) => 3.0,
-            None => 10.0,
+            None => 4.0,
         };
         let damping = self.damping.max(least) * convert(factor);
         self.damping = if damping < least {
             T::zero()
         } else {
-            damping.min(convert(1e6))
+            damping.min(convert(1e3))
         };
     }
 
