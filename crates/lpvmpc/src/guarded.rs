@@ -25,7 +25,9 @@ use core::fmt;
 use nalgebra::{SVector, convert};
 use plan::Plan;
 use program::Slope;
-pub use settings::{GuardedError, GuardedIterations, GuardedSettings, Rollout, TerminalSet};
+pub use settings::{
+    GuardedError, GuardedIterations, GuardedSettings, Rollout, TerminalSet, share_of_bounds,
+};
 
 /// What the applied input is backed by, from the strongest to the weakest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -74,6 +76,11 @@ pub struct GuardedStep<T, const NX: usize, const NU: usize> {
     /// Cost of the plan on the nonlinear model: sum ||x - z d||_Q^2 + ||u||_R^2, terminal cost
     /// ||x_N - z d||_P^2 and offset cost.
     pub cost: T,
+    /// How much the integration error of the coming sample may add to the next plan's cost: while what
+    /// is wanted stays and the step is guaranteed, that is at most this one's less the first stage
+    /// cost, plus this. In the unit of the cost; of first order in the deviations from the plan, with
+    /// their squares.
+    pub epsilon: T,
     /// Rolled-out minus predicted state at the end of the horizon, in state units; zero where
     /// the plan is not the quadratic program's.
     pub gap: SVector<T, NX>,
@@ -230,16 +237,20 @@ where
         let improved = self.improve(x, aims, &along, known, workspace);
         let improved = improved.or(again.map(|plan| (plan, SVector::zeros())));
         let status = workspace.solution.status;
-        let (plan, decision, gap) = match (improved, guaranteed) {
+        let (mut plan, decision, gap) = match (improved, guaranteed) {
             (Some((plan, gap)), _) => (plan, Decision::NewPlan, gap),
             (None, Some((plan, decision))) => (plan, decision, SVector::zeros()),
             (None, None) => self.last_resort(x, aims, &along, workspace),
         };
+        if decision != Decision::NewPlan {
+            (plan.drift, plan.end_drift) = self.tube(&plan);
+        }
         let step = GuardedStep {
             u: self.settings.u.project(&plan.u[0]),
             decision,
             set_point: plan.set_point,
             cost: plan.cost,
+            epsilon: self.epsilon(&plan, aims),
             gap,
             status,
         };
@@ -389,7 +400,7 @@ where
                 Outcome::Nothing
             };
             if workspace.solution.status.is_solved() {
-                (self.drift, self.end_drift) = self.tube(&along, workspace);
+                (self.drift, self.end_drift) = self.tube_of_program(&along, workspace);
             }
             let found = match outcome {
                 Outcome::Found(found) => found,
@@ -450,7 +461,7 @@ where
         let mut nearer = None;
         for fraction in FRACTIONS {
             let plan = self.between(x, aims, along, &towards, convert(fraction));
-            let found = self.judge(plan, fraction, &predicted, workspace);
+            let found = self.judge(plan, fraction, &predicted);
             if self.is_better(&found, along, is_known) {
                 return Outcome::Found(found);
             }
@@ -465,16 +476,15 @@ where
     }
 
     /// A rollout with what it is worth; `predicted` is where the program expected its end.
-    fn judge<const M: usize>(
+    fn judge(
         &self,
         mut plan: Plan<T, NX, NU, N>,
         fraction: f64,
         predicted: &SVector<T, NX>,
-        workspace: &GuardedWorkspace<T, NU, NA, NP, M>,
     ) -> Found<T, NX, NU, N> {
         let gap = plan.end - predicted;
         let feasible = self.is_feasible(&plan) && {
-            (plan.drift, plan.end_drift) = self.tube(&plan, workspace);
+            (plan.drift, plan.end_drift) = self.tube(&plan);
             self.is_robust(&plan)
         };
         Found {
