@@ -155,7 +155,7 @@ impl CertifiedTable {
             t_s: plain.t_s,
             horizon: plain.horizon,
             rk4,
-            rollout: rollout::accurate(ballbot, plain, &terminal, MARGIN)?,
+            rollout: rollout::accurate(ballbot, plain, &terminal, MARGIN, self.substeps)?,
             weights: plain.weights,
             terminal,
             x: plain.x,

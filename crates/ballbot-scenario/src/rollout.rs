@@ -2,10 +2,12 @@
 //! known of their error.
 //!
 //! The error of a sample is that of step doubling (Richardson): for a method of order four the
-//! difference of n and 2 n steps is 15/16 of the error of n. The largest one is looked for on a grid of
-//! tilts, rates and torques over their bounds, corners included, among the motions that stay within
-//! them; twice that is taken for what lies between the points. It is an estimate with a safety factor,
-//! not a proof. The same goes for how far a state lies beyond both ends of a step.
+//! difference of n and 2 n steps is 15/16 of the error of n. Upright without rates and torque there is
+//! none, and it grows with them, so what is bounded is the error per share of the bounds: the largest
+//! of |tilt|, |rate| and |torque| over its bound. The largest value is looked for on a grid of tilts,
+//! rates and torques over their bounds, corners included, among the motions that stay within them;
+//! twice that is taken for what lies between the points. It is an estimate with a safety factor, not a
+//! proof. The same goes for how far a state lies beyond both ends of a step, which is taken as it is.
 
 use crate::error::ScenarioError;
 use ballbot::Ballbot;
@@ -20,15 +22,17 @@ const TORQUES: usize = 5;
 /// What the grid may miss.
 const SAFETY: f64 = 2.0;
 
-/// The coarsest rollout whose error fits into `margin`.
+/// The coarsest rollout whose error fits into `margin`, or one with as many steps as are `wanted`.
 ///
 /// # Errors
-/// A bound of tilt, rates or torque is infinite, or no number of steps suffices.
+/// A bound of tilt, rates or torque is infinite, no number of steps suffices, or more steps than are
+/// wanted are needed.
 pub(crate) fn accurate(
     ballbot: &Ballbot<f64>,
     plain: &ControllerSettings<f64, 4, 1, 3>,
     terminal: &TerminalSet<f64, 4, 1>,
     margin: f64,
+    wanted: Option<usize>,
 ) -> Result<Rollout<f64, 4>, ScenarioError> {
     let names = ["theta_rad", "phi_dot_rad_s", "theta_dot_rad_s"];
     let states = (1..4).map(|i| (names[i - 1], plain.x.lower[i], plain.x.upper[i]));
@@ -43,8 +47,7 @@ pub(crate) fn accurate(
             ));
         }
     }
-    // Every second number of steps: what comes between saves little.
-    let mut tried = (2..=MOST_SUBSTEPS).step_by(2).map(|substeps| {
+    let with = |substeps: usize| {
         let rk4 = Rk4 { substeps };
         let (error, between) = error(ballbot, plain, rk4);
         Rollout {
@@ -52,26 +55,63 @@ pub(crate) fn accurate(
             error: error * SAFETY,
             between: between * SAFETY,
         }
-    });
+    };
     let fits = |rollout: &Rollout<f64, 4>| {
         let (drift, end) = drift(ballbot, plain, terminal, rollout);
         let width = plain.x.upper - plain.x.lower;
         let free = |i: usize| drift[i] + rollout.between[i] <= margin * width[i];
         (1..4).all(free) && end <= margin * terminal.level.sqrt()
     };
-    tried.find(fits).ok_or_else(|| {
-        ScenarioError::value(
+    // Every second number of steps: what comes between saves little.
+    let mut tried = (2..=MOST_SUBSTEPS).step_by(2).map(with);
+    let Some(coarsest) = tried.find(fits) else {
+        let needed = extrapolated(&with(MOST_SUBSTEPS), fits);
+        let needed = needed.map_or_else(|| "more".to_owned(), |needed| format!("about {needed}"));
+        return Err(ScenarioError::value(
             "controller.t_s",
             plain.t_s,
             format!(
-                "{MOST_SUBSTEPS} integration steps per sample are too coarse for a guarantee; take \
-                 a shorter sampling time, or narrower bounds"
+                "{MOST_SUBSTEPS} integration steps per sample, the most there are, are too coarse \
+                 for a guarantee, which needs {needed}; take a shorter sampling time, or narrower \
+                 bounds"
             ),
-        )
-    })
+        ));
+    };
+    let needed = coarsest.rk4.substeps;
+    match wanted {
+        None => Ok(coarsest),
+        Some(wanted) if (needed..=MOST_SUBSTEPS).contains(&wanted) => Ok(with(wanted)),
+        Some(wanted) => Err(ScenarioError::value(
+            "controller.terminal.certified.substeps",
+            wanted,
+            format!(
+                "the guarantee needs {needed} integration steps per sample with these bounds, this \
+                 sampling time and horizon; {MOST_SUBSTEPS} are the most"
+            ),
+        )),
+    }
 }
 
-/// The largest error of a sample, and the largest way beyond both ends of a step.
+/// The number of steps beyond those of `rollout` that fits, by the orders of the error, 4, and of what
+/// lies beyond both ends of a step, 2.
+fn extrapolated(
+    rollout: &Rollout<f64, 4>,
+    fits: impl Fn(&Rollout<f64, 4>) -> bool,
+) -> Option<usize> {
+    const FARTHEST: i32 = 20;
+    let finer = (1..=FARTHEST).map(|doublings| Rollout {
+        rk4: Rk4 {
+            substeps: rollout.rk4.substeps << doublings,
+        },
+        error: rollout.error * 0.0625_f64.powi(doublings),
+        between: rollout.between * 0.25_f64.powi(doublings),
+    });
+    let mut finer = finer.filter(fits);
+    finer.next().map(|rollout| rollout.rk4.substeps)
+}
+
+/// The largest error of a sample per share of the bounds, and the largest way beyond both ends of a
+/// step.
 fn error(
     ballbot: &Ballbot<f64>,
     plain: &ControllerSettings<f64, 4, 1, 3>,
@@ -107,7 +147,10 @@ fn error(
             continue;
         }
         let coarse = rk4.advance(ballbot, &start, &u, plain.t_s);
-        error = error.sup(&((coarse - end).abs() * (16.0 / 15.0)));
+        let share = lpvmpc::share_of_bounds(&start, &plain.x, &u, &plain.u);
+        if share > 0.0 {
+            error = error.sup(&((coarse - end).abs() * (16.0 / 15.0 / share)));
+        }
         let one = Rk4 { substeps: 1 };
         let mut x = start;
         for _ in 0..rk4.substeps {
@@ -152,4 +195,86 @@ fn drift(
         power = closed * power;
     }
     (total, end)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Scenario;
+    use lpvmpc_sim::{Random, Tolerances};
+    use std::path::Path;
+
+    /// A margin that no permitted number of steps keeps is refused with the number that would.
+    #[test]
+    fn steps_that_are_too_coarse_are_refused_with_the_number_needed() {
+        let prepared = Scenario::load("far-setpoints").unwrap();
+        let prepared = prepared.prepare(Path::new(".")).unwrap();
+        let terminal = prepared.guarded.unwrap().terminal;
+        let refused = |margin: f64, wanted: Option<usize>| {
+            let (ballbot, plain) = (&prepared.ballbot, &prepared.settings);
+            let rollout = accurate(ballbot, plain, &terminal, margin, wanted);
+            rollout.map_or_else(|error| error.to_string(), |rollout| format!("{rollout:?}"))
+        };
+        assert!(refused(4e-3, Some(10)).contains("needs 12 integration steps"));
+        assert!(refused(4e-3, Some(65)).contains("64 are the most"));
+        assert!(refused(4e-3, Some(13)).contains("substeps: 13"));
+        let fine = refused(1e-5, None);
+        assert!(
+            fine.contains("controller.t_s") && fine.contains("needs about 128"),
+            "{fine}"
+        );
+    }
+
+    /// From random states under random torques, the rollout is as close as is said to a plant that is
+    /// integrated to 1e-12, and the plant is between two steps where it is said to be.
+    #[test]
+    fn the_error_is_within_its_bound() {
+        let prepared = Scenario::load("far-setpoints").unwrap();
+        let prepared = prepared.prepare(Path::new(".")).unwrap();
+        let settings = prepared.guarded.unwrap();
+        let Rollout {
+            rk4,
+            error,
+            between,
+        } = settings.rollout;
+        let tolerances = Tolerances {
+            relative: 1e-12,
+            absolute: 1e-12,
+        };
+        let mut random = Random::new(7, 0);
+        let (mut largest, mut runs) = (0.0_f64, 0);
+        while runs < 3000 {
+            // Small motions as well as large ones.
+            let size = random.uniform().powi(2);
+            let part = |i: usize, random: &mut Random| {
+                size * random.symmetric() * if i == 0 { 0.0 } else { settings.x.upper[i] }
+            };
+            let start = Vector4::from_fn(|i, _| part(i, &mut random));
+            let u = Vector1::new(size * random.symmetric() * settings.u.upper[0]);
+            let exact = |seconds: f64| {
+                lpvmpc_sim::advance(&prepared.ballbot, &start, &u, seconds, tolerances).unwrap()
+            };
+            let end = exact(settings.t_s);
+            if !stays(&settings.x, &end) {
+                continue;
+            }
+            runs += 1;
+            let share = lpvmpc::share_of_bounds(&start, &settings.x, &u, &settings.u);
+            let off = (rk4.advance(&prepared.ballbot, &start, &u, settings.t_s) - end).abs();
+            for i in 0..4 {
+                let part = (off[i] - 1e-11) / (error[i] * share);
+                largest = largest.max(part);
+                assert!(part <= 1.0, "{start} {u}: {off}");
+            }
+            let step = settings.t_s / rk4.substeps as f64;
+            let ends = [start, exact(step)];
+            let inside = exact(step * random.uniform());
+            for i in 0..4 {
+                let [lower, upper] = [ends[0].inf(&ends[1])[i], ends[0].sup(&ends[1])[i]];
+                assert!(inside[i] <= upper + between[i] && inside[i] >= lower - between[i]);
+            }
+        }
+        // The factor of 2 is there, and little more.
+        assert!((0.2..0.75).contains(&largest), "{largest}");
+    }
 }

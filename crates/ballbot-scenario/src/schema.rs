@@ -247,6 +247,10 @@ pub struct CertifiedTable {
     /// the set point when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub offset_weight: Option<f64>,
+    /// Runge-Kutta steps per sample of the rollout by which plans are judged; as few as the guarantee
+    /// needs when absent. Fewer are refused.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub substeps: Option<usize>,
 }
 
 /// The predictor.

@@ -7,9 +7,10 @@
 
 use ballbot_control::guarded_feedback;
 use ballbot_scenario::{
-    IterationsTable, LONGEST_HORIZON, Parameters, PointTable, ReferenceTable, Scenario,
-    ScenarioError, Surroundings, TerminalTable, TorqueRateTable, builtin,
+    CertifiedTable, IterationsTable, LONGEST_HORIZON, Parameters, PointTable, ReferenceTable,
+    Scenario, ScenarioError, Surroundings, TerminalTable, TorqueRateTable, builtin,
 };
+use lpvmpc::{GuardedController, GuardedWorkspace, share_of_bounds};
 use lpvmpc_sim::{Ending, Trajectory};
 use nalgebra::Vector4;
 use std::path::Path;
@@ -73,6 +74,56 @@ fn one_program_per_sample_arrives_as_early_as_three() {
     };
     let (one, three) = (arrival(1), arrival(3));
     assert!(one.max(three) < 4.5, "{three} s against {one} s");
+}
+
+/// A plant that is off the rollout by as much as the integration error may be, in the direction that
+/// changes at random: there is a plan at every sample, all bounds are kept, and the cost falls by the
+/// stage cost but for epsilon, which goes to zero at rest.
+#[test]
+fn errors_as_large_as_assumed_break_nothing() {
+    let scenario = Scenario::load("far-setpoints").unwrap();
+    let prepared = scenario.prepare(Path::new(".")).unwrap();
+    let mut workspace = Box::new(GuardedWorkspace::<f64, 1, 5, 62, 200>::new());
+    let mut random = fastrand::Rng::with_seed(3);
+    for (horizon, programs) in [(5, 1), (12, 1), (20, 3), (20, 0), (60, 1)] {
+        let mut settings = prepared.guarded.unwrap();
+        (settings.horizon, settings.iterations.known) = (horizon, programs);
+        let mut controller =
+            GuardedController::<_, f64, 4, 1, 3, 60, 5, 62>::new(prepared.ballbot, settings)
+                .unwrap();
+        let (mut x, mut wanted) = (Vector4::new(0.0, 0.2, 1.0, -0.3), 40.0);
+        let mut before: Option<(f64, f64)> = None;
+        for k in 0..200 {
+            if k == 25 {
+                (wanted, before) = (-3.0, None);
+            }
+            let step = controller.step(&x, wanted, &mut workspace);
+            assert!(step.decision.is_guaranteed(), "{horizon}, {k}: {step:?}");
+            assert!(settings.x.contains(&x, 0.0), "{horizon}, {k}: {x}");
+            if let Some((most, cost)) = before {
+                let rounding = 1e-12 * cost + 1e-9;
+                assert!(step.cost <= most + rounding, "{horizon}, {k}: {step:?}");
+            }
+            let error = x - Vector4::x() * step.set_point;
+            let stage = (settings.weights.q * error).dot(&error)
+                + (settings.weights.r * step.u).dot(&step.u);
+            before = Some((step.cost - stage + step.epsilon, step.cost));
+            assert!(step.epsilon <= 2e-3 * step.cost, "{horizon}, {k}: {step:?}");
+            let moving = x.component_mul(&Vector4::new(0.0, 1.0, 1.0, 1.0));
+            let share = share_of_bounds(&moving, &settings.x, &step.u, &settings.u);
+            let off = settings.rollout.error * share;
+            let sign = |random: &mut fastrand::Rng| if random.bool() { 1.0 } else { -1.0 };
+            let off = off.map(|off| off * sign(&mut random));
+            x = settings
+                .rollout
+                .rk4
+                .advance(&prepared.ballbot, &x, &step.u, settings.t_s)
+                + off;
+        }
+        // Without programs the robot is in no hurry.
+        let arrived = (x[0] - wanted).abs() < 1e-2;
+        assert!(programs == 0 || arrived, "{horizon}: {x}");
+    }
 }
 
 /// Short and long horizons, in memories of either size: every input is backed and the set point is
@@ -192,6 +243,16 @@ fn a_certificate_of_something_else_is_refused() {
     refused(
         |s| s.controller.horizon = 201,
         &["controller.horizon", "1 to 200"],
+    );
+    refused(
+        |s| {
+            let substeps = Some(8);
+            s.controller.terminal = TerminalTable::Certified(CertifiedTable {
+                substeps,
+                ..Default::default()
+            });
+        },
+        &["certified.substeps", "8", "needs 12"],
     );
     refused(
         |s| s.bounds.theta_dot_rad_s = [f64::NEG_INFINITY, f64::INFINITY],

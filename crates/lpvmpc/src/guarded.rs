@@ -13,19 +13,22 @@
 mod aim;
 mod plan;
 mod program;
+mod search;
 mod settings;
 mod tube;
 
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Ocp;
 use crate::solution::{BoundId, Quantity, Side, Solution, Status};
-use crate::solver::{Solver, SolverSettings, WarmStart};
+use crate::solver::Solver;
 pub use aim::SetPoints;
 use core::fmt;
 use nalgebra::{SVector, convert};
 use plan::Plan;
 use program::Slope;
-pub use settings::{GuardedError, GuardedIterations, GuardedSettings, Rollout, TerminalSet};
+pub use settings::{
+    GuardedError, GuardedIterations, GuardedSettings, Rollout, TerminalSet, share_of_bounds,
+};
 
 /// What the applied input is backed by, from the strongest to the weakest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -74,6 +77,11 @@ pub struct GuardedStep<T, const NX: usize, const NU: usize> {
     /// Cost of the plan on the nonlinear model: sum ||x - z d||_Q^2 + ||u||_R^2, terminal cost
     /// ||x_N - z d||_P^2 and offset cost.
     pub cost: T,
+    /// How much the integration error of the coming sample may add to the next plan's cost: while what
+    /// is wanted stays and the step is guaranteed, that is at most this one's less the first stage
+    /// cost, plus this. In the unit of the cost; of first order in the deviations from the plan, with
+    /// their squares.
+    pub epsilon: T,
     /// Rolled-out minus predicted state at the end of the horizon, in state units; zero where
     /// the plan is not the quadratic program's.
     pub gap: SVector<T, NX>,
@@ -155,11 +163,6 @@ pub struct GuardedController<
     touch: Option<SVector<T, NX>>,
 }
 
-/// Relative decrease of the cost below which more programs of a sample are not worth their time.
-const WORTHWHILE: f64 = 1e-7;
-/// Fractions of the way to the quadratic program's answer that are tried.
-const FRACTIONS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
-
 impl<
     P,
     T,
@@ -230,16 +233,20 @@ where
         let improved = self.improve(x, aims, &along, known, workspace);
         let improved = improved.or(again.map(|plan| (plan, SVector::zeros())));
         let status = workspace.solution.status;
-        let (plan, decision, gap) = match (improved, guaranteed) {
+        let (mut plan, decision, gap) = match (improved, guaranteed) {
             (Some((plan, gap)), _) => (plan, Decision::NewPlan, gap),
             (None, Some((plan, decision))) => (plan, decision, SVector::zeros()),
             (None, None) => self.last_resort(x, aims, &along, workspace),
         };
+        if decision != Decision::NewPlan {
+            (plan.drift, plan.end_drift) = self.tube(&plan);
+        }
         let step = GuardedStep {
             u: self.settings.u.project(&plan.u[0]),
             decision,
             set_point: plan.set_point,
             cost: plan.cost,
+            epsilon: self.epsilon(&plan, aims),
             gap,
             status,
         };
@@ -351,233 +358,6 @@ where
         let cheaper = plan.cost < known.cost && self.is_robust(&plan);
         cheaper.then_some(plan)
     }
-
-    /// Quadratic programs along `along`, each answer confirmed by the rollout. Returns the best
-    /// confirmed plan that costs less than the known one, with its gap, and goes on after a first
-    /// one as long as there are programs left and the cost falls.
-    fn improve<const M: usize>(
-        &mut self,
-        x: &SVector<T, NX>,
-        aims: &SetPoints<T, N>,
-        along: &Plan<T, NX, NU, N>,
-        known: Option<Decision>,
-        workspace: &mut GuardedWorkspace<T, NU, NA, NP, M>,
-    ) -> Option<(Plan<T, NX, NU, N>, SVector<T, NX>)> {
-        let GuardedSettings { iterations, .. } = self.settings;
-        let most = match known {
-            Some(Decision::Candidate) => iterations.known,
-            _ => iterations.unknown,
-        };
-        let mut along = *along;
-        let mut is_known = known.is_some();
-        let mut improved = None;
-        let mut in_vain = 0;
-        let mut warm_start = WarmStart::Same;
-        for _ in 0..most {
-            self.pose(x, aims, &along, self.slope, &mut workspace.ocp);
-            self.solve(workspace, warm_start);
-            warm_start = WarmStart::Same;
-            if !is_known && !workspace.solution.status.is_solved() {
-                self.soften(&mut workspace.ocp);
-                self.solve(workspace, WarmStart::Cold);
-            }
-            let outcome = if workspace.solution.status.is_solved() {
-                self.learn(workspace, &along);
-                self.search(x, aims, &along, is_known, workspace)
-            } else {
-                Outcome::Nothing
-            };
-            if workspace.solution.status.is_solved() {
-                (self.drift, self.end_drift) = self.tube(&along, workspace);
-            }
-            let found = match outcome {
-                Outcome::Found(found) => found,
-                Outcome::Settled => {
-                    self.damp(Some(1.0));
-                    break;
-                }
-                Outcome::Nothing => {
-                    // What does not serve far from the plan may serve close to it, and the other
-                    // way round.
-                    self.damp(None);
-                    self.slope = self.slope.other();
-                    in_vain += 1;
-                    if in_vain == 3 {
-                        break;
-                    }
-                    continue;
-                }
-            };
-            self.damp(Some(found.fraction));
-            in_vain = 0;
-            self.slope = Slope::Jacobian;
-            let settled = is_known && !self.is_worthwhile(along.cost - found.plan.cost, &along);
-            along = found.plan;
-            if found.feasible {
-                is_known = true;
-                improved = Some((found.plan, found.gap));
-            }
-            if settled {
-                break;
-            }
-        }
-        improved
-    }
-
-    /// The first part of the way to the program's answer that costs less and is feasible; while no
-    /// feasible plan is known, the first that is feasible, or else nearer to it.
-    fn search<const M: usize>(
-        &self,
-        x: &SVector<T, NX>,
-        aims: &SetPoints<T, N>,
-        along: &Plan<T, NX, NU, N>,
-        is_known: bool,
-        workspace: &GuardedWorkspace<T, NU, NA, NP, M>,
-    ) -> Outcome<T, NX, NU, N> {
-        let horizon = self.settings.horizon;
-        let origin = self.settings.direction * along.set_point;
-        let GuardedWorkspace {
-            solution, solver, ..
-        } = workspace;
-        let towards = program::answer(solution, solver, &origin);
-        let predicted = program::predicted_end(solution, horizon, &origin);
-        let before = self.merit(along);
-        let mut nearer = None;
-        for fraction in FRACTIONS {
-            let plan = self.between(x, aims, along, &towards, convert(fraction));
-            let found = self.judge(plan, fraction, &predicted, workspace);
-            if self.is_better(&found, along, is_known) {
-                return Outcome::Found(found);
-            }
-            if is_known && fraction == 1.0 && !self.is_worthwhile(plan.cost - along.cost, along) {
-                return Outcome::Settled;
-            }
-            if !is_known && nearer.is_none() && self.merit(&plan) < before {
-                nearer = Some(found);
-            }
-        }
-        nearer.map_or(Outcome::Nothing, Outcome::Found)
-    }
-
-    /// A rollout with what it is worth; `predicted` is where the program expected its end.
-    fn judge<const M: usize>(
-        &self,
-        mut plan: Plan<T, NX, NU, N>,
-        fraction: f64,
-        predicted: &SVector<T, NX>,
-        workspace: &GuardedWorkspace<T, NU, NA, NP, M>,
-    ) -> Found<T, NX, NU, N> {
-        let gap = plan.end - predicted;
-        let feasible = self.is_feasible(&plan) && {
-            (plan.drift, plan.end_drift) = self.tube(&plan, workspace);
-            self.is_robust(&plan)
-        };
-        Found {
-            plan,
-            fraction,
-            feasible,
-            gap,
-        }
-    }
-
-    /// Whether a change of the cost by so much, up or down, is worth another program.
-    fn is_worthwhile(&self, change: T, along: &Plan<T, NX, NU, N>) -> bool {
-        let relative = along.cost * convert::<f64, T>(WORTHWHILE);
-        let absolute = self.settings.terminal.level * T::default_epsilon().powf(convert(0.75));
-        !(change.abs() <= relative + absolute)
-    }
-
-    fn is_better(
-        &self,
-        found: &Found<T, NX, NU, N>,
-        along: &Plan<T, NX, NU, N>,
-        is_known: bool,
-    ) -> bool {
-        found.feasible && (!is_known || found.plan.cost < along.cost)
-    }
-
-    /// More damping where a program's answer did not hold, less where all of it did.
-    fn damp(&mut self, fraction: Option<f64>) {
-        let least: T = convert(0.1);
-        let factor = match fraction {
-            Some(1.0) => 0.2,
-            Some(0.5) => 1.5,
-            Some(_) => 3.0,
-            None => 10.0,
-        };
-        let damping = self.damping.max(least) * convert(factor);
-        self.damping = if damping < least {
-            T::zero()
-        } else {
-            damping.min(convert(1e6))
-        };
-    }
-
-    /// Outside of what is guaranteed: soft bounds, then the saturated terminal law.
-    fn last_resort<const M: usize>(
-        &self,
-        x: &SVector<T, NX>,
-        aims: &SetPoints<T, N>,
-        along: &Plan<T, NX, NU, N>,
-        workspace: &mut GuardedWorkspace<T, NU, NA, NP, M>,
-    ) -> (Plan<T, NX, NU, N>, Decision, SVector<T, NX>) {
-        if along.cost.is_finite() {
-            self.pose(x, aims, along, self.slope, &mut workspace.ocp);
-            self.soften(&mut workspace.ocp);
-            self.solve(workspace, WarmStart::Cold);
-            if workspace.solution.status.is_solved() {
-                let GuardedWorkspace {
-                    solution, solver, ..
-                } = workspace;
-                let origin = self.settings.direction * along.set_point;
-                let towards = program::answer(solution, solver, &origin);
-                let plan = self.between(x, aims, along, &towards, T::one());
-                if plan.cost.is_finite() {
-                    let predicted =
-                        program::predicted_end(solution, self.settings.horizon, &origin);
-                    return (plan, Decision::SoftBounds, plan.end - predicted);
-                }
-            }
-        }
-        let plan = self.under_terminal_law(x, aims);
-        (plan, Decision::SaturatedLqr, SVector::zeros())
-    }
-
-    fn solve<const M: usize>(
-        &self,
-        workspace: &mut GuardedWorkspace<T, NU, NA, NP, M>,
-        warm_start: WarmStart,
-    ) {
-        let settings = SolverSettings {
-            warm_start,
-            ..self.settings.solver
-        };
-        workspace
-            .solver
-            .solve(&workspace.ocp, &settings, &mut workspace.solution);
-    }
-}
-
-/// What a program's answer is good for.
-#[derive(Clone, Copy)]
-enum Outcome<T, const NX: usize, const NU: usize, const N: usize> {
-    /// A plan to go on from.
-    Found(Found<T, NX, NU, N>),
-    /// It is the plan that there is, up to what is not worth its time.
-    Settled,
-    /// No part of the way is better.
-    Nothing,
-}
-
-/// A part of the way to a program's answer, rolled out.
-#[derive(Clone, Copy)]
-struct Found<T, const NX: usize, const NU: usize, const N: usize> {
-    plan: Plan<T, NX, NU, N>,
-    /// Part of the way.
-    fraction: f64,
-    feasible: bool,
-    /// Rolled-out minus predicted state at the end.
-    gap: SVector<T, NX>,
 }
 
 /// The bound of the `quantity` at `stage` that its `value` meets, if it meets one.

@@ -38,7 +38,7 @@ pub use estimator::{
 pub use farkas::infeasibility_margin;
 pub use guarded::{
     Decision, GuardedController, GuardedError, GuardedIterations, GuardedSettings, GuardedStep,
-    GuardedWorkspace, Rollout, SetPoints, TerminalSet,
+    GuardedWorkspace, Rollout, SetPoints, TerminalSet, share_of_bounds,
 };
 pub use kkt::{KktResidual, kkt_residual};
 pub use model::{LpvModel, Scalar};

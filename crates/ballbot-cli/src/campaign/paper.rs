@@ -42,7 +42,7 @@ pub(super) fn run(
         if let Some((same, earlier)) = before
             && same == *wanted
         {
-            record.compare(earlier, cost);
+            record.compare(earlier, 0.0, cost);
         }
         before = Some((*wanted, cost));
         let moved = lpvmpc_sim::advance(

@@ -156,10 +156,7 @@ impl Guarantee {
                 &self.guarded_single,
             ),
             ("scenario 1, terminal cost, no guarantee", &self.fine),
-            (
-                "scenario 1, guaranteed, three programs, no preview",
-                &self.guarded,
-            ),
+            ("scenario 1, guaranteed, three programs", &self.guarded),
         ] {
             let metrics = &run.metrics[0];
             let cells = [

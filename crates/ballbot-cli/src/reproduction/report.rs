@@ -75,8 +75,7 @@ fn guaranteed(reproduction: &Reproduction) -> Result<String, FigureError> {
          thousands of starts; docs/guarantees.md states the theorem and its limits.</p>\n\
          {}\
          <p>The guarantee has its price. The certified set is small, and every plan must end in it \
-         after one second, so the robot moves more slowly than it could; nor does the guaranteed \
-         loop look ahead to set points that are not yet given.</p>\n{}\
+         after one second, so the robot moves more slowly than it could.</p>\n{}\
          <p>One quadratic program per sample loses little. Nonlinear MPC, solved to convergence at \
          every sample of scenario 1 ({:.1} programs each, last change {:.0e}), costs {:.1}; the LPV \
          controller with the same predictor costs {one_program:.1} ({:+.3} %).</p>\n",

@@ -263,7 +263,9 @@ where
             / (stages * q_d.dot(d) + stiffness + weight);
         let middle = centre / stiffness;
         let value = (settings.terminal.p * end).dot(&end);
-        let room = (level - value) / stiffness + middle * middle;
+        // Not quite to the edge: rounding would put every second end beyond it.
+        let within = level * (T::one() - T::default_epsilon().sqrt());
+        let room = (within - value) / stiffness + middle * middle;
         let room = if room > T::zero() {
             room.sqrt()
         } else {
@@ -272,7 +274,7 @@ where
         let [lower, upper] = settings.set_points;
         let move_by = best.max(middle - room).min(middle + room);
         plan.set_point = (near + move_by).max(lower).min(upper);
-        // Rounding must not push the end over the edge.
+        // An end that lies nearer to the edge than that keeps its set point.
         let [there, here] = [plan.set_point, near].map(|z| self.terminal_value(&plan.end, z));
         if there > level && here <= there {
             plan.set_point = near;

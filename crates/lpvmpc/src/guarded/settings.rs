@@ -46,11 +46,37 @@ pub struct GuardedIterations {
 pub struct Rollout<T, const NX: usize> {
     /// Runge-Kutta steps of a sample.
     pub rk4: Rk4,
-    /// Largest difference of plant and rollout after one sample, in state units, not negative.
+    /// Largest difference of plant and rollout after one sample from (x, u) per
+    /// [`share_of_bounds`] of it, in state units, not negative: without motion there is no error.
     pub error: SVector<T, NX>,
     /// How far a state may lie beyond its values at both ends of a Runge-Kutta step, in state units,
     /// not negative.
     pub between: SVector<T, NX>,
+}
+
+/// The largest |x_i| or |u_j| as a share of its bounds, the larger one of both in size: 0 for nothing,
+/// 1 where one is met. What is unbounded or bounded by 0 alone does not count.
+pub fn share_of_bounds<T: Scalar, const NX: usize, const NU: usize>(
+    x: &SVector<T, NX>,
+    x_bounds: &Bounds<T, NX>,
+    u: &SVector<T, NU>,
+    u_bounds: &Bounds<T, NU>,
+) -> T {
+    largest_share(x, x_bounds).max(largest_share(u, u_bounds))
+}
+
+fn largest_share<T: Scalar, const K: usize>(v: &SVector<T, K>, bounds: &Bounds<T, K>) -> T {
+    let sides = bounds.lower.iter().zip(bounds.upper.iter());
+    let shares = v.iter().zip(sides).map(|(value, (lower, upper))| {
+        let size = lower.abs().max(upper.abs());
+        let share = value.abs() / size;
+        if size > T::zero() && share.is_finite() {
+            share
+        } else {
+            T::zero()
+        }
+    });
+    shares.fold(T::zero(), T::max)
 }
 
 /// Everything that defines a guarded controller besides its model.

@@ -1,16 +1,22 @@
-//! Where a plant can be that follows a plan while the rollout is wrong by its integration error.
+//! Where a plant can be that follows a plan while the rollout is wrong by its integration error, and
+//! what that changes in the cost.
 //!
 //! The deviation from the plan grows and shrinks by the policy's own closed loop, e+ = (A + B K) e + w
 //! with |w_i| <= error_i, and is enclosed in ellipsoids e'S^-1 e <= 1. The sum of two of them lies in
 //! (1 + 1/c) S_1 + (1 + c) S_2 for every c > 0 (Kurzhanski and Valyi, Ellipsoidal Calculus, 1997);
 //! c is that of the smallest trace. Where the input may be at its bound, it may follow the feedback
-//! or not: the sum of both S holds either. The matrices are those of the quadratic program.
+//! or not: the sum of both S holds either. A and B are the derivatives of the prediction along the plan
+//! itself, so what is of second order in the deviation is left out.
 
+use super::aim::SetPoints;
 use super::plan::Plan;
-use super::{GuardedController, GuardedWorkspace};
+use super::{GuardedController, GuardedSettings, GuardedWorkspace, share_of_bounds};
 use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
 use nalgebra::{SMatrix, SVector, convert};
+
+/// A and B of a sample.
+type Slopes<T, const NX: usize, const NU: usize> = (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>);
 
 impl<
     P,
@@ -26,50 +32,129 @@ where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
-    /// How far the plant may be from x_1 to x_N of `plan` under the policy of the last program, and
-    /// from x_N in the norm of P.
-    pub(super) fn tube<const M: usize>(
+    /// How far the plant may be from x_1 to x_N of `plan`, and from x_N in the norm of P.
+    pub(super) fn tube(&self, plan: &Plan<T, NX, NU, N>) -> ([SVector<T, NX>; N], T) {
+        let states = core::iter::once(&plan.start).chain(&plan.x);
+        let slopes = states.zip(&plan.u).map(|(x, u)| self.slopes(x, u));
+        self.tube_along(plan, slopes.zip(plan.gain))
+    }
+
+    /// The same under the policy of the program that was made along `plan`, with its derivatives.
+    pub(super) fn tube_of_program<const M: usize>(
         &self,
         plan: &Plan<T, NX, NU, N>,
         workspace: &GuardedWorkspace<T, NU, NA, NP, M>,
     ) -> ([SVector<T, NX>; N], T) {
-        let mut drifts = [SVector::zeros(); N];
-        let error = &self.settings.rollout.error;
-        // The box lies in the ellipsoid through its corners.
-        let parts: T = convert(NX as f64);
-        let noise = SMatrix::from_diagonal(&error.component_mul(error)) * parts;
         let stages = workspace.ocp.stages.iter().skip(1);
         let factors = workspace.solver.factors().iter().skip(1);
-        let places = drifts.iter_mut().zip(&plan.u);
-        let mut shape = SMatrix::<T, NX, NX>::zeros();
-        let steps = places.zip(stages.zip(factors));
-        for ((drift, u), (stage, factor)) in steps.take(self.settings.horizon) {
-            let closed = factor.closed_loop.fixed_view::<NX, NX>(0, 0).into_owned();
-            let mut moved = around(&closed, &shape);
+        let policy = stages.zip(factors).map(|(stage, factor)| {
+            let a = stage.a.fixed_view::<NX, NX>(0, 0).into_owned();
+            let b = stage.b.fixed_view::<NX, NU>(0, 0).into_owned();
             let gain = factor.gain.fixed_columns::<NX>(0).into_owned();
-            if self.may_saturate(u, &gain, &shape) {
-                let open = stage.a.fixed_view::<NX, NX>(0, 0).into_owned();
-                moved += around(&open, &shape);
-            }
-            shape = sum(&moved, &noise);
-            *drift = shape.diagonal().map(|square| square.max(T::zero()).sqrt());
-        }
-        let square = product(&self.settings.terminal.p, &shape).trace();
-        (drifts, square.max(T::zero()).sqrt())
+            ((a, b), gain)
+        });
+        self.tube_along(plan, policy)
     }
 
-    /// Whether the feedback within the ellipsoid `shape` can push an input to its bound.
-    fn may_saturate(
+    fn tube_along(
         &self,
-        u: &SVector<T, NU>,
-        gain: &SMatrix<T, NU, NX>,
-        shape: &SMatrix<T, NX, NX>,
-    ) -> bool {
-        let reach = (gain * shape * gain.transpose()).diagonal();
-        let reach = reach.map(|square| square.max(T::zero()).sqrt());
+        plan: &Plan<T, NX, NU, N>,
+        policy: impl Iterator<Item = (Slopes<T, NX, NU>, SMatrix<T, NU, NX>)>,
+    ) -> ([SVector<T, NX>; N], T) {
+        let mut drifts = [SVector::zeros(); N];
+        // The box lies in the ellipsoid through its corners.
+        let parts: T = convert(NX as f64);
+        let mut shape = SMatrix::<T, NX, NX>::zeros();
+        let states = core::iter::once(&plan.start).chain(&plan.x);
+        let steps = drifts.iter_mut().zip(states.zip(&plan.u)).zip(policy);
+        for ((drift, (x, u)), ((a, b), gain)) in steps.take(self.settings.horizon) {
+            let error = self.error(x, u);
+            let noise = SMatrix::from_diagonal(&error.component_mul(&error)) * parts;
+            let mut moved = around(&(a + product(&b, &gain)), &shape);
+            if self.may_saturate(u, &self.reach(&gain, &shape)) {
+                moved += around(&a, &shape);
+            }
+            shape = sum(&moved, &noise);
+            *drift = shape.diagonal().map(root);
+        }
+        let square = product(&self.settings.terminal.p, &shape).trace();
+        (drifts, root(square))
+    }
+
+    /// How much dearer than the rest of `plan` the next sample's candidate may be, for the integration
+    /// error of the sample in between: |dJ/dx_1| error and the squares.
+    ///
+    /// The gradient is that of the policy's own closed loop, from the end backwards. Where the input may
+    /// be at its bound, the feedback may act or not; what that changes is added with its size.
+    pub(super) fn epsilon(&self, plan: &Plan<T, NX, NU, N>, aims: &SetPoints<T, N>) -> T {
+        let settings = &self.settings;
+        let two: T = convert(2.0);
+        let d = &settings.direction;
+        let (q, r) = (&settings.weights.q, &settings.weights.r);
+        let changes = aims.before_last_change(settings.horizon);
+        let mut gradient = settings.terminal.p * (plan.end - d * plan.set_point) * two;
+        // The squares, and what saturation may change.
+        let mut rest = plan.end_drift * plan.end_drift;
+        let stages = plan
+            .x
+            .iter()
+            .zip(&plan.drift)
+            .zip(plan.u.iter().zip(&plan.gain).skip(1));
+        let stages = stages.zip(aims.stages.iter().skip(1)).enumerate();
+        let count = settings.horizon - 1;
+        for (i, (((x, drift), (u, gain)), wanted)) in stages.take(count).rev() {
+            let aim = if i + 1 < changes {
+                *wanted
+            } else {
+                plan.set_point
+            };
+            let (a, b) = self.slopes(x, u);
+            let by_input = r * u * two + b.transpose() * gradient;
+            let reach = gain.abs() * drift;
+            gradient = q * (x - d * aim) * two + a.transpose() * gradient;
+            if self.may_saturate(u, &reach) {
+                rest += by_input.abs().dot(&reach);
+            } else {
+                gradient += gain.transpose() * by_input;
+            }
+            rest += (q.abs() * drift).dot(drift) + (r.abs() * reach).dot(&reach);
+        }
+        let first = plan
+            .u
+            .first()
+            .map_or_else(SVector::zeros, |u| self.error(&plan.start, u));
+        gradient.abs().dot(&first) + rest
+    }
+
+    /// The rollout's error over a sample from `x` under `u`, wherever along d that is.
+    fn error(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NX> {
+        let settings = &self.settings;
+        let d = &settings.direction;
+        let moving = x - d * (x.dot(d) / d.norm_squared());
+        settings.rollout.error * share_of_bounds(&moving, &settings.x, u, &settings.u)
+    }
+
+    /// The derivatives of the prediction over a sample.
+    fn slopes(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> Slopes<T, NX, NU> {
+        let GuardedSettings { rk4, t_s, .. } = &self.settings;
+        rk4.differentiate(&self.model, x, u, *t_s)
+    }
+
+    /// How far the feedback within the ellipsoid `shape` moves the input.
+    fn reach(&self, gain: &SMatrix<T, NU, NX>, shape: &SMatrix<T, NX, NX>) -> SVector<T, NU> {
+        (gain * shape * gain.transpose()).diagonal().map(root)
+    }
+
+    /// Whether the feedback that moves the input by as much as `reach` can push it to its bound.
+    fn may_saturate(&self, u: &SVector<T, NU>, reach: &SVector<T, NU>) -> bool {
         let bounds = &self.settings.u;
         !(bounds.hold_at(&(u + reach)) && bounds.hold_at(&(u - reach)))
     }
+}
+
+/// Of a square that rounding may have put below zero.
+fn root<T: Scalar>(square: T) -> T {
+    square.max(T::zero()).sqrt()
 }
 
 /// M S M'
