@@ -15,7 +15,7 @@ mod standard;
 use nalgebra::{Complex, DMatrix};
 use thiserror::Error;
 
-use crate::matrix_check::MatrixError;
+use crate::matrix_check::{MatrixError, unit};
 use crate::modes::poles;
 use candidate::Candidate;
 use doubling::{Doubling, Stalled};
@@ -80,15 +80,24 @@ pub enum RiccatiError {
     },
     /// The iteration stopped and no mode is to blame.
     #[error(
-        "no stabilising solution was found: {reason} (after {doublings} doubling steps). \
-         A pole of the optimal loop may lie on the stability limit, or the matrices may be scaled \
-         too far apart"
+        "no stabilising solution was found: {reason} (after {doublings} doubling steps). The \
+         largest entries are {largest_a:e} of A, {largest_b:e} of B, {largest_q:e} of Q and \
+         {largest_r:e} of R. If these are far apart, weights of similar cost and units of similar \
+         size will do; if not, a pole of the optimal loop may lie on the stability limit"
     )]
     NoConvergence {
         /// What went wrong.
         reason: &'static str,
         /// Doubling steps taken.
         doublings: usize,
+        /// The largest absolute value in A.
+        largest_a: f64,
+        /// The same in B.
+        largest_b: f64,
+        /// The same in Q.
+        largest_q: f64,
+        /// The same in R.
+        largest_r: f64,
     },
     /// The equation does not hold at the P that was found.
     #[error(
@@ -120,7 +129,10 @@ impl Time {
     /// Whether the mode of this pole of `matrix` decays.
     fn is_stable(self, pole: Complex<f64>, matrix: &DMatrix<f64>) -> bool {
         match self {
-            Self::Continuous => pole.re < -STABILITY_MARGIN * matrix.norm(),
+            Self::Continuous => {
+                let unit = unit(matrix);
+                pole.re / unit < -STABILITY_MARGIN * (matrix / unit).norm()
+            }
             Self::Discrete => pole.norm() < 1.0 - STABILITY_MARGIN,
         }
     }
@@ -162,11 +174,7 @@ fn solve(problem: &LqProblem<'_>, time: Time) -> Result<RiccatiSolution, Riccati
         .and_then(Doubling::run)
         .map_err(blame)?;
     let solution = Candidate::at(problem, time, p)
-        .ok_or(Stalled {
-            reason: "the input weight R + B'P B at the limit is not positive definite",
-            doublings,
-        })
-        .map_err(blame)?
+        .map_err(|reason| blame(Stalled { reason, doublings }))?
         .refined();
     let poles = poles(&solution.closed_loop)?;
     if !poles
