@@ -26,6 +26,7 @@ pub mod refinement;
 pub mod refinement_file;
 pub mod regulator;
 pub mod reproduction;
+pub mod results;
 pub mod table;
 
 use arguments::{Arguments, Command};

@@ -3,12 +3,13 @@
 use super::CommandError;
 use super::robot::RobotArguments;
 use crate::benchmark::{self, GuardedTimes, SEQUENCES, SequenceTimes, Times};
+use crate::json;
 use crate::output;
 use crate::progress::Progress;
 use crate::table::Table;
 use clap::Args;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `ballbot bench`.
 #[derive(Debug, Args)]
@@ -26,7 +27,7 @@ pub struct BenchArguments {
     /// The robot.
     #[command(flatten)]
     pub robot: RobotArguments,
-    /// Write the times to this file as JSON, too
+    /// Write the times to this file as JSON, too; - for standard output, in place of the table
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
 }
@@ -40,6 +41,9 @@ pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
         Some(name) => vec![name.as_str()],
         None => SEQUENCES.to_vec(),
     };
+    let file = arguments.json.as_deref();
+    let file = file.filter(|path| *path != Path::new("-"));
+    file.map(output::check_writable).transpose()?;
     let progress = Progress::new("timing", names.len() + 1);
     let mut sequences: Vec<SequenceTimes> = Vec::with_capacity(names.len());
     for name in names {
@@ -48,12 +52,11 @@ pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
     }
     let guarded = benchmark::time_guarded()?;
     progress.set(sequences.len() + 1);
-    if let Some(path) = &arguments.json {
-        let document = format!(
-            "{:#}\n",
-            json!({ "sequences": sequences, "guarded": guarded })
-        );
-        output::write_files(&[(path, document.as_bytes())])?;
+    let document = json::text(&json!({ "sequences": sequences, "guarded": guarded }));
+    match file {
+        Some(path) => output::write_files(&[(path, document.as_bytes())])?,
+        None if arguments.json.is_some() => return Ok(document),
+        None => {}
     }
     let mut table = Table::new([
         "times in us",

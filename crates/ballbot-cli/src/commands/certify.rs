@@ -4,15 +4,17 @@ use super::CommandError;
 use super::robot::RobotArguments;
 use crate::arguments::positive;
 use crate::certificate_page;
-use crate::output;
 use crate::progress::Progress;
 use crate::proofs::{self, STEPS};
+use crate::results::ResultFolder;
 use crate::table::{Table, number};
 use ballbot_scenario::{Prepared, RobotTable, TerminalCertificate, TerminalTable};
 use clap::Args;
+use clap::builder::RangedU64ValueParser;
 use lpvmpc::Bounds;
 use lpvmpc_design::{
-    CertificateProblem, CertifyError, Effort, Proof, TerminalProblem, certify_terminal, raise_level,
+    CertificateProblem, CertifyError, Effort, MOST_BOXES, Proof, TerminalProblem, certify_terminal,
+    raise_level,
 };
 use nalgebra::{SVector, Vector2, Vector4};
 use std::path::PathBuf;
@@ -47,7 +49,7 @@ pub struct CertifyArguments {
     #[arg(long, default_value = "0.15", value_parser = share)]
     pub contraction: f64,
     /// Boxes of states that one proof may look at
-    #[arg(long, default_value = "40000")]
+    #[arg(long, default_value = "40000", value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_BOXES as u64))]
     pub boxes: usize,
     /// Higher levels that are tried for the same K and P after the design, each a proof; 0 keeps
     /// the level
@@ -84,6 +86,8 @@ pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
     }
     let prepared = scenario.prepare(folder.as_path())?;
     let robot = RobotTable::try_from(&prepared.ballbot)?;
+    let names = ["certificate.json", "certificate.html"];
+    let results = ResultFolder::open(&arguments.out, &names)?;
     let (size, certified) = match arguments.size {
         Some(size) => (size, certify(arguments, &prepared, robot, size)?),
         None => search(arguments, &prepared, robot)?,
@@ -92,8 +96,10 @@ pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
     proofs::remember(&certificate);
     let json = certificate.to_json()?;
     let page = certificate_page::html(&prepared.title, &certificate, &proof)?;
-    let paths = ["certificate.json", "certificate.html"].map(|name| arguments.out.join(name));
-    output::write_files(&[(&paths[0], json.as_bytes()), (&paths[1], page.as_bytes())])?;
+    let contents = [json.into_bytes(), page.into_bytes()];
+    let files: Vec<_> = names.map(str::to_owned).into_iter().zip(contents).collect();
+    results.write(&files, &[])?;
+    let paths = names.map(|name| arguments.out.join(name));
     Ok(format!(
         "{}\nwrote {} and {}\n",
         summary(&certificate, &proof),

@@ -7,7 +7,7 @@ use crate::optimality::{
     Case, CostOverDistance, Outcome, cost_over_distance, distances, guaranteed_cost, long_horizon,
     quantile, random_starts, run_all,
 };
-use crate::output;
+use crate::results::ResultFolder;
 use crate::table::Table;
 use clap::Args;
 use rayon::prelude::*;
@@ -38,11 +38,20 @@ pub struct OptimalityArguments {
     pub json: bool,
 }
 
+const RESULTS: [&str; 5] = [
+    "optimality.csv",
+    "cost-over-distance.svg",
+    "cost-over-distance.png",
+    "long-horizon.svg",
+    "long-horizon.png",
+];
+
 /// Runs the cases and writes the results.
 ///
 /// # Errors
 /// A file cannot be written.
 pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
+    let results = ResultFolder::open(&arguments.out, &RESULTS)?;
     let programs = arguments.programs.map(|programs| programs as usize);
     let sets = [
         ("from rest", distances()?),
@@ -77,15 +86,11 @@ pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
         }
     }
     contents.push(("optimality.csv", rows.into_bytes()));
-    let files: Vec<_> = contents
-        .iter()
-        .map(|(name, content)| (arguments.out.join(name), content))
-        .collect();
+    let files = contents.into_iter();
     let files: Vec<_> = files
-        .iter()
-        .map(|(path, content)| (path.as_path(), content.as_slice()))
+        .map(|(name, content)| (name.to_owned(), content))
         .collect();
-    output::write_files(&files)?;
+    results.write(&files, &RESULTS)?;
     if arguments.json {
         return Ok(json::text(&json!({ "sets": documents })));
     }

@@ -3,10 +3,11 @@
 use super::CommandError;
 use super::robot::RobotArguments;
 use crate::figures::{Figure, Role};
-use crate::output;
+use crate::output::{self, FileError};
 use crate::pictures::{self, Shown};
 use crate::progress::Progress;
 use crate::recording::{self, Columns, Metrics};
+use crate::results::ResultFolder;
 use crate::table::Table;
 use ballbot_scenario::{MotorSample, Prepared, Record, Surroundings, words};
 use clap::Args;
@@ -23,7 +24,8 @@ Examples:
   ballbot simulate my.toml               a file made by `ballbot scenario show NAME`
 
 Writes trajectory.csv (for two planes trajectory_x.csv, trajectory_y.csv and motors.csv) and a
-figure as SVG and PNG, in place of those of an earlier run in the same folder. --log adds what the
+figure as SVG and PNG, in place of those of an earlier run in the same folder; other files are not
+touched, .ballbot-files says which are the program's. --log adds what the
 sensors of `[world]` delivered. A run that ends early keeps what it recorded, and exits with 1.")]
 pub struct SimulateArguments {
     /// A built-in scenario or a TOML file
@@ -70,18 +72,23 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
         Some(folder) => folder.clone(),
         None => Path::new("out").join(name),
     };
+    let folder = ResultFolder::open(&folder, &RESULTS)?;
+    let logs = match &arguments.log {
+        Some(path) => log_paths(path, prepared.planes.len()),
+        None => Vec::new(),
+    };
+    logs.iter()
+        .try_for_each(|path| output::check_writable(path))?;
     let Record { planes, motors } = record(&prepared)?;
-    let (trajectories, logs): (Vec<_>, Vec<_>) = planes
+    let (trajectories, rows): (Vec<_>, Vec<_>) = planes
         .into_iter()
         .map(|recording| (recording.trajectory, recording.log))
         .unzip();
     let motors = motors.unwrap_or_else(|| motors_of_planes(&prepared, &trajectories));
     write(&folder, &prepared, &trajectories, &motors)?;
-    if let Some(path) = &arguments.log {
-        write_logs(path, &logs)?;
-    }
+    write_logs(&logs, &rows)?;
 
-    let summary = summary(&prepared, &trajectories, &folder);
+    let summary = summary(&prepared, &trajectories, folder.path());
     let runs = match trajectories.len() {
         1 => ["run", ""],
         _ => ["run of the x plane", "run of the y plane"],
@@ -100,7 +107,7 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
             what,
             ending: words::ending(&run.ending),
             state: run.final_state.into(),
-            folder,
+            folder: folder.path().to_owned(),
         }),
     }
 }
@@ -133,20 +140,23 @@ fn motors_of_planes(prepared: &Prepared, trajectories: &[Trajectory<4, 1>]) -> V
     samples.collect()
 }
 
-/// Writes one log per plane.
-fn write_logs(path: &Path, logs: &[Vec<LogRow<4, 1>>]) -> Result<(), CommandError> {
-    let paths = match logs.len() {
+/// The files of the planes' logs.
+fn log_paths(path: &Path, planes: usize) -> Vec<PathBuf> {
+    match planes {
         1 => vec![path.to_owned()],
         _ => ["x", "y"].map(|plane| with_suffix(path, plane)).to_vec(),
-    };
+    }
+}
+
+/// Writes one log per plane to each of the paths.
+fn write_logs(paths: &[PathBuf], logs: &[Vec<LogRow<4, 1>>]) -> Result<(), FileError> {
     let texts: Vec<String> = logs.iter().map(|log| recording::log_csv(log)).collect();
     let files: Vec<(&Path, &[u8])> = paths
         .iter()
         .zip(&texts)
         .map(|(path, text)| (path.as_path(), text.as_bytes()))
         .collect();
-    output::write_files(&files)?;
-    Ok(())
+    output::write_files(&files)
 }
 
 /// `log.csv` and `x` make `log-x.csv`.
@@ -170,41 +180,28 @@ fn file_names(planes: usize) -> &'static [&'static str] {
 }
 
 fn write(
-    folder: &Path,
+    folder: &ResultFolder,
     prepared: &Prepared,
     trajectories: &[Trajectory<4, 1>],
     motors: &[MotorSample],
 ) -> Result<(), CommandError> {
-    let mut files: Vec<(PathBuf, Vec<u8>)> = file_names(trajectories.len())
+    let mut files: Vec<(String, Vec<u8>)> = file_names(trajectories.len())
         .iter()
         .zip(trajectories)
         .map(|(name, run)| {
-            (
-                folder.join(name),
-                recording::trajectory_csv(run).into_bytes(),
-            )
+            let text = recording::trajectory_csv(run);
+            ((*name).to_owned(), text.into_bytes())
         })
         .collect();
     if trajectories.len() == 2 {
         let text = recording::motors_csv(motors);
-        files.push((folder.join("motors.csv"), text.into_bytes()));
+        files.push(("motors.csv".to_owned(), text.into_bytes()));
     }
     for (name, figure) in figures(prepared, trajectories, motors) {
-        files.push((
-            folder.join(format!("{name}.svg")),
-            figure.svg()?.into_bytes(),
-        ));
-        files.push((folder.join(format!("{name}.png")), figure.png(PNG_SCALE)?));
+        files.push((format!("{name}.svg"), figure.svg()?.into_bytes()));
+        files.push((format!("{name}.png"), figure.png(PNG_SCALE)?));
     }
-    let files: Vec<(&Path, &[u8])> = files
-        .iter()
-        .map(|(path, content)| (path.as_path(), content.as_slice()))
-        .collect();
-    output::write_files(&files)?;
-    // What an earlier run of another kind left in the folder would be taken for this one's.
-    let written = |name: &str| files.iter().any(|(path, _)| path.ends_with(name));
-    let stale = RESULTS.into_iter().filter(|name| !written(name));
-    Ok(output::remove_files(stale.map(|name| folder.join(name)))?)
+    Ok(folder.write(&files, &RESULTS)?)
 }
 
 /// All files that a run can leave in its folder.
