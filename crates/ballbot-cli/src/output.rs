@@ -162,6 +162,12 @@ pub fn fail(error: &CommandError) -> ExitCode {
     }
 }
 
+/// Says what the reader of a result should know, beside it.
+pub fn warn(message: &str) {
+    // Where standard error is closed there is nobody to tell.
+    let _ = writeln!(io::stderr(), "note: {message}");
+}
+
 fn complain(message: &str) -> ExitCode {
     // Where standard error is closed there is nobody to tell.
     let _ = writeln!(io::stderr(), "error: {message}");

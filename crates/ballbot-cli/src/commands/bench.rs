@@ -1,7 +1,7 @@
 //! `ballbot bench`.
 
 use super::CommandError;
-use super::robot::RobotArguments;
+use super::robot::ScenarioOptions;
 use crate::benchmark::{self, GuardedTimes, SEQUENCES, SequenceTimes, Times};
 use crate::json;
 use crate::output;
@@ -24,9 +24,9 @@ loops of the built-in scenarios; and the guaranteed step against the plain one. 
 pub struct BenchArguments {
     /// A built-in scenario or a TOML file [default: four of the built-in ones]
     pub scenario: Option<String>,
-    /// The robot.
+    /// What it is changed by.
     #[command(flatten)]
-    pub robot: RobotArguments,
+    pub options: ScenarioOptions,
     /// Write the times to this file as JSON, too; - for standard output, in place of the table
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
@@ -47,7 +47,7 @@ pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
     let progress = Progress::new("timing", names.len() + 1);
     let mut sequences: Vec<SequenceTimes> = Vec::with_capacity(names.len());
     for name in names {
-        sequences.push(benchmark::time(name, &arguments.robot.prepare(name)?)?);
+        sequences.push(benchmark::time(name, &arguments.options.prepare(name)?)?);
         progress.set(sequences.len());
     }
     let guarded = benchmark::time_guarded()?;

@@ -1,7 +1,7 @@
 //! `ballbot campaign`.
 
 use super::CommandError;
-use super::robot::RobotArguments;
+use super::robot::ScenarioOptions;
 use crate::campaign::{Campaign, Outcome, Record, Scenarios, drawing};
 use crate::commands::simulate::PNG_SCALE;
 use crate::json;
@@ -32,9 +32,9 @@ pub struct CampaignArguments {
     /// A built-in scenario or a TOML file with a certified terminal set
     #[arg(default_value = "far-setpoints")]
     pub scenario: String,
-    /// The robot.
+    /// What it is changed by.
     #[command(flatten)]
-    pub robot: RobotArguments,
+    pub options: ScenarioOptions,
     /// Closed loops of the nominal plant; a twentieth of them of every other variant
     #[arg(long, default_value = "10000", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub runs: u32,
@@ -48,7 +48,7 @@ pub struct CampaignArguments {
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "out/campaign")]
+    #[arg(short, long, value_name = "DIR", default_value = "out/campaign")]
     pub out: PathBuf,
     /// Print JSON
     #[arg(long)]
@@ -71,7 +71,7 @@ pub fn run(arguments: &CampaignArguments) -> Result<String, CommandError> {
         // Zero is one per core.
         threads: usize::from(arguments.threads.unwrap_or(0)),
     };
-    let scenarios = Scenarios::of(arguments.robot.prepare(&arguments.scenario)?)?;
+    let scenarios = Scenarios::of(arguments.options.prepare(&arguments.scenario)?)?;
     let results = ResultFolder::open(&arguments.out, &RESULTS)?;
     let outcomes = campaign.run(&scenarios)?;
     let figure = drawing(&outcomes, limits(&scenarios.guaranteed).states[1]);

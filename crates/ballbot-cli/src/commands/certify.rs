@@ -1,9 +1,10 @@
 //! `ballbot certify`.
 
 use super::CommandError;
-use super::robot::RobotArguments;
+use super::robot::ScenarioOptions;
 use crate::arguments::positive;
 use crate::certificate_page;
+use crate::json;
 use crate::progress::Progress;
 use crate::proofs::{self, STEPS};
 use crate::results::ResultFolder;
@@ -17,6 +18,7 @@ use lpvmpc_design::{
     raise_level,
 };
 use nalgebra::{SVector, Vector2, Vector4};
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// Arguments of `ballbot certify`.
@@ -35,9 +37,9 @@ pub struct CertifyArguments {
     /// A built-in scenario or a TOML file: robot, sampling time, weights and bounds
     #[arg(default_value = "two-setpoints")]
     pub scenario: String,
-    /// The robot.
+    /// What it is changed by.
     #[command(flatten)]
-    pub robot: RobotArguments,
+    pub options: ScenarioOptions,
     /// Share of the bounds of tilt and tilt rate that the set may use; searched for if not given
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub size: Option<f64>,
@@ -55,8 +57,11 @@ pub struct CertifyArguments {
     /// the level
     #[arg(long, value_name = "TRIALS", default_value = "3", value_parser = clap::value_parser!(u8).range(0..=20))]
     pub raise: u8,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "out/certificate")]
+    #[arg(short, long, value_name = "DIR", default_value = "out/certificate")]
     pub out: PathBuf,
 }
 
@@ -79,7 +84,7 @@ type Certified = (TerminalCertificate, Proof<4>);
 /// # Errors
 /// The scenario is not valid, no set could be proved, or a file cannot be written.
 pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
-    let (mut scenario, folder) = arguments.robot.load(&arguments.scenario)?;
+    let (mut scenario, folder) = arguments.options.load(&arguments.scenario)?;
     // Its certificate, where it has one, is about to be replaced.
     if let TerminalTable::Certified(_) = scenario.controller.terminal {
         scenario.controller.terminal = TerminalTable::DiscreteRiccati;
@@ -100,6 +105,11 @@ pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
     let files: Vec<_> = names.map(str::to_owned).into_iter().zip(contents).collect();
     results.write(&files, &[])?;
     let paths = names.map(|name| arguments.out.join(name));
+    if arguments.json {
+        let mut document = document(&certificate, &proof);
+        document["files"] = json!(paths);
+        return Ok(json::text(&document));
+    }
     Ok(format!(
         "{}\nwrote {} and {}\n",
         summary(&certificate, &proof),
@@ -116,13 +126,17 @@ fn search(
     prepared: &Prepared,
     robot: RobotTable,
 ) -> Result<(f64, Certified), CommandError> {
+    let progress = Progress::new("designing sets", SIZES);
     let sizes = (1..=SIZES).map(|i| i as f64 / SIZES as f64);
     let designed: Vec<(f64, f64)> = sizes
-        .map(|size| {
+        .enumerate()
+        .map(|(done, size)| {
+            progress.set(done);
             let design = problem(arguments, prepared, size).design(&robot.ballbot());
             (size, design.map_or(f64::NEG_INFINITY, |set| set.log_det()))
         })
         .collect();
+    drop(progress);
     let mut largest = 0;
     for (i, (_, volume)) in designed.iter().enumerate() {
         if *volume > designed[largest].1 {
@@ -185,7 +199,8 @@ fn certify(
     size: f64,
 ) -> Result<Certified, CertifyError> {
     let problem = problem(arguments, prepared, size);
-    let progress = Progress::new("proving", STEPS);
+    let what = format!("proving a set of {size:.3} of the bounds");
+    let progress = Progress::new(what, STEPS);
     certify_terminal(
         (&robot.ballbot(), robot),
         &problem,
@@ -274,6 +289,27 @@ pub(super) fn summary(certificate: &TerminalCertificate, proof: &Proof<4>) -> St
         proof.boxes,
         proof.scheduling_boxes,
     )
+}
+
+/// The same for other programs.
+pub(super) fn document(certificate: &TerminalCertificate, proof: &Proof<4>) -> Value {
+    let terminal = &certificate.terminal;
+    let rows = terminal.p.row_iter();
+    let p: Vec<Vec<f64>> = rows.map(|row| row.iter().copied().collect()).collect();
+    json!({
+        "holds": true,
+        "t_s": certificate.t_s,
+        "k": terminal.k.as_slice(),
+        "p": p,
+        "level": terminal.level,
+        "contraction": terminal.contraction,
+        "rate_1_s": certificate.continuous.rate_1_s,
+        "scheduling_limits": certificate.scheduling_limits.as_slice(),
+        "largest_states_at_samples": semi_axes(certificate),
+        "largest_states_between_samples": proof.reach.as_slice(),
+        "boxes": proof.boxes,
+        "scheduling_boxes": proof.scheduling_boxes,
+    })
 }
 
 /// The largest |x_i| in the set.

@@ -31,7 +31,7 @@ pub struct OptimalityArguments {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub programs: Option<u32>,
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "out/optimality")]
+    #[arg(short, long, value_name = "DIR", default_value = "out/optimality")]
     pub out: PathBuf,
     /// Print JSON
     #[arg(long)]

@@ -35,12 +35,7 @@ pub struct RefineArguments {
     pub json: bool,
     /// Write b and the geometry to this file as a `[parameters]` table; - for standard output, in
     /// place of the report
-    #[arg(
-        short,
-        long = "out",
-        visible_alias = "output",
-        value_name = "FILE.toml"
-    )]
+    #[arg(short, long = "out", alias = "output", value_name = "FILE.toml")]
     pub output: Option<PathBuf>,
 }
 

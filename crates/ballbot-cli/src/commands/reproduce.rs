@@ -20,11 +20,12 @@ Examples:
   ballbot reproduce --out results
 
 Writes report.html (one self-contained file), every figure as SVG and PNG, every table and
-trajectory as CSV, and summary.json. Exits with 0 only if every published number agrees with the
-computed one within its stated tolerance.")]
+trajectory as CSV, and summary.json. Exits with 0 only if every number that is to be met agrees
+with the computed one within its stated tolerance; the column `source` says whether the paper prints
+it, says it in words (the number is then ours), or it is a check of our own.")]
 pub struct ReproduceArguments {
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "out/reproduction")]
+    #[arg(short, long, value_name = "DIR", default_value = "out/reproduction")]
     pub out: PathBuf,
 }
 
@@ -45,8 +46,8 @@ pub fn run(arguments: &ReproduceArguments) -> Result<String, CommandError> {
     let place = arguments.out.join("report.html");
     if differing == 0 {
         Ok(format!(
-            "{table}\nall {} agree; see {}\n",
-            claims.len(),
+            "{table}\n{}; see {}\n",
+            claims::counts(&claims),
             place.display()
         ))
     } else {
@@ -105,6 +106,7 @@ fn summary(reproduction: &Reproduction, claims: &[Claim], machine: &str) -> serd
             json!({
                 "place": claim.place,
                 "quantity": claim.quantity,
+                "source": claim.source,
                 "published": claim.published,
                 "computed": claim.computed,
                 "difference": claim.difference(),

@@ -1,8 +1,9 @@
 //! `ballbot simulate`.
 
 use super::CommandError;
-use super::robot::RobotArguments;
+use super::robot::ScenarioOptions;
 use crate::figures::{Figure, Role};
+use crate::json;
 use crate::output::{self, FileError};
 use crate::pictures::{self, Shown};
 use crate::progress::Progress;
@@ -12,6 +13,7 @@ use crate::table::Table;
 use ballbot_scenario::{MotorSample, Prepared, Record, Surroundings, words};
 use clap::Args;
 use lpvmpc_sim::{Ending, LogRow, Trajectory};
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -22,6 +24,7 @@ Examples:
   ballbot simulate two-setpoints
   ballbot simulate lissajous --out results
   ballbot simulate my.toml               a file made by `ballbot scenario show NAME`
+  ballbot simulate two-setpoints --set controller.horizon=30 --set bounds.torque_nm.1=1.0
 
 Writes trajectory.csv (for two planes trajectory_x.csv, trajectory_y.csv and motors.csv) and a
 figure as SVG and PNG, in place of those of an earlier run in the same folder; other files are not
@@ -30,12 +33,15 @@ sensors of `[world]` delivered. A run that ends early keeps what it recorded, an
 pub struct SimulateArguments {
     /// A built-in scenario or a TOML file
     pub scenario: String,
-    /// The robot.
+    /// What it is changed by.
     #[command(flatten)]
-    pub robot: RobotArguments,
+    pub options: ScenarioOptions,
     /// Folder for the results [default: out/SCENARIO]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
     /// Write what the robot's sensors delivered, as CSV; for two planes FILE-x and FILE-y
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
@@ -46,7 +52,11 @@ pub struct SimulateArguments {
 /// # Errors
 /// The scenario is not valid, a file cannot be written, or the run ended early.
 pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
-    Ok(complete(arguments)?.summary)
+    let simulated = complete(arguments)?;
+    Ok(match arguments.json {
+        true => json::text(&simulated.document),
+        false => simulated.summary,
+    })
 }
 
 /// A run that came to its end.
@@ -58,6 +68,8 @@ pub struct Simulated {
     pub trajectories: Vec<Trajectory<4, 1>>,
     /// Its numbers, for people.
     pub summary: String,
+    /// The same for other programs.
+    pub document: Value,
 }
 
 /// [`run`] with all that is known of it.
@@ -65,7 +77,7 @@ pub struct Simulated {
 /// # Errors
 /// As [`run`].
 pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError> {
-    let prepared = arguments.robot.prepare(&arguments.scenario)?;
+    let prepared = arguments.options.prepare(&arguments.scenario)?;
     let file = Path::new(&arguments.scenario);
     let name = file.file_stem().unwrap_or(file.as_os_str());
     let folder = match &arguments.out {
@@ -88,7 +100,22 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
     write(&folder, &prepared, &trajectories, &motors)?;
     write_logs(&logs, &rows)?;
 
-    let summary = summary(&prepared, &trajectories, folder.path());
+    let metrics: Vec<Metrics> = prepared
+        .planes
+        .iter()
+        .zip(&trajectories)
+        .map(|(plane, run)| Metrics::new(&prepared, plane, run))
+        .collect();
+    let summary = summary(&prepared, &metrics, folder.path());
+    let document = json!({
+        "title": prepared.title,
+        "samples": prepared.samples,
+        "t_s": prepared.settings.t_s,
+        // All sums, means and largest values are over this time, from 0 s on.
+        "window_s": prepared.samples as f64 * prepared.settings.t_s,
+        "planes": metrics,
+        "folder": folder.path(),
+    });
     let runs = match trajectories.len() {
         1 => ["run", ""],
         _ => ["run of the x plane", "run of the y plane"],
@@ -102,6 +129,7 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
             prepared,
             trajectories,
             summary,
+            document,
         }),
         Some((what, run)) => Err(CommandError::EndedEarly {
             what,
@@ -268,20 +296,14 @@ pub const PNG_SCALE: f64 = 2.0;
 /// A line of the summary: its name, and the metric as text.
 type Line = (&'static str, fn(&Metrics) -> String);
 
-fn summary(prepared: &Prepared, trajectories: &[Trajectory<4, 1>], folder: &Path) -> String {
-    let planes: &[&str] = if trajectories.len() == 1 {
+fn summary(prepared: &Prepared, metrics: &[Metrics], folder: &Path) -> String {
+    let planes: &[&str] = if metrics.len() == 1 {
         &["value"]
     } else {
         &["x plane", "y plane"]
     };
     let mut table = Table::new(std::iter::once("").chain(planes.iter().copied()));
-    let metrics: Vec<Metrics> = prepared
-        .planes
-        .iter()
-        .zip(trajectories)
-        .map(|(plane, run)| Metrics::new(prepared, plane, run))
-        .collect();
-    let rows: [Line; 9] = [
+    let rows: [Line; 10] = [
         ("largest tilt [rad]", |m| {
             format!("{:.4}", m.largest_tilt_rad)
         }),
@@ -294,6 +316,7 @@ fn summary(prepared: &Prepared, trajectories: &[Trajectory<4, 1>], folder: &Path
         ("tracking error, largest [rad]", |m| {
             format!("{:.4}", m.largest_error_rad)
         }),
+        ("closed-loop cost", |m| format!("{:.1}", m.closed_loop_cost)),
         ("samples outside the bounds", |m| m.violations.to_string()),
         ("samples not backed by a guarantee", |m| {
             let none = || "no guarantee".to_owned();
@@ -315,10 +338,12 @@ fn summary(prepared: &Prepared, trajectories: &[Trajectory<4, 1>], folder: &Path
         format!("terminal certificate: {standing}\n")
     });
     format!(
-        "{}: {} samples of {} s\n{table}{certificate}written to {}\n",
+        "{}: {} samples of {} s; costs, rms and largest values from 0 s to {} s\n\
+         {table}{certificate}written to {}\n",
         prepared.title,
         prepared.samples,
         prepared.settings.t_s,
+        recording::time(prepared.samples as f64 * prepared.settings.t_s),
         folder.display()
     )
 }

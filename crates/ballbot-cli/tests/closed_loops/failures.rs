@@ -182,6 +182,7 @@ fn work_of_no_size_is_refused() {
     for arguments in [
         &["campaign", "--threads", "0"][..],
         &["certify", "--boxes", "0"],
+        &["excite", "--harmonics", "0"],
     ] {
         assert_says(&fail(Path::new("."), arguments, 2), &[arguments[1], "0"]);
     }
@@ -251,8 +252,8 @@ fn what_is_no_command_line_is_refused() {
         ),
         (&["simulate"], &["<SCENARIO>"]),
         (
-            &["simulate", "lissajous", "--output", "x"],
-            &["--output", "--out"],
+            &["simulate", "lissajous", "--outs", "x"],
+            &["--outs", "--out"],
         ),
         (&["scenario", "lst"], &["lst", "list"]),
         (&["reproduce", "lissajous"], &["lissajous"]),
