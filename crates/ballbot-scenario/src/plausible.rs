@@ -59,6 +59,8 @@ pub const DELAY: Plausible = range(0.0, 1.0, "s", MILLISECONDS);
 pub const RADIUS: Plausible = range(0.002, 1.0, "m", MILLIMETRES);
 /// A height above the ball's centre.
 pub const HEIGHT: Plausible = range(0.002, 5.0, "m", MILLIMETRES);
+/// An inertia per body mass.
+pub const INERTIA: Plausible = range(0.0, 100.0, "m^2", Some(("mm^2", 1e-6)));
 /// The acceleration of gravity, on the moon as well.
 pub const GRAVITY: Plausible = range(1.0, 30.0, "m/s^2", Some(("mm/s^2", 1e-3)));
 /// The zenith angle of the wheels.
@@ -138,6 +140,9 @@ impl Scenario {
         let geometry = &robot.ballbot.geometry;
         let zenith = robot.wheels.zenith_angle().to_degrees();
         for (name, value, plausible) in [
+            ("b1_m2", robot.ballbot.b1, INERTIA),
+            ("b2_m2", robot.ballbot.b2, INERTIA),
+            ("b3_m2", robot.ballbot.b3, INERTIA),
             ("centre_of_mass_m", geometry.centre_of_mass, HEIGHT),
             ("ball_radius_m", geometry.ball_radius, RADIUS),
             ("wheel_radius_m", geometry.wheel_radius, RADIUS),

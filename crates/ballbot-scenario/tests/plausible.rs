@@ -60,6 +60,11 @@ fn other_units_are_asked_about() {
             ],
         ),
         (
+            "b3_m2 = 0.143093",
+            "b3_m2 = 143093.0",
+            ["parameters.b3_m2 = 143093", "143093 mm^2 are 0.1431 m^2"],
+        ),
+        (
             "torque_nm = [-1.5, 1.5]",
             "torque_nm = [-1.5, 1500.0]",
             ["bounds.torque_nm[1] = 1500", "1500 mN m are 1.5 N m"],
@@ -126,7 +131,7 @@ fn work_without_end_is_refused_whoever_means_it() {
         (
             &[("t_s = 0.05", "t_s = 100.0")][..],
             "",
-            &["t_s", "100 s", "4.0497", "e^405"][..],
+            &["t_s", "100 s", "4.04969", "e^405"][..],
         ),
         (&[("t_s = 0.05", "t_s = 1e6")], "", &["t_s", "1000000 s"]),
         (

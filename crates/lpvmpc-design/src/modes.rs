@@ -29,6 +29,27 @@ pub fn poles(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, MatrixError> {
     Ok(eigenvalues)
 }
 
+/// A pole for a message: six digits, and an imaginary part only where there is one.
+pub(crate) fn pole_text(pole: Complex<f64>) -> String {
+    let short = |value: f64| match value {
+        0.0 => "0".to_owned(),
+        value if (1e-3..1e6).contains(&value.abs()) => {
+            let decimals = (5 - value.abs().log10().floor() as i32).max(0) as usize;
+            let text = format!("{value:.decimals$}");
+            match text.contains('.') {
+                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+                false => text,
+            }
+        }
+        value => format!("{value:.2e}"),
+    };
+    let sign = if pole.im < 0.0 { '-' } else { '+' };
+    match pole.im {
+        0.0 => short(pole.re),
+        imaginary => format!("{} {sign} {} i", short(pole.re), short(imaginary.abs())),
+    }
+}
+
 fn eigenvalues(a: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     let schur = Schur::try_new(a.clone(), f64::EPSILON, QR_ITERATION_CAP)?;
     let values = schur.complex_eigenvalues();
@@ -213,6 +234,18 @@ mod tests {
         let spread = DMatrix::from_row_slice(2, 2, &[1.0, 1e200, 1e-100, 1.0]);
         let found = poles(&spread).unwrap();
         assert!((found[1].re / 1e50 - 1.0).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn poles_are_written_for_people() {
+        for (re, im, text) in [
+            (-51.801_508_841_443_706, 0.0, "-51.8015"),
+            (1.0, 0.0, "1"),
+            (-2.5, -1.25, "-2.5 - 1.25 i"),
+            (0.0, 3e-9, "0 + 3.00e-9 i"),
+        ] {
+            assert_eq!(pole_text(Complex::new(re, im)), text);
+        }
     }
 
     #[test]

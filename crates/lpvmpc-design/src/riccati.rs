@@ -16,7 +16,7 @@ use nalgebra::{Complex, DMatrix};
 use thiserror::Error;
 
 use crate::matrix_check::{MatrixError, unit};
-use crate::modes::poles;
+use crate::modes::{pole_text, poles};
 use candidate::Candidate;
 use doubling::{Doubling, Stalled};
 use standard::Standard;
@@ -62,8 +62,9 @@ pub enum RiccatiError {
     Matrix(#[from] MatrixError),
     /// A mode that does not decay is out of reach of the inputs.
     #[error(
-        "(A, B) is not stabilisable: no input moves the mode with pole {pole}, \
-         which does not decay by itself"
+        "(A, B) is not stabilisable: no input moves the mode with pole {}, \
+         which does not decay by itself",
+        pole_text(*pole)
     )]
     NotStabilisable {
         /// The pole of A.
@@ -71,8 +72,9 @@ pub enum RiccatiError {
     },
     /// A mode that does not decay costs nothing, so the optimal input leaves it alone.
     #[error(
-        "(A, Q) is not detectable: the mode with pole {pole} does not decay by itself \
-         and Q gives it no cost"
+        "(A, Q) is not detectable: the mode with pole {} does not decay by itself \
+         and Q gives it no cost",
+        pole_text(*pole)
     )]
     NotDetectable {
         /// The pole of A.
@@ -81,8 +83,8 @@ pub enum RiccatiError {
     /// The iteration stopped and no mode is to blame.
     #[error(
         "no stabilising solution was found: {reason} (after {doublings} doubling steps). The \
-         largest entries are {largest_a:e} of A, {largest_b:e} of B, {largest_q:e} of Q and \
-         {largest_r:e} of R. If these are far apart, weights of similar cost and units of similar \
+         largest entries are {largest_a:.0e} of A, {largest_b:.0e} of B, {largest_q:.0e} of Q and \
+         {largest_r:.0e} of R. If these are far apart, weights of similar cost and units of similar \
          size will do; if not, a pole of the optimal loop may lie on the stability limit"
     )]
     NoConvergence {

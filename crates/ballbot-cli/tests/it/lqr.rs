@@ -178,9 +178,11 @@ fn parameters_without_motion_are_refused() {
 fn numbers_without_a_regulator_end_with_the_reason() {
     // Each of these once ran without end, or named a mode that the weights do see.
     for (arguments, parts) in [
-        (&["--ts", "100"][..], &["100 s", "4.0497", "e^405"][..]),
+        (&["--ts", "100"][..], &["100 s", "4.04969", "e^405"][..]),
         (&["--ts", "50"], &["50 s", "e^202", "50 ms are 0.05 s"]),
-        (&["--ts", "1e6"], &["1000000 s", "4.0497"]),
+        (&["--ts", "5"], &["5 s", "e^20", "4.45 s"]),
+        (&["--ts", "5", "--substeps", "400"], &["no gain", "of A"]),
+        (&["--ts", "1e6"], &["1000000 s", "4.04969"]),
         (
             &["--continuous", "--q", "1e200,1,0.1,0.1"],
             &["no gain", "1e200"],
@@ -194,6 +196,8 @@ fn numbers_without_a_regulator_end_with_the_reason() {
             .collect();
         let message = failure(&arguments, 1);
         assert_says(&message, parts);
-        assert!(!message.contains("detectable"), "{message}");
+        for wrong in ["detectable", "stabilisable"] {
+            assert!(!message.contains(wrong), "{message}");
+        }
     }
 }

@@ -83,6 +83,8 @@ impl<'a> Standard<'a> {
         let lasting: Vec<_> = open_loop
             .into_iter()
             .filter(|pole| !time.is_stable(*pole, &self.a))
+            // Beside entries of A that are this much larger, rounding hides what moves the mode.
+            .filter(|pole| time == Time::Continuous || UNREACHABLE * self.a.amax() < pole.norm())
             .collect();
         if let Some(pole) = lasting
             .iter()

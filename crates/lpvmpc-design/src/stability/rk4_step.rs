@@ -4,7 +4,7 @@ use nalgebra::{Complex, DMatrix};
 use thiserror::Error;
 
 use crate::matrix_check::MatrixError;
-use crate::modes::poles;
+use crate::modes::{pole_text, poles};
 
 /// A step of the classical fourth-order Runge-Kutta method that every decaying pole allows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,10 +48,10 @@ pub enum Rk4StepError {
     },
     /// An unstable mode grows so far within one sample that no number can follow it.
     #[error(
-        "the sampling time of {sample_time} s is too long for the unstable pole {pole:.4} 1/s: \
-         within one sample its mode grows by e^{exponent:.0}, beyond the 16 digits of a number. \
-         Take less than {longest:.2} s (the sampling time is in seconds: {sample_time} ms are {} \
-         s)",
+        "the sampling time of {sample_time} s is too long for the unstable pole {} 1/s: within one \
+         sample its mode grows by e^{exponent:.0}, beyond the digits of a number. Take less than \
+         {longest:.2} s (the sampling time is in seconds: {sample_time} ms are {} s)",
+        pole_text(*pole),
         sample_time / 1e3
     )]
     Outgrown {
@@ -67,9 +67,10 @@ pub enum Rk4StepError {
     /// A mode that decays in the plant grows in the predictor.
     #[error(
         "the Runge-Kutta step of {step} s (sampling time {sample_time} s in {substeps} substeps) \
-         is too long for the pole {pole} 1/s: this decaying mode is multiplied by \
+         is too long for the pole {} 1/s: this decaying mode is multiplied by \
          {amplification:.4} in each step, allowed is 1. The longest stable step is \
-         {longest_step:.6} s: take at least {fewest_substeps} substeps"
+         {longest_step:.6} s: take at least {fewest_substeps} substeps",
+        pole_text(*pole)
     )]
     TooLong {
         /// Sampling time, s.
@@ -118,7 +119,7 @@ pub fn check_rk4_step(
     }
     let step = sample_time / substeps as f64;
     let poles = poles(a)?;
-    check_growth(&poles, sample_time, substeps)?;
+    check_growth(&poles, sample_time, substeps, DIGITS)?;
     let tightest = poles
         .into_iter()
         .filter(|pole| pole.re < 0.0)
@@ -154,8 +155,8 @@ pub fn check_rk4_step(
 /// of x_dot = A x well, where nothing else is said: |step * fastest pole| is at most 0.7.
 ///
 /// # Errors
-/// A has no eigenvalues, the sampling time is not positive, or more than [`MOST_RK4_SUBSTEPS`] were
-/// needed.
+/// A has no eigenvalues, the sampling time is not positive, more than [`MOST_RK4_SUBSTEPS`] were
+/// needed, or a mode grows so far within one sample that no regulator could be designed.
 pub fn accurate_rk4_substeps(a: &DMatrix<f64>, sample_time: f64) -> Result<usize, Rk4StepError> {
     const ACCURATE_STEP: f64 = 0.7;
     if !(sample_time.is_finite() && sample_time > 0.0) {
@@ -164,11 +165,13 @@ pub fn accurate_rk4_substeps(a: &DMatrix<f64>, sample_time: f64) -> Result<usize
     let poles = poles(a)?;
     let fastest = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
     let substeps = (sample_time * fastest / ACCURATE_STEP).ceil().max(1.0);
+    let taken = substeps.min(MOST_RK4_SUBSTEPS as f64) as usize;
+    // A Riccati equation squares the growth, so half of the digits are left for it. The likelier
+    // cause first, where there are two.
+    check_growth(&poles, sample_time, taken, 0.5 * DIGITS)?;
     if substeps <= MOST_RK4_SUBSTEPS as f64 {
-        return Ok(substeps as usize);
+        return Ok(taken);
     }
-    // The likelier cause, where it is one too.
-    check_growth(&poles, sample_time, MOST_RK4_SUBSTEPS)?;
     Err(Rk4StepError::TooMany {
         sample_time,
         substeps,
@@ -176,13 +179,16 @@ pub fn accurate_rk4_substeps(a: &DMatrix<f64>, sample_time: f64) -> Result<usize
     })
 }
 
-/// No mode grows by more than 1 / machine epsilon in the plant, if `substeps` steps follow it.
+/// The logarithm of 1 / machine epsilon.
+const DIGITS: f64 = 52.0 * std::f64::consts::LN_2;
+
+/// No mode grows by more than e^`most` in the plant, if `substeps` steps follow it.
 fn check_growth(
     poles: &[Complex<f64>],
     sample_time: f64,
     substeps: usize,
+    most: f64,
 ) -> Result<(), Rk4StepError> {
-    let most = -f64::EPSILON.ln();
     let step = sample_time / substeps as f64;
     for pole in poles {
         let predicted = substeps as f64 * amplification(pole * step).ln();

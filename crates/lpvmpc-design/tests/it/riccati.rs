@@ -360,3 +360,17 @@ fn units_of_inputs_and_costs_do_not_hide_a_mode() {
         );
     }
 }
+
+#[test]
+fn a_mode_that_rounding_hides_is_not_blamed() {
+    // Sampled every 5 s the fast mode grows by e^20, beside which the integrator cannot be seen.
+    let a = dmatrix![1.0, 1e8; 0.0, 5e8];
+    let b = dmatrix![1e8; 5e8];
+    let (q, r) = (DMatrix::identity(2, 2), dmatrix![1.0]);
+    if let Err(error) = solve_dare(&problem(&a, &b, &q, &r)) {
+        assert!(
+            matches!(error, RiccatiError::NoConvergence { .. }),
+            "{error}"
+        );
+    }
+}
