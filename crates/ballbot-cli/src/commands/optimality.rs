@@ -94,7 +94,17 @@ pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
     if arguments.json {
         return Ok(json::text(&json!({ "sets": documents })));
     }
-    Ok(format!("{table}written to {}\n", arguments.out.display()))
+    let durations = || {
+        sets.iter()
+            .flat_map(|(_, cases)| cases)
+            .map(|case| case.duration)
+    };
+    Ok(format!(
+        "{table}costs over each whole run, {} s to {} s\nwritten to {}\n",
+        durations().fold(f64::INFINITY, f64::min),
+        durations().fold(0.0, f64::max),
+        arguments.out.display()
+    ))
 }
 
 /// Figures of the cases from rest.
