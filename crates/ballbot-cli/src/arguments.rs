@@ -26,9 +26,28 @@ Examples:
 Exit codes: 0 done, 1 no result (the message says why), 2 the command line is not understood."
 )]
 pub struct Arguments {
+    /// No progress, and no report where the results are in files; errors are still told
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
+}
+
+impl Command {
+    /// Whether what it prints is a report of files that it has written.
+    pub fn reports_files(&self) -> bool {
+        match self {
+            Self::Reproduce(_) | Self::Excite(_) => true,
+            Self::Identify(arguments) => !arguments.example,
+            Self::Simulate(arguments) => !arguments.json,
+            Self::Rehearse(arguments) => !arguments.json,
+            Self::Certify(arguments) => !arguments.json,
+            Self::Campaign(arguments) => !arguments.json,
+            Self::Optimality(arguments) => !arguments.json,
+            _ => false,
+        }
+    }
 }
 
 /// The commands.

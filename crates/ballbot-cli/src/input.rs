@@ -2,7 +2,7 @@
 
 use ballbot::Ballbot;
 use ballbot_identification::ConfigError;
-use ballbot_scenario::ScenarioError;
+use ballbot_scenario::{ScenarioError, words};
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
@@ -61,7 +61,7 @@ pub fn read_text(path: &Path) -> Result<String, InputError> {
 pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, InputError> {
     toml::from_str(&read_text(path)?).map_err(|error| InputError::Syntax {
         path: path.to_owned(),
-        message: error.to_string(),
+        message: words::toml_message(&error.to_string()),
     })
 }
 

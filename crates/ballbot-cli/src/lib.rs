@@ -26,6 +26,7 @@ pub mod refinement;
 pub mod refinement_file;
 pub mod regulator;
 pub mod reproduction;
+pub mod results;
 pub mod table;
 
 use arguments::{Arguments, Command};
@@ -36,7 +37,16 @@ use commands::CommandError;
 /// # Errors
 /// What kept the command from its result, for a person to read.
 pub fn run(arguments: Arguments) -> Result<String, CommandError> {
-    match arguments.command {
+    if arguments.quiet {
+        progress::silence();
+    }
+    let silent = arguments.quiet && arguments.command.reports_files();
+    let text = dispatch(arguments.command)?;
+    Ok(if silent { String::new() } else { text })
+}
+
+fn dispatch(command: Command) -> Result<String, CommandError> {
+    match command {
         Command::Reproduce(arguments) => commands::reproduce::run(&arguments),
         Command::Simulate(arguments) => commands::simulate::run(&arguments),
         Command::Bench(arguments) => commands::bench::run(&arguments),

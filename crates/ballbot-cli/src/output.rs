@@ -17,57 +17,118 @@ pub struct FileError {
     pub source: io::Error,
 }
 
+impl FileError {
+    /// For `map_err`, with the path.
+    pub(crate) fn at(path: &Path) -> impl Fn(io::Error) -> Self {
+        move |source| Self {
+            path: path.to_owned(),
+            source,
+        }
+    }
+}
+
 /// Writes every file under a temporary name beside its place, then renames them all. When one
 /// cannot be written, none of the old files is touched and no temporary file stays behind.
-/// Directories that are missing are made.
+/// Directories that are missing are made. A symbolic link stays, and the file that it names is
+/// written; what is neither a file nor a directory (a pipe, a device) is written into.
 ///
 /// # Errors
 /// The first file that could not be written or renamed.
 pub fn write_files(files: &[(&Path, &[u8])]) -> Result<(), FileError> {
-    let temporary: Vec<PathBuf> = files.iter().map(|(path, _)| temporary(path)).collect();
-    let result = write_then_rename(files, &temporary);
+    let places = files.iter().map(|(path, _)| Place::of(path));
+    let places = places.collect::<Result<Vec<_>, _>>()?;
+    let result = write_then_rename(files, &places);
     if result.is_err() {
-        for path in &temporary {
-            // It may not exist; the error to report is the one that led here.
-            let _ = fs::remove_file(path);
+        for place in &places {
+            if let Place::File { temporary, .. } = place {
+                // It may not exist; the error to report is the one that led here.
+                let _ = fs::remove_file(temporary);
+            }
         }
     }
     result
 }
 
-/// Removes files, those that are there.
+/// Whether a file could be written, as far as can be told without leaving anything behind.
 ///
 /// # Errors
-/// The first file that could not be removed.
-pub fn remove_files(paths: impl IntoIterator<Item = PathBuf>) -> Result<(), FileError> {
-    for path in paths {
-        match fs::remove_file(&path) {
-            Err(source) if source.kind() != io::ErrorKind::NotFound => {
-                return Err(FileError { path, source });
-            }
-            _ => {}
-        }
-    }
-    Ok(())
+/// A directory is in its place, or a file in that of a directory above it; or nothing can be
+/// written there.
+pub fn check_writable(path: &Path) -> Result<(), FileError> {
+    let Place::File { file, temporary } = Place::of(path)? else {
+        return Ok(());
+    };
+    let above = file.ancestors().skip(1);
+    let folder = above
+        .map(|folder| match folder {
+            folder if folder.as_os_str().is_empty() => Path::new("."),
+            folder => folder,
+        })
+        .find(|folder| folder.symlink_metadata().is_ok());
+    let folder = folder.unwrap_or(Path::new("."));
+    let attempt = folder.join(temporary.file_name().unwrap_or_default());
+    let tried = fs::write(&attempt, "").and_then(|()| fs::remove_file(&attempt));
+    tried.map_err(FileError::at(path))
 }
 
-fn write_then_rename(files: &[(&Path, &[u8])], temporary: &[PathBuf]) -> Result<(), FileError> {
-    let failed = |path: &Path| {
-        let path = path.to_owned();
-        move |source| FileError { path, source }
-    };
-    for ((path, content), temporary) in files.iter().zip(temporary) {
-        if let Some(directory) = path.parent() {
-            fs::create_dir_all(directory).map_err(failed(path))?;
+/// Where a path leads.
+enum Place {
+    /// To a file, there or not, which is replaced by one written beside it.
+    File { file: PathBuf, temporary: PathBuf },
+    /// To a pipe or a device.
+    Special,
+}
+
+/// Symbolic links followed, one after the other, before it must be a circle.
+const MOST_LINKS: usize = 40;
+
+impl Place {
+    fn of(path: &Path) -> Result<Self, FileError> {
+        let mut file = path.to_owned();
+        for _ in 0..MOST_LINKS {
+            match fs::read_link(&file) {
+                Ok(target) => file = file.parent().unwrap_or(Path::new("")).join(target),
+                Err(_) => {
+                    return match fs::metadata(&file) {
+                        Ok(found) if found.is_dir() => {
+                            Err(FileError::at(path)(io::ErrorKind::IsADirectory.into()))
+                        }
+                        Ok(found) if !found.is_file() => Ok(Self::Special),
+                        _ => {
+                            let temporary = temporary(&file);
+                            Ok(Self::File { file, temporary })
+                        }
+                    };
+                }
+            }
         }
-        if path.is_dir() {
-            // Found out when renaming, it would be too late for the files before it.
-            return Err(failed(path)(io::ErrorKind::IsADirectory.into()));
-        }
-        fs::write(temporary, content).map_err(failed(path))?;
+        Err(FileError::at(path)(io::Error::other(
+            "its symbolic links lead in a circle",
+        )))
     }
-    for ((path, _), temporary) in files.iter().zip(temporary) {
-        fs::rename(temporary, path).map_err(failed(path))?;
+}
+
+fn write_then_rename(files: &[(&Path, &[u8])], places: &[Place]) -> Result<(), FileError> {
+    for ((path, content), place) in files.iter().zip(places) {
+        if let Place::File { file, temporary } = place {
+            if let Some(directory) = file.parent() {
+                fs::create_dir_all(directory).map_err(FileError::at(path))?;
+            }
+            fs::write(temporary, content).map_err(FileError::at(path))?;
+            if let Ok(old) = fs::metadata(file) {
+                fs::set_permissions(temporary, old.permissions()).map_err(FileError::at(path))?;
+            }
+        }
+    }
+    for ((path, content), place) in files.iter().zip(places) {
+        match place {
+            Place::File { file, temporary } => fs::rename(temporary, file),
+            Place::Special => {
+                let opened = fs::OpenOptions::new().write(true).open(path);
+                opened.and_then(|mut special| special.write_all(content))
+            }
+        }
+        .map_err(FileError::at(path))?;
     }
     Ok(())
 }
@@ -99,6 +160,12 @@ pub fn fail(error: &CommandError) -> ExitCode {
         CommandError::Usage(_) => ExitCode::from(2),
         _ => code,
     }
+}
+
+/// Says what the reader of a result should know, beside it.
+pub fn warn(message: &str) {
+    // Where standard error is closed there is nobody to tell.
+    let _ = writeln!(io::stderr(), "note: {message}");
 }
 
 fn complain(message: &str) -> ExitCode {
@@ -137,6 +204,55 @@ mod tests {
         assert_eq!(error.path, bad);
         assert_eq!(fs::read_to_string(&good).unwrap(), "old");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_stay_links_and_special_files_are_written_into() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let (target, link) = (folder.path().join("target"), folder.path().join("link"));
+        fs::write(&target, "old").unwrap();
+        fs::set_permissions(&target, fs::Permissions::from_mode(0o600)).unwrap();
+        symlink("target", &link).unwrap();
+        write_files(&[(&link, b"new")]).unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(fs::read_to_string(&target).unwrap(), "new");
+        let mode = fs::metadata(&target).unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o600);
+
+        let dangling = folder.path().join("dangling");
+        symlink("later", &dangling).unwrap();
+        write_files(&[(&dangling, b"new")]).unwrap();
+        assert!(dangling.is_symlink());
+        assert!(folder.path().join("later").is_file());
+
+        let circle = folder.path().join("circle");
+        symlink("circle", &circle).unwrap();
+        assert!(write_files(&[(&circle, b"new")]).is_err());
+
+        // A file system is not asked to rename over a device.
+        let null = Path::new("/dev/null");
+        write_files(&[(null, b"new")]).unwrap();
+        assert!(!fs::metadata(null).unwrap().is_file());
+        let full = folder.path().join("full");
+        symlink("/dev/full", &full).unwrap();
+        let error = write_files(&[(&full, b"new")]).unwrap_err();
+        assert_eq!(error.source.kind(), io::ErrorKind::StorageFull);
+        assert!(full.is_symlink());
+    }
+
+    #[test]
+    fn a_check_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        check_writable(&folder.path().join("a").join("b").join("c.csv")).unwrap();
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+        let file = folder.path().join("file");
+        fs::write(&file, "mine").unwrap();
+        check_writable(&file).unwrap();
+        assert_eq!(fs::read_to_string(&file).unwrap(), "mine");
+        assert!(check_writable(&file.join("below.csv")).is_err());
+        assert!(check_writable(folder.path()).is_err());
     }
 
     #[test]

@@ -23,6 +23,13 @@ pub const COLUMNS: [&str; 16] = [
     "artificial_set_point_rad",
 ];
 
+/// A time in s without the rounding of a sum: 0.3, not 0.30000000000000004. Times of samples are
+/// far more than a picosecond apart.
+pub fn time(t: f64) -> f64 {
+    let rounded = (t * 1e12).round() / 1e12;
+    if rounded.is_finite() { rounded } else { t }
+}
+
 /// `trajectory.csv`: one row per sample, the state at the sample and the torque held after it;
 /// a last row with the final state and no torque. After a run that ended early, the last row's
 /// status says why.
@@ -37,7 +44,7 @@ pub fn trajectory_csv(trajectory: &Trajectory<4, 1>) -> String {
         );
         text += &format!(
             "{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{},{step_us:.3},{:?},{:?},{:?},{:?},{guard}\n",
-            sample.t,
+            time(sample.t),
             x[0],
             x[1],
             x[2],
@@ -60,7 +67,12 @@ pub fn trajectory_csv(trajectory: &Trajectory<4, 1>) -> String {
     };
     text += &format!(
         "{:?},{:?},{:?},{:?},{:?},,{:?},,{status},,,,,,,\n",
-        trajectory.final_time, x[0], x[1], x[2], x[3], trajectory.final_reference[0]
+        time(trajectory.final_time),
+        x[0],
+        x[1],
+        x[2],
+        x[3],
+        trajectory.final_reference[0]
     );
     text
 }
@@ -79,7 +91,7 @@ pub fn log_csv(log: &[LogRow<4, 1>]) -> String {
         }
         text += &format!(
             "{:?},{},{},{},{:?},{:?}\n",
-            row.t,
+            time(row.t),
             cell(phi),
             cell(theta),
             cell(theta_dot),
@@ -98,7 +110,9 @@ pub fn motors_csv(motors: &[MotorSample]) -> String {
         let [first, second, third] = sample.torques.into();
         text += &format!(
             "{:?},{first:?},{second:?},{third:?},{:?},{:?}\n",
-            sample.t, sample.heading, sample.target
+            time(sample.t),
+            sample.heading,
+            sample.target
         );
     }
     text

@@ -3,7 +3,8 @@
 use nalgebra::{Complex, DMatrix};
 use std::fmt;
 
-/// A table with right-aligned columns; the first, of names, is left-aligned.
+/// A table whose columns of numbers are right-aligned, and others left-aligned. The first column is
+/// one of names.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
     rows: Vec<Vec<String>>,
@@ -36,6 +37,21 @@ impl Table {
         table
     }
 
+    /// Whether a cell of this column below its header is a number, with a relation or a per cent
+    /// sign perhaps; or all are empty.
+    fn has_numbers(&self, column: usize) -> bool {
+        let is_number = |cell: &str| {
+            let bare = cell.trim_start_matches(['<', '>', '=', '\u{b1}', ' ']);
+            bare.trim_end_matches([' ', '%']).parse::<f64>().is_ok()
+        };
+        let below = self.rows.iter().skip(1);
+        let mut cells = below
+            .filter_map(|row| row.get(column))
+            .filter(|cell| !cell.is_empty())
+            .peekable();
+        cells.peek().is_none() || cells.any(|cell| is_number(cell))
+    }
+
     fn width(&self, column: usize) -> usize {
         let cells = self.rows.iter().filter_map(|row| row.get(column));
         cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
@@ -48,7 +64,7 @@ impl fmt::Display for Table {
             let mut line = String::new();
             for (column, cell) in row.iter().enumerate() {
                 let width = self.width(column);
-                if column == 0 {
+                if column == 0 || !self.has_numbers(column) {
                     line.push_str(&format!("  {cell:<width$}"));
                 } else {
                     line.push_str(&format!("  {cell:>width$}"));
@@ -108,6 +124,18 @@ mod tests {
         }
         assert_eq!(complex(Complex::new(-1.0, 0.0)), "-1.000000");
         assert_eq!(complex(Complex::new(-1.0, -2.0)), "-1.000000 - 2.000000 i");
+    }
+
+    #[test]
+    fn words_begin_where_their_header_does() {
+        let mut table = Table::new(["name", "title", "limit", "off by"]);
+        table.row(["a", "A long title", "<= 5", "2.0 %"]);
+        table.row(["b", "Short", ">= 10", ""]);
+        assert_eq!(
+            table.to_string(),
+            "  name  title         limit  off by\n  a     A long title   <= 5   2.0 %\n  \
+             b     Short         >= 10\n"
+        );
     }
 
     #[test]

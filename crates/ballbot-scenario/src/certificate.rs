@@ -83,6 +83,21 @@ impl TryFrom<&Ballbot<f64>> for RobotTable {
 }
 
 impl RobotTable {
+    /// The parameters with their keys.
+    pub fn entries(&self) -> [(&'static str, f64); 9] {
+        [
+            ("b1_m2", self.b1_m2),
+            ("b2_m2", self.b2_m2),
+            ("b3_m2", self.b3_m2),
+            ("b4_m2_s", self.b4_m2_s),
+            ("drive_friction_m2_s", self.drive_friction_m2_s),
+            ("centre_of_mass_m", self.centre_of_mass_m),
+            ("ball_radius_m", self.ball_radius_m),
+            ("wheel_radius_m", self.wheel_radius_m),
+            ("gravity_m_s2", self.gravity_m_s2),
+        ]
+    }
+
     fn lift<T>(&self, constant: fn(f64) -> T) -> Ballbot<T> {
         Ballbot {
             b1: constant(self.b1_m2),

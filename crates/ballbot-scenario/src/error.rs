@@ -71,8 +71,8 @@ pub enum ScenarioError {
         /// What is wrong, and what would be right.
         problem: String,
     },
-    /// The terminal cost cannot be computed.
-    #[error("controller.terminal: no Riccati solution: {0}")]
+    /// There is no LQR, from whose cost terminal cost and prices of bounds are computed.
+    #[error("controller.q, controller.r and controller.t_s: no LQR: {0}")]
     Riccati(#[from] lpvmpc_design::RiccatiError),
     /// The sampling time is too long for the predictor.
     #[error("controller.t_s and controller.predictor: {0}")]

@@ -6,7 +6,7 @@ use crate::feedback_table::{
 };
 use crate::heading::Turning;
 use crate::number::{not_negative, positive};
-use crate::problem::dynamic;
+use crate::problem::{MOST_SUBSTEPS, dynamic};
 use crate::schema::{ControllerTable, TerminalTable};
 use crate::three_motors::Motors;
 use ballbot::{Ballbot, Wheels};
@@ -28,12 +28,25 @@ impl ControllerTable {
     /// What stands around the controller.
     pub(crate) fn feedback(&self, ballbot: &Ballbot<f64>) -> Result<Feedback, ScenarioError> {
         let estimator = self.estimator.as_ref();
+        let delay = not_negative("controller.delay_s", self.delay_s)?;
+        let longest_step = longest_step(ballbot)?;
+        let steps = (delay / longest_step).ceil();
+        if steps > MOST_SUBSTEPS as f64 {
+            return Err(ScenarioError::value(
+                "controller.delay_s",
+                delay,
+                format!(
+                    "the fastest pole asks for {steps} steps over the delay, at most \
+                     {MOST_SUBSTEPS} can be taken"
+                ),
+            ));
+        }
         Ok(Feedback {
             estimator: estimator
                 .map(|estimator| estimator.settings(ballbot))
                 .transpose()?,
-            delay: not_negative("controller.delay_s", self.delay_s)?,
-            longest_step: longest_step(ballbot)?,
+            delay,
+            longest_step,
             preview: self.preview,
         })
     }
@@ -238,7 +251,7 @@ impl ShapingTable {
             return Err(ScenarioError::value(
                 "controller.shaping.tilt_rad",
                 tilt,
-                "it must be between 0 and pi/2",
+                "it must be between 0 and pi/2 rad",
             ));
         }
         Ok(MoveLimits {

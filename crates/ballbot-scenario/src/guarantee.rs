@@ -185,16 +185,18 @@ fn check_plant(
     t_s: f64,
 ) -> Result<(), ScenarioError> {
     let robot = RobotTable::try_from(ballbot)?;
-    if certificate.plant != robot {
-        return Err(ScenarioError::value(
-            "parameters",
-            format!("{robot:?}"),
-            format!(
-                "the certificate is of another robot, {:?}; write one of this robot with \
-                 `ballbot certify` and name it as {KEY}.certificate",
-                certificate.plant
-            ),
-        ));
+    let pairs = robot.entries().into_iter().zip(certificate.plant.entries());
+    for ((name, value), (_, certified)) in pairs {
+        if value != certified {
+            return Err(ScenarioError::value(
+                format!("parameters.{name}"),
+                value,
+                format!(
+                    "the certificate is of another robot, whose {name} is {certified}; write one of \
+                     this robot with `ballbot certify` and name it as {KEY}.certificate"
+                ),
+            ));
+        }
     }
     if certificate.t_s != t_s {
         let expected = format!("the certificate is for {} s", certificate.t_s);

@@ -36,6 +36,7 @@ mod heading_table;
 mod load;
 pub mod number;
 mod parameters;
+pub mod plausible;
 mod prepare;
 mod problem;
 mod reference;

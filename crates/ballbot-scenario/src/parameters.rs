@@ -5,6 +5,7 @@ use crate::files::Files;
 use crate::number::{finite, positive};
 use crate::schema::{BoundsTable, ParameterTable};
 use crate::uncertainty::{RobotDistribution, Uncertainty};
+use crate::words;
 use ballbot::{Ballbot, DriveFriction, Geometry, Wheels};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, Visitor};
@@ -106,7 +107,7 @@ pub(crate) fn read(file: &Path, directory: &Path) -> Result<KnownRobot, Scenario
 
 fn robot_in(text: &str) -> Result<KnownRobot, ScenarioError> {
     let file: ParameterFile = toml::from_str(text)
-        .map_err(|error| ScenarioError::ParameterFile(error.to_string().trim_end().to_owned()))?;
+        .map_err(|error| ScenarioError::ParameterFile(words::toml_message(&error.to_string())))?;
     let uncertainty = file.identification;
     Ok(KnownRobot {
         uncertainty: uncertainty.map(|known| Box::new(known) as Box<dyn RobotDistribution>),

@@ -80,7 +80,9 @@ impl Scenario {
 
     fn prepare_with(&self, files: &dyn Files) -> Result<Prepared, ScenarioError> {
         let duration = positive("duration_s", self.duration_s)?;
+        self.check_plausible()?;
         let model = self.parameters.read("parameters", files)?;
+        self.check_robot("parameters", &model)?;
         let (ballbot, wheels) = (model.ballbot, model.wheels);
         let real = match &self.world {
             Some(world) => world.real_robot(&model, files)?,

@@ -15,7 +15,7 @@ use lpvmpc::{
 use nalgebra::{DMatrix, Matrix1, Matrix4, Vector1, Vector3, Vector4};
 
 /// More Runge-Kutta steps per sample than this would be a slip of the pen, and a run without end.
-const MOST_SUBSTEPS: usize = 1000;
+pub(crate) const MOST_SUBSTEPS: usize = 1000;
 
 /// The same for quadratic programs per sample.
 const MOST_PROGRAMS: usize = 1000;
@@ -241,17 +241,24 @@ impl ControllerTable {
                     "at least one step per sample is needed",
                 ));
             }
-            Some(substeps) if substeps > MOST_SUBSTEPS => {
-                return Err(ScenarioError::value(
-                    format!("controller.predictor.{key}.substeps"),
-                    substeps,
-                    format!("at most {MOST_SUBSTEPS} steps per sample can be taken"),
-                ));
-            }
             Some(substeps) => substeps,
             None => lpvmpc_design::accurate_rk4_substeps(&a, self.t_s)?,
         };
         lpvmpc_design::check_rk4_step(&a, self.t_s, substeps)?;
+        if substeps > MOST_SUBSTEPS {
+            let (key, value, who) = match given {
+                Some(_) => {
+                    let key = format!("controller.predictor.{key}.substeps");
+                    (key, substeps as f64, String::new())
+                }
+                None => {
+                    let who = format!("the fastest pole asks for {substeps} steps per sample, ");
+                    ("controller.t_s".to_owned(), self.t_s, who)
+                }
+            };
+            let expected = format!("{who}at most {MOST_SUBSTEPS} steps per sample can be taken");
+            return Err(ScenarioError::value(key, value, expected));
+        }
         Ok(kind(Rk4 { substeps }))
     }
 

@@ -15,6 +15,10 @@ pub struct Scenario {
     pub title: String,
     /// Length of the run, s.
     pub duration_s: f64,
+    /// Values that no ballbot has, such as a tilt of 60 rad, are meant as they are; without it they
+    /// are asked about.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub accept_unusual_values: bool,
     /// The robot: the controller's model and, unless `[world]` says otherwise, the plant. A table, or
     /// the path of a file with such a table.
     pub parameters: Parameters,

@@ -53,7 +53,12 @@ impl TimeSeries {
     }
 
     fn take_rows(&mut self, text: &[u8], names: [&str; 2]) -> Result<(), ScenarioError> {
+        // Spreadsheets of countries with decimal commas write semicolons.
+        let header = text.split(|byte| *byte == b'\n');
+        let mut header = header.filter(|line| !line.starts_with(b"#"));
+        let semicolons = header.next().is_some_and(|line| line.contains(&b';'));
         let mut reader = csv::ReaderBuilder::new()
+            .delimiter(if semicolons { b';' } else { b',' })
             .trim(csv::Trim::All)
             .comment(Some(b'#'))
             .from_reader(text);
@@ -80,7 +85,13 @@ impl TimeSeries {
                     Ok(value) if value.is_finite() => Ok(value),
                     _ if text.is_empty() => Err(self.problem(line, format!("`{name}` is missing"))),
                     _ => {
-                        let problem = format!("`{name}` is `{text}`, which is not a finite number");
+                        let point = text.replace(',', ".");
+                        let hint = match point.parse::<f64>() {
+                            Ok(_) if point != text => format!("; write {point}"),
+                            _ => String::new(),
+                        };
+                        let problem =
+                            format!("`{name}` is `{text}`, which is not a finite number{hint}");
                         Err(self.problem(line, problem))
                     }
                 }

@@ -9,6 +9,43 @@ pub const STATES: [&str; 4] = ["phi", "theta", "phi_dot", "theta_dot"];
 /// Names of what a regulator decides on: the torque, and its rate where that is bounded.
 const INPUTS: [&str; 2] = ["torque", "torque rate"];
 
+/// What the reader of a TOML file says, without the types of a programming language.
+pub fn toml_message(message: &str) -> String {
+    const PLAIN: [(&str, &str); 11] = [
+        ("expected usize", "expected a whole number, 0 or more"),
+        ("expected u64", "expected a whole number, 0 or more"),
+        ("expected f64", "expected a number"),
+        ("expected an array of length", "expected a list of length"),
+        ("expected a sequence", "expected a list"),
+        ("expected a map", "expected a table"),
+        (
+            "wanted exactly 1 element, more than 1 element",
+            "one kind must be chosen here: of these tables or keys, only one may stand",
+        ),
+        (
+            "wanted exactly 1 element, found 0 elements",
+            "a kind must be chosen here: this table is empty",
+        ),
+        (
+            "wanted string or table",
+            "expected the name of a kind in quotes, or a table",
+        ),
+        (
+            "invalid type: unit variant, expected struct variant",
+            "this kind needs keys of its own: a table, not its name alone",
+        ),
+        (
+            "invalid type: unit variant, expected newtype variant",
+            "this kind needs a value or keys of its own, not its name alone",
+        ),
+    ];
+    PLAIN
+        .iter()
+        .fold(message.trim_end().to_owned(), |text, (from, to)| {
+            text.replace(from, to)
+        })
+}
+
 /// Why a run ended, with its time.
 pub fn ending(ending: &Ending) -> String {
     match ending {

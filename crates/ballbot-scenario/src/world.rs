@@ -15,6 +15,9 @@ use lpvmpc_sim::{Actuator, Disturbance, Plant, Sensor, Tolerances, WithoutPlan, 
 use nalgebra::{Vector1, Vector2, Vector4};
 use std::f64::consts::FRAC_PI_2;
 
+/// More samples of the sensors per sample of the control than this would be a slip of the pen.
+const MOST_SENSOR_SAMPLES: f64 = 1e4;
+
 /// The robot as the simulated world sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Robot {
@@ -136,7 +139,13 @@ impl WorldTable {
     fn sensor_period(&self, period: f64, t_s: f64) -> Result<f64, ScenarioError> {
         let key = "world.sensor_period_s";
         let ratio = (t_s / positive(key, period)?).round();
-        if ratio >= 1.0 && (ratio * period - t_s).abs() <= 1e-6 * t_s {
+        if ratio > MOST_SENSOR_SAMPLES {
+            let expected = format!(
+                "at most {MOST_SENSOR_SAMPLES} samples of the sensors per controller.t_s ({t_s} s) \
+                 can be simulated"
+            );
+            Err(ScenarioError::value(key, period, expected))
+        } else if ratio >= 1.0 && (ratio * period - t_s).abs() <= 1e-6 * t_s {
             Ok(t_s / ratio)
         } else {
             Err(ScenarioError::value(

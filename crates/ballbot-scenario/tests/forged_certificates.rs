@@ -108,7 +108,7 @@ fn what_does_not_fit_is_refused_on_loading() {
             "a robot with friction in its drive",
             |c| c.plant.drive_friction_m2_s = 1e-3,
             nothing,
-            &["another robot", "drive_friction_m2_s: 0.001"],
+            &["another robot", "drive_friction_m2_s is 0.001"],
         ),
         (
             "a robot without mass",

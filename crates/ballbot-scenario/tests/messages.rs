@@ -49,12 +49,98 @@ fn unknown_key() {
 fn wrong_type() {
     assert_says(
         &message("t_s = 0.05", "t_s = \"0.05\""),
-        &["my.toml", "line 22", "t_s", "expected f64"],
+        &["my.toml", "line 22", "t_s", "expected a number"],
     );
     assert_says(
         &message("q = [200.0, 1.0, 0.1, 0.1]", "q = [200.0, 1.0]"),
         &["line", "4"],
     );
+}
+
+#[test]
+fn types_are_named_as_people_name_them() {
+    for (from, to, words) in [
+        (
+            "horizon = 20",
+            "horizon = 20.5",
+            "a whole number, 0 or more",
+        ),
+        ("horizon = 20", "horizon = -3", "a whole number, 0 or more"),
+        (
+            "model = \"lpv\"",
+            "model = 3",
+            "the name of a kind in quotes",
+        ),
+        (
+            "[reference.set_points]",
+            "[reference.sine]\namplitude_rad = 1.0\nangular_frequency_rad_s = 1.0\n\n\
+             [reference.set_points]",
+            "one kind must be chosen",
+        ),
+    ] {
+        let said = message(from, to);
+        assert_says(&said, &["line", words]);
+        for jargon in ["usize", "f64", "variant", "element"] {
+            assert!(!said.contains(jargon), "`{jargon}` in: {said}");
+        }
+    }
+}
+
+#[test]
+fn another_robots_certificate_is_told_by_the_first_difference() {
+    let text = builtin::find("far-setpoints").expect("built-in").text;
+    let text = text.replace("ball_radius_m = 0.12", "ball_radius_m = 0.13");
+    let scenario = Scenario::parse(&text, "my.toml").expect("valid TOML");
+    let said = scenario.prepare(Path::new(".")).expect_err("another robot");
+    let words = [
+        "parameters.ball_radius_m = 0.13",
+        "another robot",
+        "is 0.12",
+    ];
+    assert_says(&said.to_string(), &words);
+}
+
+#[test]
+fn values_are_set_by_their_keys() {
+    let with = |changes: &[(&str, &str)]| {
+        let changes: Vec<_> = changes
+            .iter()
+            .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
+            .collect();
+        Scenario::load_with("two-setpoints", &changes)
+    };
+    let scenario = with(&[
+        ("controller.t_s", "0.04"),
+        ("bounds.torque_nm.1", "0.5"),
+        ("controller.terminal", "none"),
+        ("world.seed", "7"),
+        ("title", "Mine"),
+        ("controller.predictor", "{ stage_consistent = {} }"),
+    ])
+    .expect("valid");
+    assert_eq!(scenario.controller.t_s, 0.04);
+    assert_eq!(scenario.bounds.torque_nm, [-1.5, 0.5]);
+    assert_eq!(scenario.world.expect("made").seed, 7);
+    assert_eq!(scenario.title, "Mine");
+    assert_eq!(with(&[]).expect("valid").controller.t_s, 0.05);
+    for (key, value, words) in [
+        ("controller.horizn", "3", ["horizn", "horizon"]),
+        ("controller.horizon", "many", ["horizon", "a whole number"]),
+        (
+            "controller.t_s.x",
+            "3",
+            ["controller.t_s.x", "below a value"],
+        ),
+        (
+            "bounds.torque_nm.2",
+            "3",
+            ["bounds.torque_nm.2", "a list of 2"],
+        ),
+        ("controller..t_s", "3", ["controller..t_s", "name of a key"]),
+    ] {
+        let said = with(&[(key, value)]).expect_err("refused").to_string();
+        assert_says(&said, &words);
+    }
 }
 
 #[test]
@@ -307,6 +393,12 @@ fn reference_files() {
         "backwards",
         "t_s,phi_ref_rad\n0,0\n1,2\n0.5,1\n4,8\n",
         &["line 4", "increase"],
+    );
+    with_reference("semicolons", &rows(grid(40)).replace(',', ";")).expect("accepted");
+    refused(
+        "decimal commas",
+        &rows(grid(40)).replace(',', ";").replace('.', ","),
+        &["line 3", "`0,1`", "0.1"],
     );
     refused("empty", "", &["no column"]);
     refused("header", "t_s,phi_ref_rad\n", &["no rows"]);

@@ -81,8 +81,8 @@ pub use shooting::{
     ShootingTermination, Unknown,
 };
 pub use stability::{
-    FrozenError, FrozenStability, Rk4Step, Rk4StepError, SchedulingGrid, accurate_rk4_substeps,
-    check_rk4_step, frozen_stability,
+    FrozenError, FrozenStability, MOST_RK4_SUBSTEPS, Rk4Step, Rk4StepError, SchedulingGrid,
+    accurate_rk4_substeps, check_rk4_step, frozen_stability,
 };
 pub use terminal::{
     Certificate, CertificateProblem, CertifyError, ClaimError, DocumentError, Effort, MOST_BOXES,

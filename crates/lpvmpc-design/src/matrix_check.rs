@@ -195,9 +195,20 @@ pub(crate) fn checked_symmetric(
     Ok(symmetric_part(m))
 }
 
-/// (M + M') / 2.
+/// (M + M') / 2, halved first: the sum could overflow.
 pub(crate) fn symmetric_part(m: &DMatrix<f64>) -> DMatrix<f64> {
-    (m + m.transpose()) * 0.5
+    m * 0.5 + m.transpose() * 0.5
+}
+
+/// The power of two at the largest entry of a finite M; 1 for M = 0. M over it has entries below
+/// 2, exactly, whose squares do not overflow.
+pub(crate) fn unit(m: &DMatrix<f64>) -> f64 {
+    let largest = m.amax();
+    if largest > 0.0 {
+        largest.max(f64::MIN_POSITIVE).log2().floor().exp2()
+    } else {
+        1.0
+    }
 }
 
 /// M > 0 for a symmetric, finite M.
@@ -205,11 +216,13 @@ pub(crate) fn check_positive_definite(
     name: &'static str,
     m: &DMatrix<f64>,
 ) -> Result<(), MatrixError> {
-    let smallest_eigenvalue = smallest_eigenvalue(name, m)?;
-    if smallest_eigenvalue <= rounding_of_eigenvalues(m) {
+    let unit = unit(m);
+    let scaled = m / unit;
+    let smallest = smallest_eigenvalue(name, &scaled)?;
+    if smallest <= rounding_of_eigenvalues(&scaled) {
         return Err(MatrixError::NotPositiveDefinite {
             name,
-            smallest_eigenvalue,
+            smallest_eigenvalue: smallest * unit,
         });
     }
     Ok(())
@@ -220,11 +233,13 @@ pub(crate) fn check_positive_semidefinite(
     name: &'static str,
     m: &DMatrix<f64>,
 ) -> Result<(), MatrixError> {
-    let smallest_eigenvalue = smallest_eigenvalue(name, m)?;
-    if smallest_eigenvalue < -rounding_of_eigenvalues(m) {
+    let unit = unit(m);
+    let scaled = m / unit;
+    let smallest = smallest_eigenvalue(name, &scaled)?;
+    if smallest < -rounding_of_eigenvalues(&scaled) {
         return Err(MatrixError::NotPositiveSemidefinite {
             name,
-            smallest_eigenvalue,
+            smallest_eigenvalue: smallest * unit,
         });
     }
     Ok(())

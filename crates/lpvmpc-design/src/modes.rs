@@ -3,7 +3,7 @@
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{Complex, DMatrix, DVector, SVD, Schur};
 
-use crate::matrix_check::{MatrixError, QR_ITERATION_CAP, check_shape, check_square};
+use crate::matrix_check::{MatrixError, QR_ITERATION_CAP, check_shape, check_square, unit};
 
 /// The poles of x_dot = A x (in 1/s) or of x+ = A x (no unit): the eigenvalues of A, sorted by
 /// real part, then by imaginary part, both ascending.
@@ -13,15 +13,41 @@ use crate::matrix_check::{MatrixError, QR_ITERATION_CAP, check_shape, check_squa
 pub fn poles(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, MatrixError> {
     const NAME: &str = "the state matrix A";
     check_square(NAME, a)?;
-    let mut balanced = a.clone();
+    // Balancing sums squares, and does not end once one overflows.
+    let unit = unit(a);
+    let mut balanced = a / unit;
     balance_parlett_reinsch(&mut balanced);
-    let mut eigenvalues = eigenvalues(&balanced)
+    let mut eigenvalues: Vec<_> = eigenvalues(&balanced)
         // The QR iteration has no exceptional shifts, so a cyclic permutation stands still under
         // it. A similarity by any reflector takes it out of such a fixed point.
         .or_else(|| eigenvalues(&reflected(&balanced)))
-        .ok_or(MatrixError::EigenvaluesDidNotConverge { name: NAME })?;
+        .ok_or(MatrixError::EigenvaluesDidNotConverge { name: NAME })?
+        .into_iter()
+        .map(|value| value * unit)
+        .collect();
     eigenvalues.sort_unstable_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
     Ok(eigenvalues)
+}
+
+/// A pole for a message: six digits, and an imaginary part only where there is one.
+pub(crate) fn pole_text(pole: Complex<f64>) -> String {
+    let short = |value: f64| match value {
+        0.0 => "0".to_owned(),
+        value if (1e-3..1e6).contains(&value.abs()) => {
+            let decimals = (5 - value.abs().log10().floor() as i32).max(0) as usize;
+            let text = format!("{value:.decimals$}");
+            match text.contains('.') {
+                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+                false => text,
+            }
+        }
+        value => format!("{value:.2e}"),
+    };
+    let sign = if pole.im < 0.0 { '-' } else { '+' };
+    match pole.im {
+        0.0 => short(pole.re),
+        imaginary => format!("{} {sign} {} i", short(pole.re), short(imaginary.abs())),
+    }
 }
 
 fn eigenvalues(a: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
@@ -43,8 +69,8 @@ fn reflected(a: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// The controllability matrix [B, A B, .., A^(n-1) B] with its rank, by singular values.
 ///
-/// A (n x n) is divided by its Frobenius norm first: this leaves the rank as it is and keeps the
-/// powers from spreading over many decades. A singular value counts when it is above
+/// A (n x n) is divided by its Frobenius norm and B by its largest entry first: this leaves the
+/// rank as it is and keeps the powers from spreading over many decades. A singular value counts when it is above
 /// n * max(n, n m) * machine epsilon times the largest.
 ///
 /// The rank says which part of the state space the inputs (B is n x m) reach in exact arithmetic;
@@ -62,10 +88,13 @@ pub fn controllability_rank(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<usize,
         "as many rows as A, for x_dot = A x + B u",
     )?;
     let (n, m) = b.shape();
-    let norm = a.norm();
-    let scaled = if norm > 0.0 { a / norm } else { a.clone() };
+    let mut scaled = a / unit(a);
+    let norm = scaled.norm();
+    if norm > 0.0 {
+        scaled /= norm;
+    }
     let mut matrix = DMatrix::zeros(n, n * m);
-    let mut power = b.clone();
+    let mut power = b / unit(b);
     for k in 0..n {
         matrix.columns_mut(k * m, m).copy_from(&power);
         power = &scaled * power;
@@ -84,20 +113,30 @@ pub fn controllability_rank(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<usize,
 }
 
 /// How near the mode `pole` of A is to being out of reach of the inputs B: about the smallest
-/// singular value of [pole I - A, B] over the largest entry of A and B (Popov-Belevitch-Hautus
-/// test), as the last pivot of a QR decomposition. Zero: no input moves this mode.
+/// singular value of [pole I - A, B] (Popov-Belevitch-Hautus test), as the last pivot of a QR
+/// decomposition. Zero: no input moves this mode. A is taken relative to its largest entry and
+/// each column of B relative to its own, since what an input reaches does not depend on its unit.
 pub(crate) fn distance_to_unreachable(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
     pole: Complex<f64>,
 ) -> f64 {
     let (n, m) = b.shape();
+    let unit_of_a = unit(a);
+    let (a, pole) = (a / unit_of_a, pole / unit_of_a);
+    let mut b = b.clone();
+    for mut column in b.column_iter_mut() {
+        let largest = column.amax();
+        if largest > 0.0 {
+            column /= largest;
+        }
+    }
     // [Re, -Im; Im, Re] has the singular values of Re + i Im, each twice.
     let mut pencil = DMatrix::zeros(2 * n, 2 * (n + m));
     for half in 0..2 {
         let (top, left) = (half * n, half * (n + m));
-        pencil.view_mut((top, left), (n, n)).copy_from(&-a);
-        pencil.view_mut((top, left + n), (n, m)).copy_from(b);
+        pencil.view_mut((top, left), (n, n)).copy_from(&-&a);
+        pencil.view_mut((top, left + n), (n, m)).copy_from(&b);
         for i in 0..n {
             pencil[(top + i, left + i)] += pole.re;
         }
@@ -106,11 +145,7 @@ pub(crate) fn distance_to_unreachable(
         pencil[(i, n + m + i)] = -pole.im;
         pencil[(n + i, i)] = pole.im;
     }
-    let size = a.amax().max(b.amax());
-    if size == 0.0 {
-        return 0.0;
-    }
-    pivots(pencil.transpose()).min() / size
+    pivots(pencil.transpose()).min()
 }
 
 /// The sizes of the pivots of a QR decomposition with column pivoting: they fall, and show the rank
@@ -182,6 +217,35 @@ mod tests {
             poles(&DMatrix::from_element(1, 1, 4.0)).unwrap(),
             vec![Complex::from(4.0)]
         );
+    }
+
+    #[test]
+    fn matrices_at_the_ends_of_the_numbers_have_poles() {
+        // Squares of these overflow or vanish: balancing once did not end.
+        for size in [1e-300, 1e-160, 1e160, 1e200, 1e307] {
+            let a = DMatrix::from_row_slice(2, 2, &[0.0, size, 0.25 * size, 0.0]);
+            let found = poles(&a).unwrap();
+            for (pole, expected) in found.iter().zip([-0.5, 0.5]) {
+                assert!((pole.re / size - expected).abs() < 1e-14, "{pole}");
+            }
+            let b = DMatrix::from_row_slice(2, 1, &[size, 0.0]);
+            assert_eq!(controllability_rank(&a, &b).unwrap(), 2, "{size}");
+        }
+        let spread = DMatrix::from_row_slice(2, 2, &[1.0, 1e200, 1e-100, 1.0]);
+        let found = poles(&spread).unwrap();
+        assert!((found[1].re / 1e50 - 1.0).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn poles_are_written_for_people() {
+        for (re, im, text) in [
+            (-51.801_508_841_443_706, 0.0, "-51.8015"),
+            (1.0, 0.0, "1"),
+            (-2.5, -1.25, "-2.5 - 1.25 i"),
+            (0.0, 3e-9, "0 + 3.00e-9 i"),
+        ] {
+            assert_eq!(pole_text(Complex::new(re, im)), text);
+        }
     }
 
     #[test]

@@ -15,8 +15,8 @@ mod standard;
 use nalgebra::{Complex, DMatrix};
 use thiserror::Error;
 
-use crate::matrix_check::MatrixError;
-use crate::modes::poles;
+use crate::matrix_check::{MatrixError, unit};
+use crate::modes::{pole_text, poles};
 use candidate::Candidate;
 use doubling::{Doubling, Stalled};
 use standard::Standard;
@@ -62,8 +62,9 @@ pub enum RiccatiError {
     Matrix(#[from] MatrixError),
     /// A mode that does not decay is out of reach of the inputs.
     #[error(
-        "(A, B) is not stabilisable: no input moves the mode with pole {pole}, \
-         which does not decay by itself"
+        "(A, B) is not stabilisable: no input moves the mode with pole {}, \
+         which does not decay by itself",
+        pole_text(*pole)
     )]
     NotStabilisable {
         /// The pole of A.
@@ -71,8 +72,9 @@ pub enum RiccatiError {
     },
     /// A mode that does not decay costs nothing, so the optimal input leaves it alone.
     #[error(
-        "(A, Q) is not detectable: the mode with pole {pole} does not decay by itself \
-         and Q gives it no cost"
+        "(A, Q) is not detectable: the mode with pole {} does not decay by itself \
+         and Q gives it no cost",
+        pole_text(*pole)
     )]
     NotDetectable {
         /// The pole of A.
@@ -80,15 +82,24 @@ pub enum RiccatiError {
     },
     /// The iteration stopped and no mode is to blame.
     #[error(
-        "no stabilising solution was found: {reason} (after {doublings} doubling steps). \
-         A pole of the optimal loop may lie on the stability limit, or the matrices may be scaled \
-         too far apart"
+        "no stabilising solution was found: {reason} (after {doublings} doubling steps). The \
+         largest entries are {largest_a:.0e} of A, {largest_b:.0e} of B, {largest_q:.0e} of Q and \
+         {largest_r:.0e} of R. If these are far apart, weights of similar cost and units of similar \
+         size will do; if not, a pole of the optimal loop may lie on the stability limit"
     )]
     NoConvergence {
         /// What went wrong.
         reason: &'static str,
         /// Doubling steps taken.
         doublings: usize,
+        /// The largest absolute value in A.
+        largest_a: f64,
+        /// The same in B.
+        largest_b: f64,
+        /// The same in Q.
+        largest_q: f64,
+        /// The same in R.
+        largest_r: f64,
     },
     /// The equation does not hold at the P that was found.
     #[error(
@@ -120,7 +131,10 @@ impl Time {
     /// Whether the mode of this pole of `matrix` decays.
     fn is_stable(self, pole: Complex<f64>, matrix: &DMatrix<f64>) -> bool {
         match self {
-            Self::Continuous => pole.re < -STABILITY_MARGIN * matrix.norm(),
+            Self::Continuous => {
+                let unit = unit(matrix);
+                pole.re / unit < -STABILITY_MARGIN * (matrix / unit).norm()
+            }
             Self::Discrete => pole.norm() < 1.0 - STABILITY_MARGIN,
         }
     }
@@ -162,11 +176,7 @@ fn solve(problem: &LqProblem<'_>, time: Time) -> Result<RiccatiSolution, Riccati
         .and_then(Doubling::run)
         .map_err(blame)?;
     let solution = Candidate::at(problem, time, p)
-        .ok_or(Stalled {
-            reason: "the input weight R + B'P B at the limit is not positive definite",
-            doublings,
-        })
-        .map_err(blame)?
+        .map_err(|reason| blame(Stalled { reason, doublings }))?
         .refined();
     let poles = poles(&solution.closed_loop)?;
     if !poles

@@ -4,4 +4,6 @@ mod frozen;
 mod rk4_step;
 
 pub use frozen::{FrozenError, FrozenStability, SchedulingGrid, frozen_stability};
-pub use rk4_step::{Rk4Step, Rk4StepError, accurate_rk4_substeps, check_rk4_step};
+pub use rk4_step::{
+    MOST_RK4_SUBSTEPS, Rk4Step, Rk4StepError, accurate_rk4_substeps, check_rk4_step,
+};

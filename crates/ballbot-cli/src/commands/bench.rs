@@ -1,14 +1,15 @@
 //! `ballbot bench`.
 
 use super::CommandError;
-use super::robot::RobotArguments;
+use super::robot::ScenarioOptions;
 use crate::benchmark::{self, GuardedTimes, SEQUENCES, SequenceTimes, Times};
+use crate::json;
 use crate::output;
 use crate::progress::Progress;
 use crate::table::Table;
 use clap::Args;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `ballbot bench`.
 #[derive(Debug, Args)]
@@ -23,10 +24,10 @@ loops of the built-in scenarios; and the guaranteed step against the plain one. 
 pub struct BenchArguments {
     /// A built-in scenario or a TOML file [default: four of the built-in ones]
     pub scenario: Option<String>,
-    /// The robot.
+    /// What it is changed by.
     #[command(flatten)]
-    pub robot: RobotArguments,
-    /// Write the times to this file as JSON, too
+    pub options: ScenarioOptions,
+    /// Write the times to this file as JSON, too; - for standard output, in place of the table
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
 }
@@ -40,20 +41,22 @@ pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
         Some(name) => vec![name.as_str()],
         None => SEQUENCES.to_vec(),
     };
+    let file = arguments.json.as_deref();
+    let file = file.filter(|path| *path != Path::new("-"));
+    file.map(output::check_writable).transpose()?;
     let progress = Progress::new("timing", names.len() + 1);
     let mut sequences: Vec<SequenceTimes> = Vec::with_capacity(names.len());
     for name in names {
-        sequences.push(benchmark::time(name, &arguments.robot.prepare(name)?)?);
+        sequences.push(benchmark::time(name, &arguments.options.prepare(name)?)?);
         progress.set(sequences.len());
     }
     let guarded = benchmark::time_guarded()?;
     progress.set(sequences.len() + 1);
-    if let Some(path) = &arguments.json {
-        let document = format!(
-            "{:#}\n",
-            json!({ "sequences": sequences, "guarded": guarded })
-        );
-        output::write_files(&[(path, document.as_bytes())])?;
+    let document = json::text(&json!({ "sequences": sequences, "guarded": guarded }));
+    match file {
+        Some(path) => output::write_files(&[(path, document.as_bytes())])?,
+        None if arguments.json.is_some() => return Ok(document),
+        None => {}
     }
     let mut table = Table::new([
         "times in us",

@@ -1,12 +1,12 @@
 //! `ballbot campaign`.
 
 use super::CommandError;
-use super::robot::RobotArguments;
+use super::robot::ScenarioOptions;
 use crate::campaign::{Campaign, Outcome, Record, Scenarios, drawing};
 use crate::commands::simulate::PNG_SCALE;
 use crate::json;
-use crate::output;
 use crate::pictures::limits;
+use crate::results::ResultFolder;
 use crate::table::Table;
 use clap::Args;
 use lpvmpc::Decision;
@@ -32,9 +32,9 @@ pub struct CampaignArguments {
     /// A built-in scenario or a TOML file with a certified terminal set
     #[arg(default_value = "far-setpoints")]
     pub scenario: String,
-    /// The robot.
+    /// What it is changed by.
     #[command(flatten)]
-    pub robot: RobotArguments,
+    pub options: ScenarioOptions,
     /// Closed loops of the nominal plant; a twentieth of them of every other variant
     #[arg(long, default_value = "10000", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub runs: u32,
@@ -45,15 +45,17 @@ pub struct CampaignArguments {
     #[arg(long, default_value = "1")]
     pub seed: u64,
     /// Threads, one per core if not given; the numbers do not depend on them
-    #[arg(long, default_value = "0", hide_default_value = true)]
-    pub threads: usize,
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "out/campaign")]
+    #[arg(short, long, value_name = "DIR", default_value = "out/campaign")]
     pub out: PathBuf,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
 }
+
+const RESULTS: [&str; 3] = ["campaign.csv", "campaign.svg", "campaign.png"];
 
 /// Runs the campaign and writes its results.
 ///
@@ -66,24 +68,21 @@ pub fn run(arguments: &CampaignArguments) -> Result<String, CommandError> {
         other_runs: (arguments.runs as usize).div_ceil(20),
         samples: arguments.samples as usize,
         seed: arguments.seed,
-        threads: arguments.threads,
+        // Zero is one per core.
+        threads: usize::from(arguments.threads.unwrap_or(0)),
     };
-    let scenarios = Scenarios::of(arguments.robot.prepare(&arguments.scenario)?)?;
+    let scenarios = Scenarios::of(arguments.options.prepare(&arguments.scenario)?)?;
+    let results = ResultFolder::open(&arguments.out, &RESULTS)?;
     let outcomes = campaign.run(&scenarios)?;
     let figure = drawing(&outcomes, limits(&scenarios.guaranteed).states[1]);
-    let paths = ["campaign.csv", "campaign.svg", "campaign.png"];
-    let paths = paths.map(|name| arguments.out.join(name));
     let contents = [
         csv(&outcomes).into_bytes(),
         figure.svg()?.into_bytes(),
         figure.png(PNG_SCALE)?,
     ];
-    let files: Vec<_> = paths.iter().zip(&contents).collect();
-    let files: Vec<_> = files
-        .iter()
-        .map(|(path, content)| (path.as_path(), content.as_slice()))
-        .collect();
-    output::write_files(&files)?;
+    let names = RESULTS.map(str::to_owned);
+    let files: Vec<_> = names.into_iter().zip(contents).collect();
+    results.write(&files, &[])?;
     let nominal = outcomes
         .iter()
         .filter(|outcome| outcome.variant.is_nominal());

@@ -1,20 +1,24 @@
 //! `ballbot certify`.
 
 use super::CommandError;
-use super::robot::RobotArguments;
+use super::robot::ScenarioOptions;
 use crate::arguments::positive;
 use crate::certificate_page;
-use crate::output;
+use crate::json;
 use crate::progress::Progress;
 use crate::proofs::{self, STEPS};
+use crate::results::ResultFolder;
 use crate::table::{Table, number};
 use ballbot_scenario::{Prepared, RobotTable, TerminalCertificate, TerminalTable};
 use clap::Args;
+use clap::builder::RangedU64ValueParser;
 use lpvmpc::Bounds;
 use lpvmpc_design::{
-    CertificateProblem, CertifyError, Effort, Proof, TerminalProblem, certify_terminal, raise_level,
+    CertificateProblem, CertifyError, Effort, MOST_BOXES, Proof, TerminalProblem, certify_terminal,
+    raise_level,
 };
 use nalgebra::{SVector, Vector2, Vector4};
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// Arguments of `ballbot certify`.
@@ -33,9 +37,9 @@ pub struct CertifyArguments {
     /// A built-in scenario or a TOML file: robot, sampling time, weights and bounds
     #[arg(default_value = "two-setpoints")]
     pub scenario: String,
-    /// The robot.
+    /// What it is changed by.
     #[command(flatten)]
-    pub robot: RobotArguments,
+    pub options: ScenarioOptions,
     /// Share of the bounds of tilt and tilt rate that the set may use; searched for if not given
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub size: Option<f64>,
@@ -47,14 +51,17 @@ pub struct CertifyArguments {
     #[arg(long, default_value = "0.15", value_parser = share)]
     pub contraction: f64,
     /// Boxes of states that one proof may look at
-    #[arg(long, default_value = "40000")]
+    #[arg(long, default_value = "40000", value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_BOXES as u64))]
     pub boxes: usize,
     /// Higher levels that are tried for the same K and P after the design, each a proof; 0 keeps
     /// the level
     #[arg(long, value_name = "TRIALS", default_value = "3", value_parser = clap::value_parser!(u8).range(0..=20))]
     pub raise: u8,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "out/certificate")]
+    #[arg(short, long, value_name = "DIR", default_value = "out/certificate")]
     pub out: PathBuf,
 }
 
@@ -77,13 +84,15 @@ type Certified = (TerminalCertificate, Proof<4>);
 /// # Errors
 /// The scenario is not valid, no set could be proved, or a file cannot be written.
 pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
-    let (mut scenario, folder) = arguments.robot.load(&arguments.scenario)?;
+    let (mut scenario, folder) = arguments.options.load(&arguments.scenario)?;
     // Its certificate, where it has one, is about to be replaced.
     if let TerminalTable::Certified(_) = scenario.controller.terminal {
         scenario.controller.terminal = TerminalTable::DiscreteRiccati;
     }
     let prepared = scenario.prepare(folder.as_path())?;
     let robot = RobotTable::try_from(&prepared.ballbot)?;
+    let names = ["certificate.json", "certificate.html"];
+    let results = ResultFolder::open(&arguments.out, &names)?;
     let (size, certified) = match arguments.size {
         Some(size) => (size, certify(arguments, &prepared, robot, size)?),
         None => search(arguments, &prepared, robot)?,
@@ -92,8 +101,15 @@ pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
     proofs::remember(&certificate);
     let json = certificate.to_json()?;
     let page = certificate_page::html(&prepared.title, &certificate, &proof)?;
-    let paths = ["certificate.json", "certificate.html"].map(|name| arguments.out.join(name));
-    output::write_files(&[(&paths[0], json.as_bytes()), (&paths[1], page.as_bytes())])?;
+    let contents = [json.into_bytes(), page.into_bytes()];
+    let files: Vec<_> = names.map(str::to_owned).into_iter().zip(contents).collect();
+    results.write(&files, &[])?;
+    let paths = names.map(|name| arguments.out.join(name));
+    if arguments.json {
+        let mut document = document(&certificate, &proof);
+        document["files"] = json!(paths);
+        return Ok(json::text(&document));
+    }
     Ok(format!(
         "{}\nwrote {} and {}\n",
         summary(&certificate, &proof),
@@ -110,13 +126,17 @@ fn search(
     prepared: &Prepared,
     robot: RobotTable,
 ) -> Result<(f64, Certified), CommandError> {
+    let progress = Progress::new("designing sets", SIZES);
     let sizes = (1..=SIZES).map(|i| i as f64 / SIZES as f64);
     let designed: Vec<(f64, f64)> = sizes
-        .map(|size| {
+        .enumerate()
+        .map(|(done, size)| {
+            progress.set(done);
             let design = problem(arguments, prepared, size).design(&robot.ballbot());
             (size, design.map_or(f64::NEG_INFINITY, |set| set.log_det()))
         })
         .collect();
+    drop(progress);
     let mut largest = 0;
     for (i, (_, volume)) in designed.iter().enumerate() {
         if *volume > designed[largest].1 {
@@ -179,7 +199,8 @@ fn certify(
     size: f64,
 ) -> Result<Certified, CertifyError> {
     let problem = problem(arguments, prepared, size);
-    let progress = Progress::new("proving", STEPS);
+    let what = format!("proving a set of {size:.3} of the bounds");
+    let progress = Progress::new(what, STEPS);
     certify_terminal(
         (&robot.ballbot(), robot),
         &problem,
@@ -268,6 +289,27 @@ pub(super) fn summary(certificate: &TerminalCertificate, proof: &Proof<4>) -> St
         proof.boxes,
         proof.scheduling_boxes,
     )
+}
+
+/// The same for other programs.
+pub(super) fn document(certificate: &TerminalCertificate, proof: &Proof<4>) -> Value {
+    let terminal = &certificate.terminal;
+    let rows = terminal.p.row_iter();
+    let p: Vec<Vec<f64>> = rows.map(|row| row.iter().copied().collect()).collect();
+    json!({
+        "holds": true,
+        "t_s": certificate.t_s,
+        "k": terminal.k.as_slice(),
+        "p": p,
+        "level": terminal.level,
+        "contraction": terminal.contraction,
+        "rate_1_s": certificate.continuous.rate_1_s,
+        "scheduling_limits": certificate.scheduling_limits.as_slice(),
+        "largest_states_at_samples": semi_axes(certificate),
+        "largest_states_between_samples": proof.reach.as_slice(),
+        "boxes": proof.boxes,
+        "scheduling_boxes": proof.scheduling_boxes,
+    })
 }
 
 /// The largest |x_i| in the set.

@@ -35,7 +35,7 @@ pub struct ExciteArguments {
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 2, value_parser = positive, default_values_t = [0.2, 6.0])]
     pub band: Vec<f64>,
     /// Number of harmonics
-    #[arg(long, default_value_t = 15)]
+    #[arg(long, default_value_t = 15, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=10_000))]
     pub harmonics: usize,
     /// Largest torque of the excitation, N m
     #[arg(long, value_parser = positive, default_value_t = 1.0)]

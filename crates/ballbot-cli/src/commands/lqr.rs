@@ -10,7 +10,7 @@ use ballbot::limits;
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use lpvmpc::Rk4;
-use lpvmpc_design::accurate_rk4_substeps;
+use lpvmpc_design::{MOST_RK4_SUBSTEPS, accurate_rk4_substeps};
 use serde_json::{Value, json};
 
 /// Arguments of `ballbot lqr`.
@@ -40,7 +40,7 @@ pub struct LqrArguments {
     #[arg(long, value_name = "SECONDS", default_value = "0.05", value_parser = positive)]
     pub ts: f64,
     /// Runge-Kutta steps per sample [default: as in a scenario, by the fastest pole]
-    #[arg(long, value_parser = RangedU64ValueParser::<usize>::new().range(1..=100_000))]
+    #[arg(long, value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_RK4_SUBSTEPS as u64))]
     pub substeps: Option<usize>,
     /// Design in continuous time: P is then about t_s times that of sampled time
     #[arg(long, conflicts_with_all = ["ts", "substeps"])]

@@ -110,7 +110,7 @@ pub enum CommandError {
     },
     /// Published numbers that were not reproduced.
     #[error(
-        "{differing} of the published statements do not agree:\n{table}\nsee {}",
+        "{differing} of the statements do not agree:\n{table}\nsee {}",
         report.display()
     )]
     Disagreement {

@@ -7,7 +7,7 @@ use crate::optimality::{
     Case, CostOverDistance, Outcome, cost_over_distance, distances, guaranteed_cost, long_horizon,
     quantile, random_starts, run_all,
 };
-use crate::output;
+use crate::results::ResultFolder;
 use crate::table::Table;
 use clap::Args;
 use rayon::prelude::*;
@@ -31,18 +31,27 @@ pub struct OptimalityArguments {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub programs: Option<u32>,
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "out/optimality")]
+    #[arg(short, long, value_name = "DIR", default_value = "out/optimality")]
     pub out: PathBuf,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
 }
 
+const RESULTS: [&str; 5] = [
+    "optimality.csv",
+    "cost-over-distance.svg",
+    "cost-over-distance.png",
+    "long-horizon.svg",
+    "long-horizon.png",
+];
+
 /// Runs the cases and writes the results.
 ///
 /// # Errors
 /// A file cannot be written.
 pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
+    let results = ResultFolder::open(&arguments.out, &RESULTS)?;
     let programs = arguments.programs.map(|programs| programs as usize);
     let sets = [
         ("from rest", distances()?),
@@ -77,19 +86,25 @@ pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
         }
     }
     contents.push(("optimality.csv", rows.into_bytes()));
-    let files: Vec<_> = contents
-        .iter()
-        .map(|(name, content)| (arguments.out.join(name), content))
-        .collect();
+    let files = contents.into_iter();
     let files: Vec<_> = files
-        .iter()
-        .map(|(path, content)| (path.as_path(), content.as_slice()))
+        .map(|(name, content)| (name.to_owned(), content))
         .collect();
-    output::write_files(&files)?;
+    results.write(&files, &RESULTS)?;
     if arguments.json {
         return Ok(json::text(&json!({ "sets": documents })));
     }
-    Ok(format!("{table}written to {}\n", arguments.out.display()))
+    let durations = || {
+        sets.iter()
+            .flat_map(|(_, cases)| cases)
+            .map(|case| case.duration)
+    };
+    Ok(format!(
+        "{table}costs over each whole run, {} s to {} s\nwritten to {}\n",
+        durations().fold(f64::INFINITY, f64::min),
+        durations().fold(0.0, f64::max),
+        arguments.out.display()
+    ))
 }
 
 /// Figures of the cases from rest.

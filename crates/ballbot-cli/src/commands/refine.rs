@@ -9,7 +9,7 @@ use clap::Args;
 use lpvmpc_design::Fit;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `ballbot refine`.
 #[derive(Debug, Args)]
@@ -33,8 +33,9 @@ pub struct RefineArguments {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
-    /// Write b and the geometry to this file as a `[parameters]` table
-    #[arg(short, long, value_name = "FILE.toml")]
+    /// Write b and the geometry to this file as a `[parameters]` table; - for standard output, in
+    /// place of the report
+    #[arg(short, long = "out", alias = "output", value_name = "FILE.toml")]
     pub output: Option<PathBuf>,
 }
 
@@ -50,10 +51,15 @@ pub fn run(arguments: &RefineArguments) -> Result<String, CommandError> {
         Some(path) => refinement_file::read(path)?,
         None => RefinementProblem::paper(),
     };
+    let output = arguments.output.as_deref();
+    let file = output.filter(|path| *path != Path::new("-"));
+    file.map(output::check_writable).transpose()?;
     let refinement = problem.solve()?;
-    if let Some(path) = &arguments.output {
-        let table = parameters_toml(&refinement);
-        output::write_files(&[(path, table.as_bytes())])?;
+    let table = parameters_toml(&refinement);
+    match file {
+        Some(path) => output::write_files(&[(path, table.as_bytes())])?,
+        None if output.is_some() => return Ok(table),
+        None => {}
     }
     Ok(if arguments.json {
         json::text(&document(&refinement))

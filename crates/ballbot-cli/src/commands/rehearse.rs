@@ -3,12 +3,16 @@
 use super::CommandError;
 use super::simulate::{self, Simulated};
 use crate::arguments::{Arguments, Command};
+use crate::json;
 use crate::output;
+use crate::recording;
 use crate::table::{Table, number};
 use ballbot::Ballbot;
 use ballbot_scenario::{Parameters, PhiReference, Plane};
 use clap::{Args, Parser};
 use lpvmpc_sim::Trajectory;
+use serde::Serialize;
+use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -26,8 +30,11 @@ files (robot, drawing, scenarios) are written to the folder first. Those that ar
 kept: change them and rehearse again.")]
 pub struct RehearseArguments {
     /// Folder for files and results
-    #[arg(long, value_name = "DIR", default_value = "out/rehearsal")]
+    #[arg(short, long, value_name = "DIR", default_value = "out/rehearsal")]
     pub out: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 macro_rules! file {
@@ -114,7 +121,10 @@ pub fn run(arguments: &RehearseArguments) -> Result<String, CommandError> {
                 runs.push(run);
                 said
             }
-            command => crate::run(Arguments { command })?,
+            command => crate::run(Arguments {
+                command,
+                quiet: false,
+            })?,
         };
         let _ = writeln!(text, "\n{said}");
     }
@@ -122,7 +132,15 @@ pub fn run(arguments: &RehearseArguments) -> Result<String, CommandError> {
         robot(folder, "true-robot.toml")?,
         robot(folder, "identification/parameters.toml")?,
     ];
-    Ok(text + &parameters(&robots).to_string() + &errors(&runs).to_string())
+    let parameters = parameters(&robots);
+    let errors: Vec<Error> = runs.iter().map(Error::of).collect();
+    if arguments.json {
+        let parameter = |(name, real, found): &(&str, f64, f64)| json!({ "name": name, "true": real, "identified": found });
+        let parameters: Vec<Value> = parameters.iter().map(parameter).collect();
+        let document = json!({ "folder": folder, "parameters": parameters, "runs": errors });
+        return Ok(json::text(&document));
+    }
+    Ok(text + &parameter_table(&parameters).to_string() + &error_table(&errors).to_string())
 }
 
 fn robot(folder: &Path, name: &str) -> Result<Ballbot<f64>, CommandError> {
@@ -131,10 +149,9 @@ fn robot(folder: &Path, name: &str) -> Result<Ballbot<f64>, CommandError> {
 }
 
 /// What there is beside what was found.
-fn parameters([real, found]: &[Ballbot<f64>; 2]) -> Table {
-    let mut table = Table::new(["parameter", "true", "identified", "off by"]);
+fn parameters([real, found]: &[Ballbot<f64>; 2]) -> [(&'static str, f64, f64); 7] {
     let gain = |robot: &Ballbot<f64>| robot.geometry.ball_radius / robot.geometry.wheel_radius;
-    let rows: [(&str, f64, f64); 7] = [
+    [
         ("b1 [m^2]", real.b1, found.b1),
         ("b2 [m^2]", real.b2, found.b2),
         ("b3 [m^2]", real.b3, found.b3),
@@ -150,8 +167,12 @@ fn parameters([real, found]: &[Ballbot<f64>; 2]) -> Table {
             found.drive.coulomb,
         ),
         ("torque to ball [1/kg]", gain(real), gain(found)),
-    ];
-    for (name, real, found) in rows {
+    ]
+}
+
+fn parameter_table(parameters: &[(&str, f64, f64)]) -> Table {
+    let mut table = Table::new(["parameter", "true", "identified", "off by"]);
+    for &(name, real, found) in parameters {
         let off = 100.0 * (found / real - 1.0);
         let off = if off.is_finite() {
             format!("{off:.1} %")
@@ -164,39 +185,69 @@ fn parameters([real, found]: &[Ballbot<f64>; 2]) -> Table {
 }
 
 /// How far the controlled robot was from where it should be.
-fn errors(runs: &[Simulated]) -> Table {
-    let mut table = Table::new(["run", "rms distance [mm]", "largest tilt [rad]"]);
-    for run in runs {
+#[derive(Debug, Serialize)]
+struct Error {
+    run: String,
+    /// The time that the distance is taken over, s: during a move if the reference is one, else the
+    /// run.
+    from_s: f64,
+    until_s: f64,
+    rms_distance_mm: f64,
+    largest_tilt_rad: f64,
+}
+
+impl Error {
+    fn of(run: &Simulated) -> Self {
         let planes = || run.prepared.planes.iter().zip(&run.trajectories);
-        let squares = planes().map(|(plane, trajectory)| mean_square(plane, trajectory));
-        let distance = run
-            .prepared
-            .ballbot
-            .geometry
-            .position(squares.sum::<f64>().sqrt());
+        let end = run.prepared.samples as f64 * run.prepared.settings.t_s;
+        // The planes of a run have references of one kind.
+        let [from_s, until_s] = window(run.prepared.planes.first(), end);
+        let squares = planes().map(|(_, trajectory)| mean_square(trajectory, [from_s, until_s]));
+        let geometry = &run.prepared.ballbot.geometry;
+        let distance = geometry.position(squares.sum::<f64>().sqrt());
         let tilts = planes().flat_map(|(_, trajectory)| trajectory.states());
-        let tilt = tilts.fold(0.0_f64, |most, x| most.max(x[1].abs()));
+        Self {
+            run: run.prepared.title.clone(),
+            from_s,
+            until_s,
+            rms_distance_mm: 1000.0 * distance,
+            largest_tilt_rad: tilts.fold(0.0_f64, |most, x| most.max(x[1].abs())),
+        }
+    }
+}
+
+fn error_table(errors: &[Error]) -> Table {
+    let mut table = Table::new(["run", "rms distance [mm]", "over [s]", "largest tilt [rad]"]);
+    for error in errors {
         table.row([
-            run.prepared.title.clone(),
-            format!("{:.1}", 1000.0 * distance),
-            format!("{tilt:.3}"),
+            error.run.clone(),
+            format!("{:.1}", error.rms_distance_mm),
+            format!(
+                "{} to {}",
+                recording::time(error.from_s),
+                recording::time(error.until_s)
+            ),
+            format!("{:.3}", error.largest_tilt_rad),
         ]);
     }
     table
 }
 
-/// Mean square of phi - phi_ref, rad^2: during a move if the reference is one, else over the run.
-fn mean_square(plane: &Plane, trajectory: &Trajectory<4, 1>) -> f64 {
-    let (from, until) = match &plane.reference {
-        PhiReference::MinimumJerk(points) => {
-            let time = |point: Option<&ballbot_scenario::PointTable>| point.map(|p| p.time_s);
-            (time(points.first()), time(points.last()))
-        }
-        _ => (None, None),
-    };
-    let samples = trajectory.samples.iter().filter(|sample| {
-        from.is_none_or(|from| sample.t >= from) && until.is_none_or(|until| sample.t <= until)
-    });
+/// The time of the plane's move, else of the whole run up to `end`, s.
+fn window(plane: Option<&Plane>, end: f64) -> [f64; 2] {
+    match plane.map(|plane| &plane.reference) {
+        Some(PhiReference::MinimumJerk(points)) => match (points.first(), points.last()) {
+            (Some(first), Some(last)) => [first.time_s, last.time_s],
+            _ => [0.0, end],
+        },
+        _ => [0.0, end],
+    }
+}
+
+/// Mean square of phi - phi_ref in a time window, rad^2.
+fn mean_square(trajectory: &Trajectory<4, 1>, [from, until]: [f64; 2]) -> f64 {
+    let samples = trajectory.samples.iter();
+    let samples = samples.filter(|sample| sample.t >= from && sample.t <= until);
     let errors: Vec<f64> = samples
         .map(|sample| sample.x[0] - sample.x_ref[0])
         .collect();

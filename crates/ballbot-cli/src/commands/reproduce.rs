@@ -3,14 +3,14 @@
 use super::CommandError;
 use super::simulate::PNG_SCALE;
 use crate::html::Drawing;
-use crate::output;
 use crate::recording;
 use crate::reproduction::claims::{self, Claim};
 use crate::reproduction::tables::Sheet;
 use crate::reproduction::{Reproduction, report};
+use crate::results::ResultFolder;
 use clap::Args;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `ballbot reproduce`.
 #[derive(Debug, Args)]
@@ -20,11 +20,12 @@ Examples:
   ballbot reproduce --out results
 
 Writes report.html (one self-contained file), every figure as SVG and PNG, every table and
-trajectory as CSV, and summary.json. Exits with 0 only if every published number agrees with the
-computed one within its stated tolerance.")]
+trajectory as CSV, and summary.json. Exits with 0 only if every number that is to be met agrees
+with the computed one within its stated tolerance; the column `source` says whether the paper prints
+it, says it in words (the number is then ours), or it is a check of our own.")]
 pub struct ReproduceArguments {
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "out/reproduction")]
+    #[arg(short, long, value_name = "DIR", default_value = "out/reproduction")]
     pub out: PathBuf,
 }
 
@@ -33,19 +34,20 @@ pub struct ReproduceArguments {
 /// # Errors
 /// A file cannot be written, or a published number does not agree.
 pub fn run(arguments: &ReproduceArguments) -> Result<String, CommandError> {
+    let results = ResultFolder::open(&arguments.out, &["report.html", "summary.json"])?;
     let reproduction = Reproduction::compute()?;
     let claims = reproduction.claims();
     let sheets = reproduction.sheets(&claims);
     let drawings = reproduction.drawings();
-    write(&arguments.out, &reproduction, &claims, &sheets, &drawings)?;
+    write(&results, &reproduction, &claims, &sheets, &drawings)?;
 
     let table = claims::table(&claims);
     let differing = claims.iter().filter(|claim| !claim.agrees()).count();
     let place = arguments.out.join("report.html");
     if differing == 0 {
         Ok(format!(
-            "{table}\nall {} agree; see {}\n",
-            claims.len(),
+            "{table}\n{}; see {}\n",
+            claims::counts(&claims),
             place.display()
         ))
     } else {
@@ -58,26 +60,23 @@ pub fn run(arguments: &ReproduceArguments) -> Result<String, CommandError> {
 }
 
 fn write(
-    folder: &Path,
+    results: &ResultFolder,
     reproduction: &Reproduction,
     claims: &[Claim],
     sheets: &[Sheet],
     drawings: &[Drawing],
 ) -> Result<(), CommandError> {
     let machine = machine();
-    let mut files: Vec<(PathBuf, Vec<u8>)> = Vec::new();
+    let mut files: Vec<(String, Vec<u8>)> = Vec::new();
     let guarantee = &reproduction.guarantee;
     for drawing in drawings.iter().chain([&guarantee.drawing()]) {
-        let path = folder.join("figures").join(drawing.name);
-        files.push((
-            path.with_extension("svg"),
-            drawing.figure.svg()?.into_bytes(),
-        ));
-        files.push((path.with_extension("png"), drawing.figure.png(PNG_SCALE)?));
+        let stem = format!("figures/{}", drawing.name);
+        files.push((format!("{stem}.svg"), drawing.figure.svg()?.into_bytes()));
+        files.push((format!("{stem}.png"), drawing.figure.png(PNG_SCALE)?));
     }
     for sheet in sheets.iter().chain(&guarantee.sheets()) {
-        let path = folder.join("tables").join(sheet.name).with_extension("csv");
-        files.push((path, sheet.csv().into_bytes()));
+        let name = format!("tables/{}.csv", sheet.name);
+        files.push((name, sheet.csv().into_bytes()));
     }
     for run in reproduction.runs.all() {
         let planes: &[&str] = if run.trajectories.len() == 1 {
@@ -86,24 +85,17 @@ fn write(
             &["-x", "-y"]
         };
         for (plane, trajectory) in planes.iter().zip(&run.trajectories) {
-            let name = format!("{}{plane}.csv", run.name);
+            let name = format!("trajectories/{}{plane}.csv", run.name);
             let text = recording::trajectory_csv(trajectory);
-            files.push((folder.join("trajectories").join(name), text.into_bytes()));
+            files.push((name, text.into_bytes()));
         }
     }
     let summary = summary(reproduction, claims, &machine);
-    files.push((
-        folder.join("summary.json"),
-        format!("{summary:#}\n").into_bytes(),
-    ));
+    let summary = format!("{summary:#}\n");
+    files.push(("summary.json".to_owned(), summary.into_bytes()));
     let report = report::html(reproduction, claims, sheets, drawings, &machine)?;
-    files.push((folder.join("report.html"), report.into_bytes()));
-    let files: Vec<(&Path, &[u8])> = files
-        .iter()
-        .map(|(path, content)| (path.as_path(), content.as_slice()))
-        .collect();
-    output::write_files(&files)?;
-    Ok(())
+    files.push(("report.html".to_owned(), report.into_bytes()));
+    Ok(results.write(&files, &[])?)
 }
 
 fn summary(reproduction: &Reproduction, claims: &[Claim], machine: &str) -> serde_json::Value {
@@ -114,6 +106,7 @@ fn summary(reproduction: &Reproduction, claims: &[Claim], machine: &str) -> serd
             json!({
                 "place": claim.place,
                 "quantity": claim.quantity,
+                "source": claim.source,
                 "published": claim.published,
                 "computed": claim.computed,
                 "difference": claim.difference(),

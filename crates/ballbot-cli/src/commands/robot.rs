@@ -1,4 +1,4 @@
-//! Which robot: the option that all commands with a robot have.
+//! Which robot, and which scenario: the options that all commands with one have.
 
 use super::CommandError;
 use crate::proofs::ProvedFiles;
@@ -30,8 +30,32 @@ impl RobotArguments {
             None => Ok(Ballbot::paper()),
         }
     }
+}
 
-    /// A built-in scenario or a scenario file with this robot, checked. Files that it names are
+/// What a scenario is changed by.
+#[derive(Debug, Default, Args)]
+pub struct ScenarioOptions {
+    /// The robot.
+    #[command(flatten)]
+    pub robot: RobotArguments,
+    /// Set a key of the scenario, in place of what its file says; may be given more than once
+    #[arg(long, value_name = "KEY=VALUE", value_parser = assignment)]
+    pub set: Vec<(String, String)>,
+}
+
+fn assignment(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.trim().is_empty() => {
+            Ok((key.trim().to_owned(), value.trim().to_owned()))
+        }
+        _ => Err(format!(
+            "`{text}` is not KEY=VALUE, such as controller.t_s=0.04"
+        )),
+    }
+}
+
+impl ScenarioOptions {
+    /// A built-in scenario or a scenario file with these options, checked. Files that it names are
     /// looked for beside it; a certificate among them is proved, the first time.
     ///
     /// # Errors
@@ -42,13 +66,13 @@ impl RobotArguments {
         Ok(loaded.prepare(files)?)
     }
 
-    /// A scenario with this robot, and the folder for files that it names; not checked yet.
+    /// A scenario with these options, and the folder for files that it names; not checked yet.
     ///
     /// # Errors
-    /// The scenario cannot be read.
+    /// The scenario cannot be read, or a key of it cannot be set.
     pub fn load(&self, scenario: &str) -> Result<(Scenario, PathBuf), CommandError> {
-        let mut loaded = Scenario::load(scenario)?;
-        if let Some(path) = &self.parameters {
+        let mut loaded = Scenario::load_with(scenario, &self.set)?;
+        if let Some(path) = &self.robot.parameters {
             // Relative to where the command was given, not to the scenario.
             let path = std::path::absolute(path).unwrap_or_else(|_| path.clone());
             loaded.parameters = Parameters::File(path);

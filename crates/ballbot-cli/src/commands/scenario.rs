@@ -1,9 +1,11 @@
 //! `ballbot scenario`.
 
 use super::CommandError;
+use crate::json;
 use crate::table::Table;
 use ballbot_scenario::{Scenario, ScenarioError, builtin};
 use clap::{Args, Subcommand};
+use serde_json::{Value, json};
 
 /// Arguments of `ballbot scenario`.
 #[derive(Debug, Args)]
@@ -20,7 +22,11 @@ pub struct ScenarioArguments {
 #[derive(Debug, Subcommand)]
 enum Action {
     /// List the built-in scenarios
-    List,
+    List {
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
     /// Print a built-in scenario as commented TOML
     Show {
         /// Its name
@@ -34,13 +40,18 @@ enum Action {
 /// An unknown name.
 pub fn run(arguments: &ScenarioArguments) -> Result<String, CommandError> {
     match &arguments.action {
-        Action::List => {
+        Action::List { json } => {
             let mut table = Table::new(["name", "title"]);
+            let mut documents = Vec::new();
             for builtin in builtin::ALL {
-                let scenario = Scenario::parse(builtin.text, builtin.name)?;
-                table.row([builtin.name.to_owned(), scenario.title]);
+                let title = Scenario::parse(builtin.text, builtin.name)?.title;
+                documents.push(json!({ "name": builtin.name, "title": title }));
+                table.row([builtin.name.to_owned(), title]);
             }
-            Ok(table.to_string())
+            Ok(match json {
+                true => json::text(&Value::Array(documents)),
+                false => table.to_string(),
+            })
         }
         Action::Show { name } => match builtin::find(name) {
             Some(builtin) => Ok(builtin.text.to_owned()),

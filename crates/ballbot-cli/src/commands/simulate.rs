@@ -1,16 +1,19 @@
 //! `ballbot simulate`.
 
 use super::CommandError;
-use super::robot::RobotArguments;
+use super::robot::ScenarioOptions;
 use crate::figures::{Figure, Role};
-use crate::output;
+use crate::json;
+use crate::output::{self, FileError};
 use crate::pictures::{self, Shown};
 use crate::progress::Progress;
 use crate::recording::{self, Columns, Metrics};
+use crate::results::ResultFolder;
 use crate::table::Table;
 use ballbot_scenario::{MotorSample, Prepared, Record, Surroundings, words};
 use clap::Args;
 use lpvmpc_sim::{Ending, LogRow, Trajectory};
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -21,19 +24,24 @@ Examples:
   ballbot simulate two-setpoints
   ballbot simulate lissajous --out results
   ballbot simulate my.toml               a file made by `ballbot scenario show NAME`
+  ballbot simulate two-setpoints --set controller.horizon=30 --set bounds.torque_nm.1=1.0
 
 Writes trajectory.csv (for two planes trajectory_x.csv, trajectory_y.csv and motors.csv) and a
-figure as SVG and PNG, in place of those of an earlier run in the same folder. --log adds what the
+figure as SVG and PNG, in place of those of an earlier run in the same folder; other files are not
+touched, .ballbot-files says which are the program's. --log adds what the
 sensors of `[world]` delivered. A run that ends early keeps what it recorded, and exits with 1.")]
 pub struct SimulateArguments {
     /// A built-in scenario or a TOML file
     pub scenario: String,
-    /// The robot.
+    /// What it is changed by.
     #[command(flatten)]
-    pub robot: RobotArguments,
+    pub options: ScenarioOptions,
     /// Folder for the results [default: out/SCENARIO]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
     /// Write what the robot's sensors delivered, as CSV; for two planes FILE-x and FILE-y
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
@@ -44,7 +52,11 @@ pub struct SimulateArguments {
 /// # Errors
 /// The scenario is not valid, a file cannot be written, or the run ended early.
 pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
-    Ok(complete(arguments)?.summary)
+    let simulated = complete(arguments)?;
+    Ok(match arguments.json {
+        true => json::text(&simulated.document),
+        false => simulated.summary,
+    })
 }
 
 /// A run that came to its end.
@@ -56,6 +68,8 @@ pub struct Simulated {
     pub trajectories: Vec<Trajectory<4, 1>>,
     /// Its numbers, for people.
     pub summary: String,
+    /// The same for other programs.
+    pub document: Value,
 }
 
 /// [`run`] with all that is known of it.
@@ -63,25 +77,45 @@ pub struct Simulated {
 /// # Errors
 /// As [`run`].
 pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError> {
-    let prepared = arguments.robot.prepare(&arguments.scenario)?;
+    let prepared = arguments.options.prepare(&arguments.scenario)?;
     let file = Path::new(&arguments.scenario);
     let name = file.file_stem().unwrap_or(file.as_os_str());
     let folder = match &arguments.out {
         Some(folder) => folder.clone(),
         None => Path::new("out").join(name),
     };
+    let folder = ResultFolder::open(&folder, &RESULTS)?;
+    let logs = match &arguments.log {
+        Some(path) => log_paths(path, prepared.planes.len()),
+        None => Vec::new(),
+    };
+    logs.iter()
+        .try_for_each(|path| output::check_writable(path))?;
     let Record { planes, motors } = record(&prepared)?;
-    let (trajectories, logs): (Vec<_>, Vec<_>) = planes
+    let (trajectories, rows): (Vec<_>, Vec<_>) = planes
         .into_iter()
         .map(|recording| (recording.trajectory, recording.log))
         .unzip();
     let motors = motors.unwrap_or_else(|| motors_of_planes(&prepared, &trajectories));
     write(&folder, &prepared, &trajectories, &motors)?;
-    if let Some(path) = &arguments.log {
-        write_logs(path, &logs)?;
-    }
+    write_logs(&logs, &rows)?;
 
-    let summary = summary(&prepared, &trajectories, &folder);
+    let metrics: Vec<Metrics> = prepared
+        .planes
+        .iter()
+        .zip(&trajectories)
+        .map(|(plane, run)| Metrics::new(&prepared, plane, run))
+        .collect();
+    let summary = summary(&prepared, &metrics, folder.path());
+    let document = json!({
+        "title": prepared.title,
+        "samples": prepared.samples,
+        "t_s": prepared.settings.t_s,
+        // All sums, means and largest values are over this time, from 0 s on.
+        "window_s": prepared.samples as f64 * prepared.settings.t_s,
+        "planes": metrics,
+        "folder": folder.path(),
+    });
     let runs = match trajectories.len() {
         1 => ["run", ""],
         _ => ["run of the x plane", "run of the y plane"],
@@ -95,12 +129,13 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
             prepared,
             trajectories,
             summary,
+            document,
         }),
         Some((what, run)) => Err(CommandError::EndedEarly {
             what,
             ending: words::ending(&run.ending),
             state: run.final_state.into(),
-            folder,
+            folder: folder.path().to_owned(),
         }),
     }
 }
@@ -133,20 +168,23 @@ fn motors_of_planes(prepared: &Prepared, trajectories: &[Trajectory<4, 1>]) -> V
     samples.collect()
 }
 
-/// Writes one log per plane.
-fn write_logs(path: &Path, logs: &[Vec<LogRow<4, 1>>]) -> Result<(), CommandError> {
-    let paths = match logs.len() {
+/// The files of the planes' logs.
+fn log_paths(path: &Path, planes: usize) -> Vec<PathBuf> {
+    match planes {
         1 => vec![path.to_owned()],
         _ => ["x", "y"].map(|plane| with_suffix(path, plane)).to_vec(),
-    };
+    }
+}
+
+/// Writes one log per plane to each of the paths.
+fn write_logs(paths: &[PathBuf], logs: &[Vec<LogRow<4, 1>>]) -> Result<(), FileError> {
     let texts: Vec<String> = logs.iter().map(|log| recording::log_csv(log)).collect();
     let files: Vec<(&Path, &[u8])> = paths
         .iter()
         .zip(&texts)
         .map(|(path, text)| (path.as_path(), text.as_bytes()))
         .collect();
-    output::write_files(&files)?;
-    Ok(())
+    output::write_files(&files)
 }
 
 /// `log.csv` and `x` make `log-x.csv`.
@@ -170,41 +208,28 @@ fn file_names(planes: usize) -> &'static [&'static str] {
 }
 
 fn write(
-    folder: &Path,
+    folder: &ResultFolder,
     prepared: &Prepared,
     trajectories: &[Trajectory<4, 1>],
     motors: &[MotorSample],
 ) -> Result<(), CommandError> {
-    let mut files: Vec<(PathBuf, Vec<u8>)> = file_names(trajectories.len())
+    let mut files: Vec<(String, Vec<u8>)> = file_names(trajectories.len())
         .iter()
         .zip(trajectories)
         .map(|(name, run)| {
-            (
-                folder.join(name),
-                recording::trajectory_csv(run).into_bytes(),
-            )
+            let text = recording::trajectory_csv(run);
+            ((*name).to_owned(), text.into_bytes())
         })
         .collect();
     if trajectories.len() == 2 {
         let text = recording::motors_csv(motors);
-        files.push((folder.join("motors.csv"), text.into_bytes()));
+        files.push(("motors.csv".to_owned(), text.into_bytes()));
     }
     for (name, figure) in figures(prepared, trajectories, motors) {
-        files.push((
-            folder.join(format!("{name}.svg")),
-            figure.svg()?.into_bytes(),
-        ));
-        files.push((folder.join(format!("{name}.png")), figure.png(PNG_SCALE)?));
+        files.push((format!("{name}.svg"), figure.svg()?.into_bytes()));
+        files.push((format!("{name}.png"), figure.png(PNG_SCALE)?));
     }
-    let files: Vec<(&Path, &[u8])> = files
-        .iter()
-        .map(|(path, content)| (path.as_path(), content.as_slice()))
-        .collect();
-    output::write_files(&files)?;
-    // What an earlier run of another kind left in the folder would be taken for this one's.
-    let written = |name: &str| files.iter().any(|(path, _)| path.ends_with(name));
-    let stale = RESULTS.into_iter().filter(|name| !written(name));
-    Ok(output::remove_files(stale.map(|name| folder.join(name)))?)
+    Ok(folder.write(&files, &RESULTS)?)
 }
 
 /// All files that a run can leave in its folder.
@@ -271,20 +296,14 @@ pub const PNG_SCALE: f64 = 2.0;
 /// A line of the summary: its name, and the metric as text.
 type Line = (&'static str, fn(&Metrics) -> String);
 
-fn summary(prepared: &Prepared, trajectories: &[Trajectory<4, 1>], folder: &Path) -> String {
-    let planes: &[&str] = if trajectories.len() == 1 {
+fn summary(prepared: &Prepared, metrics: &[Metrics], folder: &Path) -> String {
+    let planes: &[&str] = if metrics.len() == 1 {
         &["value"]
     } else {
         &["x plane", "y plane"]
     };
     let mut table = Table::new(std::iter::once("").chain(planes.iter().copied()));
-    let metrics: Vec<Metrics> = prepared
-        .planes
-        .iter()
-        .zip(trajectories)
-        .map(|(plane, run)| Metrics::new(prepared, plane, run))
-        .collect();
-    let rows: [Line; 9] = [
+    let rows: [Line; 10] = [
         ("largest tilt [rad]", |m| {
             format!("{:.4}", m.largest_tilt_rad)
         }),
@@ -297,6 +316,7 @@ fn summary(prepared: &Prepared, trajectories: &[Trajectory<4, 1>], folder: &Path
         ("tracking error, largest [rad]", |m| {
             format!("{:.4}", m.largest_error_rad)
         }),
+        ("closed-loop cost", |m| format!("{:.1}", m.closed_loop_cost)),
         ("samples outside the bounds", |m| m.violations.to_string()),
         ("samples not backed by a guarantee", |m| {
             let none = || "no guarantee".to_owned();
@@ -318,10 +338,12 @@ fn summary(prepared: &Prepared, trajectories: &[Trajectory<4, 1>], folder: &Path
         format!("terminal certificate: {standing}\n")
     });
     format!(
-        "{}: {} samples of {} s\n{table}{certificate}written to {}\n",
+        "{}: {} samples of {} s; costs, rms and largest values from 0 s to {} s\n\
+         {table}{certificate}written to {}\n",
         prepared.title,
         prepared.samples,
         prepared.settings.t_s,
+        recording::time(prepared.samples as f64 * prepared.settings.t_s),
         folder.display()
     )
 }

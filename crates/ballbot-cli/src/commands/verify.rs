@@ -1,8 +1,9 @@
 //! `ballbot verify`.
 
 use super::CommandError;
-use super::certify::summary;
+use super::certify::{document, summary};
 use crate::input::InputError;
+use crate::json;
 use crate::proofs;
 use ballbot_scenario::{TerminalCertificate, read_certificate};
 use clap::Args;
@@ -21,6 +22,9 @@ or if the file is not as it was written.")]
 pub struct VerifyArguments {
     /// A file written by `ballbot certify`
     pub certificate: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Proves the claims of a certificate again.
@@ -37,6 +41,9 @@ pub fn run(arguments: &VerifyArguments) -> Result<String, CommandError> {
     let proof = proofs::prove("verifying", &certificate)?;
     // After the proof, so that a false claim is told by what it claims.
     TerminalCertificate::check_digest(&text)?;
+    if arguments.json {
+        return Ok(json::text(&document(&certificate, &proof)));
+    }
     Ok(format!(
         "{}\nThe certificate holds, for the model, the exact state and no delay.\n",
         summary(&certificate, &proof)

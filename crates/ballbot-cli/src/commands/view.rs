@@ -74,6 +74,13 @@ pub fn run(arguments: &ViewArguments) -> Result<String, CommandError> {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
     output::print(&format!("http://{address}/  (Ctrl-C ends)\n"));
+    if cfg!(not(feature = "page")) {
+        output::warn(
+            "this program was built without the page, and serves only a note that says so. With Node \
+             20 or later: `cd web && npm ci && npm run build`, then `cargo build --release -p \
+             ballbot-cli --features page`, and view again",
+        );
+    }
     for stream in listener.incoming().flatten() {
         // Who goes away before the answer is complete does not need it.
         thread::spawn(move || answer(&stream));

@@ -2,6 +2,7 @@
 
 use super::Case;
 use crate::commands::CommandError;
+use crate::progress::Progress;
 use ballbot::Ballbot;
 use ballbot_scenario::{
     CertifiedTable, PointTable, Prepared, ReferenceTable, Scenario, ScenarioError, Surroundings,
@@ -11,6 +12,7 @@ use lpvmpc::{Controller, Iterations, Reference, Workspace};
 use nalgebra::Vector4;
 use rayon::prelude::*;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 /// The longest horizon of the cases.
@@ -61,7 +63,14 @@ fn scenario(case: &Case) -> Result<Scenario, ScenarioError> {
 /// # Errors
 /// A scenario is not valid.
 pub fn run_all(cases: &[Case], programs: Option<usize>) -> Result<Vec<Outcome>, CommandError> {
-    cases.par_iter().map(|case| run(case, programs)).collect()
+    let progress = Progress::new("running", cases.len());
+    let done = AtomicUsize::new(0);
+    let outcome = |case| {
+        let outcome = run(case, programs);
+        progress.set(done.fetch_add(1, Ordering::Relaxed) + 1);
+        outcome
+    };
+    cases.par_iter().map(outcome).collect()
 }
 
 /// Runs one.

@@ -93,7 +93,8 @@ impl Guarantee {
 
     /// Prediction and robot's model at the end of the horizon, scenario 3.
     fn gap_sheet(&self) -> Sheet {
-        let title = "Scenario 3: nonlinear rollout minus prediction at the end of the horizon";
+        let title = "Scenario 3: nonlinear rollout minus prediction at the end of the horizon; costs \
+                     over the whole 4 s";
         let headers = [
             "",
             "first sample, phi [rad]",
@@ -132,7 +133,8 @@ impl Guarantee {
     /// Cost and time of the guarantee. Scenario 3 asks for its set point from the beginning on;
     /// in scenario 1 the loop without guarantee knows of a set point one horizon ahead.
     fn price_sheet(&self) -> Sheet {
-        let title = "The price of the guarantee: stage-consistent predictor, two steps per sample";
+        let title = "The price of the guarantee: stage-consistent predictor, two steps per sample; \
+                     costs and largest values over the whole 4 s";
         let headers = [
             "",
             "closed-loop cost",

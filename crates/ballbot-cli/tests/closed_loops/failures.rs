@@ -141,11 +141,51 @@ fn results_that_cannot_be_written_leave_nothing_behind() {
     let results = here.join("results");
     std::fs::create_dir_all(results.join("figure.png")).unwrap();
     std::fs::write(results.join("trajectory.csv"), "old").unwrap();
+    std::fs::write(results.join(".ballbot-files"), "trajectory.csv\n").unwrap();
     let arguments = ["simulate", "single-setpoint", "--out", "results"];
     assert_says(&fail(here, &arguments, 1), &["cannot write", "figure.png"]);
     assert_eq!(files(&results), ["trajectory.csv"]);
     let old = std::fs::read_to_string(results.join("trajectory.csv")).unwrap();
     assert_eq!(old, "old");
+}
+
+#[test]
+fn files_of_others_are_refused_before_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::create_dir(here.join("keep")).unwrap();
+    // Names that a run of two planes would have, and that a run of one plane once removed.
+    for (name, command) in [
+        ("motors.csv", &["simulate", "single-setpoint"][..]),
+        ("report.html", &["reproduce"]),
+        ("campaign.csv", &["campaign", "--runs", "1"]),
+        ("certificate.json", &["certify"]),
+        ("optimality.csv", &["optimality"]),
+    ] {
+        let path = here.join("keep").join(name);
+        std::fs::write(&path, "mine").unwrap();
+        let message = fail(here, &[command, &["--out", "keep"]].concat(), 1);
+        assert_says(&message, &["cannot write", name, "another folder"]);
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
+        std::fs::remove_file(&path).unwrap();
+        assert!(files(here).is_empty());
+    }
+    // A log in a place that cannot be is found out before, too.
+    std::fs::write(here.join("taken"), "mine").unwrap();
+    let arguments = ["simulate", "single-setpoint", "--log", "taken/log.csv"];
+    assert_says(&fail(here, &arguments, 1), &["cannot write", "log.csv"]);
+    assert_eq!(files(here), ["taken"]);
+}
+
+#[test]
+fn work_of_no_size_is_refused() {
+    for arguments in [
+        &["campaign", "--threads", "0"][..],
+        &["certify", "--boxes", "0"],
+        &["excite", "--harmonics", "0"],
+    ] {
+        assert_says(&fail(Path::new("."), arguments, 2), &[arguments[1], "0"]);
+    }
 }
 
 #[test]
@@ -212,8 +252,8 @@ fn what_is_no_command_line_is_refused() {
         ),
         (&["simulate"], &["<SCENARIO>"]),
         (
-            &["simulate", "lissajous", "--output", "x"],
-            &["--output", "--out"],
+            &["simulate", "lissajous", "--outs", "x"],
+            &["--outs", "--out"],
         ),
         (&["scenario", "lst"], &["lst", "list"]),
         (&["reproduce", "lissajous"], &["lissajous"]),

@@ -67,12 +67,16 @@ fn with_section(text: &str, from: &str, to: &str, new: &str) -> String {
     format!("{}{new}\n\n{}", &text[..start], &text[end..])
 }
 
-/// The files below `folder`, sorted, with `/` between the parts of their paths.
+/// The files below `folder` but for the lists of them, sorted, with `/` between the parts of their
+/// paths.
 fn files(folder: &Path) -> Vec<String> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_str().unwrap();
+        if name == ballbot_cli::results::LIST {
+            continue;
+        }
         if path.is_dir() {
             found.extend(files(&path).iter().map(|inner| format!("{name}/{inner}")));
         } else {

@@ -1,8 +1,9 @@
 //! `ballbot simulate`: what it writes.
 
 use crate::recorded::{self, assert_figure};
-use crate::{assert_says, edited, files, succeed, with_section};
+use crate::{assert_says, edited, fail, files, succeed, with_section};
 use ballbot_scenario::{Scenario, builtin};
+use serde_json::Value;
 use std::path::Path;
 
 /// The text of a built-in scenario, from the program.
@@ -284,4 +285,68 @@ fn nothing_of_an_earlier_run_stays_in_the_folder() {
     expected.push("notes.txt".to_owned());
     expected.sort();
     assert_eq!(files(&same), expected);
+}
+
+#[test]
+fn keys_are_set_on_the_command_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let short = ["simulate", "two-setpoints", "--set", "duration_s=1.0"];
+    let more = ["--set", "controller.horizon = 10", "--set", "title=Mine"];
+    let said = succeed(here, &[&short[..], &more].concat());
+    assert_says(
+        &said,
+        &["Mine: 20 samples", "from 0 s to 1 s", "closed-loop cost"],
+    );
+    recorded::complete(&here.join("out/two-setpoints/trajectory.csv"), 20, 0.05);
+    for (set, code, parts) in [
+        ("controller.horizn=3", 1, ["horizn", "horizon"]),
+        (
+            "controller.horizon=0",
+            1,
+            ["controller.horizon = 0", "from 1"],
+        ),
+        ("horizon", 2, ["horizon", "KEY=VALUE"]),
+    ] {
+        let message = fail(here, &["simulate", "two-setpoints", "--set", set], code);
+        assert_says(&message, &parts);
+    }
+}
+
+#[test]
+fn other_programs_get_json_and_scripts_silence() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let short = ["simulate", "lissajous", "--set", "duration_s=1.0"];
+    let said = succeed(here, &[&short[..], &["--json"]].concat());
+    let document: Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(document["samples"], 20);
+    assert_eq!(document["window_s"], 1.0);
+    let planes = document["planes"].as_array().unwrap();
+    assert_eq!(planes.len(), 2);
+    for plane in planes {
+        assert_eq!(plane["samples"], 20);
+        assert!(plane["closed_loop_cost"].as_f64().unwrap() > 0.0);
+    }
+    assert_eq!(succeed(here, &[&short[..], &["--quiet"]].concat()), "");
+    assert_eq!(succeed(here, &[&["-q"], &short[..]].concat()), "");
+    // What it prints is the result, and not a report of it.
+    assert!(!succeed(here, &["--quiet", "scenario", "show", "lissajous"]).is_empty());
+}
+
+#[test]
+fn times_are_written_without_the_rounding_of_a_sum() {
+    let folder = tempfile::tempdir().unwrap();
+    succeed(
+        folder.path(),
+        &["simulate", "two-setpoints", "--log", "log.csv"],
+    );
+    for name in ["out/two-setpoints/trajectory.csv", "log.csv"] {
+        let text = std::fs::read_to_string(folder.path().join(name)).unwrap();
+        for line in text.lines().skip(1) {
+            let time = line.split(',').next().unwrap();
+            // It was once 0.15000000000000002.
+            assert!(time.len() <= 4, "{name}: {time}");
+        }
+    }
 }

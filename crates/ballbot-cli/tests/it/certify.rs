@@ -52,6 +52,9 @@ fn a_certificate_is_written_and_verified_again() {
         &text(&["verify", &path]),
         &["The certificate holds, for the model, the exact state and no delay."],
     );
+    let verified: Value = crate::json(&["verify", &path, "--json"]);
+    assert_eq!(verified["holds"], true);
+    assert_eq!(verified["level"], claim["terminal"]["level"]);
     let page = std::fs::read_to_string(folder.path().join("certificate.html")).unwrap();
     assert_says(&page, &["<svg", "θ", "level"]);
 }

@@ -173,3 +173,31 @@ fn parameters_without_motion_are_refused() {
     let message = failure(&["lqr", "--continuous", "--parameters", path], 1);
     assert_says(&message, &["crosses zero", "det M"]);
 }
+
+#[test]
+fn numbers_without_a_regulator_end_with_the_reason() {
+    // Each of these once ran without end, or named a mode that the weights do see.
+    for (arguments, parts) in [
+        (&["--ts", "100"][..], &["100 s", "4.04969", "e^405"][..]),
+        (&["--ts", "50"], &["50 s", "e^202", "50 ms are 0.05 s"]),
+        (&["--ts", "5"], &["5 s", "e^20", "4.45 s"]),
+        (&["--ts", "5", "--substeps", "400"], &["no gain", "of A"]),
+        (&["--ts", "1e6"], &["1000000 s", "4.04969"]),
+        (
+            &["--continuous", "--q", "1e200,1,0.1,0.1"],
+            &["no gain", "1e200"],
+        ),
+        (&["--q", "1e200,1,0.1,0.1"], &["no gain", "1e200"]),
+        (&["--continuous", "--r", "1e-300"], &["no gain", "1e-300"]),
+    ] {
+        let arguments: Vec<&str> = ["lqr"]
+            .into_iter()
+            .chain(arguments.iter().copied())
+            .collect();
+        let message = failure(&arguments, 1);
+        assert_says(&message, parts);
+        for wrong in ["detectable", "stabilisable"] {
+            assert!(!message.contains(wrong), "{message}");
+        }
+    }
+}

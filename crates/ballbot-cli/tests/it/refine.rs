@@ -206,7 +206,7 @@ fn a_bad_file_is_refused_with_its_place() {
         (
             "p1 = -342.6038",
             "p1 = \"fast\"",
-            &["line 8", "\"fast\"", "f64"],
+            &["line 8", "\"fast\"", "expected a number"],
         ),
         ("p1 = -342.6038", "# p1", &["missing field `p1`", "line 7"]),
         ("p1 = -342.6038", "p1 = ", &["line 8"]),
@@ -265,4 +265,27 @@ fn options_that_exclude_each_other_are_refused() {
         &failure(&["refine", "--example", "--json"], 2),
         &["--example", "--json"],
     );
+}
+
+#[test]
+fn a_minus_is_standard_output() {
+    let table = text(&["refine", "-o", "-"]);
+    assert!(table.starts_with("[parameters]\nb1_m2 = "), "{table}");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("robot.toml");
+    text(&["refine", "--out", path.to_str().unwrap()]);
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), table);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_device_stays_a_device() {
+    // It was once replaced by a file, where the user may do so.
+    let folder = tempfile::tempdir().unwrap();
+    let link = folder.path().join("full");
+    std::os::unix::fs::symlink("/dev/full", &link).unwrap();
+    let message = failure(&["refine", "-o", link.to_str().unwrap()], 1);
+    assert_says(&message, &["cannot write", "full"]);
+    assert!(!std::fs::metadata("/dev/full").unwrap().is_file());
+    assert!(link.is_symlink());
 }

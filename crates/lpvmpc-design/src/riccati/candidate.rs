@@ -4,7 +4,7 @@ use std::iter::successors;
 
 use nalgebra::DMatrix;
 
-use super::doubling::Doubling;
+use super::doubling::{Doubling, LEFT_THE_NUMBERS};
 use super::{LqProblem, Time};
 use crate::matrix_check::symmetric_part;
 
@@ -29,8 +29,13 @@ pub(super) struct Candidate<'a> {
 }
 
 impl<'a> Candidate<'a> {
-    /// `None` if the weight of the input is not positive definite at this P, or P not finite.
-    pub(super) fn at(problem: &'a LqProblem<'a>, time: Time, p: DMatrix<f64>) -> Option<Self> {
+    /// The reason if the weight of the input is not positive definite at this P, or the residual
+    /// not finite.
+    pub(super) fn at(
+        problem: &'a LqProblem<'a>,
+        time: Time,
+        p: DMatrix<f64>,
+    ) -> Result<Self, &'static str> {
         let LqProblem { a, b, q, r, cross } = *problem;
         let bp = b.transpose() * &p;
         // K = weight^-1 right, and the gain saves K' weight K.
@@ -42,7 +47,10 @@ impl<'a> Candidate<'a> {
             right += s.transpose();
         }
         let weight = symmetric_part(&weight);
-        let k = weight.clone().cholesky()?.solve(&right);
+        let factor = weight.clone().cholesky();
+        let k = factor
+            .ok_or("the input weight R + B'P B at the limit is not positive definite")?
+            .solve(&right);
         let saved = k.transpose() * weight * &k;
         let (drift, kept) = match time {
             Time::Continuous => (a.transpose() * &p + &p * a, 0.0),
@@ -55,7 +63,10 @@ impl<'a> Candidate<'a> {
         } else {
             0.0
         };
-        relative_residual.is_finite().then(|| Self {
+        if !relative_residual.is_finite() {
+            return Err(LEFT_THE_NUMBERS);
+        }
+        Ok(Self {
             closed_loop: a - b * &k,
             problem,
             time,
@@ -92,6 +103,6 @@ impl<'a> Candidate<'a> {
         let (correction, _) = Doubling::of(self.time, &self.closed_loop, &no_input, &self.residual)
             .and_then(Doubling::run)
             .ok()?;
-        Self::at(self.problem, self.time, &self.p + correction)
+        Self::at(self.problem, self.time, &self.p + correction).ok()
     }
 }

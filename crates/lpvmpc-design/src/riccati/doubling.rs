@@ -23,6 +23,9 @@ pub(super) struct Doubling {
     h: DMatrix<f64>,
 }
 
+/// A number, or the square of one, overflowed.
+pub(super) const LEFT_THE_NUMBERS: &str = "the iteration left the finite numbers";
+
 /// The iteration ended without a solution.
 pub(super) struct Stalled {
     pub(super) reason: &'static str,
@@ -78,7 +81,7 @@ impl Doubling {
         for doublings in 1..=DOUBLING_CAP {
             let Some(next) = self.doubled() else {
                 return Err(Stalled {
-                    reason: "the iteration left the finite numbers",
+                    reason: LEFT_THE_NUMBERS,
                     doublings,
                 });
             };
@@ -106,7 +109,8 @@ impl Doubling {
         };
         [&next.a, &next.g, &next.h]
             .iter()
-            .all(|m| m.iter().all(|x| x.is_finite()))
+            // Where the norm overflows, nothing can be told of convergence.
+            .all(|m| m.norm().is_finite())
             .then_some(next)
     }
 }

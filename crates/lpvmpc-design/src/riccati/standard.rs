@@ -5,8 +5,8 @@ use nalgebra::DMatrix;
 use super::doubling::Stalled;
 use super::{LqProblem, RiccatiError, Time};
 use crate::matrix_check::{
-    MatrixError, check_positive_definite, check_positive_semidefinite, check_shape, check_square,
-    checked_symmetric, symmetric_part,
+    MatrixError, check_finite, check_positive_definite, check_positive_semidefinite, check_shape,
+    check_square, checked_symmetric, symmetric_part,
 };
 use crate::modes::{distance_to_unreachable, poles};
 
@@ -21,6 +21,8 @@ pub(super) struct Standard<'a> {
     b: &'a DMatrix<f64>,
     pub(super) g: DMatrix<f64>,
     pub(super) q: DMatrix<f64>,
+    /// The largest entry of R.
+    largest_r: f64,
 }
 
 impl<'a> Standard<'a> {
@@ -36,17 +38,20 @@ impl<'a> Standard<'a> {
         let r = checked_symmetric("R", r)?;
         check_positive_definite("R", &r)?;
         check_positive_semidefinite("Q", &q)?;
+        let largest_r = r.amax();
         let factor = r.cholesky().ok_or(MatrixError::NotPositiveDefinite {
             name: "R",
             smallest_eigenvalue: 0.0,
         })?;
         let g = symmetric_part(&(b * factor.solve(&b.transpose())));
+        check_finite("B R^-1 B'", &g)?;
         let Some(s) = cross else {
             return Ok(Self {
                 a: a.clone(),
                 b,
                 g,
                 q,
+                largest_r,
             });
         };
         check_shape("S", s, (n, m), "the size of B")?;
@@ -58,6 +63,7 @@ impl<'a> Standard<'a> {
             b,
             g,
             q,
+            largest_r,
         })
     }
 
@@ -66,6 +72,10 @@ impl<'a> Standard<'a> {
         let failure = RiccatiError::NoConvergence {
             reason: stalled.reason,
             doublings: stalled.doublings,
+            largest_a: self.a.amax(),
+            largest_b: self.b.amax(),
+            largest_q: self.q.amax(),
+            largest_r: self.largest_r,
         };
         let Ok(open_loop) = poles(&self.a) else {
             return failure;
@@ -73,6 +83,8 @@ impl<'a> Standard<'a> {
         let lasting: Vec<_> = open_loop
             .into_iter()
             .filter(|pole| !time.is_stable(*pole, &self.a))
+            // Beside entries of A that are this much larger, rounding hides what moves the mode.
+            .filter(|pole| time == Time::Continuous || UNREACHABLE * self.a.amax() < pole.norm())
             .collect();
         if let Some(pole) = lasting
             .iter()

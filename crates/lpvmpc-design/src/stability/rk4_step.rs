@@ -4,7 +4,7 @@ use nalgebra::{Complex, DMatrix};
 use thiserror::Error;
 
 use crate::matrix_check::MatrixError;
-use crate::modes::poles;
+use crate::modes::{pole_text, poles};
 
 /// A step of the classical fourth-order Runge-Kutta method that every decaying pole allows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,12 +32,45 @@ pub enum Rk4StepError {
     /// No substeps.
     #[error("the number of substeps is 0: it must be at least 1")]
     NoSubsteps,
+    /// The fastest mode asks for more substeps than anybody would wait for.
+    #[error(
+        "the sampling time of {sample_time} s would take {substeps:e} Runge-Kutta steps, at most \
+         {MOST_RK4_SUBSTEPS} are taken: the fastest pole is {fastest:.4} 1/s. Take a shorter \
+         sampling time (it is in seconds)"
+    )]
+    TooMany {
+        /// Sampling time, s.
+        sample_time: f64,
+        /// The steps that the fastest pole asks for.
+        substeps: f64,
+        /// Its absolute value, 1/s.
+        fastest: f64,
+    },
+    /// An unstable mode grows so far within one sample that no number can follow it.
+    #[error(
+        "the sampling time of {sample_time} s is too long for the unstable pole {} 1/s: within one \
+         sample its mode grows by e^{exponent:.0}, beyond the digits of a number. Take less than \
+         {longest:.2} s (the sampling time is in seconds: {sample_time} ms are {} s)",
+        pole_text(*pole),
+        sample_time / 1e3
+    )]
+    Outgrown {
+        /// Sampling time, s.
+        sample_time: f64,
+        /// The fastest growing pole, 1/s.
+        pole: Complex<f64>,
+        /// Sampling time times its real part.
+        exponent: f64,
+        /// The sampling time at which the growth uses up the digits, s.
+        longest: f64,
+    },
     /// A mode that decays in the plant grows in the predictor.
     #[error(
         "the Runge-Kutta step of {step} s (sampling time {sample_time} s in {substeps} substeps) \
-         is too long for the pole {pole} 1/s: this decaying mode is multiplied by \
+         is too long for the pole {} 1/s: this decaying mode is multiplied by \
          {amplification:.4} in each step, allowed is 1. The longest stable step is \
-         {longest_step:.6} s: take at least {fewest_substeps} substeps"
+         {longest_step:.6} s: take at least {fewest_substeps} substeps",
+        pole_text(*pole)
     )]
     TooLong {
         /// Sampling time, s.
@@ -57,8 +90,11 @@ pub enum Rk4StepError {
     },
 }
 
+/// More Runge-Kutta steps per sample than these are a slip of the pen.
+pub const MOST_RK4_SUBSTEPS: usize = 100_000;
+
 /// Checks that `substeps` classical Runge-Kutta steps in `sample_time` (s) keep every decaying
-/// mode of x_dot = A x decaying.
+/// mode of x_dot = A x decaying, and every other one within the digits of a number.
 ///
 /// One step of length h multiplies the mode of a pole lambda (1/s) by R(h lambda),
 /// R(z) = 1 + z + z^2/2 + z^3/6 + z^4/24; for each pole with negative real part |R| <= 1 is
@@ -68,7 +104,8 @@ pub enum Rk4StepError {
 ///
 /// # Errors
 /// [`Rk4StepError::TooLong`] with the pole, the step, its limit and the substeps that would do;
-/// or an argument is out of range.
+/// [`Rk4StepError::Outgrown`] if a growing mode leaves the digits of a number within one sample; or
+/// an argument is out of range.
 pub fn check_rk4_step(
     a: &DMatrix<f64>,
     sample_time: f64,
@@ -81,7 +118,9 @@ pub fn check_rk4_step(
         return Err(Rk4StepError::NoSubsteps);
     }
     let step = sample_time / substeps as f64;
-    let tightest = poles(a)?
+    let poles = poles(a)?;
+    check_growth(&poles, sample_time, substeps, DIGITS)?;
+    let tightest = poles
         .into_iter()
         .filter(|pole| pole.re < 0.0)
         .map(|pole| (pole, longest_step(pole)))
@@ -116,14 +155,55 @@ pub fn check_rk4_step(
 /// of x_dot = A x well, where nothing else is said: |step * fastest pole| is at most 0.7.
 ///
 /// # Errors
-/// A has no eigenvalues, or the sampling time is not positive.
+/// A has no eigenvalues, the sampling time is not positive, more than [`MOST_RK4_SUBSTEPS`] were
+/// needed, or a mode grows so far within one sample that no regulator could be designed.
 pub fn accurate_rk4_substeps(a: &DMatrix<f64>, sample_time: f64) -> Result<usize, Rk4StepError> {
     const ACCURATE_STEP: f64 = 0.7;
     if !(sample_time.is_finite() && sample_time > 0.0) {
         return Err(Rk4StepError::SampleTime { value: sample_time });
     }
-    let fastest = poles(a)?.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
-    Ok((sample_time * fastest / ACCURATE_STEP).ceil().max(1.0) as usize)
+    let poles = poles(a)?;
+    let fastest = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+    let substeps = (sample_time * fastest / ACCURATE_STEP).ceil().max(1.0);
+    let taken = substeps.min(MOST_RK4_SUBSTEPS as f64) as usize;
+    // A Riccati equation squares the growth, so half of the digits are left for it. The likelier
+    // cause first, where there are two.
+    check_growth(&poles, sample_time, taken, 0.5 * DIGITS)?;
+    if substeps <= MOST_RK4_SUBSTEPS as f64 {
+        return Ok(taken);
+    }
+    Err(Rk4StepError::TooMany {
+        sample_time,
+        substeps,
+        fastest,
+    })
+}
+
+/// The logarithm of 1 / machine epsilon.
+const DIGITS: f64 = 52.0 * std::f64::consts::LN_2;
+
+/// No mode grows by more than e^`most` in the plant, if `substeps` steps follow it.
+fn check_growth(
+    poles: &[Complex<f64>],
+    sample_time: f64,
+    substeps: usize,
+    most: f64,
+) -> Result<(), Rk4StepError> {
+    let step = sample_time / substeps as f64;
+    for pole in poles {
+        let predicted = substeps as f64 * amplification(pole * step).ln();
+        let exponent = sample_time * pole.re;
+        // An overflow of the prediction may end in a NaN.
+        if exponent > most && (predicted > most || predicted.is_nan()) {
+            return Err(Rk4StepError::Outgrown {
+                sample_time,
+                pole: *pole,
+                exponent,
+                longest: most / pole.re,
+            });
+        }
+    }
+    Ok(())
 }
 
 /// |R(z)|.

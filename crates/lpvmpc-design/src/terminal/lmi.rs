@@ -38,6 +38,11 @@ impl AffineMatrix {
         self.constant.nrows()
     }
 
+    fn is_finite(&self) -> bool {
+        let mut matrices = std::iter::once(&self.constant).chain(&self.slopes);
+        matrices.all(|matrix| matrix.iter().all(|entry| entry.is_finite()))
+    }
+
     /// The same with one unknown more, s: F(v) + s I.
     fn relaxed(&self) -> Self {
         let rows = self.rows();
@@ -80,6 +85,10 @@ pub(super) fn maximise_log_det(
     blocks: &[AffineMatrix],
     unknowns: usize,
 ) -> Result<Maximum, LmiFailure> {
+    // An eigenvalue of what is not finite would be looked for without end.
+    if !blocks.iter().all(AffineMatrix::is_finite) {
+        return Err(LmiFailure::NotConverged);
+    }
     let mut v = strictly_feasible(blocks, unknowns)?;
     let rows: usize = blocks.iter().skip(1).map(AffineMatrix::rows).sum();
     let mut first_weight = 1.0;

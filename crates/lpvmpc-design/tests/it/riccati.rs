@@ -309,3 +309,68 @@ fn mistakes_in_the_matrices_are_named() {
     };
     assert!(message(&crossed).contains("Q - S R^-1 S' is not positive semidefinite"));
 }
+
+#[test]
+fn weights_far_apart_are_not_blamed_on_a_mode() {
+    // A definite Q sees every mode, whatever its units; squares of these weights overflow.
+    let (a, b) = at_rest(B_OPTIMAL);
+    let (q, r) = cost();
+    for largest in [1e20, 1e80, 1e150, 1e200, 1e300] {
+        let mut far = q.clone();
+        far[(0, 0)] = largest;
+        for solve in [solve_care, solve_dare] {
+            match solve(&problem(&a, &b, &far, &r)) {
+                Ok(found) => assert!(found.relative_residual < 1e-10),
+                Err(error @ RiccatiError::NotDetectable { .. }) => panic!("{largest:e}: {error}"),
+                Err(error) => {
+                    let text = error.to_string();
+                    assert!(!text.contains("detectable"), "{largest:e}: {text}");
+                }
+            }
+        }
+    }
+    for weight in [1e-300, 1e-200, 1e155, 1e200, 1e300] {
+        let weight = DMatrix::from_element(1, 1, weight);
+        for solve in [solve_care, solve_dare] {
+            if let Err(error) = solve(&problem(&a, &b, &q, &weight)) {
+                let text = error.to_string();
+                // It once said that R = 1e300 was not positive definite.
+                assert!(!text.contains("definite"), "{text}");
+            }
+        }
+    }
+}
+
+#[test]
+fn units_of_inputs_and_costs_do_not_hide_a_mode() {
+    // The integrator is beyond the input and beyond the cost at any size of either.
+    for size in [1e-12, 1.0, 1e12] {
+        let (r, one) = (dmatrix![1.0], DMatrix::identity(2, 2));
+        let a = dmatrix![-1.0, 0.0; 0.0, 2.0];
+        let error = solve_care(&problem(&a, &dmatrix![size; 0.0], &one, &r)).unwrap_err();
+        assert!(
+            matches!(error, RiccatiError::NotStabilisable { .. }),
+            "{size:e}: {error}"
+        );
+        let q = dmatrix![size, 0.0; 0.0, 0.0];
+        let error = solve_care(&problem(&a, &dmatrix![1.0; 1.0], &q, &r)).unwrap_err();
+        assert!(
+            matches!(error, RiccatiError::NotDetectable { .. }),
+            "{size:e}: {error}"
+        );
+    }
+}
+
+#[test]
+fn a_mode_that_rounding_hides_is_not_blamed() {
+    // Sampled every 5 s the fast mode grows by e^20, beside which the integrator cannot be seen.
+    let a = dmatrix![1.0, 1e8; 0.0, 5e8];
+    let b = dmatrix![1e8; 5e8];
+    let (q, r) = (DMatrix::identity(2, 2), dmatrix![1.0]);
+    if let Err(error) = solve_dare(&problem(&a, &b, &q, &r)) {
+        assert!(
+            matches!(error, RiccatiError::NoConvergence { .. }),
+            "{error}"
+        );
+    }
+}

@@ -1,6 +1,6 @@
 //! The limit of the Runge-Kutta step, against the method itself.
 
-use lpvmpc_design::{Rk4StepError, check_rk4_step};
+use lpvmpc_design::{Rk4StepError, accurate_rk4_substeps, check_rk4_step};
 use nalgebra::{Complex, DMatrix, dmatrix};
 
 /// |x| after one Runge-Kutta step of x_dot = z x from 1, taken stage by stage.
@@ -85,4 +85,34 @@ fn arguments_out_of_range_are_refused() {
     );
     let error = check_rk4_step(&dmatrix![f64::NAN], 0.1, 1).unwrap_err();
     assert!(matches!(error, Rk4StepError::Matrix(_)));
+}
+
+#[test]
+fn a_mode_that_outgrows_the_digits_is_named() {
+    let a = DMatrix::from_diagonal(&nalgebra::dvector![-50.0, 4.0]);
+    // e^200; ln(2^52) / 4 = 9.01 s use up the digits, half of that leaves some for a regulator.
+    for (error, longest) in [
+        (check_rk4_step(&a, 50.0, 4000).unwrap_err(), "9.01 s"),
+        (accurate_rk4_substeps(&a, 50.0).unwrap_err(), "4.51 s"),
+    ] {
+        assert!(matches!(error, Rk4StepError::Outgrown { .. }), "{error}");
+        let text = error.to_string();
+        for part in ["50 s", "pole 4 1/s", "e^200", longest, "50 ms are 0.05 s"] {
+            assert!(text.contains(part), "{part} is not in: {text}");
+        }
+    }
+    check_rk4_step(&a, 9.0, 700).unwrap();
+    accurate_rk4_substeps(&a, 4.5).unwrap();
+}
+
+#[test]
+fn steps_without_end_are_refused() {
+    let stable = dmatrix![-1e6];
+    let error = accurate_rk4_substeps(&stable, 1e6).unwrap_err();
+    assert!(matches!(error, Rk4StepError::TooMany { .. }), "{error}");
+    let unstable = dmatrix![-1e6, 0.0; 0.0, 1.0];
+    for time in [1e6, 1e300] {
+        let error = accurate_rk4_substeps(&unstable, time).unwrap_err();
+        assert!(matches!(error, Rk4StepError::Outgrown { .. }), "{error}");
+    }
 }

@@ -1,0 +1,162 @@
+//! The folder that a command writes its results to. A list in it says which files are this program's;
+//! others are never touched.
+
+use crate::output::{self, FileError};
+use std::collections::BTreeSet;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// The list, one path per line, relative to the folder.
+pub const LIST: &str = ".ballbot-files";
+
+/// A folder for results.
+#[derive(Clone, Debug)]
+pub struct ResultFolder {
+    path: PathBuf,
+    /// What is in it that this program wrote.
+    ours: BTreeSet<String>,
+}
+
+impl ResultFolder {
+    /// The folder at `path`, there or not, for a run that may leave the files `names` in it. Nothing
+    /// is made yet.
+    ///
+    /// # Errors
+    /// Nothing can be written there, or one of these files is there and not this program's.
+    pub fn open(path: &Path, names: &[&str]) -> Result<Self, FileError> {
+        let list = path.join(LIST);
+        let ours = match fs::read_to_string(&list) {
+            Ok(text) => text.lines().map(str::to_owned).collect(),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => BTreeSet::new(),
+            // A file where the folder should be is found out below.
+            Err(_) if !path.is_dir() => BTreeSet::new(),
+            Err(error) => return Err(FileError::at(&list)(error)),
+        };
+        let folder = Self {
+            path: path.to_owned(),
+            ours,
+        };
+        output::check_writable(&list)?;
+        for name in names {
+            folder.check(name)?;
+        }
+        Ok(folder)
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether this program may write the file.
+    fn check(&self, name: &str) -> Result<(), FileError> {
+        let path = self.path.join(name);
+        if path.is_dir() {
+            return Err(FileError::at(&path)(io::ErrorKind::IsADirectory.into()));
+        }
+        // What a symbolic link names is for its owner to keep, whether it is there or not.
+        if path.symlink_metadata().is_err() || self.ours.contains(name) {
+            return Ok(());
+        }
+        Err(FileError::at(&path)(io::Error::new(
+            io::ErrorKind::AlreadyExists,
+            format!(
+                "it is there, and {LIST} beside it does not say that ballbot wrote it. Choose \
+                 another folder with --out, or move the file away"
+            ),
+        )))
+    }
+
+    /// Writes all files or none, in place of what an earlier run left under `stale` names, and
+    /// keeps the list.
+    ///
+    /// # Errors
+    /// A file that is not this program's is in the way, or cannot be written or removed.
+    pub fn write(&self, files: &[(String, Vec<u8>)], stale: &[&str]) -> Result<(), FileError> {
+        for (name, _) in files {
+            self.check(name)?;
+        }
+        let written: BTreeSet<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+        let is_stale = |name: &str| stale.contains(&name) && !written.contains(name);
+        let kept = self.ours.iter().map(String::as_str);
+        let kept = kept
+            .filter(|name| !is_stale(name))
+            .chain(written.iter().copied());
+        let list: BTreeSet<&str> = kept.collect();
+        let list: String = list.iter().map(|name| format!("{name}\n")).collect();
+        let mut paths: Vec<PathBuf> = files.iter().map(|(name, _)| self.path.join(name)).collect();
+        paths.push(self.path.join(LIST));
+        let contents = files.iter().map(|(_, content)| content.as_slice());
+        let contents = contents.chain([list.as_bytes()]);
+        let all: Vec<(&Path, &[u8])> = paths.iter().map(PathBuf::as_path).zip(contents).collect();
+        output::write_files(&all)?;
+        // What an earlier run of another kind left would be taken for this one's.
+        for name in self.ours.iter().filter(|name| is_stale(name)) {
+            let path = self.path.join(name);
+            match fs::remove_file(&path) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                    return Err(FileError::at(&path)(error));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(name: &str) -> (String, Vec<u8>) {
+        (name.to_owned(), b"new".to_vec())
+    }
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        let name = |entry: io::Result<fs::DirEntry>| entry.unwrap().file_name();
+        let mut names: Vec<String> = entries
+            .map(|entry| name(entry).into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn files_of_others_are_neither_replaced_nor_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path();
+        fs::write(path.join("figure.svg"), "mine").unwrap();
+        let error = ResultFolder::open(path, &["a.csv", "figure.svg"]).unwrap_err();
+        assert!(error.to_string().contains("figure.svg"), "{error}");
+        assert!(error.to_string().contains("--out"), "{error}");
+        // Where its name is not known before the run, it is found out before anything is written.
+        let results = ResultFolder::open(path, &["a.csv"]).unwrap();
+        let files = [file("a.csv"), file("figure.svg")];
+        assert!(results.write(&files, &[]).is_err());
+        assert_eq!(names(path), ["figure.svg"]);
+        // Its name is not enough to be removed.
+        results.write(&[file("a.csv")], &["figure.svg"]).unwrap();
+        assert_eq!(fs::read_to_string(path.join("figure.svg")).unwrap(), "mine");
+    }
+
+    #[test]
+    fn what_is_listed_is_replaced_and_removed_when_stale() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new");
+        let all = ["a.csv", "b.csv", "c.csv"];
+        let first = ResultFolder::open(&path, &all).unwrap();
+        assert!(!path.exists());
+        first
+            .write(&[file("a.csv"), file("b.csv"), file("other.csv")], &all)
+            .unwrap();
+        fs::write(path.join("c.csv.bak"), "mine").unwrap();
+        let second = ResultFolder::open(&path, &all).unwrap();
+        second.write(&[file("a.csv"), file("c.csv")], &all).unwrap();
+        let expected = [LIST, "a.csv", "c.csv", "c.csv.bak", "other.csv"];
+        assert_eq!(names(&path), expected);
+        let list = fs::read_to_string(path.join(LIST)).unwrap();
+        assert_eq!(list, "a.csv\nc.csv\nother.csv\n");
+    }
+}
