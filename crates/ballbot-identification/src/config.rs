@@ -163,15 +163,40 @@ impl Config {
     }
 
     fn check(&self) -> Result<(), ConfigError> {
-        let geometry = &self.geometry;
-        for (key, value) in [
-            ("geometry.centre_of_mass_m", geometry.centre_of_mass_m),
-            ("geometry.ball_radius_m", geometry.ball_radius_m),
-            ("geometry.wheel_radius_m", geometry.wheel_radius_m),
-            ("geometry.gravity_m_s2", geometry.gravity_m_s2),
-        ] {
-            positive(key, value)?;
-        }
+        let GeometryTable {
+            centre_of_mass_m,
+            ball_radius_m,
+            wheel_radius_m,
+            gravity_m_s2,
+        } = self.geometry;
+        within(
+            "geometry.centre_of_mass_m",
+            centre_of_mass_m,
+            0.01,
+            3.0,
+            "from 0.01 to 3 m: lengths are in metres",
+        )?;
+        within(
+            "geometry.ball_radius_m",
+            ball_radius_m,
+            0.01,
+            1.0,
+            "from 0.01 to 1 m: lengths are in metres",
+        )?;
+        within(
+            "geometry.wheel_radius_m",
+            wheel_radius_m,
+            0.002,
+            1.0,
+            "from 0.002 to 1 m: lengths are in metres",
+        )?;
+        within(
+            "geometry.gravity_m_s2",
+            gravity_m_s2,
+            1.0,
+            30.0,
+            "from 1 to 30 m/s^2 (9.81 on Earth)",
+        )?;
         let noise = [
             ("noise.phi_rad", self.noise.phi_rad),
             ("noise.theta_rad", self.noise.theta_rad),
@@ -350,6 +375,13 @@ mod tests {
                 "[geometry]\nball_radius_m = -1",
                 "geometry.ball_radius_m = -1",
             ),
+            ("[geometry]\nball_radius_m = 120.0", "lengths are in metres"),
+            (
+                "[geometry]\ncentre_of_mass_m = 297.8",
+                "geometry.centre_of_mass_m = 297.8: it must be from 0.01 to 3 m",
+            ),
+            ("[geometry]\nwheel_radius_m = 5.0", "lengths are in metres"),
+            ("[geometry]\ngravity_m_s2 = 981.0", "from 1 to 30 m/s^2"),
             ("[fit]\nsegment_s = nan", "fit.segment_s"),
             ("[fit]\nheld_back = 1.0", "from 0 to 0.8"),
             ("[parameters]\nb7 = \"free\"", "there is no such parameter"),

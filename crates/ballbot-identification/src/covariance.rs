@@ -22,7 +22,9 @@ pub fn covariances(
     // What the segments' scores lose to the parameters that were fitted to them.
     let segments = reduced.scores.len() as f64;
     let lost = segments / (segments - n as f64).max(1.0);
-    let scatter = &inverse * meat * &inverse * lost;
+    // What was known beforehand scatters, too.
+    let prior = problem.prior_information(&fit.parameters, &reduced.indices);
+    let scatter = &inverse * (meat * lost + prior) * &inverse;
     let of = |covariance| of_parameters(&covariance, &reduced.indices, coordinates);
     (of(inverse), of(scatter))
 }

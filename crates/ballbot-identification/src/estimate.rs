@@ -7,6 +7,7 @@ use crate::model::{Segment, SegmentedRuns};
 use crate::parameter::{Choice, Parameter, Values};
 use crate::segments::{segments, spread};
 use crate::start::{linear_fits, typical};
+use crate::suspects::Suspects;
 use ballbot::Geometry;
 use lpvmpc_design::{
     Prior, ShootingError, ShootingFit, ShootingProblem, ShootingSettings, Unknown,
@@ -55,6 +56,15 @@ pub struct Estimate {
     pub segment: f64,
 }
 
+/// A fit to a few short segments, weighted by the noise that the sensors have by themselves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coarse {
+    /// All parameters, held ones included.
+    pub values: Values,
+    /// chi^2 per degree of freedom: 1 if a robot explains the log.
+    pub chi_square: f64,
+}
+
 /// What became of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
@@ -88,6 +98,14 @@ pub enum EstimateError {
     /// The fit.
     #[error(transparent)]
     Shooting(#[from] ShootingError),
+    /// No robot explains the log as it is, but one would if its columns were others.
+    #[error("{error} A robot explains the log if {suspects}")]
+    Suspect {
+        /// What is wrong.
+        suspects: Suspects,
+        /// Why there is no estimate as it is.
+        error: Box<EstimateError>,
+    },
 }
 
 /// Told the number of steps of the fit so far.
@@ -96,11 +114,19 @@ pub type Progress<'a> = &'a dyn Fn(usize);
 /// Segments of the first, coarse fit: so short that the unstable mode hardly grows, so few that
 /// trying several starts costs nothing, s.
 const COARSE: f64 = 0.25;
-const COARSE_COUNT: usize = 80;
-const COARSE_SETTINGS: ShootingSettings = ShootingSettings {
-    reduction_tolerance: 1e-2,
+const START: Effort = Effort {
+    segments: 80,
     max_iterations: 40,
 };
+
+/// How much a coarse fit may cost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Effort {
+    /// Segments, at most.
+    pub segments: usize,
+    /// Steps from each start, at most.
+    pub max_iterations: usize,
+}
 
 /// Times that the noise is found anew from the residuals, at most.
 const REWEIGHTINGS: usize = 6;
@@ -124,7 +150,22 @@ impl Task<'_> {
         floor: Vector3<f64>,
         progress: Progress<'_>,
     ) -> Result<Estimate, EstimateError> {
-        let start = self.start(stretches, floor, progress)?;
+        let start = self.coarse(stretches, floor, START, progress)?;
+        let start = start.values;
+        self.refine(start, stretches, floor, progress)
+    }
+
+    /// Fits the robot to these stretches from a start.
+    ///
+    /// # Errors
+    /// [`EstimateError`].
+    pub fn refine(
+        &self,
+        start: Values,
+        stretches: &[(usize, Range<usize>)],
+        floor: Vector3<f64>,
+        progress: Progress<'_>,
+    ) -> Result<Estimate, EstimateError> {
         let mut length = self.segment;
         loop {
             let segments = segments(self.runs, stretches, length, self.lead());
@@ -224,12 +265,16 @@ impl Task<'_> {
     }
 
     /// The best of several starts after a coarse fit.
-    fn start(
+    ///
+    /// # Errors
+    /// [`EstimateError::NoSegments`] or [`EstimateError::NoStart`].
+    pub fn coarse(
         &self,
         stretches: &[(usize, Range<usize>)],
         floor: Vector3<f64>,
+        effort: Effort,
         progress: Progress<'_>,
-    ) -> Result<Values, EstimateError> {
+    ) -> Result<Coarse, EstimateError> {
         let lead = self.lead();
         let coarse = segments(self.runs, stretches, COARSE, lead);
         if coarse.is_empty() {
@@ -238,26 +283,38 @@ impl Task<'_> {
                 lead,
             });
         }
-        let model = self.model(spread(&coarse, COARSE_COUNT));
+        let model = self.model(spread(&coarse, effort.segments));
         let priors = self.priors(&model.coordinates);
-        let mut best: Option<(f64, Values)> = None;
+        let mut best: Option<Coarse> = None;
         let mut refused = None;
+        let settings = ShootingSettings {
+            reduction_tolerance: 1e-2,
+            max_iterations: effort.max_iterations,
+        };
         for start in self.candidates(stretches) {
             let unknowns = self.unknowns(&start, &model.coordinates);
             let start = model.coordinates.values(&starts(&unknowns));
             let problem = self.problem(&model, &unknowns, &priors, self.known(floor));
-            match problem.fit(model.initial_states(&start), &COARSE_SETTINGS, progress) {
-                Ok(fit) if best.is_none_or(|(least, _)| fit.chi_square < least) => {
-                    best = Some((fit.chi_square, model.coordinates.values(&fit.parameters)));
+            match problem.fit(model.initial_states(&start), &settings, progress) {
+                Ok(fit) => {
+                    let chi_square = fit.chi_square / fit.degrees_of_freedom();
+                    if best.is_none_or(|best| chi_square < best.chi_square) {
+                        best = Some(Coarse {
+                            values: model.coordinates.values(&fit.parameters),
+                            chi_square,
+                        });
+                    }
                 }
-                Ok(_) => {}
                 Err(error) => refused = Some(error),
             }
         }
         match (best, refused) {
-            (Some((_, start)), _) => Ok(start),
+            (Some(best), _) => Ok(best),
             (None, Some(error)) => Err(EstimateError::NoStart(error)),
-            (None, None) => Ok(typical(&self.geometry, 0.0)),
+            (None, None) => Ok(Coarse {
+                values: typical(&self.geometry, 0.0),
+                chi_square: f64::INFINITY,
+            }),
         }
     }
 

@@ -39,6 +39,8 @@ pub struct ExcitationTask {
     pub gain: Option<Vector4<f64>>,
     /// Length of a segment of the fit, s.
     pub segment: f64,
+    /// Whether there is a gyroscope. Without one its bias is held.
+    pub gyroscope: bool,
 }
 
 /// An excitation, and what it is expected to do.
@@ -147,6 +149,11 @@ impl ExcitationTask {
         Err(ExcitationError::Unstable {
             limit: self.tilt_limit,
         })
+    }
+
+    /// What is done with each parameter: what no sensor tells is held.
+    pub fn choices(&self) -> Values<Choice> {
+        self.choices.with_sensors(self.gyroscope)
     }
 
     fn check(&self) -> Result<(), ExcitationError> {
@@ -289,12 +296,17 @@ impl ExcitationTask {
 
     /// The Cramer-Rao bound of the fit that [`Task::estimate`] will make.
     fn standard_deviations(&self, motion: &Motion) -> Values {
-        let runs = std::slice::from_ref(&motion.run);
+        let mut run = motion.run.clone();
+        if !self.gyroscope {
+            run.outputs.iter_mut().for_each(|row| row[2] = f64::NAN);
+        }
+        let runs = std::slice::from_ref(&run);
+        let choices = self.choices();
         let task = Task {
             runs,
             ball_angle: BallAngle::Inertial,
             geometry: self.geometry,
-            choices: self.choices,
+            choices,
             physical: false,
             segment: self.segment,
             noise: [0, 1, 2].map(|output| Some(self.noise[output])),
@@ -308,7 +320,7 @@ impl ExcitationTask {
         let initial: Vec<Vector4<f64>> = starts.map(|s| motion.states[s.first]).collect();
         let indices: Vec<usize> = Parameter::ALL
             .into_iter()
-            .filter(|parameter| self.choices[*parameter].is_free())
+            .filter(|parameter| choices[*parameter].is_free())
             .map(Parameter::index)
             .collect();
         let coordinates = model.coordinates.of(&self.robot);

@@ -1,6 +1,7 @@
 //! From logs to a judged robot: the whole way.
 
 use crate::config::Config;
+use crate::coordinates::Coordinates;
 use crate::estimate::{Estimate, EstimateError, Progress, Task};
 use crate::log::{Finding, Log, Run};
 use crate::model::Robot;
@@ -11,7 +12,9 @@ use crate::published::{LinearRegression, regression};
 use crate::residuals::{OutputResidual, ScoreTest, SegmentResidual, score_tests, simulated, tests};
 use crate::segments::Split;
 use crate::structures::{Compared, compare};
+use crate::suspects::Suspects;
 use crate::validation::{Validation, validate};
+use crate::verdict::Weight;
 use ballbot::{Ballbot, Consistency, Geometry, LinearParameters, limits};
 use lpvmpc_design::NORMAL_95;
 use nalgebra::{DMatrix, Vector3};
@@ -26,6 +29,12 @@ pub struct Identification {
     pub physical: bool,
     /// Length of a segment that was asked for, s.
     pub segment: f64,
+    /// The fit's coordinates, which have its limits.
+    pub coordinates: Coordinates,
+    /// What is wrong with the columns, if no robot explains them as they are.
+    pub suspects: Option<Suspects>,
+    /// The builder insists on the columns as they are.
+    pub columns_accepted: bool,
     /// What was done with each parameter.
     pub choices: Values<Choice>,
     /// What is odd about each log.
@@ -70,7 +79,7 @@ pub fn identify(
             (log.run, (name, log.findings))
         })
         .unzip();
-    let task = Task {
+    let mut task = Task {
         runs: &runs,
         ball_angle: config.log.ball_angle_read(),
         geometry: config.geometry(),
@@ -79,9 +88,11 @@ pub fn identify(
         segment: config.fit.segment_s,
         noise: config.noise(),
     };
+    task.choices = choices.with_sensors(task.measures_rate());
     let split = Split::new(&runs, config.fit.held_back);
     let floor = noise::floor(&runs);
-    let estimate = task.estimate(&split.fitted, floor, progress)?;
+    let estimate = task.estimate(&split.fitted, floor, progress);
+    let estimate = estimate.map_err(|error| task.explained(error, &split))?;
     let task = Task {
         segment: estimate.segment,
         ..task
@@ -92,7 +103,10 @@ pub fn identify(
         geometry: task.geometry,
         physical: task.physical,
         segment: config.fit.segment_s,
-        choices,
+        coordinates: Coordinates::new(&task.choices, task.geometry),
+        suspects: None,
+        columns_accepted: config.log.accept_suspicious_units,
+        choices: task.choices,
         findings,
         floor,
         residuals: tests(&simulated, estimate.noise, floor),
@@ -111,7 +125,28 @@ pub fn identify(
         identification.covariance(),
         identification.geometry,
     );
+    let verdicts = identification.verdicts();
+    if verdicts.iter().any(|one| one.weight() >= Weight::Warning) {
+        identification.suspects = task.suspects(&split.fitted);
+    }
     Ok(identification)
+}
+
+impl Task<'_> {
+    /// Why there is no estimate, with what is wrong with the columns if that is why.
+    fn explained(&self, error: EstimateError, split: &Split) -> EstimateError {
+        let suspects = match error {
+            EstimateError::NoSegments { .. } => None,
+            _ => self.suspects(&split.fitted),
+        };
+        match suspects {
+            Some(suspects) => EstimateError::Suspect {
+                suspects,
+                error: Box::new(error),
+            },
+            None => error,
+        }
+    }
 }
 
 /// The fit on the data that were held back, and other structures of friction beside it.

@@ -186,4 +186,14 @@ impl Values<Choice> {
         choices[Parameter::TorqueBias] = Choice::Fixed(0.0);
         choices
     }
+
+    /// The choices, with the gyroscope's bias held where there is no gyroscope: no other column tells
+    /// of it.
+    #[must_use]
+    pub fn with_sensors(mut self, gyroscope: bool) -> Self {
+        if !gyroscope {
+            self[Parameter::GyroBias] = Choice::Fixed(0.0);
+        }
+        self
+    }
 }

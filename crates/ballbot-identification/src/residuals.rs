@@ -1,6 +1,7 @@
 //! What the residuals say about the model.
 
 use crate::estimate::{Estimate, Task};
+use crate::line::Line;
 use crate::log::Run;
 use crate::model::SegmentedRuns;
 use crate::parameter::Parameter;
@@ -20,6 +21,8 @@ pub struct OutputResidual {
     pub spread: f64,
     /// The least it can be: the noise of the sensor.
     pub floor: f64,
+    /// Standard deviation of the measured values from a straight line in each segment: the motion.
+    pub motion: f64,
     /// Correlation with itself.
     pub autocorrelation: Correlation,
     /// Correlation with the torque.
@@ -30,6 +33,11 @@ impl OutputResidual {
     /// Residual over noise: 1 is right, from about 1.3 on the model misses something.
     pub fn normalised(&self) -> f64 {
         self.spread / self.floor
+    }
+
+    /// Which part of the motion the robot does not explain.
+    pub fn unexplained(&self) -> f64 {
+        self.spread / self.motion
     }
 
     /// Whether it is noise. A fit leaves correlations of a few percent; with many rows they are
@@ -98,11 +106,27 @@ pub fn tests(
             OutputResidual {
                 spread: noise[output],
                 floor: floor[output],
+                motion: motion(segments, output),
                 autocorrelation: autocorrelation(&pieces, LAGS),
                 with_torque: cross_correlation(&pieces, &torque, LAGS),
             }
         })
         .collect()
+}
+
+/// Standard deviation of an output from a straight line in each segment.
+fn motion(segments: &[SegmentResidual], output: usize) -> f64 {
+    let (mut squares, mut count) = (0.0, 0.0);
+    for segment in segments {
+        let values = segment.measured.iter().map(|row| row[output]);
+        let points: Vec<(f64, f64)> = segment.time.iter().copied().zip(values).collect();
+        let line = Line::through(points.iter().copied().filter(|(_, value)| !value.is_nan()));
+        for (time, value) in points.into_iter().filter(|(_, value)| !value.is_nan()) {
+            squares += (value - line.at(time)).powi(2);
+            count += 1.0;
+        }
+    }
+    (squares / f64::max(count, 1.0)).sqrt()
 }
 
 /// What a fit of a parameter that was held would change, to first order.

@@ -106,6 +106,7 @@ fn task(arguments: &ExciteArguments, config: &Config) -> Result<ExcitationTask, 
         noise: Vector3::from_fn(|i, _| noise[i].unwrap_or(ORDINARY_NOISE[i])),
         gain: arguments.gain.as_deref().map(Vector4::from_column_slice),
         segment: config.fit.segment_s,
+        gyroscope: !config.log.theta_dot.column.is_empty(),
     })
 }
 
@@ -168,8 +169,9 @@ fn report(task: &ExcitationTask, excitation: &Excitation, out: &Path) -> String 
         "relative",
         "unit",
     ]);
+    let choices = task.choices();
     for parameter in Parameter::ALL {
-        if !task.choices[parameter].is_free() {
+        if !choices[parameter].is_free() {
             continue;
         }
         let (value, deviation) = (

@@ -21,7 +21,8 @@ Examples:
   ballbot identify a.csv b.csv --config my-robot.toml --out results
 
 Several logs are runs of one plane of one robot. Writes parameters.toml (for `ballbot lqr
---parameters` and for scenario files), report.html and the figures as SVG and PNG.")]
+--parameters` and for scenario files), report.html and the figures as SVG and PNG. Where no robot
+explains the logs, it says why, writes the report without parameters.toml, and exits with 1.")]
 pub struct IdentifyArguments {
     /// CSV files with a header
     #[arg(value_name = "LOG.csv", required_unless_present = "example")]
@@ -68,7 +69,22 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, CommandError> {
     })?;
     drop(progress);
     let drawings = drawings::drawings(&identification);
-    write(&arguments.out, &identification, &drawings)?;
+    let parameters = identification.parameter_file();
+    write(
+        &arguments.out,
+        &identification,
+        &drawings,
+        parameters.as_deref().ok(),
+    )?;
+    if let Err(reasons) = parameters {
+        let reasons = reasons.iter().map(|reason| format!("\n- {reason}"));
+        let old = arguments.out.join("parameters.toml");
+        return Err(CommandError::NoRobot {
+            reasons: reasons.collect(),
+            report: arguments.out.join("report.html"),
+            old: old.exists().then_some(old),
+        });
+    }
     let lengths = match arguments.config {
         Some(_) => "",
         None => {
@@ -126,17 +142,15 @@ fn write(
     folder: &Path,
     identification: &Identification,
     drawings: &[Drawing],
+    parameters: Option<&str>,
 ) -> Result<(), CommandError> {
-    let mut files: Vec<(PathBuf, Vec<u8>)> = vec![
-        (
-            folder.join("parameters.toml"),
-            identification.parameter_file().into_bytes(),
-        ),
-        (
-            folder.join("report.html"),
-            report::html(identification, drawings)?.into_bytes(),
-        ),
-    ];
+    let mut files: Vec<(PathBuf, Vec<u8>)> = vec![(
+        folder.join("report.html"),
+        report::html(identification, drawings)?.into_bytes(),
+    )];
+    if let Some(parameters) = parameters {
+        files.push((folder.join("parameters.toml"), parameters.into()));
+    }
     for drawing in drawings {
         let path = folder.join("figures").join(drawing.name);
         let svg = drawing.figure.svg()?.into_bytes();

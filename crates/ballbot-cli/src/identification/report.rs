@@ -72,7 +72,7 @@ fn verdicts(identification: &Identification) -> String {
         let class = match verdict.weight() {
             Weight::Good => "agrees",
             Weight::Note => "",
-            Weight::Warning => "differs",
+            Weight::Warning | Weight::Refusal => "differs",
         };
         format!(
             "<li><span class=\"{class}\">{}</span> {}</li>\n",

@@ -81,9 +81,14 @@ pub(super) fn run(
     let lengths = run.stretches.iter().map(|stretch| run.length(stretch));
     let longest = lengths.fold(0.0, f64::max);
     if longest < SHORTEST_STRETCH {
+        let jumps = findings.iter().filter_map(|finding| match finding {
+            Finding::Jumps { column, count, .. } => Some((column.clone(), *count)),
+            _ => None,
+        });
         return Err(Problem::NoStretch {
             needed: SHORTEST_STRETCH,
             longest,
+            jumps: jumps.max_by_key(|(_, count)| *count),
         });
     }
     Ok(run)

@@ -251,7 +251,7 @@ fn mechanics_is_imposed_unless_it_is_not_wanted() {
     let at_bound = imposed
         .verdicts()
         .iter()
-        .any(|v| matches!(v, Verdict::AtBound(_)));
+        .any(|v| matches!(v, Verdict::AtBound { .. }));
     assert!(at_bound && imposed.normalised_residual() > 1.3);
     let free = identified(&laboratory, 3, &format!("{fixed}\n[fit]\nphysical = false"));
     assert!(

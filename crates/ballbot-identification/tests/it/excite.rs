@@ -31,6 +31,7 @@ fn task() -> ExcitationTask {
         noise: healthy.noise,
         gain: None,
         segment: 1.0,
+        gyroscope: true,
     }
 }
 

@@ -6,6 +6,7 @@
 
 mod accuracy;
 mod chain;
+mod columns;
 mod excite;
 mod laboratory;
 mod malformed;

@@ -249,7 +249,7 @@ fn returns_from_beyond(theta: &[f64]) -> usize {
     returns
 }
 
-/// Slope of the tilt's changes over the integrals of the rate, and the size of the changes, rad.
+/// Slope of the tilt's changes over the integrals of the rate, and the size of the larger of them, rad.
 fn slope_of_tilt_over_rate(run: &Run) -> Option<(f64, f64)> {
     let mut pairs: Vec<(f64, f64)> = Vec::new();
     for stretch in &run.stretches {
@@ -274,6 +274,8 @@ fn slope_of_tilt_over_rate(run: &Run) -> Option<(f64, f64)> {
     let size = median(&mut sizes.collect::<Vec<_>>());
     let changes = pairs.iter().map(|pair| (pair.1 - middle_change).abs());
     let change = median(&mut changes.collect::<Vec<_>>());
+    // Of a tilt in the wrong unit, or of its rate, one alone may look like rest.
+    let change = change.max(size);
     let ratios = pairs
         .iter()
         .map(|pair| (pair.0 - middle_integral, pair.1 - middle_change))
