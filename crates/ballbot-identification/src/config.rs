@@ -50,24 +50,35 @@ impl Default for GeometryTable {
     }
 }
 
-/// Masses and inertias from a drawing: they become priors of b1, b2, b3 and the torque gain.
+/// The body: its mass, weighed; or, with all of the rest, masses and inertias from a drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BodyTable {
-    /// m_a, kg, wheels and motors included.
+    /// m_a, kg, wheels and motors included, without the ball. Alone it holds the torque gain.
     pub body_mass_kg: f64,
     /// I_a about the centre of mass, kg m^2.
-    pub body_inertia_kg_m2: f64,
+    pub body_inertia_kg_m2: Option<f64>,
     /// m_k, kg.
-    pub ball_mass_kg: f64,
+    pub ball_mass_kg: Option<f64>,
     /// I_k, kg m^2.
-    pub ball_inertia_kg_m2: f64,
+    pub ball_inertia_kg_m2: Option<f64>,
     /// I_w of one wheel with its motor's rotor as seen at the wheel, kg m^2.
-    pub wheel_inertia_kg_m2: f64,
+    pub wheel_inertia_kg_m2: Option<f64>,
     /// Angle of the wheels' contact points from the top of the ball, degrees.
-    pub zenith_angle_deg: f64,
+    pub zenith_angle_deg: Option<f64>,
     /// Relative standard deviation of what follows from these numbers.
-    pub uncertainty: f64,
+    pub uncertainty: Option<f64>,
+}
+
+/// Masses and inertias from a drawing: they become priors of b1, b2, b3 and the torque gain.
+struct Drawing {
+    body_mass: f64,
+    body_inertia: f64,
+    ball_mass: f64,
+    ball_inertia: f64,
+    wheel_inertia: f64,
+    zenith_angle: f64,
+    uncertainty: f64,
 }
 
 /// What is done with a parameter.
@@ -134,6 +145,15 @@ pub enum ConfigError {
     UnknownParameter {
         /// What was written.
         key: String,
+    },
+    /// A part of a drawing.
+    #[error(
+        "{key} is missing: [body] has either body_mass_kg alone, or all of a drawing (`ballbot \
+         identify --example`)"
+    )]
+    IncompleteBody {
+        /// The key with its table.
+        key: &'static str,
     },
     /// A value out of range.
     #[error("{key} = {value}: it must be {expected}")]
@@ -212,7 +232,6 @@ impl Config {
         } = self.fit;
         within("fit.segment_s", segment_s, 0.1, 10.0, "from 0.1 to 10 s")?;
         within("fit.held_back", held_back, 0.0, 0.8, "from 0 to 0.8")?;
-        self.body.map_or(Ok(()), |body| body.check())?;
         self.choices().map(|_| ())
     }
 
@@ -242,7 +261,7 @@ impl Config {
     pub fn choices(&self) -> Result<Values<Choice>, ConfigError> {
         let mut choices = Values::usual();
         if let Some(body) = self.body {
-            body.priors(&self.geometry(), &mut choices);
+            body.choose(&self.geometry(), &mut choices)?;
         }
         for (key, table) in &self.parameters {
             let parameter = Parameter::from_key(key)
@@ -286,33 +305,71 @@ impl ChoiceTable {
 }
 
 impl BodyTable {
-    fn check(&self) -> Result<(), ConfigError> {
+    /// What it says of the parameters.
+    fn choose(
+        &self,
+        geometry: &Geometry<f64>,
+        choices: &mut Values<Choice>,
+    ) -> Result<(), ConfigError> {
         positive("body.body_mass_kg", self.body_mass_kg)?;
-        positive("body.body_inertia_kg_m2", self.body_inertia_kg_m2)?;
-        positive("body.ball_mass_kg", self.ball_mass_kg)?;
-        positive("body.ball_inertia_kg_m2", self.ball_inertia_kg_m2)?;
-        positive("body.wheel_inertia_kg_m2", self.wheel_inertia_kg_m2)?;
-        positive("body.uncertainty", self.uncertainty)?;
-        let angle = self.zenith_angle_deg;
-        within(
-            "body.zenith_angle_deg",
-            angle,
-            1.0,
-            89.0,
-            "from 1 to 89 degrees",
-        )
+        match self.drawing()? {
+            Some(drawing) => drawing.priors(geometry, choices),
+            None => choices[Parameter::TorqueGain] = Choice::Fixed(1.0 / self.body_mass_kg),
+        }
+        Ok(())
     }
 
+    /// The drawing, if there is one.
+    fn drawing(&self) -> Result<Option<Drawing>, ConfigError> {
+        let keys = [
+            ("body.body_inertia_kg_m2", self.body_inertia_kg_m2),
+            ("body.ball_mass_kg", self.ball_mass_kg),
+            ("body.ball_inertia_kg_m2", self.ball_inertia_kg_m2),
+            ("body.wheel_inertia_kg_m2", self.wheel_inertia_kg_m2),
+            ("body.zenith_angle_deg", self.zenith_angle_deg),
+            ("body.uncertainty", self.uncertainty),
+        ];
+        if keys.iter().all(|(_, value)| value.is_none()) {
+            return Ok(None);
+        }
+        let mut values = [0.0; 6];
+        for (place, (key, value)) in values.iter_mut().zip(keys) {
+            *place = value.ok_or(ConfigError::IncompleteBody { key })?;
+            positive(key, *place)?;
+        }
+        let [
+            body_inertia,
+            ball_mass,
+            ball_inertia,
+            wheel_inertia,
+            angle,
+            uncertainty,
+        ] = values;
+        let degrees = "from 1 to 89 degrees";
+        within("body.zenith_angle_deg", angle, 1.0, 89.0, degrees)?;
+        Ok(Some(Drawing {
+            body_mass: self.body_mass_kg,
+            body_inertia,
+            ball_mass,
+            ball_inertia,
+            wheel_inertia,
+            zenith_angle: angle.to_radians(),
+            uncertainty,
+        }))
+    }
+}
+
+impl Drawing {
     /// b2 = 3/2 cos^2(alpha) (r_b/r_w)^2 I_w/m_a, b1 = b2 + (I_k + (m_k + m_a) r_b^2)/m_a,
     /// b3 = b2 + l^2 + I_a/m_a.
     fn priors(&self, geometry: &Geometry<f64>, choices: &mut Values<Choice>) {
-        let mass = self.body_mass_kg;
+        let mass = self.body_mass;
         let gear = geometry.ball_radius / geometry.wheel_radius;
-        let cos = self.zenith_angle_deg.to_radians().cos();
-        let b2 = 1.5 * (cos * gear).powi(2) * self.wheel_inertia_kg_m2 / mass;
-        let rolling = (self.ball_mass_kg + mass) * geometry.ball_radius.powi(2);
-        let b1 = b2 + (self.ball_inertia_kg_m2 + rolling) / mass;
-        let b3 = b2 + geometry.centre_of_mass.powi(2) + self.body_inertia_kg_m2 / mass;
+        let cos = self.zenith_angle.cos();
+        let b2 = 1.5 * (cos * gear).powi(2) * self.wheel_inertia / mass;
+        let rolling = (self.ball_mass + mass) * geometry.ball_radius.powi(2);
+        let b1 = b2 + (self.ball_inertia + rolling) / mass;
+        let b3 = b2 + geometry.centre_of_mass.powi(2) + self.body_inertia / mass;
         for (parameter, mean) in [
             (Parameter::B1, b1),
             (Parameter::B2, b2),
@@ -369,6 +426,14 @@ mod tests {
     }
 
     #[test]
+    fn a_body_that_was_weighed_holds_the_torque_gain() {
+        let config = Config::parse("[body]\nbody_mass_kg = 8.0").unwrap();
+        let choices = config.choices().unwrap();
+        assert_eq!(choices[Parameter::TorqueGain], Choice::Fixed(0.125));
+        assert_eq!(choices[Parameter::B1], Choice::FREE);
+    }
+
+    #[test]
     fn wrong_values_are_named() {
         for (text, part) in [
             (
@@ -390,6 +455,11 @@ mod tests {
                 "[parameters]\nb1_m2 = { prior = { mean = 1.0, standard_deviation = 0.0 } }",
                 "a positive number",
             ),
+            (
+                "[body]\nbody_mass_kg = 10.0\nball_mass_kg = 2.0",
+                "body.body_inertia_kg_m2 is missing",
+            ),
+            ("[body]\nbody_mass_kg = 0.0", "body.body_mass_kg = 0"),
             ("[log.theta]\ncolumn = \"t\"\nunit = \"grad\"", "grad"),
             ("[logs]", "logs"),
         ] {

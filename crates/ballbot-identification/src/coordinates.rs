@@ -35,6 +35,9 @@ const LARGEST_TILT_OFFSET: f64 = 0.35;
 /// Gyroscopes that were never calibrated have less, rad/s.
 const LARGEST_GYRO_BIAS: f64 = 0.5;
 
+/// Contacts that creep more slip, s.
+const LARGEST_CREEP: f64 = 0.2;
+
 /// No friction brings a ball to rest faster, 1/s.
 const FASTEST_FRICTION: f64 = 1000.0;
 
@@ -127,6 +130,7 @@ impl Coordinates {
             Parameter::Delay => (f64::NEG_INFINITY, LONGEST_DELAY),
             Parameter::TiltOffset => either(LARGEST_TILT_OFFSET),
             Parameter::GyroBias => either(LARGEST_GYRO_BIAS),
+            Parameter::CreepBall | Parameter::CreepTilt => either(LARGEST_CREEP),
             Parameter::TorqueBias => either(LARGEST_TILT_OFFSET * lever * heaviest),
         }))
     }
@@ -186,6 +190,8 @@ impl Coordinates {
         scales[Parameter::TiltOffset] = 0.01;
         scales[Parameter::GyroBias] = 0.01;
         scales[Parameter::TorqueBias] = 0.01;
+        scales[Parameter::CreepBall] = 0.01;
+        scales[Parameter::CreepTilt] = 0.01;
         scales
     }
 }
@@ -220,7 +226,7 @@ mod tests {
     #[test]
     fn the_bounds_keep_the_mass_matrix_positive() {
         let coordinates = Coordinates::new(&Values::usual(), Geometry::paper());
-        let start = Values([0.0; 11]);
+        let start = Values([0.0; Parameter::ALL.len()]);
         let bounds = coordinates.bounds(&start, true);
         let corner: Vec<f64> = bounds.0.iter().map(|(lower, _)| lower.max(-1.0)).collect();
         let values = coordinates.values(&corner);

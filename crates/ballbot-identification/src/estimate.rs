@@ -5,6 +5,7 @@ use crate::covariance::covariances;
 use crate::log::{BallAngle, Run};
 use crate::model::{Segment, SegmentedRuns};
 use crate::parameter::{Choice, Parameter, Values};
+use crate::residuals::repetition;
 use crate::segments::{segments, spread};
 use crate::start::{linear_fits, typical};
 use crate::suspects::Suspects;
@@ -39,14 +40,18 @@ pub struct Task<'a> {
 pub struct Estimate {
     /// All parameters, held ones included.
     pub values: Values,
-    /// Their covariance if the residuals are white noise, in the order of [`Parameter::ALL`]; zero
-    /// for what was held, by choice or at a bound.
+    /// Their covariance from the information of the fit, in the order of [`Parameter::ALL`]; zero for
+    /// what was held, by choice or at a bound.
     pub covariance: DMatrix<f64>,
-    /// Their covariance from the scatter of the segments, right for coloured residuals, too.
+    /// Their covariance from the scatter of the segments, never below that of the information: for
+    /// coloured residuals.
     pub scatter_covariance: DMatrix<f64>,
     /// What became of each parameter.
     pub status: Values<Status>,
-    /// Noise of ball angle, tilt and tilt rate as the residuals show it.
+    /// Standard deviation of the residuals of ball angle, tilt and tilt rate.
+    pub spread: Vector3<f64>,
+    /// What the outputs are weighted by: the spread, that of the ball angle times the root of how many
+    /// rows of coloured residuals count as one.
     pub noise: Vector3<f64>,
     /// The fit.
     pub fit: ShootingFit<4>,
@@ -208,14 +213,19 @@ impl Task<'_> {
         let mut unknowns = self.unknowns(&start, &model.coordinates);
         let priors = self.priors(&model.coordinates);
         let mut rounds = 0;
-        let (fit, problem) = loop {
+        let (fit, spread, coloured) = loop {
             let problem = self.problem(&model, &unknowns, &priors, noise);
             let fit = problem.fit(initial, &ShootingSettings::default(), progress)?;
-            let next = self.known(residual_noise(&problem, &fit));
+            let residuals = problem.residuals(&fit.parameters, &fit.initial);
+            let spread = residual_noise(&residuals, &fit, noise);
+            let coloured = spread.component_mul(&repetition(&residuals).map(f64::sqrt));
+            // Contacts give way and gears have play: of the three it is the ball angle whose errors
+            // repeat themselves while the robot is as it should be.
+            let next = self.known(Vector3::new(coloured[0], spread[1], spread[2]));
             let change = next.component_div(&noise).map(|ratio| (ratio - 1.0).abs());
             rounds += 1;
             if change.max() < 0.01 || rounds > REWEIGHTINGS {
-                break (fit, self.problem(&model, &unknowns, &priors, noise));
+                break (fit, self.known(spread), self.known(coloured));
             }
             noise = next;
             for (unknown, value) in unknowns.iter_mut().zip(&fit.parameters) {
@@ -223,6 +233,7 @@ impl Task<'_> {
             }
             initial = fit.initial;
         };
+        let problem = self.problem(&model, &unknowns, &priors, coloured);
         let (covariance, scatter_covariance) = covariances(&problem, &fit, &model.coordinates);
         let status = self.status(&fit);
         Ok(Estimate {
@@ -230,6 +241,7 @@ impl Task<'_> {
             covariance,
             scatter_covariance,
             status,
+            spread,
             noise,
             fit,
             segments: model.segments,
@@ -411,12 +423,12 @@ fn starts(unknowns: &[Unknown]) -> Vec<f64> {
     unknowns.iter().map(|unknown| unknown.start).collect()
 }
 
-/// Standard deviation of the residuals of each output; 1 for one that is not measured.
-pub fn residual_noise(
-    problem: &ShootingProblem<'_, SegmentedRuns<'_>, 4, 3>,
+/// Standard deviation of the residuals of each output; what it was for one that is not measured.
+fn residual_noise(
+    residuals: &[Vec<Vector3<f64>>],
     fit: &ShootingFit<4>,
+    noise: Vector3<f64>,
 ) -> Vector3<f64> {
-    let residuals = problem.residuals(&fit.parameters, &fit.initial);
     let lost = fit.values as f64 / fit.degrees_of_freedom().max(1.0);
     Vector3::from_fn(|output, _| {
         let values = residuals.iter().flatten().map(|row| row[output]);
@@ -426,7 +438,7 @@ pub fn residual_noise(
                 (sum + value * value, count + 1)
             });
         if count == 0 || sum == 0.0 {
-            return problem.noise[output];
+            return noise[output];
         }
         (sum / f64::from(count) * lost).sqrt()
     })

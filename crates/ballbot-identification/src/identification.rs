@@ -2,7 +2,7 @@
 
 use crate::config::Config;
 use crate::coordinates::Coordinates;
-use crate::estimate::{Estimate, EstimateError, Progress, Task};
+use crate::estimate::{Estimate, EstimateError, Progress, Status, Task};
 use crate::log::{Finding, Log, Run};
 use crate::model::Robot;
 use crate::noise;
@@ -16,7 +16,7 @@ use crate::suspects::Suspects;
 use crate::validation::{Validation, validate};
 use crate::verdict::Weight;
 use ballbot::{Ballbot, Consistency, Geometry, LinearParameters, limits};
-use lpvmpc_design::NORMAL_95;
+use lpvmpc_design::{NORMAL_95, poles};
 use nalgebra::{DMatrix, Vector3};
 use std::ops::Range;
 
@@ -49,6 +49,8 @@ pub struct Identification {
     pub residuals: Vec<OutputResidual>,
     /// What the residuals say about the parameters that were held.
     pub scores: Vec<ScoreTest>,
+    /// The covariance that the intervals are from.
+    covariance: DMatrix<f64>,
     /// Poles at the upright position.
     pub poles: Vec<Pole>,
     /// On held-back data, if any were held back; or why it could not be judged there.
@@ -109,9 +111,10 @@ pub fn identify(
         choices: task.choices,
         findings,
         floor,
-        residuals: tests(&simulated, estimate.noise, floor),
+        residuals: tests(&simulated, estimate.spread, floor),
         simulated,
         scores: score_tests(&task, &estimate),
+        covariance: DMatrix::zeros(0, 0),
         poles: Vec::new(),
         validation,
         structures,
@@ -119,6 +122,7 @@ pub fn identify(
         times: (time(&runs, &split.fitted), time(&runs, &split.held_back)),
         estimate,
     };
+    identification.covariance = identification.widened();
     // Their intervals are from the covariance that the residuals decide on.
     identification.poles = uncertain_poles(
         &identification.estimate,
@@ -159,7 +163,7 @@ fn held_back(
     if split.held_back.is_empty() {
         return (None, Vec::new());
     }
-    let validation = validate(task, &estimate.values, estimate.noise, &split.held_back);
+    let validation = validate(task, &estimate.values, estimate.spread, &split.held_back);
     let structures = compare(task, estimate, &split.held_back, progress);
     (Some(validation), structures)
 }
@@ -176,14 +180,49 @@ impl Identification {
         self.residuals.iter().all(OutputResidual::is_white)
     }
 
-    /// The covariance that the intervals are from: that of white residuals, or, where they are not
-    /// white, that of the segments' scatter.
+    /// The covariance that the intervals are from: that of the information, or, where the residuals
+    /// are not white and there are enough segments, that of their scatter; with creep, of the model's
+    /// own error, too.
     pub fn covariance(&self) -> &DMatrix<f64> {
-        if self.is_white() {
-            &self.estimate.covariance
+        &self.covariance
+    }
+
+    fn widened(&self) -> DMatrix<f64> {
+        let mut covariance = if self.is_white() || self.has_few_segments() {
+            self.estimate.covariance.clone()
         } else {
-            &self.estimate.scatter_covariance
+            self.estimate.scatter_covariance.clone()
+        };
+        let error = self.creep_error();
+        for parameter in Parameter::ROBOT {
+            let (index, value) = (parameter.index(), self.estimate.values[parameter]);
+            if self.estimate.status[parameter] == Status::Found {
+                covariance[(index, index)] += (error * value).powi(2);
+            }
         }
+        covariance
+    }
+
+    /// The relative error of a robot whose contacts creep: the model has what the sensors see of it,
+    /// and neglects that the contacts relax, which is of the order of the creep's time times the
+    /// robot's fastest pole. Zero without creep.
+    pub(crate) fn creep_error(&self) -> f64 {
+        let creep = Parameter::CreepBall;
+        let asked = self.scores.iter().find(|score| score.parameter == creep);
+        let time = match asked {
+            Some(score) if score.is_alarm() => score.change,
+            _ => self.estimate.values[creep],
+        };
+        let Some((a, _)) = linear_model(&self.estimate.values, self.geometry) else {
+            return 0.0;
+        };
+        let found = poles(&DMatrix::from_column_slice(4, 4, a.as_slice()));
+        let fastest = found.map_or(0.0, |poles| {
+            poles
+                .iter()
+                .fold(0.0_f64, |most, pole| most.max(pole.re.abs()))
+        });
+        (time * fastest).abs()
     }
 
     /// Whether there are fewer than two segments per parameter: their scatter then tells nothing.

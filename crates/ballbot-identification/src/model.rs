@@ -66,8 +66,10 @@ impl Robot {
             BallAngle::Inertial => x[0],
             BallAngle::RelativeToBody => x[0] - x[1],
         };
+        let creep =
+            self.values[Parameter::CreepBall] * x[2] + self.values[Parameter::CreepTilt] * x[3];
         Vector3::new(
-            phi,
+            phi + creep,
             x[1] + self.values[Parameter::TiltOffset],
             x[3] + self.values[Parameter::GyroBias],
         )

@@ -40,12 +40,47 @@ impl OutputResidual {
         self.spread / self.motion
     }
 
-    /// Whether it is noise. A fit leaves correlations of a few percent; with many rows they are
-    /// significant, and mean nothing.
+    /// Whether it is noise.
     pub fn is_white(&self) -> bool {
-        let (_, largest) = self.autocorrelation.largest();
-        self.autocorrelation.exceeding() <= 0.2 || largest.abs() < 0.1
+        is_white(&self.autocorrelation)
     }
+}
+
+/// Segments that the colour of residuals is taken from; more tell little more.
+const COLOUR_SEGMENTS: usize = 60;
+
+/// How many rows of each output count as one, since the residuals repeat themselves (the integrated
+/// autocorrelation): 1 for white noise.
+pub fn repetition(residuals: &[Vec<Vector3<f64>>]) -> Vector3<f64> {
+    let every = residuals.len().div_ceil(COLOUR_SEGMENTS).max(1);
+    Vector3::from_fn(|output, _| {
+        let pieces = residuals.iter().step_by(every);
+        let pieces: Vec<Vec<f64>> = pieces
+            .map(|rows| rows.iter().map(|row| row[output]).collect())
+            .collect();
+        // Beyond half of a segment its fitted initial state makes up for what is left.
+        let longest = pieces.iter().map(Vec::len).max().unwrap_or(0) / 2;
+        let correlation = autocorrelation(&pieces, longest);
+        // Only as far as it is positive: what follows is chance.
+        let positive = correlation
+            .values
+            .iter()
+            .take_while(|value| **value > COLOURED / 2.0);
+        if is_white(&correlation) {
+            1.0
+        } else {
+            1.0 + 2.0 * positive.sum::<f64>()
+        }
+    })
+}
+
+/// A fit leaves correlations of a few percent; with many rows they are significant, and mean
+/// nothing.
+const COLOURED: f64 = 0.1;
+
+fn is_white(autocorrelation: &Correlation) -> bool {
+    let (_, largest) = autocorrelation.largest();
+    autocorrelation.exceeding() <= 0.2 || largest.abs() < COLOURED
 }
 
 /// Measured minus simulated outputs with their times, segment by segment.
@@ -88,7 +123,7 @@ pub fn simulated(task: &Task<'_>, estimate: &Estimate) -> Vec<SegmentResidual> {
 /// The residuals output by output.
 pub fn tests(
     segments: &[SegmentResidual],
-    noise: Vector3<f64>,
+    spread: Vector3<f64>,
     floor: Vector3<f64>,
 ) -> Vec<OutputResidual> {
     let torque: Vec<Vec<f64>> = segments.iter().map(|s| s.torque.clone()).collect();
@@ -104,7 +139,7 @@ pub fn tests(
             };
             let pieces: Vec<Vec<f64>> = segments.iter().map(residual).collect();
             OutputResidual {
-                spread: noise[output],
+                spread: spread[output],
                 floor: floor[output],
                 motion: motion(segments, output),
                 autocorrelation: autocorrelation(&pieces, LAGS),
@@ -153,8 +188,8 @@ impl ScoreTest {
     }
 }
 
-/// A score test (Rao 1948) of every parameter that was held. `noise` is that of the residuals, so
-/// a model that misses much asks for little by itself.
+/// A score test (Rao 1948) of every parameter that was held. The noise is that of the residuals,
+/// their colour included, so a model that misses much asks for little by itself.
 pub fn score_tests(task: &Task<'_>, estimate: &Estimate) -> Vec<ScoreTest> {
     let model: SegmentedRuns<'_> = task.model(estimate.segments.clone());
     let unknowns = task.unknowns(&estimate.values, &model.coordinates);

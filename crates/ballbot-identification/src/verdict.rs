@@ -103,16 +103,6 @@ pub enum Verdict {
         /// Its residuals over those of the others.
         ratio: f64,
     },
-    /// Residuals that are not white, and too few segments to take their scatter.
-    #[error(
-        "the residuals are not white, and {segments} segments for {parameters} parameters are too few to take their scatter: the intervals are too narrow. Record for longer"
-    )]
-    TooShort {
-        /// Segments.
-        segments: usize,
-        /// Parameters that were found.
-        parameters: usize,
-    },
     /// The held-back data could not be used.
     #[error("the data held back could not be used: {0}")]
     NotJudged(String),
@@ -124,13 +114,15 @@ pub enum Verdict {
     },
     /// The residual is more than the noise of the sensors.
     #[error(
-        "the residual of the {output} is {} times the noise of the sensor: the model misses something (delay, friction, offset, saturation, slip, unit or sign)", times(*normalised)
+        "the residual of the {output} is {} times the noise of the sensor and {} of the motion: {}; the intervals are widened for it", times(*normalised), percent(*part), if *part > MATTERS { "the model misses something (delay, friction, offset, saturation, slip, unit or sign)" } else { "small beside the motion, as of contacts that creep or gears with play" }
     )]
     ResidualTooLarge {
         /// Which output.
         output: &'static str,
         /// Residual over noise.
         normalised: f64,
+        /// Residual over motion.
+        part: f64,
     },
     /// The residual is not white.
     #[error(
@@ -155,7 +147,7 @@ pub enum Verdict {
         significance: f64,
     },
     /// Another parameter that was held.
-    #[error("{} is held at {}, the residuals ask for about {} {} ({} standard deviations): set {parameter} = \"free\", and see whether the other parameters stay", parameter.words(), number(*held), number(*wanted), parameter.unit(), times(*significance))]
+    #[error("{} is held at {}, the residuals ask for about {} {} ({} standard deviations): {}", parameter.words(), number(*held), number(*wanted), parameter.unit(), times(*significance), advice(*parameter))]
     HeldParameter {
         /// The parameter.
         parameter: Parameter,
@@ -165,7 +157,16 @@ pub enum Verdict {
         wanted: f64,
         /// Over its standard deviation.
         significance: f64,
+        /// The difference is one that a controller would notice.
+        matters: bool,
     },
+    /// Nothing is said of the body's mass.
+    #[error(
+        "the body's mass is not given: weigh the body, and set body_mass_kg in [body]. Without it the \
+         torque gain and the inertias are told from each other by little, and contacts that creep \
+         shift them together by tens of per cent, beyond their intervals"
+    )]
+    BodyNotWeighed,
     /// Mechanics held a parameter at its bound.
     #[error("{} is held at its bound: the data alone want it beyond what mechanics allows{}", parameter.words(), if *refused { NO_ROBOT_WITHIN } else { "" })]
     AtBound {
@@ -262,14 +263,21 @@ impl Verdict {
             | Self::WrongColumns { .. }
             | Self::PriorContradicted { .. }
             | Self::NotJudged(_)
-            | Self::TooShort { .. }
             | Self::Disturbed { .. }
-            | Self::ResidualTooLarge { .. }
             | Self::DelayAlarm { .. }
-            | Self::HeldParameter { .. }
+            | Self::HeldParameter { matters: true, .. }
             | Self::Unphysical(_)
             | Self::HeldBackBad { .. } => Weight::Warning,
+            Self::ResidualTooLarge { part, .. } => {
+                if *part > MATTERS {
+                    Weight::Warning
+                } else {
+                    Weight::Note
+                }
+            }
             Self::Coloured { .. }
+            | Self::HeldParameter { .. }
+            | Self::BodyNotWeighed
             | Self::AtBound { .. }
             | Self::Weak { .. }
             | Self::IndistinctFromZero { .. }
@@ -283,12 +291,37 @@ impl Verdict {
     }
 }
 
+/// A residual is a part of the motion that the model should have, not an imperfection of the robot,
+/// from this part on.
+const MATTERS: f64 = 0.1;
+
 const ACCEPT: &str = " (or accept_suspicious_units = true there, if they are right)";
 
 const NO_ROBOT_WITHIN: &str = ", and no robot within that explains them: the mass, a length, a unit or \
     what ball_angle is relative to is wrong, or the contacts slip";
 
 const HELD_BACK_LIMIT: &str = " and 4 the most that is accepted";
+
+/// What to do about a parameter that was held elsewhere than the residuals want it.
+fn advice(parameter: Parameter) -> String {
+    match parameter {
+        Parameter::TorqueGain => "check the body's mass, the unit of the torque and the torque per \
+             ampere, but do not set it free on a body that was weighed: contacts that creep look like \
+             that, too"
+            .to_owned(),
+        Parameter::DriveCoulomb | Parameter::TorqueBias => format!(
+            "contacts that creep and a floor that rubs look like that, too: set {parameter} = \
+             \"free\" only if the data held back are explained better with it"
+        ),
+        Parameter::CreepBall | Parameter::CreepTilt => "the contacts of the ball creep under their \
+             forces, or the encoders are read late: set creep_phi_s = \"free\" and creep_theta_s = \
+             \"free\""
+            .to_owned(),
+        _ => format!(
+            "set {parameter} = \"free\", and see whether the other parameters stay"
+        ),
+    }
+}
 
 fn contradiction(parameter: Parameter) -> &'static str {
     match parameter {
@@ -327,6 +360,11 @@ fn beyond(parameter: Parameter, value: f64, masses: &(f64, f64), lever: f64) -> 
                 number(heaviest),
             )
         }
+        Parameter::CreepBall | Parameter::CreepTilt => format!(
+            "{words} goes to {} s, the limit: the contacts slip rather than creep, or the columns are \
+             shifted against each other",
+            number(value)
+        ),
         Parameter::TiltOffset | Parameter::GyroBias => format!(
             "{words} goes to {} {}, the limit: is the sensor mounted askew, or are units or signs \
              wrong?",

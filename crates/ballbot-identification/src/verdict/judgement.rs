@@ -34,6 +34,12 @@ const HELD_BACK_REFUSED: f64 = 4.0;
 /// Residual over motion from which on a robot is not what moved.
 const UNEXPLAINED: f64 = 0.5;
 
+/// A relative error of the inertias that is no reason for a warning.
+const SMALL_ERROR: f64 = 0.02;
+
+/// A torque that holds the body at this tilt is no reason for a warning, rad.
+const SMALL_TILT: f64 = 1e-3;
+
 /// A parameter may be so many standard deviations from what was known of it.
 const CONTRADICTED: f64 = 4.0;
 
@@ -99,24 +105,19 @@ impl Identification {
                 used: self.estimate.segment,
             });
         }
-        if !self.is_white() && self.has_few_segments() {
-            verdicts.push(Verdict::TooShort {
-                segments: self.estimate.segments.len(),
-                parameters: self.estimate.fit.reduced.indices.len(),
-            });
-        }
         verdicts.extend(self.disturbed());
         let (mut noise, mut unexplained) = (true, None);
         for (output, residual) in OUTPUTS.into_iter().zip(&self.residuals) {
-            if !(residual.normalised() <= TOO_LARGE) {
+            if exceeds(residual.normalised(), TOO_LARGE) {
                 noise = false;
                 let part = residual.unexplained();
-                if !(part <= UNEXPLAINED) {
+                if exceeds(part, UNEXPLAINED) {
                     unexplained = Some(Verdict::Unexplained { output, part });
                 }
                 verdicts.push(Verdict::ResidualTooLarge {
                     output,
                     normalised: residual.normalised(),
+                    part,
                 });
             }
             if !residual.is_white() {
@@ -175,8 +176,21 @@ impl Identification {
                     held,
                     wanted,
                     significance,
+                    matters: self.matters(parameter, score.change),
                 },
             });
+        }
+    }
+
+    /// Whether a controller would notice that change of a parameter that was held.
+    fn matters(&self, parameter: Parameter, change: f64) -> bool {
+        let weight = self.geometry.gravity * self.geometry.centre_of_mass;
+        let gain = self.estimate.values[Parameter::TorqueGain];
+        match parameter {
+            Parameter::CreepBall | Parameter::CreepTilt => self.creep_error() > SMALL_ERROR,
+            Parameter::TorqueBias => (gain * change).abs() > SMALL_TILT * weight,
+            Parameter::DriveCoulomb => change.abs() > SMALL_TILT * weight,
+            _ => true,
         }
     }
 
@@ -192,19 +206,22 @@ impl Identification {
             };
             let found = self.estimate.values[parameter];
             let significance = (found - mean).abs() / standard_deviation;
-            if !(significance <= CONTRADICTED) {
+            if exceeds(significance, CONTRADICTED) {
                 verdicts.push(Verdict::PriorContradicted {
                     parameter,
                     mean,
                     found,
                     significance,
-                    refused: !(significance <= REFUTED),
+                    refused: exceeds(significance, REFUTED),
                 });
             }
         }
     }
 
     fn judge_found(&self, verdicts: &mut Vec<Verdict>) {
+        if matches!(self.choices[Parameter::TorqueGain], Choice::Free { .. }) {
+            verdicts.push(Verdict::BodyNotWeighed);
+        }
         for parameter in Parameter::ALL {
             match self.estimate.status[parameter] {
                 Status::Held => continue,
@@ -249,7 +266,7 @@ impl Identification {
     /// Whether more than noise is left of any output.
     fn misfits(&self) -> bool {
         let mut outputs = self.residuals.iter();
-        outputs.any(|residual| !(residual.normalised() <= TOO_LARGE))
+        outputs.any(|residual| exceeds(residual.normalised(), TOO_LARGE))
     }
 
     /// Whether the fit ended where no robot of these lengths is.
@@ -268,11 +285,15 @@ impl Identification {
         }
         match parameter {
             Parameter::B1 | Parameter::B3 | Parameter::TorqueGain
-                if !(deviation <= UNTOLD * value.abs()) =>
+                if exceeds(deviation, UNTOLD * value.abs()) =>
             {
                 Some(Verdict::Untold { parameter })
             }
-            Parameter::TiltOffset | Parameter::GyroBias | Parameter::TorqueBias => None,
+            Parameter::TiltOffset
+            | Parameter::GyroBias
+            | Parameter::TorqueBias
+            | Parameter::CreepBall
+            | Parameter::CreepTilt => None,
             Parameter::Delay => exceeds(deviation, VAGUE_DELAY).then_some(Verdict::VagueDelay {
                 standard_deviation: deviation,
             }),
@@ -304,7 +325,7 @@ impl Identification {
         } else {
             Verdict::HeldBackBad {
                 chi_square,
-                refused: !(chi_square <= HELD_BACK_REFUSED),
+                refused: exceeds(chi_square, HELD_BACK_REFUSED),
             }
         });
         let own = |structure: Structure| {
@@ -330,7 +351,7 @@ impl Identification {
     }
 }
 
-/// Whether a deviation is above a limit; one that is no number is.
-fn exceeds(deviation: f64, limit: f64) -> bool {
-    deviation.is_nan() || deviation > limit
+/// Whether a value is above a limit; one that is NaN is.
+fn exceeds(value: f64, limit: f64) -> bool {
+    value.is_nan() || value > limit
 }

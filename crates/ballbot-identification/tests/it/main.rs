@@ -7,6 +7,7 @@
 mod accuracy;
 mod chain;
 mod columns;
+mod creep;
 mod excite;
 mod laboratory;
 mod malformed;
