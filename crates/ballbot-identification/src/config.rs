@@ -146,6 +146,12 @@ pub enum ConfigError {
         /// What was written.
         key: String,
     },
+    /// A mass beside a torque in no unit of torque.
+    #[error(
+        "[body] says a mass, and the torque is a current, a voltage or a duty cycle without the torque \
+         per unit: give that as factor, or leave [body] out"
+    )]
+    NoTorque,
     /// A part of a drawing.
     #[error(
         "{key} is missing: [body] has either body_mass_kg alone, or all of a drawing (`ballbot \
@@ -232,7 +238,34 @@ impl Config {
         } = self.fit;
         within("fit.segment_s", segment_s, 0.1, 10.0, "from 0.1 to 10 s")?;
         within("fit.held_back", held_back, 0.0, 0.8, "from 0 to 0.8")?;
+        self.check_log()?;
         self.choices().map(|_| ())
+    }
+
+    fn check_log(&self) -> Result<(), ConfigError> {
+        let times = [
+            ("log.from_s", self.log.from_s),
+            ("log.until_s", self.log.until_s),
+        ];
+        for (key, time) in times {
+            time.map_or(Ok(()), |time| {
+                within(key, time, 0.0, 1e9, "a time from 0 on")
+            })?;
+        }
+        for [from, to] in &self.log.leave_out {
+            within("log.leave_out", *from, 0.0, 1e9, "a time from 0 on")?;
+            within(
+                "log.leave_out",
+                *to,
+                *from,
+                1e9,
+                "a time after the one before it",
+            )?;
+        }
+        if self.body.is_some() && !self.log.torque_known() {
+            return Err(ConfigError::NoTorque);
+        }
+        Ok(())
     }
 
     /// Lengths and gravity.
@@ -461,6 +494,14 @@ mod tests {
             ),
             ("[body]\nbody_mass_kg = 0.0", "body.body_mass_kg = 0"),
             ("[log.theta]\ncolumn = \"t\"\nunit = \"grad\"", "grad"),
+            (
+                "[log]\nleave_out = [[3.0, 2.0]]",
+                "log.leave_out = 2: it must be a time after",
+            ),
+            (
+                "[body]\nbody_mass_kg = 10.0\n[log.torque]\ncolumn = \"pwm\"\nunit = \"1\"",
+                "without the torque per unit",
+            ),
             ("[logs]", "logs"),
         ] {
             let message = Config::parse(text).unwrap_err().to_string();

@@ -14,8 +14,8 @@ pub struct Coordinates {
     ball_excess: bool,
     /// b3 is represented by its excess.
     body_excess: bool,
-    /// Something is said of the body's mass, which then needs no limits.
-    mass_known: bool,
+    /// The gain is the inverse of a mass of which nothing is said: that of a body of this size.
+    gain_limited: bool,
 }
 
 /// The least inertia that counts as positive, m^2: that of a body of a millimetre.
@@ -42,13 +42,14 @@ const LARGEST_CREEP: f64 = 0.2;
 const FASTEST_FRICTION: f64 = 1000.0;
 
 impl Coordinates {
-    /// The coordinates for a robot of which `choices` are made.
-    pub fn new(choices: &Values<Choice>, geometry: Geometry<f64>) -> Self {
+    /// The coordinates for a robot of which `choices` are made. `torque_known`: the torque is in N m.
+    pub fn new(choices: &Values<Choice>, geometry: Geometry<f64>, torque_known: bool) -> Self {
         Self {
             geometry,
             ball_excess: choices[Parameter::B1].is_free(),
             body_excess: choices[Parameter::B3].is_free(),
-            mass_known: !matches!(choices[Parameter::TorqueGain], Choice::Free { .. }),
+            gain_limited: torque_known
+                && matches!(choices[Parameter::TorqueGain], Choice::Free { .. }),
         }
     }
 
@@ -125,8 +126,8 @@ impl Coordinates {
             // It would hold the body level.
             Parameter::DriveCoulomb => either(lever),
             // A negative gain is a wrong sign of the torque, which is to be found out, not fitted.
-            Parameter::TorqueGain if self.mass_known => (f64::MIN_POSITIVE, f64::INFINITY),
-            Parameter::TorqueGain => (1.0 / heaviest, 1.0 / lightest),
+            Parameter::TorqueGain if self.gain_limited => (1.0 / heaviest, 1.0 / lightest),
+            Parameter::TorqueGain => (f64::MIN_POSITIVE, f64::INFINITY),
             Parameter::Delay => (f64::NEG_INFINITY, LONGEST_DELAY),
             Parameter::TiltOffset => either(LARGEST_TILT_OFFSET),
             Parameter::GyroBias => either(LARGEST_GYRO_BIAS),
@@ -204,7 +205,7 @@ mod tests {
     fn coordinates_and_parameters_are_inverse_and_differentiated() {
         let mut choices = Values::usual();
         choices[Parameter::B3] = Choice::Fixed(0.2);
-        let coordinates = Coordinates::new(&choices, Geometry::paper());
+        let coordinates = Coordinates::new(&choices, Geometry::paper(), true);
         let values = Values(std::array::from_fn(|i| 0.3 + 0.1 * i as f64));
         let z = coordinates.of(&values);
         for (back, value) in coordinates.values(&z).0.iter().zip(values.0) {
@@ -225,7 +226,7 @@ mod tests {
 
     #[test]
     fn the_bounds_keep_the_mass_matrix_positive() {
-        let coordinates = Coordinates::new(&Values::usual(), Geometry::paper());
+        let coordinates = Coordinates::new(&Values::usual(), Geometry::paper(), true);
         let start = Values([0.0; Parameter::ALL.len()]);
         let bounds = coordinates.bounds(&start, true);
         let corner: Vec<f64> = bounds.0.iter().map(|(lower, _)| lower.max(-1.0)).collect();

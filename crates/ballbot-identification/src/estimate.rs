@@ -31,6 +31,8 @@ pub struct Task<'a> {
     pub physical: bool,
     /// Length of a segment, s.
     pub segment: f64,
+    /// Whether the torque is in N m.
+    pub torque_known: bool,
     /// Known noise of ball angle, tilt and tilt rate; what is `None` is found.
     pub noise: [Option<f64>; 3],
 }
@@ -136,6 +138,13 @@ pub struct Effort {
 /// Times that the noise is found anew from the residuals, at most.
 const REWEIGHTINGS: usize = 6;
 
+/// Steps of each fit after the first, which begins where that ended.
+const STEPS_AGAIN: usize = 20;
+
+/// Rows that are fitted, at most: of a longer log segments that are spread evenly over it. Errors
+/// fall with the root of the rows, and at a hundred thousand they are those of the model.
+const MOST_ROWS: usize = 200_000;
+
 impl Task<'_> {
     /// Time at the begin of a stretch whose torque a delay may need, s.
     pub fn lead(&self) -> f64 {
@@ -174,6 +183,8 @@ impl Task<'_> {
         let mut length = self.segment;
         loop {
             let segments = segments(self.runs, stretches, length, self.lead());
+            let rows: usize = segments.iter().map(|one| one.end - one.first).sum();
+            let segments = spread(&segments, segments.len() * MOST_ROWS / rows.max(MOST_ROWS));
             let task = Task {
                 segment: length,
                 ..self.clone()
@@ -213,9 +224,10 @@ impl Task<'_> {
         let mut unknowns = self.unknowns(&start, &model.coordinates);
         let priors = self.priors(&model.coordinates);
         let mut rounds = 0;
+        let mut settings = ShootingSettings::default();
         let (fit, spread, coloured) = loop {
             let problem = self.problem(&model, &unknowns, &priors, noise);
-            let fit = problem.fit(initial, &ShootingSettings::default(), progress)?;
+            let fit = problem.fit(initial, &settings, progress)?;
             let residuals = problem.residuals(&fit.parameters, &fit.initial);
             let spread = residual_noise(&residuals, &fit, noise);
             let coloured = spread.component_mul(&repetition(&residuals).map(f64::sqrt));
@@ -228,6 +240,7 @@ impl Task<'_> {
                 break (fit, self.known(spread), self.known(coloured));
             }
             noise = next;
+            settings.max_iterations = STEPS_AGAIN;
             for (unknown, value) in unknowns.iter_mut().zip(&fit.parameters) {
                 unknown.start = *value;
             }
@@ -254,7 +267,7 @@ impl Task<'_> {
         SegmentedRuns {
             runs: self.runs,
             segments,
-            coordinates: Coordinates::new(&self.choices, self.geometry),
+            coordinates: Coordinates::new(&self.choices, self.geometry, self.torque_known),
             ball_angle: self.ball_angle,
         }
     }

@@ -33,6 +33,8 @@ pub struct Identification {
     pub coordinates: Coordinates,
     /// What is wrong with the columns, if no robot explains them as they are.
     pub suspects: Option<Suspects>,
+    /// Whether the torque is in N m.
+    pub torque_known: bool,
     /// The builder insists on the columns as they are.
     pub columns_accepted: bool,
     /// What was done with each parameter.
@@ -88,6 +90,7 @@ pub fn identify(
         choices,
         physical: config.fit.physical,
         segment: config.fit.segment_s,
+        torque_known: config.log.torque_known(),
         noise: config.noise(),
     };
     task.choices = choices.with_sensors(task.measures_rate());
@@ -105,8 +108,9 @@ pub fn identify(
         geometry: task.geometry,
         physical: task.physical,
         segment: config.fit.segment_s,
-        coordinates: Coordinates::new(&task.choices, task.geometry),
+        coordinates: Coordinates::new(&task.choices, task.geometry, task.torque_known),
         suspects: None,
+        torque_known: task.torque_known,
         columns_accepted: config.log.accept_suspicious_units,
         choices: task.choices,
         findings,

@@ -208,7 +208,7 @@ impl Task<'_> {
 
     /// Whether a parameter that was fitted is where no robot is.
     fn ends_at_limit(&self, found: &[f64]) -> bool {
-        let coordinates = Coordinates::new(&self.choices, self.geometry);
+        let coordinates = Coordinates::new(&self.choices, self.geometry, self.torque_known);
         Parameter::ALL.into_iter().any(|parameter| {
             let coordinate = found[parameter.index()];
             self.choices[parameter].is_free() && coordinates.is_at_limit(parameter, coordinate)

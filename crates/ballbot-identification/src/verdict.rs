@@ -94,7 +94,7 @@ pub enum Verdict {
         used: f64,
     },
     /// A stretch that the robot explains much worse than the rest.
-    #[error("run {run}, {:.2} s to {:.2} s: the residuals are {} times those of the rest. Was the robot pushed, or did the ball slip? Leave this part of the log out", time.0, time.1, times(*ratio))]
+    #[error("run {run}, {:.2} s to {:.2} s: the residuals are {} times those of the rest. Was the robot pushed, or did the ball slip? Leave this part of the log out: --leave-out {run}:{:.2},{:.2}", time.0, time.1, times(*ratio), time.0, time.1)]
     Disturbed {
         /// Number of the run, counted from 1.
         run: usize,
@@ -167,6 +167,13 @@ pub enum Verdict {
          shift them together by tens of per cent, beyond their intervals"
     )]
     BodyNotWeighed,
+    /// A voltage or a duty cycle of unknown torque.
+    #[error(
+        "the torque is given by a current, a voltage or a duty cycle without the torque per unit: the \
+         torque gain is per that unit, the back-EMF is in the friction of the drive, and a controller \
+         made from these parameters decides on that unit, not on N m"
+    )]
+    NoTorque,
     /// Mechanics held a parameter at its bound.
     #[error("{} is held at its bound: the data alone want it beyond what mechanics allows{}", parameter.words(), if *refused { NO_ROBOT_WITHIN } else { "" })]
     AtBound {
@@ -278,6 +285,7 @@ impl Verdict {
             Self::Coloured { .. }
             | Self::HeldParameter { .. }
             | Self::BodyNotWeighed
+            | Self::NoTorque
             | Self::AtBound { .. }
             | Self::Weak { .. }
             | Self::IndistinctFromZero { .. }

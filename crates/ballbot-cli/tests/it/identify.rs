@@ -290,3 +290,66 @@ fn parameters_from_a_log_without_gyroscope_are_read_back() {
     // What no column tells is not promised either.
     assert!(!words.contains("gyro_bias"), "{words}");
 }
+
+#[test]
+fn the_examples_of_excite_work_and_useless_torques_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let torque = folder.path().join("torque.csv");
+    let excite = |more: &[&'static str]| -> Vec<String> {
+        let mut arguments = vec!["excite".to_owned()];
+        arguments.extend(more.iter().map(ToString::to_string));
+        arguments.extend(["--out".to_owned(), name(&torque).to_owned()]);
+        arguments
+    };
+    let run = |more: &[&'static str]| {
+        let arguments = excite(more);
+        text(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    // As `ballbot help excite` shows it.
+    let help = text(&["help", "excite"]);
+    let gain = "--gain=-1.4,-48,-1.8,-11";
+    assert!(help.contains(gain), "{help}");
+    run(&["--amplitude", "2", "--tilt-limit", "8", gain]);
+    run(&["--gain", "-1.4,-48,-1.8,-11"]);
+    assert_says(&run(&["--band", "0.2,5"]), &["0.20 Hz to 5.00 Hz"]);
+    assert!(torque.exists());
+    std::fs::remove_file(&torque).unwrap();
+    let refuse = |more: &[&'static str], code: i32| {
+        let arguments = excite(more);
+        failure(
+            &arguments.iter().map(String::as_str).collect::<Vec<_>>(),
+            code,
+        )
+    };
+    let message = refuse(&["--gain=-0.5,-12,-0.6,-2.5"], 1);
+    assert_says(
+        &message,
+        &["does not hold the robot", "pole at +", "other sign"],
+    );
+    refuse(&["--gain=1.4,48,1.8,11"], 1);
+    refuse(&["--gain=1,2,3"], 2);
+    refuse(&["--band", "0.2"], 2);
+    assert_says(&refuse(&["--amplitude", "1e-4"], 1), &["--amplitude"]);
+    assert!(!torque.exists());
+}
+
+#[test]
+fn a_part_of_a_log_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let (log_file, out) = (folder.path().join("log.csv"), folder.path().join("out"));
+    std::fs::write(&log_file, log()).unwrap();
+    let identify = |part: &'static str| {
+        text(&[
+            "identify",
+            name(&log_file),
+            "--out",
+            name(&out),
+            "--leave-out",
+            part,
+        ])
+    };
+    assert_says(&identify("3,4.5"), &["301 rows are left out"]);
+    assert_says(&identify("1:3,4.5"), &["301 rows are left out"]);
+    failure(&["identify", name(&log_file), "--leave-out", "2:3,4.5"], 2);
+    failure(&["identify", name(&log_file), "--leave-out", "4.5,3"], 2);
+}

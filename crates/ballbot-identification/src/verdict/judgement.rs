@@ -219,7 +219,9 @@ impl Identification {
     }
 
     fn judge_found(&self, verdicts: &mut Vec<Verdict>) {
-        if matches!(self.choices[Parameter::TorqueGain], Choice::Free { .. }) {
+        if !self.torque_known {
+            verdicts.push(Verdict::NoTorque);
+        } else if matches!(self.choices[Parameter::TorqueGain], Choice::Free { .. }) {
             verdicts.push(Verdict::BodyNotWeighed);
         }
         for parameter in Parameter::ALL {

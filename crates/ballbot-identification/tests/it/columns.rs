@@ -290,3 +290,46 @@ fn an_error_of_the_fit_names_the_columns() {
             .contains("the ball angle has the other sign")
     );
 }
+
+#[test]
+fn a_duty_cycle_with_back_emf_is_a_torque_and_a_friction() {
+    // A drive of 24 V: 0.05 N m per volt at standstill, and 0.02 N m less per rad/s of the ball
+    // against the body.
+    let laboratory = laboratory();
+    let gear = laboratory.plant.geometry.ball_radius / laboratory.plant.geometry.wheel_radius;
+    let mut driven = laboratory.clone();
+    driven.drive_friction += gear * laboratory.torque_gain * 0.02;
+    let mut record = driven.record(3);
+    record
+        .run
+        .torque
+        .iter_mut()
+        .for_each(|torque| *torque /= 24.0 * 0.05);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    std::fs::write(&path, csv(&record)).unwrap();
+    let identified = |factor: &str| {
+        let config =
+            format!("[log.torque]\ncolumn = \"torque_applied_nm\"\nunit = \"1\"\n{factor}");
+        let config = Config::parse(&config).unwrap();
+        let log = log::read(&path, &config.log, &|_| ()).unwrap();
+        let found = identify(vec![log], &config, config.choices().unwrap(), &|_| {}).unwrap();
+        found.parameter_file().unwrap();
+        found
+    };
+    let found = identified("");
+    let said = found.verdicts().contains(&Verdict::NoTorque);
+    assert!(said, "{:?}", found.verdicts());
+    let gain = found.estimate.values[Parameter::TorqueGain];
+    assert!((gain / (0.1 * 24.0 * 0.05) - 1.0).abs() < 0.05, "{gain}");
+    let friction = found.estimate.values[Parameter::DriveFriction];
+    assert!(
+        (friction / driven.drive_friction - 1.0).abs() < 0.1,
+        "{friction}"
+    );
+    // With the torque per unit it is one.
+    let found = identified("factor = 1.2");
+    assert!(!found.verdicts().contains(&Verdict::NoTorque));
+    let gain = found.estimate.values[Parameter::TorqueGain];
+    assert!((gain / 0.1 - 1.0).abs() < 0.05, "{gain}");
+}
