@@ -139,7 +139,7 @@ pub struct Effort {
 const REWEIGHTINGS: usize = 6;
 
 /// Steps of each fit after the first, which begins where that ended.
-const STEPS_AGAIN: usize = 20;
+const STEPS_AGAIN: usize = 30;
 
 /// Rows that are fitted, at most: of a longer log segments that are spread evenly over it. Errors
 /// fall with the root of the rows, and at a hundred thousand they are those of the model.

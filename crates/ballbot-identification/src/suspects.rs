@@ -8,7 +8,7 @@
 use crate::coordinates::Coordinates;
 use crate::estimate::{Effort, EstimateError, Task};
 use crate::log::{BallAngle, Run};
-use crate::parameter::{Choice, Parameter};
+use crate::parameter::Parameter;
 use crate::segments::{segments, spread};
 use lpvmpc_design::{ShootingFit, ShootingSettings};
 use nalgebra::Vector3;
@@ -70,13 +70,15 @@ const CHANCE: f64 = 0.1;
 /// The log is explained if chi^2 per degree of freedom is below this.
 const EXPLAINED: f64 = 1.0 + CHANCE;
 
-/// Otherwise chi^2 must fall to this part of what it is as the columns are.
+/// Otherwise chi^2 must fall to this part of what it is as the columns are, and below what is left
+/// of a robot that creeps.
 const MUCH_BETTER: f64 = 0.1;
+const CREEPING: f64 = 10.0;
 
 impl Suspect {
-    /// What is worth a try: `rate` says that the tilt rate is measured, `mass` that something is
-    /// said of the body's mass.
-    fn all(ball_angle: BallAngle, rate: bool, mass: bool) -> Vec<Self> {
+    /// What is worth a try: `rate` says that the tilt rate is measured, `torque` that the torque is
+    /// in N m.
+    fn all(ball_angle: BallAngle, rate: bool, torque: bool) -> Vec<Self> {
         const DEGREE: f64 = 180.0 / PI;
         let mut all = vec![
             Self::TorqueSign,
@@ -91,7 +93,7 @@ impl Suspect {
         let units = [DEGREE, 1.0 / DEGREE, TAU, 1.0 / TAU, 1e3, 1e-3];
         all.extend(units.map(Self::BallScale));
         all.extend([DEGREE, 1.0 / DEGREE, 1e3, 1e-3].map(Self::TiltScale));
-        if mass {
+        if torque {
             all.extend([1e3, 1e-3].map(Self::TorqueScale));
         }
         if !rate {
@@ -138,14 +140,14 @@ impl Task<'_> {
     pub fn suspects(&self, stretches: &[(usize, Range<usize>)]) -> Option<Suspects> {
         let own = self.chi_square_of(self.runs, self.ball_angle, stretches);
         let rate = self.measures_rate();
-        let mass = !matches!(self.choices[Parameter::TorqueGain], Choice::Free { .. });
-        let chi_squares: Vec<(Suspect, f64)> = Suspect::all(self.ball_angle, rate, mass)
-            .into_iter()
-            .map(|suspect| (suspect, self.chi_square_if(suspect, stretches)))
-            .collect();
+        let chi_squares: Vec<(Suspect, f64)> =
+            Suspect::all(self.ball_angle, rate, self.torque_known)
+                .into_iter()
+                .map(|suspect| (suspect, self.chi_square_if(suspect, stretches)))
+                .collect();
         let least = chi_squares.iter().map(|(_, one)| *one).fold(own, f64::min);
         let explained = least < EXPLAINED && own > least + CHANCE;
-        if !(explained || least < MUCH_BETTER * own) {
+        if !(explained || least < CREEPING.min(MUCH_BETTER * own)) {
             return None;
         }
         let alike = |one: f64| one <= least + CHANCE * least;

@@ -28,7 +28,7 @@ pub enum Weight {
 pub enum Verdict {
     /// The iteration did not end at a minimum.
     #[error(
-        "the fit did not converge: {0}. Better starting values may help ([parameters] with start, or [body])"
+        "the fit did not converge: {0}. Better starting values may help ([parameters] with start, or [body]), if signs, units and lengths are right and it is the log of a ballbot"
     )]
     NotConverged(ShootingTermination),
     /// A robot would explain the log if its columns were others.
