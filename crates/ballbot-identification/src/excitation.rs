@@ -240,7 +240,8 @@ impl ExcitationTask {
         let choices = self.choices();
         for parameter in [Parameter::B1, Parameter::B3, Parameter::TorqueGain] {
             let relative = (deviations[parameter] / self.robot[parameter]).abs();
-            if choices[parameter].is_free() && !(relative <= LEAST_PRECISE) {
+            let told = relative <= LEAST_PRECISE;
+            if choices[parameter].is_free() && !told {
                 return Err(ExcitationError::TellsNothing {
                     parameter,
                     relative,

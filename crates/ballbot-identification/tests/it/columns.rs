@@ -128,18 +128,18 @@ fn everything_with_the_other_sign_is_the_same_robot_seen_from_behind() {
 
 #[test]
 fn a_torque_in_another_unit() {
-    refused("", "heavier", torque_scaled(1e3));
-    refused("", "lighter", torque_scaled(1e-3));
+    let (milli, kilo) = (
+        "thousandths of the unit",
+        "a thousand times those that are said",
+    );
+    refused("", milli, torque_scaled(1e3));
+    refused("", kilo, torque_scaled(1e-3));
     let prior = "[parameters]\ntorque_gain_1_kg = { prior = { mean = 0.1, \
                  standard_deviation = 0.004 } }";
     refused(prior, "was expected at 0.1", torque_scaled(2.0));
     // With the body's mass the unit itself is known.
-    refused(MASS, "thousandths of the unit", torque_scaled(1e3));
-    refused(
-        MASS,
-        "a thousand times those that are said",
-        torque_scaled(1e-3),
-    );
+    refused(MASS, milli, torque_scaled(1e3));
+    refused(MASS, kilo, torque_scaled(1e-3));
 }
 
 #[test]
