@@ -141,7 +141,7 @@ const REWEIGHTINGS: usize = 6;
 /// Steps of each fit after the first, which begins where that ended.
 const STEPS_AGAIN: usize = 30;
 
-/// Rows that are fitted, at most: of a longer log segments that are spread evenly over it. Errors
+/// Rows that are fitted, at most, to within a segment: of a longer log segments that are spread evenly over it. Errors
 /// fall with the root of the rows, and at a hundred thousand they are those of the model.
 const MOST_ROWS: usize = 200_000;
 

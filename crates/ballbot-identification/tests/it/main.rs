@@ -10,4 +10,5 @@ mod columns;
 mod creep;
 mod excite;
 mod laboratory;
+mod long;
 mod malformed;
