@@ -164,7 +164,8 @@ pub enum Verdict {
     #[error(
         "the body's mass is not given: weigh the body, and set body_mass_kg in [body]. Without it the \
          torque gain and the inertias are told from each other by little, and contacts that creep \
-         shift them together by tens of per cent, beyond their intervals"
+         shift them together by tens of per cent, beyond their intervals; so does a ball_angle that is \
+         relative to something else than was said, which nothing else would show"
     )]
     BodyNotWeighed,
     /// A voltage or a duty cycle of unknown torque.
