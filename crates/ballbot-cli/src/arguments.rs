@@ -96,6 +96,15 @@ pub fn finite(text: &str) -> Result<f64, String> {
     }
 }
 
+/// N finite numbers with commas between them.
+pub fn finite_list<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let numbers: Vec<f64> = text.split(',').map(finite).collect::<Result<_, _>>()?;
+    let found = numbers.len();
+    numbers
+        .try_into()
+        .map_err(|_| format!("{N} numbers with commas between them are needed, not {found}"))
+}
+
 /// A finite number above zero.
 pub fn positive(text: &str) -> Result<f64, String> {
     let value = finite(text)?;

@@ -50,24 +50,35 @@ impl Default for GeometryTable {
     }
 }
 
-/// Masses and inertias from a drawing: they become priors of b1, b2, b3 and the torque gain.
+/// The body: its mass, weighed; or, with all of the rest, masses and inertias from a drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BodyTable {
-    /// m_a, kg, wheels and motors included.
+    /// m_a, kg, wheels and motors included, without the ball. Alone it holds the torque gain.
     pub body_mass_kg: f64,
     /// I_a about the centre of mass, kg m^2.
-    pub body_inertia_kg_m2: f64,
+    pub body_inertia_kg_m2: Option<f64>,
     /// m_k, kg.
-    pub ball_mass_kg: f64,
+    pub ball_mass_kg: Option<f64>,
     /// I_k, kg m^2.
-    pub ball_inertia_kg_m2: f64,
+    pub ball_inertia_kg_m2: Option<f64>,
     /// I_w of one wheel with its motor's rotor as seen at the wheel, kg m^2.
-    pub wheel_inertia_kg_m2: f64,
+    pub wheel_inertia_kg_m2: Option<f64>,
     /// Angle of the wheels' contact points from the top of the ball, degrees.
-    pub zenith_angle_deg: f64,
+    pub zenith_angle_deg: Option<f64>,
     /// Relative standard deviation of what follows from these numbers.
-    pub uncertainty: f64,
+    pub uncertainty: Option<f64>,
+}
+
+/// Masses and inertias from a drawing: they become priors of b1, b2, b3 and the torque gain.
+struct Drawing {
+    body_mass: f64,
+    body_inertia: f64,
+    ball_mass: f64,
+    ball_inertia: f64,
+    wheel_inertia: f64,
+    zenith_angle: f64,
+    uncertainty: f64,
 }
 
 /// What is done with a parameter.
@@ -135,6 +146,21 @@ pub enum ConfigError {
         /// What was written.
         key: String,
     },
+    /// A mass beside a torque in no unit of torque.
+    #[error(
+        "[body] says a mass, and the torque is a current, a voltage or a duty cycle without the torque \
+         per unit: give that as factor, or leave [body] out"
+    )]
+    NoTorque,
+    /// A part of a drawing.
+    #[error(
+        "{key} is missing: [body] has either body_mass_kg alone, or all of a drawing (`ballbot \
+         identify --example`)"
+    )]
+    IncompleteBody {
+        /// The key with its table.
+        key: &'static str,
+    },
     /// A value out of range.
     #[error("{key} = {value}: it must be {expected}")]
     Value {
@@ -163,15 +189,40 @@ impl Config {
     }
 
     fn check(&self) -> Result<(), ConfigError> {
-        let geometry = &self.geometry;
-        for (key, value) in [
-            ("geometry.centre_of_mass_m", geometry.centre_of_mass_m),
-            ("geometry.ball_radius_m", geometry.ball_radius_m),
-            ("geometry.wheel_radius_m", geometry.wheel_radius_m),
-            ("geometry.gravity_m_s2", geometry.gravity_m_s2),
-        ] {
-            positive(key, value)?;
-        }
+        let GeometryTable {
+            centre_of_mass_m,
+            ball_radius_m,
+            wheel_radius_m,
+            gravity_m_s2,
+        } = self.geometry;
+        within(
+            "geometry.centre_of_mass_m",
+            centre_of_mass_m,
+            0.01,
+            3.0,
+            "from 0.01 to 3 m: lengths are in metres",
+        )?;
+        within(
+            "geometry.ball_radius_m",
+            ball_radius_m,
+            0.01,
+            1.0,
+            "from 0.01 to 1 m: lengths are in metres",
+        )?;
+        within(
+            "geometry.wheel_radius_m",
+            wheel_radius_m,
+            0.002,
+            1.0,
+            "from 0.002 to 1 m: lengths are in metres",
+        )?;
+        within(
+            "geometry.gravity_m_s2",
+            gravity_m_s2,
+            1.0,
+            30.0,
+            "from 1 to 30 m/s^2 (9.81 on Earth)",
+        )?;
         let noise = [
             ("noise.phi_rad", self.noise.phi_rad),
             ("noise.theta_rad", self.noise.theta_rad),
@@ -187,8 +238,34 @@ impl Config {
         } = self.fit;
         within("fit.segment_s", segment_s, 0.1, 10.0, "from 0.1 to 10 s")?;
         within("fit.held_back", held_back, 0.0, 0.8, "from 0 to 0.8")?;
-        self.body.map_or(Ok(()), |body| body.check())?;
+        self.check_log()?;
         self.choices().map(|_| ())
+    }
+
+    fn check_log(&self) -> Result<(), ConfigError> {
+        let times = [
+            ("log.from_s", self.log.from_s),
+            ("log.until_s", self.log.until_s),
+        ];
+        for (key, time) in times {
+            time.map_or(Ok(()), |time| {
+                within(key, time, 0.0, 1e9, "a time from 0 on")
+            })?;
+        }
+        for [from, to] in &self.log.leave_out {
+            within("log.leave_out", *from, 0.0, 1e9, "a time from 0 on")?;
+            within(
+                "log.leave_out",
+                *to,
+                *from,
+                1e9,
+                "a time after the one before it",
+            )?;
+        }
+        if self.body.is_some() && !self.log.torque_known() {
+            return Err(ConfigError::NoTorque);
+        }
+        Ok(())
     }
 
     /// Lengths and gravity.
@@ -217,7 +294,7 @@ impl Config {
     pub fn choices(&self) -> Result<Values<Choice>, ConfigError> {
         let mut choices = Values::usual();
         if let Some(body) = self.body {
-            body.priors(&self.geometry(), &mut choices);
+            body.choose(&self.geometry(), &mut choices)?;
         }
         for (key, table) in &self.parameters {
             let parameter = Parameter::from_key(key)
@@ -261,33 +338,71 @@ impl ChoiceTable {
 }
 
 impl BodyTable {
-    fn check(&self) -> Result<(), ConfigError> {
+    /// What it says of the parameters.
+    fn choose(
+        &self,
+        geometry: &Geometry<f64>,
+        choices: &mut Values<Choice>,
+    ) -> Result<(), ConfigError> {
         positive("body.body_mass_kg", self.body_mass_kg)?;
-        positive("body.body_inertia_kg_m2", self.body_inertia_kg_m2)?;
-        positive("body.ball_mass_kg", self.ball_mass_kg)?;
-        positive("body.ball_inertia_kg_m2", self.ball_inertia_kg_m2)?;
-        positive("body.wheel_inertia_kg_m2", self.wheel_inertia_kg_m2)?;
-        positive("body.uncertainty", self.uncertainty)?;
-        let angle = self.zenith_angle_deg;
-        within(
-            "body.zenith_angle_deg",
-            angle,
-            1.0,
-            89.0,
-            "from 1 to 89 degrees",
-        )
+        match self.drawing()? {
+            Some(drawing) => drawing.priors(geometry, choices),
+            None => choices[Parameter::TorqueGain] = Choice::Fixed(1.0 / self.body_mass_kg),
+        }
+        Ok(())
     }
 
+    /// The drawing, if there is one.
+    fn drawing(&self) -> Result<Option<Drawing>, ConfigError> {
+        let keys = [
+            ("body.body_inertia_kg_m2", self.body_inertia_kg_m2),
+            ("body.ball_mass_kg", self.ball_mass_kg),
+            ("body.ball_inertia_kg_m2", self.ball_inertia_kg_m2),
+            ("body.wheel_inertia_kg_m2", self.wheel_inertia_kg_m2),
+            ("body.zenith_angle_deg", self.zenith_angle_deg),
+            ("body.uncertainty", self.uncertainty),
+        ];
+        if keys.iter().all(|(_, value)| value.is_none()) {
+            return Ok(None);
+        }
+        let mut values = [0.0; 6];
+        for (place, (key, value)) in values.iter_mut().zip(keys) {
+            *place = value.ok_or(ConfigError::IncompleteBody { key })?;
+            positive(key, *place)?;
+        }
+        let [
+            body_inertia,
+            ball_mass,
+            ball_inertia,
+            wheel_inertia,
+            angle,
+            uncertainty,
+        ] = values;
+        let degrees = "from 1 to 89 degrees";
+        within("body.zenith_angle_deg", angle, 1.0, 89.0, degrees)?;
+        Ok(Some(Drawing {
+            body_mass: self.body_mass_kg,
+            body_inertia,
+            ball_mass,
+            ball_inertia,
+            wheel_inertia,
+            zenith_angle: angle.to_radians(),
+            uncertainty,
+        }))
+    }
+}
+
+impl Drawing {
     /// b2 = 3/2 cos^2(alpha) (r_b/r_w)^2 I_w/m_a, b1 = b2 + (I_k + (m_k + m_a) r_b^2)/m_a,
     /// b3 = b2 + l^2 + I_a/m_a.
     fn priors(&self, geometry: &Geometry<f64>, choices: &mut Values<Choice>) {
-        let mass = self.body_mass_kg;
+        let mass = self.body_mass;
         let gear = geometry.ball_radius / geometry.wheel_radius;
-        let cos = self.zenith_angle_deg.to_radians().cos();
-        let b2 = 1.5 * (cos * gear).powi(2) * self.wheel_inertia_kg_m2 / mass;
-        let rolling = (self.ball_mass_kg + mass) * geometry.ball_radius.powi(2);
-        let b1 = b2 + (self.ball_inertia_kg_m2 + rolling) / mass;
-        let b3 = b2 + geometry.centre_of_mass.powi(2) + self.body_inertia_kg_m2 / mass;
+        let cos = self.zenith_angle.cos();
+        let b2 = 1.5 * (cos * gear).powi(2) * self.wheel_inertia / mass;
+        let rolling = (self.ball_mass + mass) * geometry.ball_radius.powi(2);
+        let b1 = b2 + (self.ball_inertia + rolling) / mass;
+        let b3 = b2 + geometry.centre_of_mass.powi(2) + self.body_inertia / mass;
         for (parameter, mean) in [
             (Parameter::B1, b1),
             (Parameter::B2, b2),
@@ -344,12 +459,27 @@ mod tests {
     }
 
     #[test]
+    fn a_body_that_was_weighed_holds_the_torque_gain() {
+        let config = Config::parse("[body]\nbody_mass_kg = 8.0").unwrap();
+        let choices = config.choices().unwrap();
+        assert_eq!(choices[Parameter::TorqueGain], Choice::Fixed(0.125));
+        assert_eq!(choices[Parameter::B1], Choice::FREE);
+    }
+
+    #[test]
     fn wrong_values_are_named() {
         for (text, part) in [
             (
                 "[geometry]\nball_radius_m = -1",
                 "geometry.ball_radius_m = -1",
             ),
+            ("[geometry]\nball_radius_m = 120.0", "lengths are in metres"),
+            (
+                "[geometry]\ncentre_of_mass_m = 297.8",
+                "geometry.centre_of_mass_m = 297.8: it must be from 0.01 to 3 m",
+            ),
+            ("[geometry]\nwheel_radius_m = 5.0", "lengths are in metres"),
+            ("[geometry]\ngravity_m_s2 = 981.0", "from 1 to 30 m/s^2"),
             ("[fit]\nsegment_s = nan", "fit.segment_s"),
             ("[fit]\nheld_back = 1.0", "from 0 to 0.8"),
             ("[parameters]\nb7 = \"free\"", "there is no such parameter"),
@@ -358,7 +488,20 @@ mod tests {
                 "[parameters]\nb1_m2 = { prior = { mean = 1.0, standard_deviation = 0.0 } }",
                 "a positive number",
             ),
+            (
+                "[body]\nbody_mass_kg = 10.0\nball_mass_kg = 2.0",
+                "body.body_inertia_kg_m2 is missing",
+            ),
+            ("[body]\nbody_mass_kg = 0.0", "body.body_mass_kg = 0"),
             ("[log.theta]\ncolumn = \"t\"\nunit = \"grad\"", "grad"),
+            (
+                "[log]\nleave_out = [[3.0, 2.0]]",
+                "log.leave_out = 2: it must be a time after",
+            ),
+            (
+                "[body]\nbody_mass_kg = 10.0\n[log.torque]\ncolumn = \"pwm\"\nunit = \"1\"",
+                "without the torque per unit",
+            ),
             ("[logs]", "logs"),
         ] {
             let message = Config::parse(text).unwrap_err().to_string();

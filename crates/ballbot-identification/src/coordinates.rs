@@ -14,6 +14,8 @@ pub struct Coordinates {
     ball_excess: bool,
     /// b3 is represented by its excess.
     body_excess: bool,
+    /// The gain is the inverse of a mass of which nothing is said: that of a body of this size.
+    gain_limited: bool,
 }
 
 /// The least inertia that counts as positive, m^2: that of a body of a millimetre.
@@ -22,16 +24,32 @@ const SMALLEST_INERTIA: f64 = 1e-6;
 /// The longest delay that is looked for, s.
 pub const LONGEST_DELAY: f64 = 0.1;
 
-/// The smallest torque gain that counts as positive, 1/kg: that of a body of a hundred tonnes.
-const SMALLEST_GAIN: f64 = 1e-5;
+/// Mass of a body over the cube of its centre of mass' height, kg/m^3, from the lightest to the
+/// heaviest body of that size. Robots that were built have 150 to 5000; a torque that is in mN m and
+/// taken for N m, or the other way round, puts the mass outside.
+const DENSITIES: (f64, f64) = (10.0, 5e4);
+
+/// A body that leans so far upright is mounted askew, rad.
+const LARGEST_TILT_OFFSET: f64 = 0.35;
+
+/// Gyroscopes that were never calibrated have less, rad/s.
+const LARGEST_GYRO_BIAS: f64 = 0.5;
+
+/// Contacts that creep more slip, s.
+const LARGEST_CREEP: f64 = 0.2;
+
+/// No friction brings a ball to rest faster, 1/s.
+const FASTEST_FRICTION: f64 = 1000.0;
 
 impl Coordinates {
-    /// The coordinates for a robot of which `choices` are made.
-    pub fn new(choices: &Values<Choice>, geometry: Geometry<f64>) -> Self {
+    /// The coordinates for a robot of which `choices` are made. `torque_known`: the torque is in N m.
+    pub fn new(choices: &Values<Choice>, geometry: Geometry<f64>, torque_known: bool) -> Self {
         Self {
             geometry,
             ball_excess: choices[Parameter::B1].is_free(),
             body_excess: choices[Parameter::B3].is_free(),
+            gain_limited: torque_known
+                && matches!(choices[Parameter::TorqueGain], Choice::Free { .. }),
         }
     }
 
@@ -83,20 +101,62 @@ impl Coordinates {
         jacobian
     }
 
-    /// What mechanics and the fit allow of each coordinate. `physical`: a positive mass matrix and
-    /// friction that takes energy away, by construction.
+    /// The lightest and the heaviest body of this size, kg.
+    pub fn masses(&self) -> (f64, f64) {
+        let volume = self.geometry.centre_of_mass.powi(3);
+        (DENSITIES.0 * volume, DENSITIES.1 * volume)
+    }
+
+    /// What any robot of these lengths can have of each coordinate, whatever mechanics says of
+    /// their signs. A fit that ends there has found no robot.
+    pub fn limits(&self) -> Values<(f64, f64)> {
+        let (ball, body) = self.least();
+        let (lightest, heaviest) = self.masses();
+        let lever = self.geometry.gravity * self.geometry.centre_of_mass;
+        let either = |limit: f64| (-limit, limit);
+        Values(Parameter::ALL.map(|parameter| match parameter {
+            // A ball that weighs six times the body; rotors that weigh as much as it.
+            Parameter::B1 => either(10.0 * ball),
+            Parameter::B2 => either(100.0 * ball),
+            // A radius of gyration of ten times the height of the centre of mass.
+            Parameter::B3 => either(100.0 * body),
+            Parameter::RollingFriction | Parameter::DriveFriction => {
+                either(FASTEST_FRICTION * ball)
+            }
+            // It would hold the body level.
+            Parameter::DriveCoulomb => either(lever),
+            // A negative gain is a wrong sign of the torque, which is to be found out, not fitted.
+            Parameter::TorqueGain if self.gain_limited => (1.0 / heaviest, 1.0 / lightest),
+            Parameter::TorqueGain => (f64::MIN_POSITIVE, f64::INFINITY),
+            Parameter::Delay => (f64::NEG_INFINITY, LONGEST_DELAY),
+            Parameter::TiltOffset => either(LARGEST_TILT_OFFSET),
+            Parameter::GyroBias => either(LARGEST_GYRO_BIAS),
+            Parameter::CreepBall | Parameter::CreepTilt => either(LARGEST_CREEP),
+            Parameter::TorqueBias => either(LARGEST_TILT_OFFSET * lever * heaviest),
+        }))
+    }
+
+    /// Whether the coordinate of a parameter is at a limit, but for rounding.
+    pub fn is_at_limit(&self, parameter: Parameter, coordinate: f64) -> bool {
+        let (least, most) = self.limits()[parameter];
+        [least, most]
+            .into_iter()
+            .any(|limit| limit.is_finite() && (coordinate - limit).abs() <= 1e-9 * limit.abs())
+    }
+
+    /// What mechanics and [`Coordinates::limits`] allow of each coordinate. `physical`: a positive
+    /// mass matrix and friction that takes energy away, by construction.
     pub fn bounds(&self, values: &Values, physical: bool) -> Values<(f64, f64)> {
-        let mut bounds = Values([(f64::NEG_INFINITY, f64::INFINITY); Parameter::ALL.len()]);
-        // A negative gain is a wrong sign of the torque, which is to be found out, not fitted.
-        bounds[Parameter::TorqueGain].0 = SMALLEST_GAIN;
-        bounds[Parameter::Delay] = (0.0, LONGEST_DELAY);
+        let mut bounds = self.limits();
+        bounds[Parameter::Delay].0 = 0.0;
         if physical {
             let (ball, body) = self.least();
             bounds[Parameter::B2].0 = SMALLEST_INERTIA;
             if self.ball_excess {
                 bounds[Parameter::B1].0 = SMALLEST_INERTIA;
             } else {
-                bounds[Parameter::B2].1 = values[Parameter::B1] - ball;
+                let most = &mut bounds[Parameter::B2].1;
+                *most = most.min(values[Parameter::B1] - ball);
             }
             if self.body_excess {
                 bounds[Parameter::B3].0 = SMALLEST_INERTIA;
@@ -131,6 +191,8 @@ impl Coordinates {
         scales[Parameter::TiltOffset] = 0.01;
         scales[Parameter::GyroBias] = 0.01;
         scales[Parameter::TorqueBias] = 0.01;
+        scales[Parameter::CreepBall] = 0.01;
+        scales[Parameter::CreepTilt] = 0.01;
         scales
     }
 }
@@ -143,7 +205,7 @@ mod tests {
     fn coordinates_and_parameters_are_inverse_and_differentiated() {
         let mut choices = Values::usual();
         choices[Parameter::B3] = Choice::Fixed(0.2);
-        let coordinates = Coordinates::new(&choices, Geometry::paper());
+        let coordinates = Coordinates::new(&choices, Geometry::paper(), true);
         let values = Values(std::array::from_fn(|i| 0.3 + 0.1 * i as f64));
         let z = coordinates.of(&values);
         for (back, value) in coordinates.values(&z).0.iter().zip(values.0) {
@@ -164,8 +226,8 @@ mod tests {
 
     #[test]
     fn the_bounds_keep_the_mass_matrix_positive() {
-        let coordinates = Coordinates::new(&Values::usual(), Geometry::paper());
-        let start = Values([0.0; 11]);
+        let coordinates = Coordinates::new(&Values::usual(), Geometry::paper(), true);
+        let start = Values([0.0; Parameter::ALL.len()]);
         let bounds = coordinates.bounds(&start, true);
         let corner: Vec<f64> = bounds.0.iter().map(|(lower, _)| lower.max(-1.0)).collect();
         let values = coordinates.values(&corner);

@@ -6,7 +6,10 @@ use crate::parameter::Parameter;
 use lpvmpc_design::{ShootingFit, ShootingProblem};
 use nalgebra::DMatrix;
 
-/// The covariance of the parameters from the information, and from the scatter of the segments.
+/// The covariance of the parameters from the information, and for coloured residuals: from the
+/// scatter of the segments, but no variance below that of the information, in which coloured rows
+/// count as the fewer white ones that they are worth. An error that repeats itself in every segment
+/// does not scatter.
 pub fn covariances(
     problem: &ShootingProblem<'_, SegmentedRuns<'_>, 4, 3>,
     fit: &ShootingFit<4>,
@@ -22,9 +25,22 @@ pub fn covariances(
     // What the segments' scores lose to the parameters that were fitted to them.
     let segments = reduced.scores.len() as f64;
     let lost = segments / (segments - n as f64).max(1.0);
-    let scatter = &inverse * meat * &inverse * lost;
-    let of = |covariance| of_parameters(&covariance, &reduced.indices, coordinates);
-    (of(inverse), of(scatter))
+    // What was known beforehand scatters, too.
+    let prior = problem.prior_information(&fit.parameters, &reduced.indices);
+    let scatter = &inverse * (meat * lost + prior) * &inverse;
+    let of = |covariance: &DMatrix<f64>| of_parameters(covariance, &reduced.indices, coordinates);
+    let (white, scatter) = (of(&inverse), of(&scatter));
+    let growth = white
+        .diagonal()
+        .zip_map(&scatter.diagonal(), |least, scatter| {
+            if scatter < least && scatter > 0.0 {
+                (least / scatter).sqrt()
+            } else {
+                1.0
+            }
+        });
+    let growth = DMatrix::from_diagonal(&growth);
+    (white, &growth * scatter * &growth)
 }
 
 /// The covariance of all parameters from that of the coordinates `indices`; zero for the others.

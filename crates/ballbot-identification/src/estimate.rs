@@ -5,8 +5,10 @@ use crate::covariance::covariances;
 use crate::log::{BallAngle, Run};
 use crate::model::{Segment, SegmentedRuns};
 use crate::parameter::{Choice, Parameter, Values};
+use crate::residuals::repetition;
 use crate::segments::{segments, spread};
 use crate::start::{linear_fits, typical};
+use crate::suspects::Suspects;
 use ballbot::Geometry;
 use lpvmpc_design::{
     Prior, ShootingError, ShootingFit, ShootingProblem, ShootingSettings, Unknown,
@@ -29,6 +31,8 @@ pub struct Task<'a> {
     pub physical: bool,
     /// Length of a segment, s.
     pub segment: f64,
+    /// Whether the torque is in N m.
+    pub torque_known: bool,
     /// Known noise of ball angle, tilt and tilt rate; what is `None` is found.
     pub noise: [Option<f64>; 3],
 }
@@ -38,14 +42,18 @@ pub struct Task<'a> {
 pub struct Estimate {
     /// All parameters, held ones included.
     pub values: Values,
-    /// Their covariance if the residuals are white noise, in the order of [`Parameter::ALL`]; zero
-    /// for what was held, by choice or at a bound.
+    /// Their covariance from the information of the fit, in the order of [`Parameter::ALL`]; zero for
+    /// what was held, by choice or at a bound.
     pub covariance: DMatrix<f64>,
-    /// Their covariance from the scatter of the segments, right for coloured residuals, too.
+    /// Their covariance from the scatter of the segments, never below that of the information: for
+    /// coloured residuals.
     pub scatter_covariance: DMatrix<f64>,
     /// What became of each parameter.
     pub status: Values<Status>,
-    /// Noise of ball angle, tilt and tilt rate as the residuals show it.
+    /// Standard deviation of the residuals of ball angle, tilt and tilt rate.
+    pub spread: Vector3<f64>,
+    /// What the outputs are weighted by: the spread, that of the ball angle times the root of how many
+    /// rows of coloured residuals count as one.
     pub noise: Vector3<f64>,
     /// The fit.
     pub fit: ShootingFit<4>,
@@ -53,6 +61,15 @@ pub struct Estimate {
     pub segments: Vec<Segment>,
     /// Length of a segment, s; less than was asked for if the robot could not be simulated so long.
     pub segment: f64,
+}
+
+/// A fit to a few short segments, weighted by the noise that the sensors have by themselves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coarse {
+    /// All parameters, held ones included.
+    pub values: Values,
+    /// chi^2 per degree of freedom: 1 if a robot explains the log.
+    pub chi_square: f64,
 }
 
 /// What became of a parameter.
@@ -88,6 +105,14 @@ pub enum EstimateError {
     /// The fit.
     #[error(transparent)]
     Shooting(#[from] ShootingError),
+    /// No robot explains the log as it is, but one would if its columns were others.
+    #[error("{error} A robot explains the log if {suspects}")]
+    Suspect {
+        /// What is wrong.
+        suspects: Suspects,
+        /// Why there is no estimate as it is.
+        error: Box<EstimateError>,
+    },
 }
 
 /// Told the number of steps of the fit so far.
@@ -96,14 +121,29 @@ pub type Progress<'a> = &'a dyn Fn(usize);
 /// Segments of the first, coarse fit: so short that the unstable mode hardly grows, so few that
 /// trying several starts costs nothing, s.
 const COARSE: f64 = 0.25;
-const COARSE_COUNT: usize = 80;
-const COARSE_SETTINGS: ShootingSettings = ShootingSettings {
-    reduction_tolerance: 1e-2,
+const START: Effort = Effort {
+    segments: 80,
     max_iterations: 40,
 };
 
+/// How much a coarse fit may cost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Effort {
+    /// Segments, at most.
+    pub segments: usize,
+    /// Steps from each start, at most.
+    pub max_iterations: usize,
+}
+
 /// Times that the noise is found anew from the residuals, at most.
 const REWEIGHTINGS: usize = 6;
+
+/// Steps of each fit after the first, which begins where that ended.
+const STEPS_AGAIN: usize = 30;
+
+/// Rows that are fitted, at most, to within a segment: of a longer log segments that are spread evenly over it. Errors
+/// fall with the root of the rows, and at a hundred thousand they are those of the model.
+const MOST_ROWS: usize = 200_000;
 
 impl Task<'_> {
     /// Time at the begin of a stretch whose torque a delay may need, s.
@@ -124,10 +164,27 @@ impl Task<'_> {
         floor: Vector3<f64>,
         progress: Progress<'_>,
     ) -> Result<Estimate, EstimateError> {
-        let start = self.start(stretches, floor, progress)?;
+        let start = self.coarse(stretches, floor, START, progress)?;
+        let start = start.values;
+        self.refine(start, stretches, floor, progress)
+    }
+
+    /// Fits the robot to these stretches from a start.
+    ///
+    /// # Errors
+    /// [`EstimateError`].
+    pub fn refine(
+        &self,
+        start: Values,
+        stretches: &[(usize, Range<usize>)],
+        floor: Vector3<f64>,
+        progress: Progress<'_>,
+    ) -> Result<Estimate, EstimateError> {
         let mut length = self.segment;
         loop {
             let segments = segments(self.runs, stretches, length, self.lead());
+            let rows: usize = segments.iter().map(|one| one.end - one.first).sum();
+            let segments = spread(&segments, segments.len() * MOST_ROWS / rows.max(MOST_ROWS));
             let task = Task {
                 segment: length,
                 ..self.clone()
@@ -167,21 +224,29 @@ impl Task<'_> {
         let mut unknowns = self.unknowns(&start, &model.coordinates);
         let priors = self.priors(&model.coordinates);
         let mut rounds = 0;
-        let (fit, problem) = loop {
+        let mut settings = ShootingSettings::default();
+        let (fit, spread, coloured) = loop {
             let problem = self.problem(&model, &unknowns, &priors, noise);
-            let fit = problem.fit(initial, &ShootingSettings::default(), progress)?;
-            let next = self.known(residual_noise(&problem, &fit));
+            let fit = problem.fit(initial, &settings, progress)?;
+            let residuals = problem.residuals(&fit.parameters, &fit.initial);
+            let spread = residual_noise(&residuals, &fit, noise);
+            let coloured = spread.component_mul(&repetition(&residuals).map(f64::sqrt));
+            // Contacts give way and gears have play: of the three it is the ball angle whose errors
+            // repeat themselves while the robot is as it should be.
+            let next = self.known(Vector3::new(coloured[0], spread[1], spread[2]));
             let change = next.component_div(&noise).map(|ratio| (ratio - 1.0).abs());
             rounds += 1;
             if change.max() < 0.01 || rounds > REWEIGHTINGS {
-                break (fit, self.problem(&model, &unknowns, &priors, noise));
+                break (fit, self.known(spread), self.known(coloured));
             }
             noise = next;
+            settings.max_iterations = STEPS_AGAIN;
             for (unknown, value) in unknowns.iter_mut().zip(&fit.parameters) {
                 unknown.start = *value;
             }
             initial = fit.initial;
         };
+        let problem = self.problem(&model, &unknowns, &priors, coloured);
         let (covariance, scatter_covariance) = covariances(&problem, &fit, &model.coordinates);
         let status = self.status(&fit);
         Ok(Estimate {
@@ -189,6 +254,7 @@ impl Task<'_> {
             covariance,
             scatter_covariance,
             status,
+            spread,
             noise,
             fit,
             segments: model.segments,
@@ -201,7 +267,7 @@ impl Task<'_> {
         SegmentedRuns {
             runs: self.runs,
             segments,
-            coordinates: Coordinates::new(&self.choices, self.geometry),
+            coordinates: Coordinates::new(&self.choices, self.geometry, self.torque_known),
             ball_angle: self.ball_angle,
         }
     }
@@ -224,12 +290,16 @@ impl Task<'_> {
     }
 
     /// The best of several starts after a coarse fit.
-    fn start(
+    ///
+    /// # Errors
+    /// [`EstimateError::NoSegments`] or [`EstimateError::NoStart`].
+    pub fn coarse(
         &self,
         stretches: &[(usize, Range<usize>)],
         floor: Vector3<f64>,
+        effort: Effort,
         progress: Progress<'_>,
-    ) -> Result<Values, EstimateError> {
+    ) -> Result<Coarse, EstimateError> {
         let lead = self.lead();
         let coarse = segments(self.runs, stretches, COARSE, lead);
         if coarse.is_empty() {
@@ -238,26 +308,38 @@ impl Task<'_> {
                 lead,
             });
         }
-        let model = self.model(spread(&coarse, COARSE_COUNT));
+        let model = self.model(spread(&coarse, effort.segments));
         let priors = self.priors(&model.coordinates);
-        let mut best: Option<(f64, Values)> = None;
+        let mut best: Option<Coarse> = None;
         let mut refused = None;
+        let settings = ShootingSettings {
+            reduction_tolerance: 1e-2,
+            max_iterations: effort.max_iterations,
+        };
         for start in self.candidates(stretches) {
             let unknowns = self.unknowns(&start, &model.coordinates);
             let start = model.coordinates.values(&starts(&unknowns));
             let problem = self.problem(&model, &unknowns, &priors, self.known(floor));
-            match problem.fit(model.initial_states(&start), &COARSE_SETTINGS, progress) {
-                Ok(fit) if best.is_none_or(|(least, _)| fit.chi_square < least) => {
-                    best = Some((fit.chi_square, model.coordinates.values(&fit.parameters)));
+            match problem.fit(model.initial_states(&start), &settings, progress) {
+                Ok(fit) => {
+                    let chi_square = fit.chi_square / fit.degrees_of_freedom();
+                    if best.is_none_or(|best| chi_square < best.chi_square) {
+                        best = Some(Coarse {
+                            values: model.coordinates.values(&fit.parameters),
+                            chi_square,
+                        });
+                    }
                 }
-                Ok(_) => {}
                 Err(error) => refused = Some(error),
             }
         }
         match (best, refused) {
-            (Some((_, start)), _) => Ok(start),
+            (Some(best), _) => Ok(best),
             (None, Some(error)) => Err(EstimateError::NoStart(error)),
-            (None, None) => Ok(typical(&self.geometry, 0.0)),
+            (None, None) => Ok(Coarse {
+                values: typical(&self.geometry, 0.0),
+                chi_square: f64::INFINITY,
+            }),
         }
     }
 
@@ -354,12 +436,12 @@ fn starts(unknowns: &[Unknown]) -> Vec<f64> {
     unknowns.iter().map(|unknown| unknown.start).collect()
 }
 
-/// Standard deviation of the residuals of each output; 1 for one that is not measured.
-pub fn residual_noise(
-    problem: &ShootingProblem<'_, SegmentedRuns<'_>, 4, 3>,
+/// Standard deviation of the residuals of each output; what it was for one that is not measured.
+fn residual_noise(
+    residuals: &[Vec<Vector3<f64>>],
     fit: &ShootingFit<4>,
+    noise: Vector3<f64>,
 ) -> Vector3<f64> {
-    let residuals = problem.residuals(&fit.parameters, &fit.initial);
     let lost = fit.values as f64 / fit.degrees_of_freedom().max(1.0);
     Vector3::from_fn(|output, _| {
         let values = residuals.iter().flatten().map(|row| row[output]);
@@ -369,7 +451,7 @@ pub fn residual_noise(
                 (sum + value * value, count + 1)
             });
         if count == 0 || sum == 0.0 {
-            return problem.noise[output];
+            return noise[output];
         }
         (sum / f64::from(count) * lost).sqrt()
     })

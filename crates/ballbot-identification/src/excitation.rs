@@ -7,8 +7,9 @@ use crate::model::{LONGEST_STEP, Robot};
 use crate::parameter::{Choice, Parameter, Values};
 use crate::poles::linear_model;
 use crate::segments::segments;
+use crate::words::{number, percent};
 use ballbot::Geometry;
-use lpvmpc_design::{RiccatiError, lqr_continuous};
+use lpvmpc_design::{RiccatiError, lqr_continuous, poles};
 use nalgebra::{DMatrix, DVector, Vector3, Vector4};
 use std::f64::consts::{PI, TAU};
 
@@ -39,6 +40,8 @@ pub struct ExcitationTask {
     pub gain: Option<Vector4<f64>>,
     /// Length of a segment of the fit, s.
     pub segment: f64,
+    /// Whether there is a gyroscope. Without one its bias is held.
+    pub gyroscope: bool,
 }
 
 /// An excitation, and what it is expected to do.
@@ -88,6 +91,46 @@ pub enum ExcitationError {
         "a robot with these parameters has no linear model: its mass matrix cannot be inverted"
     )]
     NoLinearModel,
+    /// The loop is unstable without any excitation.
+    #[error(
+        "the loop u = -K x, K = ({}, {}, {}, {}) does not hold the robot that is expected: it has a \
+         pole at +{} 1/s. The gains belong to another robot, have the other sign or another unit (N m \
+         per rad and per rad/s), or the robot is not what is expected (--config, --parameters)",
+        number(gain[0]), number(gain[1]), number(gain[2]), number(gain[3]), number(*pole)
+    )]
+    UnstableLoop {
+        /// The gains.
+        gain: [f64; 4],
+        /// The real part of the pole, 1/s.
+        pole: f64,
+    },
+    /// What the tilt leaves of the torque tells nothing.
+    #[error(
+        "only {} N m of the {} N m are left before the robot leans {} degrees: that excitation tells \
+         nothing. The loop hardly holds the robot that is expected: check its gains, or allow more \
+         tilt (--tilt-limit)",
+        number(*left), number(*wanted), number(limit.to_degrees())
+    )]
+    Useless {
+        /// What is left of the torque, N m.
+        left: f64,
+        /// What was asked for, N m.
+        wanted: f64,
+        /// The tilt limit, rad.
+        limit: f64,
+    },
+    /// The log would not tell what it is recorded for.
+    #[error(
+        "a log with that excitation would tell {} to {} only: a larger torque (--amplitude) or a longer \
+         log (--length) is needed",
+        parameter.words(), percent(*relative)
+    )]
+    TellsNothing {
+        /// What it would not tell.
+        parameter: Parameter,
+        /// Expected standard deviation over the value.
+        relative: f64,
+    },
     /// The loop does not hold the robot.
     #[error(
         "the loop does not hold the robot within {limit:.3} rad, however small the torque: the gains \
@@ -105,6 +148,15 @@ const MARGIN: f64 = 0.95;
 /// A robot that leans so far has fallen, rad.
 const FALLEN: f64 = 1.5;
 
+/// A loop with a pole right of this lets the robot drift or fall, 1/s.
+const SLOWEST: f64 = 1e-6;
+
+/// If less than this part of the torque is left, something is wrong.
+const LEAST_LEFT: f64 = 0.02;
+
+/// An expected standard deviation relative to the value from which on a log is not worth recording.
+const LEAST_PRECISE: f64 = 0.5;
+
 /// Fading in and out, s: no jump of the torque.
 const FADE: f64 = 1.0;
 
@@ -117,14 +169,23 @@ impl ExcitationTask {
     pub fn design(&self) -> Result<Excitation, ExcitationError> {
         self.check()?;
         let gain = self.gain.map_or_else(|| self.regulator(), Ok)?;
+        self.check_loop(&gain)?;
         let frequencies = self.frequencies();
         let shape = self.shape(&frequencies);
         let mut amplitude = self.amplitude;
         for _ in 0..30 {
             let torque: Vec<f64> = shape.iter().map(|value| amplitude * value).collect();
             let motion = self.simulate(&gain, &torque);
+            if amplitude < LEAST_LEFT * self.amplitude {
+                return Err(ExcitationError::Useless {
+                    left: amplitude,
+                    wanted: self.amplitude,
+                    limit: self.tilt_limit,
+                });
+            }
             if motion.tilt <= self.tilt_limit {
                 let standard_deviations = self.standard_deviations(&motion);
+                self.check_precision(&standard_deviations)?;
                 let most = |values: &mut dyn Iterator<Item = f64>| {
                     values.fold(0.0_f64, |most, value| most.max(value.abs()))
                 };
@@ -147,6 +208,47 @@ impl ExcitationTask {
         Err(ExcitationError::Unstable {
             limit: self.tilt_limit,
         })
+    }
+
+    /// What is done with each parameter: what no sensor tells is held.
+    pub fn choices(&self) -> Values<Choice> {
+        self.choices.with_sensors(self.gyroscope)
+    }
+
+    /// The gains hold the robot that is expected, its delay aside.
+    fn check_loop(&self, gain: &Vector4<f64>) -> Result<(), ExcitationError> {
+        let linear = linear_model(&self.robot, self.geometry);
+        let (a, b) = linear.ok_or(ExcitationError::NoLinearModel)?;
+        let closed = a - b * gain.transpose();
+        let found = poles(&DMatrix::from_column_slice(4, 4, closed.as_slice()));
+        let worst = found.map_or(f64::INFINITY, |poles| {
+            poles
+                .iter()
+                .fold(f64::NEG_INFINITY, |most, pole| most.max(pole.re))
+        });
+        if worst < SLOWEST {
+            return Ok(());
+        }
+        Err(ExcitationError::UnstableLoop {
+            gain: (*gain).into(),
+            pole: worst,
+        })
+    }
+
+    /// The body's inertias and mass are told, if they are to be found.
+    fn check_precision(&self, deviations: &Values) -> Result<(), ExcitationError> {
+        let choices = self.choices();
+        for parameter in [Parameter::B1, Parameter::B3, Parameter::TorqueGain] {
+            let relative = (deviations[parameter] / self.robot[parameter]).abs();
+            let told = relative <= LEAST_PRECISE;
+            if choices[parameter].is_free() && !told {
+                return Err(ExcitationError::TellsNothing {
+                    parameter,
+                    relative,
+                });
+            }
+        }
+        Ok(())
     }
 
     fn check(&self) -> Result<(), ExcitationError> {
@@ -289,14 +391,20 @@ impl ExcitationTask {
 
     /// The Cramer-Rao bound of the fit that [`Task::estimate`] will make.
     fn standard_deviations(&self, motion: &Motion) -> Values {
-        let runs = std::slice::from_ref(&motion.run);
+        let mut run = motion.run.clone();
+        if !self.gyroscope {
+            run.outputs.iter_mut().for_each(|row| row[2] = f64::NAN);
+        }
+        let runs = std::slice::from_ref(&run);
+        let choices = self.choices();
         let task = Task {
             runs,
             ball_angle: BallAngle::Inertial,
             geometry: self.geometry,
-            choices: self.choices,
+            choices,
             physical: false,
             segment: self.segment,
+            torque_known: true,
             noise: [0, 1, 2].map(|output| Some(self.noise[output])),
         };
         let stretch = [(0, 0..motion.run.time.len())];
@@ -308,7 +416,7 @@ impl ExcitationTask {
         let initial: Vec<Vector4<f64>> = starts.map(|s| motion.states[s.first]).collect();
         let indices: Vec<usize> = Parameter::ALL
             .into_iter()
-            .filter(|parameter| self.choices[*parameter].is_free())
+            .filter(|parameter| choices[*parameter].is_free())
             .map(Parameter::index)
             .collect();
         let coordinates = model.coordinates.of(&self.robot);

@@ -1,7 +1,8 @@
 //! From logs to a judged robot: the whole way.
 
 use crate::config::Config;
-use crate::estimate::{Estimate, EstimateError, Progress, Task};
+use crate::coordinates::Coordinates;
+use crate::estimate::{Estimate, EstimateError, Progress, Status, Task};
 use crate::log::{Finding, Log, Run};
 use crate::model::Robot;
 use crate::noise;
@@ -11,9 +12,11 @@ use crate::published::{LinearRegression, regression};
 use crate::residuals::{OutputResidual, ScoreTest, SegmentResidual, score_tests, simulated, tests};
 use crate::segments::Split;
 use crate::structures::{Compared, compare};
+use crate::suspects::Suspects;
 use crate::validation::{Validation, validate};
+use crate::verdict::Weight;
 use ballbot::{Ballbot, Consistency, Geometry, LinearParameters, limits};
-use lpvmpc_design::NORMAL_95;
+use lpvmpc_design::{NORMAL_95, poles};
 use nalgebra::{DMatrix, Vector3};
 use std::ops::Range;
 
@@ -26,6 +29,14 @@ pub struct Identification {
     pub physical: bool,
     /// Length of a segment that was asked for, s.
     pub segment: f64,
+    /// The fit's coordinates, which have its limits.
+    pub coordinates: Coordinates,
+    /// What is wrong with the columns, if no robot explains them as they are.
+    pub suspects: Option<Suspects>,
+    /// Whether the torque is in N m.
+    pub torque_known: bool,
+    /// The builder insists on the columns as they are.
+    pub columns_accepted: bool,
     /// What was done with each parameter.
     pub choices: Values<Choice>,
     /// What is odd about each log.
@@ -40,6 +51,8 @@ pub struct Identification {
     pub residuals: Vec<OutputResidual>,
     /// What the residuals say about the parameters that were held.
     pub scores: Vec<ScoreTest>,
+    /// The covariance that the intervals are from.
+    covariance: DMatrix<f64>,
     /// Poles at the upright position.
     pub poles: Vec<Pole>,
     /// On held-back data, if any were held back; or why it could not be judged there.
@@ -70,18 +83,21 @@ pub fn identify(
             (log.run, (name, log.findings))
         })
         .unzip();
-    let task = Task {
+    let mut task = Task {
         runs: &runs,
         ball_angle: config.log.ball_angle_read(),
         geometry: config.geometry(),
         choices,
         physical: config.fit.physical,
         segment: config.fit.segment_s,
+        torque_known: config.log.torque_known(),
         noise: config.noise(),
     };
+    task.choices = choices.with_sensors(task.measures_rate());
     let split = Split::new(&runs, config.fit.held_back);
     let floor = noise::floor(&runs);
-    let estimate = task.estimate(&split.fitted, floor, progress)?;
+    let estimate = task.estimate(&split.fitted, floor, progress);
+    let estimate = estimate.map_err(|error| task.explained(error, &split))?;
     let task = Task {
         segment: estimate.segment,
         ..task
@@ -92,12 +108,17 @@ pub fn identify(
         geometry: task.geometry,
         physical: task.physical,
         segment: config.fit.segment_s,
-        choices,
+        coordinates: Coordinates::new(&task.choices, task.geometry, task.torque_known),
+        suspects: None,
+        torque_known: task.torque_known,
+        columns_accepted: config.log.accept_suspicious_units,
+        choices: task.choices,
         findings,
         floor,
-        residuals: tests(&simulated, estimate.noise, floor),
+        residuals: tests(&simulated, estimate.spread, floor),
         simulated,
         scores: score_tests(&task, &estimate),
+        covariance: DMatrix::zeros(0, 0),
         poles: Vec::new(),
         validation,
         structures,
@@ -105,13 +126,35 @@ pub fn identify(
         times: (time(&runs, &split.fitted), time(&runs, &split.held_back)),
         estimate,
     };
+    identification.covariance = identification.widened();
     // Their intervals are from the covariance that the residuals decide on.
     identification.poles = uncertain_poles(
         &identification.estimate,
         identification.covariance(),
         identification.geometry,
     );
+    let verdicts = identification.verdicts();
+    if verdicts.iter().any(|one| one.weight() >= Weight::Warning) {
+        identification.suspects = task.suspects(&split.fitted);
+    }
     Ok(identification)
+}
+
+impl Task<'_> {
+    /// Why there is no estimate, with what is wrong with the columns if that is why.
+    fn explained(&self, error: EstimateError, split: &Split) -> EstimateError {
+        let suspects = match error {
+            EstimateError::NoSegments { .. } => None,
+            _ => self.suspects(&split.fitted),
+        };
+        match suspects {
+            Some(suspects) => EstimateError::Suspect {
+                suspects,
+                error: Box::new(error),
+            },
+            None => error,
+        }
+    }
 }
 
 /// The fit on the data that were held back, and other structures of friction beside it.
@@ -124,7 +167,7 @@ fn held_back(
     if split.held_back.is_empty() {
         return (None, Vec::new());
     }
-    let validation = validate(task, &estimate.values, estimate.noise, &split.held_back);
+    let validation = validate(task, &estimate.values, estimate.spread, &split.held_back);
     let structures = compare(task, estimate, &split.held_back, progress);
     (Some(validation), structures)
 }
@@ -141,14 +184,49 @@ impl Identification {
         self.residuals.iter().all(OutputResidual::is_white)
     }
 
-    /// The covariance that the intervals are from: that of white residuals, or, where they are not
-    /// white, that of the segments' scatter.
+    /// The covariance that the intervals are from: that of the information, or, where the residuals
+    /// are not white and there are enough segments, that of their scatter; with creep, of the model's
+    /// own error, too.
     pub fn covariance(&self) -> &DMatrix<f64> {
-        if self.is_white() {
-            &self.estimate.covariance
+        &self.covariance
+    }
+
+    fn widened(&self) -> DMatrix<f64> {
+        let mut covariance = if self.is_white() || self.has_few_segments() {
+            self.estimate.covariance.clone()
         } else {
-            &self.estimate.scatter_covariance
+            self.estimate.scatter_covariance.clone()
+        };
+        let error = self.creep_error();
+        for parameter in Parameter::ROBOT {
+            let (index, value) = (parameter.index(), self.estimate.values[parameter]);
+            if self.estimate.status[parameter] == Status::Found {
+                covariance[(index, index)] += (error * value).powi(2);
+            }
         }
+        covariance
+    }
+
+    /// The relative error of a robot whose contacts creep: the model has what the sensors see of it,
+    /// and neglects that the contacts relax, which is of the order of the creep's time times the
+    /// robot's fastest pole. Zero without creep.
+    pub(crate) fn creep_error(&self) -> f64 {
+        let creep = Parameter::CreepBall;
+        let asked = self.scores.iter().find(|score| score.parameter == creep);
+        let time = match asked {
+            Some(score) if score.is_alarm() => score.change,
+            _ => self.estimate.values[creep],
+        };
+        let Some((a, _)) = linear_model(&self.estimate.values, self.geometry) else {
+            return 0.0;
+        };
+        let found = poles(&DMatrix::from_column_slice(4, 4, a.as_slice()));
+        let fastest = found.map_or(0.0, |poles| {
+            poles
+                .iter()
+                .fold(0.0_f64, |most, pole| most.max(pole.re.abs()))
+        });
+        (time * fastest).abs()
     }
 
     /// Whether there are fewer than two segments per parameter: their scatter then tells nothing.

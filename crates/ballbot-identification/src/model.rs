@@ -1,6 +1,7 @@
 //! The robot as its log shows it: plant, drive and sensors, simulated at the log's own times.
 
 use crate::coordinates::Coordinates;
+use crate::line::Line;
 use crate::log::{BallAngle, Run};
 use crate::parameter::{Parameter, Values};
 use ballbot::{Ballbot, DriveFriction, Geometry};
@@ -65,8 +66,10 @@ impl Robot {
             BallAngle::Inertial => x[0],
             BallAngle::RelativeToBody => x[0] - x[1],
         };
+        let creep =
+            self.values[Parameter::CreepBall] * x[2] + self.values[Parameter::CreepTilt] * x[3];
         Vector3::new(
-            phi,
+            phi + creep,
             x[1] + self.values[Parameter::TiltOffset],
             x[3] + self.values[Parameter::GyroBias],
         )
@@ -147,23 +150,8 @@ fn first_outputs(run: &Run, segment: Segment) -> (Vector3<f64>, f64) {
         .take_while(|(place, row)| *place < 4 || run.time[*row] - start <= 0.03)
         .map(|(_, row)| (run.time[row] - start, run.outputs[row][0]))
         .filter(|(_, phi)| !phi.is_nan());
-    let points: Vec<(f64, f64)> = window.collect();
-    let count = points.len().max(1) as f64;
-    let mean_time = points.iter().map(|point| point.0).sum::<f64>() / count;
-    let mean_phi = points.iter().map(|point| point.1).sum::<f64>() / count;
-    let spread: f64 = points
-        .iter()
-        .map(|point| (point.0 - mean_time).powi(2))
-        .sum();
-    let product: f64 = points
-        .iter()
-        .map(|point| (point.0 - mean_time) * (point.1 - mean_phi))
-        .sum();
-    let slope = if spread > 0.0 { product / spread } else { 0.0 };
-    (
-        Vector3::new(mean_phi - slope * mean_time, first(1), first(2)),
-        slope,
-    )
+    let line = Line::through(window);
+    (Vector3::new(line.at(0.0), first(1), first(2)), line.slope)
 }
 
 impl ShootingModel<4, 3> for SegmentedRuns<'_> {

@@ -28,11 +28,18 @@ pub enum Parameter {
     GyroBias,
     /// Torque that acts without being logged, N m.
     TorqueBias,
+    /// How far the ball angle that is measured runs ahead per rate of the ball, s. Where the contacts
+    /// give way in proportion to their force (creep), the wheels turn further than the ball rolls,
+    /// by what the momentum of ball and body takes: by this and [`Self::CreepTilt`]. Negative of
+    /// both: encoders that are read late.
+    CreepBall,
+    /// The same per tilt rate, s.
+    CreepTilt,
 }
 
 impl Parameter {
     /// All of them, in the order of every vector and matrix of this crate.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 13] = [
         Self::B1,
         Self::B2,
         Self::B3,
@@ -44,6 +51,19 @@ impl Parameter {
         Self::TiltOffset,
         Self::GyroBias,
         Self::TorqueBias,
+        Self::CreepBall,
+        Self::CreepTilt,
+    ];
+
+    /// What the robot itself is made of: inertias, friction, and the torque gain.
+    pub const ROBOT: [Self; 7] = [
+        Self::B1,
+        Self::B2,
+        Self::B3,
+        Self::RollingFriction,
+        Self::DriveFriction,
+        Self::DriveCoulomb,
+        Self::TorqueGain,
     ];
 
     /// Its place in [`Parameter::ALL`].
@@ -65,6 +85,8 @@ impl Parameter {
             Self::TiltOffset => "tilt_offset_rad",
             Self::GyroBias => "gyro_bias_rad_s",
             Self::TorqueBias => "torque_bias_nm",
+            Self::CreepBall => "creep_phi_s",
+            Self::CreepTilt => "creep_theta_s",
         }
     }
 
@@ -82,6 +104,8 @@ impl Parameter {
             Self::TiltOffset => "the tilt sensor's offset",
             Self::GyroBias => "the gyroscope's bias",
             Self::TorqueBias => "a constant torque",
+            Self::CreepBall => "the creep of the ball angle with the ball's rate",
+            Self::CreepTilt => "the creep of the ball angle with the tilt rate",
         }
     }
 
@@ -92,7 +116,7 @@ impl Parameter {
             Self::RollingFriction | Self::DriveFriction => "m^2/s",
             Self::DriveCoulomb => "m^2/s^2",
             Self::TorqueGain => "1/kg",
-            Self::Delay => "s",
+            Self::Delay | Self::CreepBall | Self::CreepTilt => "s",
             Self::TiltOffset => "rad",
             Self::GyroBias => "rad/s",
             Self::TorqueBias => "N m",
@@ -111,7 +135,9 @@ impl Parameter {
             }
             Self::DriveFriction => "faster rolling and tilting, 0.5 Hz to 5 Hz",
             Self::DriveCoulomb => "many reversals at low speed, and fast motion to compare with",
-            Self::Delay => "a torque that changes fast: harmonics above 5 Hz, or a square wave",
+            Self::Delay | Self::CreepBall | Self::CreepTilt => {
+                "a torque that changes fast: harmonics above 5 Hz, or a square wave"
+            }
             Self::TiltOffset | Self::TorqueBias => "a longer log",
             Self::GyroBias => "a longer log, tilt and rate both recorded",
         }
@@ -178,12 +204,24 @@ impl Choice {
 }
 
 impl Values<Choice> {
-    /// What is fitted unless the builder says otherwise: everything but Coulomb friction and a
-    /// constant torque, which are held at zero.
+    /// What is fitted unless the builder says otherwise: everything but Coulomb friction, a constant
+    /// torque and creep, which are held at zero.
     pub fn usual() -> Self {
         let mut choices = Self([Choice::FREE; Parameter::ALL.len()]);
         choices[Parameter::DriveCoulomb] = Choice::Fixed(0.0);
         choices[Parameter::TorqueBias] = Choice::Fixed(0.0);
+        choices[Parameter::CreepBall] = Choice::Fixed(0.0);
+        choices[Parameter::CreepTilt] = Choice::Fixed(0.0);
         choices
+    }
+
+    /// The choices, with the gyroscope's bias held where there is no gyroscope: no other column tells
+    /// of it.
+    #[must_use]
+    pub fn with_sensors(mut self, gyroscope: bool) -> Self {
+        if !gyroscope {
+            self[Parameter::GyroBias] = Choice::Fixed(0.0);
+        }
+        self
     }
 }

@@ -3,12 +3,20 @@
 use crate::estimate::Status;
 use crate::identification::Identification;
 use crate::parameter::Parameter;
+use crate::verdict::Verdict;
 use std::fmt::Write as _;
 
 impl Identification {
     /// `parameters.toml`: the robot as a `[parameters]` table of a scenario, what does not fit into
     /// that, and the covariance.
-    pub fn parameter_file(&self) -> String {
+    ///
+    /// # Errors
+    /// The verdicts that forbid it: what was found is no robot.
+    pub fn parameter_file(&self) -> Result<String, Vec<Verdict>> {
+        let refusals = self.refusals();
+        if !refusals.is_empty() {
+            return Err(refusals);
+        }
         let mut text = String::new();
         let robot = self.ballbot();
         let geometry = &robot.geometry;
@@ -68,6 +76,6 @@ impl Identification {
             let entries: Vec<String> = row.iter().map(|entry| format!("{entry:?}")).collect();
             let _ = writeln!(text, "    [{}],", entries.join(", "));
         }
-        text + "]\n"
+        Ok(text + "]\n")
     }
 }

@@ -1,6 +1,7 @@
 //! What the residuals say about the model.
 
 use crate::estimate::{Estimate, Task};
+use crate::line::Line;
 use crate::log::Run;
 use crate::model::SegmentedRuns;
 use crate::parameter::Parameter;
@@ -20,6 +21,8 @@ pub struct OutputResidual {
     pub spread: f64,
     /// The least it can be: the noise of the sensor.
     pub floor: f64,
+    /// Standard deviation of the measured values from a straight line in each segment: the motion.
+    pub motion: f64,
     /// Correlation with itself.
     pub autocorrelation: Correlation,
     /// Correlation with the torque.
@@ -32,12 +35,52 @@ impl OutputResidual {
         self.spread / self.floor
     }
 
-    /// Whether it is noise. A fit leaves correlations of a few percent; with many rows they are
-    /// significant, and mean nothing.
-    pub fn is_white(&self) -> bool {
-        let (_, largest) = self.autocorrelation.largest();
-        self.autocorrelation.exceeding() <= 0.2 || largest.abs() < 0.1
+    /// Which part of the motion the robot does not explain.
+    pub fn unexplained(&self) -> f64 {
+        self.spread / self.motion
     }
+
+    /// Whether it is noise.
+    pub fn is_white(&self) -> bool {
+        is_white(&self.autocorrelation)
+    }
+}
+
+/// Segments that the colour of residuals is taken from; more tell little more.
+const COLOUR_SEGMENTS: usize = 60;
+
+/// How many rows of each output count as one, since the residuals repeat themselves (the integrated
+/// autocorrelation): 1 for white noise.
+pub fn repetition(residuals: &[Vec<Vector3<f64>>]) -> Vector3<f64> {
+    let every = residuals.len().div_ceil(COLOUR_SEGMENTS).max(1);
+    Vector3::from_fn(|output, _| {
+        let pieces = residuals.iter().step_by(every);
+        let pieces: Vec<Vec<f64>> = pieces
+            .map(|rows| rows.iter().map(|row| row[output]).collect())
+            .collect();
+        // Beyond half of a segment its fitted initial state makes up for what is left.
+        let longest = pieces.iter().map(Vec::len).max().unwrap_or(0) / 2;
+        let correlation = autocorrelation(&pieces, longest);
+        // Only as far as it is positive: what follows is chance.
+        let positive = correlation
+            .values
+            .iter()
+            .take_while(|value| **value > COLOURED / 2.0);
+        if is_white(&correlation) {
+            1.0
+        } else {
+            1.0 + 2.0 * positive.sum::<f64>()
+        }
+    })
+}
+
+/// A fit leaves correlations of a few percent; with many rows they are significant, and mean
+/// nothing.
+const COLOURED: f64 = 0.1;
+
+fn is_white(autocorrelation: &Correlation) -> bool {
+    let (_, largest) = autocorrelation.largest();
+    autocorrelation.exceeding() <= 0.2 || largest.abs() < COLOURED
 }
 
 /// Measured minus simulated outputs with their times, segment by segment.
@@ -80,7 +123,7 @@ pub fn simulated(task: &Task<'_>, estimate: &Estimate) -> Vec<SegmentResidual> {
 /// The residuals output by output.
 pub fn tests(
     segments: &[SegmentResidual],
-    noise: Vector3<f64>,
+    spread: Vector3<f64>,
     floor: Vector3<f64>,
 ) -> Vec<OutputResidual> {
     let torque: Vec<Vec<f64>> = segments.iter().map(|s| s.torque.clone()).collect();
@@ -96,13 +139,29 @@ pub fn tests(
             };
             let pieces: Vec<Vec<f64>> = segments.iter().map(residual).collect();
             OutputResidual {
-                spread: noise[output],
+                spread: spread[output],
                 floor: floor[output],
+                motion: motion(segments, output),
                 autocorrelation: autocorrelation(&pieces, LAGS),
                 with_torque: cross_correlation(&pieces, &torque, LAGS),
             }
         })
         .collect()
+}
+
+/// Standard deviation of an output from a straight line in each segment.
+fn motion(segments: &[SegmentResidual], output: usize) -> f64 {
+    let (mut squares, mut count) = (0.0, 0.0);
+    for segment in segments {
+        let values = segment.measured.iter().map(|row| row[output]);
+        let points: Vec<(f64, f64)> = segment.time.iter().copied().zip(values).collect();
+        let line = Line::through(points.iter().copied().filter(|(_, value)| !value.is_nan()));
+        for (time, value) in points.into_iter().filter(|(_, value)| !value.is_nan()) {
+            squares += (value - line.at(time)).powi(2);
+            count += 1.0;
+        }
+    }
+    (squares / f64::max(count, 1.0)).sqrt()
 }
 
 /// What a fit of a parameter that was held would change, to first order.
@@ -129,8 +188,8 @@ impl ScoreTest {
     }
 }
 
-/// A score test (Rao 1948) of every parameter that was held. `noise` is that of the residuals, so
-/// a model that misses much asks for little by itself.
+/// A score test (Rao 1948) of every parameter that was held. The noise is that of the residuals,
+/// their colour included, so a model that misses much asks for little by itself.
 pub fn score_tests(task: &Task<'_>, estimate: &Estimate) -> Vec<ScoreTest> {
     let model: SegmentedRuns<'_> = task.model(estimate.segments.clone());
     let unknowns = task.unknowns(&estimate.values, &model.coordinates);

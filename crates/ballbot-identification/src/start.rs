@@ -14,6 +14,9 @@ use std::ops::Range;
 /// Length of a window, s: some time constants of tilting.
 const WINDOW: f64 = 0.4;
 
+/// Windows of a regression, at most; they are spread evenly over the log.
+const MOST_WINDOWS: usize = 2000;
+
 /// Delays that are tried, s.
 const DELAYS: [f64; 6] = [0.0, 0.005, 0.01, 0.02, 0.03, 0.05];
 
@@ -54,6 +57,7 @@ fn linear_fit(
 ) -> Option<LinearFit> {
     let mut rows: Vec<[f64; 5]> = Vec::new();
     let (mut ball, mut body) = (Vec::new(), Vec::new());
+    let all: usize = stretches.iter().map(|(_, stretch)| stretch.len()).sum();
     for (run, stretch) in stretches {
         let run = &runs[*run];
         let mut first = stretch.start;
@@ -68,7 +72,7 @@ fn linear_fit(
                 ball.push(window.ball);
                 body.push(window.body);
             }
-            first += ((end - first) / 4).max(1);
+            first += ((end - first) / 4).max(all / MOST_WINDOWS).max(1);
         }
     }
     let regressors = DMatrix::from_fn(rows.len(), 5, |row, column| rows[row][column]);

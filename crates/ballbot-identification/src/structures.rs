@@ -110,7 +110,7 @@ pub fn compare(
             Some(Compared {
                 structure,
                 fitted_chi_square: fitted.fit.chi_square / fitted.fit.degrees_of_freedom(),
-                validation: validate(&task, &fitted.values, noise, held_back).ok()?,
+                validation: validate(&task, &fitted.values, estimate.spread, held_back).ok()?,
                 estimate: fitted,
             })
         })

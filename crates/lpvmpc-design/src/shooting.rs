@@ -200,6 +200,11 @@ where
         }
     }
 
+    /// The priors' part of [`Reduced::information`] in the parameters `indices`.
+    pub fn prior_information(&self, parameters: &[f64], indices: &[usize]) -> DMatrix<f64> {
+        self.prior_equations(parameters, indices).0
+    }
+
     /// Measured minus simulated outputs, segment by segment; NaN where a value is missing.
     pub fn residuals(
         &self,

@@ -2,7 +2,7 @@
 
 use super::CommandError;
 use super::identify::configuration;
-use crate::arguments::{finite, positive};
+use crate::arguments::{finite_list, positive};
 use crate::input::{self, InputError};
 use crate::output;
 use crate::table::{Table, number};
@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 Examples:
   ballbot excite --config my-robot.toml                     from masses, priors or starts
   ballbot excite --parameters out/identification/parameters.toml
-  ballbot excite --amplitude 2 --tilt-limit 8 --gain=-0.5,-12,-0.6,-2.5
+  ballbot excite --amplitude 2 --tilt-limit 8 --gain=-1.4,-48,-1.8,-11
 
 Add the torque to that of the loop that holds the robot, log, and identify. Without --gain the loop
 is an LQR of the expected robot. Gains are for u = -K x, x = (phi, theta, phi_dot, theta_dot).")]
@@ -32,8 +32,8 @@ pub struct ExciteArguments {
     #[arg(long, value_name = "parameters.toml")]
     pub parameters: Option<PathBuf>,
     /// Lowest and highest frequency, Hz
-    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 2, value_parser = positive, default_values_t = [0.2, 6.0])]
-    pub band: Vec<f64>,
+    #[arg(long, value_name = "LOW,HIGH", value_parser = finite_list::<2>, default_value = "0.2,6")]
+    pub band: [f64; 2],
     /// Number of harmonics
     #[arg(long, default_value_t = 15, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=10_000))]
     pub harmonics: usize,
@@ -50,8 +50,8 @@ pub struct ExciteArguments {
     #[arg(long, value_name = "HZ", value_parser = positive, default_value_t = 200.0)]
     pub rate: f64,
     /// Gains of your loop, N m per rad and per rad/s
-    #[arg(long, value_delimiter = ',', num_args = 4, value_parser = finite, allow_negative_numbers = true, value_name = "K1,K2,K3,K4")]
-    pub gain: Option<Vec<f64>>,
+    #[arg(long, value_parser = finite_list::<4>, allow_hyphen_values = true, value_name = "K1,K2,K3,K4")]
+    pub gain: Option<[f64; 4]>,
     /// Where the torque is written
     #[arg(long, value_name = "FILE.csv", default_value = "out/excitation.csv")]
     pub out: PathBuf,
@@ -92,20 +92,20 @@ fn task(arguments: &ExciteArguments, config: &Config) -> Result<ExcitationTask, 
         }
     }
     let noise = config.noise();
-    let pair = |values: &[f64]| (values[0], values[1]);
     Ok(ExcitationTask {
         robot,
         geometry,
         choices,
-        band: pair(&arguments.band),
+        band: arguments.band.into(),
         harmonics: arguments.harmonics,
         amplitude: arguments.amplitude,
         duration: arguments.length,
         tilt_limit: arguments.tilt_limit.to_radians(),
         rate: arguments.rate,
         noise: Vector3::from_fn(|i, _| noise[i].unwrap_or(ORDINARY_NOISE[i])),
-        gain: arguments.gain.as_deref().map(Vector4::from_column_slice),
+        gain: arguments.gain.map(Vector4::from),
         segment: config.fit.segment_s,
+        gyroscope: !config.log.theta_dot.column.is_empty(),
     })
 }
 
@@ -168,8 +168,9 @@ fn report(task: &ExcitationTask, excitation: &Excitation, out: &Path) -> String 
         "relative",
         "unit",
     ]);
+    let choices = task.choices();
     for parameter in Parameter::ALL {
-        if !task.choices[parameter].is_free() {
+        if !choices[parameter].is_free() {
             continue;
         }
         let (value, deviation) = (

@@ -81,6 +81,22 @@ pub enum CommandError {
     /// A log that no robot could be found from.
     #[error(transparent)]
     Estimate(#[from] EstimateError),
+    /// What was identified is no robot.
+    #[error(
+        "no parameters: what was found is no robot.{reasons}\nwhat was fitted is in {}{}",
+        report.display(),
+        old.as_ref().map_or(String::new(), |old| format!(
+            "; {} is of an earlier identification", old.display()
+        ))
+    )]
+    NoRobot {
+        /// Why, a line each.
+        reasons: String,
+        /// The report.
+        report: PathBuf,
+        /// Parameters of an earlier identification that still stand there.
+        old: Option<PathBuf>,
+    },
     /// An excitation that cannot be.
     #[error(transparent)]
     Excitation(#[from] ExcitationError),

@@ -1,6 +1,6 @@
 //! The published chain beside the trajectory fit: p by linear regression, b by refinement.
 
-use super::tables::Sheet;
+use super::tables::{Sheet, decimal};
 use crate::refinement::{RefinementProblem, start_from};
 use ballbot_identification::Identification;
 use std::fmt::Write as _;
@@ -26,9 +26,9 @@ pub fn linear_parameters(identification: &Identification) -> Sheet {
     for i in 0..6 {
         sheet.rows.push(vec![
             format!("p{}", i + 1),
-            format!("{:.3}", p[i]),
-            format!("{:.3}", published.standard_deviations[i]),
-            format!("{:.3}", fitted[i]),
+            decimal(p[i], 3),
+            decimal(published.standard_deviations[i], 3),
+            decimal(fitted[i], 3),
             units[i % 3].to_owned(),
         ]);
     }

@@ -59,10 +59,14 @@ fn mechanics(identification: &Identification) -> &'static str {
 }
 
 fn intervals(identification: &Identification) -> &'static str {
-    if identification.has_few_segments() || identification.is_white() {
+    if identification.is_white() {
         "The intervals are those of white residuals."
+    } else if identification.has_few_segments() {
+        "The residuals are not white: in the intervals they count as the fewer white ones that they \
+         are worth."
     } else {
-        "The residuals are not white, so the intervals are taken from the scatter of the segments."
+        "The residuals are not white: the intervals are taken from the scatter of the segments, or, \
+         where that is less, from residuals counted as the fewer white ones that they are worth."
     }
 }
 
@@ -72,7 +76,7 @@ fn verdicts(identification: &Identification) -> String {
         let class = match verdict.weight() {
             Weight::Good => "agrees",
             Weight::Note => "",
-            Weight::Warning => "differs",
+            Weight::Warning | Weight::Refusal => "differs",
         };
         format!(
             "<li><span class=\"{class}\">{}</span> {}</li>\n",

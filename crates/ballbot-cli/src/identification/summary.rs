@@ -53,5 +53,6 @@ pub fn mark(weight: Weight) -> &'static str {
         Weight::Good => "good:",
         Weight::Note => "note:",
         Weight::Warning => "WARNING:",
+        Weight::Refusal => "NO RESULT:",
     }
 }

@@ -34,10 +34,32 @@ impl Sheet {
 /// A value with as many digits as its standard deviation leaves it.
 fn rounded(value: f64, deviation: f64) -> String {
     if !(deviation > 0.0 && deviation.is_finite()) {
-        return format!("{value}");
+        return short(value);
     }
     let decimals = (1.0 - deviation.log10().floor()).clamp(0.0, 12.0) as usize;
     format!("{value:.decimals$}")
+}
+
+/// A number for a cell; "-" where there is none.
+fn short(value: f64) -> String {
+    match value {
+        _ if !value.is_finite() => "-".to_owned(),
+        0.0 => "0".to_owned(),
+        _ if (1e-4..1e6).contains(&value.abs()) => {
+            let decimals = (4.0 - value.abs().log10().floor()).max(0.0) as usize;
+            format!("{value:.decimals$}")
+        }
+        _ => format!("{value:.2e}"),
+    }
+}
+
+/// A number of this many decimals, unless it is so large that they say nothing.
+pub(super) fn decimal(value: f64, decimals: usize) -> String {
+    if value.abs() < 1e4 {
+        format!("{value:.decimals$}")
+    } else {
+        short(value)
+    }
 }
 
 /// The parameters with standard deviations and 95 % intervals.
@@ -56,6 +78,7 @@ pub fn parameters(identification: &Identification) -> Sheet {
         let status = identification.estimate.status[parameter];
         let (least, most) = identification.interval(parameter);
         let (deviation_text, interval) = match status {
+            Status::Found if !deviation.is_finite() => ("-".to_owned(), "not told".to_owned()),
             Status::Found => (
                 rounded(deviation, deviation),
                 format!(
@@ -114,7 +137,7 @@ pub fn correlations(identification: &Identification) -> Sheet {
     for row in &found {
         let entries = found
             .iter()
-            .map(|column| format!("{:.2}", identification.correlation(*row, *column)));
+            .map(|column| decimal(identification.correlation(*row, *column), 2));
         let row = std::iter::once(row.key().to_owned()).chain(entries);
         sheet.rows.push(row.collect());
     }
@@ -138,7 +161,7 @@ pub fn residuals(identification: &Identification) -> Sheet {
             (*output).to_owned(),
             format!("{:.3e}", residual.spread),
             format!("{:.3e}", residual.floor),
-            format!("{:.2}", residual.normalised()),
+            decimal(residual.normalised(), 2),
             format!("{:.0} %", 100.0 * residual.autocorrelation.exceeding()),
             format!("{largest:.3}, {lag}"),
             if residual.is_white() { "yes" } else { "no" }.to_owned(),
@@ -158,11 +181,11 @@ pub fn structures(identification: &Identification) -> Sheet {
     let rows = identification.structures.iter().map(|compared| {
         let mut row = vec![
             compared.structure.words().to_owned(),
-            format!("{:.3}", compared.fitted_chi_square),
-            format!("{:.3}", compared.validation.chi_square),
+            decimal(compared.fitted_chi_square, 3),
+            decimal(compared.validation.chi_square, 3),
         ];
         let errors = compared.validation.errors.iter();
-        row.extend(errors.map(|error| format!("{:.2}", 1e3 * error[1])));
+        row.extend(errors.map(|error| decimal(1e3 * error[1], 2)));
         row
     });
     Sheet {

@@ -35,6 +35,7 @@ fn robot() -> ExcitationTask {
         noise: Vector3::new(1e-3, 1e-3, 5e-3),
         gain: None,
         segment: 1.0,
+        gyroscope: true,
     }
 }
 
@@ -193,4 +194,162 @@ fn what_cannot_be_used_is_named() {
     assert_says(&message, &["no stretch of 1 s"]);
     let message = failure(&["excite", "--length", "3", "--out", name(&empty)], 1);
     assert_says(&message, &["the length is 3", "10.0 s"]);
+}
+
+/// The log with a column of it multiplied.
+fn scaled(column: usize, factor: f64) -> String {
+    let text = log();
+    let (header, rows) = text.split_once('\n').unwrap();
+    let rows = rows.lines().map(|row| {
+        let fields = row.split(',').enumerate().map(|(place, field)| {
+            let value: f64 = field.parse().unwrap();
+            (if place == column {
+                factor * value
+            } else {
+                value
+            })
+            .to_string()
+        });
+        fields.collect::<Vec<_>>().join(",") + "\n"
+    });
+    format!("{header}\n{}", rows.collect::<String>())
+}
+
+#[test]
+fn what_is_no_robot_has_a_report_and_no_parameters() {
+    let folder = tempfile::tempdir().unwrap();
+    let (log_file, out) = (folder.path().join("log.csv"), folder.path().join("out"));
+    std::fs::write(&log_file, scaled(4, -1.0)).unwrap();
+    let arguments = ["identify", name(&log_file), "--out", name(&out)];
+    let message = failure(&arguments, 1);
+    assert_says(
+        &message,
+        &[
+            "no parameters",
+            "the torque has the other sign: set factor = -1.0 in [log.torque]",
+            "report.html",
+        ],
+    );
+    assert!(!message.contains("NaN"), "{message}");
+    assert!(!out.join("parameters.toml").exists());
+    let report = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(report.contains("NO RESULT:") && !report.contains("good:"));
+    assert!(!report.contains("NaN"));
+
+    // A file that an earlier run left is not taken for the result of this one.
+    std::fs::write(out.join("parameters.toml"), "earlier").unwrap();
+    let message = failure(&arguments, 1);
+    assert_says(
+        &message,
+        &["parameters.toml is of an earlier identification"],
+    );
+    let earlier = std::fs::read_to_string(out.join("parameters.toml")).unwrap();
+    assert_eq!(earlier, "earlier");
+}
+
+#[test]
+fn parameters_from_a_log_without_gyroscope_are_read_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, content: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        path
+    };
+    let log_file = file("log.csv", &log().replace("theta_dot_rad_s", "unused"));
+    let config = file(
+        "robot.toml",
+        "[log.theta_dot]\ncolumn = \"\"\nunit = \"rad/s\"\n",
+    );
+    let out = folder.path().join("out");
+    let summary = text(&[
+        "identify",
+        name(&log_file),
+        "--config",
+        name(&config),
+        "--out",
+        name(&out),
+    ]);
+    assert!(!summary.contains("NaN"), "{summary}");
+    let parameters = out.join("parameters.toml");
+    let written = std::fs::read_to_string(&parameters).unwrap();
+    assert!(
+        !written.contains("nan") && !written.contains("inf"),
+        "{written}"
+    );
+    json(&["linearize", "--json", "--parameters", name(&parameters)]);
+    let torque = folder.path().join("torque.csv");
+    let words = text(&[
+        "excite",
+        "--config",
+        name(&config),
+        "--parameters",
+        name(&parameters),
+        "--out",
+        name(&torque),
+    ]);
+    // What no column tells is not promised either.
+    assert!(!words.contains("gyro_bias"), "{words}");
+}
+
+#[test]
+fn the_examples_of_excite_work_and_useless_torques_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let torque = folder.path().join("torque.csv");
+    let excite = |more: &[&'static str]| -> Vec<String> {
+        let mut arguments = vec!["excite".to_owned()];
+        arguments.extend(more.iter().map(ToString::to_string));
+        arguments.extend(["--out".to_owned(), name(&torque).to_owned()]);
+        arguments
+    };
+    let run = |more: &[&'static str]| {
+        let arguments = excite(more);
+        text(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    // As `ballbot help excite` shows it.
+    let help = text(&["help", "excite"]);
+    let gain = "--gain=-1.4,-48,-1.8,-11";
+    assert!(help.contains(gain), "{help}");
+    run(&["--amplitude", "2", "--tilt-limit", "8", gain]);
+    run(&["--gain", "-1.4,-48,-1.8,-11"]);
+    assert_says(&run(&["--band", "0.2,5"]), &["0.20 Hz to 5.00 Hz"]);
+    assert!(torque.exists());
+    std::fs::remove_file(&torque).unwrap();
+    let refuse = |more: &[&'static str], code: i32| {
+        let arguments = excite(more);
+        failure(
+            &arguments.iter().map(String::as_str).collect::<Vec<_>>(),
+            code,
+        )
+    };
+    let message = refuse(&["--gain=-0.5,-12,-0.6,-2.5"], 1);
+    assert_says(
+        &message,
+        &["does not hold the robot", "pole at +", "other sign"],
+    );
+    refuse(&["--gain=1.4,48,1.8,11"], 1);
+    refuse(&["--gain=1,2,3"], 2);
+    refuse(&["--band", "0.2"], 2);
+    assert_says(&refuse(&["--amplitude", "1e-4"], 1), &["--amplitude"]);
+    assert!(!torque.exists());
+}
+
+#[test]
+fn a_part_of_a_log_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let (log_file, out) = (folder.path().join("log.csv"), folder.path().join("out"));
+    std::fs::write(&log_file, log()).unwrap();
+    let identify = |part: &'static str| {
+        text(&[
+            "identify",
+            name(&log_file),
+            "--out",
+            name(&out),
+            "--leave-out",
+            part,
+        ])
+    };
+    assert_says(&identify("3,4.5"), &["301 rows are left out"]);
+    assert_says(&identify("1:3,4.5"), &["301 rows are left out"]);
+    failure(&["identify", name(&log_file), "--leave-out", "2:3,4.5"], 2);
+    failure(&["identify", name(&log_file), "--leave-out", "4.5,3"], 2);
 }

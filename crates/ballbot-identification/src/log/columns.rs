@@ -1,6 +1,7 @@
 //! Where a log's quantities stand, and in which units.
 
 use ballbot::Wheels;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -8,8 +9,16 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Columns {
-    /// What stands between two fields.
+    /// What stands between two fields; a blank stands for any number of blanks and tabs.
     pub delimiter: char,
+    /// Names of the columns in a file that has no header.
+    pub header: Vec<String>,
+    /// Rows before this time are left out, s since the first row.
+    pub from_s: Option<f64>,
+    /// Rows after this time are left out, s since the first row.
+    pub until_s: Option<f64>,
+    /// Rows between these times are left out, s since the first row.
+    pub leave_out: Vec<[f64; 2]>,
     /// Time stamps.
     pub time: Channel,
     /// Ball angle.
@@ -62,6 +71,10 @@ pub struct WheelEncoders {
     /// The wheels in the order of the torque map; each factor is r_w / r_b for an angle of the
     /// wheel, over the gear's ratio for one of the motor, negative for the other sign.
     pub encoders: [Channel; 3],
+    /// The wheels' torques in the same order, which are put together to that of the virtual wheel;
+    /// `torque` is not read then.
+    #[serde(default)]
+    pub torques: Option<[Channel; 3]>,
 }
 
 /// A plane of the robot.
@@ -83,6 +96,29 @@ impl Columns {
         }
     }
 
+    /// Whether the torque is in N m. Where it is a voltage or a duty cycle of unknown torque, the torque
+    /// gain is per that, and the back-EMF is a friction in the drive.
+    pub fn torque_known(&self) -> bool {
+        let torques = self
+            .wheels
+            .as_ref()
+            .and_then(|wheels| wheels.torques.as_ref());
+        match torques {
+            Some(torques) => torques.iter().all(Channel::is_torque),
+            None => self.torque.is_torque(),
+        }
+    }
+
+    /// Whether the row at a time (s since the first row) is to be read.
+    pub(super) fn takes(&self, time: f64) -> bool {
+        let out = self.leave_out.iter();
+        self.from_s.is_none_or(|from| time >= from)
+            && self.until_s.is_none_or(|until| time <= until)
+            && !out
+                .into_iter()
+                .any(|[from, to]| (*from..=*to).contains(&time))
+    }
+
     /// What the ball angle is called in messages.
     pub(super) fn phi_name(&self) -> &str {
         match self.wheels {
@@ -102,6 +138,20 @@ impl WheelEncoders {
         };
         let matrix = wheels.matrix();
         Some([0, 1, 2].map(|wheel| matrix[(wheel, plane)]))
+    }
+
+    /// What each wheel's torque contributes to that of the virtual wheel; `None` where the zenith
+    /// angle is none.
+    pub(super) fn torque_weights(&self) -> Option<[f64; 3]> {
+        let wheels = Wheels::new(self.zenith_angle_deg.to_radians()).ok()?;
+        let plane = match self.plane {
+            WheelPlane::X => 0,
+            WheelPlane::Y => 1,
+        };
+        Some([0, 1, 2].map(|wheel| {
+            let alone = Vector3::ith(wheel, 1.0);
+            wheels.virtual_torques(&alone)[plane]
+        }))
     }
 }
 
@@ -134,9 +184,18 @@ pub enum Unit {
     /// Radians.
     #[serde(rename = "rad")]
     Radian,
+    /// Milliradians.
+    #[serde(rename = "mrad")]
+    Milliradian,
     /// Degrees.
     #[serde(rename = "deg")]
     Degree,
+    /// Metres that the ball has rolled, with 1 / r_b (in 1/m) as the factor.
+    #[serde(rename = "m")]
+    Metre,
+    /// Millimetres that the ball has rolled, with 1 / r_b (in 1/m) as the factor.
+    #[serde(rename = "mm")]
+    Millimetre,
     /// Turns.
     #[serde(rename = "turn")]
     Turn,
@@ -146,6 +205,12 @@ pub enum Unit {
     /// Degrees per second.
     #[serde(rename = "deg/s")]
     DegreePerSecond,
+    /// Milliradians per second.
+    #[serde(rename = "mrad/s")]
+    MilliradianPerSecond,
+    /// Turns per second.
+    #[serde(rename = "turn/s")]
+    TurnPerSecond,
     /// Turns per minute.
     #[serde(rename = "rpm")]
     TurnPerMinute,
@@ -158,6 +223,19 @@ pub enum Unit {
     /// Amperes, with the torque per ampere as the factor.
     #[serde(rename = "A")]
     Ampere,
+    /// Milliamperes, with the torque per ampere as the factor.
+    #[serde(rename = "mA")]
+    Milliampere,
+    /// Volts at the motor, with the torque per volt at standstill as the factor, if it is known.
+    #[serde(rename = "V")]
+    Volt,
+    /// Duty cycle or counts of a pulse-width modulation, with the torque of one at standstill as the
+    /// factor, if it is known.
+    #[serde(rename = "1")]
+    One,
+    /// Duty cycle in per cent; see [`Unit::One`].
+    #[serde(rename = "%")]
+    Percent,
 }
 
 /// What a unit measures.
@@ -173,9 +251,12 @@ impl fmt::Display for Dimension {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Time => "a time: s, ms, us or ns",
-            Self::Angle => "an angle: rad, deg or turn",
-            Self::Rate => "a rate: rad/s, deg/s or rpm",
-            Self::Torque => "a torque: Nm or mNm, or A with the torque per ampere as factor",
+            Self::Angle => "an angle: rad, mrad, deg or turn, or m or mm with 1 / r_b as factor",
+            Self::Rate => "a rate: rad/s, mrad/s, deg/s, turn/s or rpm",
+            Self::Torque => {
+                "a torque: Nm or mNm; A or mA with the torque per ampere as factor; V, %, or 1 for a \
+                 duty cycle"
+            }
         })
     }
 }
@@ -186,9 +267,24 @@ impl Unit {
             Self::Second | Self::Millisecond | Self::Microsecond | Self::Nanosecond => {
                 Dimension::Time
             }
-            Self::Radian | Self::Degree | Self::Turn => Dimension::Angle,
-            Self::RadianPerSecond | Self::DegreePerSecond | Self::TurnPerMinute => Dimension::Rate,
-            Self::NewtonMetre | Self::MillinewtonMetre | Self::Ampere => Dimension::Torque,
+            Self::Radian
+            | Self::Milliradian
+            | Self::Degree
+            | Self::Turn
+            | Self::Metre
+            | Self::Millimetre => Dimension::Angle,
+            Self::RadianPerSecond
+            | Self::MilliradianPerSecond
+            | Self::DegreePerSecond
+            | Self::TurnPerSecond
+            | Self::TurnPerMinute => Dimension::Rate,
+            Self::NewtonMetre
+            | Self::MillinewtonMetre
+            | Self::Ampere
+            | Self::Milliampere
+            | Self::Volt
+            | Self::One
+            | Self::Percent => Dimension::Torque,
         }
     }
 
@@ -199,13 +295,22 @@ impl Unit {
             Self::Second
             | Self::Radian
             | Self::RadianPerSecond
+            | Self::Metre
             | Self::NewtonMetre
-            | Self::Ampere => 1.0,
-            Self::Millisecond | Self::MillinewtonMetre => 1e-3,
+            | Self::Ampere
+            | Self::Volt
+            | Self::One => 1.0,
+            Self::Percent => 1e-2,
+            Self::Millisecond
+            | Self::Milliradian
+            | Self::MilliradianPerSecond
+            | Self::Millimetre
+            | Self::MillinewtonMetre
+            | Self::Milliampere => 1e-3,
             Self::Microsecond => 1e-6,
             Self::Nanosecond => 1e-9,
             Self::Degree | Self::DegreePerSecond => PI / 180.0,
-            Self::Turn => TAU,
+            Self::Turn | Self::TurnPerSecond => TAU,
             Self::TurnPerMinute => TAU / 60.0,
         }
     }
@@ -218,6 +323,13 @@ impl Channel {
             unit,
             factor: 1.0,
         }
+    }
+
+    /// Whether a torque is in N m once the factor is applied: a current or a voltage is by a factor
+    /// that was measured.
+    fn is_torque(&self) -> bool {
+        let newton_metres = [Unit::NewtonMetre, Unit::MillinewtonMetre];
+        newton_metres.contains(&self.unit) || self.factor.abs() != 1.0
     }
 
     /// SI units for one of the file's.
@@ -236,6 +348,10 @@ impl Default for Columns {
     fn default() -> Self {
         Self {
             delimiter: ',',
+            header: Vec::new(),
+            from_s: None,
+            until_s: None,
+            leave_out: Vec::new(),
             time: Channel::new("t_s", Unit::Second),
             phi: Channel::new("phi_rad", Unit::Radian),
             theta: Channel::new("theta_rad", Unit::Radian),

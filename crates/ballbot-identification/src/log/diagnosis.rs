@@ -47,6 +47,15 @@ pub(super) fn run(
         torque_name,
     ]);
     let (time, mut breaks) = stamps::check(table, &names, findings)?;
+    let out = time.iter().enumerate();
+    let out = out.filter(|(_, time)| !columns.takes(**time));
+    let out: Vec<usize> = out.map(|(row, _)| row).collect();
+    for &row in &out {
+        isolate(row, &mut breaks);
+    }
+    if !out.is_empty() {
+        findings.push(Finding::LeftOut { count: out.len() });
+    }
     missing(
         table,
         &names,
@@ -55,6 +64,16 @@ pub(super) fn run(
     )?;
     sensors::constant(table, &names)?;
     let [_, phi, theta, theta_dot, torque] = &table.columns;
+    let angle;
+    let phi = if table.rate_of_ball {
+        findings.push(Finding::IntegratedRate {
+            column: names.0[1].to_owned(),
+        });
+        angle = integrated(&time, phi, &mut breaks);
+        &angle
+    } else {
+        phi
+    };
     let outputs = phi.iter().zip(theta).zip(theta_dot);
     let mut run = Run {
         name: path.display().to_string(),
@@ -73,7 +92,7 @@ pub(super) fn run(
         }
         findings.push(Finding::AcceptedUnits(suspicion));
     }
-    sensors::jumps(table, &names, &mut breaks, findings);
+    sensors::jumps(table, &run, &names, &mut breaks, findings);
     sensors::fallen(table, &run.time, &mut breaks, findings);
     sensors::torque(table, findings);
     sensors::stuck_or_stepped(table, &names, &run.time, findings);
@@ -81,12 +100,36 @@ pub(super) fn run(
     let lengths = run.stretches.iter().map(|stretch| run.length(stretch));
     let longest = lengths.fold(0.0, f64::max);
     if longest < SHORTEST_STRETCH {
+        let jumps = findings.iter().filter_map(|finding| match finding {
+            Finding::Jumps { column, count, .. } => Some((column.clone(), *count)),
+            _ => None,
+        });
         return Err(Problem::NoStretch {
             needed: SHORTEST_STRETCH,
             longest,
+            jumps: jumps.max_by_key(|(_, count)| *count),
         });
     }
     Ok(run)
+}
+
+/// Lets a row stand alone, so that it is in no stretch.
+fn isolate(row: usize, breaks: &mut [bool]) {
+    breaks[row] = true;
+    if let Some(next) = breaks.get_mut(row + 1) {
+        *next = true;
+    }
+}
+
+/// The angle of a rate, by trapezoids. Across a break, and a missing rate, it goes on where it was.
+fn integrated(time: &[f64], rate: &[f64], breaks: &mut [bool]) -> Vec<f64> {
+    let mut angle = vec![0.0; rate.len()];
+    for row in 1..rate.len() {
+        let change = 0.5 * (rate[row] + rate[row - 1]) * (time[row] - time[row - 1]);
+        breaks[row] |= change.is_nan();
+        angle[row] = angle[row - 1] + if breaks[row] { 0.0 } else { change };
+    }
+    angle
 }
 
 /// Values that are not there.

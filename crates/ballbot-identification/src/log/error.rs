@@ -1,5 +1,6 @@
 //! Why a log cannot be used, said to a person.
 
+use crate::words::number;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -189,7 +190,7 @@ pub enum Problem {
         needed: usize,
     },
     /// A column without information.
-    #[error("column `{column}` is {value} in all rows: {consequence}")]
+    #[error("column `{column}` is {} in all rows: {consequence}", number(*value))]
     Constant {
         /// The column.
         column: String,
@@ -212,7 +213,8 @@ pub enum Problem {
     },
     /// The time between rows is that of no control loop.
     #[error(
-        "rows are {interval} s apart (median): {}",
+        "rows are {} s apart (median): {}",
+        number(*interval),
         if *interval > 0.2 {
             "a tilt mode of a ballbot needs at least 5 rows per second; is the time in ms, us or \
              ns? Say so as unit of [log.time]"
@@ -233,13 +235,19 @@ pub enum Problem {
     /// Nothing is left between gaps and jumps.
     #[error(
         "there is no stretch of {needed} s without gap, jump or missing torque; the longest is \
-         {longest:.3} s"
+         {longest:.3} s{}",
+        jumps.as_ref().map_or(String::new(), |(column, count)| format!(
+            ". `{column}` jumps {count} times: is its unit wrong (degrees taken for radians), or does \
+             its sensor fail?"
+        ))
     )]
     NoStretch {
         /// Needed, s.
         needed: f64,
         /// Longest, s.
         longest: f64,
+        /// The column that jumps most, and how often.
+        jumps: Option<(String, usize)>,
     },
 }
 
@@ -291,7 +299,8 @@ impl fmt::Display for Suspicion {
                 let degrees = 180.0 / std::f64::consts::PI;
                 write!(
                     f,
-                    "`{tilt}` changes by {slope:.4} times the integral of `{rate}`, where 1 is right: "
+                    "`{tilt}` changes by {} times the integral of `{rate}`, where 1 is right: ",
+                    number(*slope)
                 )?;
                 let near = |value: f64| {
                     slope.signum() == value.signum() && {

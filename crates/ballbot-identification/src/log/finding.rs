@@ -27,6 +27,18 @@ pub enum Finding {
         /// Line of the first.
         line: usize,
     },
+    /// Rows that the builder wants left out.
+    #[error("{count} rows are left out, as from_s, until_s or leave_out say")]
+    LeftOut {
+        /// How many rows.
+        count: usize,
+    },
+    /// A rate in place of an angle.
+    #[error("`{column}` is a rate; it is integrated to the ball angle")]
+    IntegratedRate {
+        /// The column.
+        column: String,
+    },
     /// Rows are missing.
     #[error(
         "{count} gap(s) in the time stamps, the longest of {longest:.3} s after {time:.3} s; the fit does not reach across"

@@ -1,7 +1,7 @@
 //! From the text of a CSV file to columns of numbers.
 
 use super::Progress;
-use super::columns::{APPLIED, COMMANDED, Channel, Columns, Dimension};
+use super::columns::{APPLIED, COMMANDED, Channel, Columns, Dimension, WheelEncoders};
 use super::error::Problem;
 use super::finding::Finding;
 use super::lines::Lines;
@@ -18,6 +18,8 @@ pub(super) struct Table {
     /// Torque that was asked for, where it stands beside the one that was applied.
     pub(super) commanded: Vec<f64>,
     pub(super) torque: Torque,
+    /// The second column is the ball's rate.
+    pub(super) rate_of_ball: bool,
 }
 
 /// A column that is read.
@@ -54,7 +56,12 @@ fn parse(
     progress: &dyn Fn(u64),
 ) -> Result<Table, Problem> {
     let mut lines = Lines::new(reader);
-    let header = header(&mut lines, columns, findings)?;
+    let header = if columns.header.is_empty() {
+        header(&mut lines, columns, findings)?
+    } else {
+        columns.header.clone()
+    };
+    duplicates(&header)?;
     let header_line = lines.number;
     let (sources, commanded, torque) = sources(&header, columns)?;
     let mut table = Table {
@@ -62,6 +69,7 @@ fn parse(
         columns: Default::default(),
         commanded: Vec::new(),
         torque,
+        rate_of_ball: columns.ball_dimension()? == Dimension::Rate,
     };
     let mut reported = 0;
     while lines.advance()? {
@@ -110,11 +118,15 @@ fn parse(
 /// A blank line or a comment.
 fn skipped(line: &str) -> bool {
     let line = line.trim_start();
-    line.is_empty() || line.starts_with('#')
+    line.is_empty() || line.starts_with(['#', '%'])
 }
 
 fn split(line: &str, delimiter: char) -> impl Iterator<Item = &str> {
-    line.split(delimiter)
+    let blank = delimiter == ' ';
+    let line = if blank { line.trim() } else { line };
+    line.split(move |c: char| c == delimiter || blank && c == '\t')
+        // Blanks that align columns stand for one.
+        .filter(move |field| !(blank && field.is_empty()))
         .map(|field| field.trim().trim_matches('"').trim())
 }
 
@@ -152,6 +164,11 @@ fn header(
             suspected: found.filter(|other| text.contains(*other)),
         });
     }
+    Ok(header)
+}
+
+/// Each name once.
+fn duplicates(header: &[String]) -> Result<(), Problem> {
     for (place, name) in header.iter().enumerate() {
         if let Some(first) = header[..place].iter().position(|other| other == name) {
             return Err(Problem::DuplicateColumn {
@@ -161,7 +178,7 @@ fn header(
             });
         }
     }
-    Ok(header)
+    Ok(())
 }
 
 /// What each quantity is the sum of.
@@ -171,7 +188,9 @@ type Sources = ([Vec<Source>; 5], Option<Source>, Torque);
 fn sources(header: &[String], columns: &Columns) -> Result<Sources, Problem> {
     let has = |name: &str| header.iter().any(|column| column == name);
     let mut torque = columns.torque.clone();
-    let kind = if !torque.column.is_empty() {
+    let wheels = columns.wheels.as_ref();
+    let torques = wheels.and_then(|wheels| Some((wheels, wheels.torques.as_ref()?)));
+    let kind = if torques.is_some() || !torque.column.is_empty() {
         Torque::Named
     } else if has(APPLIED) {
         torque.column = APPLIED.to_owned();
@@ -199,27 +218,68 @@ fn sources(header: &[String], columns: &Columns) -> Result<Sources, Problem> {
         } else {
             vec![source(header, rate, Dimension::Rate)?]
         },
-        vec![source(header, &torque, Dimension::Torque)?],
+        match torques {
+            Some((wheels, torques)) => {
+                let weights = wheels.torque_weights();
+                weighted(header, wheels, torques, weights, Dimension::Torque)?
+            }
+            None => vec![source(header, &torque, Dimension::Torque)?],
+        },
     ];
     Ok((sources, commanded, kind))
 }
 
 /// The ball angle's column, or those of the three wheels.
 fn ball_angle(header: &[String], columns: &Columns) -> Result<Vec<Source>, Problem> {
+    let dimension = columns.ball_dimension()?;
     let Some(wheels) = &columns.wheels else {
-        return Ok(vec![source(header, &columns.phi, Dimension::Angle)?]);
+        return Ok(vec![source(header, &columns.phi, dimension)?]);
     };
-    let weights = wheels.weights().ok_or(Problem::ZenithAngle {
+    weighted(
+        header,
+        wheels,
+        &wheels.encoders,
+        wheels.weights(),
+        dimension,
+    )
+}
+
+/// The columns of three wheels, each with its weight.
+fn weighted(
+    header: &[String],
+    wheels: &WheelEncoders,
+    channels: &[Channel; 3],
+    weights: Option<[f64; 3]>,
+    dimension: Dimension,
+) -> Result<Vec<Source>, Problem> {
+    let weights = weights.ok_or(Problem::ZenithAngle {
         degrees: wheels.zenith_angle_deg,
     })?;
-    let encoders = wheels.encoders.iter().zip(weights);
-    encoders
+    let channels = channels.iter().zip(weights);
+    channels
         .map(|(channel, weight)| {
-            let mut encoder = source(header, channel, Dimension::Angle)?;
-            encoder.scale *= weight;
-            Ok(encoder)
+            let mut source = source(header, channel, dimension)?;
+            source.scale *= weight;
+            Ok(source)
         })
         .collect()
+}
+
+impl Columns {
+    /// Whether the ball's angle is read, or its rate.
+    fn ball_dimension(&self) -> Result<Dimension, Problem> {
+        let channel = match &self.wheels {
+            Some(wheels) => &wheels.encoders[0],
+            None => &self.phi,
+        };
+        match channel.unit.dimension() {
+            dimension @ (Dimension::Angle | Dimension::Rate) => Ok(dimension),
+            _ => Err(Problem::Dimension {
+                column: channel.column.clone(),
+                expected: format!("{}; or {}", Dimension::Angle, Dimension::Rate),
+            }),
+        }
+    }
 }
 
 fn source(header: &[String], channel: &Channel, dimension: Dimension) -> Result<Source, Problem> {

@@ -1,11 +1,10 @@
 //! From numbers to verdicts. The one place of their limits.
 
-use super::Verdict;
-use crate::coordinates::LONGEST_DELAY;
+use super::{Verdict, Weight};
 use crate::estimate::Status;
 use crate::identification::Identification;
 use crate::log::quantile;
-use crate::parameter::Parameter;
+use crate::parameter::{Choice, Parameter};
 use crate::residuals::{OUTPUTS, SegmentResidual};
 use crate::structures::{Structure, best};
 use lpvmpc_design::ShootingTermination;
@@ -29,23 +28,70 @@ const VAGUE_DELAY: f64 = 2e-3;
 /// Held-back data may be explained so much worse, chi^2 per value.
 const HELD_BACK: f64 = 1.3;
 
+/// From here on, errors of twice those of the fit, what was fitted is not what is there.
+const HELD_BACK_REFUSED: f64 = 4.0;
+
+/// Residual over motion from which on a robot is not what moved.
+const UNEXPLAINED: f64 = 0.5;
+
+/// A relative error of the inertias that is no reason for a warning.
+const SMALL_ERROR: f64 = 0.02;
+
+/// A torque that holds the body at this tilt is no reason for a warning, rad.
+const SMALL_TILT: f64 = 1e-3;
+
+/// A parameter may be so many standard deviations from what was known of it.
+const CONTRADICTED: f64 = 4.0;
+
+/// From here on one of the two is wrong.
+const REFUTED: f64 = 10.0;
+
+/// A body's mass or inertia that is known worse than this, relative to itself, is not known.
+const UNTOLD: f64 = 0.5;
+
 impl Identification {
     /// All that is to be said, the gravest first.
     pub fn verdicts(&self) -> Vec<Verdict> {
         let mut verdicts = Vec::new();
         self.judge_residuals(&mut verdicts);
         self.judge_held(&mut verdicts);
+        self.judge_priors(&mut verdicts);
         self.judge_found(&mut verdicts);
         self.judge_held_back(&mut verdicts);
+        verdicts.extend(self.suspects.clone().map(|suspects| Verdict::WrongColumns {
+            suspects,
+            accepted: self.columns_accepted,
+        }));
         let consistency = self.consistency();
         // The range of tilts is that of the paper's constraints.
-        verdicts.push(if consistency.is_physical() {
-            Verdict::Physical
-        } else {
-            Verdict::Unphysical(consistency.to_string())
+        if !consistency.is_physical() {
+            verdicts.push(Verdict::Unphysical(consistency.to_string()));
+        } else if !self.is_inertia_imposed() {
+            verdicts.push(Verdict::Physical);
+        }
+        if verdicts.iter().any(|one| one.weight() == Weight::Refusal) {
+            verdicts.retain(|one| one.weight() != Weight::Good);
+        }
+        // A wrong column is the cause of all else.
+        verdicts.sort_by_key(|verdict| {
+            let cause = matches!(verdict, Verdict::WrongColumns { .. });
+            std::cmp::Reverse((verdict.weight(), cause))
         });
-        verdicts.sort_by_key(|verdict| std::cmp::Reverse(verdict.weight()));
         verdicts
+    }
+
+    /// Why this is no result; empty if it is one.
+    pub fn refusals(&self) -> Vec<Verdict> {
+        let mut verdicts = self.verdicts();
+        verdicts.retain(|one| one.weight() == Weight::Refusal);
+        verdicts
+    }
+
+    /// Whether it is only the bounds of mechanics that make the inertias those of a rigid body.
+    fn is_inertia_imposed(&self) -> bool {
+        [Parameter::B1, Parameter::B2, Parameter::B3]
+            .into_iter()
+            .any(|inertia| self.estimate.status[inertia] == Status::AtBound)
     }
 
     fn judge_residuals(&self, verdicts: &mut Vec<Verdict>) {
@@ -59,20 +105,19 @@ impl Identification {
                 used: self.estimate.segment,
             });
         }
-        if !self.is_white() && self.has_few_segments() {
-            verdicts.push(Verdict::TooShort {
-                segments: self.estimate.segments.len(),
-                parameters: self.estimate.fit.reduced.indices.len(),
-            });
-        }
         verdicts.extend(self.disturbed());
-        let mut noise = true;
+        let (mut noise, mut unexplained) = (true, None);
         for (output, residual) in OUTPUTS.into_iter().zip(&self.residuals) {
-            if residual.normalised() > TOO_LARGE {
+            if exceeds(residual.normalised(), TOO_LARGE) {
                 noise = false;
+                let part = residual.unexplained();
+                if exceeds(part, UNEXPLAINED) {
+                    unexplained = Some(Verdict::Unexplained { output, part });
+                }
                 verdicts.push(Verdict::ResidualTooLarge {
                     output,
                     normalised: residual.normalised(),
+                    part,
                 });
             }
             if !residual.is_white() {
@@ -84,6 +129,7 @@ impl Identification {
                 });
             }
         }
+        verdicts.extend(unexplained);
         if noise {
             let normalised = self.normalised_residual();
             verdicts.push(Verdict::ResidualIsNoise { normalised });
@@ -130,20 +176,73 @@ impl Identification {
                     held,
                     wanted,
                     significance,
+                    matters: self.matters(parameter, score.change),
                 },
             });
         }
     }
 
+    /// Whether a controller would notice that change of a parameter that was held.
+    fn matters(&self, parameter: Parameter, change: f64) -> bool {
+        let weight = self.geometry.gravity * self.geometry.centre_of_mass;
+        let gain = self.estimate.values[Parameter::TorqueGain];
+        match parameter {
+            Parameter::CreepBall | Parameter::CreepTilt => self.creep_error() > SMALL_ERROR,
+            Parameter::TorqueBias => (gain * change).abs() > SMALL_TILT * weight,
+            Parameter::DriveCoulomb => change.abs() > SMALL_TILT * weight,
+            _ => true,
+        }
+    }
+
+    /// What was known beforehand, against what was found.
+    fn judge_priors(&self, verdicts: &mut Vec<Verdict>) {
+        for parameter in Parameter::ALL {
+            let Choice::Prior {
+                mean,
+                standard_deviation,
+            } = self.choices[parameter]
+            else {
+                continue;
+            };
+            let found = self.estimate.values[parameter];
+            let significance = (found - mean).abs() / standard_deviation;
+            if exceeds(significance, CONTRADICTED) {
+                verdicts.push(Verdict::PriorContradicted {
+                    parameter,
+                    mean,
+                    found,
+                    significance,
+                    refused: exceeds(significance, REFUTED),
+                });
+            }
+        }
+    }
+
     fn judge_found(&self, verdicts: &mut Vec<Verdict>) {
+        if !self.torque_known {
+            verdicts.push(Verdict::NoTorque);
+        } else if matches!(self.choices[Parameter::TorqueGain], Choice::Free { .. }) {
+            verdicts.push(Verdict::BodyNotWeighed);
+        }
         for parameter in Parameter::ALL {
             match self.estimate.status[parameter] {
                 Status::Held => continue,
+                Status::AtBound if self.is_at_limit(parameter) => {
+                    verdicts.push(Verdict::BeyondLimits {
+                        parameter,
+                        value: self.estimate.values[parameter],
+                        masses: self.coordinates.masses(),
+                        lever: self.geometry.centre_of_mass,
+                    });
+                }
                 // Without delay, noise wants a negative one half of the time.
-                Status::AtBound
-                    if parameter == Parameter::Delay
-                        && self.estimate.values[parameter] < LONGEST_DELAY => {}
-                Status::AtBound => verdicts.push(Verdict::AtBound(parameter)),
+                Status::AtBound if parameter == Parameter::Delay => {}
+                Status::AtBound => verdicts.push(Verdict::AtBound {
+                    parameter,
+                    // A ball without mass and a body without extension do not exist; wheels may
+                    // be light.
+                    refused: matches!(parameter, Parameter::B1 | Parameter::B3) && self.misfits(),
+                }),
                 Status::Found => verdicts.extend(self.judge_precision(parameter)),
             }
         }
@@ -166,13 +265,37 @@ impl Identification {
         }
     }
 
+    /// Whether more than noise is left of any output.
+    fn misfits(&self) -> bool {
+        let mut outputs = self.residuals.iter();
+        outputs.any(|residual| exceeds(residual.normalised(), TOO_LARGE))
+    }
+
+    /// Whether the fit ended where no robot of these lengths is.
+    fn is_at_limit(&self, parameter: Parameter) -> bool {
+        let coordinate = self.estimate.fit.parameters[parameter.index()];
+        self.coordinates.is_at_limit(parameter, coordinate)
+    }
+
     fn judge_precision(&self, parameter: Parameter) -> Option<Verdict> {
         let (value, deviation) = (
             self.estimate.values[parameter],
             self.standard_deviation(parameter),
         );
+        if !(value.is_finite() && deviation.is_finite()) {
+            return Some(Verdict::Untold { parameter });
+        }
         match parameter {
-            Parameter::TiltOffset | Parameter::GyroBias | Parameter::TorqueBias => None,
+            Parameter::B1 | Parameter::B3 | Parameter::TorqueGain
+                if exceeds(deviation, UNTOLD * value.abs()) =>
+            {
+                Some(Verdict::Untold { parameter })
+            }
+            Parameter::TiltOffset
+            | Parameter::GyroBias
+            | Parameter::TorqueBias
+            | Parameter::CreepBall
+            | Parameter::CreepTilt => None,
             Parameter::Delay => exceeds(deviation, VAGUE_DELAY).then_some(Verdict::VagueDelay {
                 standard_deviation: deviation,
             }),
@@ -202,7 +325,10 @@ impl Identification {
         verdicts.push(if chi_square <= HELD_BACK {
             Verdict::HeldBackGood { chi_square }
         } else {
-            Verdict::HeldBackBad { chi_square }
+            Verdict::HeldBackBad {
+                chi_square,
+                refused: exceeds(chi_square, HELD_BACK_REFUSED),
+            }
         });
         let own = |structure: Structure| {
             [
@@ -227,7 +353,7 @@ impl Identification {
     }
 }
 
-/// Whether a deviation is above a limit; one that is no number is.
-fn exceeds(deviation: f64, limit: f64) -> bool {
-    deviation.is_nan() || deviation > limit
+/// Whether a value is above a limit; one that is NaN is.
+fn exceeds(value: f64, limit: f64) -> bool {
+    value.is_nan() || value > limit
 }

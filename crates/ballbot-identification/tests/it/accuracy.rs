@@ -34,6 +34,7 @@ fn estimate_with(laboratory: &Laboratory, seed: u64, choices: Values<Choice>) ->
         choices,
         physical: true,
         segment: 1.0,
+        torque_known: true,
         noise: [None; 3],
     };
     let split = Split::new(&runs, 0.0);
@@ -131,6 +132,7 @@ fn an_encoder_on_the_body_is_understood() {
         choices: Values::usual(),
         physical: true,
         segment: 1.0,
+        torque_known: true,
         noise: [None; 3],
     };
     let floor = noise::floor(&runs);

@@ -154,11 +154,9 @@ fn friction_at_the_wrong_place_is_found_out() {
     assert!(other, "the structure is not questioned");
     let pole = |found: &Identification| found.poles.last().unwrap().value.re;
     let truth = laboratory.unstable_pole();
-    assert!(
-        percent(pole(&found), truth) > 5.0,
-        "{} {truth}",
-        pole(&found)
-    );
+    // What is at the wrong place is made up for by what is left: rolling friction that is not there.
+    let rolling = found.estimate.values[Parameter::RollingFriction];
+    assert!(percent(rolling, laboratory.plant.b4) > 100.0, "{rolling}");
     let right = identified(&laboratory, 3, "");
     assert!(percent(pole(&right), truth) < 3.0, "{}", pole(&right));
 }
@@ -251,7 +249,7 @@ fn mechanics_is_imposed_unless_it_is_not_wanted() {
     let at_bound = imposed
         .verdicts()
         .iter()
-        .any(|v| matches!(v, Verdict::AtBound(_)));
+        .any(|v| matches!(v, Verdict::AtBound { .. }));
     assert!(at_bound && imposed.normalised_residual() > 1.3);
     let free = identified(&laboratory, 3, &format!("{fixed}\n[fit]\nphysical = false"));
     assert!(

@@ -31,6 +31,7 @@ fn task() -> ExcitationTask {
         noise: healthy.noise,
         gain: None,
         segment: 1.0,
+        gyroscope: true,
     }
 }
 
@@ -73,6 +74,7 @@ fn the_expected_precision_is_that_of_the_fit() {
         choices: task.choices,
         physical: true,
         segment: task.segment,
+        torque_known: true,
         noise: [None; 3],
     };
     let split = Split::new(&runs, 0.0);
@@ -114,7 +116,13 @@ fn what_cannot_be_done_is_said() {
     assert!(message.contains("the torque is NaN"), "{message}");
     let unstable = refused(|task| task.gain = Some(Vector4::zeros()));
     assert!(
-        matches!(unstable, ExcitationError::Unstable { .. }),
+        matches!(unstable, ExcitationError::UnstableLoop { .. }),
         "{unstable}"
     );
+    // Gains of another robot: they used to leave 1.8e-5 N m, as if that were an excitation.
+    let message = refused(|task| task.gain = Some(Vector4::new(-0.5, -12.0, -0.6, -2.5)));
+    let message = message.to_string();
+    assert!(message.contains("it has a pole at +"), "{message}");
+    let message = refused(|task| task.amplitude = 1e-4).to_string();
+    assert!(message.contains("--amplitude"), "{message}");
 }

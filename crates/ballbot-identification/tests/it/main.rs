@@ -6,6 +6,9 @@
 
 mod accuracy;
 mod chain;
+mod columns;
+mod creep;
 mod excite;
 mod laboratory;
+mod long;
 mod malformed;

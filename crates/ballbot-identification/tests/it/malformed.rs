@@ -463,9 +463,132 @@ fn wheels_that_cannot_turn_the_ball_are_refused() {
     assert!(said.contains("zenith_angle_deg = 90"), "{said}");
     let said = message(&config("45.0", "{ column = \"wheel\", unit = \"rad\" }"));
     assert!(said.contains("`wheel`"), "{said}");
-    let said = message(&config(
-        "45.0",
-        "{ column = \"phi_rad\", unit = \"rad/s\" }",
-    ));
-    assert!(said.contains("an angle: rad, deg or turn"), "{said}");
+    let said = message(&config("45.0", "{ column = \"phi_rad\", unit = \"Nm\" }"));
+    assert!(said.contains("an angle: rad, mrad, deg or turn"), "{said}");
+    // Angles and rates cannot be put together.
+    let mixed = "[log.wheels]\nplane = \"x\"\nzenith_angle_deg = 45.0\nencoders = [\
+                 { column = \"phi_rad\", unit = \"rad\" }, \
+                 { column = \"phi_rad\", unit = \"rad/s\" }, \
+                 { column = \"phi_rad\", unit = \"rad\" }]";
+    let said = message(mixed);
+    assert!(said.contains("an angle: rad, mrad, deg or turn"), "{said}");
+}
+
+/// The run of the good log.
+fn truth() -> log::Run {
+    read_with(good().as_bytes(), "").unwrap().run
+}
+
+#[test]
+fn blanks_between_columns_and_no_header() {
+    let text = good();
+    let (_, rows) = text.split_once('\n').unwrap();
+    let rows = rows.replace(',', "   ");
+    let aligned: String = rows.lines().map(|row| format!("  {row} \n")).collect();
+    let names = "header = [\"t_s\", \"phi_rad\", \"theta_rad\", \"theta_dot_rad_s\", \"asked\", \
+                 \"torque_applied_nm\"]";
+    let config = format!("[log]\ndelimiter = \" \"\n{names}");
+    let run = read_with(format!("% a comment\n{aligned}").as_bytes(), &config);
+    let run = run.unwrap().run;
+    assert_eq!(run.outputs, truth().outputs);
+    assert_eq!(run.torque, truth().torque);
+    // Tabs among them.
+    let run = read_with(rows.replace("   ", " \t").as_bytes(), &config);
+    assert_eq!(run.unwrap().run.outputs, truth().outputs);
+    // The error that leads there.
+    refused(good().replace(',', "  "), &["` `", "delimiter"]);
+}
+
+#[test]
+fn windows_of_time() {
+    let read = |keys: &str| {
+        let log = read_with(good().as_bytes(), &format!("[log]\n{keys}")).unwrap();
+        log.run.stretches
+    };
+    assert_eq!(read("from_s = 0.495").first(), Some(&(50..300)));
+    assert_eq!(read("until_s = 1.995").first(), Some(&(0..200)));
+    assert_eq!(read("leave_out = [[1.095, 1.195]]"), [0..110, 120..300]);
+    let message = read_with(good().as_bytes(), "[log]\nfrom_s = 2.5").unwrap_err();
+    assert!(
+        message.to_string().contains("no stretch of 1 s"),
+        "{message}"
+    );
+    // What is left out is not judged: here the robot lies.
+    let text = recalculated(2, |row, theta| if row < 50 { theta + 1.5 } else { theta });
+    let log = read_with(text.as_bytes(), "[log]\nfrom_s = 0.495").unwrap();
+    assert_eq!(log.run.stretches.first(), Some(&(50..300)));
+    assert_eq!(log.findings.len(), 1, "{:?}", log.findings);
+}
+
+#[test]
+fn a_rate_of_the_ball_is_integrated() {
+    // Differences between rows, as a driver that counts would give them.
+    let truth = truth();
+    let text = changed(|row, fields| {
+        let last = truth.outputs.len() - 1;
+        let (before, after) = (row.saturating_sub(1), (row + 1).min(last));
+        let change = truth.outputs[after][0] - truth.outputs[before][0];
+        let rate = change / (truth.time[after] - truth.time[before]);
+        fields[1] = (rate * 60.0 / std::f64::consts::TAU).to_string();
+    });
+    let config = "[log.phi]\ncolumn = \"phi_rad\"\nunit = \"rpm\"";
+    let log = read_with(text.as_bytes(), config).unwrap();
+    let said = log
+        .findings
+        .iter()
+        .any(|one| one.to_string().contains("integrated"));
+    assert!(said, "{:?}", log.findings);
+    let start = truth.outputs[0][0];
+    for (read, truth) in log.run.outputs.iter().zip(&truth.outputs) {
+        assert!(
+            (read[0] + start - truth[0]).abs() < 5e-3,
+            "{read} for {truth}"
+        );
+    }
+    // It does not reach across a missing one.
+    let text = changed(|row, fields| {
+        if row == 100 {
+            fields[1].clear();
+        }
+    });
+    let config = "[log.phi]\ncolumn = \"phi_rad\"\nunit = \"rad/s\"";
+    let log = read_with(text.as_bytes(), config).unwrap();
+    assert_eq!(log.run.stretches, [0..100, 101..300]);
+}
+
+#[test]
+fn three_torques_are_those_of_both_planes() {
+    let config = |plane: &str| {
+        let wheel = |i: usize| format!("{{ column = \"m{i}\", unit = \"mNm\" }}");
+        let wheels = [1, 2, 3].map(wheel).join(", ");
+        let encoder = |factor: f64| {
+            format!("{{ column = \"phi_rad\", unit = \"rad\", factor = {factor:?} }}")
+        };
+        let encoders = [1.0, 0.2, 0.5].map(encoder).join(", ");
+        format!(
+            "[log.wheels]\nplane = \"{plane}\"\nzenith_angle_deg = 45.0\n\
+             encoders = [{encoders}]\ntorques = [{wheels}]"
+        )
+    };
+    let truth = truth();
+    let wheels = ballbot::Wheels::<f64>::paper();
+    let rows = truth.torque.iter().enumerate().map(|(row, torque)| {
+        let other = (0.1 * row as f64).cos();
+        let motors = 1e3 * wheels.motors(&nalgebra::Vector3::new(*torque, other, 0.3));
+        let outputs = truth.outputs[row];
+        format!(
+            "{},{},{},{},{},{},{}\n",
+            truth.time[row], outputs[0], outputs[1], outputs[2], motors[0], motors[1], motors[2]
+        )
+    });
+    let text = format!(
+        "t_s,phi_rad,theta_rad,theta_dot_rad_s,m1,m2,m3\n{}",
+        rows.collect::<String>()
+    );
+    let x = read_with(text.as_bytes(), &config("x")).unwrap().run;
+    let y = read_with(text.as_bytes(), &config("y")).unwrap().run;
+    for row in 0..truth.torque.len() {
+        assert!((x.torque[row] - truth.torque[row]).abs() < 1e-12);
+        assert!((y.torque[row] - (0.1 * row as f64).cos()).abs() < 1e-12);
+    }
 }

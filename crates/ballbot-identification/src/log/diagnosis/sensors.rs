@@ -1,6 +1,6 @@
 //! The measured values and the torque.
 
-use super::Names;
+use super::{Names, isolate};
 use crate::log::error::{Problem, Suspicion};
 use crate::log::finding::Finding;
 use crate::log::run::{Run, Torque, median};
@@ -37,12 +37,13 @@ const SMALLEST_JUMP: f64 = 0.2;
 /// Jumps of the angles; the run is cut there.
 pub(super) fn jumps(
     table: &Table,
+    run: &Run,
     names: &Names<'_>,
     breaks: &mut [bool],
     findings: &mut Vec<Finding>,
 ) {
     for place in [1, 2] {
-        let values = &table.columns[place];
+        let values: Vec<f64> = run.outputs.iter().map(|row| row[place - 1]).collect();
         let changes: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let excess = |i: usize| {
             let before = changes[i.saturating_sub(1)];
@@ -93,12 +94,11 @@ pub(super) fn fallen(
     let middle = middle_of(&table.columns[2]);
     let theta = table.columns[2].iter().enumerate();
     let rows = theta.filter(|(_, theta)| (*theta - middle).abs() > FALLEN);
-    let rows: Vec<usize> = rows.map(|(row, _)| row).collect();
+    let stands_alone = |row: usize| breaks[row] && breaks.get(row + 1) == Some(&true);
+    let rows = rows.map(|(row, _)| row).filter(|row| !stands_alone(*row));
+    let rows: Vec<usize> = rows.collect();
     for &row in &rows {
-        breaks[row] = true;
-        if let Some(next) = breaks.get_mut(row + 1) {
-            *next = true;
-        }
+        isolate(row, breaks);
     }
     if let Some(&first) = rows.first() {
         findings.push(Finding::Fallen {
@@ -211,7 +211,8 @@ pub(super) fn units(
     names: &Names<'_>,
     findings: &mut Vec<Finding>,
 ) -> Option<Suspicion> {
-    let theta: Vec<f64> = run.outputs.iter().map(|row| row[1]).collect();
+    let rows = run.stretches.iter().cloned().flatten();
+    let theta: Vec<f64> = rows.map(|row| run.outputs[row][1]).collect();
     let slope = slope_of_tilt_over_rate(run);
     if let Some((slope, change)) = slope
         && !(0.7..=1.4).contains(&slope)
@@ -249,7 +250,7 @@ fn returns_from_beyond(theta: &[f64]) -> usize {
     returns
 }
 
-/// Slope of the tilt's changes over the integrals of the rate, and the size of the changes, rad.
+/// Slope of the tilt's changes over the integrals of the rate, and the size of the larger of them, rad.
 fn slope_of_tilt_over_rate(run: &Run) -> Option<(f64, f64)> {
     let mut pairs: Vec<(f64, f64)> = Vec::new();
     for stretch in &run.stretches {
@@ -274,6 +275,8 @@ fn slope_of_tilt_over_rate(run: &Run) -> Option<(f64, f64)> {
     let size = median(&mut sizes.collect::<Vec<_>>());
     let changes = pairs.iter().map(|pair| (pair.1 - middle_change).abs());
     let change = median(&mut changes.collect::<Vec<_>>());
+    // Of a tilt in the wrong unit, or of its rate, one alone may look like rest.
+    let change = change.max(size);
     let ratios = pairs
         .iter()
         .map(|pair| (pair.0 - middle_integral, pair.1 - middle_change))
