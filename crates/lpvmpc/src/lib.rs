@@ -6,6 +6,7 @@
 )]
 
 mod active_set;
+mod clock;
 mod controller;
 mod delay;
 mod descent;
@@ -13,6 +14,7 @@ mod estimator;
 mod guarded;
 mod kernel;
 mod kkt;
+mod last_plan;
 mod model;
 mod ocp;
 mod plan;
@@ -28,16 +30,19 @@ mod solution;
 mod solver;
 mod working_set;
 
+pub use clock::{Clock, Tick};
 pub use controller::{Controller, Reference, Workspace};
 pub use delay::DelayLine;
 pub use estimator::{
-    Covariance, Estimator, EstimatorError, EstimatorSettings, Gate, Reading, Verdict,
+    Covariance, Estimator, EstimatorError, EstimatorSettings, Gate, Observation, Reading, Restart,
+    Verdict,
 };
 pub use guarded::{
     Decision, GuardedController, GuardedError, GuardedIterations, GuardedSettings, GuardedStep,
     GuardedWorkspace, Rollout, SetPoints, TerminalSet,
 };
 pub use kkt::{KktResidual, kkt_residual};
+pub use last_plan::LastPlan;
 pub use model::{LpvModel, Scalar};
 pub use ocp::{Bounds, Ocp, Penalty, Softness, Stage, Terminal};
 pub use predictor::{Predictor, Rk4};

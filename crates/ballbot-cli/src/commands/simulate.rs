@@ -81,7 +81,7 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
         write_logs(path, &logs)?;
     }
 
-    let summary = summary(&prepared, &trajectories, &folder);
+    let summary = summary(&prepared, &trajectories, &folder) + &readings(&logs);
     let runs = match trajectories.len() {
         1 => ["run", ""],
         _ => ["run of the x plane", "run of the y plane"],
@@ -131,6 +131,22 @@ fn motors_of_planes(prepared: &Prepared, trajectories: &[Trajectory<4, 1>]) -> V
         torques,
     });
     samples.collect()
+}
+
+/// What was wrong with the readings of each plane, in a line each.
+fn readings(logs: &[Vec<LogRow<4, 1>>]) -> String {
+    let planes = match logs.len() {
+        1 => ["", ""],
+        _ => [" of the x plane", " of the y plane"],
+    };
+    let lines = planes.iter().zip(logs).map(|(plane, log)| {
+        let seen = log.iter().map(|row| (row.t, row.observation));
+        (plane, words::readings(seen))
+    });
+    lines
+        .filter(|(_, told)| !told.is_empty())
+        .map(|(plane, told)| format!("\nreadings{plane}: {told}"))
+        .collect()
 }
 
 /// Writes one log per plane.
