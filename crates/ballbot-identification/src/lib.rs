@@ -27,6 +27,7 @@ mod start;
 mod structures;
 mod validation;
 mod verdict;
+mod wheel_check;
 
 pub use config::{Config, ConfigError};
 pub use coordinates::{Coordinates, LONGEST_DELAY};
@@ -42,3 +43,4 @@ pub use segments::{Split, segments};
 pub use structures::{Compared, Structure, best, compare};
 pub use validation::{HORIZONS, Validation, validate};
 pub use verdict::{Verdict, Weight};
+pub use wheel_check::{Arrangement, Push, WheelCheck, azimuths_seen};

@@ -55,7 +55,6 @@ fn parse(
 ) -> Result<Table, Problem> {
     let mut lines = Lines::new(reader);
     let header = header(&mut lines, columns, findings)?;
-    let header_line = lines.number;
     let (sources, commanded, torque) = sources(&header, columns)?;
     let mut table = Table {
         lines: Vec::new(),
@@ -63,6 +62,70 @@ fn parse(
         commanded: Vec::new(),
         torque,
     };
+    rows(
+        &mut lines,
+        &header,
+        columns,
+        findings,
+        progress,
+        &mut |fields, number| {
+            table.lines.push(number);
+            for (column, source) in table.columns.iter_mut().zip(&sources) {
+                column.push(combined(fields, source, number)?);
+            }
+            if let Some(source) = &commanded {
+                let commanded = value(fields[source.place], source, number)?;
+                table.commanded.push(commanded);
+            }
+            Ok(())
+        },
+    )?;
+    Ok(table)
+}
+
+/// The angles of the three encoders in rad, after their factors, row by row; NaN is a missing value.
+pub(super) fn encoders(path: &Path, columns: &Columns) -> Result<Vec<[f64; 3]>, Problem> {
+    let wheels = columns.wheels.as_ref().ok_or(Problem::NoWheels)?;
+    let file = File::open(path).map_err(Problem::Read)?;
+    let mut lines = Lines::new(BufReader::new(file));
+    let mut findings = Vec::new();
+    let header = header(&mut lines, columns, &mut findings)?;
+    let [first, second, third] = &wheels.encoders;
+    let sources = [
+        source(&header, first, Dimension::Angle)?,
+        source(&header, second, Dimension::Angle)?,
+        source(&header, third, Dimension::Angle)?,
+    ];
+    let mut angles = Vec::new();
+    rows(
+        &mut lines,
+        &header,
+        columns,
+        &mut findings,
+        &|_| (),
+        &mut |fields, number| {
+            let mut row = [0.0; 3];
+            for (angle, source) in row.iter_mut().zip(&sources) {
+                *angle = value(fields[source.place], source, number)?;
+            }
+            angles.push(row);
+            Ok(())
+        },
+    )?;
+    Ok(angles)
+}
+
+/// Calls `take` for every row below the header with its fields, as many as the header has, and its
+/// line.
+fn rows(
+    lines: &mut Lines<impl BufRead>,
+    header: &[String],
+    columns: &Columns,
+    findings: &mut Vec<Finding>,
+    progress: &dyn Fn(u64),
+    take: &mut dyn FnMut(&[&str], usize) -> Result<(), Problem>,
+) -> Result<(), Problem> {
+    let header_line = lines.number;
     let mut reported = 0;
     while lines.advance()? {
         if lines.bytes >= reported + REPORT {
@@ -88,23 +151,12 @@ fn parse(
                 header_line,
             });
         }
-        if fields
-            .iter()
-            .zip(&header)
-            .all(|(field, name)| field == name)
-        {
+        if fields.iter().zip(header).all(|(field, name)| field == name) {
             return Err(Problem::SecondHeader { line: number });
         }
-        table.lines.push(number);
-        for (column, source) in table.columns.iter_mut().zip(&sources) {
-            column.push(combined(&fields, source, number)?);
-        }
-        if let Some(source) = &commanded {
-            let commanded = value(fields[source.place], source, number)?;
-            table.commanded.push(commanded);
-        }
+        take(&fields, number)?;
     }
-    Ok(table)
+    Ok(())
 }
 
 /// A blank line or a comment.
@@ -209,9 +261,7 @@ fn ball_angle(header: &[String], columns: &Columns) -> Result<Vec<Source>, Probl
     let Some(wheels) = &columns.wheels else {
         return Ok(vec![source(header, &columns.phi, Dimension::Angle)?]);
     };
-    let weights = wheels.weights().ok_or(Problem::ZenithAngle {
-        degrees: wheels.zenith_angle_deg,
-    })?;
+    let weights = wheels.weights()?;
     let encoders = wheels.encoders.iter().zip(weights);
     encoders
         .map(|(channel, weight)| {
