@@ -317,8 +317,26 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
         if violation <= self.loosest && violated.part == Part::Hard {
             self.rest(self.candidate.terms.reported())
         } else {
-            Err(Status::Infeasible(violated.bound))
+            Err(Status::Infeasible(self.cause(violated.bound)))
         }
+    }
+
+    /// The candidate and the working rows that it depends on contradict each other (Farkas): the
+    /// first of these along the horizon that is not a bound of an input, which alone contradict
+    /// nothing.
+    fn cause(&self, candidate: BoundId) -> BoundId {
+        let rows = self.working.rows().iter().zip(self.direction.dual.iter());
+        let largest = rows.clone().map(|(_, rate)| rate.abs());
+        let largest = largest.fold(T::zero(), |most, rate| most.max(rate));
+        // Smaller coefficients are rounding.
+        let least = largest * T::default_epsilon().sqrt();
+        let part = rows.filter(|(_, rate)| rate.abs() > least);
+        let conflict = part.map(|(row, _)| row.active.bound);
+        core::iter::once(candidate)
+            .chain(conflict)
+            .filter(|bound| !matches!(bound.quantity, Quantity::Input(_)))
+            .min_by_key(|bound| bound.stage)
+            .unwrap_or(candidate)
     }
 
     /// One step along the direction.

@@ -49,6 +49,7 @@ pub use predictor::{Predictor, Rk4};
 pub use ramp::RampedInput;
 pub use settings::{
     ControllerError, ControllerSettings, Iterations, Scheduling, TerminalIngredient, Weights,
+    exact_prices,
 };
 pub use shaping::{Motion, MoveLimits, SmoothMove};
 pub use solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};

@@ -244,7 +244,8 @@ pub enum Status<T> {
     /// The plan is a rollout of the nonlinear model, the rest of the last one as a rule: no program
     /// of this sample has an answer with a lower cost.
     NoImprovement,
-    /// No input satisfies all hard bounds; this bound conflicts with the rest.
+    /// No input satisfies all hard bounds: of those that contradict each other, the first along the
+    /// horizon that is not of an input.
     Infeasible(BoundId),
     /// The cap on changes of the active set ended the search.
     ChangeCap,

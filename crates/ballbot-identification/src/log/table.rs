@@ -115,6 +115,9 @@ pub(super) fn encoders(path: &Path, columns: &Columns) -> Result<Vec<[f64; 3]>, 
     Ok(angles)
 }
 
+/// Takes the fields of a row, and its line.
+type TakeRow<'a> = dyn FnMut(&[&str], usize) -> Result<(), Problem> + 'a;
+
 /// Calls `take` for every row below the header with its fields, as many as the header has, and its
 /// line.
 fn rows(
@@ -123,7 +126,7 @@ fn rows(
     columns: &Columns,
     findings: &mut Vec<Finding>,
     progress: &dyn Fn(u64),
-    take: &mut dyn FnMut(&[&str], usize) -> Result<(), Problem>,
+    take: &mut TakeRow<'_>,
 ) -> Result<(), Problem> {
     let header_line = lines.number;
     let mut reported = 0;
