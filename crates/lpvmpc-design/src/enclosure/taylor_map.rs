@@ -227,13 +227,13 @@ pub(super) fn frobenius<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) 
     scaled(m, |m| m.norm() * (1.0 + ROUNDING))
 }
 
-/// `norm` of a matrix whose squares neither overflow nor underflow: where the entries are so large
+/// `norm` of a matrix whose fourth powers neither overflow nor underflow: where the entries are so large
 /// or small, of the matrix over its largest one.
 fn scaled<const R: usize, const C: usize>(
     m: &SMatrix<f64, R, C>,
     norm: impl Fn(&SMatrix<f64, R, C>) -> f64,
 ) -> f64 {
-    const SAFE: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
+    const SAFE: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
     if !m.iter().all(|entry| entry.is_finite()) {
         return f64::INFINITY;
     }
