@@ -81,7 +81,7 @@ fn main() -> ! {
     ) else {
         board.stop()
     };
-    let (Some(planes), Ok(wheels)) = (planes, Wheels::new(ROBOT.zenith_angle)) else {
+    let (Some(planes), Ok(wheels)) = (planes, Wheels::of_paper(ROBOT.zenith_angle)) else {
         board.stop() // the settings make no sense
     };
     peripherals.SYST.set_clock_source(SystClkSource::Core);

@@ -6,7 +6,7 @@ use crate::commands::{
     linearize::LinearizeArguments, lqr::LqrArguments, optimality::OptimalityArguments,
     refine::RefineArguments, rehearse::RehearseArguments, reproduce::ReproduceArguments,
     scenario::ScenarioArguments, simulate::SimulateArguments, verify::VerifyArguments,
-    view::ViewArguments,
+    view::ViewArguments, wheels::WheelsArguments,
 };
 use clap::{Parser, Subcommand};
 
@@ -65,6 +65,8 @@ pub enum Command {
     Excite(ExciteArguments),
     /// Find a robot's parameters, with error bars, from its logs
     Identify(IdentifyArguments),
+    /// See by hand, before power-on, whether the wheels are as a configuration says
+    Wheels(WheelsArguments),
     /// From an excitation to a controller, on a simulated robot
     Rehearse(RehearseArguments),
     /// Find the nonlinear model's parameters b from a linear model's parameters p

@@ -58,6 +58,7 @@ fn dispatch(command: Command) -> Result<String, CommandError> {
         Command::Linearize(arguments) => commands::linearize::run(&arguments),
         Command::Lqr(arguments) => commands::lqr::run(&arguments),
         Command::Certify(arguments) => commands::certify::run(&arguments),
+        Command::Wheels(arguments) => commands::wheels::run(&arguments),
         Command::Verify(arguments) => commands::verify::run(&arguments),
         Command::View(arguments) => commands::view::run(&arguments),
         Command::Campaign(arguments) => commands::campaign::run(&arguments),

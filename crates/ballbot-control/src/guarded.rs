@@ -1,12 +1,12 @@
 //! The guaranteed loop.
 
 use crate::boxed::boxed;
+use crate::plane_regulator::PlaneRegulator;
 use crate::regulators::{LONGEST_HORIZON, ROWS, STAGES, too_long};
-use crate::sharing::SharingPlane;
 use ballbot::Ballbot;
 use lpvmpc::{GuardedController, GuardedError, GuardedSettings, GuardedWorkspace};
-use lpvmpc_sim::GuardedFeedback;
-use nalgebra::Vector4;
+use lpvmpc_sim::{GuardedFeedback, MeasuredState};
+use nalgebra::Vector1;
 
 /// Rows that a guarded controller of up to 20 samples may have active: its soft bounds can be many.
 pub const GUARDED_ACTIVE: usize = 200;
@@ -19,7 +19,7 @@ pub fn guarded_feedback(
     ballbot: &Ballbot<f64>,
     settings: &GuardedSettings<f64, 4, 1>,
     preview: bool,
-) -> Result<Box<dyn SharingPlane>, GuardedError> {
+) -> Result<Box<dyn PlaneRegulator>, GuardedError> {
     match settings.horizon {
         #[cfg(not(target_family = "wasm"))]
         ..=20 => sized::<20, 22, GUARDED_ACTIVE>(ballbot, settings, preview),
@@ -34,12 +34,13 @@ fn sized<const N: usize, const NP: usize, const M: usize>(
     ballbot: &Ballbot<f64>,
     settings: &GuardedSettings<f64, 4, 1>,
     preview: bool,
-) -> Result<Box<dyn SharingPlane>, GuardedError> {
+) -> Result<Box<dyn PlaneRegulator>, GuardedError> {
     let controller = GuardedController::<_, f64, 4, 1, 3, N, 5, NP>::new(*ballbot, *settings)?;
     Ok(Box::new(GuardedFeedback {
         controller,
         workspace: boxed(GuardedWorkspace::<f64, 1, 5, NP, M>::new),
-        x: Vector4::zeros(),
+        measured: MeasuredState::new(),
+        input: Vector1::zeros(),
         preview,
     }))
 }

@@ -7,14 +7,16 @@
 mod boxed;
 mod feedback;
 mod guarded;
+mod handover;
 mod output_feedback;
+mod plane_regulator;
 mod planner;
 mod ramped;
 mod regulators;
-mod sharing;
 
 pub use feedback::Feedback;
 pub use guarded::{GUARDED_ACTIVE, guarded_feedback};
+pub use handover::Handover;
+pub use plane_regulator::PlaneRegulator;
 pub use ramped::ramped_feedback;
 pub use regulators::{LONGEST_HORIZON, RegulatorError, output_feedback, state_feedback};
-pub use sharing::SharingPlane;

@@ -1,15 +1,13 @@
 //! The controller on a real robot: estimate, predict to the moment when the torque acts, decide.
 
+use crate::handover::{Commands, Filter, Handover};
+use crate::plane_regulator::PlaneRegulator;
 use crate::planner::Planner;
-use crate::sharing::SharingPlane;
 use ballbot::Ballbot;
-use lpvmpc::{BoundId, Bounds, DelayLine, Estimator, Reading, Rk4};
-use lpvmpc_sim::{Decision, Measurement, Regulator};
+use lpvmpc::{BoundId, Bounds, Observation, Reading, Rk4, Status, Verdict};
+use lpvmpc_sim::{Decision, MeasuredState, Measurement, Regulator};
 use nalgebra::{Vector1, Vector4};
 use std::time::Duration;
-
-/// Torques that can be on their way at once.
-const MOST_COMMANDS: usize = 256;
 
 /// One plane's controller with all that stands around it.
 pub(crate) struct OutputFeedback {
@@ -24,9 +22,9 @@ pub(crate) struct OutputFeedback {
     pub(crate) torque: Bounds<f64, 1>,
     /// Largest torque that the other plane leaves, N m.
     pub(crate) share: f64,
-    pub(crate) line: DelayLine<f64, 1, MOST_COMMANDS>,
-    /// Time of the last measurement, s.
-    pub(crate) time: f64,
+    pub(crate) commands: Commands,
+    /// The torque that was commanded last, N m.
+    pub(crate) commanded: f64,
 }
 
 /// Where the state comes from.
@@ -35,18 +33,18 @@ pub(crate) enum Belief {
     Measured {
         model: Ballbot<f64>,
         longest_step: f64,
-        x: Vector4<f64>,
+        measured: MeasuredState<4>,
     },
     /// From the filter.
-    Estimated(Box<Estimator<Ballbot<f64>, f64, 4, 1, 3, 3, 2>>),
+    Estimated(Box<Filter>),
 }
 
 impl Belief {
     /// The state in the model's coordinates.
     fn model_state(&self) -> Vector4<f64> {
         match self {
-            Self::Measured { x, .. } => *x,
-            Self::Estimated(estimator) => *estimator.model_state(),
+            Self::Measured { measured, .. } => *measured.state(),
+            Self::Estimated(filter) => *filter.model_state(),
         }
     }
 
@@ -54,14 +52,14 @@ impl Belief {
     fn disturbance(&self) -> f64 {
         match self {
             Self::Measured { .. } => 0.0,
-            Self::Estimated(estimator) => estimator.input_disturbance()[0],
+            Self::Estimated(filter) => filter.input_disturbance()[0],
         }
     }
 
     fn state(&self) -> Vector4<f64> {
         match self {
-            Self::Measured { x, .. } => *x,
-            Self::Estimated(estimator) => estimator.state(),
+            Self::Measured { measured, .. } => *measured.state(),
+            Self::Estimated(filter) => filter.state(),
         }
     }
 
@@ -75,31 +73,58 @@ impl Belief {
                 let substeps = (duration / longest_step).ceil().max(1.0) as usize;
                 Rk4 { substeps }.advance(model, z, u, duration)
             }
-            Self::Estimated(estimator) => estimator.predict(z, u, duration),
+            Self::Estimated(filter) => filter.predict(z, u, duration),
         }
     }
 
-    fn observe(
-        &mut self,
-        measurement: &Measurement<4>,
-        elapsed: f64,
-        line: &DelayLine<f64, 1, MOST_COMMANDS>,
-    ) {
+    /// Takes in a measurement after the torques in `commands`, which elapse.
+    fn observe(&mut self, measurement: &Measurement<4>, commands: &mut Commands) -> Observation<4> {
         match self {
-            Self::Measured { x, .. } => {
-                for (x, value) in x.iter_mut().zip(&measurement.values) {
-                    *x = value.unwrap_or(*x);
-                }
+            Self::Measured { measured, .. } => {
+                let (elapsed, observation) = measured.observe(measurement);
+                commands.elapse(elapsed);
+                observation
             }
-            Self::Estimated(estimator) => {
-                line.for_each(elapsed, |duration, u| estimator.advance(u, duration));
+            Self::Estimated(filter) => {
                 let reading = |i: usize| {
                     let age = measurement.ages[i];
                     measurement.values[i].map(|value| Reading { value, age })
                 };
                 // phi, theta and theta_dot; the filter does without phi_dot.
                 let readings = [0, 1, 3].map(reading);
-                estimator.update(&readings);
+                let Observation { verdicts, restart } =
+                    filter.observe(measurement.t, commands, &readings);
+                let [phi, theta, theta_dot] = verdicts;
+                Observation {
+                    verdicts: [phi, theta, Verdict::NotNeeded, theta_dot],
+                    restart,
+                }
+            }
+        }
+    }
+
+    /// Stamp of the last measurement, s.
+    fn time(&self) -> Option<f64> {
+        match self {
+            Self::Measured { measured, .. } => measured.time(),
+            Self::Estimated(filter) => filter.time(),
+        }
+    }
+
+    /// Whether there is no state to decide for.
+    fn is_lost(&self) -> bool {
+        match self {
+            Self::Measured { .. } => false,
+            Self::Estimated(filter) => filter.is_lost(),
+        }
+    }
+
+    fn take_over(&mut self, handover: &Handover) {
+        match (self, &handover.filter) {
+            (Self::Measured { measured, .. }, _) => *measured = handover.measured,
+            (Self::Estimated(filter), Some(previous)) => filter.take_over(previous),
+            (Self::Estimated(filter), None) => {
+                filter.begin_at(handover.measured.time(), *handover.measured.state());
             }
         }
     }
@@ -109,7 +134,7 @@ impl OutputFeedback {
     /// The state, in the model's coordinates, at which a torque decided now will act.
     fn state_ahead(&self) -> Vector4<f64> {
         let mut z = self.belief.model_state();
-        self.line.for_each(self.delay, |duration, u| {
+        self.commands.for_each(self.delay, |duration, u| {
             z = self.belief.predict(&z, u, duration)
         });
         z
@@ -127,12 +152,57 @@ impl OutputFeedback {
     /// Sends a torque, within its bounds to rounding.
     fn send(&mut self, torque: f64) -> Vector1<f64> {
         let u = self.allowed().project(&Vector1::new(torque));
-        self.line.command(u, self.delay);
+        self.commands.command(u, self.delay);
+        self.commanded = u[0];
         u
     }
 }
 
-impl SharingPlane for OutputFeedback {
+impl OutputFeedback {
+    /// The decision while there is no state to decide for: no torque.
+    fn without_state(&mut self, x_ref: Vector4<f64>) -> Decision<4, 1> {
+        Decision {
+            u: self.send(0.0),
+            estimate: self.belief.state(),
+            x_ref,
+            cost: f64::NAN,
+            status: Status::NotFinite,
+            active_bounds: 0,
+            step_time: Duration::ZERO,
+            gap: Vector4::zeros(),
+            guard: None,
+        }
+    }
+}
+
+impl PlaneRegulator for OutputFeedback {
+    fn hand_over(&self) -> Handover {
+        let (measured, filter) = match &self.belief {
+            Belief::Measured { measured, .. } => (*measured, None),
+            Belief::Estimated(filter) => {
+                let known = MeasuredState::known(filter.state(), filter.time());
+                (known, Some(filter.clone()))
+            }
+        };
+        Handover {
+            measured,
+            filter,
+            commands: self.commands.clone(),
+            torque: self.commanded,
+            next_torque: self.planner.next_torque().unwrap_or(self.commanded),
+            share: self.share,
+            plan: self.planner.last_plan(),
+        }
+    }
+
+    fn take_over(&mut self, handover: &Handover) {
+        self.belief.take_over(handover);
+        self.commands = handover.commands.clone();
+        self.commanded = handover.torque;
+        self.set_share(handover.share);
+        self.planner.go_on_from(handover);
+    }
+
     fn largest_torque(&self) -> f64 {
         self.planner.largest_torque(self.belief.disturbance())
     }
@@ -149,24 +219,29 @@ impl Regulator<4, 1, 4> for OutputFeedback {
         self.planner.t_s()
     }
 
-    fn observe(&mut self, measurement: &Measurement<4>) {
-        let elapsed = measurement.t - self.time;
-        self.belief.observe(measurement, elapsed, &self.line);
-        self.line.elapse(elapsed);
-        self.time = measurement.t;
+    fn observe(&mut self, measurement: &Measurement<4>) -> Observation<4> {
+        let observation = self.belief.observe(measurement, &mut self.commands);
+        if observation.restart.is_some() {
+            // The plan belongs to the state before.
+            self.planner.forget_plan();
+        }
+        observation
     }
 
     fn decide(
         &mut self,
-        k: usize,
         reference: &dyn Fn(f64) -> Vector4<f64>,
         clock: &dyn Fn() -> Duration,
     ) -> Decision<4, 1> {
         let (t_s, delay, preview) = (self.t_s(), self.delay, self.preview);
+        let now = self.belief.time().unwrap_or(0.0);
         let ahead = |i: usize| match preview {
-            true => reference((k + i) as f64 * t_s + delay),
-            false => reference(k as f64 * t_s),
+            true => reference(now + i as f64 * t_s + delay),
+            false => reference(now),
         };
+        if self.belief.is_lost() {
+            return self.without_state(reference(now));
+        }
         let z = self.state_ahead();
         let disturbance = self.belief.disturbance();
         let allowed = self.allowed();
@@ -175,7 +250,7 @@ impl Regulator<4, 1, 4> for OutputFeedback {
         Decision {
             u: self.send(torque.unwrap_or(0.0)),
             estimate: self.belief.state(),
-            x_ref: reference(k as f64 * t_s),
+            x_ref: reference(now),
             ..decision
         }
     }

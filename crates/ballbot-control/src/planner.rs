@@ -1,5 +1,6 @@
 //! What plans the torque of a plane.
 
+use crate::handover::{Handover, Plan, PlanKind};
 use ballbot::Ballbot;
 use lpvmpc::{BoundId, Bounds, Controller, LpvModel, Reference, Solution, Workspace};
 use lpvmpc_sim::Decision;
@@ -37,6 +38,21 @@ pub(crate) trait Planner {
     /// The bounds that are active in the last plan, as those of the robot; the rate of the torque
     /// counts as a second input.
     fn active_bounds(&self) -> Vec<BoundId>;
+
+    /// Forgets the last plan: the next one is made without it.
+    fn forget_plan(&mut self);
+
+    /// The last plan, to be handed over.
+    fn last_plan(&self) -> Option<PlanKind>;
+
+    /// Where the torque is at the next sample while it moves in a ramp, N m; `None` while it is
+    /// held.
+    fn next_torque(&self) -> Option<f64> {
+        None
+    }
+
+    /// Goes on from the plan and the torque of another planner.
+    fn go_on_from(&mut self, handover: &Handover);
 
     /// Whether its bounds may change from sample to sample.
     fn can_share(&self) -> bool {
@@ -88,6 +104,20 @@ impl<const N: usize, const M: usize> Planner for Held<N, M> {
     fn active_bounds(&self) -> Vec<BoundId> {
         let active = self.controller.solution().active.iter();
         active.map(|row| row.bound).collect()
+    }
+
+    fn forget_plan(&mut self) {
+        self.controller.reset();
+    }
+
+    fn last_plan(&self) -> Option<PlanKind> {
+        Plan::of(&self.controller).map(PlanKind::Held)
+    }
+
+    fn go_on_from(&mut self, handover: &Handover) {
+        if let Some(PlanKind::Held(plan)) = &handover.plan {
+            plan.hand_to(&mut self.controller);
+        }
     }
 
     fn can_share(&self) -> bool {

@@ -2,9 +2,10 @@
 
 use crate::boxed::boxed;
 use crate::feedback::Feedback;
+use crate::handover::{Handover, Plan, PlanKind};
+use crate::plane_regulator::PlaneRegulator;
 use crate::planner::{Planner, shifted, step};
 use crate::regulators::{RegulatorError, sized, too_long, with_planner};
-use crate::sharing::SharingPlane;
 use ballbot::Ballbot;
 use lpvmpc::{
     BoundId, Bounds, Controller, ControllerSettings, Quantity, RampedInput, Status, Workspace,
@@ -26,7 +27,7 @@ pub fn ramped_feedback(
     torque: &Bounds<f64, 1>,
     feedback: &Feedback,
     period: f64,
-) -> Result<Box<dyn SharingPlane>, RegulatorError> {
+) -> Result<Box<dyn PlaneRegulator>, RegulatorError> {
     let planner: Result<_, RegulatorError> =
         sized!(settings.horizon, 3 per sample, ramped(ballbot, settings));
     with_planner(planner?, ballbot, torque, feedback, period)
@@ -93,6 +94,25 @@ impl<const N: usize, const M: usize> Planner for Ramped<N, M> {
         let step = self.rate * period;
         self.torque += step;
         Some(self.torque - 0.5 * step)
+    }
+
+    fn forget_plan(&mut self) {
+        self.controller.reset();
+    }
+
+    fn last_plan(&self) -> Option<PlanKind> {
+        Plan::of(&self.controller).map(PlanKind::Ramped)
+    }
+
+    fn next_torque(&self) -> Option<f64> {
+        Some(self.torque)
+    }
+
+    fn go_on_from(&mut self, handover: &Handover) {
+        self.torque = handover.next_torque;
+        if let Some(PlanKind::Ramped(plan)) = &handover.plan {
+            plan.hand_to(&mut self.controller);
+        }
     }
 
     fn prediction(&self) -> Vec<Vector4<f64>> {

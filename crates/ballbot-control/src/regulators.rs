@@ -2,15 +2,15 @@
 
 use crate::boxed::boxed;
 use crate::feedback::Feedback;
+use crate::handover::Commands;
 use crate::output_feedback::{Belief, OutputFeedback};
+use crate::plane_regulator::PlaneRegulator;
 use crate::planner::{Held, Planner};
-use crate::sharing::SharingPlane;
 use ballbot::Ballbot;
 use lpvmpc::{
-    Bounds, Controller, ControllerError, ControllerSettings, DelayLine, Estimator, EstimatorError,
-    Workspace,
+    Bounds, Controller, ControllerError, ControllerSettings, Estimator, EstimatorError, Workspace,
 };
-use lpvmpc_sim::{Regulator, StateFeedback};
+use lpvmpc_sim::{MeasuredState, StateFeedback};
 use nalgebra::Vector4;
 
 /// The longest horizon that is compiled in, samples.
@@ -79,7 +79,7 @@ pub(crate) fn too_long(given: usize) -> ControllerError {
 pub fn state_feedback(
     ballbot: &Ballbot<f64>,
     settings: &ControllerSettings<f64, 4, 1, 3>,
-) -> Result<Box<dyn Regulator<4, 1, 4>>, ControllerError> {
+) -> Result<Box<dyn PlaneRegulator>, ControllerError> {
     sized!(settings.horizon, 2 per sample, state_feedback_sized(ballbot, settings))
 }
 
@@ -93,7 +93,7 @@ pub fn output_feedback(
     settings: &ControllerSettings<f64, 4, 1, 3>,
     feedback: &Feedback,
     period: f64,
-) -> Result<Box<dyn SharingPlane>, RegulatorError> {
+) -> Result<Box<dyn PlaneRegulator>, RegulatorError> {
     let planner = sized!(settings.horizon, 2 per sample, held(ballbot, settings))?;
     with_planner(planner, ballbot, &settings.u, feedback, period)
 }
@@ -108,17 +108,16 @@ pub(crate) fn with_planner(
     torque: &Bounds<f64, 1>,
     feedback: &Feedback,
     period: f64,
-) -> Result<Box<dyn SharingPlane>, RegulatorError> {
-    let x = Vector4::zeros();
+) -> Result<Box<dyn PlaneRegulator>, RegulatorError> {
     let belief = match feedback.estimator {
         Some(settings) => {
-            let estimator = Estimator::new(*ballbot, settings, x)?;
+            let estimator = Estimator::new(*ballbot, settings, Vector4::zeros())?;
             Belief::Estimated(Box::new(estimator))
         }
         None => Belief::Measured {
             model: *ballbot,
             longest_step: feedback.longest_step,
-            x,
+            measured: MeasuredState::new(),
         },
     };
     Ok(Box::new(OutputFeedback {
@@ -129,8 +128,8 @@ pub(crate) fn with_planner(
         preview: feedback.preview,
         torque: *torque,
         share: f64::INFINITY,
-        line: DelayLine::default(),
-        time: 0.0,
+        commands: Commands::default(),
+        commanded: 0.0,
     }))
 }
 
@@ -140,7 +139,7 @@ pub(crate) fn with_planner(
 fn state_feedback_sized<const N: usize, const M: usize>(
     ballbot: &Ballbot<f64>,
     settings: &ControllerSettings<f64, 4, 1, 3>,
-) -> Result<Box<dyn Regulator<4, 1, 4>>, ControllerError> {
+) -> Result<Box<dyn PlaneRegulator>, ControllerError> {
     let controller = Controller::<_, f64, 4, 1, 3, N, M>::new(*ballbot, *settings)?;
     let (controller, workspace) = (Box::new(controller), boxed(Workspace::new));
     Ok(Box::new(StateFeedback::new(controller, workspace)))

@@ -29,6 +29,7 @@ mod structures;
 mod suspects;
 mod validation;
 mod verdict;
+mod wheel_check;
 mod words;
 
 pub use config::{Config, ConfigError};
@@ -46,3 +47,4 @@ pub use structures::{Compared, Structure, best, compare};
 pub use suspects::{Suspect, Suspects};
 pub use validation::{HORIZONS, Validation, validate};
 pub use verdict::{Verdict, Weight};
+pub use wheel_check::{Arrangement, Push, WheelCheck, azimuths_seen};

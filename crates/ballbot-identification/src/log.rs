@@ -26,6 +26,39 @@ pub struct Log {
     pub findings: Vec<Finding>,
 }
 
+/// How far the three encoders of `[log.wheels]` have turned from the beginning of a log to its end,
+/// rad after their factors: medians of the first and the last tenth of the rows.
+///
+/// # Errors
+/// [`LogError`]: the file cannot be read or understood, or nothing was turned.
+pub fn turned(path: &Path, columns: &Columns) -> Result<[f64; 3], LogError> {
+    let located = |problem| LogError::at(path, problem);
+    let rows = table::encoders(path, columns).map_err(located)?;
+    let end = (rows.len() / 10).max(1).min(rows.len());
+    let median = |rows: &[[f64; 3]], wheel: usize| {
+        let angles = rows.iter().map(|row| row[wheel]);
+        let mut angles: Vec<f64> = angles.filter(|angle| angle.is_finite()).collect();
+        match angles.is_empty() {
+            true => f64::NAN,
+            false => quantile(&mut angles, 0.5),
+        }
+    };
+    let (first, last) = (&rows[..end], &rows[rows.len() - end..]);
+    let turned = [0, 1, 2].map(|wheel| median(last, wheel) - median(first, wheel));
+    let ball_deg = turned
+        .iter()
+        .fold(0.0_f64, |most, angle| most.max(angle.abs()))
+        .to_degrees();
+    if ball_deg > LEAST_PUSH_DEG && turned.iter().all(|angle| angle.is_finite()) {
+        Ok(turned)
+    } else {
+        Err(located(Problem::NoPush { ball_deg }))
+    }
+}
+
+/// Less of a turn of the ball than this says nothing, degrees.
+const LEAST_PUSH_DEG: f64 = 10.0;
+
 /// Called now and then with the part of the file that was read, 0 to 1.
 pub type Progress<'a> = &'a dyn Fn(f64);
 

@@ -3,7 +3,8 @@
 use crate::error::ScenarioError;
 use crate::reference::SAME_TIME;
 use crate::time_series::TimeSeries;
-use lpvmpc::BoundId;
+use ballbot_control::{Handover, PlaneRegulator};
+use lpvmpc::{BoundId, Observation};
 use lpvmpc_sim::{Decision, Measurement, Regulator};
 use nalgebra::{Vector1, Vector4};
 use std::path::PathBuf;
@@ -47,7 +48,7 @@ impl Excitation {
 
 /// A regulator whose command has an excitation added, which it does not know of.
 pub(crate) struct Excited {
-    pub(crate) regulator: Box<dyn Regulator<4, 1, 4>>,
+    pub(crate) regulator: Box<dyn PlaneRegulator>,
     pub(crate) excitation: Excitation,
     /// The regulator's own command.
     pub(crate) command: Vector1<f64>,
@@ -62,23 +63,34 @@ impl Excited {
     }
 }
 
+impl PlaneRegulator for Excited {
+    fn hand_over(&self) -> Handover {
+        let torque = self.command[0];
+        self.regulator.hand_over().with_torque(torque)
+    }
+
+    fn take_over(&mut self, handover: &Handover) {
+        self.command[0] = handover.torque();
+        self.regulator.take_over(handover);
+    }
+}
+
 impl Regulator<4, 1, 4> for Excited {
     fn t_s(&self) -> f64 {
         self.regulator.t_s()
     }
 
-    fn observe(&mut self, measurement: &Measurement<4>) {
+    fn observe(&mut self, measurement: &Measurement<4>) -> Observation<4> {
         self.time = measurement.t;
-        self.regulator.observe(measurement);
+        self.regulator.observe(measurement)
     }
 
     fn decide(
         &mut self,
-        k: usize,
         reference: &dyn Fn(f64) -> Vector4<f64>,
         clock: &dyn Fn() -> Duration,
     ) -> Decision<4, 1> {
-        let decision = self.regulator.decide(k, reference, clock);
+        let decision = self.regulator.decide(reference, clock);
         Decision {
             u: self.excited(decision.u),
             ..decision

@@ -117,6 +117,7 @@ impl EstimatorTable {
                 deviations: self.outlier_deviations,
                 patience: self.outlier_patience,
                 oldest: self.oldest_s,
+                longest_gap: self.longest_gap_s,
             },
         };
         if !(self.outlier_deviations > 0.0) {
@@ -131,6 +132,13 @@ impl EstimatorTable {
                 "controller.estimator.oldest_s",
                 self.oldest_s,
                 "it must not be negative; inf for any age",
+            ));
+        }
+        if !(self.longest_gap_s > 0.0) {
+            return Err(ScenarioError::value(
+                "controller.estimator.longest_gap_s",
+                self.longest_gap_s,
+                "it must be positive; inf to predict for ever",
             ));
         }
         if let DisturbancesTable::TorqueAndTilt {

@@ -26,6 +26,9 @@ pub struct EstimatorTable {
     pub outlier_patience: usize,
     /// Readings older than this are not believed, s; inf for any age.
     pub oldest_s: f64,
+    /// Without a reading that is believed for longer than this, s, there is no estimate until the
+    /// next one, with which it begins anew; inf to predict for ever.
+    pub longest_gap_s: f64,
 }
 
 impl Default for EstimatorTable {
@@ -40,6 +43,7 @@ impl Default for EstimatorTable {
             outlier_deviations: 6.0,
             outlier_patience: 2,
             oldest_s: f64::INFINITY,
+            longest_gap_s: 0.5,
         }
     }
 }

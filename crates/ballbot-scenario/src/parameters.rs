@@ -6,7 +6,7 @@ use crate::number::{finite, positive};
 use crate::schema::{BoundsTable, ParameterTable};
 use crate::uncertainty::{RobotDistribution, Uncertainty};
 use crate::words;
-use ballbot::{Ballbot, DriveFriction, Geometry, Wheels};
+use ballbot::{BadWheels, Ballbot, DriveFriction, Geometry, Wheels};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -136,9 +136,17 @@ impl ParameterTable {
                     gravity: positive("gravity_m_s2", self.gravity_m_s2)?,
                 },
             },
-            wheels: Wheels::new(self.zenith_angle_deg.to_radians()).map_err(|error| {
-                let key = format!("{key}.zenith_angle_deg");
-                ScenarioError::value(key, self.zenith_angle_deg, error.to_string())
+            wheels: self.wheels().map_err(|error| {
+                let (name, value) = match error {
+                    BadWheels::ZenithAngle(_) => {
+                        ("zenith_angle_deg", self.zenith_angle_deg.to_string())
+                    }
+                    BadWheels::Azimuths(_) => {
+                        let azimuths = self.wheel_azimuths_deg;
+                        ("wheel_azimuths_deg", format!("{azimuths:?}"))
+                    }
+                };
+                ScenarioError::value(format!("{key}.{name}"), value, error.to_string())
             })?,
             uncertainty: None,
         })

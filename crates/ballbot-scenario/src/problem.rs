@@ -9,8 +9,8 @@ use crate::schema::{
 use ballbot::{Ballbot, LinearParameters};
 use ballbot_control::LONGEST_HORIZON;
 use lpvmpc::{
-    Bounds, ControllerSettings, InputReference, Iterations, LpvModel, Penalty, Predictor, Rk4,
-    Scheduling, Softness, SolverSettings, TerminalIngredient, Weights,
+    Bounds, ControllerSettings, InputReference, Iterations, LpvModel, Predictor, Rk4, Scheduling,
+    Softness, SolverSettings, TerminalIngredient, Weights, exact_prices,
 };
 use nalgebra::{DMatrix, Matrix1, Matrix4, Vector1, Vector3, Vector4};
 
@@ -19,11 +19,6 @@ pub(crate) const MOST_SUBSTEPS: usize = 1000;
 
 /// The same for quadratic programs per sample.
 const MOST_PROGRAMS: usize = 1000;
-
-/// Price of a state bound exceeded by its width, in terminal costs of a state at that width: of
-/// plans from rest to set points up to 10 m away no multiplier of a bound was larger
-/// (`testdata/nonlinear-mpc/multipliers.py`).
-const PRICE_OF_WIDTH: f64 = 20.0;
 
 impl From<LinearModelTable> for LinearParameters<f64> {
     fn from(table: LinearModelTable) -> Self {
@@ -192,21 +187,7 @@ impl ControllerTable {
         x: &Bounds<f64, 4>,
     ) -> Result<Softness<f64, 4>, ScenarioError> {
         let lqr = self.lqr((a, b), weights, predictor)?;
-        Ok(std::array::from_fn(|j| {
-            let [lower, upper] = [x.lower[j], x.upper[j]];
-            let width = match (lower.is_finite(), upper.is_finite()) {
-                (true, true) => upper - lower,
-                (true, false) => lower.abs(),
-                (false, true) => upper.abs(),
-                (false, false) => return None,
-            };
-            // A bound of no width, or at zero, is as dear as one of a unit.
-            let width = if width > 0.0 { width } else { 1.0 };
-            Some(Penalty {
-                linear: PRICE_OF_WIDTH * lqr[(j, j)] * width,
-                quadratic: 0.0,
-            })
-        }))
+        Ok(exact_prices(&lqr, x))
     }
 
     /// The cost of the LQR of the sampled plant from a state on.

@@ -6,9 +6,9 @@ use crate::prepare::{Plane, Prepared};
 use crate::three_motors::MotorSample;
 use crate::world::{PlaneWorld, Robot};
 use ballbot_control::{
-    SharingPlane, guarded_feedback, output_feedback, ramped_feedback, state_feedback,
+    PlaneRegulator, guarded_feedback, output_feedback, ramped_feedback, state_feedback,
 };
-use lpvmpc_sim::{ClosedLoop, Course, Recording, Regulator, Trajectory, World};
+use lpvmpc_sim::{ClosedLoop, Course, Recording, Trajectory, World};
 use nalgebra::{Vector1, Vector3};
 use std::time::Duration;
 
@@ -31,7 +31,9 @@ pub struct Record {
 
 /// The closed loop of one plane, whatever the horizon. The sensors are those of (phi, theta,
 /// phi_dot, theta_dot), the load that of [`ballbot::Disturbed::f`].
-pub type PlaneLoop = ClosedLoop<Box<dyn Regulator<4, 1, 4>>, Robot, 4, 1, 4, 2>;
+pub type PlaneLoop = ClosedLoop<Box<dyn PlaneRegulator>, Robot, 4, 1, 4, 2>;
+
+type PlaneInWorld = World<Robot, 4, 1, 4, 2>;
 
 impl Prepared {
     /// Samples over all planes.
@@ -83,6 +85,36 @@ impl Prepared {
     /// [`ScenarioError::Controller`] if the controller refuses its settings;
     /// [`ScenarioError::Value`] if the planes share their motors, and so make one loop.
     pub fn closed_loop(&self, plane: &Plane) -> Result<PlaneLoop, ScenarioError> {
+        let PlaneWorld {
+            robot, settings, ..
+        } = plane.world.clone();
+        let world = World::new(robot, plane.initial_state, settings)?;
+        self.loop_in(plane, world)
+    }
+
+    /// The loop of `plane` where `before` stands, which may be one of another scenario: nothing
+    /// that is known, planned, commanded or on its way is lost.
+    ///
+    /// # Errors
+    /// As [`closed_loop`](Self::closed_loop).
+    pub fn continued_loop(
+        &self,
+        plane: &Plane,
+        before: &PlaneLoop,
+    ) -> Result<PlaneLoop, ScenarioError> {
+        let PlaneWorld {
+            robot, settings, ..
+        } = plane.world.clone();
+        let world = before.world.continued(robot, settings)?;
+        let mut closed_loop = self.loop_in(plane, world)?;
+        closed_loop
+            .regulator
+            .take_over(&before.regulator.hand_over());
+        Ok(closed_loop)
+    }
+
+    /// The loop of a plane in a world of its own.
+    fn loop_in(&self, plane: &Plane, world: PlaneInWorld) -> Result<PlaneLoop, ScenarioError> {
         if self.motors.is_some() {
             return Err(ScenarioError::value(
                 "controller.motors",
@@ -91,18 +123,17 @@ impl Prepared {
                  sample by sample",
             ));
         }
-        let regulator: Box<dyn Regulator<4, 1, 4>> = match (&self.guarded, &self.ramp) {
+        let regulator: Box<dyn PlaneRegulator> = match (&self.guarded, &self.ramp) {
             (None, None) if self.feedback.is_plain() => {
                 state_feedback(&self.ballbot, &self.settings)?
             }
             _ => self.sharing_plane(plane.world.settings.period)?,
         };
         let PlaneWorld {
-            robot,
-            settings,
             without_plan,
             range,
             excitation,
+            ..
         } = plane.world.clone();
         let regulator = match excitation {
             Some(excitation) => Box::new(Excited {
@@ -113,7 +144,6 @@ impl Prepared {
             }),
             None => regulator,
         };
-        let world = World::new(robot, plane.initial_state, settings)?;
         let mut closed_loop = ClosedLoop::new(regulator, world)?;
         closed_loop.without_plan = without_plan;
         closed_loop.range = range;
@@ -125,7 +155,7 @@ impl Prepared {
     pub(crate) fn sharing_plane(
         &self,
         period: f64,
-    ) -> Result<Box<dyn SharingPlane>, ScenarioError> {
+    ) -> Result<Box<dyn PlaneRegulator>, ScenarioError> {
         let (ballbot, feedback) = (&self.ballbot, &self.feedback);
         Ok(match (&self.guarded, &self.ramp) {
             (Some(settings), _) => guarded_feedback(ballbot, settings, feedback.preview)?,

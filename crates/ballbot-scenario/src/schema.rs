@@ -5,6 +5,7 @@ use crate::feedback_table::{EstimatorTable, MotorsTable, ShapingTable, TorqueRat
 use crate::heading_table::HeadingTable;
 use crate::parameters::Parameters;
 use crate::world_table::WorldTable;
+use ballbot::{AZIMUTHS_OF_PAPER_DEG, BadWheels, Wheel, Wheels};
 use serde::{Deserialize, Serialize};
 
 /// A closed-loop experiment, as written in a TOML file. Units are part of the key names.
@@ -74,10 +75,45 @@ pub struct ParameterTable {
     /// Angle of the wheels' contact points from the top of the ball, degrees.
     #[serde(default = "paper_zenith_angle")]
     pub zenith_angle_deg: f64,
+    /// Azimuths of the wheels 1 to 3 from the robot's x axis, counter-clockwise seen from above,
+    /// degrees.
+    #[serde(default = "paper_azimuths", skip_serializing_if = "is_of_paper")]
+    pub wheel_azimuths_deg: [f64; 3],
+    /// Which of the wheels turn the ball clockwise, seen from above, when their motors turn by
+    /// positive angles.
+    #[serde(default, skip_serializing_if = "is_none_reversed")]
+    pub wheels_reversed: [bool; 3],
 }
 
 pub(crate) fn is_zero(value: &f64) -> bool {
     *value == 0.0
+}
+
+/// The arrangement of the torque map of the paper's eq. (6).
+fn paper_azimuths() -> [f64; 3] {
+    AZIMUTHS_OF_PAPER_DEG
+}
+
+fn is_of_paper(azimuths: &[f64; 3]) -> bool {
+    *azimuths == paper_azimuths()
+}
+
+fn is_none_reversed(reversed: &[bool; 3]) -> bool {
+    *reversed == [false; 3]
+}
+
+impl ParameterTable {
+    /// The wheels as they stand.
+    ///
+    /// # Errors
+    /// [`BadWheels`] where they cannot turn the ball as one likes.
+    pub fn wheels(&self) -> Result<Wheels<f64>, BadWheels<f64>> {
+        let wheels = std::array::from_fn(|i| Wheel {
+            azimuth: self.wheel_azimuths_deg[i].to_radians(),
+            reversed: self.wheels_reversed[i],
+        });
+        Wheels::new(self.zenith_angle_deg.to_radians(), wheels)
+    }
 }
 
 fn paper_zenith_angle() -> f64 {

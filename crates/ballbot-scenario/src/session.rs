@@ -8,8 +8,8 @@ use crate::reference::PhiReference;
 use crate::run::PlaneLoop;
 use crate::schema::PointTable;
 use crate::words;
-use lpvmpc::Status;
-use lpvmpc_sim::{Disturbance, Ending, Sample, WorldError};
+use lpvmpc::{Observation, Status};
+use lpvmpc_sim::{Disturbance, Ending, LogRow, Sample, WorldError};
 use nalgebra::{Vector1, Vector3, Vector4};
 use std::f64::consts::FRAC_PI_2;
 use std::time::Duration;
@@ -18,9 +18,9 @@ use std::time::Duration;
 pub struct Session {
     prepared: Prepared,
     loops: Vec<PlaneLoop>,
-    /// Time at which the loops began, s.
-    origin: f64,
     samples: Vec<Sample<4, 1>>,
+    /// What became of each plane's last measurement.
+    observations: Vec<Observation<4>>,
     phase: Phase,
     trouble: Trouble,
     /// The planes follow what a person ordered, not the scenario.
@@ -63,8 +63,8 @@ impl Session {
         Ok(Self {
             loops: loops.collect::<Result<_, ScenarioError>>()?,
             prepared,
-            origin: 0.0,
             samples: Vec::new(),
+            observations: Vec::new(),
             phase: Phase::Running,
             trouble: Trouble::default(),
             ordered: false,
@@ -72,34 +72,46 @@ impl Session {
         })
     }
 
-    /// The same robot where it stands, at the same time, under another scenario. It goes on with
-    /// what it was ordered to do. A plane that it did not have starts as that scenario says.
+    /// The same robot where it stands, at the same time, under another scenario. Regulators and
+    /// worlds go on with all that they know; with the same scenario nothing changes. It goes on
+    /// with what it was ordered to do. A plane that it did not have starts as that scenario says.
     ///
     /// # Errors
     /// As [`new`](Self::new).
     pub fn reconfigured(&self, mut prepared: Prepared) -> Result<Self, ScenarioError> {
-        let now = self.time();
         for (plane, followed) in prepared.planes.iter_mut().zip(&self.prepared.planes) {
             if self.ordered {
                 plane.reference = followed.reference.clone();
             }
         }
-        for (plane, before) in prepared.planes.iter_mut().zip(&self.loops) {
-            plane.initial_state = *before.world.state();
-            plane.world.settings.disturbances = plane
-                .world
-                .settings
-                .disturbances
-                .iter()
-                .filter_map(|push| after(push, now))
-                .collect();
+        let planes = prepared.planes.iter().enumerate();
+        let loops = planes.map(|(index, plane)| {
+            let mut closed_loop = match self.loops.get(index) {
+                Some(before) => prepared.continued_loop(plane, before)?,
+                None => {
+                    let mut begun = prepared.closed_loop(plane)?;
+                    begun.world = begun.world.at_time(self.time());
+                    begun
+                }
+            };
+            lie_down(&mut closed_loop);
+            Ok(closed_loop)
+        });
+        let loops: Vec<_> = loops.collect::<Result<_, ScenarioError>>()?;
+        let mut samples = self.samples.clone();
+        let mut observations = self.observations.clone();
+        if loops.len() != self.loops.len() {
+            (samples, observations) = (Vec::new(), Vec::new());
         }
         let mut session = Self {
-            origin: now,
+            prepared,
+            loops,
+            samples,
+            observations,
             phase: self.phase.clone(),
             trouble: self.trouble.clone(),
             ordered: self.ordered,
-            ..Self::new(prepared)?
+            pushes: Vec::new(),
         };
         for (plane, change) in &self.pushes {
             session.change(*plane, *change)?;
@@ -114,7 +126,7 @@ impl Session {
 
     /// Time since the beginning, s.
     pub fn time(&self) -> f64 {
-        self.origin + self.loops.first().map_or(0.0, |plane| plane.world.time())
+        self.loops.first().map_or(0.0, |plane| plane.world.time())
     }
 
     /// The true state of each plane.
@@ -134,6 +146,11 @@ impl Session {
     /// The last sample of each plane; empty before the first.
     pub fn samples(&self) -> &[Sample<4, 1>] {
         &self.samples
+    }
+
+    /// What each plane's regulator made of its last measurement; empty before the first sample.
+    pub fn observations(&self) -> &[Observation<4>] {
+        &self.observations
     }
 
     /// The motors' torques (tau_1, tau_2, tau_3) of the last sample, N m; zero before the first.
@@ -161,7 +178,13 @@ impl Session {
             Phase::Running => {
                 let statuses = self.samples.iter().map(|sample| sample.status);
                 let worst = statuses.reduce(|a, b| if a.is_solved() { b } else { a });
-                worst.map_or_else(String::new, |status| words::status(&status))
+                let status = worst.map_or_else(String::new, |status| words::status(&status));
+                let observations = self.observations.iter();
+                let readings = words::readings(observations.map(|seen| (self.time(), *seen)));
+                let both = [status, readings].into_iter();
+                both.filter(|text| !text.is_empty())
+                    .collect::<Vec<_>>()
+                    .join("; ")
             }
             Phase::Falling(_) => "no plan, no torque".to_owned(),
             Phase::Down(_) => "on the floor".to_owned(),
@@ -212,19 +235,20 @@ impl Session {
     }
 
     fn sample(&mut self, clock: &dyn Fn() -> Duration) -> bool {
-        let origin = self.origin;
         let mut samples = Vec::with_capacity(self.loops.len());
+        let mut observations = Vec::with_capacity(self.loops.len());
         for (closed_loop, plane) in self.loops.iter_mut().zip(&self.prepared.planes) {
-            let reference = |t| plane.state_reference(origin + t);
-            match closed_loop.sample(&reference, clock, &mut |_| ()) {
-                Ok(mut sample) => {
-                    sample.t += origin;
-                    samples.push(sample);
-                }
-                Err(ending) => return self.give_up(shifted(ending, origin), samples),
+            let reference = |t| plane.state_reference(t);
+            let mut last = None;
+            let mut log = |row: LogRow<4, 1>| last = Some(row.observation);
+            match closed_loop.sample(&reference, clock, &mut log) {
+                Ok(sample) => samples.push(sample),
+                Err(ending) => return self.give_up(ending, samples),
             }
+            observations.extend(last);
         }
         self.samples = samples;
+        self.observations = observations;
         self.note_trouble();
         true
     }
@@ -266,8 +290,7 @@ impl Session {
     /// A sample without torque in the planes that have none among `samples`.
     fn go_on_without_torque(&mut self, mut samples: Vec<Sample<4, 1>>) {
         let falling = self.loops.get(samples.len());
-        let now = falling.map_or(0.0, |closed_loop| closed_loop.world.time());
-        let t = self.origin + now;
+        let t = falling.map_or(0.0, |closed_loop| closed_loop.world.time());
         let status = match &self.phase {
             Phase::Falling(Ending::NoPlan { status, .. })
             | Phase::Down(Ending::NoPlan { status, .. }) => *status,
@@ -291,7 +314,7 @@ impl Session {
             });
         }
         self.samples = samples;
-        self.coast(now + self.prepared.settings.t_s);
+        self.coast(t + self.prepared.settings.t_s);
     }
 
     /// Moves every plane on to the time `until` of its world without torque.
@@ -371,41 +394,4 @@ impl Session {
 fn lie_down(closed_loop: &mut PlaneLoop) {
     closed_loop.range.lower[1] = -FRAC_PI_2;
     closed_loop.range.upper[1] = FRAC_PI_2;
-}
-
-fn shifted(ending: Ending, origin: f64) -> Ending {
-    match ending {
-        Ending::Complete => Ending::Complete,
-        Ending::NoPlan { t, status } => Ending::NoPlan {
-            t: origin + t,
-            status,
-        },
-        Ending::OutOfRange { t, component } => Ending::OutOfRange {
-            t: origin + t,
-            component,
-        },
-        Ending::PlantFailed { t, error } => Ending::PlantFailed {
-            t: origin + t,
-            error,
-        },
-    }
-}
-
-/// What is left of a push at the time `now`, on a clock that begins there.
-fn after(push: &Disturbance<4, 2>, now: f64) -> Option<Disturbance<4, 2>> {
-    match *push {
-        Disturbance::Jump { time, change } => (time >= now).then_some(Disturbance::Jump {
-            time: time - now,
-            change,
-        }),
-        Disturbance::Impulse { time, impulse } => (time >= now).then_some(Disturbance::Impulse {
-            time: time - now,
-            impulse,
-        }),
-        Disturbance::Load { from, until, load } => (until > now).then_some(Disturbance::Load {
-            from: (from - now).max(0.0),
-            until: until - now,
-            load,
-        }),
-    }
 }

@@ -3,7 +3,8 @@
 use crate::heading::Turning;
 use crate::whole_robot::{HEADING, State, plane};
 use ballbot::{Heading, PlaneTorques, Wheels};
-use ballbot_control::SharingPlane;
+use ballbot_control::PlaneRegulator;
+use lpvmpc::{Observation, Verdict};
 use lpvmpc_sim::{Decision, LogRow, Measurement, Regulator, Sample};
 use nalgebra::{Vector1, Vector2, Vector3};
 use std::time::Duration;
@@ -41,11 +42,13 @@ pub struct MotorSample {
 
 /// Two planes' regulators and the law of the heading.
 pub(crate) struct PlanesAndYaw {
-    planes: [Box<dyn SharingPlane>; 2],
+    planes: [Box<dyn PlaneRegulator>; 2],
     wheels: Wheels<f64>,
     motors: Motors,
     /// Measured heading, rad, and its rate, rad/s.
     heading: Vector2<f64>,
+    /// Time of the last measurement, s.
+    time: f64,
     /// Torques of the planes and of yaw, N m.
     torques: Vector3<f64>,
     /// What each plane had for its last plan, N m.
@@ -56,7 +59,7 @@ pub(crate) struct PlanesAndYaw {
 
 impl PlanesAndYaw {
     pub(crate) fn new(
-        planes: [Box<dyn SharingPlane>; 2],
+        planes: [Box<dyn PlaneRegulator>; 2],
         wheels: Wheels<f64>,
         motors: Motors,
     ) -> Self {
@@ -65,6 +68,7 @@ impl PlanesAndYaw {
             wheels,
             motors,
             heading: Vector2::new(motors.turning.initial, 0.0),
+            time: 0.0,
             torques: Vector3::zeros(),
             // There is no last plan: as if it had been cut off.
             shares: [0.0; 2],
@@ -105,6 +109,10 @@ impl PlanesAndYaw {
         LogRow {
             t: row.t,
             measured: std::array::from_fn(|i| row.measured[4 * index + i]),
+            observation: Observation {
+                verdicts: std::array::from_fn(|i| row.observation.verdicts[4 * index + i]),
+                restart: row.observation.restart,
+            },
             commanded: felt(&row.commanded),
             applied: felt(&row.applied),
         }
@@ -119,13 +127,12 @@ impl PlanesAndYaw {
         &mut self,
         index: usize,
         share: f64,
-        k: usize,
         reference: &dyn Fn(f64) -> State,
         clock: &dyn Fn() -> Duration,
     ) {
         let regulator = &mut self.planes[index];
         regulator.set_share(share);
-        let decision = regulator.decide(k, &|t| plane(&reference(t), index), clock);
+        let decision = regulator.decide(&|t| plane(&reference(t), index), clock);
         self.shares[index] = share;
         self.torques[index] = decision.u[0];
         self.decisions[index] = Some(decision);
@@ -137,28 +144,38 @@ impl Regulator<10, 3, 10> for PlanesAndYaw {
         self.planes[0].t_s()
     }
 
-    fn observe(&mut self, measurement: &Measurement<10>) {
+    fn observe(&mut self, measurement: &Measurement<10>) -> Observation<10> {
         let Measurement { t, values, ages } = *measurement;
+        let mut verdicts = [Verdict::Missing; 10];
+        let mut restart = None;
         for (index, regulator) in self.planes.iter_mut().enumerate() {
-            regulator.observe(&Measurement {
+            let of_plane = regulator.observe(&Measurement {
                 t,
                 values: std::array::from_fn(|i| values[4 * index + i]),
                 ages: std::array::from_fn(|i| ages[4 * index + i]),
             });
+            verdicts[4 * index..][..4].copy_from_slice(&of_plane.verdicts);
+            restart = restart.or(of_plane.restart);
         }
-        for (place, value) in self.heading.iter_mut().zip(&values[HEADING..]) {
-            *place = value.unwrap_or(*place);
+        let places = self.heading.iter_mut().zip(&mut verdicts[HEADING..]);
+        for ((place, verdict), value) in places.zip(&values[HEADING..]) {
+            match value {
+                Some(value) if value.is_finite() => (*place, *verdict) = (*value, Verdict::Used),
+                Some(_) => *verdict = Verdict::NotFinite,
+                None => {}
+            }
         }
+        self.time = t;
+        Observation { verdicts, restart }
     }
 
     /// Yaw first, which is limited to what is kept for it; then the plane that needs more.
     fn decide(
         &mut self,
-        k: usize,
         reference: &dyn Fn(f64) -> State,
         clock: &dyn Fn() -> Duration,
     ) -> Decision<10, 3> {
-        let x_ref = reference(k as f64 * self.t_s());
+        let x_ref = reference(self.time);
         let Motors {
             limit,
             yaw,
@@ -172,9 +189,9 @@ impl Regulator<10, 3, 10> for PlanesAndYaw {
             PlaneTorques::need([largest], self.shares[index])
         });
         let (first, share) = left.first(needs);
-        self.decide_plane(first, share, k, reference, clock);
+        self.decide_plane(first, share, reference, clock);
         let taken = self.planes[first].largest_torque().min(share);
-        self.decide_plane(1 - first, left.rest(taken), k, reference, clock);
+        self.decide_plane(1 - first, left.rest(taken), reference, clock);
 
         let decisions = self.decisions.iter().flatten();
         let total = decisions.clone().map(|decision| decision.cost).sum();

@@ -1,6 +1,6 @@
 //! Statuses and endings for people, with the ballbot's names.
 
-use lpvmpc::{BoundId, Quantity, Side, Status};
+use lpvmpc::{BoundId, Observation, Quantity, Restart, Side, Status, Verdict};
 use lpvmpc_sim::Ending;
 
 /// Names of the states, in their order.
@@ -98,6 +98,45 @@ pub fn active_bounds(bounds: &[BoundId], t_s: f64) -> String {
     texts.join(", ")
 }
 
+/// What was wrong with the readings of (phi, theta, phi_dot, theta_dot), observation by observation
+/// with its time (s): how many of which sensor were not believed and why, and when the estimate began
+/// anew; empty where there is nothing to tell. A reading that is missing is not told.
+pub fn readings(observations: impl Iterator<Item = (f64, Observation<4>)>) -> String {
+    const REFUSED: [(Verdict, &str); 4] = [
+        (Verdict::NotFinite, "no number"),
+        (Verdict::Outlier, "outlier"),
+        (Verdict::Stale, "too old"),
+        (Verdict::Repeated, "repeated"),
+    ];
+    let mut counts = [[0_usize; REFUSED.len()]; STATES.len()];
+    let mut restarts = Vec::new();
+    for (t, observation) in observations {
+        for (counts, verdict) in counts.iter_mut().zip(observation.verdicts) {
+            for (count, (refused, _)) in counts.iter_mut().zip(REFUSED) {
+                *count += usize::from(verdict == refused);
+            }
+        }
+        if let Some(cause) = observation.restart.and_then(restart) {
+            restarts.push(format!("the estimate began anew at t = {t:.3} s: {cause}"));
+        }
+    }
+    let sensors = STATES.iter().zip(counts).flat_map(|(name, counts)| {
+        let told = REFUSED.iter().zip(counts).filter(|(_, count)| *count > 0);
+        told.map(move |((_, word), count)| format!("{name} {word} {count} times"))
+    });
+    sensors.chain(restarts).collect::<Vec<_>>().join(", ")
+}
+
+/// Why an estimate began anew; nothing of its first beginning.
+fn restart(cause: Restart) -> Option<&'static str> {
+    match cause {
+        Restart::Start => None,
+        Restart::Gap => Some("no reading was believed for too long"),
+        Restart::ClockSetBack => Some("the time stamps went back"),
+        Restart::NotFinite => Some("it had become non-finite"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -118,5 +157,25 @@ mod tests {
             active_bounds(&bounds, 0.05),
             "theta upper 0.35 s ahead, torque lower 0.00 s ahead"
         );
+    }
+
+    #[test]
+    fn readings_that_are_not_believed_are_told_by_sensor() {
+        let seen = |theta, restart| Observation {
+            verdicts: [Verdict::Used, theta, Verdict::NotNeeded, Verdict::Missing],
+            restart,
+        };
+        let run = [
+            (0.0, seen(Verdict::Used, Some(Restart::Start))),
+            (0.1, seen(Verdict::Outlier, None)),
+            (0.2, seen(Verdict::Outlier, None)),
+            (40.0, seen(Verdict::Used, Some(Restart::Gap))),
+        ];
+        assert_eq!(
+            readings(run.into_iter()),
+            "theta outlier 2 times, the estimate began anew at t = 40.000 s: no reading was believed \
+             for too long"
+        );
+        assert_eq!(readings(run.into_iter().take(1)), "");
     }
 }

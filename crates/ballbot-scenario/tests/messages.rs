@@ -403,3 +403,33 @@ fn reference_files() {
     refused("empty", "", &["no column"]);
     refused("header", "t_s,phi_ref_rad\n", &["no rows"]);
 }
+
+/// A robot whose wheels stand elsewhere has other torques of the motors for the same planes.
+#[test]
+fn wheels_stand_where_they_are_said_to() {
+    let lissajous = builtin::find("lissajous").unwrap();
+    let with = |keys: &str| {
+        let zenith = "zenith_angle_deg = 45.0";
+        let text = lissajous.text.replace(zenith, &format!("{zenith}\n{keys}"));
+        assert!(text.contains(keys));
+        let scenario = Scenario::parse(&text, "my.toml").map_err(|error| error.to_string())?;
+        let prepared = scenario.prepare(Path::new("."));
+        prepared
+            .map(|prepared| prepared.wheels)
+            .map_err(|error| error.to_string())
+    };
+    let paper = with("# nothing").unwrap();
+    assert_eq!(paper, with("wheel_azimuths_deg = [-90, 30, 150]").unwrap());
+    // Turned by a quarter: what drove along x drives along y.
+    let turned = with("wheel_azimuths_deg = [0, 120, 240]").unwrap();
+    let (along_x, along_y) = (nalgebra::Vector3::x(), nalgebra::Vector3::y());
+    assert!((turned.motors(&along_y) - paper.motors(&along_x)).amax() < 1e-15);
+    let reversed = with("wheels_reversed = [true, false, false]").unwrap();
+    let [a, b] = [&reversed, &paper].map(|wheels| wheels.motors(&along_x));
+    assert!((a[0] + b[0]).abs() < 1e-15 && (a[1] - b[1]).abs() < 1e-15);
+    let said = with("wheel_azimuths_deg = [0, 0, 120]").unwrap_err();
+    assert_says(
+        &said,
+        &["parameters.wheel_azimuths_deg", "apart from each other"],
+    );
+}

@@ -219,7 +219,6 @@ fn a_push_outlives_a_change_of_the_settings_before_the_next_sample() {
         session
     };
     let changed = |session: &Session| session.reconfigured(prepared(&scenario).unwrap()).unwrap();
-    // New settings start the controller anew, with or without the push.
     let tilt_rate = |mut session: Session| {
         assert!(session.step(&clock));
         session.states().next().unwrap()[3]

@@ -31,4 +31,4 @@ pub use friction::{CREEP_SPEED, DriveFriction};
 pub use heading::Heading;
 pub use parameters::{Ballbot, Field, Geometry, LinearParameters, limits};
 pub use shares::PlaneTorques;
-pub use wheels::{BadZenithAngle, Wheels};
+pub use wheels::{AZIMUTHS_OF_PAPER_DEG, BadWheels, Wheel, Wheels};

@@ -4,7 +4,7 @@ use crate::guarded_loop::Guard;
 use crate::plant::{Plant, PlantError, Tolerances, Unloaded};
 use crate::regulator::{Regulator, StateFeedback};
 use crate::world::{World, WorldError};
-use lpvmpc::{BoundId, Bounds, Controller, LpvModel, Status, Workspace};
+use lpvmpc::{BoundId, Bounds, Controller, LpvModel, Observation, Status, Workspace};
 use nalgebra::SVector;
 use std::time::Duration;
 
@@ -115,6 +115,8 @@ pub struct LogRow<const NY: usize, const NU: usize> {
     pub t: f64,
     /// The readings; `None` where one is missing.
     pub measured: [Option<f64>; NY],
+    /// What the regulator made of them.
+    pub observation: Observation<NY>,
     /// The input commanded from here on.
     pub commanded: SVector<f64, NU>,
     /// The mean of the actuators' outputs from here to the next row.
@@ -134,8 +136,6 @@ pub struct ClosedLoop<R, P, const NX: usize, const NU: usize, const NY: usize, c
     pub range: Bounds<f64, NX>,
     /// Samples of the sensors per control sample.
     per_sample: usize,
-    /// Control samples done.
-    k: usize,
 }
 
 impl<R, P, const NX: usize, const NU: usize, const NY: usize, const NL: usize>
@@ -169,7 +169,6 @@ where
             without_plan: WithoutPlan::End,
             range: Bounds::none(),
             per_sample: 1,
-            k: 0,
         }
     }
 
@@ -191,8 +190,8 @@ where
         if let Some(component) = x.iter().zip(sides).position(outside) {
             return Err(Ending::OutOfRange { t, component });
         }
-        self.regulator.observe(self.world.measurement());
-        let decision = self.regulator.decide(self.k, reference, clock);
+        let mut observation = self.regulator.observe(self.world.measurement());
+        let decision = self.regulator.decide(reference, clock);
         let status = decision.status;
         // A guarded controller has an answer whatever its quadratic program said.
         let guarded = decision.guard.is_some();
@@ -206,14 +205,13 @@ where
         self.world.command(decision.u);
         for i in 0..self.per_sample {
             if i > 0 {
-                self.regulator.observe(self.world.measurement());
+                observation = self.regulator.observe(self.world.measurement());
                 if let Some(u) = self.regulator.between() {
                     self.world.command(u);
                 }
             }
-            self.advance(log)?;
+            self.advance(observation, log)?;
         }
-        self.k += 1;
         Ok(Sample {
             t,
             x,
@@ -230,7 +228,11 @@ where
     }
 
     /// One sample of the sensors.
-    fn advance(&mut self, log: &mut dyn FnMut(LogRow<NY, NU>)) -> Result<(), Ending> {
+    fn advance(
+        &mut self,
+        observation: Observation<NY>,
+        log: &mut dyn FnMut(LogRow<NY, NU>),
+    ) -> Result<(), Ending> {
         let world = &mut self.world;
         let measurement = *world.measurement();
         let t = measurement.t;
@@ -239,6 +241,7 @@ where
         log(LogRow {
             t,
             measured: measurement.values,
+            observation,
             commanded: *world.commanded(),
             applied: *world.applied(),
         });

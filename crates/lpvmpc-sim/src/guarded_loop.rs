@@ -1,11 +1,13 @@
 //! The guarded controller: as a regulator in a world, and around the continuous plant with a
 //! few faults that cost no more than a campaign can pay.
 
+use crate::measured::MeasuredState;
 use crate::plant::{self, PlantError, Tolerances};
 use crate::regulator::{Decision, Regulator};
 use crate::sensor::Measurement;
 use lpvmpc::{
-    BoundId, GuardedController, GuardedSettings, GuardedStep, GuardedWorkspace, LpvModel, SetPoints,
+    BoundId, GuardedController, GuardedSettings, GuardedStep, GuardedWorkspace, LpvModel,
+    Observation, SetPoints,
 };
 use nalgebra::SVector;
 use std::time::Duration;
@@ -129,8 +131,7 @@ pub struct Guard {
     pub set_point: f64,
 }
 
-/// A guarded controller on the measured state itself. A reading that is missing keeps its last
-/// value (zero before the first). The wanted set points are the reference's coordinates along the
+/// A guarded controller on the measured state itself. The wanted set points are the reference's coordinates along the
 /// direction of the set points.
 #[derive(Debug)]
 pub struct GuardedFeedback<
@@ -148,7 +149,9 @@ pub struct GuardedFeedback<
     /// Its memory.
     pub workspace: Box<GuardedWorkspace<f64, NU, NA, NP, M>>,
     /// The measured state.
-    pub x: SVector<f64, NX>,
+    pub measured: MeasuredState<NX>,
+    /// The input that was decided last.
+    pub input: SVector<f64, NU>,
     /// Whether the controller sees the reference before its time, over the whole horizon.
     pub preview: bool,
 }
@@ -170,15 +173,12 @@ where
         self.controller.settings().t_s
     }
 
-    fn observe(&mut self, measurement: &Measurement<NX>) {
-        for (x, value) in self.x.iter_mut().zip(&measurement.values) {
-            *x = value.unwrap_or(*x);
-        }
+    fn observe(&mut self, measurement: &Measurement<NX>) -> Observation<NX> {
+        self.measured.observe(measurement).1
     }
 
     fn decide(
         &mut self,
-        k: usize,
         reference: &dyn Fn(f64) -> SVector<f64, NX>,
         clock: &dyn Fn() -> Duration,
     ) -> Decision<NX, NU> {
@@ -188,11 +188,13 @@ where
             horizon,
             ..
         } = *self.controller.settings();
-        let x_ref = reference(k as f64 * t_s);
+        let now = self.measured.time().unwrap_or(0.0);
+        let x = *self.measured.state();
+        let x_ref = reference(now);
         let coordinate = |x: &SVector<f64, NX>| x.dot(&direction) / direction.norm_squared();
         let mut wanted = SetPoints::constant(coordinate(&x_ref));
         if self.preview {
-            let at = |i: usize| coordinate(&reference((k + i) as f64 * t_s));
+            let at = |i: usize| coordinate(&reference(now + i as f64 * t_s));
             for (i, place) in wanted.stages.iter_mut().enumerate().take(horizon) {
                 *place = at(i);
             }
@@ -200,13 +202,12 @@ where
         }
         let before = clock();
         let workspace = &mut self.workspace;
-        let step = self
-            .controller
-            .step_with_preview(&self.x, &wanted, workspace);
+        let step = self.controller.step_with_preview(&x, &wanted, workspace);
         let step_time = clock().saturating_sub(before);
+        self.input = step.u;
         Decision {
             u: step.u,
-            estimate: self.x,
+            estimate: x,
             x_ref,
             cost: step.cost,
             status: step.status,

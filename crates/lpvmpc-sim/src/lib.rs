@@ -13,6 +13,7 @@ mod actuator;
 pub mod closed_loop;
 mod disturbance;
 mod guarded_loop;
+mod measured;
 pub mod plant;
 mod random;
 mod regulator;
@@ -26,6 +27,7 @@ pub use closed_loop::{
 };
 pub use disturbance::Disturbance;
 pub use guarded_loop::{Actuation, Guard, GuardedFeedback, GuardedLoop};
+pub use measured::MeasuredState;
 pub use plant::{Plant, PlantError, Tolerances, Unloaded, advance};
 pub use random::Random;
 pub use regulator::{Decision, Regulator, StateFeedback};

@@ -1,8 +1,9 @@
 //! What decides in a closed loop: measurements in, commands out.
 
 use crate::guarded_loop::Guard;
+use crate::measured::MeasuredState;
 use crate::sensor::Measurement;
-use lpvmpc::{BoundId, Controller, LpvModel, Reference, Status, Workspace};
+use lpvmpc::{BoundId, Controller, LpvModel, Observation, Reference, Status, Workspace};
 use nalgebra::SVector;
 use std::ops::DerefMut;
 use std::time::Duration;
@@ -35,15 +36,14 @@ pub trait Regulator<const NX: usize, const NU: usize, const NY: usize> {
     /// Time from one decision to the next, s.
     fn t_s(&self) -> f64;
 
-    /// Takes in what the sensors deliver. Called at every sample of the sensors, in order; at a
-    /// control sample before [`decide`](Self::decide).
-    fn observe(&mut self, measurement: &Measurement<NY>);
+    /// Takes in what the sensors deliver, and says what became of it. Called at every sample of
+    /// the sensors, in order; at a control sample before [`decide`](Self::decide).
+    fn observe(&mut self, measurement: &Measurement<NY>) -> Observation<NY>;
 
-    /// The command from control sample `k` on. `reference` is the state reference at a time in
-    /// s, `clock` a monotonic clock.
+    /// The command from the last measurement on. `reference` is the state reference at a time in
+    /// s, on the clock of the measurements' stamps; `clock` is a monotonic clock.
     fn decide(
         &mut self,
-        k: usize,
         reference: &dyn Fn(f64) -> SVector<f64, NX>,
         clock: &dyn Fn() -> Duration,
     ) -> Decision<NX, NU>;
@@ -72,17 +72,16 @@ where
         (**self).t_s()
     }
 
-    fn observe(&mut self, measurement: &Measurement<NY>) {
-        (**self).observe(measurement);
+    fn observe(&mut self, measurement: &Measurement<NY>) -> Observation<NY> {
+        (**self).observe(measurement)
     }
 
     fn decide(
         &mut self,
-        k: usize,
         reference: &dyn Fn(f64) -> SVector<f64, NX>,
         clock: &dyn Fn() -> Duration,
     ) -> Decision<NX, NU> {
-        (**self).decide(k, reference, clock)
+        (**self).decide(reference, clock)
     }
 
     fn between(&mut self) -> Option<SVector<f64, NU>> {
@@ -98,14 +97,13 @@ where
     }
 }
 
-/// The controller on the measured state itself. A reading that is missing keeps its last value
-/// (zero before the first). `K` and `W` hold a [`Controller`] and its [`Workspace`], by
+/// The controller on the measured state itself. `K` and `W` hold a [`Controller`] and its [`Workspace`], by
 /// reference or in a box.
 #[derive(Debug)]
 pub struct StateFeedback<K, W, const NX: usize> {
     controller: K,
     workspace: W,
-    x: SVector<f64, NX>,
+    measured: MeasuredState<NX>,
 }
 
 impl<K, W, const NX: usize> StateFeedback<K, W, NX> {
@@ -114,8 +112,28 @@ impl<K, W, const NX: usize> StateFeedback<K, W, NX> {
         Self {
             controller,
             workspace,
-            x: SVector::zeros(),
+            measured: MeasuredState::new(),
         }
+    }
+
+    /// The controller.
+    pub fn controller(&self) -> &K {
+        &self.controller
+    }
+
+    /// The controller, to hand something over to it.
+    pub fn controller_mut(&mut self) -> &mut K {
+        &mut self.controller
+    }
+
+    /// What was measured.
+    pub fn measured(&self) -> &MeasuredState<NX> {
+        &self.measured
+    }
+
+    /// Goes on from what another regulator knows of the state.
+    pub fn set_measured(&mut self, measured: MeasuredState<NX>) {
+        self.measured = measured;
     }
 }
 
@@ -130,31 +148,28 @@ where
         self.controller.settings().t_s
     }
 
-    fn observe(&mut self, measurement: &Measurement<NX>) {
-        for (x, value) in self.x.iter_mut().zip(&measurement.values) {
-            *x = value.unwrap_or(*x);
-        }
+    fn observe(&mut self, measurement: &Measurement<NX>) -> Observation<NX> {
+        self.measured.observe(measurement).1
     }
 
     fn decide(
         &mut self,
-        k: usize,
         reference: &dyn Fn(f64) -> SVector<f64, NX>,
         clock: &dyn Fn() -> Duration,
     ) -> Decision<NX, NU> {
         let settings = self.controller.settings();
-        let reference = preview(reference, k, settings.t_s, settings.horizon);
+        let now = self.measured.time().unwrap_or(0.0);
+        let x = *self.measured.state();
+        let reference = preview(reference, now, settings.t_s, settings.horizon);
         let before = clock();
-        let plan = self
-            .controller
-            .step(&self.x, &reference, &mut self.workspace);
+        let plan = self.controller.step(&x, &reference, &mut self.workspace);
         let step_time = clock().saturating_sub(before);
         let (u, status, active_bounds) = (plan.u[0], plan.status, plan.active.len());
         Decision {
             u,
-            estimate: self.x,
+            estimate: x,
             x_ref: reference.stages[0],
-            cost: self.controller.tracking_cost(&self.x, &reference),
+            cost: self.controller.tracking_cost(&x, &reference),
             status,
             active_bounds,
             step_time,
@@ -173,14 +188,14 @@ where
     }
 }
 
-/// The reference over the horizon that begins at sample `k`.
+/// The reference over the horizon that begins at the time `now`, s.
 fn preview<const NX: usize, const N: usize>(
     reference: &dyn Fn(f64) -> SVector<f64, NX>,
-    k: usize,
+    now: f64,
     t_s: f64,
     horizon: usize,
 ) -> Reference<f64, NX, N> {
-    let at = |i: usize| reference((k + i) as f64 * t_s);
+    let at = |i: usize| reference(now + i as f64 * t_s);
     let mut window = Reference::constant(at(horizon));
     for (i, place) in window.stages.iter_mut().enumerate().take(horizon) {
         *place = at(i);

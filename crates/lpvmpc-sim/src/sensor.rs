@@ -121,6 +121,19 @@ impl<const NX: usize> Channel<NX> {
         }
     }
 
+    /// Goes on with the noise, and with the readings, of the channel `before`.
+    pub(crate) fn go_on_from(&mut self, before: &Self, noise: bool, readings: bool) {
+        if noise {
+            self.random = before.random.clone();
+        }
+        if readings {
+            self.last = before.last;
+            // What would have arrived later than it does now, has not come in time.
+            let surplus = before.travelling.len().saturating_sub(self.sensor.late);
+            self.travelling = before.travelling.iter().skip(surplus).copied().collect();
+        }
+    }
+
     /// What is delivered at the world's sample `k`, when the state is `x`: a reading and its age
     /// in samples.
     pub(crate) fn read(&mut self, x: &SVector<f64, NX>, k: u64) -> Option<(f64, u64)> {

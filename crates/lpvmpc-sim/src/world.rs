@@ -149,6 +149,9 @@ pub struct World<P, const NX: usize, const NU: usize, const NY: usize, const NL:
     actuators: [Actuator; NU],
     channels: [Channel<NX>; NY],
     pending: Vec<Disturbance<NX, NL>>,
+    seed: u64,
+    /// Time at which the steps began to be counted, s.
+    start: f64,
     steps: u64,
     x: SVector<f64, NX>,
     commanded: SVector<f64, NU>,
@@ -180,6 +183,54 @@ where
         Ok(Self::unchecked(plant, x, settings))
     }
 
+    /// The same world where it stands, at the same time, with another plant or other settings.
+    /// What has happened stays: the state, commands on their way, the actuators' outputs, readings
+    /// that have been taken, the noise to come. Pushes are those of the `settings` whose time has
+    /// not passed. With another period the sensors start anew.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn continued(
+        &self,
+        plant: P,
+        settings: WorldSettings<NX, NU, NY, NL>,
+    ) -> Result<Self, WorldError> {
+        let mut world = Self::new(plant, self.x, settings)?;
+        world.commanded = self.commanded;
+        world.travelling = self.travelling.clone();
+        (world.arrived, world.output) = (self.arrived, self.output);
+        world.mean_output = self.mean_output;
+        let same_period = world.period == self.period;
+        for (channel, before) in world.channels.iter_mut().zip(&self.channels) {
+            channel.go_on_from(before, world.seed == self.seed, same_period);
+        }
+        if same_period {
+            (world.start, world.steps) = (self.start, self.steps);
+            world.measurement = self.measurement;
+            world.drop_past_pushes();
+            Ok(world)
+        } else {
+            Ok(world.at_time(self.time()))
+        }
+    }
+
+    /// This world, which has not moved yet, at the time `time` (s) instead of zero, without the
+    /// pushes that lie before.
+    pub fn at_time(mut self, time: f64) -> Self {
+        self.start = time;
+        self.measurement.t = time;
+        self.drop_past_pushes();
+        self
+    }
+
+    fn drop_past_pushes(&mut self) {
+        let now = self.time() - SAME_TIME;
+        self.pending.retain(|push| match push {
+            Disturbance::Jump { time, .. } | Disturbance::Impulse { time, .. } => *time >= now,
+            Disturbance::Load { until, .. } => *until > now,
+        });
+    }
+
     fn unchecked(plant: P, x: SVector<f64, NX>, settings: WorldSettings<NX, NU, NY, NL>) -> Self {
         let channel = |i| Channel::new(settings.sensors[i], settings.seed, i);
         let mut world = Self {
@@ -190,6 +241,8 @@ where
             actuators: settings.actuators,
             channels: std::array::from_fn(channel),
             pending: settings.disturbances,
+            seed: settings.seed,
+            start: 0.0,
             steps: 0,
             x,
             commanded: SVector::zeros(),
@@ -207,9 +260,9 @@ where
         world
     }
 
-    /// Time since the start, s.
+    /// The time, s.
     pub fn time(&self) -> f64 {
-        self.steps as f64 * self.period
+        self.start + self.steps as f64 * self.period
     }
 
     /// Time from one sample of the sensors to the next, s.

@@ -10,8 +10,8 @@ use lpvmpc::{
 };
 use lpvmpc_design::lqr_discrete;
 use lpvmpc_sim::{
-    Actuation, ClosedLoop, Course, Ending, GuardedFeedback, GuardedLoop, Regulator, Tolerances,
-    Unloaded, World, record,
+    Actuation, ClosedLoop, Course, Ending, GuardedFeedback, GuardedLoop, MeasuredState, Regulator,
+    Tolerances, Unloaded, World, record,
 };
 use nalgebra::{DMatrix, Matrix1, Matrix2, Matrix2x1, RowVector2, Vector1, Vector2};
 use std::time::Duration;
@@ -99,7 +99,8 @@ fn a_run_is_the_sequence_of_its_samples() {
     let regulator = GuardedFeedback {
         controller: controller(),
         workspace: Box::new(Workspace::new()),
-        x: Vector2::zeros(),
+        measured: MeasuredState::new(),
+        input: Vector1::zeros(),
         preview: false,
     };
     let course = Course {
@@ -136,12 +137,13 @@ fn active_bounds_are_where_the_plan_meets_them() {
     let mut regulator = GuardedFeedback {
         controller: controller(),
         workspace: Box::new(Workspace::new()),
-        x: Vector2::zeros(),
+        measured: MeasuredState::new(),
+        input: Vector1::zeros(),
         preview: false,
     };
     let (mut speeds, mut forces) = (0, 0);
     for k in 0..60 {
-        let decision = regulator.decide(k, &|_| Vector2::new(20.0, 0.0), &|| Duration::ZERO);
+        let decision = regulator.decide(&|_| Vector2::new(20.0, 0.0), &|| Duration::ZERO);
         let plan = regulator.prediction();
         let active = regulator.active_bounds();
         let upper_speed = |stage| {
@@ -168,7 +170,7 @@ fn active_bounds_are_where_the_plan_meets_them() {
             decision.u
         );
         forces += usize::from(upper_force);
-        regulator.x = plan[0];
+        regulator.measured = MeasuredState::known(plan[0], None);
     }
     assert!(speeds > 100 && forces > 0, "{speeds} {forces}");
 }

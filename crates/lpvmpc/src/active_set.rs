@@ -355,7 +355,9 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
             multiplier: sign,
             ..self.candidate.terms.active
         };
-        let mut rows = working.filter(|row| row.multiplier != T::zero());
+        // What is that small is rounding.
+        let least = T::default_epsilon();
+        let mut rows = working.filter(|row| row.multiplier.abs() > least);
         proof.push(candidate) && rows.all(|row| proof.push(row))
     }
 

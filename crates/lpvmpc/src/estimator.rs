@@ -1,18 +1,29 @@
 //! A Kalman filter on the LPV model, with disturbances for offset-free tracking.
 
 mod covariance;
+mod history;
+mod observation;
 mod settings;
 
+use crate::clock::{Clock, Tick};
+use crate::delay::DelayLine;
 use crate::model::{LpvModel, Scalar};
 pub use covariance::Covariance;
-use nalgebra::SVector;
-pub use settings::{EstimatorError, EstimatorSettings, Gate, Reading, Verdict};
+use history::{Estimate, History, Taken, Trust};
+use nalgebra::{SMatrix, SVector};
+pub use observation::{Observation, Restart, Verdict};
+pub use settings::{EstimatorError, EstimatorSettings, Gate, Reading};
 
 /// An extended Kalman filter whose covariance follows the LPV model at the estimated scheduling,
 /// updated one sensor at a time in Joseph's form (Bucy and Joseph 1968; Simon, Optimal State
 /// Estimation, 2006, ch. 6.1 and 5).
 ///
-/// Sensors may come and go: each update uses what there is.
+/// Sensors may come and go: each update uses what there is. A reading that comes late is taken in
+/// at the instant when it was taken, and the filter goes through the time since again; so the
+/// estimate is that of a filter that had every reading in time (Bar-Shalom, Li and Kirubarajan,
+/// Estimation with Applications to Tracking and Navigation, 2001, ch. 6.9). For this it remembers
+/// `K` instants, one per [`advance`](Self::advance) and one per reading that was taken between
+/// two: what is older is stale. 1 does where no reading is ever late.
 #[derive(Clone, Debug)]
 pub struct Estimator<
     P,
@@ -22,27 +33,32 @@ pub struct Estimator<
     const NS: usize,
     const NY: usize,
     const ND: usize,
+    const K: usize,
 > {
     model: P,
     settings: EstimatorSettings<T, NX, NU, NY, ND>,
-    /// x + E_x d.
-    z: SVector<T, NX>,
-    d: SVector<T, ND>,
-    covariance: Covariance<T, NX, ND>,
-    /// The input of the last [`Estimator::advance`].
-    input: SVector<T, NU>,
+    now: Estimate<T, NX, ND>,
+    history: History<T, NX, NU, NY, ND, K>,
     rejected: [usize; NY],
+    /// Which sensors have been believed since the beginning.
+    heard: [bool; NY],
+    clock: Clock,
+    /// Time since a reading was believed, s.
+    silence: T,
+    /// Why there is no estimate, if there is none.
+    lost: Option<Restart>,
 }
 
-/// A reading as it is expected, and how it depends on the present z and on d.
-struct Expected<T, const NX: usize, const ND: usize> {
-    value: T,
-    c_z: SVector<T, NX>,
-    c_d: SVector<T, ND>,
-}
-
-impl<P, T, const NX: usize, const NU: usize, const NS: usize, const NY: usize, const ND: usize>
-    Estimator<P, T, NX, NU, NS, NY, ND>
+impl<
+    P,
+    T,
+    const NX: usize,
+    const NU: usize,
+    const NS: usize,
+    const NY: usize,
+    const ND: usize,
+    const K: usize,
+> Estimator<P, T, NX, NU, NS, NY, ND, K>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
@@ -57,49 +73,99 @@ where
         x: SVector<T, NX>,
     ) -> Result<Self, EstimatorError> {
         settings.check()?;
+        let now = settings.initial(x);
         Ok(Self {
             model,
             settings,
-            z: x,
-            d: SVector::zeros(),
-            covariance: settings.initial_covariance(),
-            input: SVector::zeros(),
+            now,
+            history: History::new(now),
             rejected: [0; NY],
+            heard: [false; NY],
+            clock: Clock::default(),
+            silence: T::zero(),
+            lost: None,
         })
     }
 
-    /// Starts again from the state `x`.
+    /// Starts again from the state `x`. The clock goes on.
     pub fn reset(&mut self, x: SVector<T, NX>) {
-        self.z = x;
-        self.d = SVector::zeros();
-        self.covariance = self.settings.initial_covariance();
-        self.input = SVector::zeros();
+        self.begin(self.settings.initial(x));
+        self.heard = [false; NY];
+    }
+
+    /// Starts again from the state `x` at the time `stamp` (s), if that is known.
+    pub fn begin_at(&mut self, stamp: Option<f64>, x: SVector<T, NX>) {
+        self.reset(x);
+        self.clock.reset();
+        if let Some(stamp) = stamp {
+            self.clock.tick::<T>(stamp);
+        }
+    }
+
+    /// Goes on from where `previous` stands, which has other settings or another model: state,
+    /// covariance, past and clock. The disturbance is taken over if it acts in the same way, else
+    /// it is to be found anew.
+    pub fn take_over(&mut self, previous: &Self) {
+        let offsets = |of: &Self| (of.settings.state_offset, of.settings.input_offset);
+        if offsets(self) == offsets(previous) {
+            self.now = previous.now;
+            self.history = previous.history.clone();
+        } else {
+            let disturbance = &self.settings.initial_disturbance;
+            let mut covariance = self.settings.spread(&SVector::zeros(), disturbance);
+            covariance.zz += previous.state_covariance();
+            self.begin(Estimate {
+                z: previous.state(),
+                d: SVector::zeros(),
+                covariance,
+            });
+        }
+        self.clock = previous.clock;
+        self.silence = previous.silence;
+        self.lost = previous.lost;
+        self.heard = previous.heard;
+        self.rejected = previous.rejected;
+    }
+
+    fn begin(&mut self, now: Estimate<T, NX, ND>) {
+        self.now = now;
+        self.history = History::new(now);
         self.rejected = [0; NY];
+        self.silence = T::zero();
+        self.lost = None;
     }
 
     /// The estimated state x, as the sensors see it.
     pub fn state(&self) -> SVector<T, NX> {
-        self.z - self.settings.state_offset * self.d
+        self.now.z - self.settings.state_offset * self.now.d
     }
 
     /// The estimated state z = x + E_x d, as the model sees it.
     pub fn model_state(&self) -> &SVector<T, NX> {
-        &self.z
+        &self.now.z
     }
 
     /// The estimated disturbance d.
     pub fn disturbance(&self) -> &SVector<T, ND> {
-        &self.d
+        &self.now.d
     }
 
     /// E_u d: what acts on the plant besides the input, in input units.
     pub fn input_disturbance(&self) -> SVector<T, NU> {
-        self.settings.input_offset * self.d
+        self.settings.input_offset * self.now.d
     }
 
     /// The covariance of the estimate.
     pub fn covariance(&self) -> &Covariance<T, NX, ND> {
-        &self.covariance
+        &self.now.covariance
+    }
+
+    /// The covariance of the state x, `NX` x `NX`.
+    fn state_covariance(&self) -> SMatrix<T, NX, NX> {
+        let Covariance { zz, zd, dd } = self.now.covariance;
+        let offset = &self.settings.state_offset;
+        let mixed = zd * offset.transpose();
+        zz - mixed - mixed.transpose() + offset * dd * offset.transpose()
     }
 
     /// The settings.
@@ -107,24 +173,119 @@ where
         &self.settings
     }
 
+    /// The stamp of the last measurement that was [observed](Self::observe), s; `None` before the
+    /// first.
+    pub fn time(&self) -> Option<f64> {
+        self.clock.now()
+    }
+
+    /// Whether there is no estimate: no reading was believed for longer than
+    /// [`Gate::longest_gap`], or the last estimate became non-finite. It begins anew with the
+    /// next measurement that has a reading.
+    pub fn is_lost(&self) -> bool {
+        self.lost.is_some()
+    }
+
     /// The model's state `duration` s after `z`, under the input `u` and the estimated
     /// disturbance.
     pub fn predict(&self, z: &SVector<T, NX>, u: &SVector<T, NU>, duration: T) -> SVector<T, NX> {
-        let v = u + self.input_disturbance();
+        self.flow(z, &self.now.d, u, duration)
+    }
+
+    fn flow(
+        &self,
+        z: &SVector<T, NX>,
+        d: &SVector<T, ND>,
+        u: &SVector<T, NU>,
+        duration: T,
+    ) -> SVector<T, NX> {
+        let v = u + self.settings.input_offset * d;
         let predictor = self.settings.predictor(duration);
         predictor.advance(&self.model, z, &v, duration)
     }
 
-    /// Moves the estimate on by `duration` s under the constant input `u`.
+    /// Takes in a measurement by its `stamp` (s, see [`Clock`]): moves the estimate on to it under
+    /// the inputs of `line`, which elapses, and corrects it with the `readings`, whose ages count
+    /// from the stamp.
+    ///
+    /// Time begins with the first measurement. An estimate that no reading has corrected for
+    /// longer than [`Gate::longest_gap`], or that is not finite any more, is given up, and begins
+    /// anew with the first measurement that has a reading; so it does when the stamps go back by
+    /// more than that. A measurement out of order changes nothing.
+    pub fn observe<const C: usize>(
+        &mut self,
+        stamp: f64,
+        line: &mut DelayLine<T, NU, C>,
+        readings: &[Option<Reading<T>>; NY],
+    ) -> Observation<NY> {
+        let longest_gap = self.settings.gate.longest_gap;
+        let mut begins = None;
+        match self.clock.tick(stamp) {
+            Tick::First => begins = Some(Restart::Start),
+            Tick::Elapsed(duration) => self.elapse(duration, line),
+            Tick::Backward(by) if by <= longest_gap => {
+                return Observation::refused(readings, Verdict::Stale);
+            }
+            Tick::Backward(_) => {
+                self.clock.reset();
+                self.clock.tick::<T>(stamp);
+                self.lost = Some(Restart::ClockSetBack);
+            }
+            Tick::NotFinite => return Observation::refused(readings, Verdict::NotFinite),
+        }
+        if self.lost.is_some() {
+            let usable = |reading: &Reading<T>| self.settings.gate.refuses(reading).is_none();
+            if !readings.iter().flatten().any(usable) {
+                return Observation::useless(readings, &self.settings.gate);
+            }
+            begins = self.lost;
+        }
+        if begins.is_some() {
+            self.reset(SVector::zeros());
+        }
+        Observation {
+            verdicts: self.update(readings),
+            restart: begins,
+        }
+    }
+
+    /// Moves the estimate on by `duration` s under the inputs of `line`.
+    fn elapse<const C: usize>(&mut self, duration: T, line: &mut DelayLine<T, NU, C>) {
+        self.silence += duration;
+        // Negated, so that a time that is not a number is too long.
+        if self.lost.is_none() && !(self.silence <= self.settings.gate.longest_gap) {
+            self.lost = Some(Restart::Gap);
+        }
+        if self.lost.is_none() {
+            line.for_each(duration, |duration, u| self.advance(u, duration));
+            if !self.now.is_finite() {
+                self.lost = Some(Restart::NotFinite);
+            }
+        }
+        line.elapse(duration);
+    }
+
+    /// Moves the estimate on by `duration` s, positive, under the constant input `u`.
     pub fn advance(&mut self, u: &SVector<T, NU>, duration: T) {
+        self.now = self.moved(&self.now, u, duration);
+        self.history.advance(u, duration, self.now);
+    }
+
+    /// The estimate `duration` s after `from`, under the input `u`.
+    fn moved(
+        &self,
+        from: &Estimate<T, NX, ND>,
+        u: &SVector<T, NU>,
+        duration: T,
+    ) -> Estimate<T, NX, ND> {
         let settings = &self.settings;
         let predictor = settings.predictor(duration);
-        let (a, b) = self.model.matrices(&self.model.scheduling(&self.z));
+        let (a, b) = self.model.matrices(&self.model.scheduling(&from.z));
         let (a, b) = predictor.discretize(&a, &b, duration);
         let g = b * settings.input_offset;
-        let Covariance { zz, zd, dd } = self.covariance;
+        let Covariance { zz, zd, dd } = from.covariance;
         let mixed = a * zd * g.transpose();
-        let mut moved = Covariance {
+        let mut covariance = Covariance {
             zz: a * zz * a.transpose() + mixed + mixed.transpose() + g * dd * g.transpose(),
             zd: a * zd + g * dd,
             dd,
@@ -133,85 +294,156 @@ where
             &(settings.state_noise * duration),
             &(settings.disturbance_noise * duration),
         );
-        moved.zz += wandered.zz;
-        moved.zd += wandered.zd;
-        moved.dd += wandered.dd;
-        self.z = self.predict(&self.z, u, duration);
-        self.input = *u;
-        self.covariance = moved;
+        covariance.zz += wandered.zz;
+        covariance.zd += wandered.zd;
+        covariance.dd += wandered.dd;
+        Estimate {
+            z: self.flow(&from.z, &from.d, u, duration),
+            d: from.d,
+            covariance,
+        }
     }
 
     /// Corrects the estimate with what the sensors delivered, and says what became of each
-    /// reading.
+    /// reading. The work is at most `K` predictions.
     pub fn update(&mut self, readings: &[Option<Reading<T>>; NY]) -> [Verdict; NY] {
         let mut verdicts = [Verdict::Missing; NY];
         for (i, (verdict, reading)) in verdicts.iter_mut().zip(readings).enumerate() {
-            *verdict = match reading {
-                Some(reading) if reading.value.is_finite() => self.correct(i, reading),
-                _ => Verdict::Missing,
-            };
+            if let Some(reading) = reading {
+                *verdict = self.file(i, reading);
+            }
+        }
+        self.go_through_again(&mut verdicts);
+        if verdicts.iter().any(|verdict| verdict.is_used()) {
+            self.silence = T::zero();
         }
         verdicts
     }
 
-    /// What sensor `i` would have read `age` s ago, as far as the estimate knows.
-    ///
-    /// The model is followed back from the present, under the last input. What the estimate has
-    /// learnt since is then learnt about the past, too; only what the model does not know counts as
-    /// certain in between.
-    fn expected(&self, i: usize, age: T) -> Expected<T, NX, ND> {
-        let settings = &self.settings;
-        let row = settings.c.row(i).transpose();
-        let offset = -(settings.state_offset.transpose() * row);
-        let now = Expected {
-            value: row.dot(&self.z) + offset.dot(&self.d),
-            c_z: row,
-            c_d: offset,
-        };
-        if !(age > T::zero()) {
-            return now;
+    /// Puts the reading of sensor `i` to the instant when it was taken; `Used` until it is judged.
+    fn file(&mut self, i: usize, reading: &Reading<T>) -> Verdict {
+        if let Some(refused) = self.settings.gate.refuses(reading) {
+            return refused;
         }
-        let predictor = settings.predictor(age);
-        let v = self.input + self.input_disturbance();
-        let z = predictor.advance(&self.model, &self.z, &v, -age);
-        let (a, b) = self.model.matrices(&self.model.scheduling(&self.z));
-        let (a, b) = predictor.discretize(&a, &b, -age);
-        Expected {
-            value: row.dot(&z) + offset.dot(&self.d),
-            c_z: a.transpose() * row,
-            c_d: offset + (b * settings.input_offset).transpose() * row,
+        // Instants closer together than rounding tells are one.
+        let resolution = T::default_epsilon().sqrt() * self.settings.longest_step;
+        let instant = self.history.at(reading.age, resolution);
+        let place = instant
+            .and_then(|instant| self.history.get_mut(instant))
+            .and_then(|instant| instant.readings.get_mut(i));
+        match place {
+            None => Verdict::Stale,
+            Some(Some(_)) => Verdict::Repeated,
+            Some(place) => {
+                *place = Some(Taken {
+                    value: reading.value,
+                    trust: Trust::New,
+                });
+                Verdict::Used
+            }
         }
     }
 
-    /// Corrects with the reading of sensor `i`.
-    fn correct(&mut self, i: usize, reading: &Reading<T>) -> Verdict {
-        let gate = self.settings.gate;
-        // Negated, so that an age that is not a number is too old.
-        if !(reading.age <= gate.oldest) {
-            return Verdict::Stale;
+    /// Filters again from the first instant that has something new, whose readings are judged.
+    fn go_through_again(&mut self, verdicts: &mut [Verdict; NY]) {
+        let Some(first) = self.history.first_with_news() else {
+            return;
+        };
+        let mut prior = None;
+        let last = self.history.len() - 1;
+        for i in first..=last {
+            let Some(mut instant) = self.history.get(i).copied() else {
+                return;
+            };
+            instant.prior = prior.or(instant.prior);
+            let Some(mut estimate) = instant.prior else {
+                return;
+            };
+            // Each further time because one more reading speaks of a blow.
+            while !self.take_in(&mut instant.readings, &mut estimate, verdicts) {
+                estimate = instant.prior.unwrap_or(estimate);
+            }
+            if i < last {
+                prior = Some(self.moved(&estimate, &instant.u, instant.duration));
+            } else {
+                self.now = estimate;
+            }
+            if let Some(place) = self.history.get_mut(i) {
+                *place = instant;
+            }
         }
-        let Expected { value, c_z, c_d } = self.expected(i, reading.age);
-        let noise = self.settings.measurement_noise[i];
-        let error = reading.value - value;
-        let variance = self.covariance.of(&c_z, &c_d) + noise;
+    }
+
+    /// Whether the estimate makes the `value` of sensor `i` likely, and what follows from that.
+    fn judge(&mut self, i: usize, value: T, estimate: &Estimate<T, NX, ND>) -> (Verdict, Trust) {
+        let (error, c_z, c_d) = self.error(i, value, estimate);
+        let variance = estimate.covariance.of(&c_z, &c_d) + self.settings.measurement_noise[i];
         let excess = error * error / variance;
-        let mut verdict = Verdict::Used;
+        let gate = &self.settings.gate;
+        let mut judgement = (Verdict::Used, Trust::Plain);
         if !(excess <= gate.deviations * gate.deviations) {
-            if self.rejected[i] < gate.patience || !excess.is_finite() {
+            let patient = self.heard[i] && self.rejected[i] < gate.patience;
+            if patient || !excess.is_finite() {
                 self.rejected[i] += 1;
-                return Verdict::Outlier;
+                return (Verdict::Outlier, Trust::New);
             }
-            // What the reading exceeds its variance by, the state's variance has to explain.
-            let state_variance = c_z.dot(&(self.covariance.zz * c_z));
-            if state_variance > T::zero() {
-                self.covariance.zz *= T::one() + error * error / state_variance;
-            }
-            verdict = Verdict::UsedAfterBlow;
+            judgement = (Verdict::UsedAfterBlow, Trust::AfterBlow);
         }
         self.rejected[i] = 0;
-        let (k_z, k_d) = self.covariance.correct(&c_z, &c_d, noise);
-        self.z += k_z * error;
-        self.d += k_d * error;
-        verdict
+        self.heard[i] = true;
+        judgement
+    }
+
+    /// Corrects an estimate with the readings of an instant, and judges those that are new. `false`,
+    /// and the estimate of no use, if one of these says that there was a blow: the state's variance
+    /// has to be raised before all readings of the instant.
+    fn take_in(
+        &mut self,
+        readings: &mut [Option<Taken<T>>; NY],
+        estimate: &mut Estimate<T, NX, ND>,
+        verdicts: &mut [Verdict; NY],
+    ) -> bool {
+        let struck = self.settings.struck(readings);
+        for (i, taken) in readings.iter().enumerate() {
+            if let Some(taken) = taken.filter(|taken| taken.trust == Trust::AfterBlow) {
+                let (error, c_z, _) = self.error(i, taken.value, estimate);
+                estimate.covariance.open(&struck, &c_z, error);
+            }
+        }
+        for (i, (place, verdict)) in readings.iter_mut().zip(verdicts).enumerate() {
+            let Some(taken) = place else {
+                continue;
+            };
+            if taken.trust == Trust::New {
+                (*verdict, taken.trust) = self.judge(i, taken.value, estimate);
+                match taken.trust {
+                    Trust::Plain => {}
+                    Trust::AfterBlow => return false,
+                    Trust::New => {
+                        *place = None;
+                        continue;
+                    }
+                }
+            }
+            let (error, c_z, c_d) = self.error(i, taken.value, estimate);
+            let noise = self.settings.measurement_noise[i];
+            let (k_z, k_d) = estimate.covariance.correct(&c_z, &c_d, noise);
+            estimate.z += k_z * error;
+            estimate.d += k_d * error;
+        }
+        true
+    }
+
+    /// How far the `value` of sensor `i` is from what is expected, and how that depends on z and d.
+    fn error(
+        &self,
+        i: usize,
+        value: T,
+        estimate: &Estimate<T, NX, ND>,
+    ) -> (T, SVector<T, NX>, SVector<T, ND>) {
+        let c_z = self.settings.c.row(i).transpose();
+        let c_d = -(self.settings.state_offset.transpose() * c_z);
+        let expected = c_z.dot(&estimate.z) + c_d.dot(&estimate.d);
+        (value - expected, c_z, c_d)
     }
 }

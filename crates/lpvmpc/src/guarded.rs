@@ -19,7 +19,7 @@ mod tube;
 
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Ocp;
-use crate::solution::{BoundId, Quantity, Side, Solution, Status};
+use crate::solution::{ActiveSet, BoundId, Quantity, Side, Solution, Status};
 use crate::solver::Solver;
 pub use aim::SetPoints;
 use core::fmt;
@@ -109,6 +109,16 @@ impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usiz
             solver: Solver::new(),
             solution: Solution::default(),
         }
+    }
+
+    /// The rows that are active in the last quadratic program: the warm start of the next one.
+    pub fn warm_start(&self) -> &ActiveSet<T, M> {
+        &self.solution.active
+    }
+
+    /// Takes another warm start for the next quadratic program.
+    pub fn set_warm_start(&mut self, active: ActiveSet<T, M>) {
+        self.solution.active = active;
     }
 
     /// Bounds that are active in the last quadratic program, edges of terminal set and trust
@@ -284,6 +294,11 @@ where
         (self.drift, self.end_drift) = ([SVector::zeros(); N], T::zero());
         self.pressure = T::zero();
         self.touch = None;
+    }
+
+    /// The model.
+    pub fn model(&self) -> &P {
+        &self.model
     }
 
     /// The settings.

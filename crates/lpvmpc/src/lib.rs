@@ -6,6 +6,7 @@
 )]
 
 mod active_set;
+mod clock;
 mod controller;
 mod delay;
 mod descent;
@@ -14,6 +15,7 @@ mod farkas;
 mod guarded;
 mod kernel;
 mod kkt;
+mod last_plan;
 mod model;
 mod ocp;
 mod plan;
@@ -30,10 +32,12 @@ mod solver;
 mod steady_state;
 mod working_set;
 
+pub use clock::{Clock, Tick};
 pub use controller::{Controller, Reference, Workspace};
 pub use delay::DelayLine;
 pub use estimator::{
-    Covariance, Estimator, EstimatorError, EstimatorSettings, Gate, Reading, Verdict,
+    Covariance, Estimator, EstimatorError, EstimatorSettings, Gate, Observation, Reading, Restart,
+    Verdict,
 };
 pub use farkas::infeasibility_margin;
 pub use guarded::{
@@ -41,13 +45,14 @@ pub use guarded::{
     GuardedWorkspace, Rollout, SetPoints, TerminalSet, share_of_bounds,
 };
 pub use kkt::{KktResidual, kkt_residual};
+pub use last_plan::LastPlan;
 pub use model::{LpvModel, Scalar};
 pub use ocp::{Bounds, Ocp, Penalty, Softness, Stage, Terminal};
 pub use predictor::{Predictor, Rk4};
 pub use ramp::RampedInput;
 pub use settings::{
     ControllerError, ControllerSettings, InputReference, Iterations, Scheduling,
-    TerminalIngredient, Weights,
+    TerminalIngredient, Weights, exact_prices,
 };
 pub use shaping::{Motion, MoveLimits, SmoothMove};
 pub use solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};

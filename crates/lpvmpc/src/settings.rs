@@ -1,8 +1,8 @@
 //! What defines a controller besides its model, and what can be wrong with it.
 
 use crate::model::Scalar;
-use crate::ocp::{Bounds, Softness};
-use crate::predictor::Predictor;
+use crate::ocp::{Bounds, Penalty, Softness};
+use crate::predictor::{Predictor, Rk4};
 use crate::solver::SolverSettings;
 use core::fmt;
 use nalgebra::{Cholesky, Const, SMatrix, SVector, convert};
@@ -119,6 +119,94 @@ pub struct ControllerSettings<T, const NX: usize, const NU: usize, const NS: usi
     pub input_reference: InputReference<T, NU>,
     /// Settings of the solver.
     pub solver: SolverSettings<T>,
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
+    ControllerSettings<T, NX, NU, NS>
+{
+    /// What a controller needs to be told; the rest is what serves as a rule: the stage-consistent
+    /// predictor with one Runge-Kutta step per sample, LPV MPC as a descent, the input that holds the
+    /// set point as the one that costs nothing, no bounds of the state.
+    ///
+    /// Say state bounds by [`soft_bounds`](Self::soft_bounds), or hard by `x` alone.
+    pub fn new(
+        t_s: T,
+        horizon: usize,
+        weights: Weights<T, NX, NU>,
+        terminal: TerminalIngredient<T, NX>,
+        u: Bounds<T, NU>,
+    ) -> Self {
+        Self {
+            t_s,
+            horizon,
+            predictor: Predictor::StageConsistent(Rk4 { substeps: 1 }),
+            weights,
+            terminal,
+            x: Bounds::none(),
+            soft_x: [None; NX],
+            u,
+            scheduling: Scheduling::Predicted,
+            input_reference: InputReference::SteadyState,
+            iterations: Iterations::default(),
+            solver: SolverSettings::default(),
+        }
+    }
+
+    /// The same with these bounds of the state, each soft at an exact price: kept where that is
+    /// possible, exceeded as little as possible where it is not, so that a start outside of them
+    /// has a plan. With hard bounds the same start is infeasible.
+    ///
+    /// The prices are [`exact_prices`] of the terminal cost, which is to be that of an infinite horizon
+    /// (of the LQR), or of Q, sample by sample, with a terminal equality.
+    pub fn soft_bounds(self, x: Bounds<T, NX>) -> Self {
+        let samples: T = convert(self.horizon as f64);
+        let cost = match &self.terminal {
+            TerminalIngredient::Cost(p) if p.amax() > T::zero() => *p,
+            _ => self.weights.q * samples,
+        };
+        Self {
+            x,
+            soft_x: exact_prices(&cost, &x),
+            ..self
+        }
+    }
+}
+
+/// Price of a state bound exceeded by its width, in terminal costs of a state at that width: of a
+/// ballbot's plans from rest to set points up to 10 m away no multiplier of a bound was larger
+/// (`testdata/nonlinear-mpc/multipliers.py`).
+const PRICE_OF_WIDTH: f64 = 20.0;
+
+/// Prices of soft state bounds, high enough to be exact as a rule, from the cost x'Px of a state
+/// from there on (`cost` is P): 20 P_jj times the width of the bound per unit of excess, in the unit
+/// of the cost.
+///
+/// Exact means that a bound is exceeded only where it cannot be kept: the price is above the
+/// multiplier of the hard bound. That one is about the slope of the cost, 2 P_jj x_j, at the bound.
+pub fn exact_prices<T: Scalar, const NX: usize>(
+    cost: &SMatrix<T, NX, NX>,
+    x: &Bounds<T, NX>,
+) -> Softness<T, NX> {
+    let sides = x.lower.iter().zip(x.upper.iter());
+    let mut prices = [None; NX];
+    for (j, (place, (lower, upper))) in prices.iter_mut().zip(sides).enumerate() {
+        let width = match (lower.is_finite(), upper.is_finite()) {
+            (true, true) => *upper - *lower,
+            (true, false) => lower.abs(),
+            (false, true) => upper.abs(),
+            (false, false) => continue,
+        };
+        // A bound of no width, or at zero, is as dear as one of a unit; a state that costs nothing,
+        // as the dearest one.
+        let width = if width > T::zero() { width } else { T::one() };
+        let own = cost.get((j, j)).copied().unwrap_or_else(T::zero);
+        let slope = if own > T::zero() { own } else { cost.amax() };
+        *place = Some(Penalty {
+            linear: convert::<f64, T>(PRICE_OF_WIDTH) * slope * width,
+            quadratic: T::zero(),
+        });
+    }
+    prices
 }
 
 /// A mistake in the [`ControllerSettings`].

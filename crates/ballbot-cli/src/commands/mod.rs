@@ -18,6 +18,7 @@ pub mod scenario;
 pub mod simulate;
 pub mod verify;
 pub mod view;
+pub mod wheels;
 
 use crate::figures::FigureError;
 use crate::input::InputError;
@@ -100,6 +101,9 @@ pub enum CommandError {
     /// An excitation that cannot be.
     #[error(transparent)]
     Excitation(#[from] ExcitationError),
+    /// Wheels that are not as a configuration says.
+    #[error("{0}")]
+    Wheels(String),
     /// A run that ended before its time.
     #[error(
         "the {what} ended early, {ending}\nat phi = {:.4} rad, theta = {:.4} rad, phi_dot = {:.4} \

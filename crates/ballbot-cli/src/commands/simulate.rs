@@ -106,7 +106,7 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
         .zip(&trajectories)
         .map(|(plane, run)| Metrics::new(&prepared, plane, run))
         .collect();
-    let summary = summary(&prepared, &metrics, folder.path());
+    let summary = summary(&prepared, &metrics, folder.path()) + &readings(&rows);
     let document = json!({
         "title": prepared.title,
         "samples": prepared.samples,
@@ -166,6 +166,22 @@ fn motors_of_planes(prepared: &Prepared, trajectories: &[Trajectory<4, 1>]) -> V
         torques,
     });
     samples.collect()
+}
+
+/// What was wrong with the readings of each plane, in a line each.
+fn readings(logs: &[Vec<LogRow<4, 1>>]) -> String {
+    let planes = match logs.len() {
+        1 => ["", ""],
+        _ => [" of the x plane", " of the y plane"],
+    };
+    let lines = planes.iter().zip(logs).map(|(plane, log)| {
+        let seen = log.iter().map(|row| (row.t, row.observation));
+        (plane, words::readings(seen))
+    });
+    lines
+        .filter(|(_, told)| !told.is_empty())
+        .map(|(plane, told)| format!("\nreadings{plane}: {told}"))
+        .collect()
 }
 
 /// The files of the planes' logs.

@@ -55,7 +55,7 @@ fn an_infeasible_problem_keeps_what_was_recorded() {
         &[
             "the run ended early",
             "t = 3.000 s",
-            "bound of ",
+            "terminal equality of phi at stage 20 cannot be met",
             "at stage ",
         ],
     );
@@ -81,7 +81,11 @@ fn an_infeasible_start_is_said_so() {
     ));
     assert_says(
         &message,
-        &["no plan at t = 0.000 s", "infeasible", "bound of "],
+        &[
+            "no plan at t = 0.000 s",
+            "infeasible",
+            "terminal equality of phi at stage 20 cannot be met",
+        ],
     );
     let results = folder.path().join("out/my");
     let (rows, end) = recorded::trajectory(&results.join("trajectory.csv"));

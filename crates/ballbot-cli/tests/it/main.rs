@@ -10,6 +10,7 @@ mod linearize;
 mod lqr;
 mod program;
 mod refine;
+mod wheels;
 
 use serde_json::Value;
 use std::process::{Command, Output};

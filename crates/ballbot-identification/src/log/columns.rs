@@ -1,6 +1,7 @@
 //! Where a log's quantities stand, and in which units.
 
-use ballbot::Wheels;
+use super::error::Problem;
+use ballbot::{AZIMUTHS_OF_PAPER_DEG, BadWheels, Wheel, Wheels};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -54,13 +55,17 @@ pub struct Channel {
     pub factor: f64,
 }
 
+fn azimuths_of_paper() -> [f64; 3] {
+    AZIMUTHS_OF_PAPER_DEG
+}
+
 fn one() -> f64 {
     1.0
 }
 
 /// The encoders of three wheels. The angles m of the wheels against the body are those of the
-/// virtual wheels, psi = W' m with the torque map W of the paper's eq. (6) (virtual work), and a
-/// plane's ball angle against the body is r_w / r_b psi.
+/// virtual wheels, psi = W' m with the torque map W of [`Wheels`] (virtual work), and a plane's
+/// ball angle against the body is r_w / r_b psi.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WheelEncoders {
@@ -68,8 +73,15 @@ pub struct WheelEncoders {
     pub plane: WheelPlane,
     /// Angle of the wheels' contact points from the top of the ball, degrees.
     pub zenith_angle_deg: f64,
-    /// The wheels in the order of the torque map; each factor is r_w / r_b for an angle of the
-    /// wheel, over the gear's ratio for one of the motor, negative for the other sign.
+    /// Azimuths of the wheels from the robot's x axis, counter-clockwise seen from above, degrees.
+    #[serde(default = "azimuths_of_paper")]
+    pub azimuths_deg: [f64; 3],
+    /// Which of the wheels turn by negative angles when the ball turns counter-clockwise, seen from
+    /// above.
+    #[serde(default)]
+    pub reversed: [bool; 3],
+    /// The encoders in the order of the wheels; each factor is r_w / r_b for an angle of the wheel,
+    /// over the gear's ratio for one of the motor.
     pub encoders: [Channel; 3],
     /// The wheels' torques in the same order, which are put together to that of the virtual wheel;
     /// `torque` is not read then.
@@ -81,7 +93,7 @@ pub struct WheelEncoders {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum WheelPlane {
-    /// The one whose ball angle moves the robot along x, towards the first wheel.
+    /// The one whose ball angle moves the robot along x.
     X,
     /// The one that moves it along y.
     Y,
@@ -129,26 +141,44 @@ impl Columns {
 }
 
 impl WheelEncoders {
-    /// What each encoder contributes to the ball angle; `None` where the zenith angle is none.
-    pub(super) fn weights(&self) -> Option<[f64; 3]> {
-        let wheels = Wheels::new(self.zenith_angle_deg.to_radians()).ok()?;
+    /// The wheels as they stand.
+    ///
+    /// # Errors
+    /// [`Problem::ZenithAngle`] or [`Problem::Azimuths`] where they cannot turn the ball as one likes.
+    pub fn wheels(&self) -> Result<Wheels<f64>, Problem> {
+        let wheels = std::array::from_fn(|i| Wheel {
+            azimuth: self.azimuths_deg[i].to_radians(),
+            reversed: self.reversed[i],
+        });
+        Wheels::new(self.zenith_angle_deg.to_radians(), wheels).map_err(|error| match error {
+            BadWheels::ZenithAngle(_) => Problem::ZenithAngle {
+                degrees: self.zenith_angle_deg,
+            },
+            BadWheels::Azimuths(_) => Problem::Azimuths {
+                degrees: self.azimuths_deg,
+            },
+        })
+    }
+
+    /// What each encoder contributes to the ball angle.
+    pub(super) fn weights(&self) -> Result<[f64; 3], Problem> {
+        let wheels = self.wheels()?;
         let plane = match self.plane {
             WheelPlane::X => 0,
             WheelPlane::Y => 1,
         };
         let matrix = wheels.matrix();
-        Some([0, 1, 2].map(|wheel| matrix[(wheel, plane)]))
+        Ok([0, 1, 2].map(|wheel| matrix[(wheel, plane)]))
     }
 
-    /// What each wheel's torque contributes to that of the virtual wheel; `None` where the zenith
-    /// angle is none.
-    pub(super) fn torque_weights(&self) -> Option<[f64; 3]> {
-        let wheels = Wheels::new(self.zenith_angle_deg.to_radians()).ok()?;
+    /// What each wheel's torque contributes to that of the virtual wheel.
+    pub(super) fn torque_weights(&self) -> Result<[f64; 3], Problem> {
+        let wheels = self.wheels()?;
         let plane = match self.plane {
             WheelPlane::X => 0,
             WheelPlane::Y => 1,
         };
-        Some([0, 1, 2].map(|wheel| {
+        Ok([0, 1, 2].map(|wheel| {
             let alone = Vector3::ith(wheel, 1.0);
             wheels.virtual_torques(&alone)[plane]
         }))

@@ -17,7 +17,8 @@ pub struct LogError {
 }
 
 impl LogError {
-    pub(super) fn at(path: &Path, problem: Problem) -> Self {
+    /// A problem with the file at `path`.
+    pub fn at(path: &Path, problem: Problem) -> Self {
         Self {
             path: path.to_owned(),
             problem,
@@ -75,6 +76,30 @@ pub enum Problem {
     ZenithAngle {
         /// The angle, degrees.
         degrees: f64,
+    },
+    /// Wheels that stand at one place.
+    #[error(
+        "[log.wheels] azimuths_deg = {degrees:?}: they must be finite and apart from each other \
+         (the paper's robot has [-90, 30, 150])"
+    )]
+    Azimuths {
+        /// The azimuths, degrees.
+        degrees: [f64; 3],
+    },
+    /// Encoders of wheels are needed, and not named.
+    #[error(
+        "the columns of the wheels' encoders are not named: say them in the [log.wheels] table of a \
+         configuration (`ballbot identify --example`)"
+    )]
+    NoWheels,
+    /// A log of a push in which the wheels stand, or go to and fro.
+    #[error(
+        "the wheels have turned by no more than {ball_deg:.1} degrees of the ball from the beginning \
+         to the end: push it in one direction, by a quarter of a turn or more"
+    )]
+    NoPush {
+        /// How far, degrees of the ball.
+        ball_deg: f64,
     },
     /// The first line has numbers only.
     #[error(

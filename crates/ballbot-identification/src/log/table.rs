@@ -1,7 +1,7 @@
 //! From the text of a CSV file to columns of numbers.
 
 use super::Progress;
-use super::columns::{APPLIED, COMMANDED, Channel, Columns, Dimension, WheelEncoders};
+use super::columns::{APPLIED, COMMANDED, Channel, Columns, Dimension};
 use super::error::Problem;
 use super::finding::Finding;
 use super::lines::Lines;
@@ -56,13 +56,7 @@ fn parse(
     progress: &dyn Fn(u64),
 ) -> Result<Table, Problem> {
     let mut lines = Lines::new(reader);
-    let header = if columns.header.is_empty() {
-        header(&mut lines, columns, findings)?
-    } else {
-        columns.header.clone()
-    };
-    duplicates(&header)?;
-    let header_line = lines.number;
+    let header = names(&mut lines, columns, findings)?;
     let (sources, commanded, torque) = sources(&header, columns)?;
     let mut table = Table {
         lines: Vec::new(),
@@ -71,6 +65,73 @@ fn parse(
         torque,
         rate_of_ball: columns.ball_dimension()? == Dimension::Rate,
     };
+    rows(
+        &mut lines,
+        &header,
+        columns,
+        findings,
+        progress,
+        &mut |fields, number| {
+            table.lines.push(number);
+            for (column, source) in table.columns.iter_mut().zip(&sources) {
+                column.push(combined(fields, source, number)?);
+            }
+            if let Some(source) = &commanded {
+                let commanded = value(fields[source.place], source, number)?;
+                table.commanded.push(commanded);
+            }
+            Ok(())
+        },
+    )?;
+    Ok(table)
+}
+
+/// The angles of the three encoders in rad, after their factors, row by row; NaN is a missing value.
+pub(super) fn encoders(path: &Path, columns: &Columns) -> Result<Vec<[f64; 3]>, Problem> {
+    let wheels = columns.wheels.as_ref().ok_or(Problem::NoWheels)?;
+    let file = File::open(path).map_err(Problem::Read)?;
+    let mut lines = Lines::new(BufReader::new(file));
+    let mut findings = Vec::new();
+    let header = names(&mut lines, columns, &mut findings)?;
+    let [first, second, third] = &wheels.encoders;
+    let sources = [
+        source(&header, first, Dimension::Angle)?,
+        source(&header, second, Dimension::Angle)?,
+        source(&header, third, Dimension::Angle)?,
+    ];
+    let mut angles = Vec::new();
+    rows(
+        &mut lines,
+        &header,
+        columns,
+        &mut findings,
+        &|_| (),
+        &mut |fields, number| {
+            let mut row = [0.0; 3];
+            for (angle, source) in row.iter_mut().zip(&sources) {
+                *angle = value(fields[source.place], source, number)?;
+            }
+            angles.push(row);
+            Ok(())
+        },
+    )?;
+    Ok(angles)
+}
+
+/// Takes the fields of a row, and its line.
+type TakeRow<'a> = dyn FnMut(&[&str], usize) -> Result<(), Problem> + 'a;
+
+/// Calls `take` for every row below the header with its fields, as many as the header has, and its
+/// line.
+fn rows(
+    lines: &mut Lines<impl BufRead>,
+    header: &[String],
+    columns: &Columns,
+    findings: &mut Vec<Finding>,
+    progress: &dyn Fn(u64),
+    take: &mut TakeRow<'_>,
+) -> Result<(), Problem> {
+    let header_line = lines.number;
     let mut reported = 0;
     while lines.advance()? {
         if lines.bytes >= reported + REPORT {
@@ -96,23 +157,12 @@ fn parse(
                 header_line,
             });
         }
-        if fields
-            .iter()
-            .zip(&header)
-            .all(|(field, name)| field == name)
-        {
+        if fields.iter().zip(header).all(|(field, name)| field == name) {
             return Err(Problem::SecondHeader { line: number });
         }
-        table.lines.push(number);
-        for (column, source) in table.columns.iter_mut().zip(&sources) {
-            column.push(combined(&fields, source, number)?);
-        }
-        if let Some(source) = &commanded {
-            let commanded = value(fields[source.place], source, number)?;
-            table.commanded.push(commanded);
-        }
+        take(&fields, number)?;
     }
-    Ok(table)
+    Ok(())
 }
 
 /// A blank line or a comment.
@@ -131,6 +181,21 @@ fn split(line: &str, delimiter: char) -> impl Iterator<Item = &str> {
 }
 
 /// The names of the columns.
+fn names(
+    lines: &mut Lines<impl BufRead>,
+    columns: &Columns,
+    findings: &mut Vec<Finding>,
+) -> Result<Vec<String>, Problem> {
+    let names = if columns.header.is_empty() {
+        header(lines, columns, findings)?
+    } else {
+        columns.header.clone()
+    };
+    duplicates(&names)?;
+    Ok(names)
+}
+
+/// The names in the file's first line.
 fn header(
     lines: &mut Lines<impl BufRead>,
     columns: &Columns,
@@ -220,8 +285,8 @@ fn sources(header: &[String], columns: &Columns) -> Result<Sources, Problem> {
         },
         match torques {
             Some((wheels, torques)) => {
-                let weights = wheels.torque_weights();
-                weighted(header, wheels, torques, weights, Dimension::Torque)?
+                let weights = wheels.torque_weights()?;
+                weighted(header, torques, weights, Dimension::Torque)?
             }
             None => vec![source(header, &torque, Dimension::Torque)?],
         },
@@ -235,26 +300,16 @@ fn ball_angle(header: &[String], columns: &Columns) -> Result<Vec<Source>, Probl
     let Some(wheels) = &columns.wheels else {
         return Ok(vec![source(header, &columns.phi, dimension)?]);
     };
-    weighted(
-        header,
-        wheels,
-        &wheels.encoders,
-        wheels.weights(),
-        dimension,
-    )
+    weighted(header, &wheels.encoders, wheels.weights()?, dimension)
 }
 
 /// The columns of three wheels, each with its weight.
 fn weighted(
     header: &[String],
-    wheels: &WheelEncoders,
     channels: &[Channel; 3],
-    weights: Option<[f64; 3]>,
+    weights: [f64; 3],
     dimension: Dimension,
 ) -> Result<Vec<Source>, Problem> {
-    let weights = weights.ok_or(Problem::ZenithAngle {
-        degrees: wheels.zenith_angle_deg,
-    })?;
     let channels = channels.iter().zip(weights);
     channels
         .map(|(channel, weight)| {

@@ -35,8 +35,23 @@ impl<const R: usize, const C: usize, const D: usize> TaylorMap<R, C, D> {
             squares: std::array::from_fn(|k| {
                 std::array::from_fn(|l| matrix(&|entry| entry.squares[k][l]))
             }),
-            error: known(frobenius(&errors)),
+            error: frobenius(&errors),
         }
+        .checked()
+    }
+
+    /// Nothing is known of a matrix whose coefficients have overflowed.
+    fn checked(self) -> Self {
+        let squares = self.upper().map(|(i, j)| &self.squares[i][j]);
+        let matrices = std::iter::once(&self.middle).chain(&self.slopes);
+        let mut entries = matrices.chain(squares).flat_map(SMatrix::iter);
+        let finite = entries.all(|entry| entry.is_finite());
+        let error = if finite {
+            known(self.error)
+        } else {
+            f64::INFINITY
+        };
+        Self { error, ..self }
     }
 
     /// The same matrix at every z.
@@ -104,14 +119,16 @@ impl<const R: usize, const C: usize, const D: usize> TaylorMap<R, C, D> {
         // Of order three and four.
         let beyond = a1 * b2 + a2 * b1 + a2 * b2;
         let errors = self.error * (b + b1 + b2 + other.error) + other.error * (a + a1 + a2);
+        let (size, other_size) = (self.size(), other.size());
+        let zero = size + self.error == 0.0 || other_size + other.error == 0.0;
+        let underflow = if zero { 0.0 } else { UNDERFLOW };
         TaylorMap {
             middle: m * n,
             slopes: std::array::from_fn(|k| m * q[k] + p[k] * n),
             squares,
-            error: known(
-                (beyond + errors + ROUNDING * self.size() * other.size()) * (1.0 + ROUNDING),
-            ),
+            error: (beyond + errors + ROUNDING * size * other_size + underflow) * (1.0 + ROUNDING),
         }
+        .checked()
     }
 
     /// The sum.
@@ -126,9 +143,10 @@ impl<const R: usize, const C: usize, const D: usize> TaylorMap<R, C, D> {
         };
         let rounding = ROUNDING * sum.size();
         Self {
-            error: known((self.error + other.error + rounding) * (1.0 + ROUNDING)),
+            error: (self.error + other.error + rounding) * (1.0 + ROUNDING),
             ..sum
         }
+        .checked()
     }
 
     /// A bound of the entries' sizes, each summed over all coefficients.
@@ -153,8 +171,10 @@ impl<const R: usize, const C: usize, const D: usize> TaylorMap<R, C, D> {
                 terms += euclidean(&square);
             }
         }
-        affine.error = known(terms * (1.0 + ROUNDING));
-        affine
+        // Halves of subnormal numbers are rounded, too.
+        let underflow = if terms > 0.0 { UNDERFLOW } else { 0.0 };
+        affine.error = (terms + underflow) * (1.0 + ROUNDING);
+        affine.checked()
     }
 
     /// The linear part at a corner of the box, given by the signs of z, without the error.
@@ -198,13 +218,43 @@ pub(super) fn known(error: f64) -> f64 {
     if error.is_nan() { f64::INFINITY } else { error }
 }
 
+/// What is lost where products underflow, over all that is summed in one coefficient and in its
+/// error: each loses less than the smallest subnormal number.
+pub(super) const UNDERFLOW: f64 = f64::MIN_POSITIVE;
+
+/// An upper bound of the root of the sum of the squares of the entries; infinite if an entry is.
 pub(super) fn frobenius<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) -> f64 {
-    m.norm() * (1.0 + ROUNDING)
+    scaled(m, |m| m.norm() * (1.0 + ROUNDING))
+}
+
+/// `norm` of a matrix whose fourth powers neither overflow nor underflow: where the entries are so large
+/// or small, of the matrix over its largest one.
+fn scaled<const R: usize, const C: usize>(
+    m: &SMatrix<f64, R, C>,
+    norm: impl Fn(&SMatrix<f64, R, C>) -> f64,
+) -> f64 {
+    const SAFE: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
+    if !m.iter().all(|entry| entry.is_finite()) {
+        return f64::INFINITY;
+    }
+    let largest = m.amax();
+    if largest == 0.0 {
+        0.0
+    } else if SAFE.contains(&largest) {
+        norm(m)
+    } else {
+        // Rounded once more by the division, and by the product, which may be subnormal.
+        (largest * norm(&(m / largest)) * (1.0 + ROUNDING)).next_up()
+    }
 }
 
 /// An upper bound of the Euclidean operator norm, at most 1 % above it for four columns: with
 /// S = M'M, |M|^2 = |S| <= |S^n|_F^(1/n).
 pub(super) fn euclidean<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) -> f64 {
+    scaled(m, by_powers)
+}
+
+fn by_powers<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) -> f64 {
     const SQUARINGS: i32 = 5;
     let mut power = m.transpose() * m;
     let mut bound = 1.0;

@@ -101,9 +101,12 @@ impl<const D: usize> TaylorModel<D> {
     /// With the errors `terms`, themselves rounded.
     fn within(self, terms: f64) -> Self {
         let error = terms * UPWARDS + TINY;
+        let squares = self.squares.iter().flatten();
+        let mut coefficients = self.slopes.iter().chain(squares).chain([&self.middle]);
+        // A NaN anywhere is an unknown, and so is what has overflowed.
+        let unknown = error.is_nan() || !coefficients.all(|entry| entry.is_finite());
         Self {
-            // A NaN anywhere is an unknown.
-            error: if error.is_nan() { f64::INFINITY } else { error },
+            error: if unknown { f64::INFINITY } else { error },
             ..self
         }
     }

@@ -155,3 +155,45 @@ fn both_forms_of_the_pendulum_agree() {
         assert_eq!(input[i][0].middle(), b[i]);
     }
 }
+
+/// The norm and the square of 1e-200 I were 0 with the error 0, and a finite error stood beside
+/// coefficients that had overflowed.
+#[test]
+fn maps_of_tiny_and_huge_numbers_hold_what_is_true() {
+    let map = |size: f64| TaylorMap::<2, 2, 2>::constant(Matrix2::identity() * size);
+    for size in [
+        5e-324, 1e-310, 1e-200, 1e-160, 1e-101, 1e-99, 1e99, 1e101, 1e160, 1e300,
+    ] {
+        let tried = map(size);
+        assert!(tried.norm() >= size, "{size:e}: {:e}", tried.norm());
+        let close = tried.norm() <= 1.02 * size + 1e-322;
+        assert!(close, "{size:e}: {:e}", tried.norm());
+        let square = tried.times(&tried);
+        let expected = size * size;
+        // 0 and infinity stand for what is beyond the numbers.
+        let off = (square.middle[(0, 0)] - expected).abs();
+        if expected == 0.0 {
+            assert!(square.error > 0.0, "{size:e}");
+        } else if expected.is_finite() {
+            assert!(off <= square.error && square.error < 1e-12 * expected + 1e-300);
+        } else {
+            assert_eq!(square.error, f64::INFINITY, "{size:e}");
+        }
+    }
+    // Overflow in the coefficients alone: 64 eps times the sizes is still a number.
+    let product = map(1e170).times(&map(1e140));
+    assert_eq!(product.error, f64::INFINITY);
+    let sum = map(1.5e308).plus(&map(1.5e308));
+    assert_eq!(sum.error, f64::INFINITY);
+    let model = |value: f64| TaylorModel::<2>::constant(value);
+    assert_eq!((model(1e170) * model(1e140)).error, f64::INFINITY);
+    assert_eq!((model(1.5e308) + model(1.5e308)).error, f64::INFINITY);
+    assert!((model(1e-200) * model(1e-200)).error > 0.0);
+    let zero = map(0.0);
+    assert_eq!((zero.norm(), zero.times(&map(1e300)).error), (0.0, 0.0));
+    assert_eq!(map(f64::NAN).norm(), f64::INFINITY);
+    let mut mixed = map(1e-200);
+    mixed.squares[0][1] = Matrix2::identity() * 5e-324;
+    assert!(mixed.affine().error >= 5e-324);
+    assert!(mixed.norm() > 1e-200);
+}

@@ -3,15 +3,15 @@
 use crate::plant::CartPole;
 use lpvmpc::riccati::{BadPivot, CostToGo, StageFactor};
 use lpvmpc::{
-    Bounds, Controller, ControllerSettings, InputReference, Iterations, LpvModel, Predictor, Rk4,
-    Scheduling, SolverSettings, Stage, TerminalIngredient, Weights,
+    Bounds, Controller, ControllerSettings, Iterations, LpvModel, Predictor, Rk4, Scheduling,
+    Stage, TerminalIngredient, Weights,
 };
 use nalgebra::{Matrix1, Matrix4, Vector1, Vector2, Vector4};
 
 /// Stages of the horizon.
 pub const STAGES: usize = 30;
-/// One place for every stage's input bound.
-pub const ROWS: usize = STAGES;
+/// Places for every stage's input bound, and for the end of the track where it is exceeded.
+pub const ROWS: usize = 3 * STAGES;
 /// The controller: 4 states, 1 input, 2 scheduling parameters.
 pub type Regulator = Controller<CartPole<f64>, f64, 4, 1, 2, STAGES, ROWS>;
 
@@ -39,22 +39,17 @@ pub fn settings(
     let mut x = Bounds::none();
     x.lower[0] = -track;
     x.upper[0] = track;
+    let terminal = TerminalIngredient::Cost(terminal_weight(&a, &b, &weights)?);
+    let force = Bounds {
+        lower: Vector1::new(-FORCE),
+        upper: Vector1::new(FORCE),
+    };
+    let settings = ControllerSettings::new(t_s, STAGES, weights, terminal, force);
     Ok(ControllerSettings {
-        t_s,
-        horizon: STAGES,
         predictor,
-        weights,
-        terminal: TerminalIngredient::Cost(terminal_weight(&a, &b, &weights)?),
-        x,
-        u: Bounds {
-            lower: Vector1::new(-FORCE),
-            upper: Vector1::new(FORCE),
-        },
-        soft_x: [None; 4],
-        input_reference: InputReference::SteadyState,
         scheduling,
         iterations: Iterations::Fixed(1),
-        solver: SolverSettings::default(),
+        ..settings.soft_bounds(x)
     })
 }
 

@@ -33,6 +33,21 @@ impl<T: Scalar, const NX: usize, const ND: usize> Covariance<T, NX, ND> {
         )
     }
 
+    /// Raises the variances of the `chosen` components of z by as much as explains the `error` of
+    /// `c`'z; what is added hangs together with nothing.
+    pub(super) fn open(&mut self, chosen: &[bool; NX], c: &SVector<T, NX>, error: T) {
+        let known = c.dot(&(self.zz * c));
+        if !(known > T::zero()) {
+            return;
+        }
+        let factor = T::one() + error * error / known;
+        for (i, chosen) in chosen.iter().enumerate() {
+            if let (true, Some(variance)) = (*chosen, self.zz.get_mut((i, i))) {
+                *variance *= factor;
+            }
+        }
+    }
+
     /// Takes in a measurement of c_z'z + c_d'd with the variance `noise`, and returns the gain:
     /// P <- (I - K c')P(I - K c')' + K noise K', which stays positive semidefinite whatever the
     /// rounding of K.

@@ -1,10 +1,12 @@
 //! What defines an estimator besides its model, and what can be wrong with it.
 
 use super::Covariance;
+use super::history::{Estimate, Taken};
+use super::observation::Verdict;
 use crate::model::Scalar;
 use crate::predictor::Rk4;
 use core::fmt;
-use nalgebra::{SMatrix, SVector, convert};
+use nalgebra::{RowSVector, SMatrix, SVector, convert};
 
 /// Everything that defines an [`Estimator`](super::Estimator) besides its model.
 ///
@@ -59,6 +61,24 @@ pub struct Gate<T> {
     pub patience: usize,
     /// A reading older than this is stale, s.
     pub oldest: T,
+    /// Without a reading that is believed for longer than this, s, there is no estimate any more:
+    /// of an unstable plant an error has grown to anything by then. Infinite for a plant that can
+    /// be predicted for ever.
+    pub longest_gap: T,
+}
+
+impl<T: Scalar> Gate<T> {
+    /// What is wrong with a reading whatever the estimate, if anything.
+    pub(super) fn refuses(&self, reading: &Reading<T>) -> Option<Verdict> {
+        if !reading.value.is_finite() {
+            Some(Verdict::NotFinite)
+        } else if reading.age <= self.oldest {
+            None
+        } else {
+            // An age that is not a number is too old, too.
+            Some(Verdict::Stale)
+        }
+    }
 }
 
 /// A measured value.
@@ -78,21 +98,6 @@ impl<T: Scalar> Reading<T> {
             age: T::zero(),
         }
     }
-}
-
-/// What became of a reading.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// It has corrected the estimate.
-    Used,
-    /// It has corrected the estimate after the state's variance was raised.
-    UsedAfterBlow,
-    /// There was none, or no number.
-    Missing,
-    /// It was too old.
-    Stale,
-    /// It was too far from the prediction.
-    Outlier,
 }
 
 /// A mistake in the [`EstimatorSettings`].
@@ -129,7 +134,8 @@ impl fmt::Display for EstimatorError {
             ),
             Self::Gate => write!(
                 f,
-                "the gate's deviations must be positive, and its oldest age not negative"
+                "the gate's deviations and longest gap must be positive, and its oldest age not \
+                 negative"
             ),
         }
     }
@@ -151,8 +157,27 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NY: usize, const ND: usi
         Rk4 { substeps }
     }
 
-    pub(super) fn initial_covariance(&self) -> Covariance<T, NX, ND> {
-        self.spread(&self.initial_state, &self.initial_disturbance)
+    /// What is known at the start from the state `x`.
+    pub(super) fn initial(&self, x: SVector<T, NX>) -> Estimate<T, NX, ND> {
+        Estimate {
+            z: x,
+            d: SVector::zeros(),
+            covariance: self.spread(&self.initial_state, &self.initial_disturbance),
+        }
+    }
+
+    /// Which states a blow may have changed: what noise drives, which are the rates as a rule, and
+    /// what is read at the same instant, so that it is found again at once. To doubt another one
+    /// would leave it to be guessed from errors of the model until a reading of it arrives.
+    pub(super) fn struck(&self, readings: &[Option<Taken<T>>; NY]) -> [bool; NX] {
+        let zero = T::zero();
+        let driven = self.state_noise.map(|noise| noise > zero);
+        core::array::from_fn(|state| {
+            let mut rows = self.c.row_iter().zip(readings);
+            let shows = |row: &RowSVector<T, NX>| row.get(state).is_some_and(|c| *c != zero);
+            driven.get(state) == Some(&true)
+                || rows.any(|(row, reading)| reading.is_some() && shows(&row.into_owned()))
+        })
     }
 
     /// The covariance of (z, d) where x and d vary independently of each other. A disturbance
@@ -209,7 +234,13 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NY: usize, const ND: usi
                 });
             }
         }
-        if self.gate.deviations > T::zero() && self.gate.oldest >= T::zero() {
+        let Gate {
+            deviations,
+            oldest,
+            longest_gap,
+            ..
+        } = self.gate;
+        if deviations > T::zero() && oldest >= T::zero() && longest_gap > T::zero() {
             Ok(())
         } else {
             Err(EstimatorError::Gate)

@@ -1,18 +1,20 @@
 //! Readings that must not be believed.
 
-use crate::pendulum::{Pendulum, settings};
-use lpvmpc::{Estimator, Reading, Rk4, Verdict};
+use crate::pendulum::{Observer, Pendulum, settings};
+use lpvmpc::{Reading, Rk4, Verdict};
 use nalgebra::{Vector1, Vector2};
 
 const T_S: f64 = 0.01;
 
 /// An estimator that has settled at the upright pendulum, and the held-up pendulum itself.
-fn settled() -> Estimator<Pendulum, f64, 2, 1, 1, 1, 1> {
-    let mut estimator = Estimator::new(Pendulum, settings(), Vector2::zeros()).unwrap();
+fn settled() -> Observer<Pendulum> {
+    let mut estimator = Observer::new(Pendulum, settings(), Vector2::zeros()).unwrap();
     for _ in 0..500 {
         estimator.advance(&Vector1::zeros(), T_S);
         estimator.update(&[Some(Reading::fresh(0.0))]);
     }
+    // An instant without a reading.
+    estimator.advance(&Vector1::zeros(), T_S);
     estimator
 }
 
@@ -37,14 +39,14 @@ fn an_outlier_is_seen_and_changes_nothing() {
 }
 
 #[test]
-fn what_is_no_number_is_missing_and_what_is_old_is_stale() {
+fn what_is_no_number_and_what_is_old_is_refused_and_said() {
     let mut estimator = settled();
     let before = estimator.state();
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let verdict = estimator.update(&[Some(Reading::fresh(value))]);
-        assert_eq!(verdict, [Verdict::Missing], "{value}");
+        assert_eq!(verdict, [Verdict::NotFinite], "{value}");
     }
-    for age in [0.051, f64::NAN, f64::INFINITY] {
+    for age in [0.0501, f64::NAN, f64::INFINITY] {
         let reading = Reading { value: 0.001, age };
         assert_eq!(
             estimator.update(&[Some(reading)]),
@@ -55,7 +57,7 @@ fn what_is_no_number_is_missing_and_what_is_old_is_stale() {
     assert_eq!(estimator.state(), before);
     let reading = Reading {
         value: 0.001,
-        age: 0.05,
+        age: 0.045,
     };
     assert_eq!(estimator.update(&[Some(reading)]), [Verdict::Used]);
     assert_ne!(estimator.state(), before);

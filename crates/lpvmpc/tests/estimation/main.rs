@@ -5,9 +5,11 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
+mod clock;
 mod delay;
 mod estimator;
 mod gate;
+mod late;
 mod pendulum;
 mod ramp;
 mod set_points;

@@ -1,6 +1,6 @@
 //! A pendulum about its upright position, and an estimator that sees its angle.
 
-use lpvmpc::{EstimatorSettings, Gate, LpvModel};
+use lpvmpc::{Estimator, EstimatorSettings, Gate, LpvModel};
 use nalgebra::{Matrix1x2, Matrix2, SMatrix, SVector, Vector1, Vector2};
 
 /// 1 kg on a rod of 1 m, with a torque in N m; x = (angle rad, rate rad/s).
@@ -42,6 +42,10 @@ pub fn settings() -> EstimatorSettings<f64, 2, 1, 1, 1> {
             deviations: 6.0,
             patience: 3,
             oldest: 0.05,
+            longest_gap: 0.5,
         },
     }
 }
+
+/// An estimator of the pendulum's state and the torque that remembers eight instants.
+pub type Observer<P> = Estimator<P, f64, 2, 1, 1, 1, 1, 8>;

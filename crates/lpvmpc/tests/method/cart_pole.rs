@@ -4,7 +4,10 @@ use crate::closed_loop::{self, Sample};
 use crate::plant::CartPole;
 use crate::regulator::{self, FORCE, Regulator};
 use crate::rng::Rng;
-use lpvmpc::{Controller, LpvModel, Scheduling, TerminalIngredient};
+use lpvmpc::{
+    Controller, ControllerSettings, LpvModel, Quantity, Reference, Scheduling, Side, Status,
+    TerminalIngredient, Workspace,
+};
 use nalgebra::{Vector1, Vector2, Vector4};
 use std::f64::consts::PI;
 
@@ -153,4 +156,51 @@ fn near_upright_both_controllers_are_the_same() {
     // No bound is active at these tilts. The next term is smaller by theta^2 and theta_dot^2.
     let order = (coarse / fine).log2();
     assert!((order - 3.0).abs() < 0.1, "order {order}");
+}
+
+/// A start 1 cm beyond the end of the track was infeasible for ever, the force went from bound to
+/// bound, and the message named the force at stage 37.
+#[test]
+fn a_start_outside_of_a_state_bound_has_a_plan_and_comes_back() {
+    let plant = CartPole::laboratory();
+    let settings = regulator::settings(&plant, 0.4, Scheduling::Predicted).unwrap();
+    for (s, theta) in [(0.41, 0.0), (-0.45, 0.02), (0.41, 0.1)] {
+        let start = Vector4::new(s, theta, 0.0, 0.0);
+        let mut controller: Regulator = Controller::new(plant, settings).unwrap();
+        let samples = closed_loop::run(&plant, &mut controller, start, 100);
+        for (k, sample) in samples.iter().enumerate() {
+            assert!(sample.status.is_solved(), "{start}, sample {k}");
+            let outside = sample.x[0].abs() > 0.4 + 1e-3;
+            assert!(!outside || k < 20, "{start}, sample {k}: {}", sample.x);
+        }
+        assert!(samples.last().unwrap().x.norm() < 0.02);
+    }
+}
+
+/// Hard on request; and then the cause is told: the bound that the start lies beyond.
+#[test]
+fn a_hard_bound_that_cannot_be_kept_is_named_with_its_first_stage() {
+    let plant = CartPole::laboratory();
+    let soft = regulator::settings(&plant, 0.4, Scheduling::Predicted).unwrap();
+    let hard = ControllerSettings {
+        soft_x: [None; 4],
+        ..soft
+    };
+    for (s, side) in [
+        (0.43, Side::Upper),
+        (-0.43, Side::Lower),
+        (0.6, Side::Upper),
+    ] {
+        let mut controller: Regulator = Controller::new(plant, hard).unwrap();
+        let mut workspace = Workspace::new();
+        let start = Vector4::new(s, 0.0, 0.0, 0.0);
+        let upright = Reference::constant(Vector4::zeros());
+        let plan = controller.step(&start, &upright, &mut workspace);
+        let Status::Infeasible(cause) = plan.status else {
+            panic!("{}", plan.status);
+        };
+        assert_eq!((cause.quantity, cause.side), (Quantity::State(0), side));
+        // 15 N move a cart of 1 kg by 2 cm in a sample, and the pole with it.
+        assert!(cause.stage <= 3, "{cause}");
+    }
 }

@@ -115,7 +115,7 @@ fn replay(
     workspace: &mut Workspace,
     counter: &mut InstructionCounter,
 ) -> u32 {
-    let Ok(wheels) = Wheels::new(recording.zenith_angle) else {
+    let Ok(wheels) = Wheels::of_paper(recording.zenith_angle) else {
         failure::stop()
     };
     let mut deepest = 0;

@@ -154,9 +154,8 @@ fn a_terminal_equality_that_cannot_be_met() {
     let Status::Infeasible(bound) = plan.status else {
         panic!("{}", plan.status);
     };
-    // It is a bound that the program has: the force at a stage, or the track at a later one.
+    // It is a bound that the program has, and no force: those alone contradict nothing.
     match (bound.quantity, bound.side) {
-        (Quantity::Input(0), Side::Lower | Side::Upper) => assert!(bound.stage < N),
         (Quantity::State(0), Side::Lower | Side::Upper) => {
             assert!((1..=N).contains(&bound.stage));
         }
@@ -185,8 +184,12 @@ fn a_state_bound_that_cannot_be_met() {
     let Status::Infeasible(bound) = plan.status else {
         panic!("{}", plan.status);
     };
-    let named = matches!(bound.quantity, Quantity::State(0) | Quantity::Input(0));
-    assert!(named, "{bound}");
+    // The track, not the force that cannot keep to it, and where it is first exceeded.
+    assert_eq!(
+        (bound.quantity, bound.stage),
+        (Quantity::State(0), 1),
+        "{bound}"
+    );
 }
 
 /// The answer at full room, and that it needs several changes and rows.

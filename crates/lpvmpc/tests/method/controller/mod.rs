@@ -20,6 +20,7 @@ fn settings(horizon: usize) -> ControllerSettings<f64, 4, 1, 2> {
     let plant = CartPole::laboratory();
     ControllerSettings {
         horizon,
+        soft_x: [None; 4],
         ..regulator::settings(&plant, 2.4, Scheduling::Predicted).unwrap()
     }
 }
