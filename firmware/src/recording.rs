@@ -3,8 +3,8 @@
 use crate::{N, Reference};
 use ballbot::Ballbot;
 use lpvmpc::{
-    Bounds, ControllerSettings, InputReference, Iterations, Penalty, Predictor, Rk4, Scheduling, SolverSettings,
-    TerminalIngredient, Weights,
+    Bounds, ControllerSettings, InputReference, Iterations, Penalty, Predictor, Rk4, Scheduling,
+    SolverSettings, TerminalIngredient, Weights,
 };
 use nalgebra::{Matrix1, Matrix4, Vector1, Vector4};
 

@@ -341,24 +341,23 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
         if sign == T::zero() {
             return false;
         }
-        let rates = self.direction.dual.iter();
-        let working = self.working.rows().iter().zip(rates).map(|(row, rate)| {
-            let multiplier = -*rate * sign;
-            let kept = row.equality || multiplier > T::zero();
-            let multiplier = if kept { multiplier } else { T::zero() };
-            ActiveRow {
-                multiplier,
-                ..row.active
-            }
-        });
         let candidate = ActiveRow {
             multiplier: sign,
             ..self.candidate.terms.active
         };
-        // What is that small is rounding.
-        let least = T::default_epsilon();
-        let mut rows = working.filter(|row| row.multiplier.abs() > least);
-        proof.push(candidate) && rows.all(|row| proof.push(row))
+        let rates = self.direction.dual.iter();
+        let mut rows = self.working.rows().iter().zip(rates);
+        proof.push(candidate)
+            && rows.all(|(row, rate)| {
+                let multiplier = -*rate * sign;
+                // What is smaller is rounding.
+                let counts = row.equality || multiplier > T::default_epsilon();
+                !counts
+                    || proof.push(ActiveRow {
+                        multiplier,
+                        ..row.active
+                    })
+            })
     }
 
     /// One step along the direction.

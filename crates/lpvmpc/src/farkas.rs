@@ -5,7 +5,11 @@ use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::rows;
 use crate::solution::{ActiveSet, Part, Side};
+use crate::solver::default_tolerance;
 use nalgebra::{SVector, convert};
+
+/// The sum is known to so many roundings of its terms.
+const ROUNDINGS: f64 = 100.0;
 
 /// By how much the hard bounds of `ocp` contradict each other under the multipliers of `proof`, less
 /// an estimate of rounding: above zero, no inputs satisfy them all.
@@ -34,9 +38,8 @@ pub fn infeasibility_margin<
     proof: &ActiveSet<T, M>,
 ) -> T {
     let nothing: T = convert(f64::NEG_INFINITY);
-    let eps = T::default_epsilon() * convert(4.0);
     // What the multipliers themselves are off by, from the search.
-    let rounding = T::default_epsilon().powf(convert(2.0 / 3.0));
+    let rounding: T = default_tolerance();
     // V, the sum of the sizes of its terms, and the largest sum of terms of an entry of g.
     let (mut least, mut size, mut largest) = (T::zero(), T::zero(), T::zero());
     for row in proof.iter().filter(|row| row.multiplier != T::zero()) {
@@ -82,7 +85,7 @@ pub fn infeasibility_margin<
     let (sum, sizes) = sum_and_size(&ocp.x0, &costate);
     least += sum;
     size += sizes;
-    least - eps * convert((n + NX + NU) as f64) * size
+    least - T::default_epsilon() * convert(ROUNDINGS) * size
 }
 
 /// a'b, and the sum of the sizes of its terms.

@@ -3,11 +3,12 @@
 
 use crate::active_set::DualActiveSet;
 use crate::farkas::infeasibility_margin;
+use crate::kernel::add_product;
 use crate::model::Scalar;
 use crate::ocp::{Bounds, Ocp, Penalty, Softness};
 use crate::riccati::{CostToGo, StageFactor};
 use crate::rows::Trajectory;
-use crate::solution::{ActiveRow, ActiveSet, Quantity, Solution, Status};
+use crate::solution::{ActiveRow, Quantity, Solution, Status};
 use nalgebra::{SVector, convert};
 
 /// Settings of the solver.
@@ -36,7 +37,8 @@ pub enum WarmStart {
     Shifted,
 }
 
-fn default_tolerance<T: Scalar>() -> T {
+#[inline(never)]
+pub(crate) fn default_tolerance<T: Scalar>() -> T {
     T::default_epsilon().powf(convert(2.0 / 3.0))
 }
 
@@ -140,21 +142,19 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         solution: &mut Solution<T, NX, NU, N, M>,
     ) -> Option<Status<T>> {
         let proof = &mut solution.active;
-        let attempts = [DualActiveSet::report_conflict, DualActiveSet::report];
-        let proves = |proof: &ActiveSet<T, M>| infeasibility_margin(ocp, proof) > T::zero();
-        if !attempts
-            .iter()
-            .any(|attempt| attempt(&self.dual, proof) && proves(proof))
-        {
+        if !(self.dual.report_conflict(proof) && infeasibility_margin(ocp, proof) > T::zero()) {
             proof.clear();
             return None;
         }
         // The bounds of inputs can be met by themselves: the earliest other bound is the cause.
-        let earliest = |row: &ActiveRow<T>| match row.bound.quantity {
-            Quantity::Input(_) => (1, row.bound.stage),
-            Quantity::State(_) | Quantity::Row(_) => (0, row.bound.stage),
-        };
-        let cause = proof.iter().min_by_key(earliest)?;
+        let mut cause = proof.iter().next()?;
+        for row in proof.iter() {
+            let of_input = |row: &ActiveRow<T>| matches!(row.bound.quantity, Quantity::Input(_));
+            let earlier = of_input(&cause) || row.bound.stage < cause.bound.stage;
+            if !of_input(&row) && earlier {
+                cause = row;
+            }
+        }
         Some(Status::Infeasible(cause.bound))
     }
 
@@ -328,7 +328,10 @@ fn fall_back<
     let mut x = ocp.x0;
     let places = solution.u.iter().zip(solution.x.iter_mut());
     for (stage, (u, x_next)) in ocp.stages.iter().zip(places).take(ocp.length()) {
-        x = stage.a * x + stage.b * u + stage.c;
+        let mut next = stage.c;
+        add_product(&mut next, &stage.a, &x);
+        add_product(&mut next, &stage.b, u);
+        x = next;
         *x_next = x;
     }
     solution.active.clear();
@@ -347,12 +350,9 @@ fn clip_inputs<
     ocp: &Ocp<T, NX, NU, N, NG>,
     solution: &mut Solution<T, NX, NU, N, M>,
 ) {
-    for (stage, u) in ocp
-        .stages
-        .iter()
-        .zip(solution.u.iter_mut())
-        .take(ocp.length())
-    {
+    // Slices of unknown length are not unrolled, for the flash of a microcontroller.
+    let inputs = solution.u.get_mut(..ocp.length()).unwrap_or_default();
+    for (u, stage) in inputs.iter_mut().zip(&ocp.stages) {
         *u = stage.u.project(u);
     }
 }
