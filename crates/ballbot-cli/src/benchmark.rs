@@ -141,7 +141,7 @@ pub fn time_guarded() -> Result<GuardedTimes, CommandError> {
         x = advance(&prepared.ballbot, &x, &u, settings.t_s, prepared.tolerances)?;
     }
     let descent_settings = ControllerSettings {
-        iterations: DESCENT,
+        iterations: Iterations::default(),
         ..plain_settings
     };
     let near = |k: usize| [1.0, -0.5, 2.0, -2.0, 0.0][k / HOLD % 5];
@@ -200,12 +200,6 @@ impl DescentTimes {
         })
     }
 }
-
-/// The default of scenarios.
-const DESCENT: Iterations<f64> = Iterations::Descent {
-    tolerance: 1e-3,
-    most: 8,
-};
 
 /// Times the controller of a scenario, without what stands around it, on the scenario's robot
 /// in an ideal world.

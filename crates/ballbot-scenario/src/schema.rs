@@ -6,6 +6,7 @@ use crate::heading_table::HeadingTable;
 use crate::parameters::Parameters;
 use crate::world_table::WorldTable;
 use ballbot::{AZIMUTHS_OF_PAPER_DEG, BadWheels, Wheel, Wheels};
+use lpvmpc::Iterations;
 use serde::{Deserialize, Serialize};
 
 /// A closed-loop experiment, as written in a TOML file. Units are part of the key names.
@@ -215,11 +216,11 @@ impl Default for IterationsTable {
 }
 
 fn descent_tolerance() -> f64 {
-    1e-3
+    Iterations::<f64>::TOLERANCE
 }
 
 fn descent_programs() -> usize {
-    8
+    Iterations::<f64>::MOST
 }
 
 /// What the bounds of the state are worth.

@@ -69,13 +69,18 @@ impl<T: Scalar> Default for Iterations<T> {
     /// A descent of at most eight programs to a thousandth of the cost.
     fn default() -> Self {
         Self::Descent {
-            tolerance: convert(1e-3),
-            most: 8,
+            tolerance: convert(Self::TOLERANCE),
+            most: Self::MOST,
         }
     }
 }
 
 impl<T: Scalar> Iterations<T> {
+    /// The tolerance of a descent where none is given.
+    pub const TOLERANCE: f64 = 1e-3;
+    /// Quadratic programs of a descent, at most, where no number is given.
+    pub const MOST: usize = 8;
+
     /// The largest number.
     pub fn most(&self) -> usize {
         match self {
