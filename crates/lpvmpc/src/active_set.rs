@@ -375,7 +375,8 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
     /// The active rows, with multipliers in the bounds' own direction.
     pub(crate) fn active(&self) -> impl Iterator<Item = ActiveRow<T>> {
         let working = self.working.rows().iter().map(Terms::reported);
-        working.chain(self.resting.iter())
+        let held_by_others = |row: &ActiveRow<T>| row.multiplier == T::zero();
+        working.chain(self.resting.iter().filter(move |row| !held_by_others(row)))
     }
 
     /// Hands over the active rows.

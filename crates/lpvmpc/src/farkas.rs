@@ -1,6 +1,7 @@
 //! Proof that a problem is infeasible: multipliers under which its hard bounds contradict each
 //! other (Farkas' lemma).
 
+use crate::adjoint::Adjoint;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::rows;
@@ -56,33 +57,31 @@ pub fn infeasibility_margin<
         least += term;
         size += term.abs();
     }
-    let n = ocp.length();
-    let (mut costate, _) = rows::gradient(ocp, proof.iter(), n);
-    for (i, stage) in ocp.stages.iter().enumerate().take(n).rev() {
-        let (rows_x, rows_u) = rows::gradient(ocp, proof.iter(), i);
-        let (sum, sizes) = sum_and_size(&stage.c, &costate);
+    let mut adjoint = Adjoint::new(ocp, None, proof);
+    while let Some(at) = adjoint.step(proof) {
+        let Some(stage) = ocp.stages.get(at.stage) else {
+            continue;
+        };
+        let (sum, sizes) = sum_and_size(&stage.c, &at.costate);
         least += sum;
         size += sizes;
-        for j in 0..NU {
-            let b: SVector<T, NX> = stage.b.column(j).into_owned();
-            let (sum, sizes) = sum_and_size(&b, &costate);
-            let (slope, terms) = (sum + rows_u[j], sizes + rows_u[j].abs());
-            let limit = if slope > T::zero() {
+        let terms = at.dynamics + at.rows.abs();
+        for (j, (slope, terms)) in at.gradient.iter().zip(terms.iter()).enumerate() {
+            let limit = if *slope > T::zero() {
                 stage.u.lower[j]
             } else {
                 stage.u.upper[j]
             };
-            largest = largest.max(terms);
+            largest = largest.max(*terms);
             if limit.is_finite() {
-                least += slope * limit;
-                size += terms * limit.abs();
+                least += *slope * limit;
+                size += *terms * limit.abs();
             } else if !(slope.abs() <= rounding * largest) {
                 return nothing;
             }
         }
-        costate = stage.a.tr_mul(&costate) + rows_x;
     }
-    let (sum, sizes) = sum_and_size(&ocp.x0, &costate);
+    let (sum, sizes) = sum_and_size(&ocp.x0, &adjoint.costate);
     least += sum;
     size += sizes;
     least - T::default_epsilon() * convert(ROUNDINGS) * size

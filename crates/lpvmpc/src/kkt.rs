@@ -1,5 +1,6 @@
 //! The Karush-Kuhn-Tucker conditions of the problem: the oracle for every solver.
 
+use crate::adjoint::Adjoint;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::rows::{self, Trajectory};
@@ -91,43 +92,14 @@ fn stationarity<
     trajectory: &Trajectory<'_, T, NX, NU, N>,
     active: &ActiveSet<T, M>,
 ) -> T {
-    let n = ocp.length();
     let mut largest_term = T::one();
     let mut largest = T::zero();
-    let x_n = state(ocp, trajectory, n);
-    let mut costate =
-        ocp.terminal.p * x_n + ocp.terminal.linear_x + rows::gradient(ocp, active.iter(), n).0;
-    for (i, (stage, u)) in ocp
-        .stages
-        .iter()
-        .zip(trajectory.u)
-        .enumerate()
-        .take(n)
-        .rev()
-    {
-        let x = state(ocp, trajectory, i);
-        let (rows_x, rows_u) = rows::gradient(ocp, active.iter(), i);
-        let through_dynamics = stage.b.tr_mul(&costate);
-        let weights = stage.r * u + stage.s * x + stage.linear_u;
-        let gradient = weights + through_dynamics + rows_u;
-        largest = larger(largest, magnitude(&gradient));
-        let terms = stage.b.abs().tr_mul(&costate.abs());
-        largest_term = largest_term.max(terms.amax()).max(rows_u.amax());
-        costate =
-            stage.q * x + stage.s.tr_mul(u) + stage.linear_x + stage.a.tr_mul(&costate) + rows_x;
+    let mut adjoint = Adjoint::new(ocp, Some(trajectory), active);
+    while let Some(at) = adjoint.step(active) {
+        largest = larger(largest, magnitude(&at.gradient));
+        largest_term = largest_term.max(at.dynamics.amax()).max(at.rows.amax());
     }
     largest / largest_term
-}
-
-fn state<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    trajectory: &Trajectory<'_, T, NX, NU, N>,
-    stage: usize,
-) -> SVector<T, NX> {
-    match stage.checked_sub(1) {
-        Some(before) => trajectory.x.get(before).copied().unwrap_or(ocp.x0),
-        None => ocp.x0,
-    }
 }
 
 /// Dynamics, hard bounds, terminal equality.
@@ -143,8 +115,8 @@ fn primal<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG:
         .enumerate()
         .take(ocp.length())
     {
-        let x_next = state(ocp, trajectory, i + 1);
-        let defect = stage.a * state(ocp, trajectory, i) + stage.b * u + stage.c - x_next;
+        let x_next = trajectory.state(ocp, i + 1);
+        let defect = stage.a * trajectory.state(ocp, i) + stage.b * u + stage.c - x_next;
         largest = larger(largest, magnitude(&defect) / x_next.amax().max(T::one()));
     }
     rows::violated_bounds(ocp, trajectory, &mut |candidate| {
@@ -159,7 +131,7 @@ fn primal<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG:
         }
     });
     if let Some(target) = &ocp.terminal.equality {
-        let x_n = state(ocp, trajectory, ocp.length());
+        let x_n = trajectory.state(ocp, ocp.length());
         let missed = magnitude(&(x_n - target)) / target.amax().max(T::one());
         largest = larger(largest, missed);
     }

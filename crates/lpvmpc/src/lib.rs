@@ -6,6 +6,7 @@
 )]
 
 mod active_set;
+mod adjoint;
 mod clock;
 mod controller;
 mod delay;
@@ -13,6 +14,7 @@ mod descent;
 mod estimator;
 mod farkas;
 mod guarded;
+mod held_inputs;
 mod kernel;
 mod kkt;
 mod last_plan;

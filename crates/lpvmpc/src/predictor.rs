@@ -92,6 +92,15 @@ impl Predictor {
     }
 }
 
+/// The continuous-time pair (A, B) at a state.
+type PairAt<'a, T, const NX: usize, const NU: usize> =
+    dyn Fn(&SVector<T, NX>) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) + 'a;
+
+/// The slope of a Runge-Kutta stage, from the state where the step began, the state of the stage, K_j
+/// and L_j.
+type SlopeAt<'a, T, const NX: usize, const NU: usize> = dyn Fn(&SVector<T, NX>, &SVector<T, NX>, &SMatrix<T, NX, NX>, &SMatrix<T, NX, NU>) -> SVector<T, NX>
+    + 'a;
+
 /// Classical Runge-Kutta method of order four with `substeps` equal steps per sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rk4 {
@@ -140,8 +149,6 @@ impl Rk4 {
 
     /// A_d x + B_d u = [`Rk4::advance`] at the given `x` and `u`: the steps' matrices with the
     /// scheduling that the nonlinear steps have at each of their stages.
-    // Not inlined, so that the frozen kinds keep the registers.
-    #[inline(never)]
     pub fn linearize<T, P, const NX: usize, const NU: usize, const NS: usize>(
         self,
         model: &P,
@@ -155,17 +162,19 @@ impl Rk4 {
     {
         let embedding = |x: &SVector<T, NX>| model.matrices(&model.scheduling(x));
         // The embedding is exact, so the products that are at hand anyway are the slopes.
-        let slope = |from: &SVector<T, NX>, _: &SVector<T, NX>, k: &_, l: &_| {
+        let slope = |from: &SVector<T, NX>,
+                     _: &SVector<T, NX>,
+                     k: &SMatrix<T, NX, NX>,
+                     l: &SMatrix<T, NX, NU>| {
             let mut slope = product(k, from);
             add_product(&mut slope, l, u);
             slope
         };
-        self.compose(model, x, t_s, embedding, slope)
+        self.compose(model, x, t_s, &embedding, &slope)
     }
 
     /// The derivatives of [`Rk4::advance`] with respect to `x` and `u`: the same recursion with the
     /// Jacobian of f in place of the embedding's matrices.
-    #[inline(never)]
     pub fn differentiate<T, P, const NX: usize, const NU: usize, const NS: usize>(
         self,
         model: &P,
@@ -178,30 +187,28 @@ impl Rk4 {
         P: LpvModel<T, NX, NU, NS>,
     {
         let jacobian = |x: &SVector<T, NX>| model.jacobian(x, u);
-        let slope =
-            |_: &SVector<T, NX>, there: &SVector<T, NX>, _: &_, _: &_| model.derivative(there, u);
-        self.compose(model, x, t_s, jacobian, slope)
+        let slope = |_: &SVector<T, NX>,
+                     there: &SVector<T, NX>,
+                     _: &SMatrix<T, NX, NX>,
+                     _: &SMatrix<T, NX, NU>| model.derivative(there, u);
+        self.compose(model, x, t_s, &jacobian, &slope)
     }
 
     /// The steps' matrices from the continuous-time pairs `at` each Runge-Kutta stage.
     ///
     /// With A_j, B_j at stage j, the stages' slopes are K_j x + L_j u (up to a constant where the
     /// pairs are Jacobians): K_1 = A_1, L_1 = B_1, K_2 = A_2 (I + h/2 K_1),
-    /// L_2 = B_2 + h/2 A_2 L_1, and so on. `slope` is the slope of a stage, from the state where the
-    /// step began, the state of the stage, K_j and L_j.
-    #[inline(always)]
+    /// L_2 = B_2 + h/2 A_2 L_1, and so on.
+    // Once in the machine code for both kinds of pairs, and not inlined, so that the frozen kinds of
+    // prediction keep the registers.
+    #[inline(never)]
     fn compose<T, P, const NX: usize, const NU: usize, const NS: usize>(
         self,
         model: &P,
         x: &SVector<T, NX>,
         t_s: T,
-        at: impl Fn(&SVector<T, NX>) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>),
-        slope: impl Fn(
-            &SVector<T, NX>,
-            &SVector<T, NX>,
-            &SMatrix<T, NX, NX>,
-            &SMatrix<T, NX, NU>,
-        ) -> SVector<T, NX>,
+        at: &PairAt<'_, T, NX, NU>,
+        slope: &SlopeAt<'_, T, NX, NU>,
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>)
     where
         T: Scalar,

@@ -60,7 +60,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     ///
     /// # Errors
     /// [`BadPivot`] if R + B'PB is not numerically positive definite.
-    #[inline(always)]
+    #[inline(never)]
     pub fn eliminate<const NG: usize>(
         &mut self,
         stage: &Stage<T, NX, NU, NG>,

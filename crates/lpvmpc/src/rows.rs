@@ -14,6 +14,18 @@ pub(crate) struct Trajectory<'a, T, const NX: usize, const NU: usize, const N: u
     pub u: &'a [SVector<T, NU>; N],
 }
 
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Trajectory<'_, T, NX, NU, N> {
+    /// x_`stage`, from 0 to the horizon.
+    pub fn state<const NG: usize>(
+        &self,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+        stage: usize,
+    ) -> SVector<T, NX> {
+        let later = stage.checked_sub(1).and_then(|before| self.x.get(before));
+        *later.unwrap_or(&ocp.x0)
+    }
+}
+
 /// A bound's value beside its limit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate<T> {
@@ -192,13 +204,10 @@ pub(crate) fn slack<
     trajectory: &Trajectory<'_, T, NX, NU, N>,
     bound: &BoundId,
 ) -> T {
-    let x = match bound.stage.checked_sub(1) {
-        Some(before) => trajectory.x.get(before).unwrap_or(&ocp.x0),
-        None => &ocp.x0,
-    };
+    let x = trajectory.state(ocp, bound.stage);
     let u = trajectory.u.get(bound.stage);
     let (normal_x, normal_u) = normal(ocp, bound);
-    let value = normal_x.dot(x) + u.map_or(T::zero(), |u| normal_u.dot(u));
+    let value = normal_x.dot(&x) + u.map_or(T::zero(), |u| normal_u.dot(u));
     let (lower, upper) = limits(ocp, bound);
     match bound.side {
         Side::Lower | Side::Equality => value - lower,

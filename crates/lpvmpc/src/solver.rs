@@ -3,12 +3,13 @@
 
 use crate::active_set::DualActiveSet;
 use crate::farkas::infeasibility_margin;
+use crate::held_inputs::{HeldInputs, eliminate_held};
 use crate::kernel::add_product;
 use crate::model::Scalar;
 use crate::ocp::{Bounds, Ocp, Penalty, Softness};
 use crate::riccati::{CostToGo, StageFactor};
 use crate::rows::Trajectory;
-use crate::solution::{ActiveRow, Quantity, Solution, Status};
+use crate::solution::{ActiveRow, ActiveSet, Quantity, Solution, Status};
 use nalgebra::{SVector, convert};
 
 /// Settings of the solver.
@@ -62,7 +63,9 @@ impl<T: Scalar> Default for SolverSettings<T> {
 #[derive(Clone, Debug)]
 pub struct Solver<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
     factors: [StageFactor<T, NX, NU>; N],
-    dual: DualActiveSet<T, NU, N, M>,
+    pub(crate) dual: DualActiveSet<T, NU, N, M>,
+    /// None but within [`Solver::search_with_held_inputs`].
+    pub(crate) held: HeldInputs<NU, N>,
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
@@ -75,6 +78,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         Self {
             factors: [StageFactor::zeros(); N],
             dual: DualActiveSet::new(),
+            held: HeldInputs::none(),
         }
     }
 
@@ -122,26 +126,35 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
             let left = settings.max_changes.saturating_sub(spent);
             self.dual.reset(self.dual.tolerance, left);
         };
+        let outcome = match outcome {
+            Err(Status::Inaccurate(bound)) => match self.prove(ocp, &mut solution.active) {
+                Some(infeasible) => Err(infeasible),
+                None => self.search_with_held_inputs(ocp, settings, solution, bound, &mut spent),
+            },
+            known => known,
+        };
         solution.changes = spent;
         solution.status = match outcome {
             Ok(()) => Status::Solved,
             Err(status) => {
+                if !matches!(status, Status::Infeasible(_)) {
+                    solution.active.clear();
+                }
                 fall_back(ocp, solution);
-                self.prove(ocp, solution).unwrap_or(status)
+                status
             }
         };
     }
 
-    /// The verdict that the problem is infeasible, with its proof in the active rows, if the search
-    /// ended in a conflict that is one.
+    /// The verdict that the problem is infeasible, and its `proof`, if the search ended in a conflict
+    /// that is one.
     #[cold]
     #[inline(never)]
-    fn prove<const NG: usize>(
+    pub(crate) fn prove<const NG: usize>(
         &self,
         ocp: &Ocp<T, NX, NU, N, NG>,
-        solution: &mut Solution<T, NX, NU, N, M>,
+        proof: &mut ActiveSet<T, M>,
     ) -> Option<Status<T>> {
-        let proof = &mut solution.active;
         if !(self.dual.report_conflict(proof) && infeasibility_margin(ocp, proof) > T::zero()) {
             proof.clear();
             return None;
@@ -158,7 +171,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         Some(Status::Infeasible(cause.bound))
     }
 
-    fn search<const NG: usize>(
+    pub(crate) fn search<const NG: usize>(
         &mut self,
         ocp: &Ocp<T, NX, NU, N, NG>,
         settings: &SolverSettings<T>,
@@ -210,9 +223,11 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         };
         let stages = ocp.stages.iter().zip(self.factors.iter_mut());
         for (stage, (data, factor)) in stages.enumerate().take(ocp.length()).rev() {
-            factor
-                .eliminate(data, &mut cost_to_go)
-                .map_err(|bad| failed_pivot(stage, bad.0))?;
+            match self.held.of(stage) {
+                None => factor.eliminate(data, &mut cost_to_go),
+                Some(held) => eliminate_held(factor, data, held, &mut cost_to_go),
+            }
+            .map_err(|bad| failed_pivot(stage, bad.0))?;
         }
         Ok(())
     }
@@ -334,7 +349,6 @@ fn fall_back<
         x = next;
         *x_next = x;
     }
-    solution.active.clear();
     solution.cost = cost(ocp, solution);
 }
 

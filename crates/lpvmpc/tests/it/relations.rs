@@ -2,7 +2,7 @@
 
 use crate::support::problems::{Family, problem};
 use crate::support::rng::Rng;
-use crate::support::{cold, kind};
+use crate::support::{agree, cold};
 use lpvmpc::{
     Bounds, Ocp, Penalty, Side, Solution, Solver, SolverSettings, WarmStart, kkt_residual,
 };
@@ -39,7 +39,7 @@ fn cold_answer(ocp: &Problem) -> Answer {
 
 /// The same verdict, and the same optimum.
 fn assert_same(ocp: &Problem, one: &Answer, other: &Answer) -> Result<(), TestCaseError> {
-    prop_assert_eq!(kind(&one.status), kind(&other.status));
+    prop_assert!(agree(&one.status, &other.status));
     if one.status.is_solved() {
         prop_assert!(kkt_residual(ocp, other).largest() <= 1e-8);
         let scale = one.cost.abs().max(1.0);
@@ -125,7 +125,7 @@ proptest! {
         let mut reflection = cold_answer(&mirrored(&ocp));
         reflection.u.iter_mut().for_each(|u| *u = -*u);
         reflection.x.iter_mut().for_each(|x| *x = -*x);
-        prop_assert_eq!(kind(&reference.status), kind(&reflection.status));
+        prop_assert!(agree(&reference.status, &reflection.status));
         if reference.status.is_solved() {
             for (a, b) in reference.u.iter().zip(&reflection.u).take(ocp.length()) {
                 prop_assert!((a - b).amax() <= 1e-6 * (1.0 + a.amax()));
@@ -144,7 +144,7 @@ proptest! {
         let ocp = random_problem(seed);
         let reference = cold_answer(&ocp);
         let scaled = cold_answer(&dearer(&ocp, factor));
-        prop_assert_eq!(kind(&reference.status), kind(&scaled.status));
+        prop_assert!(agree(&reference.status, &scaled.status));
         if reference.status.is_solved() {
             let size = reference.cost.abs().max(1.0);
             prop_assert!((scaled.cost / factor - reference.cost).abs() <= 1e-9 * size);

@@ -3,10 +3,11 @@
 //!
 //! Stated accuracy, relative to the largest input of the plan: 1e-6 for half of the problems
 //! and 1e-4 for 99 % of them; 1e-3 for 99 % where the bounds leave a channel of a thousandth of
-//! the quantities' size. Units that differ by 1e4 change none of this. Up to 1 % of the feasible
-//! problems are called infeasible. With a terminal equality beside tight bounds: 1e-5 for half
-//! and 1e-2 for 95 %, and up to 3 % are called infeasible. No problem that is infeasible by more
-//! than rounding is called solved. Run with `--nocapture` for the figures.
+//! the quantities' size. Units that differ by 1e4 change none of this. No feasible problem is called
+//! infeasible. With a terminal equality beside tight bounds: 1e-5 for half and 1e-2 for 95 %, and up to
+//! 3 % are called inaccurate; where, beside such bounds, inputs cost a millionth of what states do, up
+//! to 15 % are. No problem that is infeasible by more than rounding is called solved. Run with
+//! `--nocapture` for the figures.
 
 use crate::support::census::{Counts, Distribution};
 use crate::support::problems::{Family, problem};
@@ -113,8 +114,10 @@ struct Findings {
 
 const COUNT: u64 = 1000;
 
+/// The problems of a family, with the costs of the inputs times `input_cost`.
 fn measure<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
     family: Family,
+    input_cost: f64,
 ) -> Findings {
     let mut findings = Findings {
         verdicts: Counts::default(),
@@ -122,7 +125,12 @@ fn measure<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
         residual: Distribution::default(),
     };
     for k in 0..COUNT {
-        let exact = problem::<NX, NU, N, NG>(&mut Rng::new(k), family, N);
+        let mut exact = problem::<NX, NU, N, NG>(&mut Rng::new(k), family, N);
+        for stage in &mut exact.stages {
+            stage.r *= input_cost;
+            stage.s *= input_cost.sqrt();
+            stage.linear_u *= input_cost;
+        }
         let single = Into(&|x: f64| x as f32).problem(&exact);
         let double = Into(&|x: f32| f64::from(x)).problem(&single);
         let reference: Solution<f64, NX, NU, N, M> = solve(&double);
@@ -164,12 +172,12 @@ impl Findings {
 
 /// The ballbot's size.
 fn single_input(family: Family) -> Findings {
-    measure::<4, 1, 20, 0>(family)
+    measure::<4, 1, 20, 0>(family, 1.0)
 }
 
 /// Twice as many bounds on the same states.
 fn two_inputs(family: Family) -> Findings {
-    measure::<4, 2, 10, 2>(family)
+    measure::<4, 2, 10, 2>(family, 1.0)
 }
 
 const SIZES: [fn(Family) -> Findings; 2] = [single_input, two_inputs];
@@ -185,6 +193,7 @@ fn bounds_with_room() {
         ];
         for (measure, family) in SIZES.iter().flat_map(|size| families.map(|f| (size, f))) {
             let findings = measure(family);
+            assert_eq!(findings.verdicts.of("solved -> infeasible"), 0);
             // Of what is infeasible, one of the two may lack the proof.
             let unproved = findings.unproved();
             assert!(findings.same_verdict() + unproved >= 0.99);
@@ -204,10 +213,24 @@ fn feasible_sets_a_thousandth_wide() {
         let families = [Family::Tight, Family::BadlyScaled];
         for (measure, family) in SIZES.iter().flat_map(|size| families.map(|f| (size, f))) {
             let findings = measure(family);
-            assert!(findings.same_verdict() >= 0.99);
+            assert!(findings.same_verdict() >= 0.999);
             assert!(findings.inputs.quantile(0.5) <= 1e-6);
             assert!(findings.inputs.quantile(0.99) <= 1e-3);
             assert!(findings.residual.quantile(0.99) <= 1e-3);
+        }
+    });
+}
+
+/// What the regulator asks for is many times the bounds.
+#[test]
+fn input_costs_of_a_millionth() {
+    on_large_stack(|| {
+        for findings in [
+            measure::<4, 1, 20, 0>(Family::Tight, 1e-6),
+            measure::<4, 2, 10, 2>(Family::Tight, 1e-6),
+        ] {
+            assert!(findings.same_verdict() >= 0.85, "{}", findings.verdicts);
+            assert_eq!(findings.verdicts.of("solved -> infeasible"), 0);
         }
     });
 }

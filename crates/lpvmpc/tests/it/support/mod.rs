@@ -37,6 +37,17 @@ pub fn solve<const NX: usize, const NU: usize, const N: usize, const M: usize, c
 }
 
 /// The kind of a status, without its details.
+/// Whether two verdicts of one problem can both be right: the same, or the proof that it is infeasible
+/// was found by one of them only.
+pub fn agree<T>(one: &Status<T>, other: &Status<T>) -> bool {
+    let (one, other) = (kind(one), kind(other));
+    one == other
+        || matches!(
+            (one, other),
+            ("infeasible", "inaccurate") | ("inaccurate", "infeasible")
+        )
+}
+
 pub fn kind<T>(status: &Status<T>) -> &'static str {
     match status {
         Status::Solved | Status::Converged | Status::Improved | Status::NoImprovement => "solved",

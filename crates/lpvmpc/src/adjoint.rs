@@ -1,0 +1,83 @@
+//! The adjoint recursion: the Lagrangian's gradient in the inputs, from the last stage to the first.
+
+use crate::model::Scalar;
+use crate::ocp::Ocp;
+use crate::rows::{self, Trajectory};
+use crate::solution::ActiveSet;
+use nalgebra::SVector;
+
+/// A backward pass along the horizon, with the states eliminated.
+pub(crate) struct Adjoint<'a, T, const NX: usize, const NU: usize, const N: usize, const NG: usize>
+{
+    ocp: &'a Ocp<T, NX, NU, N, NG>,
+    /// The point at which the cost counts; without one, the active rows are the whole Lagrangian.
+    trajectory: Option<&'a Trajectory<'a, T, NX, NU, N>>,
+    /// Derivative of the Lagrangian in x_`stage`, through what comes after it.
+    pub costate: SVector<T, NX>,
+    stage: usize,
+}
+
+/// What the pass finds at a stage.
+pub(crate) struct AdjointStage<T, const NX: usize, const NU: usize> {
+    /// The stage i.
+    pub stage: usize,
+    /// Derivative in x_{i+1}.
+    pub costate: SVector<T, NX>,
+    /// Derivative in u_i.
+    pub gradient: SVector<T, NU>,
+    /// Sum of the sizes of its terms that come through the dynamics, |B|'|costate|.
+    pub dynamics: SVector<T, NU>,
+    /// Its part from the active rows at u_i.
+    pub rows: SVector<T, NU>,
+}
+
+impl<'a, T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize>
+    Adjoint<'a, T, NX, NU, N, NG>
+{
+    /// Begins behind the last stage. `active` stays the same in all calls, but for rows at stages that
+    /// have been visited.
+    pub fn new<const M: usize>(
+        ocp: &'a Ocp<T, NX, NU, N, NG>,
+        trajectory: Option<&'a Trajectory<'a, T, NX, NU, N>>,
+        active: &ActiveSet<T, M>,
+    ) -> Self {
+        let stage = ocp.length();
+        let (mut costate, _) = rows::gradient(ocp, active.iter(), stage);
+        if let Some(trajectory) = trajectory {
+            let end = &ocp.terminal;
+            costate += end.p * trajectory.state(ocp, stage) + end.linear_x;
+        }
+        Self {
+            ocp,
+            trajectory,
+            costate,
+            stage,
+        }
+    }
+
+    /// The next stage towards the beginning; `None` in front of the first.
+    pub fn step<const M: usize>(
+        &mut self,
+        active: &ActiveSet<T, M>,
+    ) -> Option<AdjointStage<T, NX, NU>> {
+        self.stage = self.stage.checked_sub(1)?;
+        let stage = self.ocp.stages.get(self.stage)?;
+        let costate = self.costate;
+        let (rows_x, rows_u) = rows::gradient(self.ocp, active.iter(), self.stage);
+        let mut gradient = stage.b.tr_mul(&costate) + rows_u;
+        self.costate = stage.a.tr_mul(&costate) + rows_x;
+        if let Some(trajectory) = self.trajectory {
+            let x = trajectory.state(self.ocp, self.stage);
+            let u = trajectory.u.get(self.stage)?;
+            gradient += stage.r * u + stage.s * x + stage.linear_u;
+            self.costate += stage.q * x + stage.s.tr_mul(u) + stage.linear_x;
+        }
+        Some(AdjointStage {
+            stage: self.stage,
+            costate,
+            gradient,
+            dynamics: stage.b.abs().tr_mul(&costate.abs()),
+            rows: rows_u,
+        })
+    }
+}

@@ -1,0 +1,258 @@
+//! Inputs that are held at a bound by the factorisation, instead of as rows of the dual method.
+//!
+//! A bound as a row is met by pushing the regulator away from what it would ask for. Where that is
+//! many times the bound, the bound drowns in the rounding of the difference. An input that is held is
+//! no unknown any more: it is exact, and the regulator is that of the other inputs.
+
+use crate::adjoint::Adjoint;
+use crate::model::Scalar;
+use crate::ocp::{Ocp, Stage};
+use crate::riccati::{BadPivot, CostToGo, StageFactor};
+use crate::rows::Trajectory;
+use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
+use crate::solver::{Solver, SolverSettings, WarmStart};
+
+/// Searches with held inputs; two are enough in `f64`, more than ten are rare in `f32`.
+const MOST_SEARCHES: usize = 20;
+
+/// For every input of every stage: the bound that it is held at, if any.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HeldInputs<const NU: usize, const N: usize> {
+    sides: [[Option<Side>; NU]; N],
+    any: bool,
+}
+
+/// What the multipliers of the held inputs say.
+struct Verdict<T> {
+    /// Inputs were let go.
+    released: bool,
+    /// All others found a place among the active rows.
+    listed: bool,
+    /// What is left of the gradient in the inputs that are not held, relative to its largest term.
+    rest: T,
+}
+
+impl<const NU: usize, const N: usize> HeldInputs<NU, N> {
+    pub fn none() -> Self {
+        Self {
+            sides: [[None; NU]; N],
+            any: false,
+        }
+    }
+
+    /// The sides at `stage`; `None` where no input is held.
+    #[inline(always)]
+    pub fn of(&self, stage: usize) -> Option<&[Option<Side>; NU]> {
+        if self.any {
+            self.sides.get(stage)
+        } else {
+            None
+        }
+    }
+
+    /// Holds the inputs whose bounds are among `rows`; whether that is news.
+    fn take_in<T: Scalar>(&mut self, rows: impl Iterator<Item = ActiveRow<T>>) -> bool {
+        let mut news = false;
+        for row in rows {
+            let BoundId { stage, side, .. } = row.bound;
+            if let Quantity::Input(j) = row.bound.quantity
+                && let Some(place) = self.sides.get_mut(stage).and_then(|held| held.get_mut(j))
+            {
+                news |= *place != Some(side);
+                *place = Some(side);
+            }
+        }
+        self.any |= news;
+        news
+    }
+
+    /// Lets go of the inputs that are pulled into their bounds, by the cost of `trajectory` and the rows
+    /// `active`, or by these rows alone: their multiplier is below zero. The others join `active`.
+    fn release<T: Scalar, const NX: usize, const M: usize, const NG: usize>(
+        &mut self,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+        trajectory: Option<&Trajectory<'_, T, NX, NU, N>>,
+        active: &mut ActiveSet<T, M>,
+        tolerance: T,
+    ) -> Verdict<T> {
+        let (mut largest, mut rest) = (T::zero(), T::zero());
+        let (mut released, mut listed) = (false, true);
+        let mut adjoint = Adjoint::new(ocp, trajectory, active);
+        while let Some(at) = adjoint.step(active) {
+            largest = largest.max(at.dynamics.amax()).max(at.rows.amax());
+            let Some(held) = self.sides.get_mut(at.stage) else {
+                continue;
+            };
+            for (j, (place, slope)) in held.iter_mut().zip(at.gradient.iter()).enumerate() {
+                let Some(side) = *place else {
+                    rest = rest.max(slope.abs());
+                    continue;
+                };
+                let multiplier = if side == Side::Upper { -*slope } else { *slope };
+                if multiplier < -tolerance * largest {
+                    *place = None;
+                    released = true;
+                } else {
+                    listed &= active.push(ActiveRow {
+                        bound: BoundId {
+                            stage: at.stage,
+                            quantity: Quantity::Input(j),
+                            side,
+                        },
+                        part: Part::Hard,
+                        multiplier: multiplier.max(T::zero()),
+                        exceeded: false,
+                    });
+                }
+            }
+        }
+        Verdict {
+            released,
+            listed,
+            rest: if rest > T::zero() {
+                rest / largest
+            } else {
+                rest
+            },
+        }
+    }
+}
+
+/// [`StageFactor::eliminate`] with the inputs that have a side in `held` as constants: their columns
+/// of B move into c, their costs into the linear parts. In their place stand unknowns of their own, at
+/// the bounds, which no deviation moves.
+#[cold]
+#[inline(never)]
+pub(crate) fn eliminate_held<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    factor: &mut StageFactor<T, NX, NU>,
+    stage: &Stage<T, NX, NU, NG>,
+    held: &[Option<Side>; NU],
+    cost_to_go: &mut CostToGo<T, NX>,
+) -> Result<(), BadPivot<T>> {
+    let mut fixed = *stage;
+    let values = || {
+        held.iter().enumerate().filter_map(|(j, side)| match side {
+            Some(Side::Upper) => Some((j, stage.u.upper[j])),
+            Some(_) => Some((j, stage.u.lower[j])),
+            None => None,
+        })
+    };
+    for (j, value) in values() {
+        fixed.c += stage.b.column(j) * value;
+        fixed.linear_x += stage.s.row(j).transpose() * value;
+        fixed.linear_u += stage.r.column(j) * value;
+        fixed.b.column_mut(j).fill(T::zero());
+        fixed.s.row_mut(j).fill(T::zero());
+        fixed.r.row_mut(j).fill(T::zero());
+        fixed.r.column_mut(j).fill(T::zero());
+    }
+    for (j, value) in values() {
+        fixed.r[(j, j)] = T::one();
+        fixed.linear_u[j] = -value;
+    }
+    factor.eliminate(&fixed, cost_to_go)?;
+    for (j, _) in values() {
+        factor.inverse_factor[(j, j)] = T::zero();
+    }
+    Ok(())
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
+    Solver<T, NX, NU, N, M>
+{
+    /// Tries to answer what the dual method could not, for the rounding at `bound`: with the inputs that
+    /// it has found at their bounds held there. `spent` counts the changes of the active set.
+    ///
+    /// Between searches the held inputs are exchanged: those go that are pulled into their bounds, those
+    /// come that the search has found at a bound. The answer of a search is among the choices of the
+    /// next one, so that the cost does not rise and, but for rounding, no set of held inputs comes twice.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn search_with_held_inputs<const NG: usize>(
+        &mut self,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+        settings: &SolverSettings<T>,
+        solution: &mut Solution<T, NX, NU, N, M>,
+        bound: BoundId,
+        spent: &mut usize,
+    ) -> Result<(), Status<T>> {
+        let inaccurate = Err(Status::Inaccurate(bound));
+        let mut outcome = inaccurate;
+        self.held.take_in(self.dual.active());
+        for search in 0..MOST_SEARCHES {
+            outcome = self.search_again(ocp, settings, solution, spent);
+            let point = Trajectory {
+                x: &solution.x,
+                u: &solution.u,
+            };
+            let point = match outcome {
+                Ok(()) => Some(&point),
+                Err(Status::Inaccurate(_)) => None,
+                Err(Status::NumericalFailure { .. }) => {
+                    outcome = inaccurate;
+                    break;
+                }
+                Err(_) => break,
+            };
+            if point.is_none() {
+                if let Some(infeasible) = self.prove(ocp, &mut solution.active) {
+                    outcome = Err(infeasible);
+                    break;
+                }
+                self.dual.report_conflict(&mut solution.active);
+            }
+            // What goes on for so long goes in circles, for rounding.
+            let tolerance = if search < MOST_SEARCHES / 2 {
+                self.dual.tolerance
+            } else {
+                self.dual.loosest
+            };
+            let verdict = self
+                .held
+                .release(ocp, point, &mut solution.active, tolerance);
+            if outcome.is_ok() && !verdict.released {
+                if !verdict.listed {
+                    outcome = Err(Status::WorkingSetFull);
+                } else if !(verdict.rest <= self.dual.loosest) {
+                    outcome = inaccurate;
+                }
+                break;
+            }
+            let news = self.held.take_in(self.dual.active());
+            if !(verdict.released || news) {
+                break;
+            }
+            outcome = inaccurate;
+        }
+        // Whoever follows the plan needs the regulator of the problem itself.
+        self.held = HeldInputs::none();
+        self.factorize(ocp).and(outcome)
+    }
+
+    /// One search from the active rows of the last one, but for those of inputs.
+    fn search_again<const NG: usize>(
+        &mut self,
+        ocp: &Ocp<T, NX, NU, N, NG>,
+        settings: &SolverSettings<T>,
+        solution: &mut Solution<T, NX, NU, N, M>,
+        spent: &mut usize,
+    ) -> Result<(), Status<T>> {
+        let settings = SolverSettings {
+            warm_start: WarmStart::Same,
+            ..*settings
+        };
+        self.factorize(ocp)?;
+        solution.status = Status::Solved;
+        solution.active.clear();
+        for row in self.dual.active() {
+            if !matches!(row.bound.quantity, Quantity::Input(_)) {
+                solution.active.push(row);
+            }
+        }
+        let left = settings.max_changes.saturating_sub(*spent);
+        self.dual.reset(self.dual.tolerance, left);
+        let outcome = self.search(ocp, &settings, solution);
+        *spent += self.dual.changes;
+        outcome
+    }
+}
