@@ -52,7 +52,7 @@ export class Panel {
     this.targetFields = [target("Target X", (x) => actions.target({ x })), target("Target Y", (y) => actions.target({ y }))];
     host.append(
       section("Scenario", true, this.presetField.element, this.unitField.element, this.files()),
-      section("Robots side by side", true, ...this.robotChoices(), note(`LPV: ${TERMS.lpv}`), note(`Linear: ${TERMS.linear}`), note(`LQR: ${TERMS.lqr}`)),
+      section("Robots side by side", true, ...this.robotChoices(), note(`LPV MPC. ${TERMS.lpv}`), note(`Linear MPC. ${TERMS.linear}`), note(`LQR. ${TERMS.lqr}`)),
       section("Target and push", true, this.targetFields[0].element, this.targetFields[1].element, ...this.pushes()),
       section("Controller", true, ...controllerFields(this.form)),
       section("Bounds", false, ...boundFields(this.form)),

@@ -9,8 +9,9 @@ import type { Theme } from "./view";
 const AXIS = 0.45;
 /** Numbers reach this far from the middle, m. */
 const REACH = 3;
-/** They stand on lines this far before and left of the middle, m. */
-const BESIDE = 1;
+/** They stand on lines so far before and left of the middle, m. */
+const BEFORE = 0.5;
+const LEFT = 1;
 /** Height of a text in its own picture, px. */
 const PIXELS = 44;
 
@@ -52,18 +53,20 @@ export class FloorScale {
    *  lanes, each with its own zero. */
   show(x: number, y: number, withY: boolean): void {
     const [middleX, middleY] = [Math.round(x), Math.round(y)];
-    const key = `${middleX} ${middleY} ${withY}`;
+    const before = Math.round(2 * y) / 2 - BEFORE;
+    const key = `${middleX} ${middleY} ${before} ${withY}`;
     if (key === this.shown) return;
     this.shown = key;
     for (let i = -REACH; i <= REACH; i++) {
       const [ofX, ofY] = [this.numbers[i + REACH], this.numbers[i + 3 * REACH + 1]];
       if (!ofX || !ofY) continue;
       this.write(ofX, `x = ${middleX + i} m`);
-      ofX.position.copy(toScene(middleX + i, middleY - BESIDE, 0.005));
-      ofY.visible = withY && i !== -BESIDE;
+      ofX.position.copy(toScene(middleX + i, before, 0.005));
+      // Not two numbers in one place.
+      ofY.visible = withY && middleY + i !== before;
       if (!ofY.visible) continue;
       this.write(ofY, `y = ${middleY + i} m`);
-      ofY.position.copy(toScene(middleX - BESIDE, middleY + i, 0.005));
+      ofY.position.copy(toScene(middleX - LEFT, middleY + i, 0.005));
     }
   }
 

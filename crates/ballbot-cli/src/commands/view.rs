@@ -223,7 +223,7 @@ mod tests {
     }
 
     fn text_with(request: &str, headers: &[&str]) -> String {
-        let lines = [request].iter().chain(headers);
+        let lines = std::iter::once(&request).chain(headers);
         let lines = lines.map(|line| (*line).to_owned()).collect();
         String::from_utf8_lossy(&respond(&Request { lines })).into_owned()
     }
