@@ -14,8 +14,9 @@ export function connectReview(app: App, redraw: () => void): (pointed: number | 
   return (pointed) => {
     const [from, until] = app.span;
     slider.disabled = app.isRunning || until <= from;
-    [slider.min, slider.max] = [String(from), String(until)];
-    slider.value = String(app.time());
+    // While it runs the slider stays at its end.
+    if (slider.disabled) [slider.min, slider.max, slider.value] = ["0", "1", "1"];
+    else [slider.min, slider.max, slider.value] = [String(from), String(until), String(app.time())];
     words.textContent = pointed === undefined ? "" : `at the pointer: ${pointed.toFixed(2)} s`;
   };
 }

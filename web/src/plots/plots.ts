@@ -72,6 +72,10 @@ export class Plots {
       const caption = document.createElement("figcaption");
       caption.title = strip.meaning;
       const value = document.createElement("span");
+      for (const { colour } of shown) {
+        const part = value.appendChild(document.createElement("i"));
+        if (shown.length > 1) part.style.color = colour;
+      }
       caption.append(document.createElement("b"), value);
       const plot = document.createElement("div");
       plot.setAttribute("role", "img");
@@ -235,13 +239,11 @@ export class Plots {
     for (const [index, value] of this.host.querySelectorAll("figcaption > span").entries()) {
       const strip = STRIPS[index];
       if (!strip) continue;
-      const parts = this.shown.map(({ history, colour }) => {
-        const part = document.createElement("i");
-        part.textContent = this.valueAt(strip, history, time);
-        if (this.shown.length > 1) part.style.color = colour;
-        return part;
-      });
-      value.replaceChildren(...parts);
+      for (const [i, { history }] of this.shown.entries()) {
+        const part = value.children[i];
+        const text = this.valueAt(strip, history, time);
+        if (part && part.textContent !== text) part.textContent = text;
+      }
     }
   }
 
