@@ -1,8 +1,9 @@
 // The page's state: one set-up, the robots derived from it, and what they did.
 
-import { Engine, type Source } from "./engine";
+import { Engine, LONGEST_SILENCE, NoAnswer, type Source } from "./engine";
 import { readRecording, trajectoryCsv } from "./files";
 import { History } from "./history";
+import type { Offer } from "./message";
 import * as link from "./link";
 import { Live, timedPath } from "./live";
 import { Playback } from "./playback";
@@ -10,10 +11,10 @@ import { PRESETS } from "./presets";
 import type { Answers, Batch, Call, PhiPair, RobotFacts } from "./protocol";
 import { robotsNamed, type RobotKind } from "./robots";
 import { toToml, withValue, type Scenario } from "./scenario";
-import type { FloorPoint } from "./scene/view";
+import { PAPER_SHAPE, type FloorPoint } from "./scene/view";
 
 export interface AppEvents {
-  message(text: string, kind: "error" | "info"): void;
+  message(text: string, kind: "error" | "info", offer?: Offer): void;
   /** The set-up or the choice of robots changed. */
   setup(): void;
   /** New histories: what was drawn is void. */
@@ -53,6 +54,10 @@ export class App {
   private facts: RobotFacts[] = [];
   private clock = 0;
   private clockAt = 0;
+  /** The time that is looked back at while nothing runs, s. */
+  private lookedAt: number | undefined;
+  /** The last settings under which a sample was computed. */
+  private working: { setup: Scenario; robots: RobotKind[]; preset: string } | undefined;
   /** The last target; what the worker's batches say of it comes later. */
   ordered: FloorPoint | undefined;
   /** Changes that are not taken in yet. */
@@ -64,6 +69,7 @@ export class App {
       if (this.takesOrders()) this.receive(batch);
     };
     this.engine.onFailure = (reason) => this.failed(reason);
+    this.engine.onSilence = () => this.stalled();
   }
 
   /** There is no robot any more that would take orders. */
@@ -71,6 +77,23 @@ export class App {
     this.facts = [];
     if (!this.playback) this.setRunning(false);
     this.events.message(reason, "error");
+  }
+
+  /** The worker was ended since it did not answer; the one in its place waits for a set-up. */
+  private stalled(): void {
+    const { working } = this;
+    const text = `The controller did not answer for ${LONGEST_SILENCE} s and was ended: with these settings one sample takes too long. ` +
+      "A shorter horizon, fewer sub-steps or fewer QPs make it faster.";
+    this.facts = [];
+    if (!this.playback) this.setRunning(false);
+    this.events.message(text, "error", working && {
+      label: "Go on with the last settings that worked",
+      take: () => void this.attempt(async () => {
+        await this.configure(working.setup, working.robots, false);
+        this.preset = working.preset;
+        this.show();
+      }),
+    });
   }
 
   /** Opens the link in the address or the first preset; `false` if there is neither. */
@@ -105,12 +128,17 @@ export class App {
         await work();
         return true;
       } catch (error) {
-        this.events.message(text(error), "error");
+        this.complain(error);
         // Fields show what holds, not what was refused.
         if (this.facts.length > 0) this.show();
         return false;
       }
     });
+  }
+
+  /** Says what was wrong, unless it is said already. */
+  private complain(error: unknown): void {
+    if (!(error instanceof NoAnswer)) this.events.message(text(error), "error");
   }
 
   /** A field that goes on changing must not be set to what it was some changes ago. */
@@ -124,6 +152,7 @@ export class App {
     const { robots: facts, kept } = await this.engine.call({ kind: "configure", robots: setups, keep });
     this.playback?.stop();
     this.playback = undefined;
+    this.lookedAt = undefined;
     [this.setup, this.robots, this.facts] = [setup, robots, facts];
     this.planes = facts[0]?.planes ?? 1;
     if (!kept) {
@@ -180,11 +209,16 @@ export class App {
 
   /** Angle of the wheels' contact points from the top of the ball, rad. */
   get zenith(): number {
-    return this.facts[0]?.zenith ?? Math.PI / 4;
+    return this.facts[0]?.zenith ?? PAPER_SHAPE.zenith;
+  }
+
+  /** Azimuths of the wheels, rad. */
+  get azimuths(): number[] {
+    return this.facts[0]?.azimuths ?? PAPER_SHAPE.azimuths;
   }
 
   /** The ball radius: angles times this are lengths on the floor. */
-  private get radius(): number {
+  get radius(): number {
     return this.setup.parameters.ball_radius_m;
   }
 
@@ -193,7 +227,7 @@ export class App {
     try {
       taken(await this.engine.call<K>(call));
     } catch (error) {
-      this.events.message(text(error), "error");
+      this.complain(error);
     }
   }
 
@@ -271,6 +305,7 @@ export class App {
 
   private order(order: { running?: boolean; speed?: number }, source: Source = this.playback ?? this.engine): void {
     if (!this.playback && this.facts.length === 0) return;
+    this.lookedAt = undefined;
     [this.clock, this.clockAt] = [this.time(), performance.now()];
     this.speed = order.speed ?? this.speed;
     if (order.running !== undefined) this.setRunning(order.running);
@@ -285,6 +320,7 @@ export class App {
 
   step(): void {
     this.afterChanges(() => {
+      this.lookedAt = undefined;
       if (this.playback) {
         this.playback.step();
         return;
@@ -309,6 +345,7 @@ export class App {
       this.playback?.stop();
       this.playback = playback;
       this.playbackName = name;
+      this.lookedAt = undefined;
       this.planes = planes.length;
       this.ordered = undefined;
       this.robots = this.robots.slice(0, 1);
@@ -329,6 +366,9 @@ export class App {
     // A batch from before the last change of the robots is void.
     if (batch.robots.length !== this.histories.length) return;
     for (const [i, robot] of batch.robots.entries()) this.histories[i]?.add(robot);
+    if (!this.playback && batch.robots.some(({ rows }) => rows.length > 0)) {
+      this.working = { setup: this.setup, robots: this.robots, preset: this.preset };
+    }
     if (batch.references) this.references = batch.references;
     [this.clock, this.clockAt] = [batch.clock, performance.now()];
     if (batch.order === this.runOrders) this.setRunning(batch.running);
@@ -337,8 +377,26 @@ export class App {
     this.onBatch(batch);
   }
 
+  /** Looks back at a time of the run, s, as long as nothing runs. */
+  look(time: number): void {
+    if (!this.isRunning) this.lookedAt = time < this.sampleTime() ? time : undefined;
+  }
+
+  /** What is shown lies in the past. */
+  get isLookingBack(): boolean {
+    return this.lookedAt !== undefined;
+  }
+
+  /** The times that can be looked at, s. */
+  get span(): [number, number] {
+    const end = this.sampleTime();
+    const kept = this.histories.filter(({ length }) => length > 0).map((history) => history.at(0, 0, 0));
+    return [Math.min(end, ...kept), end];
+  }
+
   /** Simulated time for the eye, s. */
   time(): number {
+    if (this.lookedAt !== undefined) return this.lookedAt;
     const elapsed = this.isRunning ? ((performance.now() - this.clockAt) / 1000) * this.speed : 0;
     return Math.min(this.clock + elapsed, this.sampleTime());
   }

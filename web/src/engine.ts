@@ -10,17 +10,50 @@ export interface Source {
 
 type Waiting = { resolve: (value: never) => void; reject: (error: Error) => void };
 
+/** Time between two looks after the worker, ms. */
+const LOOK = 500;
+/** After so many looks without a word from it the worker is ended. Looks are counted, not time: a page
+ *  that was held up itself has heard nothing either. */
+const PATIENCE = 4;
+/** The same as a time, s. */
+export const LONGEST_SILENCE = (LOOK * PATIENCE) / 1000;
+
+/** There will be no answer: the worker was ended, which `onSilence` says. */
+export class NoAnswer extends Error {}
+
 export class Engine implements Source {
   onBatch: (batch: Batch) => void = () => {};
   onFailure: (text: string) => void = () => {};
-  private readonly worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+  /** The worker did not answer any more; another one, which knows of nothing, has taken its place. */
+  onSilence: () => void = () => {};
+  private worker = this.start();
   private readonly waiting = new Map<number, Waiting>();
   private nextId = 0;
+  /** Looks since the last word from the worker; `undefined` before its first one, for which a slow
+   *  line may need its time. */
+  private silentFor: number | undefined;
 
   constructor() {
-    this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.receive(data);
+    setInterval(() => this.look(), LOOK);
+  }
+
+  private start(): Worker {
+    const worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+    worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.receive(data);
     // A script that cannot be loaded leaves no message.
-    this.worker.onerror = ({ message }) => this.fail(message || "the controller's program cannot be loaded");
+    worker.onerror = ({ message }) => this.fail(message || "the controller's program cannot be loaded");
+    return worker;
+  }
+
+  private look(): void {
+    if (this.silentFor === undefined) return;
+    if (this.silentFor === 0) this.worker.postMessage({ ping: true });
+    if (this.silentFor++ < PATIENCE) return;
+    this.worker.terminate();
+    this.silentFor = undefined;
+    this.worker = this.start();
+    this.rejectAll(new NoAnswer());
+    this.onSilence();
   }
 
   /** Asks the worker; rejects with its message. */
@@ -35,13 +68,19 @@ export class Engine implements Source {
   }
 
   /** Nobody waits for answers that will not come. */
-  private fail(reason: string): void {
-    for (const { reject } of this.waiting.values()) reject(new Error(reason));
+  private rejectAll(error: Error): void {
+    for (const { reject } of this.waiting.values()) reject(error);
     this.waiting.clear();
+  }
+
+  private fail(reason: string): void {
+    this.rejectAll(new Error(reason));
     this.onFailure(reason);
   }
 
   private receive(message: FromWorker): void {
+    this.silentFor = 0;
+    if ("pong" in message) return;
     if ("batch" in message) {
       this.onBatch(message.batch);
     } else if ("failed" in message) {

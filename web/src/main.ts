@@ -11,12 +11,15 @@ import { Panel } from "./panel/panel";
 import { Pictures } from "./pictures";
 import { Plots } from "./plots/plots";
 import { PRESETS, titleOf } from "./presets";
+import { connectReview } from "./review";
 import { colourOf } from "./robots";
 import { FlatView } from "./scene/flat";
 import { Pointer } from "./scene/pointer";
 import { SolidView } from "./scene/solid";
 import { readTheme, type FloorPoint, type View } from "./scene/view";
 import { StatusList } from "./status";
+import { connectExplanations } from "./explanations";
+import { storedSystem, storeSystem, type UnitSystem } from "./units";
 
 /** Time between two updates of plots and words, ms. */
 const SLOW = 60;
@@ -35,19 +38,20 @@ function makeView(): View {
     } catch {
       host.replaceChildren();
     }
+    messages.show("No WebGL here: the floor is shown from above.", "info");
   }
-  messages.show("No WebGL here: the floor is shown from above.", "info");
   return new FlatView(host, theme);
 }
 
 const view = makeView();
 document.body.classList.add(`view-${view.kind}`);
-const plots = new Plots(byId("plots"));
+const plots = new Plots(byId("plots"), () => redraw());
 const status = new StatusList(byId("status"));
-const app = new App({ message: (text, kind) => messages.show(text, kind), setup: setupShown, restarted, running: runningShown, ended });
+const app = new App({ message: (text, kind, offer) => messages.show(text, kind, offer), setup: setupShown, restarted, running: runningShown, ended });
 const pictures = new Pictures(app);
 let panel: Panel | undefined;
 let shownShape = "";
+let units = storedSystem();
 
 function swatch(text: string, className: string): HTMLElement {
   const made = document.createElement("span");
@@ -73,8 +77,9 @@ function setupShown(): void {
   byId("title").textContent = app.playback ? `recorded: ${app.playbackName}` : setup.title;
   panel?.show(setup, app.preset, app.robots.map(({ name }) => name));
   plots.setBounds(setup.bounds);
+  showUnits();
   const { ball_radius_m: ballRadius, wheel_radius_m: wheelRadius, centre_of_mass_m: centreOfMass } = setup.parameters;
-  const shape = { ballRadius, wheelRadius, centreOfMass, zenith: app.zenith };
+  const shape = { ballRadius, wheelRadius, centreOfMass, zenith: app.zenith, azimuths: app.azimuths };
   const key = JSON.stringify(shape);
   if (key !== shownShape) {
     shownShape = key;
@@ -82,7 +87,20 @@ function setupShown(): void {
   }
 }
 
+function showUnits(): void {
+  panel?.setUnits(units, app.radius);
+  plots.setUnits(units, app.radius);
+}
+
+function chooseUnits(system: UnitSystem): void {
+  units = system;
+  storeSystem(system);
+  showUnits();
+  redraw();
+}
+
 function runningShown(): void {
+  redraw();
   const play = byId("play");
   play.textContent = app.isRunning ? "Pause" : "Run";
   play.setAttribute("aria-pressed", String(app.isRunning));
@@ -124,19 +142,20 @@ function showWords(time: number): void {
     label: app.robots[i]?.label ?? "",
     colour: app.robots[i]?.colour ?? "--robot-lpv",
     history,
-  })));
+  })), app.isLookingBack ? time : undefined);
   const fallen = app.histories.flatMap(({ ending }, i) => (ending === undefined ? [] : [`${app.robots[i]?.label}: ${ending}`]));
   const text = fallen.join("\n");
   const alert = byId("alert");
   if (alert.textContent !== text) alert.textContent = text;
   alert.hidden = text === "";
-  const millimetres = (length: number) => Math.round(length * 1000) / 1000;
+  const toMillimetres = (length: number) => Math.round(length * 1000) / 1000 / app.radius;
   const target = wanted();
   // A target that was typed may still wait for a change.
-  if (app.isSettled) panel?.showTarget(millimetres(target.x), millimetres(target.y));
+  if (app.isSettled) panel?.showTarget(toMillimetres(target.x), toMillimetres(target.y));
   byId("clock").textContent = `${time.toFixed(2)} s`;
 }
 
+const showReview = connectReview(app, redraw);
 let lastSlow = 0;
 /** Something has happened that is not yet seen. */
 let stale = true;
@@ -161,8 +180,9 @@ function frame(now: number): void {
     pictures.updateLines(time);
     plots.draw(time);
     showWords(time);
+    showReview(plots.pointed);
   }
-  const picture = { ...pictures.at(time), stroke: pointer.stroke, strokeKind: pointer.strokeKind };
+  const picture = { ...pictures.at(time), stroke: pointer.stroke, strokeKind: pointer.strokeKind, strokeHeight: pointer.strokeHeight };
   moving = view.draw(picture, inSequence);
 }
 
@@ -216,7 +236,11 @@ function makePanel(): Panel {
     preset: (name) => void app.openPreset(name),
     change: (path, value) => void app.change(path, value),
     robots: (names) => void app.chooseRobots(names),
-    target: (typed) => sendTo((target) => ({ ...target, ...typed })),
+    units: chooseUnits,
+    target: (typed) => sendTo((target) => {
+      const { x = target.x / app.radius, y = target.y / app.radius } = typed;
+      return { x: x * app.radius, y: y * app.radius };
+    }),
     push: (x, y) => app.push({ x, y }),
     openFiles: () => void choose(".toml,.csv", true).then(openFiles),
     saveToml: () => app.afterChanges(() => save("scenario.toml", app.toml(), "application/toml")),
@@ -229,6 +253,9 @@ function makePanel(): Panel {
 function connectDrawing(): void {
   new ResizeObserver(resized).observe(host);
   new ResizeObserver(resized).observe(byId("plots"));
+  // On a phone the scene stays below the bar, however many lines that has.
+  const bar = byId("bar");
+  new ResizeObserver(() => document.documentElement.style.setProperty("--bar", `${bar.offsetHeight}px`)).observe(bar);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     view.setTheme(readTheme());
     restarted();
@@ -246,6 +273,7 @@ async function start(): Promise<void> {
   const moveTarget = (dx: number, dy: number) => sendTo(({ x, y }) => ({ x: x + dx, y: y + dy }));
   connectControls({ app, view, plots, pointer, resized, moveTarget, openFiles: (files) => void openFiles(files) });
   connectDrawing();
+  connectExplanations();
   panel = makePanel();
   for (const id of ["play", "step", "reset"]) byId<HTMLButtonElement>(id).disabled = false;
   setupShown();

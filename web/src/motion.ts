@@ -56,15 +56,24 @@ export function poseAt(history: History, time: number, ballRadius: number): Pose
   return poseOf(planes, ballRadius);
 }
 
-/** The poses of the last plan. */
+/** No plan leads further than this from where the robot stands, m. */
+const FARTHEST = 50;
+
+/** The poses of the last plan, up to the first that is no place near the robot: a controller that finds
+ *  no way out may plan anything. */
 export function predictedPoses(history: History, ballRadius: number): Pose[] {
   const [x, y] = history.predictions;
-  const count = (x?.length ?? 0) / 4;
-  return Array.from({ length: count }, (_, i) => {
+  const here = poseOf([[history.nowAt(0, ROW.phi), 0], [history.nowAt(1, ROW.phi), 0]], ballRadius);
+  const poses: Pose[] = [];
+  for (let i = 0; 4 * i < (x?.length ?? 0); i++) {
     const angles = (states: Float64Array | undefined): [number, number] => [
       states?.[4 * i] ?? 0,
       states?.[4 * i + 1] ?? 0,
     ];
-    return poseOf([angles(x), angles(y)], ballRadius);
-  });
+    const pose = poseOf([angles(x), angles(y)], ballRadius);
+    const near = Math.hypot(pose.x - here.x, pose.y - here.y) < FARTHEST && Number.isFinite(pose.leanX + pose.leanY);
+    if (!near) break;
+    poses.push(pose);
+  }
+  return poses;
 }

@@ -35,15 +35,23 @@ function joined(planes: Float64Array[], radius: number): Float32Array {
   return points;
 }
 
+/** Where the camera looks: at the middle of the robots that stand. Who fell rolls away, and is left
+ *  behind; when nobody stands, it looks where it looked last. */
+export function followed(histories: Pick<History, "ending">[], poses: Pose[], last: FloorPoint): FloorPoint {
+  const standing = poses.filter((pose, i) => histories[i]?.ending === undefined && Number.isFinite(pose.x + pose.y));
+  const mean = (value: (pose: Pose) => number) => standing.reduce((sum, pose) => sum + value(pose), 0) / standing.length;
+  return standing.length > 0 ? { x: mean(({ x }) => x), y: mean(({ y }) => y) } : last;
+}
+
 export class Pictures {
   private trails: Float32Array[] = [];
   private references: Float32Array[] = [];
+  private follow: FloorPoint = { x: 0, y: 0 };
 
   constructor(private readonly app: App) {}
 
-  /** The ball radius: angles times this are lengths on the floor. */
-  get radius(): number {
-    return this.app.setup.parameters.ball_radius_m;
+  private get radius(): number {
+    return this.app.radius;
   }
 
   /** Sideways shift of a robot, m. */
@@ -71,6 +79,7 @@ export class Pictures {
 
   forget(): void {
     this.trails = [];
+    this.follow = { x: 0, y: 0 };
   }
 
   /** Ways and references, thinned for drawing; not needed in every frame. */
@@ -82,8 +91,8 @@ export class Pictures {
   at(time: number): { robots: RobotPicture[]; follow: FloorPoint } {
     const poses = this.app.histories.map((history) => poseAt(history, time, this.radius));
     const robots = this.app.histories.map((history, i) => this.picture(history, poses[i] as Pose, i));
-    const mean = (value: (pose: Pose) => number) => poses.reduce((sum, pose) => sum + value(pose), 0) / poses.length;
-    return { robots, follow: { x: mean(({ x }) => x), y: mean(({ y }) => y) } };
+    this.follow = followed(this.app.histories, poses, this.follow);
+    return { robots, follow: this.follow };
   }
 
   private picture(history: History, pose: Pose, i: number): RobotPicture {
@@ -93,7 +102,8 @@ export class Pictures {
     trail.set([pose.x, pose.y], way.length);
     return {
       pose,
-      prediction: history.ending === undefined ? predictedPoses(history, this.radius) : [],
+      // The last plan is for now.
+      prediction: history.ending === undefined && !this.app.isLookingBack ? predictedPoses(history, this.radius) : [],
       trail,
       reference: this.references[i] ?? new Float32Array(0),
       goal: this.goal(history),

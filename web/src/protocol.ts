@@ -63,6 +63,8 @@ export interface RobotFacts {
   samples: number;
   /** Angle of the wheels' contact points from the top of the ball, rad. */
   zenith: number;
+  /** Azimuths of the wheels from the robot's x axis, counter-clockwise seen from above, rad. */
+  azimuths: number[];
 }
 
 /** Run or stop, at so many times real time. */
@@ -76,7 +78,9 @@ export interface RunOrder {
 
 export type ToWorker =
   | { id: number; call: Call }
-  | { run: RunOrder };
+  | { run: RunOrder }
+  /** Whether it still answers. */
+  | { ping: true };
 
 /** Columns of a row: one sample in one plane. Times in s, angles in rad, torque in N m. */
 export const ROW = {
@@ -132,6 +136,7 @@ export interface Batch {
 }
 
 export type FromWorker =
+  | { pong: true }
   | { id: number; value: unknown }
   | { id: number; error: string }
   | { batch: Batch }

@@ -2,30 +2,11 @@
 
 import type { History } from "./history";
 import { ROW } from "./protocol";
+import { usualStepInWords } from "./steptime";
+import { TERMS } from "./terms";
 
-/** Steps over which the time is taken. */
-const STEPS = 400;
 /** What a controller says of a plan that needs no attention; nothing before the first. */
 const GOOD = new Set(["", "solved", "converged", "improved", "no improvement found"]);
-
-export function median(values: number[]): number {
-  if (values.length === 0) return NaN;
-  const sorted = values.toSorted((a, b) => a - b);
-  const middle = sorted.length >> 1;
-  return sorted.length % 2 === 1 ? (sorted[middle] ?? NaN) : ((sorted[middle - 1] ?? NaN) + (sorted[middle] ?? NaN)) / 2;
-}
-
-/** Median time per step over all planes, microseconds. */
-export function medianStep(history: History): number {
-  const values: number[] = [];
-  for (let i = Math.max(history.length - STEPS, 0); i < history.length; i++) {
-    for (let plane = 0; plane < history.planes; plane++) {
-      const value = history.at(i, plane, ROW.stepMicroseconds);
-      if (Number.isFinite(value)) values.push(value);
-    }
-  }
-  return median(values);
-}
 
 /** How many bounds are active in the last plans, and which. */
 function activeBounds(history: History): string {
@@ -41,6 +22,17 @@ function activeBounds(history: History): string {
   return named.length > 0 ? `${count} (${named.join("; ")})` : count;
 }
 
+/** What a robot does, and whether that needs no attention. */
+function state(history: History, at: number | undefined): { text: string; isGood: boolean } {
+  if (at !== undefined) {
+    const status = history.statusAt(Math.max(history.indexAt(at + 1e-9) - 1, 0));
+    return { text: status || "ready", isGood: GOOD.has(status) };
+  }
+  // A controller that still answers does not make a robot stand.
+  if (history.down) return { text: "on the floor", isGood: false };
+  return { text: (history.status || "ready") + activeBounds(history), isGood: GOOD.has(history.status) && history.ending === undefined };
+}
+
 export interface Line {
   label: string;
   colour: string;
@@ -50,8 +42,8 @@ export interface Line {
 export class StatusList {
   constructor(private readonly host: HTMLElement) {}
 
-  /** One line per robot. */
-  show(lines: Line[]): void {
+  /** One line per robot: what it does now, or did `at` a time that is looked back at, s. */
+  show(lines: Line[], at: number | undefined): void {
     while (this.host.children.length > lines.length) this.host.lastElementChild?.remove();
     for (const [i, { label, colour, history }] of lines.entries()) {
       const line = this.host.children[i] ?? this.host.appendChild(this.newLine());
@@ -59,10 +51,11 @@ export class StatusList {
       if (!name || !words || !time) continue;
       name.textContent = label;
       name.className = `dot ${colour.slice(2)}`;
-      words.textContent = (history.status || "ready") + activeBounds(history);
-      const step = medianStep(history);
-      time.textContent = Number.isFinite(step) ? `${step.toFixed(1)} \u00b5s per step (median)` : "";
-      line.classList.toggle("bad", !GOOD.has(history.status));
+      const { text, isGood } = state(history, at);
+      words.textContent = text;
+      words.title = `Active bounds: ${TERMS.activeBound}`;
+      time.textContent = history.down ? "" : usualStepInWords(history);
+      line.classList.toggle("bad", !isGood);
     }
   }
 

@@ -17,6 +17,9 @@ interface Robot {
 const MOST_BEHIND = 0.1;
 /** Time between two looks at the clock, ms. */
 const TICK = 4;
+/** After so long among samples it listens to the page, ms: where samples take longer than they last,
+ *  the run falls behind the clock. */
+const LONGEST_ABSENCE = 100;
 /** Time between two batches, ms: one per frame of the screen. */
 const BATCH = 15;
 /** Points of a reference on the floor. */
@@ -119,6 +122,10 @@ function advance(): void {
     while (running && nextTime() <= clock) {
       sampleAll();
       stopAtTheEnd();
+      if (running && performance.now() - now > LONGEST_ABSENCE) {
+        clock = nextTime();
+        break;
+      }
     }
     if (now - lastBatch >= BATCH || !running) send();
   }
@@ -138,6 +145,8 @@ function warmUp({ setup }: RobotSetup): void {
 
 function configure(setups: RobotSetup[], keep: boolean): Answers["configure"] {
   const kept = keep && (running || robots.some(({ simulation }) => simulation.time() > 0));
+  // Samples that come after the answer are those of the new set-up.
+  if (robots.length > 0) send();
   const next: Robot[] = [];
   try {
     for (const [index, { label, setup }] of setups.entries()) {
@@ -174,6 +183,7 @@ function configure(setups: RobotSetup[], keep: boolean): Answers["configure"] {
     horizon: simulation.horizon(),
     samples: simulation.samples(),
     zenith: simulation.zenith_angle(),
+    azimuths: Array.from(simulation.azimuths()),
   }));
   return { robots: facts, kept };
 }
@@ -239,6 +249,10 @@ async function start(): Promise<void> {
 const started = start();
 
 self.onmessage = async ({ data }: MessageEvent<ToWorker>) => {
+  if ("ping" in data) {
+    post({ pong: true });
+    return;
+  }
   try {
     await started;
     if (failure !== "") throw new Error(failure);

@@ -11,7 +11,7 @@ const NUMBERS: [section: string, label: string, typed: string, key: string, valu
   ["World", "Slope x", "2", "slope_x_deg", 2],
   ["World", "Slope y", "-1", "slope_y_deg", -1],
   ["World", "Delay", "12", "transport_s", 0.012],
-  ["World", "Noise, rates", "0.1", "noise_rad_s", 0.1],
+  ["World", "Noise, rates", "0.1", "noise_rad_s", (0.1 * Math.PI) / 180],
   ["World", "b1 factor", "1.05", "b1_factor", 1.05],
   ["World", "b2 factor", "0.99", "b2_factor", 0.99],
   ["World", "b3 factor", "1.02", "b3_factor", 1.02],
@@ -59,6 +59,7 @@ test("predictor, estimator, moves, torque rate and motors go into the set-up", a
   for (const label of ["Estimator (Kalman filter)", "Set points as smooth moves", "Bounded torque rate", "Motor limits known"]) {
     await panel.getByLabel(label, { exact: true }).check();
   }
+  await panel.getByLabel("Units", { exact: true }).selectOption("radians");
   await fill(page, "Noise phi", "0.002");
   await panel.getByLabel("Finds", { exact: true }).selectOption("none");
   await fill(page, "Ball speed", "5");
@@ -111,12 +112,12 @@ test("a slider does what its number does", async ({ page }) => {
   await expect(page.getByLabel("Horizon N", { exact: true })).toHaveValue("45");
   await expect(slider).toHaveValue("45");
   const push = page.getByLabel("Push, slider");
-  await push.fill("10");
-  await expect(push).toHaveValue("10");
+  await push.fill("400");
+  await expect(push).toHaveValue("400");
   const number = page.locator(".panel").getByLabel("Push", { exact: true });
-  await expect(number).toHaveValue("10");
+  await expect(number).toHaveValue("400");
   await fill(page, "Push", "");
-  await expect(number).toHaveValue("10");
+  await expect(number).toHaveValue("400");
 });
 
 test("a tighter bound is kept while the robot goes on", async ({ page }) => {

@@ -1,16 +1,10 @@
 // Files and links: out and in again, and what happens with broken ones.
 
 import { readFileSync } from "node:fs";
-import { deflateRawSync } from "node:zlib";
 import { expect, test, type Page } from "@playwright/test";
 import { readTrajectory } from "../src/files";
 import { Playback } from "../src/playback";
-import { clock, drop, fill, openFlat, openFile, ready, saved, scenario, until } from "./page";
-
-/** What stands behind the # for a set-up. */
-function fragment(toml: string): string {
-  return `1.${deflateRawSync(JSON.stringify({ toml, robots: ["lpv"] })).toString("base64url")}`;
-}
+import { clock, drop, fill, fragment, openFlat, openFile, ready, saved, scenario, until } from "./page";
 
 test("a link holds the whole set-up", async ({ page, context }) => {
   await context.grantPermissions(["clipboard-read", "clipboard-write"]);

@@ -1,7 +1,8 @@
 // The page itself: it loads, it fits, it does without WebGL, it does not grow.
 
 import { expect, test, type Page } from "@playwright/test";
-import { clock, open, openAt, scenario, until } from "./page";
+import config from "../vite.config";
+import { clock, open, openAt, openFile, openFlat, saved, scenario, until } from "./page";
 
 test("the page loads without an error and only from its own host", async ({ page }) => {
   const problems = await open(page);
@@ -37,6 +38,72 @@ test("without WebGL the floor is shown from above, and the page says so", async 
   await until(page, 1);
 });
 
+test("the picture from above that was asked for is no fault of WebGL", async ({ page }) => {
+  await openAt(page, "./?flat");
+  await expect(page.locator("body")).toHaveClass(/view-2d/);
+  await expect(page.locator("#message")).toBeHidden();
+});
+
+test("the scene shows the wheels where the set-up has them", async ({ page }) => {
+  await open(page);
+  const toml = await saved(page, "Save TOML");
+  const box = await page.locator("#scene").boundingBox();
+  if (!box) throw new Error("no scene");
+  // The robot alone.
+  const clip = { x: box.x + box.width * 0.3, y: box.y + box.height * 0.4, width: box.width * 0.4, height: box.height * 0.3 };
+  const picture = async (title: string, lines: string): Promise<Buffer> => {
+    const titled = toml.replace(/^title = .*$/m, `title = "${title}"`);
+    await openFile(page, "mine.toml", titled.replace("gravity_m_s2 = 9.81", `gravity_m_s2 = 9.81\n${lines}`));
+    await expect(page.locator("#title")).toHaveText(title);
+    await page.waitForTimeout(700);
+    return page.screenshot({ clip });
+  };
+  const paper = await picture("paper", "");
+  expect((await picture("said", "wheel_azimuths_deg = [-90.0, 30.0, 150.0]")).equals(paper)).toBe(true);
+  expect((await picture("turned", "wheel_azimuths_deg = [0.0, 120.0, 240.0]")).equals(paper)).toBe(false);
+});
+
+test("the words of the page are explained beside a picture", async ({ page }) => {
+  await openFlat(page);
+  const dialog = page.getByRole("dialog", { name: "What is what" });
+  await expect(dialog).toBeHidden();
+  await page.getByRole("button", { name: "What is what" }).click();
+  await expect(dialog.getByRole("img", { name: /phi.*theta/ })).toBeVisible();
+  for (const word of ["phi", "theta", "LPV MPC", "active bound"]) await expect(dialog.locator("dt", { hasText: word }).first()).toBeVisible();
+  await dialog.getByRole("button", { name: "Close" }).click();
+  await expect(dialog).toBeHidden();
+  const meanings = await page.locator("#plots figcaption").evaluateAll((all) => all.map((caption) => (caption as HTMLElement).title));
+  expect(meanings.every((meaning) => meaning.length > 10)).toBe(true);
+});
+
+test("the licences name what the page is made of, crates included", async ({ page }) => {
+  const response = await page.request.get("./licences.txt");
+  const text = await response.text();
+  for (const name of ["three ", "uplot ", "smol-toml ", "nalgebra ", "serde ", "wasm-bindgen ", "ode_solvers ", "standard library"]) {
+    expect(text).toContain(name);
+  }
+});
+
+test("the program sends the page packed, and only once", async ({ page }) => {
+  const sent: Record<string, string>[] = [];
+  page.on("response", (response) => {
+    if (/\.(js|wasm|css)$/.test(response.url())) void response.allHeaders().then((headers) => sent.push(headers));
+  });
+  await openAt(page, "./?flat");
+  expect(sent.length).toBeGreaterThanOrEqual(3);
+  for (const headers of sent) {
+    expect(headers["content-encoding"]).toMatch(/^(br|gzip)$/);
+    expect(headers["etag"]).toMatch(/^"[0-9a-f]{64}"$/);
+  }
+});
+
+test("the preview of the build isolates the page as the program does", () => {
+  const { preview, server } = config as { preview: { headers: object }; server: { headers: object } };
+  for (const { headers } of [preview, server]) {
+    expect(headers).toMatchObject({ "Cross-Origin-Opener-Policy": "same-origin", "Cross-Origin-Embedder-Policy": "require-corp" });
+  }
+});
+
 test("without the module the page says so, and nothing can be started", async ({ page }) => {
   await page.route("**/*.wasm", (route) => route.abort());
   await page.goto("./?flat");
@@ -55,8 +122,13 @@ test("on a phone nothing sticks out and everything can be reached", async ({ bro
   await page.touchscreen.tap(box.x + box.width * 0.8, box.y + box.height * 0.8);
   await until(page, 1);
   expect(Math.abs(Number(await page.getByLabel("Target X", { exact: true }).inputValue()))).toBeGreaterThan(0.05);
-  await page.getByLabel("Horizon N", { exact: true }).scrollIntoViewIfNeeded();
-  await expect(page.getByLabel("Horizon N", { exact: true })).toBeVisible();
+  // A slider and the robot are seen together.
+  const slider = page.getByLabel("Horizon N, slider");
+  await slider.evaluate((element) => element.scrollIntoView({ block: "end" }));
+  await expect(slider).toBeInViewport();
+  await expect(page.locator("#scene canvas")).toBeInViewport({ ratio: 0.9 });
+  const [scene, field] = [await page.locator(".stage").boundingBox(), await slider.boundingBox()];
+  expect(field?.y ?? NaN).toBeGreaterThan((scene?.y ?? NaN) + (scene?.height ?? NaN));
   expect(problems).toEqual([]);
   await context.close();
 });

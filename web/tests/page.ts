@@ -1,6 +1,7 @@
 // What the tests do with the page, in a user's words.
 
 import { readFile } from "node:fs/promises";
+import { deflateRawSync } from "node:zlib";
 import { expect, type Page } from "@playwright/test";
 
 /** Opens the page, with ten pictures a second: they keep the processor, which draws for these
@@ -88,11 +89,21 @@ export async function fill(page: Page, label: string, value: string): Promise<vo
   await field.blur();
 }
 
+/** The strength of the push that buttons give, rad/s, typed in the page's unit. */
+export async function setPush(page: Page, strength: number): Promise<void> {
+  await fill(page, "Push", String((strength * 180) / Math.PI));
+}
+
 /** The content of what a button saves. */
 export async function saved(page: Page, button: string): Promise<string> {
   const download = page.waitForEvent("download");
   await page.getByRole("button", { name: button }).click();
   return readFile(await (await download).path(), "utf8");
+}
+
+/** What stands behind the # for a set-up. */
+export function fragment(toml: string): string {
+  return `1.${deflateRawSync(JSON.stringify({ toml, robots: ["lpv"] })).toString("base64url")}`;
 }
 
 /** Chooses a file in the dialogue of the button "Open". */

@@ -1,7 +1,8 @@
 // What goes wrong is said, and what was there stays.
 
 import { expect, test } from "@playwright/test";
-import { drop, fill, openFlat, saved, scenario, table, until } from "./page";
+import { followed } from "../src/pictures";
+import { drop, fill, fragment, open, openFile, openFlat, openSection, saved, scenario, setPush, table, until } from "./page";
 import { expectSameUntil } from "./program";
 
 test("without the control loop's program the page says so", async ({ page }) => {
@@ -25,7 +26,7 @@ for (const name of ["tight-bounds", "lissajous"]) {
     await scenario(page, name);
     await page.locator("#play").click();
     await until(page, 0.2);
-    await fill(page, "Push", "40");
+    await setPush(page, 40);
     await page.getByRole("button", { name: "\u2192" }).click();
     await expect(page.locator("#alert")).toContainText("no plan at t = ");
     await expect(page.locator("#status")).toContainText("on the floor");
@@ -44,7 +45,7 @@ test("a push by hand stands in the file at its time", async ({ page }) => {
   await scenario(page, "drive");
   await page.locator("#play").click();
   await until(page, 0.5);
-  await fill(page, "Push", "1");
+  await setPush(page, 1);
   await page.getByRole("button", { name: "\u2192" }).click();
   await until(page, 1.5);
   await page.locator("#play").click();
@@ -75,4 +76,104 @@ test("programs per sample go in and out of the set-up", async ({ page }) => {
   await fill(page, "Sub-steps", "1000000000");
   await expect(page.locator("#message")).toContainText("substeps = 1000000000: at most 1000");
   await expect(page.locator("#message")).not.toBeHidden();
+});
+
+test("times that no ballbot has are refused, in a field as in a link", async ({ page }) => {
+  await openFlat(page);
+  await openSection(page, "World");
+  await openSection(page, "On a real robot");
+  for (const [label, key] of [["Sampling t_s", "controller.t_s"], ["Known delay", "controller.delay_s"], ["Delay", "world.delay.transport_s"]] as const) {
+    await fill(page, label, "1e9");
+    await expect(page.locator("#message")).toContainText(`${key} = 1000000: more than 1 s`);
+  }
+  const toml = (await saved(page, "Save TOML")).replace("t_s = 0.05", "t_s = 1e6");
+  await page.evaluate((hash) => (location.hash = hash), fragment(toml));
+  await expect(page.locator("#message")).toContainText("controller.t_s = 1000000: more than 1 s");
+  // Whoever means it is told what no controller can do.
+  await page.evaluate((hash) => (location.hash = hash), fragment(`accept_unusual_values = true\n${toml}`));
+  await expect(page.locator("#message")).toContainText("too long for the unstable pole");
+  await page.locator("#play").click();
+  await until(page, 0.3);
+});
+
+/** A set-up that passes every check, and whose samples take minutes. */
+function endless(toml: string): string {
+  return toml.replace("horizon = 20", "horizon = 200\niterations = { fixed = 1000 }\npredictor = { stage_consistent = { substeps = 1000 } }");
+}
+
+test("a controller that does not answer is ended, and the last settings that worked are offered", async ({ page }) => {
+  await openFlat(page);
+  await page.locator("#play").click();
+  await until(page, 0.5);
+  const worked = await saved(page, "Save TOML");
+  await openFile(page, "endless.toml", endless(worked));
+  await page.locator("#play").click();
+  await expect(page.locator("#message")).toContainText("did not answer for 2 s and was ended");
+  await expect(page.locator("#play")).toHaveText("Run");
+  await page.getByRole("button", { name: "Go on with the last settings that worked" }).click();
+  await expect(page.getByLabel("Horizon N", { exact: true })).toHaveValue("20");
+  expect(await saved(page, "Save TOML")).toBe(worked);
+  await page.locator("#play").click();
+  await until(page, 0.5);
+  await expect(page.locator("#message")).toBeHidden();
+});
+
+test("a link whose controller does not answer leaves the page at work", async ({ page }) => {
+  await openFlat(page);
+  const toml = await saved(page, "Save TOML");
+  await page.goto("about:blank");
+  await page.goto(`./?flat#${fragment(endless(toml))}`);
+  await expect(page.locator("#message")).toContainText("did not answer for 2 s and was ended");
+  await scenario(page, "two-setpoints");
+  await page.locator("#play").click();
+  await until(page, 0.5);
+});
+
+test("a fallen robot is said to lie on the floor, and no word covers another", async ({ page }) => {
+  await open(page);
+  for (const label of ["linear MPC", "LQR"]) await page.locator(".panel").getByLabel(label, { exact: true }).check();
+  await fill(page, "Target X", "2.5");
+  await until(page, 4);
+  await page.locator("#play").click();
+  // The LQR knows no bound of the tilt.
+  const badges = page.locator("#status > div");
+  await expect(badges.filter({ hasText: "LQR" })).toHaveText("LQRon the floor");
+  await expect(badges.filter({ hasText: "LQR" })).toHaveClass("bad");
+  await expect(badges.filter({ hasText: "LPV MPC" })).toContainText("converged");
+  const boxes = await page.locator("#alert, #status > div").evaluateAll((all) => all.map((element) => element.getBoundingClientRect().toJSON() as DOMRect));
+  for (const [i, box] of boxes.entries()) {
+    for (const other of boxes.slice(i + 1)) expect(Math.min(box.bottom, other.bottom) - Math.max(box.top, other.top)).toBeLessThanOrEqual(0);
+  }
+});
+
+test("the camera follows the robots that stand, and nobody's fall", () => {
+  const standing = { ending: undefined };
+  const fallen = { ending: "the robot has fallen" };
+  const at = (x: number, y: number) => ({ x, y, leanX: 0, leanY: 0 });
+  const last = { x: 7, y: 7 };
+  expect(followed([standing, standing], [at(1, 0), at(3, 2)], last)).toEqual({ x: 2, y: 1 });
+  expect(followed([standing, fallen], [at(1, 0), at(300, 2)], last)).toEqual({ x: 1, y: 0 });
+  expect(followed([standing, standing], [at(1, 0), at(NaN, 2)], last)).toEqual({ x: 1, y: 0 });
+  expect(followed([fallen], [at(300, 2)], last)).toEqual(last);
+});
+
+test("where the clock is coarse the time per step is a mean", async ({ page }) => {
+  // A host that does not isolate the page.
+  await page.route("**/*", async (route) => {
+    const response = await route.fetch();
+    const headers = Object.fromEntries(Object.entries(response.headers()).filter(([name]) => !name.startsWith("cross-origin")));
+    await route.fulfill({ response, headers });
+  });
+  await openFlat(page);
+  expect(await page.evaluate(() => crossOriginIsolated)).toBe(false);
+  await fill(page, "Target X", "0.5");
+  await until(page, 4);
+  await page.locator("#play").click();
+  const shown = (await page.locator("#status .time").textContent()) ?? "";
+  expect(shown).toContain("(mean; coarse clock)");
+  const steps = (table(await saved(page, "Save CSV"))["step_us"] ?? []).filter(Number.isFinite);
+  const mean = parseFloat(shown.replace(/^\D*/, ""));
+  expect(mean).toBeGreaterThan(0);
+  expect(mean).toBeLessThan(1000);
+  expect(steps.length).toBeGreaterThan(50);
 });

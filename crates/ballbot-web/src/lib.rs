@@ -166,6 +166,12 @@ impl Simulation {
         self.session.prepared().wheels.zenith_angle()
     }
 
+    /// Azimuths of the wheels' contact points from the robot's x axis, counter-clockwise seen from
+    /// above, rad.
+    pub fn azimuths(&self) -> Vec<f64> {
+        self.session.prepared().wheels.azimuths().to_vec()
+    }
+
     /// Why the robot does not stand any more; absent while it stands.
     pub fn ending(&self) -> Option<String> {
         self.session.fall_in_words()

@@ -1,13 +1,13 @@
 // What decides: the controller's own numbers, and what stands around it on a real robot.
 
 import { kindOf, type Scenario } from "../scenario";
+import { TERMS } from "../terms";
 import { numberField } from "./fields";
 import type { Form } from "./form";
 
 const STATES = ["phi", "theta", "phi_dot", "theta_dot"];
 /** The largest number of sub-steps the slider offers; the field takes any. */
 const SUBSTEPS = 8;
-const RAD_PER_DEG = Math.PI / 180;
 
 export function controllerFields(form: Form): HTMLElement[] {
   const weight = { min: 0.01, max: 10000, logarithmic: true };
@@ -105,8 +105,8 @@ export function feedbackFields(form: Form): HTMLElement[] {
     estimator(form),
     form.number("controller.delay_s", { label: "Known delay", title: "The controller decides for the state at which its torque will act", unit: "ms", factor: 1e-3, min: 0, max: 60, step: 1, absent: 0 }),
     form.table("controller.shaping", { label: "Set points as smooth moves" }, { tilt_rad: 0.1, phi_dot_rad_s: 8 },
-      form.number("controller.shaping.tilt_rad", { label: "Tilt", unit: "deg", factor: RAD_PER_DEG, min: 0.5, max: 20, step: 0.5 }),
-      form.number("controller.shaping.phi_dot_rad_s", { label: "Ball speed", unit: "rad/s", min: 0.5, max: 30, step: 0.5 })),
+      form.number("controller.shaping.tilt_rad", { label: "Tilt", quantity: "tilt", min: 0, max: 0.35 }),
+      form.number("controller.shaping.phi_dot_rad_s", { label: "Ball speed", quantity: "ballSpeed", min: 0, max: 30 })),
     form.table("controller.torque_rate", { label: "Bounded torque rate" }, { limit_nm_s: 20, weight: 1 },
       form.number("controller.torque_rate.limit_nm_s", { label: "Rate limit", unit: "N m/s", min: 1, max: 200, logarithmic: true, whenEmpty: Infinity }),
       form.number("controller.torque_rate.weight", { label: "Rate weight", min: 0.001, max: 1000, logarithmic: true })),
@@ -126,11 +126,11 @@ function estimator(form: Form): HTMLElement {
     (kind) => (kind === "none" ? "none" : undefined),
   );
   return form.table("controller.estimator", { label: "Estimator (Kalman filter)" }, {},
-    form.optional(key("phi_noise_rad"), { label: "Noise phi", unit: "rad" }),
-    form.optional(key("theta_noise_rad"), { label: "Noise theta", unit: "rad" }),
-    form.optional(key("theta_dot_noise_rad_s"), { label: "Noise rate", unit: "rad/s" }),
-    form.optional(key("phi_dot_drift_rad_s"), { label: "Drift phi_dot", unit: "rad/s" }),
-    form.optional(key("theta_dot_drift_rad_s"), { label: "Drift rate", unit: "rad/s" }),
+    form.optional(key("phi_noise_rad"), { label: "Noise phi", quantity: "ball" }),
+    form.optional(key("theta_noise_rad"), { label: "Noise theta", quantity: "tilt" }),
+    form.optional(key("theta_dot_noise_rad_s"), { label: "Noise rate", quantity: "tiltRate" }),
+    form.optional(key("phi_dot_drift_rad_s"), { label: "Drift phi_dot", quantity: "ballSpeed" }),
+    form.optional(key("theta_dot_drift_rad_s"), { label: "Drift rate", quantity: "tiltRate" }),
     form.optional(key("outlier_deviations"), { label: "Outliers", title: "Readings further off than this many standard deviations are not believed" }),
     disturbances,
   );
@@ -138,10 +138,10 @@ function estimator(form: Form): HTMLElement {
 
 export function boundFields(form: Form): HTMLElement[] {
   return [
-    form.range("bounds.phi_rad", { label: "phi", unit: "rad" }),
-    form.range("bounds.theta_rad", { label: "theta", unit: "rad" }),
-    form.range("bounds.phi_dot_rad_s", { label: "phi_dot", unit: "rad/s" }),
-    form.range("bounds.theta_dot_rad_s", { label: "theta_dot", unit: "rad/s" }),
-    form.range("bounds.torque_nm", { label: "torque", unit: "N m" }),
+    form.range("bounds.phi_rad", { label: "phi", title: TERMS.phi, quantity: "ball" }),
+    form.range("bounds.theta_rad", { label: "theta", title: TERMS.theta, quantity: "tilt" }),
+    form.range("bounds.phi_dot_rad_s", { label: "phi_dot", title: "How fast phi changes", quantity: "ballSpeed" }),
+    form.range("bounds.theta_dot_rad_s", { label: "theta_dot", title: "How fast theta changes", quantity: "tiltRate" }),
+    form.range("bounds.torque_nm", { label: "torque", title: TERMS.torque, unit: "N m" }),
   ];
 }

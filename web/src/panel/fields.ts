@@ -1,8 +1,14 @@
 // The elements that the panel is made of. Every one is a native control with a label.
 
+import { niceStep } from "../plots/range";
+import type { Quantity, Unit } from "../units";
+
 export interface FieldSpec {
   label: string;
   unit?: string;
+  /** In place of `unit`: the field shows and takes the unit that was chosen for this; its values, limits
+   *  of its slider included, are in rad or rad/s. */
+  quantity?: Quantity;
   title?: string;
 }
 
@@ -27,7 +33,7 @@ function row(spec: FieldSpec, ...controls: HTMLElement[]): HTMLElement {
     if (part !== null) control.setAttribute("aria-label", `${spec.label}, ${part}`);
   }
   const line = element("div", { className: "field" }, label, ...controls);
-  if (spec.unit) line.append(element("span", { className: "unit", textContent: spec.unit }));
+  if (spec.unit || spec.quantity) line.append(element("span", { className: "unit", textContent: spec.unit ?? "" }));
   if (spec.title) line.title = spec.title;
   return line;
 }
@@ -71,18 +77,32 @@ export interface Field<T> {
   set(value: T): void;
 }
 
-export function numberField(spec: NumberSpec, changed: (value: number) => void): Field<number> {
+/** A field whose unit may be another one from now on. */
+export interface Measured<T> extends Field<T> {
+  measure(unit: Unit): void;
+}
+
+function showUnit(line: HTMLElement, { name }: Unit): void {
+  const shown = line.querySelector(".unit");
+  if (shown) shown.textContent = name;
+}
+
+export function numberField(spec: NumberSpec, changed: (value: number) => void): Measured<number> {
   const input = element("input", { type: "number", inputMode: "decimal", step: "any" });
   const slides = spec.min !== undefined && spec.max !== undefined;
   const slider = element("input", { type: "range", step: String(spec.step ?? "any") });
   slider.setAttribute("aria-label", "slider");
   const typing = new Typing(input);
+  let factor = 1;
   const toSlider = (value: number) => (spec.logarithmic ? Math.log10(Math.max(value, 1e-9)) : value);
-  if (slides) {
-    slider.min = String(toSlider(spec.min ?? 0));
-    slider.max = String(toSlider(spec.max ?? 1));
+  const setLimits = () => {
+    const [min, max] = [(spec.min ?? 0) / factor, (spec.max ?? 1) / factor];
+    slider.min = String(toSlider(min));
+    slider.max = String(toSlider(max));
     if (spec.logarithmic) slider.step = "0.05";
-  }
+    else if (spec.quantity) slider.step = String(niceStep((max - min) / 100));
+  };
+  if (slides) setLimits();
   if (spec.whenEmpty !== undefined) input.placeholder = "none";
   if (spec.cleared) input.placeholder = "default";
   input.addEventListener("change", () => {
@@ -92,7 +112,7 @@ export function numberField(spec: NumberSpec, changed: (value: number) => void):
     }
     const value = typed(input, spec.whenEmpty ?? NaN);
     if (!Number.isNaN(value)) slider.value = String(toSlider(value));
-    changed(value);
+    changed(value * factor);
   });
   // While it is held it shows where it is, then what holds.
   let [now, held, answered] = [NaN, false, true];
@@ -101,24 +121,32 @@ export function numberField(spec: NumberSpec, changed: (value: number) => void):
     const at = Number(slider.value);
     const value = spec.logarithmic ? Number((10 ** at).toPrecision(2)) : at;
     input.value = shown(value);
-    changed(value);
+    changed(value * factor);
   });
   slider.addEventListener("change", () => {
     held = false;
-    if (answered) slider.value = String(toSlider(now));
+    if (answered) slider.value = String(toSlider(now / factor));
   });
+  const line = slides ? row(spec, input, slider) : row(spec, input);
+  const set = (value: number) => {
+    [now, answered] = [value, true];
+    if (!typing.now) input.value = shown(value / factor);
+    if (!held) slider.value = String(toSlider(value / factor));
+  };
   return {
-    element: slides ? row(spec, input, slider) : row(spec, input),
-    set(value) {
-      [now, answered] = [value, true];
-      if (!typing.now) input.value = shown(value);
-      if (!held) slider.value = String(toSlider(value));
+    element: line,
+    set,
+    measure(unit) {
+      ({ factor } = unit);
+      showUnit(line, unit);
+      if (slides) setLimits();
+      set(now);
     },
   };
 }
 
 /** [lower, upper]; an empty field is no bound. */
-export function rangeField(spec: FieldSpec, changed: (value: [number, number]) => void): Field<[number, number]> {
+export function rangeField(spec: FieldSpec, changed: (value: [number, number]) => void): Measured<[number, number]> {
   const make = (name: string) => {
     const input = element("input", { type: "number", inputMode: "decimal", step: "any", placeholder: "none" });
     input.setAttribute("aria-label", name);
@@ -129,14 +157,22 @@ export function rangeField(spec: FieldSpec, changed: (value: [number, number]) =
   // Only the side that was typed: the other one may have more digits than are shown. The second may
   // be typed before it is shown what came of the first.
   let now: [number, number] = [-Infinity, Infinity];
-  lower.addEventListener("change", () => changed(now = [typed(lower, -Infinity), now[1]]));
-  upper.addEventListener("change", () => changed(now = [now[0], typed(upper, Infinity)]));
+  let factor = 1;
+  lower.addEventListener("change", () => changed(now = [typed(lower, -Infinity) * factor, now[1]]));
+  upper.addEventListener("change", () => changed(now = [now[0], typed(upper, Infinity) * factor]));
+  const line = row(spec, lower, upper);
+  const set = ([low, high]: [number, number]) => {
+    now = [low, high];
+    if (!typing[0].now) lower.value = shown(low / factor);
+    if (!typing[1].now) upper.value = shown(high / factor);
+  };
   return {
-    element: row(spec, lower, upper),
-    set([low, high]) {
-      now = [low, high];
-      if (!typing[0].now) lower.value = shown(low);
-      if (!typing[1].now) upper.value = shown(high);
+    element: line,
+    set,
+    measure(unit) {
+      ({ factor } = unit);
+      showUnit(line, unit);
+      set(now);
     },
   };
 }

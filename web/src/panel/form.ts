@@ -1,7 +1,8 @@
 // Fields that show and change values of the set-up, each by its path.
 
 import { valueAt, type Range, type Scenario } from "../scenario";
-import { checkField, choiceField, numberField, rangeField, type FieldSpec, type NumberSpec } from "./fields";
+import { unitOf, type Quantity, type Unit, type UnitSystem } from "../units";
+import { checkField, choiceField, numberField, rangeField, type FieldSpec, type Measured, type NumberSpec } from "./fields";
 
 export interface FormNumber extends NumberSpec {
   /** The set-up's unit over the field's. */
@@ -14,6 +15,7 @@ export interface FormNumber extends NumberSpec {
 
 export class Form {
   private readonly shows: ((setup: Scenario) => void)[] = [];
+  private readonly measures: ((unit: (quantity: Quantity) => Unit) => void)[] = [];
 
   /** `change` sets a value of the set-up; `undefined` leaves the key out. */
   constructor(readonly change: (path: string, value: unknown) => void) {}
@@ -27,13 +29,25 @@ export class Form {
     this.shows.push(show);
   }
 
+  /** From now on in these units, for a robot with this ball radius, m. */
+  setUnits(system: UnitSystem, ballRadius: number): void {
+    for (const measure of this.measures) measure((quantity) => unitOf(quantity, system, ballRadius));
+  }
+
+  /** Lets the field have the unit that was chosen for its quantity. */
+  measured<F extends Measured<never>>(spec: FieldSpec, field: F): F {
+    const { quantity } = spec;
+    if (quantity) this.measures.push((unit) => field.measure(unit(quantity)));
+    return field;
+  }
+
   /** A number, in its own unit or in another one for people. */
   number(path: string, spec: FormNumber): HTMLElement {
     const factor = spec.factor ?? 1;
-    const field = numberField(spec, (value) => {
+    const field = this.measured(spec, numberField(spec, (value) => {
       this.change(path, value * factor);
       if (spec.also !== undefined) this.change(spec.also, value * factor);
-    });
+    }));
     this.watch((setup) => {
       const value = valueAt(setup, path);
       field.set((typeof value === "number" ? value : (spec.absent ?? NaN)) / factor);
@@ -47,7 +61,7 @@ export class Form {
   }
 
   range(path: string, spec: FieldSpec): HTMLElement {
-    const field = rangeField(spec, (value) => this.change(path, value));
+    const field = this.measured(spec, rangeField(spec, (value) => this.change(path, value)));
     this.watch((setup) => field.set((valueAt(setup, path) as Range | undefined) ?? [-Infinity, Infinity]));
     return field.element;
   }

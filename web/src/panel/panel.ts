@@ -2,8 +2,10 @@
 
 import { ROBOTS } from "../robots";
 import type { Scenario } from "../scenario";
+import { TERMS } from "../terms";
+import type { UnitSystem } from "../units";
 import { boundFields, controllerFields, feedbackFields } from "./controller";
-import { button, buttons, checkField, choiceField, note, numberField, section, type Field } from "./fields";
+import { button, buttons, checkField, choiceField, note, numberField, section, type Field, type NumberSpec } from "./fields";
 import { Form } from "./form";
 import { worldFields } from "./world";
 
@@ -12,8 +14,9 @@ export interface PanelActions {
   /** A value of the set-up was changed; `undefined` leaves the key out. */
   change(path: string, value: unknown): void;
   robots(names: string[]): void;
-  /** A coordinate of the target was typed, m. */
-  target(typed: { x: number } | { y: number }): void;
+  units(system: UnitSystem): void;
+  /** A coordinate of the target was typed, rad of the ball. */
+  target(typed: { x?: number; y?: number }): void;
   push(x: number, y: number): void;
   openFiles(): void;
   saveToml(): void;
@@ -33,18 +36,23 @@ export class Panel {
   private readonly robotFields = new Map<string, Field<boolean>>();
   private chosen: string[] = [];
   private targetFields: [Field<number>, Field<number>];
-  private pushBy = 3;
+  private readonly unitField: Field<string>;
+  private pushBy = Math.PI;
 
   constructor(host: HTMLElement, presets: [name: string, title: string][], private readonly actions: PanelActions) {
     this.form = new Form((path, value) => actions.change(path, value));
     this.presetField = choiceField({ label: "Scenario" }, presets, (name) => actions.preset(name));
-    this.targetFields = [
-      numberField({ label: "Target X", unit: "m", min: -3, max: 3, step: 0.05 }, (x) => actions.target({ x })),
-      numberField({ label: "Target Y", unit: "m", min: -3, max: 3, step: 0.05 }, (y) => actions.target({ y })),
-    ];
+    this.unitField = choiceField(
+      { label: "Units", title: "Of fields and plots. Files hold rad; the weights Q and R are for rad, rad/s and N m" },
+      [["metres", "m and degrees"], ["radians", "rad"]], (system) => actions.units(system as UnitSystem));
+    const target = (label: string, order: (phi: number) => void) => {
+      const spec: NumberSpec = { label, quantity: "ball", min: -25, max: 25 };
+      return this.form.measured(spec, numberField(spec, order));
+    };
+    this.targetFields = [target("Target X", (x) => actions.target({ x })), target("Target Y", (y) => actions.target({ y }))];
     host.append(
-      section("Scenario", true, this.presetField.element, this.files()),
-      section("Robots side by side", true, ...this.robotChoices(), note("LQR: u = -Kx, clipped to the torque's bounds; it knows no other bound.")),
+      section("Scenario", true, this.presetField.element, this.unitField.element, this.files()),
+      section("Robots side by side", true, ...this.robotChoices(), note(`LPV MPC. ${TERMS.lpv}`), note(`Linear MPC. ${TERMS.linear}`), note(`LQR. ${TERMS.lqr}`)),
       section("Target and push", true, this.targetFields[0].element, this.targetFields[1].element, ...this.pushes()),
       section("Controller", true, ...controllerFields(this.form)),
       section("Bounds", false, ...boundFields(this.form)),
@@ -81,10 +89,11 @@ export class Panel {
   }
 
   private pushes(): HTMLElement[] {
-    const strength = numberField({ label: "Push", unit: "rad/s", title: "Change of the tilt rate at once", min: 0.5, max: 40, step: 0.5 }, (value) => {
+    const spec: NumberSpec = { label: "Push", quantity: "tiltRate", title: "Change of the tilt rate at once", min: 0, max: 40 };
+    const strength = this.form.measured(spec, numberField(spec, (value) => {
       if (value > 0) this.pushBy = value;
       else strength.set(this.pushBy);
-    });
+    }));
     strength.set(this.pushBy);
     const push = (text: string, title: string, x: number, y: number) =>
       button(text, title, () => this.actions.push(x * this.pushBy, y * this.pushBy));
@@ -102,6 +111,13 @@ export class Panel {
     this.form.show(setup);
   }
 
+  /** In these units, for a robot with this ball radius, m. */
+  setUnits(system: UnitSystem, ballRadius: number): void {
+    this.unitField.set(system);
+    this.form.setUnits(system, ballRadius);
+  }
+
+  /** Where the first robot is to go, rad of the ball. */
   showTarget(x: number, y: number): void {
     this.targetFields[0].set(x);
     this.targetFields[1].set(y);

@@ -3,6 +3,7 @@
 import type uPlot from "uplot";
 import type { History } from "../history";
 import { ROW } from "../protocol";
+import { stepAt } from "../steptime";
 import type { Strip } from "./strips";
 
 /** Points of a curve; more would not be seen. */
@@ -19,6 +20,13 @@ export function planeOf(history: History, chosen: number): number {
   return Math.min(chosen, history.planes - 1);
 }
 
+/** What a strip shows of a sample: one value, or one of each motor. */
+export function valuesAt(strip: Strip, history: History, index: number, plane: number): number[] {
+  if (strip.motors) return [0, 1, 2].map((motor) => history.motor(index, motor));
+  if (strip.column === ROW.stepMicroseconds) return [stepAt(history, index, plane)];
+  return [history.at(index, plane, strip.column ?? ROW.phi)];
+}
+
 /** One column of times, then the columns of every robot. Robots may have stopped early. */
 export function columns(strip: Strip, shown: Shown[], chosen: number, start: number): uPlot.AlignedData {
   const longest = shown.map(({ history }) => history).reduce<History | undefined>(
@@ -33,29 +41,28 @@ export function columns(strip: Strip, shown: Shown[], chosen: number, start: num
   const made: (number | null)[][] = [];
   for (const { history } of shown) {
     const offset = longest.total - longest.length - (history.total - history.length);
-    const column = (value: (i: number) => number, final: number) => {
-      const values = indices.map((i) => {
-        const at = i + offset;
-        const known = at >= 0 && at < history.length ? value(at) : NaN;
-        return Number.isFinite(known) ? known : null;
-      });
-      made.push([...values, history === longest && Number.isFinite(final) ? final : null]);
-    };
     const plane = planeOf(history, chosen);
+    const known = indices.map((i) => {
+      const at = i + offset;
+      return at >= 0 && at < history.length ? valuesAt(strip, history, at, plane) : [];
+    });
     const last = history.length - 1;
-    if (strip.motors) {
-      for (let motor = 0; motor < 3; motor++) column((i) => history.motor(i, motor), history.motor(last, motor));
-    } else {
-      const key = strip.column ?? ROW.phi;
-      const final = strip.held ? history.at(last, plane, key) : history.nowAt(plane, key);
-      column((i) => history.at(i, plane, key), final);
+    const final = strip.held ? valuesAt(strip, history, last, plane) : [history.nowAt(plane, strip.column ?? ROW.phi)];
+    for (let curve = 0; curve < final.length; curve++) {
+      const values = known.map((all) => finite(all[curve]));
+      made.push([...values, history === longest ? finite(final[curve]) : null]);
     }
   }
   if (strip.reference) {
     const plane = planeOf(longest, chosen);
-    made.push([...indices.map((i) => longest.at(i, plane, ROW.phiReference)), longest.nowAt(plane, 5)]);
+    made.push([...indices.map((i) => finite(longest.at(i, plane, ROW.phiReference))), finite(longest.nowAt(plane, 5))]);
   }
   return [times, ...made] as uPlot.AlignedData;
+}
+
+/** A gap in place of what is not a finite number. */
+function finite(value: number | undefined): number | null {
+  return value !== undefined && Number.isFinite(value) ? value : null;
 }
 
 function emptyColumns(strip: Strip, robots: number): number[][] {

@@ -29,15 +29,20 @@ function clipped({ ctx, bbox }: uPlot, draw: () => void): void {
   ctx.restore();
 }
 
-/** The plan ahead, and earlier plans behind what then happened: a component of their states. */
+/** The plan ahead, and earlier plans behind what then happened: a component of their states. A plan
+ *  of a controller that finds no way out may have any values: what is drawn ends just outside the
+ *  axes, since a browser draws every dash of a line, however far away. */
 export function drawPredictions(chart: uPlot, component: number, shown: Shown[], chosen: number): void {
-  const { ctx } = chart;
+  const { ctx, bbox } = chart;
   const ratio = uPlot.pxRatio;
+  const [highest, lowest] = [bbox.top - bbox.height, bbox.top + 2 * bbox.height];
   const curve = (time: number, states: Float64Array, samplingTime: number) => {
     ctx.beginPath();
     for (let i = 0; 4 * i < states.length; i++) {
       const x = chart.valToPos(time + i * samplingTime, "x", true);
-      ctx.lineTo(x, chart.valToPos(states[4 * i + component] ?? 0, "y", true));
+      const y = chart.valToPos(states[4 * i + component] ?? NaN, "y", true);
+      if (Number.isNaN(x + y) || x > bbox.left + 2 * bbox.width) break;
+      ctx.lineTo(x, Math.min(Math.max(y, highest), lowest));
     }
     ctx.stroke();
   };
@@ -47,27 +52,29 @@ export function drawPredictions(chart: uPlot, component: number, shown: Shown[],
       ctx.strokeStyle = colour;
       ctx.lineWidth = ratio;
       ctx.globalAlpha = 0.35;
+      ctx.setLineDash([]);
       for (const { time, states } of history.fans[plane] ?? []) curve(time, states, history.samplingTime);
       ctx.globalAlpha = 0.9;
       ctx.setLineDash([3 * ratio, 3 * ratio]);
       const states = history.predictions[plane];
       if (states) curve(history.nowAt(plane, ROW.time), states, history.samplingTime);
-      ctx.setLineDash([]);
     }
   });
 }
 
-/** A line at the present. */
-export function drawNow(chart: uPlot, time: number, colour: string): void {
+/** A line at a time. */
+export function drawTime(chart: uPlot, time: number, colour: string): void {
   const { ctx, bbox } = chart;
   clipped(chart, () => {
+    // The chart's last curve leaves its dashes.
+    ctx.setLineDash([]);
     ctx.globalAlpha = 0.5;
     ctx.strokeStyle = colour;
     ctx.lineWidth = uPlot.pxRatio;
-    const now = Math.round(chart.valToPos(time, "x", true)) + 0.5;
+    const at = Math.round(chart.valToPos(time, "x", true)) + 0.5;
     ctx.beginPath();
-    ctx.moveTo(now, bbox.top);
-    ctx.lineTo(now, bbox.top + bbox.height);
+    ctx.moveTo(at, bbox.top);
+    ctx.lineTo(at, bbox.top + bbox.height);
     ctx.stroke();
   });
 }

@@ -2,11 +2,20 @@
 
 import { ROW } from "../protocol";
 import type { Range, Scenario } from "../scenario";
+import { TERMS } from "../terms";
+import type { Quantity } from "../units";
 
 /** What a strip shows. */
 export interface Strip {
+  /** What it is, in a few words. */
   title: string;
+  /** The same where lengths on the floor are shown. */
+  inMetres?: string;
+  /** One sentence more. */
+  meaning: string;
   unit: string;
+  /** Its unit is the one that was chosen. */
+  quantity?: Quantity;
   /** Column of the sample, or a motor by its number. */
   column?: number;
   motors?: boolean;
@@ -23,13 +32,28 @@ export interface Strip {
 }
 
 export const STRIPS: Strip[] = [
-  { title: "phi", unit: "rad", column: ROW.phi, predicted: 0, bound: (b) => b.phi_rad, least: 0.5, reference: true },
-  { title: "theta", unit: "rad", column: ROW.theta, predicted: 1, bound: (b) => b.theta_rad, least: 0.05 },
-  { title: "phi_dot", unit: "rad/s", column: ROW.phiDot, predicted: 2, bound: (b) => b.phi_dot_rad_s, least: 1 },
-  { title: "theta_dot", unit: "rad/s", column: ROW.thetaDot, predicted: 3, bound: (b) => b.theta_dot_rad_s, least: 0.2 },
-  { title: "torque", unit: "N m", column: ROW.torque, bound: (b) => b.torque_nm, held: true, least: 0.05 },
-  { title: "motor torques", unit: "N m", motors: true, held: true, least: 0.05 },
-  { title: "cost J", unit: "", column: ROW.cost, held: true, logarithmic: true, least: 1 },
-  { title: "active bounds", unit: "", column: ROW.activeBounds, held: true, least: 2, fromZero: true },
-  { title: "time per step", unit: "\u00b5s", column: ROW.stepMicroseconds, held: true, least: 20, fromZero: true },
+  {
+    title: "phi: angle of the ball", inMetres: "r phi: position of the ball", meaning: TERMS.phi, unit: "", quantity: "ball",
+    column: ROW.phi, predicted: 0, bound: (b) => b.phi_rad, least: 0.5, reference: true,
+  },
+  {
+    title: "theta: tilt of the body", meaning: TERMS.theta, unit: "", quantity: "tilt",
+    column: ROW.theta, predicted: 1, bound: (b) => b.theta_rad, least: 0.05,
+  },
+  {
+    title: "phi_dot: speed of the ball", inMetres: "r phi_dot: speed of the ball", meaning: "How fast phi changes.", unit: "", quantity: "ballSpeed",
+    column: ROW.phiDot, predicted: 2, bound: (b) => b.phi_dot_rad_s, least: 1,
+  },
+  {
+    title: "theta_dot: tilt rate", meaning: "How fast theta changes.", unit: "", quantity: "tiltRate",
+    column: ROW.thetaDot, predicted: 3, bound: (b) => b.theta_dot_rad_s, least: 0.2,
+  },
+  {
+    title: "torque on the ball", meaning: TERMS.torque, unit: "N m",
+    column: ROW.torque, bound: (b) => b.torque_nm, held: true, least: 0.05,
+  },
+  { title: "torques of motors 1, 2, 3", meaning: TERMS.motors, unit: "N m", motors: true, held: true, least: 0.05 },
+  { title: "cost J of the plan", meaning: TERMS.cost, unit: "", column: ROW.cost, held: true, logarithmic: true, least: 1 },
+  { title: "active bounds", meaning: TERMS.activeBound, unit: "", column: ROW.activeBounds, held: true, least: 2, fromZero: true },
+  { title: "time per step", meaning: TERMS.step, unit: "\u00b5s", column: ROW.stepMicroseconds, held: true, least: 20, fromZero: true },
 ];

@@ -1,15 +1,18 @@
 // The floor from above and the robot from the side, for browsers without WebGL.
 
-import type { FloorPoint, Picture, RobotPicture, Shape, Theme, View } from "./view";
+import { PAPER_SHAPE, type FloorPoint, type Picture, type RobotPicture, type Shape, type Theme, type View } from "./view";
 
 /** Shown around the followed point, m. */
 const SPAN = 3.2;
+/** Numbers keep off the edges, px; those of x stand below the words at the top. */
+const EDGE = 30;
+const TOP = 100;
 
 export class FlatView implements View {
   readonly kind = "2d";
   readonly element = document.createElement("canvas");
   private readonly context: CanvasRenderingContext2D;
-  private shape: Shape = { ballRadius: 0.12, wheelRadius: 0.05, zenith: Math.PI / 4, centreOfMass: 0.3 };
+  private shape = PAPER_SHAPE;
   private centre: FloorPoint = { x: 0, y: 0 };
   private scale = 100;
   /** Of the host, px: asked for once, since every question lets the browser lay out the page. */
@@ -60,27 +63,31 @@ export class FlatView implements View {
     context.fillStyle = theme.background;
     context.fillRect(0, 0, this.width, this.height);
     this.drawGrid();
+    this.drawScale(picture.robots.length === 1);
     for (const robot of picture.robots) this.drawRobot(robot);
-    this.line(picture.stroke.length, (i) => picture.stroke[i] ?? this.centre, theme.ink, 2);
+    const isPush = picture.strokeKind === "push";
+    this.line(picture.stroke.length, (i) => picture.stroke[i] ?? this.centre, isPush ? theme.ballStripe : theme.ink, isPush ? 4 : 2);
+    if (isPush) this.arrowHead(picture.stroke, theme.ballStripe, 14);
     return Math.hypot(dx, dy) * this.scale > 0.5;
   }
 
-  /** Lines at whole multiples of the step, over what is seen. */
+  /** Whole multiples of a step that are seen, around a middle, over so many pixels. */
+  private multiples(step: number, middle: number, pixels: number): number[] {
+    const reach = pixels / 2 / this.scale;
+    const first = Math.ceil((middle - reach) / step);
+    return Array.from({ length: Math.floor((middle + reach) / step) - first + 1 }, (_, i) => (first + i) * step);
+  }
+
   private drawGrid(): void {
-    const { context, scale, centre, width, height } = this;
+    const { context, centre, width, height } = this;
     for (const [step, colour] of [[0.25, this.theme.grid], [1, this.theme.gridStrong]] as const) {
-      const multiples = (middle: number, pixels: number): number[] => {
-        const reach = pixels / 2 / scale;
-        const first = Math.ceil((middle - reach) / step);
-        return Array.from({ length: Math.floor((middle + reach) / step) - first + 1 }, (_, i) => (first + i) * step);
-      };
       context.beginPath();
-      for (const x of multiples(centre.x, width)) {
+      for (const x of this.multiples(step, centre.x, width)) {
         const [left] = this.toCanvas(x, 0);
         context.moveTo(left, 0);
         context.lineTo(left, height);
       }
-      for (const y of multiples(centre.y, height)) {
+      for (const y of this.multiples(step, centre.y, height)) {
         const [, top] = this.toCanvas(0, y);
         context.moveTo(0, top);
         context.lineTo(width, top);
@@ -89,6 +96,49 @@ export class FlatView implements View {
       context.lineWidth = 1;
       context.stroke();
     }
+  }
+
+  /** The axes at the origin, and numbers at the edges: at whole metres, or half ones. Of y only where
+   *  `withY`: robots side by side stand on lanes, each with its own zero. */
+  private drawScale(withY: boolean): void {
+    const { centre, width, height, theme } = this;
+    const origin = { x: 0, y: 0 };
+    for (const [end, name] of [[{ x: 0.45, y: 0 }, "x"], [{ x: 0, y: 0.45 }, "y"]] as const) {
+      this.line(2, (i) => (i ? end : origin), theme.reference, 2.5);
+      this.arrowHead([origin, end], theme.reference, 9);
+      const [left, top] = this.toCanvas(1.15 * end.x, 1.15 * end.y);
+      this.text(name, left, top, "center");
+    }
+    for (const x of this.multiples(0.5, centre.x, width - 2 * EDGE)) {
+      this.text(`x = ${x} m`, this.toCanvas(x, 0)[0], TOP, "center");
+    }
+    if (!withY) return;
+    for (const y of this.multiples(0.5, centre.y, height / 2)) this.text(`y = ${y} m`, width - 6, this.toCanvas(0, y)[1], "right");
+  }
+
+  private text(words: string, left: number, top: number, align: CanvasTextAlign): void {
+    const { context } = this;
+    context.font = "11px system-ui, sans-serif";
+    context.textAlign = align;
+    context.textBaseline = "middle";
+    context.fillStyle = this.theme.reference;
+    context.fillText(words, left, top);
+  }
+
+  /** The head of an arrow at the end of a line, px long. */
+  private arrowHead(line: readonly FloorPoint[], colour: string, length: number): void {
+    const [from, to] = [line[0], line.at(-1)];
+    if (!from || !to) return;
+    const [left, top] = this.toCanvas(to.x, to.y);
+    const along = Math.atan2(from.y - to.y, to.x - from.x);
+    const corner = (turn: number): [number, number] => [left - length * Math.cos(along + turn), top - length * Math.sin(along + turn)];
+    const { context } = this;
+    context.beginPath();
+    context.moveTo(left + 0.3 * length * Math.cos(along), top + 0.3 * length * Math.sin(along));
+    context.lineTo(...corner(0.45));
+    context.lineTo(...corner(-0.45));
+    context.fillStyle = colour;
+    context.fill();
   }
 
   private line(count: number, point: (i: number) => FloorPoint, colour: string, width: number): void {

@@ -41,6 +41,11 @@ export class Pointer {
   strokeKind: "path" | "push" = "path";
   private active: Active | undefined;
 
+  /** Above the floor, m: a body is pushed where it was grabbed. */
+  get strokeHeight(): number {
+    return this.active?.height ?? 0;
+  }
+
   constructor(private readonly view: View, private readonly actions: Actions) {
     const { element } = view;
     element.addEventListener("pointerdown", (event) => this.down(event));

@@ -120,10 +120,8 @@ export class Robot {
   }
 
   private buildWheels(metal: Material, rubber: Material): void {
-    const { ballRadius: r, wheelRadius, zenith } = this.shape;
-    for (let i = 0; i < 3; i++) {
-      // As in the torque map of the paper: -90, 30 and 150 degrees.
-      const azimuth = (i * 2 * Math.PI) / 3 - Math.PI / 2;
+    const { ballRadius: r, wheelRadius, zenith, azimuths } = this.shape;
+    for (const azimuth of azimuths) {
       const outward = toScene(Math.cos(azimuth), Math.sin(azimuth));
       const normal = UP.clone().multiplyScalar(Math.cos(zenith)).addScaledVector(outward, Math.sin(zenith));
       const tangent = UP.clone().cross(outward);

@@ -6,9 +6,11 @@ import {
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Actor } from "./actor";
+import { Arrow } from "./arrow";
 import { FloorLine, gridLines, LINE_POINTS } from "./lines";
 import { toScene } from "./robot";
-import type { FloorPoint, Picture, Shape, Theme, View } from "./view";
+import { FloorScale } from "./scale";
+import { PAPER_SHAPE, type FloorPoint, type Picture, type Shape, type Theme, type View } from "./view";
 
 /** How fast the camera goes after the robots, 1/s. */
 const FOLLOW_RATE = 3.5;
@@ -16,6 +18,8 @@ const FOLLOW_RATE = 3.5;
 const STILL = 1e-4;
 /** Time between two frames as a rule, ms. */
 const FRAME = 1000 / 60;
+/** Height of numbers on the floor, px. */
+const TEXT = 15;
 /** Frames further apart are too slow, ms. */
 const SLOW_FRAME = 40;
 /** For how long frames may be slow, ms. */
@@ -35,7 +39,9 @@ export class SolidView implements View {
   private actors: Actor[] = [];
   private stroke: FloorLine;
   private theme: Theme;
-  private shape: Shape = { ballRadius: 0.12, wheelRadius: 0.05, zenith: Math.PI / 4, centreOfMass: 0.3 };
+  private readonly push = new Arrow(0.014, true);
+  private readonly scale: FloorScale;
+  private shape = PAPER_SHAPE;
   private followed = new Vector3();
   private robots = 1;
   private slowFor = 0;
@@ -60,7 +66,8 @@ export class SolidView implements View {
     const box = this.sun.shadow.camera;
     [box.left, box.right, box.bottom, box.top, box.near, box.far] = [-1.6, 1.6, -1.6, 1.6, 0.5, 8];
     this.stroke = new FloorLine(new LineBasicMaterial({ color: new Color(theme.ink) }), LINE_POINTS, 0.01);
-    this.scene.add(this.floor, this.sun, this.sun.target, this.sky, this.stroke.object);
+    this.scale = new FloorScale(theme);
+    this.scene.add(this.push.group, this.scale.group, this.floor, this.sun, this.sun.target, this.sky, this.stroke.object);
     this.camera.position.set(0.9, 1.35, 2.9);
     this.controls = new OrbitControls(this.camera, this.element);
     this.controls.target.set(0, 0.32, 0);
@@ -99,6 +106,9 @@ export class SolidView implements View {
     }
     this.grid = [gridLines(0.25, 4, theme.grid, 0.5), gridLines(1, 0, theme.gridStrong, 0.9)];
     this.scene.add(...this.grid);
+    this.scale.setTheme(theme);
+    this.push.setColour(theme.ballStripe);
+    (this.stroke.object.material as LineBasicMaterial).color.set(theme.ink);
     this.clearActors();
   }
 
@@ -111,6 +121,7 @@ export class SolidView implements View {
     const { clientWidth, clientHeight } = this.host;
     if (clientWidth === 0 || clientHeight === 0) return;
     this.renderer.setSize(clientWidth, clientHeight, false);
+    this.scale.setTextHeight((TEXT * 2 * Math.tan((this.camera.fov * Math.PI) / 360)) / clientHeight);
     this.camera.aspect = clientWidth / clientHeight;
     this.camera.updateProjectionMatrix();
   }
@@ -123,7 +134,7 @@ export class SolidView implements View {
       this.actors = colours.map((colour) => new Actor(this.scene, this.shape, this.theme, colour));
     }
     for (const [i, robot] of picture.robots.entries()) this.actors[i]?.draw(robot);
-    this.stroke.set(picture.stroke.length, (i) => picture.stroke[i] ?? { x: 0, y: 0 }, 0);
+    this.drawStroke(picture);
     const now = performance.now();
     // After a pause nothing is known of how fast frames are.
     const gap = inSequence ? now - this.lastFrame : FRAME;
@@ -133,6 +144,16 @@ export class SolidView implements View {
     this.adapt(gap);
     this.renderer.render(this.scene, this.camera);
     return followed > STILL || turned;
+  }
+
+  private drawStroke({ stroke, strokeKind, strokeHeight, robots }: Picture): void {
+    const [from, to] = [stroke[0], stroke.at(-1)];
+    const isPush = strokeKind === "push" && from !== undefined && to !== undefined;
+    this.stroke.set(isPush ? 0 : stroke.length, (i) => stroke[i] ?? { x: 0, y: 0 }, 0);
+    const height = Math.max(strokeHeight, 0.02);
+    if (isPush) this.push.set(toScene(from.x, from.y, height), toScene(to.x, to.y, height));
+    else this.push.group.visible = false;
+    this.scale.show(this.followed.x, -this.followed.z, robots.length === 1);
   }
 
   /** The camera steps back for robots that come, and closer when they go. */

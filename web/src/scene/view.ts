@@ -12,6 +12,8 @@ export interface Shape {
   ballRadius: number;
   wheelRadius: number;
   zenith: number;
+  /** Of the wheels, from the robot's x axis, counter-clockwise seen from above. */
+  azimuths: number[];
   centreOfMass: number;
 }
 
@@ -35,6 +37,8 @@ export interface Picture {
   /** The drawn path or push, while the pointer is down. */
   stroke: FloorPoint[];
   strokeKind: "path" | "push";
+  /** Above the floor, m. */
+  strokeHeight: number;
   follow: FloorPoint;
 }
 
@@ -67,6 +71,11 @@ export interface View {
   /** Where a point above the floor appears in the window. */
   project(x: number, y: number, height: number): { clientX: number; clientY: number };
 }
+
+/** The robot of the paper, until the set-up's own is known. */
+export const PAPER_SHAPE: Shape = {
+  ballRadius: 0.12, wheelRadius: 0.05, zenith: Math.PI / 4, azimuths: [-Math.PI / 2, Math.PI / 6, (5 * Math.PI) / 6], centreOfMass: 0.3,
+};
 
 export function readTheme(): Theme {
   const style = getComputedStyle(document.documentElement);

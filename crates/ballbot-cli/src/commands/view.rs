@@ -3,6 +3,7 @@
 use super::CommandError;
 use crate::output;
 use clap::Args;
+use sha2::{Digest, Sha256};
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::thread;
@@ -96,21 +97,54 @@ const PATIENCE: Duration = Duration::from_secs(10);
 fn answer(mut stream: &TcpStream) -> io::Result<()> {
     stream.set_read_timeout(Some(PATIENCE))?;
     stream.set_write_timeout(Some(PATIENCE))?;
-    let mut lines = BufReader::new(stream.take(LONGEST_REQUEST)).lines();
-    let request = lines.next().transpose()?.unwrap_or_default();
-    for line in lines {
-        if line?.is_empty() {
-            break;
-        }
-    }
-    let response = respond(&request);
+    let lines = BufReader::new(stream.take(LONGEST_REQUEST)).lines();
+    let lines: io::Result<Vec<String>> = lines
+        .take_while(|line| !matches!(line, Ok(text) if text.is_empty()))
+        .collect();
+    let response = respond(&Request { lines: lines? });
     stream.write_all(&response)?;
     stream.flush()
 }
 
-/// The response to a request line.
-fn respond(request: &str) -> Vec<u8> {
-    let mut words = request.split(' ');
+/// The request line, then the headers.
+struct Request {
+    lines: Vec<String>,
+}
+
+impl Request {
+    /// The content of a header; empty if it is not there.
+    fn header(&self, name: &str) -> &str {
+        let headers = self.lines.iter().skip(1);
+        let mut fields = headers.filter_map(|line| line.split_once(':'));
+        let found = fields.find(|(field, _)| field.eq_ignore_ascii_case(name));
+        found.map_or("", |(_, content)| content.trim())
+    }
+
+    /// Whether the browser unpacks this encoding.
+    fn unpacks(&self, encoding: &str) -> bool {
+        self.header("Accept-Encoding").split(',').any(|offer| {
+            let mut parts = offer.split(';').map(str::trim);
+            let refused = |weight: &str| {
+                let weight = weight.strip_prefix("q=").unwrap_or("1");
+                weight.parse() == Ok(0.0)
+            };
+            parts.next() == Some(encoding) && !parts.any(refused)
+        })
+    }
+}
+
+/// Encodings in which the built page lies beside its files, the shortest first, and their endings.
+const PACKED: [(&str, &str); 2] = [("br", ".br"), ("gzip", ".gz")];
+
+/// A file of the page.
+fn file(name: &str) -> Option<&'static [u8]> {
+    let found = FILES.iter().find(|(file, _)| *file == name);
+    found.map(|(_, content)| *content)
+}
+
+/// The response to a request.
+fn respond(request: &Request) -> Vec<u8> {
+    let mut words = request.lines.first().map_or("", String::as_str).split(' ');
     let (method, target) = (words.next(), words.next());
     let with_content = match method {
         Some("GET") => true,
@@ -122,22 +156,45 @@ fn respond(request: &str) -> Vec<u8> {
         Some("/") | None => "index.html",
         Some(path) => path.trim_start_matches('/'),
     };
-    match FILES.iter().find(|(file, _)| *file == name) {
-        Some((_, content)) => response("200 OK", media_type(name), content, with_content),
-        None => plain("404 Not Found", "there is no such file\n"),
+    let Some(content) = file(name) else {
+        return plain("404 Not Found", "there is no such file\n");
+    };
+    let offered = PACKED
+        .iter()
+        .filter(|(encoding, _)| request.unpacks(encoding));
+    let mut packed = offered
+        .filter_map(|(encoding, ending)| Some((encoding, file(&format!("{name}{ending}"))?)));
+    let (coding, content) = match packed.next() {
+        Some((encoding, content)) => (format!("Content-Encoding: {encoding}\r\n"), content),
+        None => (String::new(), content),
+    };
+    let tag = format!("\"{:x}\"", Sha256::digest(content));
+    let about = format!(
+        "Content-Type: {}\r\n{coding}Vary: Accept-Encoding\r\nETag: {tag}\r\n",
+        media_type(name)
+    );
+    if request
+        .header("If-None-Match")
+        .split(',')
+        .any(|known| known.trim() == tag)
+    {
+        return response("304 Not Modified", &about, &[], false);
     }
+    response("200 OK", &about, content, with_content)
 }
 
 fn plain(status: &str, text: &str) -> Vec<u8> {
-    response(status, "text/plain; charset=utf-8", text.as_bytes(), true)
+    let about = "Content-Type: text/plain; charset=utf-8\r\n";
+    response(status, about, text.as_bytes(), true)
 }
 
-fn response(status: &str, media_type: &str, content: &[u8], with_content: bool) -> Vec<u8> {
-    let length = content.len();
-    let head = format!(
-        "HTTP/1.1 {status}\r\nContent-Type: {media_type}\r\nContent-Length: {length}\r\n\
-         {HEADERS}\r\n"
-    );
+/// `about` are the headers that tell of the content.
+fn response(status: &str, about: &str, content: &[u8], with_content: bool) -> Vec<u8> {
+    let length = match status {
+        "304 Not Modified" => String::new(),
+        _ => format!("Content-Length: {}\r\n", content.len()),
+    };
+    let head = format!("HTTP/1.1 {status}\r\n{about}{length}{HEADERS}\r\n");
     let mut bytes = head.into_bytes();
     if with_content {
         bytes.extend_from_slice(content);
@@ -152,6 +209,7 @@ fn media_type(name: &str) -> &'static str {
         Some("css") => "text/css; charset=utf-8",
         Some("wasm") => "application/wasm",
         Some("svg") => "image/svg+xml",
+        Some("txt") => "text/plain; charset=utf-8",
         _ => "application/octet-stream",
     }
 }
@@ -161,7 +219,13 @@ mod tests {
     use super::*;
 
     fn text(request: &str) -> String {
-        String::from_utf8_lossy(&respond(request)).into_owned()
+        text_with(request, &[])
+    }
+
+    fn text_with(request: &str, headers: &[&str]) -> String {
+        let lines = std::iter::once(&request).chain(headers);
+        let lines = lines.map(|line| (*line).to_owned()).collect();
+        String::from_utf8_lossy(&respond(&Request { lines })).into_owned()
     }
 
     #[test]
@@ -170,6 +234,52 @@ mod tests {
         assert!(answer.starts_with("HTTP/1.1 200 OK\r\nContent-Type: text/html"));
         assert!(answer.contains("Content-Security-Policy: default-src 'none';"));
         assert!(answer.contains("<!doctype html>"));
+    }
+
+    #[test]
+    fn what_the_browser_has_already_is_not_sent_again() {
+        let first = text("GET / HTTP/1.1");
+        let tag = first.lines().find_map(|line| line.strip_prefix("ETag: "));
+        let tag = tag.expect("an ETag");
+        for known in [tag.to_owned(), format!("\"other\", {tag}")] {
+            let again = text_with("GET / HTTP/1.1", &[&format!("if-none-match: {known}")]);
+            assert!(again.starts_with("HTTP/1.1 304"), "{again}");
+            assert!(again.ends_with("\r\n\r\n"), "{again}");
+        }
+        let other = text_with("GET / HTTP/1.1", &["If-None-Match: \"other\""]);
+        assert!(other.starts_with("HTTP/1.1 200"), "{other}");
+    }
+
+    #[test]
+    fn a_refused_encoding_is_not_offered() {
+        let offers = |accepted: &str| {
+            let lines = vec![String::new(), format!("Accept-Encoding: {accepted}")];
+            let request = Request { lines };
+            PACKED.map(|(encoding, _)| request.unpacks(encoding))
+        };
+        assert_eq!(offers("gzip, deflate, br"), [true, true]);
+        assert_eq!(offers("br;q=0, gzip;q=0.5"), [false, true]);
+        assert_eq!(offers("identity"), [false, false]);
+    }
+
+    #[cfg(feature = "page")]
+    #[test]
+    fn the_page_is_sent_packed() {
+        let head = |accepted: &str| {
+            let answer = text_with(
+                "HEAD / HTTP/1.1",
+                &[&format!("Accept-Encoding: {accepted}")],
+            );
+            let find = |name: &str| answer.lines().find_map(|line| line.strip_prefix(name));
+            let length = find("Content-Length: ").expect("a length");
+            let length: usize = length.parse().expect("a number");
+            (find("Content-Encoding: ").unwrap_or("").to_owned(), length)
+        };
+        let (plain, whole) = head("identity");
+        let (brotli, shortest) = head("gzip, deflate, br");
+        let (gzip, short) = head("gzip");
+        assert_eq!([plain.as_str(), &brotli, &gzip], ["", "br", "gzip"]);
+        assert!(shortest < short && short < whole);
     }
 
     #[test]
