@@ -52,10 +52,8 @@ enum Outcome<T> {
     },
 }
 
-/// A difference of two merits is known to so many roundings of one of them,
-const ROUNDINGS: f64 = 100.0;
-/// and to so many roundings of the states.
-const STATE_ROUNDINGS: f64 = 10.0;
+/// A difference of two merits is known to so many roundings of one of them, and of its states.
+const ROUNDINGS: f64 = 30.0;
 /// Parts of the way to a program's answer that are tried.
 const STEPS: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
 /// Part of the expected gain that a step has to bring (Armijo's condition).
@@ -345,13 +343,11 @@ where
         let expected = before - merit.of(x, &answer.u, &answer.x);
         self.gap = at(&self.rollout, last) - at(&answer.x, last);
         self.policy.cost = before;
-        // What a full step leaves is of second order; what is less than rounding is nothing. That of
-        // the states counts more than that of the merit where they are far from zero, close to their
-        // aim.
-        let rounding = T::default_epsilon() * convert(ROUNDINGS);
+        // What a full step leaves is of second order; what is less than rounding is nothing. The
+        // states are rounded, too, which counts where they are far from zero and close to their aim.
         let from_zero = merit.end(&(aim.end() + aim.end()));
-        let least = ((tolerance * tolerance).max(rounding) * before)
-            .max(T::default_epsilon() * convert(STATE_ROUNDINGS) * (before * from_zero).sqrt());
+        let known_to = (before * (before + from_zero)).sqrt() * convert(ROUNDINGS);
+        let least = (tolerance * tolerance * before).max(T::default_epsilon() * known_to);
         // Negated, so that a NaN ends the search.
         if !(expected > least) {
             return Outcome::NothingToGain;
@@ -366,12 +362,12 @@ where
         let answer = &self.solution;
         let moves = answer.u.iter().zip(&self.policy.u);
         let moved = moves.take(self.settings.horizon);
-        let change = moved.fold(T::zero(), |sum, (to, from)| sum + (to - from).norm_squared());
-        // Along the way to the answer, the damped program's cost falls by a parabola.
-        let damping = self.policy.damping;
+        let change = moved.fold(T::zero(), |sum, (to, from)| {
+            sum + (to - from).norm_squared()
+        });
+        // Along the way to its answer, the program's cost falls by a parabola.
         let parabola = step * (T::one() + T::one() - step);
-        let surprise = cost - before + (expected - damping * change) * parabola;
-        let curvature = damping + surprise / (change * step * step);
+        let curvature = (cost - before + expected * parabola) / (change * step * step);
         self.take_if_some(Some(cost), &workspace.trial);
         self.gap = at(&self.rollout, last) - at(&self.solution.x, last);
         Outcome::Moved {
