@@ -5,14 +5,14 @@
 //! of the state bounds included. A quadratic program along the plan proposes another one, and the
 //! plan is moved towards it as far as the merit falls: a line search (Nocedal and Wright, Numerical
 //! Optimization, ch. 18), with programs whose soft bounds have the very price of the merit
-//! (Fletcher, Practical Methods of Optimization, ch. 14.3). Where steps have to be short, the next
-//! programs are damped: what they change of the inputs costs extra, as in the method of Levenberg
-//! and Marquardt.
+//! (Fletcher, Practical Methods of Optimization, ch. 14.3).
 //!
 //! Two linear models take turns. The embedding's matrices are good for long steps, far from where
 //! the plan has to go; but what repeats itself under them is not the optimum. The Jacobian's are
 //! exact to first order: what repeats itself under them is a stationary point of the nonlinear
-//! problem.
+//! problem. What they leave out is the curvature of the model. It is measured along every step, and
+//! the next program of the Jacobian gets so much of it: what it changes of the inputs costs extra,
+//! as in the method of Levenberg and Marquardt.
 
 use crate::controller::{Controller, Workspace, next_state};
 use crate::kernel::product;
@@ -47,20 +47,23 @@ enum Outcome<T> {
         step: T,
         /// Part of the merit that it saves.
         gain: T,
+        /// The damping with which the program would have expected the merit that came.
+        curvature: T,
     },
 }
 
-/// A difference of two merits is known to so many roundings of one of them.
-const ROUNDINGS: f64 = 100.0;
+/// A difference of two merits is known to so many roundings of one of them, and of its states.
+const ROUNDINGS: f64 = 30.0;
 /// Parts of the way to a program's answer that are tried.
 const STEPS: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
 /// Part of the expected gain that a step has to bring (Armijo's condition).
 const SUFFICIENT: f64 = 1e-4;
 /// The search ends after so many programs in a row that bring nothing; each is damped more.
 const MOST_FAILURES: usize = 8;
-/// Damping is raised after shorter steps than this.
+/// After shorter steps than this the other linear model has its turn.
 const SHORT_STEP: f64 = 0.5;
-/// Damping goes up and down by this factor; the least is the largest entry of R.
+/// Damping goes up by this factor without a step, and down by no more; the least is the largest entry
+/// of R.
 const DAMPING_FACTOR: f64 = 10.0;
 /// Parts of the way to the set point to which the regulator is sent where there is no plan.
 const PARTS: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.01, 0.0];
@@ -96,21 +99,26 @@ where
         let mut status = Status::NoImprovement;
         // Programs in a row that have brought nothing.
         let mut failures = 0;
+        // Whether the embedding still has turns: once it has brought nothing, the plan is too near for it.
+        let mut far = true;
         while self.problems < self.settings.iterations.most() {
             self.linearize_plan(x, aim, along, workspace);
             self.solve_program(workspace);
             let outcome = self.improve(x, aim, tolerance, &mut prices, workspace);
             let damped = self.policy.damping > T::zero();
-            self.adapt_damping(&outcome);
+            if along == Along::Jacobian {
+                self.adapt_damping(&outcome);
+            }
             match outcome {
                 Outcome::NothingToGain if along == Along::Jacobian => {
-                    // A damped program expects little, whatever there is to gain.
-                    if !damped {
+                    // Damped by more than was measured, a program expects little, whatever there is
+                    // to gain.
+                    if !damped || failures == 0 {
                         status = Status::Converged;
-                        break;
                     }
+                    break;
                 }
-                Outcome::Moved { step, gain } => {
+                Outcome::Moved { step, gain, .. } => {
                     failures = 0;
                     status = Status::Improved;
                     let settled = step == T::one() && gain <= tolerance;
@@ -121,7 +129,7 @@ where
                     if settled {
                         along = Along::Jacobian;
                     } else if step < convert(SHORT_STEP) || gain <= tolerance {
-                        along = along.other();
+                        along = along.other(far);
                     }
                 }
                 Outcome::NothingToGain | Outcome::NoStep | Outcome::Unsolved(_) => {
@@ -132,7 +140,8 @@ where
                     if failures >= MOST_FAILURES {
                         break;
                     }
-                    along = along.other();
+                    far &= along == Along::Jacobian;
+                    along = along.other(far);
                 }
             }
         }
@@ -261,11 +270,15 @@ where
         ocp.x0 = *x;
         let states = core::iter::once(x).chain(&self.rollout);
         let samples = states.zip(&self.policy.u).zip(&self.rollout);
+        let damping = match along {
+            Along::Scheduling => T::zero(),
+            Along::Jacobian => self.policy.damping,
+        };
         for (stage, ((x, u), next)) in ocp.stages.iter_mut().zip(samples).take(settings.horizon) {
             (stage.a, stage.b) = self.sample_matrices(x, u, along);
             stage.c = next - stage.a * x - stage.b * u;
-            stage.r = settings.weights.r + SMatrix::identity() * self.policy.damping;
-            stage.linear_u = linear_u - u * self.policy.damping;
+            stage.r = settings.weights.r + SMatrix::identity() * damping;
+            stage.linear_u = linear_u - u * damping;
         }
     }
 
@@ -330,10 +343,13 @@ where
         let expected = before - merit.of(x, &answer.u, &answer.x);
         self.gap = at(&self.rollout, last) - at(&answer.x, last);
         self.policy.cost = before;
-        // What a full step leaves is of second order; what is less than rounding is nothing.
-        let rounding = T::default_epsilon() * convert(ROUNDINGS);
+        // What a full step leaves is of second order; what is less than rounding is nothing. The
+        // states are rounded, too, which counts where they are far from zero and close to their aim.
+        let from_zero = merit.end(&(aim.end() + aim.end()));
+        let known_to = (before * (before + from_zero)).sqrt() * convert(ROUNDINGS);
+        let least = (tolerance * tolerance * before).max(T::default_epsilon() * known_to);
         // Negated, so that a NaN ends the search.
-        if !(expected > (tolerance * tolerance).max(rounding) * before) {
+        if !(expected > least) {
             return Outcome::NothingToGain;
         }
         let taken = self.search_line(x, &merit, expected, &mut workspace.trial, &|i| {
@@ -343,11 +359,21 @@ where
         let Some((step, cost)) = taken else {
             return Outcome::NoStep;
         };
+        let answer = &self.solution;
+        let moves = answer.u.iter().zip(&self.policy.u);
+        let moved = moves.take(self.settings.horizon);
+        let change = moved.fold(T::zero(), |sum, (to, from)| {
+            sum + (to - from).norm_squared()
+        });
+        // Along the way to its answer, the program's cost falls by a parabola.
+        let parabola = step * (T::one() + T::one() - step);
+        let curvature = (cost - before + expected * parabola) / (change * step * step);
         self.take_if_some(Some(cost), &workspace.trial);
         self.gap = at(&self.rollout, last) - at(&self.solution.x, last);
         Outcome::Moved {
             step,
             gain: (before - cost) / before,
+            curvature,
         }
     }
 
@@ -426,32 +452,28 @@ where
                 (at(&self.solution.x, i), u)
             });
             self.take_if_some(taken.map(|(_, cost)| cost), &workspace.trial);
-            self.adapt_damping(&match taken {
-                Some((step, _)) => Outcome::Moved {
-                    step,
-                    gain: T::zero(),
-                },
-                None => Outcome::NothingToGain,
-            });
+            self.adapt_damping(&Outcome::NothingToGain);
         }
         self.linearize_plan(&x, aim, Along::Jacobian, workspace);
         true
     }
 
-    /// Long steps need no damping, short ones more.
+    /// The curvature that the last step showed, for the next program of the Jacobian; more where there
+    /// was no step.
     fn adapt_damping(&mut self, outcome: &Outcome<T>) {
         let least = self.settings.weights.r.amax();
         let factor: T = convert(DAMPING_FACTOR);
-        let damping = &mut self.policy.damping;
-        *damping = match outcome {
-            Outcome::NothingToGain => T::zero(),
-            Outcome::Moved { step, .. } if *step == T::one() => *damping / factor,
-            Outcome::Moved { step, .. } if *step >= convert(SHORT_STEP) => *damping,
-            _ => (*damping * factor).max(least),
+        let before = self.policy.damping;
+        let lower = before / factor;
+        let damping = match outcome {
+            Outcome::NothingToGain => lower,
+            // A full step that the program was good enough for.
+            Outcome::Moved { step, .. } if *step == T::one() && before == T::zero() => lower,
+            Outcome::Moved { curvature, .. } => curvature.max(lower),
+            Outcome::NoStep | Outcome::Unsolved(_) => (before * factor).max(least),
         };
-        if *damping < least {
-            *damping = T::zero();
-        }
+        let sound = damping >= least && damping.is_finite();
+        self.policy.damping = if sound { damping } else { T::zero() };
     }
 
     fn merit<'a>(
@@ -512,10 +534,11 @@ where
 }
 
 impl Along {
-    fn other(self) -> Self {
+    /// The one whose turn is next; the embedding's only while the plan is `far` from its goal.
+    fn other(self, far: bool) -> Self {
         match self {
-            Self::Scheduling => Self::Jacobian,
-            Self::Jacobian => Self::Scheduling,
+            Self::Jacobian if far => Self::Scheduling,
+            _ => Self::Jacobian,
         }
     }
 }

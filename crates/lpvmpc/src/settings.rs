@@ -66,7 +66,7 @@ pub enum Iterations<T> {
 }
 
 impl<T: Scalar> Default for Iterations<T> {
-    /// A descent of at most eight programs to a thousandth of the cost.
+    /// A descent of at most eight programs to a hundred-thousandth of the cost.
     fn default() -> Self {
         Self::Descent {
             tolerance: convert(Self::TOLERANCE),
@@ -77,7 +77,7 @@ impl<T: Scalar> Default for Iterations<T> {
 
 impl<T: Scalar> Iterations<T> {
     /// The tolerance of a descent where none is given.
-    pub const TOLERANCE: f64 = 1e-3;
+    pub const TOLERANCE: f64 = 1e-5;
     /// Quadratic programs of a descent, at most, where no number is given.
     pub const MOST: usize = 8;
 

@@ -52,6 +52,17 @@ fn random_starts_cost_what_they_must() {
     assert!(quantile(&ratios, 1.0) < 1.01, "{ratios:?}");
 }
 
+/// The starts that once cost most: far set points seen by a short horizon (up to 10 % above), and fast
+/// motions close by, whose first plan takes many programs (1.3 %).
+#[test]
+fn the_dearest_starts_cost_what_they_must() {
+    let all = random_starts().unwrap();
+    let cases = [482, 507, 506, 129, 594].map(|row| all[row]);
+    let outcomes = run_all(&cases, None).unwrap();
+    let ratios = ratios(&cases, &outcomes);
+    assert!(quantile(&ratios, 1.0) < 1.02, "{ratios:?}");
+}
+
 /// The measure can fail: with one program per sample far set points cost several per cent more.
 #[test]
 fn one_program_per_sample_is_not_enough() {

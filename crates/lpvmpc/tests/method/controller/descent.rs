@@ -154,6 +154,24 @@ fn jumps_and_pushes_leave_a_plan() {
     assert!((x - Vector4::new(-2.0, 0.0, 0.0, 0.0)).amax() < 1e-3, "{x}");
 }
 
+/// Close to rest, far from zero, rounding of the states is all that is left to gain: one program per
+/// sample is enough then.
+#[test]
+fn rounding_is_not_improved_on() {
+    let mut memory = Memory::new();
+    let plant = CartPole::laboratory();
+    let mut tried: Descent = controller(descent(8));
+    let mut x = Vector4::new(0.0, 0.1, 0.0, 0.0);
+    for k in 0..600 {
+        let plan = tried.step(&x, &set_point(2.0), &mut memory);
+        x = Rk4 { substeps: 20 }.advance(&plant, &x, &plan.u[0], 0.05);
+        if (x[0] - 2.0).abs() < 1e-8 {
+            assert_eq!(tried.problems(), 1, "sample {k}: {x}");
+        }
+    }
+    assert!((x[0] - 2.0).abs() < 1e-8, "{x}");
+}
+
 /// Numbers that are none in state or reference: no plan, inputs within their bounds, and the next
 /// good sample is a first one.
 #[test]
