@@ -264,16 +264,17 @@ impl Rk4 {
         M: LpvModel<T, NX, NU, NS>,
     {
         let h = self.step_length(t_s);
-        let half: T = h * convert::<f64, T>(0.5);
-        let sixth: T = h * convert::<f64, T>(1.0 / 6.0);
-        let two: T = convert(2.0);
+        let [half, third, sixth] =
+            [0.5, 1.0 / 3.0, 1.0 / 6.0].map(|part| h * convert::<f64, T>(part));
         let mut x = *x;
         for _ in 0..self.substeps {
-            let k1 = model.derivative(&x, u);
-            let k2 = model.derivative(&(x + k1 * half), u);
-            let k3 = model.derivative(&(x + k2 * half), u);
-            let k4 = model.derivative(&(x + k3 * h), u);
-            x += (k1 + (k2 + k3) * two + k4) * sixth;
+            let mut rate = model.derivative(&x, u);
+            let mut next = x + rate * sixth;
+            for (reach, weight) in [(half, third), (half, third), (h, sixth)] {
+                rate = model.derivative(&(x + rate * reach), u);
+                next += rate * weight;
+            }
+            x = next;
         }
         x
     }
