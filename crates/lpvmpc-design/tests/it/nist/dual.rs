@@ -82,7 +82,11 @@ impl<T: Into<Self>> Add<T> for Dual {
 impl<T: Into<Self>> Sub<T> for Dual {
     type Output = Self;
     fn sub(self, other: T) -> Self {
-        self + -other.into()
+        let other = other.into();
+        Self {
+            value: self.value - other.value,
+            slopes: std::array::from_fn(|i| self.slopes[i] - other.slopes[i]),
+        }
     }
 }
 
