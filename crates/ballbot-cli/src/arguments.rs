@@ -38,8 +38,9 @@ impl Command {
     /// Whether what it prints is a report of files that it has written.
     pub fn reports_files(&self) -> bool {
         match self {
-            Self::Reproduce(_) | Self::Excite(_) => true,
-            Self::Identify(arguments) => !arguments.example,
+            Self::Reproduce(_) => true,
+            Self::Excite(arguments) => !arguments.json,
+            Self::Identify(arguments) => !arguments.example && !arguments.json,
             Self::Simulate(arguments) => !arguments.json,
             Self::Rehearse(arguments) => !arguments.json,
             Self::Certify(arguments) => !arguments.json,

@@ -1,5 +1,6 @@
 //! From logs to a judged robot: the whole way.
 
+use crate::ball_angle::OtherReading;
 use crate::config::Config;
 use crate::coordinates::Coordinates;
 use crate::estimate::{Estimate, EstimateError, Progress, Status, Task};
@@ -33,6 +34,8 @@ pub struct Identification {
     pub coordinates: Coordinates,
     /// What is wrong with the columns, if no robot explains them as they are.
     pub suspects: Option<Suspects>,
+    /// The best robot with the other reading of the ball angle, if the body's mass is not known.
+    pub other_reading: Option<OtherReading>,
     /// Whether the torque is in N m.
     pub torque_known: bool,
     /// The builder insists on the columns as they are.
@@ -103,6 +106,11 @@ pub fn identify(
         ..task
     };
     let simulated = simulated(&task, &estimate);
+    // Wheels stand on the body: what their angle is relative to is known.
+    let other_reading = match config.log.wheels {
+        Some(_) => None,
+        None => task.other_reading(&estimate, &split.fitted),
+    };
     let (validation, structures) = held_back(&task, &estimate, &split, progress);
     let mut identification = Identification {
         geometry: task.geometry,
@@ -110,6 +118,7 @@ pub fn identify(
         segment: config.fit.segment_s,
         coordinates: Coordinates::new(&task.choices, task.geometry, task.torque_known),
         suspects: None,
+        other_reading,
         torque_known: task.torque_known,
         columns_accepted: config.log.accept_suspicious_units,
         choices: task.choices,
@@ -204,19 +213,32 @@ impl Identification {
                 covariance[(index, index)] += (error * value).powi(2);
             }
         }
+        if self.estimate.status[Parameter::Delay] == Status::Found {
+            // The torque drives the ball when the contacts have built up their force: after the part
+            // of the creep's time that the wheels have of the inertia.
+            let values = &self.estimate.values;
+            let late = self.creep_time() * values[Parameter::B2] / values[Parameter::B1];
+            let index = Parameter::Delay.index();
+            covariance[(index, index)] += late.powi(2);
+        }
         covariance
+    }
+
+    /// How far the ball angle runs ahead per rate of the ball, s: as it was found, or, where creep was
+    /// held and the residuals ask for it, as they do.
+    fn creep_time(&self) -> f64 {
+        let creep = Parameter::CreepBall;
+        let asked = self.scores.iter().find(|score| score.parameter == creep);
+        match asked {
+            Some(score) if score.is_alarm() => score.change,
+            _ => self.estimate.values[creep],
+        }
     }
 
     /// The relative error of a robot whose contacts creep: the model has what the sensors see of it,
     /// and neglects that the contacts relax, which is of the order of the creep's time times the
     /// robot's fastest pole. Zero without creep.
     pub(crate) fn creep_error(&self) -> f64 {
-        let creep = Parameter::CreepBall;
-        let asked = self.scores.iter().find(|score| score.parameter == creep);
-        let time = match asked {
-            Some(score) if score.is_alarm() => score.change,
-            _ => self.estimate.values[creep],
-        };
         let Some((a, _)) = linear_model(&self.estimate.values, self.geometry) else {
             return 0.0;
         };
@@ -226,7 +248,7 @@ impl Identification {
                 .iter()
                 .fold(0.0_f64, |most, pole| most.max(pole.re.abs()))
         });
-        (time * fastest).abs()
+        (self.creep_time() * fastest).abs()
     }
 
     /// Whether there are fewer than two segments per parameter: their scatter then tells nothing.

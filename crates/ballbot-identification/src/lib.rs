@@ -10,6 +10,7 @@
 pub mod log;
 pub mod noise;
 
+mod ball_angle;
 mod config;
 mod coordinates;
 mod covariance;
@@ -32,6 +33,7 @@ mod verdict;
 mod wheel_check;
 mod words;
 
+pub use ball_angle::OtherReading;
 pub use config::{Config, ConfigError};
 pub use coordinates::{Coordinates, LONGEST_DELAY};
 pub use estimate::{Coarse, Effort, Estimate, EstimateError, Progress, Status, Task};

@@ -52,11 +52,48 @@ impl Robot {
     /// The state `duration` seconds later under a constant torque: one Runge-Kutta step of order 4.
     #[inline(always)]
     pub fn step(&self, x: &Vector4<f64>, torque: f64, duration: f64) -> Vector4<f64> {
-        let k1 = self.f(x, torque);
-        let k2 = self.f(&(x + k1 * (0.5 * duration)), torque);
-        let k3 = self.f(&(x + k2 * (0.5 * duration)), torque);
-        let k4 = self.f(&(x + k3 * duration), torque);
-        x + (k1 + (k2 + k3) * 2.0 + k4) * (duration / 6.0)
+        let [next] = Self::step_each([self], &[*x], [torque], duration);
+        next
+    }
+
+    /// [`Robot::step`] of several robots. Each waits for its own results most of the time; stage by
+    /// stage the processor works on the others meanwhile.
+    #[inline(always)]
+    fn step_each<const LANES: usize>(
+        robots: [&Self; LANES],
+        x: &[Vector4<f64>; LANES],
+        torque: [f64; LANES],
+        duration: f64,
+    ) -> [Vector4<f64>; LANES] {
+        // Loops: the closures of array::from_fn are not inlined.
+        let (mut slope, mut sum) = ([Vector4::zeros(); LANES], [Vector4::zeros(); LANES]);
+        for (time, weight) in [
+            (0.0, 1.0),
+            (0.5 * duration, 2.0),
+            (0.5 * duration, 2.0),
+            (duration, 1.0),
+        ] {
+            for (i, robot) in robots.iter().enumerate() {
+                slope[i] = robot.f(&(x[i] + slope[i] * time), torque[i]);
+                sum[i] += slope[i] * weight;
+            }
+        }
+        let mut next = *x;
+        for (next, sum) in next.iter_mut().zip(&sum) {
+            *next += sum * (duration / 6.0);
+        }
+        next
+    }
+
+    /// Whether the two differ at most in their sensors.
+    fn moves_like(&self, other: &Self) -> bool {
+        let acting = [
+            Parameter::TorqueGain,
+            Parameter::Delay,
+            Parameter::TorqueBias,
+        ];
+        let alike = |parameter| self.values[parameter] == other.values[parameter];
+        self.plant == other.plant && acting.into_iter().all(alike)
     }
 
     /// What the sensors show: ball angle, tilt, tilt rate.
@@ -171,25 +208,109 @@ impl ShootingModel<4, 3> for SegmentedRuns<'_> {
         initial: &Vector4<f64>,
         outputs: &mut Vec<Vector3<f64>>,
     ) {
+        let robot = self.robot(parameters);
+        let [states] = self.states(segment, [&robot], [*initial]);
+        let rows = states.iter().map(|x| robot.outputs(x, self.ball_angle));
+        outputs.extend(rows);
+    }
+
+    fn simulate_each(
+        &self,
+        segment: usize,
+        starts: &[(Vec<f64>, Vector4<f64>)],
+    ) -> Vec<Vec<Vector3<f64>>> {
+        let Some((parameters, first)) = starts.first() else {
+            return Vec::new();
+        };
+        let leader = self.robot(parameters);
+        // What only the sensors have moves as the first does; so does one that stands elsewhere:
+        // nothing depends on phi.
+        let follows = |robot: &Robot, initial: &Vector4<f64>| {
+            robot.moves_like(&leader) && initial.fixed_rows::<3>(1) == first.fixed_rows::<3>(1)
+        };
+        let robots: Vec<Robot> = starts.iter().map(|(one, _)| self.robot(one)).collect();
+        let pairs = || robots.iter().zip(starts.iter().map(|(_, initial)| initial));
+        let others: Vec<(&Robot, Vector4<f64>)> = std::iter::once((&leader, *first))
+            .chain(pairs().filter_map(|(robot, x)| (!follows(robot, x)).then_some((robot, *x))))
+            .collect();
+        let mut motions = Vec::with_capacity(others.len());
+        // More of them side by side do not fit into the processor's window.
+        let (fours, rest) = others.as_chunks::<4>();
+        for [a, b, c, d] in fours {
+            let robots = [a.0, b.0, c.0, d.0];
+            motions.extend(self.states(segment, robots, [a.1, b.1, c.1, d.1]));
+        }
+        for (robot, initial) in rest {
+            motions.extend(self.states(segment, [robot], [*initial]));
+        }
+        let mut next = 0;
+        pairs()
+            .map(|(robot, initial)| {
+                let (motion, shift) = if follows(robot, initial) {
+                    (0, Vector4::new(initial[0] - first[0], 0.0, 0.0, 0.0))
+                } else {
+                    next += 1;
+                    (next, Vector4::zeros())
+                };
+                let states = motions[motion].iter();
+                states
+                    .map(|x| robot.outputs(&(x + shift), self.ball_angle))
+                    .collect()
+            })
+            .collect()
+    }
+}
+
+impl SegmentedRuns<'_> {
+    fn robot(&self, parameters: &[f64]) -> Robot {
+        let values = self.coordinates.values(parameters);
+        Robot::new(values, self.coordinates.geometry)
+    }
+
+    /// The states at a segment's rows of several robots side by side, of each as far as it is a
+    /// robot's.
+    fn states<const LANES: usize>(
+        &self,
+        segment: usize,
+        robots: [&Robot; LANES],
+        initial: [Vector4<f64>; LANES],
+    ) -> [Vec<Vector4<f64>>; LANES] {
         let Segment { run, first, end } = self.segments[segment];
         let run = &self.runs[run];
-        let values = self.coordinates.values(parameters);
-        let robot = Robot::new(values, self.coordinates.geometry);
-        let mut torque = run.torque_from(run.time[first] - robot.values[Parameter::Delay]);
-        let mut x = *initial;
-        outputs.push(robot.outputs(&x, self.ball_angle));
+        let delays = robots.map(|robot| robot.values[Parameter::Delay]);
+        let mut torques = delays.map(|delay| run.torque_from(run.time[first] - delay));
+        let one_delay = delays.iter().all(|delay| *delay == delays[0]);
+        let mut x = initial;
+        let mut states = initial.map(|initial| {
+            let mut states = Vec::with_capacity(end - first);
+            states.push(initial);
+            states
+        });
         for row in first + 1..end {
             let interval = run.time[row] - run.time[row - 1];
             let steps = (interval / LONGEST_STEP).ceil().max(1.0);
             let duration = interval / steps;
             for _ in 0..steps as usize {
                 // The mean over the step is continuous in the delay.
-                x = robot.step(&x, torque.mean_over(duration), duration);
+                let torque = if one_delay {
+                    [torques[0].mean_over(duration); LANES]
+                } else {
+                    torques.each_mut().map(|torque| torque.mean_over(duration))
+                };
+                x = Robot::step_each(robots, &x, torque, duration);
             }
-            if !(x[2].abs() < 1e6 && x[3].abs() < 1e6) {
-                return;
+            let mut all_left = true;
+            for (states, x) in states.iter_mut().zip(&x) {
+                let stays = x[2].abs() < 1e6 && x[3].abs() < 1e6;
+                if stays && states.len() == row - first {
+                    states.push(*x);
+                    all_left = false;
+                }
             }
-            outputs.push(robot.outputs(&x, self.ball_angle));
+            if all_left {
+                break;
+            }
         }
+        states
     }
 }

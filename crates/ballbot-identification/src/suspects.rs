@@ -10,6 +10,7 @@ use crate::estimate::{Effort, EstimateError, Task};
 use crate::log::{BallAngle, Run};
 use crate::parameter::Parameter;
 use crate::segments::{segments, spread};
+use crate::words::number;
 use lpvmpc_design::{ShootingFit, ShootingSettings};
 use nalgebra::Vector3;
 use std::f64::consts::{PI, TAU};
@@ -29,6 +30,8 @@ pub enum Suspect {
     TorqueScale(f64),
     /// The ball angle is too large by this factor.
     BallScale(f64),
+    /// The ball angle is that of a wheel, larger by this factor, r_b / r_w.
+    WheelAngle(f64),
     /// Tilt and rate are too large by this factor.
     TiltScale(f64),
     /// The time, and with it nothing else, is too large by this factor.
@@ -55,7 +58,7 @@ impl fmt::Display for Suspects {
 /// What the start of a suspect's fit may cost, and the fit. From a right start a robot is found in a
 /// few steps.
 const START: Effort = Effort {
-    segments: 20,
+    segments: 10,
     max_iterations: 12,
 };
 const SEGMENTS: usize = 10;
@@ -75,20 +78,22 @@ const EXPLAINED: f64 = 1.0 + CHANCE;
 const MUCH_BETTER: f64 = 0.1;
 const CREEPING: f64 = 10.0;
 
+/// A start whose segments, four times shorter than those of the fit, leave more than this leads to no
+/// fit that would be named.
+const HOPELESS: f64 = 10.0 * CREEPING;
+
 impl Suspect {
-    /// What is worth a try: `rate` says that the tilt rate is measured, `torque` that the torque is
-    /// in N m.
-    fn all(ball_angle: BallAngle, rate: bool, torque: bool) -> Vec<Self> {
+    /// What is worth a try: `gear` is r_b / r_w, `rate` says that the tilt rate is measured, `torque`
+    /// that the torque is in N m.
+    fn all(ball_angle: BallAngle, gear: f64, rate: bool, torque: bool) -> Vec<Self> {
         const DEGREE: f64 = 180.0 / PI;
         let mut all = vec![
             Self::TorqueSign,
             Self::BallSign,
             Self::TiltSign,
-            Self::BallAngle(match ball_angle {
-                BallAngle::Inertial => BallAngle::RelativeToBody,
-                BallAngle::RelativeToBody => BallAngle::Inertial,
-            }),
+            Self::BallAngle(ball_angle.other()),
             Self::BallAndTorque,
+            Self::WheelAngle(gear),
         ];
         let units = [DEGREE, 1.0 / DEGREE, TAU, 1.0 / TAU, 1e3, 1e-3];
         all.extend(units.map(Self::BallScale));
@@ -113,7 +118,9 @@ impl Suspect {
             Self::TorqueScale(by) => run.torque.iter_mut().for_each(|torque| *torque /= by),
             Self::TimeScale(by) => run.time.iter_mut().for_each(|time| *time /= by),
             Self::BallSign => outputs.for_each(|row| row[0] *= -1.0),
-            Self::BallScale(by) => outputs.for_each(|row| row[0] /= by),
+            Self::BallScale(by) | Self::WheelAngle(by) => {
+                outputs.for_each(|row| row[0] /= by);
+            }
             Self::TiltSign => outputs.for_each(|row| {
                 row[1] *= -1.0;
                 row[2] *= -1.0;
@@ -139,9 +146,12 @@ impl Task<'_> {
     /// angles of the ball and large ones of the body, say.
     pub fn suspects(&self, stretches: &[(usize, Range<usize>)]) -> Option<Suspects> {
         let own = self.chi_square_of(self.runs, self.ball_angle, stretches);
-        let rate = self.measures_rate();
+        let (gear, rate) = (
+            self.geometry.ball_radius / self.geometry.wheel_radius,
+            self.measures_rate(),
+        );
         let chi_squares: Vec<(Suspect, f64)> =
-            Suspect::all(self.ball_angle, rate, self.torque_known)
+            Suspect::all(self.ball_angle, gear, rate, self.torque_known)
                 .into_iter()
                 .map(|suspect| (suspect, self.chi_square_if(suspect, stretches)))
                 .collect();
@@ -186,26 +196,31 @@ impl Task<'_> {
         };
         let floor = crate::noise::floor(runs);
         match task.quick(stretches, floor) {
-            Ok(fit) if !self.ends_at_limit(&fit.parameters) => {
+            Ok(Some(fit)) if !self.ends_at_limit(&fit.parameters) => {
                 fit.chi_square / fit.degrees_of_freedom()
             }
             _ => f64::INFINITY,
         }
     }
 
-    /// A fit to a few segments.
+    /// A fit to a few segments; none from a start that is hopeless.
     fn quick(
         &self,
         stretches: &[(usize, Range<usize>)],
         floor: Vector3<f64>,
-    ) -> Result<ShootingFit<4>, EstimateError> {
-        let start = self.coarse(stretches, floor, START, &|_| {})?.values;
+    ) -> Result<Option<ShootingFit<4>>, EstimateError> {
+        let start = self.coarse(stretches, floor, START, &|_| {})?;
+        if start.chi_square > HOPELESS {
+            return Ok(None);
+        }
+        let start = start.values;
         let segments = segments(self.runs, stretches, self.segment, self.lead());
         let model = self.model(spread(&segments, SEGMENTS));
         let unknowns = self.unknowns(&start, &model.coordinates);
         let priors = self.priors(&model.coordinates);
         let problem = self.problem(&model, &unknowns, &priors, floor);
-        Ok(problem.fit(model.initial_states(&start), &SETTINGS, &|_| {})?)
+        let fit = problem.fit(model.initial_states(&start), &SETTINGS, &|_| {})?;
+        Ok(Some(fit))
     }
 
     /// Whether a parameter that was fitted is where no robot is.
@@ -250,6 +265,12 @@ impl fmt::Display for Suspect {
             ),
             Self::TorqueScale(by) => write!(f, "the torque has another unit: {}", unit(*by)),
             Self::BallScale(by) => write!(f, "the ball angle has another unit: {}", unit(*by)),
+            Self::WheelAngle(by) => write!(
+                f,
+                "the ball angle is the angle of a wheel: set factor = {} (r_w / r_b, over the gear's \
+                 ratio for an encoder on the motor's shaft) for it",
+                number(1.0 / by)
+            ),
             Self::TiltScale(by) => write!(f, "tilt and rate have another unit: {}", unit(*by)),
             Self::TimeScale(by) => write!(f, "the time has another unit: {}", unit(*by)),
             Self::BallAngle(BallAngle::Inertial) => write!(

@@ -2,10 +2,11 @@
 
 mod judgement;
 
+use crate::ball_angle::DECIDES;
 use crate::coordinates::LONGEST_DELAY;
 use crate::parameter::Parameter;
 use crate::structures::Structure;
-use crate::suspects::Suspects;
+use crate::suspects::{Suspect, Suspects};
 use crate::words::{number, percent, times};
 use lpvmpc_design::ShootingTermination;
 use thiserror::Error;
@@ -38,6 +39,24 @@ pub enum Verdict {
         suspects: Suspects,
         /// The builder insists on the columns as they are.
         accepted: bool,
+    },
+    /// The log speaks for the other reading of the ball angle.
+    #[error("the log is explained better (chi^2 lower by {better_by:.0}, where {DECIDES:.0} is no chance) by another robot if {reading}{}", if *accepted { "" } else { ACCEPT })]
+    OtherBallAngle {
+        /// The other reading.
+        reading: Suspect,
+        /// By how much chi^2 is lower with it.
+        better_by: f64,
+        /// The builder insists on the columns as they are.
+        accepted: bool,
+    },
+    /// The log does not tell what the ball angle is relative to.
+    #[error("the log is explained as well by another robot (b1 = {} m^2) if {reading}. Weigh the body, and set body_mass_kg in [body]; or log with a larger torque", number(*b1))]
+    BallAngleUntold {
+        /// The other reading.
+        reading: Suspect,
+        /// b1 of the robot that fits with it, m^2.
+        b1: f64,
     },
     /// A parameter ended where no robot is.
     #[error("{}", beyond(*parameter, *value, masses, *lever))]
@@ -164,8 +183,7 @@ pub enum Verdict {
     #[error(
         "the body's mass is not given: weigh the body, and set body_mass_kg in [body]. Without it the \
          torque gain and the inertias are told from each other by little, and contacts that creep \
-         shift them together by tens of per cent, beyond their intervals; so does a ball_angle that is \
-         relative to something else than was said, which nothing else would show"
+         shift them together by tens of per cent, beyond their intervals"
     )]
     BodyNotWeighed,
     /// A voltage or a duty cycle of unknown torque.
@@ -261,6 +279,9 @@ impl Verdict {
             | Self::WrongColumns {
                 accepted: false, ..
             }
+            | Self::OtherBallAngle {
+                accepted: false, ..
+            }
             | Self::BeyondLimits { .. }
             | Self::Untold { .. }
             | Self::Unexplained { .. }
@@ -269,6 +290,8 @@ impl Verdict {
             | Self::HeldBackBad { refused: true, .. } => Weight::Refusal,
             Self::Shortened { .. }
             | Self::WrongColumns { .. }
+            | Self::OtherBallAngle { .. }
+            | Self::BallAngleUntold { .. }
             | Self::PriorContradicted { .. }
             | Self::NotJudged(_)
             | Self::Disturbed { .. }

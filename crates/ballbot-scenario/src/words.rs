@@ -11,13 +11,16 @@ const INPUTS: [&str; 2] = ["torque", "torque rate"];
 
 /// What the reader of a TOML file says, without the types of a programming language.
 pub fn toml_message(message: &str) -> String {
-    const PLAIN: [(&str, &str); 11] = [
+    const PLAIN: [(&str, &str); 14] = [
         ("expected usize", "expected a whole number, 0 or more"),
         ("expected u64", "expected a whole number, 0 or more"),
         ("expected f64", "expected a number"),
         ("expected an array of length", "expected a list of length"),
         ("expected a sequence", "expected a list"),
         ("expected a map", "expected a table"),
+        ("expected a boolean", "expected true or false"),
+        ("expected a string", "expected a text in quotes"),
+        ("unknown variant", "unknown name"),
         (
             "wanted exactly 1 element, more than 1 element",
             "one kind must be chosen here: of these tables or keys, only one may stand",
@@ -39,11 +42,35 @@ pub fn toml_message(message: &str) -> String {
             "this kind needs a value or keys of its own, not its name alone",
         ),
     ];
-    PLAIN
+    let plain = PLAIN
         .iter()
         .fold(message.trim_end().to_owned(), |text, (from, to)| {
             text.replace(from, to)
-        })
+        });
+    without_types(&plain)
+}
+
+/// The text with "a table" or "a text" in place of what a program's types are called.
+fn without_types(text: &str) -> String {
+    const TYPES: [(&str, &str); 4] = [
+        ("expected struct variant ", "expected a table"),
+        ("expected struct ", "expected a table"),
+        ("expected tuple struct ", "expected a list"),
+        (
+            "expected enum ",
+            "expected the name of a kind in quotes, or a table",
+        ),
+    ];
+    let mut text = text.to_owned();
+    for (kind, plain) in TYPES {
+        while let Some(place) = text.find(kind) {
+            let name = &text[place + kind.len()..];
+            let is_name = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
+            let end = name.find(|c| !is_name(c)).unwrap_or(name.len());
+            text.replace_range(place..place + kind.len() + end, plain);
+        }
+    }
+    text
 }
 
 /// Why a run ended, with its time.
@@ -157,6 +184,23 @@ mod tests {
             active_bounds(&bounds, 0.05),
             "theta upper 0.35 s ahead, torque lower 0.00 s ahead"
         );
+    }
+
+    #[test]
+    fn no_type_of_a_programming_language_is_named() {
+        for (message, plain) in [
+            (
+                "invalid type: integer `3`, expected struct GeometryTable\n",
+                "invalid type: integer `3`, expected a table",
+            ),
+            (
+                "expected struct variant ChoiceTable::Prior, or",
+                "expected a table, or",
+            ),
+            ("expected usize", "expected a whole number, 0 or more"),
+        ] {
+            assert_eq!(toml_message(message), plain);
+        }
     }
 
     #[test]

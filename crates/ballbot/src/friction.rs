@@ -48,6 +48,9 @@ impl<T: Scalar> DriveFriction<T> {
     #[cold]
     #[inline(never)]
     pub fn coefficient(self, speed: T) -> T {
+        if self.coulomb == T::zero() {
+            return self.viscous;
+        }
         let creep: T = convert(CREEP_SPEED);
         self.viscous + self.coulomb / (speed * speed + creep * creep).sqrt()
     }

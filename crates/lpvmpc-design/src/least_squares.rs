@@ -40,7 +40,7 @@ pub struct LeastSquaresSettings {
     /// each Jacobian column is below this. Default 1e-14.
     pub orthogonality_tolerance: f64,
     /// Gauss-Newton stops after this many steps; Levenberg-Marquardt after this many times (n + 1)
-    /// evaluations of the residual, as MINPACK counts. Default 100.
+    /// evaluations of the residual, as MINPACK counts. Default 200.
     pub max_iterations: usize,
     /// Gauss-Newton only: it has stagnated when this many steps in a row were not smaller than the
     /// smallest before them. Default 30.
@@ -56,7 +56,7 @@ impl Default for LeastSquaresSettings {
             step_tolerance: 1e-10,
             reduction_tolerance: 1e-14,
             orthogonality_tolerance: 1e-14,
-            max_iterations: 100,
+            max_iterations: 200,
             stagnation_steps: 30,
             weights: None,
         }

@@ -4,12 +4,14 @@ use super::CommandError;
 use super::identify::configuration;
 use crate::arguments::{finite_list, positive};
 use crate::input::{self, InputError};
+use crate::json;
 use crate::output;
 use crate::table::{Table, number};
 use ballbot_identification::{Config, Excitation, ExcitationTask, Parameter, Values};
 use clap::Args;
 use nalgebra::{Vector3, Vector4};
 use serde::Deserialize;
+use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -55,6 +57,9 @@ pub struct ExciteArguments {
     /// Where the torque is written
     #[arg(long, value_name = "FILE.csv", default_value = "out/excitation.csv")]
     pub out: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// The noise of an ordinary inertial unit and encoder, where the configuration does not know it:
@@ -68,10 +73,15 @@ const ORDINARY_NOISE: [f64; 3] = [1e-3, 1e-3, 5e-3];
 pub fn run(arguments: &ExciteArguments) -> Result<String, CommandError> {
     let config = configuration(arguments.config.as_deref())?;
     let task = task(arguments, &config)?;
+    output::check_writable(&arguments.out)?;
     let excitation = task.design()?;
     let csv = csv(&excitation);
     output::write_files(&[(&arguments.out, csv.as_bytes())])?;
-    Ok(report(&task, &excitation, &arguments.out))
+    Ok(if arguments.json {
+        json::text(&document(&task, &excitation, &arguments.out))
+    } else {
+        report(&task, &excitation, &arguments.out)
+    })
 }
 
 fn task(arguments: &ExciteArguments, config: &Config) -> Result<ExcitationTask, CommandError> {
@@ -168,11 +178,7 @@ fn report(task: &ExcitationTask, excitation: &Excitation, out: &Path) -> String 
         "relative",
         "unit",
     ]);
-    let choices = task.choices();
-    for parameter in Parameter::ALL {
-        if !choices[parameter].is_free() {
-            continue;
-        }
+    for parameter in found(task) {
         let (value, deviation) = (
             task.robot[parameter],
             excitation.standard_deviations[parameter],
@@ -200,4 +206,34 @@ fn report(task: &ExcitationTask, excitation: &Excitation, out: &Path) -> String 
         out.display()
     );
     text
+}
+
+/// The parameters that the log is to tell.
+fn found(task: &ExcitationTask) -> impl Iterator<Item = Parameter> {
+    let choices = task.choices();
+    let all = Parameter::ALL.into_iter();
+    all.filter(move |parameter| choices[*parameter].is_free())
+}
+
+fn document(task: &ExcitationTask, excitation: &Excitation, out: &Path) -> Value {
+    let parameters = found(task).map(|parameter| {
+        let told = json!({
+            "expected_value": task.robot[parameter],
+            "expected_standard_deviation": excitation.standard_deviations[parameter],
+        });
+        (parameter.key().to_owned(), told)
+    });
+    json!({
+        "frequencies_hz": excitation.frequencies,
+        "length_s": task.duration,
+        "amplitude_asked_nm": task.amplitude,
+        "amplitude_nm": excitation.amplitude,
+        "gain": excitation.gain.as_slice(),
+        "largest_tilt_rad": excitation.tilt,
+        "largest_torque_nm": excitation.total_torque,
+        "largest_travel_m": excitation.travel,
+        "noise": task.noise.as_slice(),
+        "parameters": parameters.collect::<Map<_, _>>(),
+        "file": out,
+    })
 }

@@ -3,13 +3,15 @@
 use super::CommandError;
 use super::simulate::PNG_SCALE;
 use crate::arguments::finite_list;
-use crate::html::Drawing;
-use crate::identification::{drawings, published, report, summary};
+use crate::identification::{document, drawings, published, report, summary};
 use crate::input::{self, InputError};
-use crate::output;
+use crate::json;
+use crate::output::FileError;
 use crate::progress::Progress;
+use crate::results::ResultFolder;
 use ballbot_identification::log::{self, Log, LogError};
-use ballbot_identification::{Config, Identification, identify};
+use ballbot_identification::{Config, ConfigError, Identification, identify};
+use ballbot_scenario::words;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -23,8 +25,9 @@ Examples:
   ballbot identify a.csv b.csv --leave-out 2:7.5,9            a push in the second log
 
 Several logs are runs of one plane of one robot. Writes parameters.toml (for `ballbot lqr
---parameters` and for scenario files), report.html and the figures as SVG and PNG. Where no robot
-explains the logs, it says why, writes the report without parameters.toml, and exits with 1.")]
+--parameters` and for scenario files), report.html and the figures as SVG and PNG, and prints their
+names. Where no robot explains the logs, it says why, writes the report without parameters.toml, and
+exits with 1.")]
 pub struct IdentifyArguments {
     /// CSV files with a header
     #[arg(value_name = "LOG.csv", required_unless_present = "example")]
@@ -42,10 +45,13 @@ pub struct IdentifyArguments {
     #[arg(long)]
     pub unphysical: bool,
     /// Show the published chain, too: p by linear regression, b by refinement
-    #[arg(long)]
+    #[arg(long, conflicts_with = "json")]
     pub published: bool,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
     /// Print a commented configuration and stop
-    #[arg(long, conflicts_with_all = ["logs", "config", "unphysical", "published"])]
+    #[arg(long, conflicts_with_all = ["logs", "config", "unphysical", "published", "json"])]
     pub example: bool,
 }
 
@@ -59,6 +65,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, CommandError> {
     }
     let mut config = configuration(arguments.config.as_deref())?;
     config.fit.physical &= !arguments.unphysical;
+    let folder = open(&arguments.out)?;
     let logs = read(arguments, &config)?;
     let choices = config
         .choices()
@@ -73,23 +80,33 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, CommandError> {
         progress.set(step.get().min(EXPECTED_STEPS - 1));
     })?;
     drop(progress);
-    let drawings = drawings::drawings(&identification);
     let parameters = identification.parameter_file();
-    write(
-        &arguments.out,
-        &identification,
-        &drawings,
-        parameters.as_deref().ok(),
-    )?;
+    let files = write(&folder, &identification, parameters.as_deref().ok())?;
     if let Err(reasons) = parameters {
         let reasons = reasons.iter().map(|reason| format!("\n- {reason}"));
-        let old = arguments.out.join("parameters.toml");
+        let old = arguments.out.join(PARAMETERS);
         return Err(CommandError::NoRobot {
             reasons: reasons.collect(),
-            report: arguments.out.join("report.html"),
+            report: arguments.out.join(REPORT),
             old: old.exists().then_some(old),
         });
     }
+    Ok(if arguments.json {
+        let mut document = document::document(&identification);
+        document["folder"] = serde_json::json!(folder.path());
+        document["files"] = serde_json::json!(files);
+        json::text(&document)
+    } else {
+        said(arguments, &identification, &files)
+    })
+}
+
+/// The result in words, with the names of the files.
+fn said(
+    arguments: &IdentifyArguments,
+    identification: &Identification,
+    files: &[String],
+) -> String {
     let lengths = match arguments.config {
         Some(_) => "",
         None => {
@@ -100,17 +117,18 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, CommandError> {
     let chain = if arguments.published {
         format!(
             "\nThe published chain, to compare with\n{}{}\n",
-            published::linear_parameters(&identification).on_screen(),
-            published::refined(&identification)
+            published::linear_parameters(identification).on_screen(),
+            published::refined(identification)
         )
     } else {
         String::new()
     };
-    Ok(format!(
-        "{lengths}{}{chain}\nwritten to {}: parameters.toml, report.html, figures\n",
-        summary::text(&identification),
-        arguments.out.display()
-    ))
+    format!(
+        "{lengths}{}{chain}\nwritten to {}: {}\n",
+        summary::text(identification),
+        arguments.out.display(),
+        files.join(", ")
+    )
 }
 
 /// A part of a log.
@@ -175,35 +193,52 @@ pub fn configuration(path: Option<&Path>) -> Result<Config, InputError> {
     let Some(path) = path else {
         return Ok(Config::default());
     };
-    Config::parse(&input::read_text(path)?).map_err(|source| InputError::Identification {
+    let error = match Config::parse(&input::read_text(path)?) {
+        Ok(config) => return Ok(config),
+        Err(ConfigError::Syntax(message)) => ConfigError::Syntax(words::toml_message(&message)),
+        Err(error) => error,
+    };
+    Err(InputError::Identification {
         path: path.to_owned(),
-        source,
+        source: error,
     })
 }
 
+const PARAMETERS: &str = "parameters.toml";
+const REPORT: &str = "report.html";
+
+/// The files of the drawing `name`, in the folder of the results.
+fn figure(name: &str) -> [String; 2] {
+    ["svg", "png"].map(|kind| format!("figures/{name}.{kind}"))
+}
+
+/// The folder for the results, if all of them can be written there.
+fn open(path: &Path) -> Result<ResultFolder, FileError> {
+    let figures: Vec<String> = drawings::NAMES.into_iter().flat_map(figure).collect();
+    let figures = figures.iter().map(String::as_str);
+    let names: Vec<&str> = [PARAMETERS, REPORT].into_iter().chain(figures).collect();
+    ResultFolder::open(path, &names)
+}
+
+/// Writes what there is, parameters only of a robot, and returns the names of the files.
 fn write(
-    folder: &Path,
+    folder: &ResultFolder,
     identification: &Identification,
-    drawings: &[Drawing],
     parameters: Option<&str>,
-) -> Result<(), CommandError> {
-    let mut files: Vec<(PathBuf, Vec<u8>)> = vec![(
-        folder.join("report.html"),
-        report::html(identification, drawings)?.into_bytes(),
-    )];
-    if let Some(parameters) = parameters {
-        files.push((folder.join("parameters.toml"), parameters.into()));
+) -> Result<Vec<String>, CommandError> {
+    let drawings = drawings::drawings(identification);
+    let report = report::html(identification, &drawings)?;
+    let parameters = parameters.map(|text| (PARAMETERS.to_owned(), text.into()));
+    let mut files: Vec<(String, Vec<u8>)> = parameters.into_iter().collect();
+    files.push((REPORT.to_owned(), report.into_bytes()));
+    for drawing in &drawings {
+        let [svg, png] = figure(drawing.name);
+        files.push((svg, drawing.figure.svg()?.into_bytes()));
+        files.push((png, drawing.figure.png(PNG_SCALE)?));
     }
-    for drawing in drawings {
-        let path = folder.join("figures").join(drawing.name);
-        let svg = drawing.figure.svg()?.into_bytes();
-        files.push((path.with_extension("svg"), svg));
-        files.push((path.with_extension("png"), drawing.figure.png(PNG_SCALE)?));
-    }
-    let files: Vec<(&Path, &[u8])> = files
-        .iter()
-        .map(|(path, content)| (path.as_path(), content.as_slice()))
-        .collect();
-    output::write_files(&files)?;
-    Ok(())
+    // A figure of an earlier run that this one has not; parameters are kept, and told of.
+    let figures: Vec<String> = drawings::NAMES.into_iter().flat_map(figure).collect();
+    let stale: Vec<&str> = figures.iter().map(String::as_str).collect();
+    folder.write(&files, &stale)?;
+    Ok(files.into_iter().map(|(name, _)| name).collect())
 }

@@ -11,6 +11,9 @@ const SHOWN: f64 = 10.0;
 const LABELS: [&str; 3] = ["φ [rad]", "θ [rad]", "θ\u{307} [rad/s]"];
 const UNITS: [&str; 3] = ["rad", "rad", "rad/s"];
 
+/// The names of all figures; the last is only of data that were held back.
+pub const NAMES: [&str; 4] = ["fit", "residuals", "correlations", "predictions"];
+
 /// All figures.
 pub fn drawings(identification: &Identification) -> Vec<Drawing> {
     let mut drawings = vec![

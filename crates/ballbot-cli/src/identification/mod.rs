@@ -1,5 +1,6 @@
 //! What `ballbot identify` shows of an identification: tables, figures, report, words.
 
+pub mod document;
 pub mod drawings;
 pub mod published;
 pub mod report;

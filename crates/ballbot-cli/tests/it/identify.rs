@@ -237,14 +237,153 @@ fn what_is_no_robot_has_a_report_and_no_parameters() {
     assert!(!report.contains("NaN"));
 
     // A file that an earlier run left is not taken for the result of this one.
-    std::fs::write(out.join("parameters.toml"), "earlier").unwrap();
+    let good = folder.path().join("good.csv");
+    std::fs::write(&good, log()).unwrap();
+    text(&["identify", name(&good), "--out", name(&out)]);
+    let earlier = std::fs::read_to_string(out.join("parameters.toml")).unwrap();
     let message = failure(&arguments, 1);
     assert_says(
         &message,
         &["parameters.toml is of an earlier identification"],
     );
-    let earlier = std::fs::read_to_string(out.join("parameters.toml")).unwrap();
-    assert_eq!(earlier, "earlier");
+    let now = std::fs::read_to_string(out.join("parameters.toml")).unwrap();
+    assert_eq!(now, earlier);
+}
+
+#[test]
+fn results_are_told_to_other_programs_with_the_files_that_were_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let (log_file, out) = (folder.path().join("log.csv"), folder.path().join("out"));
+    std::fs::write(&log_file, log()).unwrap();
+    let arguments = ["identify", name(&log_file), "--out", name(&out)];
+    let told = json(&[&arguments[..], &["--json"]].concat());
+    let b1 = &told["parameters"]["b1_m2"];
+    let [least, most] = [0, 1].map(|end| numbers(&b1["interval_95"])[end]);
+    let value = b1["value"].as_f64().unwrap();
+    assert!(least < value && value < most && b1["status"] == "found");
+    assert!((value / 0.0387 - 1.0).abs() < 0.03, "{value}");
+    assert_eq!(told["parameters"]["torque_bias_nm"]["status"], "held");
+    let verdicts = told["verdicts"].as_array().unwrap();
+    assert!(verdicts.iter().any(|verdict| verdict["weight"] == "good"));
+    assert_eq!(told["folder"], name(&out));
+
+    // The same files on the screen, and no others in the folder but the list of them.
+    let files: Vec<&str> = told["files"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|one| one.as_str().unwrap())
+        .collect();
+    assert_says(&text(&arguments), &[&files.join(", ")]);
+    let mut found = Vec::new();
+    for (prefix, folder) in [("", out.clone()), ("figures/", out.join("figures"))] {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let entry = entry.unwrap();
+            let file = entry.file_name().into_string().unwrap();
+            if entry.path().is_file() && !file.starts_with('.') {
+                found.push(format!("{prefix}{file}"));
+            }
+        }
+    }
+    let mut expected = files.clone();
+    found.sort();
+    expected.sort_unstable();
+    assert_eq!(found, expected);
+
+    let torque = folder.path().join("torque.csv");
+    let told = json(&["excite", "--json", "--out", name(&torque)]);
+    assert_eq!(numbers(&told["gain"]).len(), 4);
+    assert_eq!(told["file"], name(&torque));
+    let b1 = &told["parameters"]["b1_m2"]["expected_standard_deviation"];
+    assert!(b1.as_f64().unwrap() > 0.0);
+}
+
+#[test]
+fn where_nothing_can_be_written_is_found_out_before_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let taken = folder.path().join("file");
+    std::fs::write(&taken, "mine").unwrap();
+    // The log would be found missing next.
+    let message = failure(&["identify", "none.csv", "--out", name(&taken)], 1);
+    assert_says(&message, &["cannot write", name(&taken)]);
+    let below = taken.join("torque.csv");
+    let message = failure(&["excite", "--gain=1,4,1,8", "--out", name(&below)], 1);
+    assert_says(&message, &["cannot write", "torque.csv"]);
+    // Parameters that were written by hand are not replaced.
+    let mine = folder.path().join("parameters.toml");
+    std::fs::write(&mine, "[parameters]").unwrap();
+    let message = failure(&["identify", "none.csv", "--out", name(folder.path())], 1);
+    assert_says(&message, &["parameters.toml", "--out"]);
+    assert_eq!(std::fs::read_to_string(&mine).unwrap(), "[parameters]");
+}
+
+#[test]
+fn mistakes_in_a_configuration_are_told_without_the_words_of_a_programming_language() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("robot.toml");
+    for (content, parts) in [
+        (
+            "[geometry]\nball_radius_m = \"12 cm\"",
+            &["line 2", "expected a number"][..],
+        ),
+        ("geometry = 3", &["line 1", "expected a table"]),
+        ("[log]\nleave_out = 3", &["line 2", "expected a list"]),
+        (
+            "[log]\nleave_out = [[1.0]]",
+            &["line 2", "expected a list of length 2"],
+        ),
+        (
+            "[log]\nball_angle = \"floor\"",
+            &["line 2", "`inertial`", "`relative_to_body`"],
+        ),
+        (
+            "[log.theta]\ncolumn = \"t\"\nunit = \"grad\"",
+            &["line 3", "`rad`"],
+        ),
+        ("[log.theta]\ncolumn = \"t\"", &["missing", "`unit`"]),
+        (
+            "[parameters]\nb1_m2 = 0.3",
+            &[
+                "line 2",
+                "expected the name of a kind in quotes, or a table",
+            ],
+        ),
+        (
+            "[parameters]\nb1_m2 = \"fixed\"",
+            &["line 2", "needs a value or keys of its own"],
+        ),
+        (
+            "[parameters]\nb1_m2 = { fixed = 0.1, start = 0.2 }",
+            &["line 2", "only one may stand"],
+        ),
+        (
+            "[parameters]\nb1_m2 = { prior = 0.1 }",
+            &["line 2", "expected a table"],
+        ),
+        (
+            "[parameters]\nb1_m2 = { prior = { mean = 0.1 } }",
+            &["line 2", "`standard_deviation`"],
+        ),
+        ("[fit]\nphysical = 1", &["line 2", "expected true or false"]),
+        (
+            "[body]\nbody_mass_kg = \"10\"",
+            &["line 2", "expected a number"],
+        ),
+        ("[wheels]", &["line 1", "`wheels`", "`geometry`"]),
+        ("[log.wheels]\nplane = \"z\"", &["line 2", "`x`", "`y`"]),
+        ("[geometry", &["line 1"]),
+    ] {
+        std::fs::write(&config, content).unwrap();
+        let message = failure(&["excite", "--config", name(&config)], 1);
+        assert_says(&message, &["robot.toml"]);
+        assert_says(&message, parts);
+        for word in [
+            "struct", "enum", "tuple", "variant", "f64", "usize", "sequence", "boolean", "Table",
+            "::",
+        ] {
+            assert!(!message.contains(word), "`{word}` is in: {message}");
+        }
+    }
 }
 
 #[test]

@@ -164,7 +164,7 @@ fn no_convergence_is_an_error_and_no_result() {
         let folder = tempfile::tempdir().unwrap();
         let path = file(
             &folder,
-            &example_with("max_iterations = 100", "max_iterations = 1")
+            &example_with("max_iterations = 200", "max_iterations = 1")
                 .replace("b1_m2 = 0.0025", "b1_m2 = 0.01"),
         );
         failure(&["refine", name(&path)], 1)
@@ -237,12 +237,12 @@ fn a_bad_file_is_refused_with_its_place() {
             &["settings.tilt_deg = 200", "180"],
         ),
         (
-            "max_iterations = 100",
+            "max_iterations = 200",
             "max_iterations = 0",
             &["settings.max_iterations = 0", "1 to"],
         ),
         (
-            "max_iterations = 100",
+            "max_iterations = 200",
             "max_iterations = -1",
             &["line 43", "-1"],
         ),

@@ -196,6 +196,17 @@ pub enum BallAngle {
     RelativeToBody,
 }
 
+impl BallAngle {
+    /// The other reading.
+    #[must_use]
+    pub fn other(self) -> Self {
+        match self {
+            Self::Inertial => Self::RelativeToBody,
+            Self::RelativeToBody => Self::Inertial,
+        }
+    }
+}
+
 /// A unit of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Unit {

@@ -7,6 +7,7 @@ use crate::log::quantile;
 use crate::parameter::{Choice, Parameter};
 use crate::residuals::{OUTPUTS, SegmentResidual};
 use crate::structures::{Structure, best};
+use crate::suspects::Suspect;
 use lpvmpc_design::ShootingTermination;
 
 /// Residual over noise from which on a model misses something.
@@ -62,6 +63,7 @@ impl Identification {
             suspects,
             accepted: self.columns_accepted,
         }));
+        verdicts.extend(self.judge_ball_angle());
         let consistency = self.consistency();
         // The range of tilts is that of the paper's constraints.
         if !consistency.is_physical() {
@@ -74,10 +76,33 @@ impl Identification {
         }
         // A wrong column is the cause of all else.
         verdicts.sort_by_key(|verdict| {
-            let cause = matches!(verdict, Verdict::WrongColumns { .. });
+            let cause = matches!(
+                verdict,
+                Verdict::WrongColumns { .. } | Verdict::OtherBallAngle { .. }
+            );
             std::cmp::Reverse((verdict.weight(), cause))
         });
         verdicts
+    }
+
+    /// Whether the ball angle is relative to what was said.
+    fn judge_ball_angle(&self) -> Option<Verdict> {
+        let other = self.other_reading?;
+        let reading = Suspect::BallAngle(other.ball_angle);
+        if other.is_better() {
+            Some(Verdict::OtherBallAngle {
+                reading,
+                better_by: other.better_by,
+                accepted: self.columns_accepted,
+            })
+        } else if other.is_worse() || self.misfits() {
+            None
+        } else {
+            Some(Verdict::BallAngleUntold {
+                reading,
+                b1: other.values[Parameter::B1],
+            })
+        }
     }
 
     /// Why this is no result; empty if it is one.

@@ -2,6 +2,7 @@
 //! it is, or refused with what is wrong.
 
 use crate::laboratory::{Laboratory, Record, csv, healthy};
+use ballbot_identification::log::BallAngle;
 use ballbot_identification::{
     Choice, Config, EstimateError, Identification, Parameter, Suspect, Suspects, Verdict, Weight,
     identify, log,
@@ -151,6 +152,12 @@ fn a_ball_angle_in_another_unit() {
         scaled(0, 1.0 / DEGREE),
     );
     refused("", "in turns and taken for radians", scaled(0, 1.0 / TAU));
+    // r_w / r_b is forgotten.
+    refused(
+        "",
+        "is the angle of a wheel: set factor = 0.4167",
+        scaled(0, 2.4),
+    );
 }
 
 #[test]
@@ -178,11 +185,41 @@ fn a_tilt_in_another_unit() {
 
 #[test]
 fn a_ball_angle_relative_to_something_else() {
-    // Without the body's mass it is that of another robot; with it, there is none.
-    refused(MASS, "what ball_angle is relative to", |record| {
+    let relative = |record: &mut Record| {
         let outputs = record.run.outputs.iter_mut();
         outputs.for_each(|row| row[0] -= row[1]);
-    });
+    };
+    refused(MASS, "what ball_angle is relative to", relative);
+    // Without the body's mass another robot nearly explains it. Said rightly, it is a robot's.
+    refused("", "the ball angle is relative to the body", relative);
+    let right = "[log]\nball_angle = \"relative_to_body\"";
+    let found = outcome(right, relative).unwrap();
+    found.parameter_file().unwrap();
+    let other = found.other_reading.unwrap();
+    assert!(other.is_worse(), "{other:?}");
+    // The other way round.
+    refused(right, "the ball angle is relative to the floor", |_| ());
+    // A body that was weighed is not asked about.
+    assert_eq!(outcome(MASS, |_| ()).unwrap().other_reading, None);
+}
+
+#[test]
+fn what_the_ball_angle_is_relative_to_is_asked_where_the_log_does_not_tell() {
+    let quiet = Laboratory {
+        amplitude: 0.05,
+        ..laboratory()
+    };
+    let found = crate::chain::identified(&quiet, 3, "");
+    let untold = found
+        .verdicts()
+        .into_iter()
+        .find_map(|verdict| match verdict {
+            Verdict::BallAngleUntold { reading, .. } => Some((reading, verdict.to_string())),
+            _ => None,
+        });
+    let (reading, words) = untold.unwrap();
+    assert_eq!(reading, Suspect::BallAngle(BallAngle::RelativeToBody));
+    assert!(words.contains("body_mass_kg"), "{words}");
 }
 
 #[test]

@@ -141,6 +141,12 @@ fn errors(found: &Identification) -> [(f64, f64); 3] {
     })
 }
 
+/// The error of the delay of 10 ms over its standard deviation.
+fn delay_deviations(found: &Identification) -> f64 {
+    let error = found.estimate.values[Parameter::Delay] - 0.01;
+    error / found.standard_deviation(Parameter::Delay)
+}
+
 const WEIGHED: &str = "[body]\nbody_mass_kg = 10.0\n";
 const FREE: &str = "[parameters]\ncreep_phi_s = \"free\"\ncreep_theta_s = \"free\"\n";
 
@@ -174,6 +180,8 @@ fn creep_is_found_out_and_its_parameters_mend_it() {
         assert!(deviations.abs() < 2.0, "{:?}", errors(&found));
     }
     assert!(errors(&found)[1].0.abs() < before, "{before}");
+    // The contacts build up their force first.
+    assert!(delay_deviations(&found).abs() < 2.0);
     // (m + m_k) times the compliance is 6 ms.
     let creep = found.estimate.values[Parameter::CreepBall];
     assert!((4e-3..12e-3).contains(&creep), "{creep}");
@@ -187,6 +195,7 @@ fn intervals_hold_on_a_robot_that_creeps_much() {
         assert!(relative.abs() < 0.1, "{:?}", errors(&found));
         assert!(deviations.abs() < 2.0, "{:?}", errors(&found));
     }
+    assert!(delay_deviations(&found).abs() < 2.0);
 }
 
 #[test]

@@ -33,20 +33,36 @@ impl<const NX: usize> Block<NX> {
     {
         let measured = problem.model.measured(segment);
         let rows = measured.len();
-        let simulate = |parameters: &[f64], initial: &SVector<f64, NX>| {
-            let mut outputs = Vec::with_capacity(rows);
-            problem
-                .model
-                .simulate(segment, parameters, initial, &mut outputs);
-            outputs
-        };
-        let base = simulate(parameters, initial);
+        // The iterate, then with each of the unknowns moved by a step.
+        let mut starts = vec![(parameters.to_vec(), *initial)];
+        let mut steps = Vec::new();
+        for state in 0..NX {
+            let mut moved = *initial;
+            moved[state] += DIFFERENCE * problem.state_scale[state];
+            steps.push(moved[state] - initial[state]);
+            starts.push((parameters.to_vec(), moved));
+        }
+        for &index in indices {
+            let unknown = &problem.unknowns[index];
+            // Away from an upper bound, so that no bound is left.
+            let wanted = DIFFERENCE * unknown.scale;
+            let up = parameters[index] + wanted <= unknown.upper;
+            let mut moved = parameters.to_vec();
+            moved[index] += if up { wanted } else { -wanted };
+            steps.push(moved[index] - parameters[index]);
+            starts.push((moved, *initial));
+        }
+        let simulated = problem.model.simulate_each(segment, &starts);
+        let (base, moved) = simulated.split_first().map_or_else(
+            || (&[][..], &[][..]),
+            |(base, moved)| (base.as_slice(), moved),
+        );
         let columns = NX + indices.len();
         // The last column is the residual.
         let mut jacobian = DMatrix::zeros(rows * NY, columns + 1);
         let mut fill = |column: usize, moved: &[SVector<f64, NY>], step: f64| {
             let mut target = jacobian.column_mut(column);
-            for (row, (moved, base)) in moved.iter().zip(&base).enumerate() {
+            for (row, (moved, base)) in moved.iter().zip(base).enumerate() {
                 for output in 0..NY {
                     if !measured[row][output].is_nan() {
                         target[row * NY + output] =
@@ -55,22 +71,8 @@ impl<const NX: usize> Block<NX> {
                 }
             }
         };
-        for state in 0..NX {
-            let mut moved = *initial;
-            moved[state] += DIFFERENCE * problem.state_scale[state];
-            let step = moved[state] - initial[state];
-            fill(state, &simulate(parameters, &moved), step);
-        }
-        let mut moved = parameters.to_vec();
-        for (place, &index) in indices.iter().enumerate() {
-            let unknown = &problem.unknowns[index];
-            // Away from an upper bound, so that no bound is left.
-            let wanted = DIFFERENCE * unknown.scale;
-            let up = parameters[index] + wanted <= unknown.upper;
-            moved[index] += if up { wanted } else { -wanted };
-            let step = moved[index] - parameters[index];
-            fill(NX + place, &simulate(&moved, initial), step);
-            moved[index] = parameters[index];
+        for (column, (moved, step)) in moved.iter().zip(&steps).enumerate() {
+            fill(column, moved, *step);
         }
         // (simulated + 1) - simulated, with the measured value as what it is moved to.
         fill(columns, measured, -1.0);
