@@ -58,15 +58,15 @@ fn scenario(case: &Case) -> Result<Scenario, ScenarioError> {
     Ok(scenario)
 }
 
-/// Runs all of them, with at most so many `programs` per sample if given.
+/// Runs all of them with `iterations`; scenarios have [`Iterations::default`].
 ///
 /// # Errors
 /// A scenario is not valid.
-pub fn run_all(cases: &[Case], programs: Option<usize>) -> Result<Vec<Outcome>, CommandError> {
+pub fn run_all(cases: &[Case], iterations: Iterations<f64>) -> Result<Vec<Outcome>, CommandError> {
     let progress = Progress::new("running", cases.len());
     let done = AtomicUsize::new(0);
     let outcome = |case| {
-        let outcome = run(case, programs);
+        let outcome = run(case, iterations);
         progress.set(done.fetch_add(1, Ordering::Relaxed) + 1);
         outcome
     };
@@ -77,7 +77,7 @@ pub fn run_all(cases: &[Case], programs: Option<usize>) -> Result<Vec<Outcome>, 
 ///
 /// # Errors
 /// The scenario is not valid.
-pub fn run(case: &Case, programs: Option<usize>) -> Result<Outcome, CommandError> {
+pub fn run(case: &Case, iterations: Iterations<f64>) -> Result<Outcome, CommandError> {
     let Prepared {
         ballbot,
         mut settings,
@@ -86,10 +86,7 @@ pub fn run(case: &Case, programs: Option<usize>) -> Result<Outcome, CommandError
         tolerances,
         ..
     } = scenario(case)?.prepare(Path::new("."))?;
-    if let (Iterations::Descent { most, .. }, Some(programs)) = (&mut settings.iterations, programs)
-    {
-        *most = programs;
-    }
+    settings.iterations = iterations;
     let controller = Controller::<Ballbot<f64>, f64, 4, 1, 3, N, M>::new(ballbot, settings);
     let mut controller = Box::new(controller.map_err(ScenarioError::from)?);
     let mut workspace = Box::new(Workspace::new());

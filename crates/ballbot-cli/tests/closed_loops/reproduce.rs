@@ -7,8 +7,9 @@ use serde_json::Value;
 use std::collections::HashSet;
 use std::path::Path;
 
-const FIGURES: [&str; 8] = [
+const FIGURES: [&str; 9] = [
     "convergence",
+    "cost-by-distance",
     "far-setpoints",
     "lissajous-motors",
     "lissajous-path",
@@ -28,8 +29,9 @@ const TRAJECTORIES: [(&str, usize); 6] = [
     ("two-setpoints-linear", 80),
 ];
 
-const TABLES: [&str; 8] = [
+const TABLES: [&str; 9] = [
     "constraints",
+    "cost-by-distance",
     "elements",
     "gap",
     "linear-parameters",
@@ -187,6 +189,8 @@ fn assert_report(results: &Path, claims: usize) {
         "Published and computed",
         "Differences from the paper",
         "Sign of p6",
+        "How near to the optimum",
+        "IPOPT converged at every sample",
         "What b* means physically",
         "no rigid ballbot has these parameters",
     ];
