@@ -159,7 +159,8 @@ fn work_without_end_is_refused_whoever_means_it() {
 fn weights_that_no_regulator_can_follow_are_named() {
     for (q, r) in [(1e200, 1e3), (1e20, 1e3), (200.0, 1e-300)] {
         let mut scenario = scenario(&[], "");
-        (scenario.controller.q[0], scenario.controller.r) = (q, r);
+        scenario.controller.q = Some([q, 1.0, 0.1, 0.1]);
+        scenario.controller.r = Some(r);
         scenario.controller.terminal = ballbot_scenario::TerminalTable::DiscreteRiccati;
         let said = match scenario.prepare(Path::new(".")) {
             // A gain that is found has passed its check.

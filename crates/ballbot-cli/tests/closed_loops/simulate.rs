@@ -30,14 +30,15 @@ fn every_built_in_scenario_runs_and_is_recorded() {
         assert_says(&summary, &[&scenario.title, "largest tilt [rad]", &out]);
 
         let results = folder.path().join(&out);
-        let samples = (scenario.duration_s / 0.05).round() as usize;
+        let samples = (scenario.duration_s / scenario.controller.t_s).round() as usize;
         let trajectories: &[&str] = if name == "lissajous" {
             &["trajectory_x.csv", "trajectory_y.csv"]
         } else {
             &["trajectory.csv"]
         };
         for trajectory in trajectories {
-            let (rows, _) = recorded::complete(&results.join(trajectory), samples, 0.05);
+            let (rows, _) =
+                recorded::complete(&results.join(trajectory), samples, scenario.controller.t_s);
             let [lower, upper] = scenario.bounds.torque_nm;
             for row in rows {
                 assert!((lower..=upper).contains(&row.torque), "{name}: {row:?}");
