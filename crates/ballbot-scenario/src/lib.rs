@@ -65,7 +65,7 @@ pub use files::Files;
 pub use guarantee::Standing;
 pub use heading::Turning;
 pub use heading_table::HeadingTable;
-pub use parameters::{KnownRobot, Parameters};
+pub use parameters::{KnownRobot, Parameters, read_robot};
 pub use prepare::{Plane, Prepared};
 pub use reference::PhiReference;
 pub use run::{PlaneLoop, Record, Surroundings};

@@ -1,7 +1,7 @@
 //! `[controller]` and `[bounds]`: the problem that the controller solves at every sample.
 
 use crate::error::ScenarioError;
-use crate::number::positive;
+use crate::number::{positive, text};
 use crate::schema::{
     BoundsTable, ControllerTable, IterationsTable, LinearModelTable, ModelKind, PredictorTable,
     StateBounds, TerminalTable,
@@ -55,7 +55,7 @@ impl BoundsTable {
             if !(lower <= upper) || lower == f64::INFINITY || upper == f64::NEG_INFINITY {
                 return Err(ScenarioError::value(
                     format!("bounds.{key}"),
-                    format!("[{lower}, {upper}]"),
+                    format!("[{}, {}]", text(lower), text(upper)),
                     "the lower bound must not be above the upper one; use -inf and inf for none",
                 ));
             }

@@ -55,7 +55,7 @@ pub struct LqrArguments {
 fn state_weights(text: &str) -> Result<[f64; 4], String> {
     let weights = text.split(',').map(finite).collect::<Result<Vec<_>, _>>()?;
     if let Some(negative) = weights.iter().find(|weight| **weight < 0.0) {
-        return Err(format!("the weight {negative} is negative"));
+        return Err(format!("the weight {} is negative", short(*negative)));
     }
     <[f64; 4]>::try_from(weights).map_err(|weights| {
         format!(
@@ -168,8 +168,8 @@ fn time(problem: &RegulatorProblem, regulator: &Regulator) -> String {
             1 => "1 step".to_owned(),
             steps => format!("{steps} steps"),
         },
-        number(t_s / predictor.substeps as f64),
-        number(longest)
+        short(t_s / predictor.substeps as f64),
+        short(longest)
     )
 }
 

@@ -291,7 +291,10 @@ fn figures(
             vec![
                 ("figure", pictures::both_planes(title, prepared, planes)),
                 ("path", pictures::path(title, prepared, [x, y])),
-                ("motors", pictures::motors("Motor torques", x, &torques)),
+                (
+                    "motors",
+                    pictures::motors("Motor torques", prepared, x, &torques),
+                ),
                 ("plans_x", pictures::plans("Plans of the x plane", x)),
                 ("plans_y", pictures::plans("Plans of the y plane", y)),
             ]
