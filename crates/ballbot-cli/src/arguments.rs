@@ -42,7 +42,7 @@ impl Command {
         match self {
             Self::Reproduce(_) | Self::Excite(_) => true,
             Self::Identify(arguments) => !arguments.example,
-            Self::Simulate(arguments) => !arguments.json,
+            Self::Simulate(arguments) => !(arguments.json || arguments.logs_to_standard_output()),
             Self::Rehearse(arguments) => !arguments.json,
             Self::Certify(arguments) => !arguments.json,
             Self::Campaign(arguments) => !arguments.json,

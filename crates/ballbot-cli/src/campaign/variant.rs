@@ -202,7 +202,7 @@ mod tests {
     fn robots_that_cannot_be_drawn_are_refused() {
         let mut prepared = Scenarios::built_in().unwrap().guaranteed;
         let variant = Variant::Parameters(0.2);
-        let mut random = Random::new(1);
+        let mut random = Random::new(1, 0);
         variant.plant(&prepared, &mut random).unwrap();
         // det M = b1 b3 - (b2 - l r_b cos theta)^2 changes its sign on the way to the floor.
         let ballbot = &mut prepared.ballbot;

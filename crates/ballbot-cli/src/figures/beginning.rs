@@ -6,7 +6,7 @@ use super::figure::{Panel, Series};
 /// As much of a run is its beginning.
 const BEGINNING: f64 = 0.02;
 /// A beginning that needs more than this many times the scale of the rest gets panels of its own.
-const DOMINATES: f64 = 1.5;
+const DOMINATES: f64 = 2.0;
 
 /// Panels over time, one below the other, on one axis of time. Where the beginning dominates the
 /// scale of one of them they stand in two columns: the beginning, and the whole run at the scale of

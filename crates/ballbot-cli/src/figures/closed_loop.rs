@@ -82,7 +82,7 @@ pub fn closed_loop(
         panels,
         columns: 2,
         width: 900.0,
-        height: 760.0,
+        height: 800.0,
     }
 }
 

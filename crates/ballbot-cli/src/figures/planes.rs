@@ -42,7 +42,7 @@ pub fn two_planes(
         panels[0].series.extend(references.map(Reference::series));
         if references.iter().all(|reference| !reference.held) {
             let errors = runs.iter().zip(&references).map(error).collect();
-            panels.insert(1, Panel::new(TIME_LABEL, "φ − φ_ref [rad]", errors));
+            panels.insert(1, Panel::new(TIME_LABEL, "error of φ [rad]", errors));
         }
     }
     panels.push(torque_panel(&runs, limits));

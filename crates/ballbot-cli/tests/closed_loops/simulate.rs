@@ -336,6 +336,29 @@ fn other_programs_get_json_and_scripts_silence() {
 }
 
 #[test]
+fn a_log_goes_to_standard_output_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    succeed(here, &["simulate", "two-setpoints", "--log", "log.csv"]);
+    let log = std::fs::read_to_string(here.join("log.csv")).unwrap();
+    for more in [&[][..], &["--quiet"]] {
+        let arguments = [&["simulate", "two-setpoints", "--log", "-"], more].concat();
+        assert_eq!(succeed(here, &arguments), log);
+    }
+    assert!(!here.join("-").exists());
+    for (arguments, words) in [
+        (
+            &["simulate", "two-setpoints", "--log", "-", "--json"][..],
+            "--json",
+        ),
+        (&["simulate", "lissajous", "--log", "-"], "one per plane"),
+    ] {
+        assert_says(&fail(here, arguments, 2), &["--log -", words]);
+    }
+    assert!(!here.join("out/lissajous").exists());
+}
+
+#[test]
 fn times_are_written_without_the_rounding_of_a_sum() {
     let folder = tempfile::tempdir().unwrap();
     succeed(
