@@ -213,7 +213,7 @@ fn another_robot_gets_weights_of_its_own() {
     let path = folder.path().join("robot.toml");
     std::fs::write(&path, text(&["scenario", "show", "one-metre"])).unwrap();
     let path = path.to_str().unwrap();
-    let of = |more: &[&str]| [&["lqr", "--parameters", path], more].concat();
+    let of = |more: &[&'static str]| [&["lqr", "--parameters", path][..], more].concat();
     // By hand: it falls with 4.784 1/s, and at 5 degrees the ball gains 4.629 rad/s^2.
     let own = json(&of(&["--json"]));
     assert_close(
