@@ -8,6 +8,7 @@ use crate::commands::{
     scenario::ScenarioArguments, simulate::SimulateArguments, verify::VerifyArguments,
     view::ViewArguments, wheels::WheelsArguments,
 };
+use ballbot_scenario::number;
 use clap::{Parser, Subcommand};
 
 /// Predictive control of a ballbot, a robot that balances on one ball.
@@ -23,7 +24,8 @@ Examples:
   ballbot lqr --ts 0.05 --substeps 4  a gain and its terminal cost
   ballbot help lqr                    options and examples of one command
 
-Exit codes: 0 done, 1 no result (the message says why), 2 the command line is not understood."
+Exit codes: 0 done, 1 no result (the message says why), 2 the command line is not understood, 130
+interrupted (what was written until then is said, nothing is half-written)."
 )]
 pub struct Arguments {
     /// No progress, and no report where the results are in files; errors are still told
@@ -41,7 +43,7 @@ impl Command {
             Self::Reproduce(_) => true,
             Self::Excite(arguments) => !arguments.json,
             Self::Identify(arguments) => !arguments.example && !arguments.json,
-            Self::Simulate(arguments) => !arguments.json,
+            Self::Simulate(arguments) => !(arguments.json || arguments.logs_to_standard_output()),
             Self::Rehearse(arguments) => !arguments.json,
             Self::Certify(arguments) => !arguments.json,
             Self::Campaign(arguments) => !arguments.json,
@@ -114,6 +116,6 @@ pub fn positive(text: &str) -> Result<f64, String> {
     if value > 0.0 {
         Ok(value)
     } else {
-        Err(format!("{value} is not positive"))
+        Err(format!("{} is not positive", number::text(value)))
     }
 }

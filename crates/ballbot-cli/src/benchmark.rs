@@ -33,6 +33,13 @@ const M: usize = N + 4;
 /// Repetitions of each sample.
 const PASSES: usize = 30;
 
+/// Samples of a sequence, spread evenly, that are timed with a cold cache, and their repetitions: each
+/// needs a sweep, which takes a thousand times as long as a step.
+const COLD_SAMPLES: usize = 40;
+const COLD_PASSES: usize = 3;
+/// What is swept before each of these, bytes: more than the caches of a core hold.
+const SWEPT: usize = 48 << 20;
+
 /// Samples of the guaranteed loop, and how long it keeps a set point.
 const GUARDED_SAMPLES: usize = 400;
 const HOLD: usize = 80;
@@ -60,6 +67,8 @@ pub struct SequenceTimes {
     pub qp_us: Times,
     /// The whole step: scheduling, predictor, quadratic program, rollout.
     pub step_us: Times,
+    /// The whole step after other work, of 48 MB, has taken the caches.
+    pub step_cold_us: Times,
     /// Most bounds active in one sample (components of a terminal equality included).
     pub max_active: usize,
 }
@@ -224,6 +233,7 @@ pub fn time(name: &str, prepared: &Prepared) -> Result<SequenceTimes, CommandErr
         name: name.to_owned(),
         qp_us: Times::new(record.qp),
         step_us: Times::new(record.step),
+        step_cold_us: Times::new(record.cold),
         max_active: record.max_active,
     })
 }
@@ -232,6 +242,7 @@ pub fn time(name: &str, prepared: &Prepared) -> Result<SequenceTimes, CommandErr
 struct Record {
     qp: Vec<f64>,
     step: Vec<f64>,
+    cold: Vec<f64>,
     max_active: usize,
 }
 
@@ -243,6 +254,8 @@ fn time_plane(prepared: &Prepared, plane: usize, record: &mut Record) -> Result<
     let mut controller =
         Control::new(prepared.ballbot, prepared.settings).map_err(ScenarioError::from)?;
     let mut x = plane.initial_state;
+    let mut other_work = OtherWork::new();
+    let stride = prepared.samples.div_ceil(COLD_SAMPLES);
     for k in 0..prepared.samples {
         let at = |i: usize| plane.state_reference((k + i) as f64 * t_s);
         let reference = Reference {
@@ -265,6 +278,15 @@ fn time_plane(prepared: &Prepared, plane: usize, record: &mut Record) -> Result<
             black_box(&solution);
             elapsed
         });
+        if k % stride == 0 {
+            record.cold.push(shortest_of(COLD_PASSES, || {
+                controller.clone_from(&before);
+                other_work.sweep();
+                let start = Instant::now();
+                black_box(controller.step(black_box(&x), &reference, &mut workspace));
+                start.elapsed()
+            }));
+        }
         record.step.push(step);
         record.qp.push(qp);
         record.max_active = record.max_active.max(controller.solution().active.len());
@@ -283,8 +305,33 @@ fn next(
     Ok(advance(&prepared.ballbot, x, &u, t_s, prepared.tolerances)?)
 }
 
+/// Memory that work of another kind goes through between two steps.
+struct OtherWork {
+    memory: Vec<u64>,
+}
+
+impl OtherWork {
+    fn new() -> Self {
+        Self {
+            memory: vec![0; SWEPT / size_of::<u64>()],
+        }
+    }
+
+    /// Reads and writes all of it.
+    fn sweep(&mut self) {
+        for word in &mut self.memory {
+            *word = word.wrapping_add(1);
+        }
+        black_box(&self.memory);
+    }
+}
+
 /// The shortest of [`PASSES`] repetitions, in microseconds.
-fn shortest(mut repetition: impl FnMut() -> Duration) -> f64 {
-    let times = (0..PASSES).map(|_| repetition());
+fn shortest(repetition: impl FnMut() -> Duration) -> f64 {
+    shortest_of(PASSES, repetition)
+}
+
+fn shortest_of(passes: usize, mut repetition: impl FnMut() -> Duration) -> f64 {
+    let times = (0..passes).map(|_| repetition());
     times.min().unwrap_or_default().as_secs_f64() * 1e6
 }

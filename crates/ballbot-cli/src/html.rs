@@ -18,7 +18,7 @@ const STYLE: &str = "
 body { margin: 0; font: 16px/1.5 system-ui, sans-serif; color: #1b1f24; background: #fff; }
 main { max-width: 60rem; margin: 0 auto; padding: 1.5rem 1rem 4rem; }
 h1 { font-size: 1.9rem; line-height: 1.2; } h2 { margin-top: 2.5rem; border-bottom: 1px solid #d0d7de; }
-figure { margin: 2rem 0; } figure svg { width: 100%; height: auto; }
+figure { margin: 2rem 0; } figure svg { display: block; margin: 0 auto; max-width: 100%; height: auto; }
 figcaption { font-size: .92rem; color: #444c56; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .88rem; font-variant-numeric: tabular-nums; }

@@ -14,6 +14,7 @@ pub mod figures;
 pub mod html;
 pub mod identification;
 pub mod input;
+pub mod interrupt;
 pub mod json;
 pub mod linear_model;
 pub mod optimality;

@@ -1,11 +1,20 @@
 //! The program `ballbot`.
 
-use ballbot_cli::{arguments::Arguments, output};
-use clap::Parser;
+use ballbot_cli::{arguments::Arguments, interrupt, output};
+use clap::{CommandFactory, FromArgMatches};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    match ballbot_cli::run(Arguments::parse()) {
+    let matches = Arguments::command().get_matches();
+    let arguments = match Arguments::from_arg_matches(&matches) {
+        Ok(arguments) => arguments,
+        Err(error) => error.exit(),
+    };
+    // A server is ended by an interrupt as a rule.
+    if let Some(name) = matches.subcommand_name().filter(|name| *name != "view") {
+        interrupt::watch(name.to_owned());
+    }
+    match ballbot_cli::run(arguments) {
         Ok(text) => output::print(&text),
         Err(error) => output::fail(&error),
     }

@@ -6,6 +6,7 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A file that could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -27,25 +28,86 @@ impl FileError {
     }
 }
 
+/// What is on its way to the disk. Who writes files holds it, so that an interrupt comes before or
+/// after.
+static WRITES: Mutex<Writes> = Mutex::new(Writes {
+    temporary: Vec::new(),
+    folders: Vec::new(),
+    done: Vec::new(),
+});
+
+struct Writes {
+    /// Files under temporary names.
+    temporary: Vec<PathBuf>,
+    /// Folders made for them, the outer ones first.
+    folders: Vec<PathBuf>,
+    /// Files that are in their places.
+    done: Vec<PathBuf>,
+}
+
+impl Writes {
+    fn lock() -> MutexGuard<'static, Self> {
+        // A list of paths is as good after a panic as before it.
+        WRITES.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Makes the folder and those above it that are missing.
+    fn make(&mut self, folder: &Path) -> io::Result<()> {
+        let missing = folder
+            .ancestors()
+            .take_while(|above| !above.as_os_str().is_empty() && above.symlink_metadata().is_err());
+        let missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
+        self.folders.extend(missing.into_iter().rev());
+        fs::create_dir_all(folder)
+    }
+
+    /// Takes away what is not in its place, and the folders that were made for it alone.
+    fn take_back(&mut self) {
+        for file in self.temporary.drain(..) {
+            // It may not exist; what is reported is what led here.
+            let _ = fs::remove_file(file);
+        }
+        for folder in self.folders.drain(..).rev() {
+            // One with something in it stays.
+            let _ = fs::remove_dir(folder);
+        }
+    }
+}
+
+/// Ends all writing, for a program that is about to end: what is half-written goes. Returns the files
+/// that were written.
+pub fn abandon() -> Vec<PathBuf> {
+    let mut writes = Writes::lock();
+    writes.take_back();
+    let done = std::mem::take(&mut writes.done);
+    // Nothing is written from here on.
+    std::mem::forget(writes);
+    done
+}
+
 /// Writes every file under a temporary name beside its place, then renames them all. When one
 /// cannot be written, none of the old files is touched and no temporary file stays behind.
 /// Directories that are missing are made. A symbolic link stays, and the file that it names is
-/// written; what is neither a file nor a directory (a pipe, a device) is written into.
+/// written; what is neither a file nor a directory (a pipe, a device) is written into, before any
+/// file is renamed.
 ///
 /// # Errors
 /// The first file that could not be written or renamed.
 pub fn write_files(files: &[(&Path, &[u8])]) -> Result<(), FileError> {
     let places = files.iter().map(|(path, _)| Place::of(path));
     let places = places.collect::<Result<Vec<_>, _>>()?;
-    let result = write_then_rename(files, &places);
-    if result.is_err() {
-        for place in &places {
-            if let Place::File { temporary, .. } = place {
-                // It may not exist; the error to report is the one that led here.
-                let _ = fs::remove_file(temporary);
-            }
+    // Before the lock is taken: a pipe may wait for its reader, and must not keep an interrupt waiting.
+    for ((path, content), place) in files.iter().zip(&places) {
+        if let Place::Special = place {
+            let opened = fs::OpenOptions::new().write(true).open(path);
+            let written = opened.and_then(|mut special| special.write_all(content));
+            written.map_err(FileError::at(path))?;
+            Writes::lock().done.push(path.to_path_buf());
         }
     }
+    let mut writes = Writes::lock();
+    let result = write_then_rename(files, &places, &mut writes);
+    writes.take_back();
     result
 }
 
@@ -67,6 +129,7 @@ pub fn check_writable(path: &Path) -> Result<(), FileError> {
         .find(|folder| folder.symlink_metadata().is_ok());
     let folder = folder.unwrap_or(Path::new("."));
     let attempt = folder.join(temporary.file_name().unwrap_or_default());
+    let _writes = Writes::lock();
     let tried = fs::write(&attempt, "").and_then(|()| fs::remove_file(&attempt));
     tried.map_err(FileError::at(path))
 }
@@ -108,27 +171,28 @@ impl Place {
     }
 }
 
-fn write_then_rename(files: &[(&Path, &[u8])], places: &[Place]) -> Result<(), FileError> {
+fn write_then_rename(
+    files: &[(&Path, &[u8])],
+    places: &[Place],
+    writes: &mut Writes,
+) -> Result<(), FileError> {
     for ((path, content), place) in files.iter().zip(places) {
         if let Place::File { file, temporary } = place {
             if let Some(directory) = file.parent() {
-                fs::create_dir_all(directory).map_err(FileError::at(path))?;
+                writes.make(directory).map_err(FileError::at(path))?;
             }
+            writes.temporary.push(temporary.clone());
             fs::write(temporary, content).map_err(FileError::at(path))?;
             if let Ok(old) = fs::metadata(file) {
                 fs::set_permissions(temporary, old.permissions()).map_err(FileError::at(path))?;
             }
         }
     }
-    for ((path, content), place) in files.iter().zip(places) {
-        match place {
-            Place::File { file, temporary } => fs::rename(temporary, file),
-            Place::Special => {
-                let opened = fs::OpenOptions::new().write(true).open(path);
-                opened.and_then(|mut special| special.write_all(content))
-            }
+    for ((path, _), place) in files.iter().zip(places) {
+        if let Place::File { file, temporary } = place {
+            fs::rename(temporary, file).map_err(FileError::at(path))?;
+            writes.done.push(path.to_path_buf());
         }
-        .map_err(FileError::at(path))?;
     }
     Ok(())
 }
@@ -190,6 +254,18 @@ mod tests {
         assert!(error.to_string().contains("bad.svg"), "{error}");
         assert_eq!(fs::read_to_string(&good).unwrap(), "old");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn folders_that_were_made_in_vain_are_taken_away() {
+        let folder = tempfile::tempdir().unwrap();
+        let good = folder.path().join("new").join("deep").join("good.svg");
+        let full = folder.path().join("file");
+        fs::write(&full, "mine").unwrap();
+        assert!(write_files(&[(&good, b"new"), (&full.join("bad.svg"), b"new")]).is_err());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        write_files(&[(&good, b"new")]).unwrap();
+        assert_eq!(fs::read_to_string(&good).unwrap(), "new");
     }
 
     #[test]

@@ -125,10 +125,19 @@ pub fn plans(title: &str, columns: &Columns) -> Figure {
     )
 }
 
-/// The three motors' torques.
-pub fn motors(title: &str, columns: &Columns, torques: &[Vector3<f64>]) -> Figure {
+/// The three motors' torques, with their limits where the planes share them.
+pub fn motors(
+    title: &str,
+    prepared: &Prepared,
+    columns: &Columns,
+    torques: &[Vector3<f64>],
+) -> Figure {
     let of = |i: usize| torques.iter().map(|torque| torque[i]).collect::<Vec<_>>();
     let (first, second, third) = (of(0), of(1), of(2));
     let time = columns.time.get(..=torques.len()).unwrap_or(&columns.time);
-    motor_torques(title, time, [&first, &second, &third], None)
+    let limit = prepared.motors.map(|motors| Band {
+        lower: -motors.limit,
+        upper: motors.limit,
+    });
+    motor_torques(title, time, [&first, &second, &third], limit)
 }

@@ -89,6 +89,21 @@ pub fn number(value: f64) -> String {
     }
 }
 
+/// The same without zeros at its end: for a number that somebody gave, and for the middle of a
+/// sentence.
+pub fn short(value: f64) -> String {
+    let text = number(value);
+    let (digits, power) = match text.split_once('e') {
+        Some((digits, power)) => (digits, format!("e{power}")),
+        None => (text.as_str(), String::new()),
+    };
+    let digits = match digits.contains('.') {
+        true => digits.trim_end_matches('0').trim_end_matches('.'),
+        false => digits,
+    };
+    format!("{digits}{power}")
+}
+
 /// A complex number.
 pub fn complex(value: Complex<f64>) -> String {
     if value.im == 0.0 {
@@ -124,6 +139,22 @@ mod tests {
         }
         assert_eq!(complex(Complex::new(-1.0, 0.0)), "-1.000000");
         assert_eq!(complex(Complex::new(-1.0, -2.0)), "-1.000000 - 2.000000 i");
+    }
+
+    #[test]
+    fn given_numbers_are_as_they_were_given() {
+        for (value, text) in [
+            (0.0, "0"),
+            (200.0, "200"),
+            (0.1 + 0.2, "0.3"),
+            (1e6, "1e6"),
+            (-1e200, "-1e200"),
+            (2.5e-9, "2.5e-9"),
+            (f64::INFINITY, "inf"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(short(value), text);
+        }
     }
 
     #[test]

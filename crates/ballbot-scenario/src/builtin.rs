@@ -24,7 +24,7 @@ macro_rules! builtin {
 pub const TERMINAL_CERTIFICATE: &str = include_str!("builtin/terminal-certificate.json");
 
 /// All built-in scenarios.
-pub const ALL: [Builtin; 7] = [
+pub const ALL: [Builtin; 8] = [
     builtin!("two-setpoints"),
     builtin!("two-setpoints-linear"),
     builtin!("lissajous"),
@@ -32,6 +32,7 @@ pub const ALL: [Builtin; 7] = [
     builtin!("single-setpoint-terminal"),
     builtin!("tight-bounds"),
     builtin!("far-setpoints"),
+    builtin!("one-metre"),
 ];
 
 /// The built-in scenario with this name.

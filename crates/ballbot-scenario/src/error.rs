@@ -1,6 +1,7 @@
 //! What can be wrong with a scenario, said to a person.
 
 use crate::builtin;
+use crate::number::Given;
 use ballbot_control::RegulatorError;
 use std::fmt::Display;
 use std::io;
@@ -114,15 +115,15 @@ impl ScenarioError {
     }
 
     /// A value that makes no sense, with what would be right.
-    pub(crate) fn value(key: impl Display, value: impl Display, expected: impl Display) -> Self {
-        Self::of(&key, &value, &expected)
+    pub(crate) fn value(key: impl Display, value: impl Given, expected: impl Display) -> Self {
+        Self::of(&key, value.given(), &expected)
     }
 
     /// Not generic: there are many such messages, and a browser has to load their code.
-    fn of(key: &dyn Display, value: &dyn Display, expected: &dyn Display) -> Self {
+    fn of(key: &dyn Display, value: String, expected: &dyn Display) -> Self {
         Self::Value {
             key: key.to_string(),
-            value: value.to_string(),
+            value,
             expected: expected.to_string(),
         }
     }

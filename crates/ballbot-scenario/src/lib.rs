@@ -47,6 +47,7 @@ mod session;
 mod three_motors;
 mod time_series;
 mod uncertainty;
+mod weights;
 mod whole_robot;
 mod whole_run;
 pub mod words;
@@ -64,7 +65,7 @@ pub use files::Files;
 pub use guarantee::Standing;
 pub use heading::Turning;
 pub use heading_table::HeadingTable;
-pub use parameters::{KnownRobot, Parameters};
+pub use parameters::{KnownRobot, Parameters, read_robot};
 pub use prepare::{Plane, Prepared};
 pub use reference::PhiReference;
 pub use run::{PlaneLoop, Record, Surroundings};
@@ -76,6 +77,7 @@ pub use schema::{
 pub use session::{Phase, Session, Trouble};
 pub use three_motors::{MotorSample, Motors};
 pub use uncertainty::{RobotDistribution, Uncertainty};
+pub use weights::bryson;
 pub use world::{PlaneWorld, Robot};
 pub use world_table::{
     ActuatorTable, AngleSensorTable, DelayTable, DeviationsTable, FloorTable, PlaneName, PushTable,

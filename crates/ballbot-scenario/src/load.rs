@@ -88,7 +88,7 @@ fn set(root: &mut Value, key: &str, value: Value) -> Result<(), ScenarioError> {
     let refused = |part: &str, problem: &str| {
         Err(ScenarioError::value(
             key,
-            &value,
+            value.to_string(),
             format!(
                 "`{part}` {problem}; keys are as in `ballbot scenario show`, with dots between"
             ),

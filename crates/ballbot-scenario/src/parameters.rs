@@ -3,6 +3,7 @@
 use crate::error::ScenarioError;
 use crate::files::Files;
 use crate::number::{finite, positive};
+use crate::plausible;
 use crate::schema::{BoundsTable, ParameterTable};
 use crate::uncertainty::{RobotDistribution, Uncertainty};
 use crate::words;
@@ -74,6 +75,8 @@ pub struct KnownRobot {
 struct ParameterFile {
     parameters: ParameterTable,
     identification: Option<Uncertainty>,
+    #[serde(default)]
+    accept_unusual_values: bool,
 }
 
 impl Parameters {
@@ -91,28 +94,55 @@ impl Parameters {
     }
 }
 
+/// The robot in the table `[parameters]` of a TOML file, for a command that has no scenario.
+///
+/// # Errors
+/// As [`Parameters::read`], or a number that no ballbot has where the file does not say that it is
+/// meant (`accept_unusual_values = true`).
+pub fn read_robot(file: &Path) -> Result<KnownRobot, ScenarioError> {
+    in_file(file, |text| {
+        let file = parsed(text)?;
+        let unusual = file.accept_unusual_values;
+        let robot = file.robot()?;
+        match unusual {
+            true => Ok(robot),
+            false => plausible::check_robot("parameters", &robot).map(|()| robot),
+        }
+    })
+}
+
 /// The robot in a file of `directory`.
 pub(crate) fn read(file: &Path, directory: &Path) -> Result<KnownRobot, ScenarioError> {
-    let path = directory.join(file);
-    let text = std::fs::read_to_string(&path);
-    let text = text.map_err(|source| ScenarioError::Read {
-        path: path.clone(),
+    in_file(&directory.join(file), |text| parsed(text)?.robot())
+}
+
+fn in_file(
+    path: &Path,
+    robot: impl Fn(&str) -> Result<KnownRobot, ScenarioError>,
+) -> Result<KnownRobot, ScenarioError> {
+    let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Read {
+        path: path.to_owned(),
         source,
     })?;
-    robot_in(&text).map_err(|source| ScenarioError::InFile {
-        path,
+    robot(&text).map_err(|source| ScenarioError::InFile {
+        path: path.to_owned(),
         source: Box::new(source),
     })
 }
 
-fn robot_in(text: &str) -> Result<KnownRobot, ScenarioError> {
-    let file: ParameterFile = toml::from_str(text)
-        .map_err(|error| ScenarioError::ParameterFile(words::toml_message(&error.to_string())))?;
-    let uncertainty = file.identification;
-    Ok(KnownRobot {
-        uncertainty: uncertainty.map(|known| Box::new(known) as Box<dyn RobotDistribution>),
-        ..file.parameters.robot("parameters")?
-    })
+fn parsed(text: &str) -> Result<ParameterFile, ScenarioError> {
+    toml::from_str(text)
+        .map_err(|error| ScenarioError::ParameterFile(words::toml_message(&error.to_string())))
+}
+
+impl ParameterFile {
+    fn robot(self) -> Result<KnownRobot, ScenarioError> {
+        let uncertainty = self.identification;
+        Ok(KnownRobot {
+            uncertainty: uncertainty.map(|known| Box::new(known) as Box<dyn RobotDistribution>),
+            ..self.parameters.robot("parameters")?
+        })
+    }
 }
 
 impl ParameterTable {

@@ -4,8 +4,12 @@
 
 use crate::error::ScenarioError;
 use crate::feedback_table::{EstimatorTable, MotorsTable, ShapingTable};
+use crate::number::text;
 use crate::parameters::KnownRobot;
-use crate::schema::{BoundsTable, ControllerTable, Scenario, StateTable};
+use crate::reference::PhiReference;
+use crate::schema::{
+    BoundsTable, ControllerTable, LissajousTable, ReferenceTable, Scenario, StateTable,
+};
 use crate::world_table::{PushTable, WorldTable};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -49,6 +53,10 @@ pub const START_TILT: Plausible = range(0.0, FRAC_PI_2, "rad", DEGREES);
 pub const TILT_RATE: Plausible = range(0.0, 100.0, "rad/s", DEGREES_PER_SECOND);
 /// A speed of the ball.
 pub const BALL_RATE: Plausible = range(0.0, 300.0, "rad/s", DEGREES_PER_SECOND);
+/// An angle of the ball as a place to be at: some 50 m on a ball of 0.11 m.
+pub const BALL_ANGLE: Plausible = range(0.0, 450.0, "rad", DEGREES);
+/// A place on the floor.
+pub const PLACE: Plausible = range(0.0, 50.0, "m", MILLIMETRES);
 /// A torque.
 pub const TORQUE: Plausible = range(0.0, 100.0, "N m", Some(("mN m", 1e-3)));
 /// A sampling time, of the control or of the sensors.
@@ -90,18 +98,18 @@ impl Plausible {
         };
         let meant = self.mistaken.map(|(name, factor)| (name, value * factor));
         let question = match meant {
-            Some((name, right)) if self.holds(right) => {
-                format!(
-                    "; were {name} meant? {value} {name} are {} {unit}",
-                    short(right)
-                )
-            }
+            Some((name, right)) if self.holds(right) => format!(
+                "; were {name} meant? {} {name} are {} {unit}",
+                text(value),
+                text(short(right))
+            ),
             _ => String::new(),
         };
         let expected = format!(
-            "{end} than {} {unit} is no ballbot's{question}. If {value} {unit} is right, set \
-             accept_unusual_values = true at the top of the scenario",
-            short(limit)
+            "{end} than {} {unit} is no ballbot's{question}. If {} {unit} is right, set \
+             accept_unusual_values = true at the top of the file",
+            text(short(limit)),
+            text(value)
         );
         Err(ScenarioError::value(key, value, expected))
     }
@@ -124,6 +132,7 @@ impl Scenario {
         self.controller.check_plausible()?;
         self.bounds.check_plausible()?;
         self.initial_state.check_plausible("initial_state")?;
+        self.reference.check_plausible("reference")?;
         if let Some(state) = &self.initial_state_y {
             state.check_plausible("initial_state_y")?;
         }
@@ -134,22 +143,77 @@ impl Scenario {
 
     /// The same for a robot, which may stand in a file; `key` is where the scenario names it.
     pub(crate) fn check_robot(&self, key: &str, robot: &KnownRobot) -> Result<(), ScenarioError> {
-        if self.accept_unusual_values {
-            return Ok(());
+        match self.accept_unusual_values {
+            true => Ok(()),
+            false => check_robot(key, robot),
         }
-        let geometry = &robot.ballbot.geometry;
-        let zenith = robot.wheels.zenith_angle().to_degrees();
-        for (name, value, plausible) in [
-            ("b1_m2", robot.ballbot.b1, INERTIA),
-            ("b2_m2", robot.ballbot.b2, INERTIA),
-            ("b3_m2", robot.ballbot.b3, INERTIA),
-            ("centre_of_mass_m", geometry.centre_of_mass, HEIGHT),
-            ("ball_radius_m", geometry.ball_radius, RADIUS),
-            ("wheel_radius_m", geometry.wheel_radius, RADIUS),
-            ("gravity_m_s2", geometry.gravity, GRAVITY),
-            ("zenith_angle_deg", short(zenith), ZENITH),
-        ] {
-            plausible.check(&format!("{key}.{name}"), value)?;
+    }
+
+    /// The same for a reference that stands in a file.
+    pub(crate) fn check_reference(
+        &self,
+        key: &str,
+        reference: &PhiReference,
+    ) -> Result<(), ScenarioError> {
+        match reference {
+            PhiReference::Interpolated(points) if !self.accept_unusual_values => {
+                let mut points = points.iter();
+                points.try_for_each(|point| BALL_ANGLE.check(key, point.phi_rad))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Asks about a robot that could not be built.
+///
+/// # Errors
+/// The first of its numbers that is not plausible, below `key`.
+pub fn check_robot(key: &str, robot: &KnownRobot) -> Result<(), ScenarioError> {
+    let geometry = &robot.ballbot.geometry;
+    let zenith = robot.wheels.zenith_angle().to_degrees();
+    for (name, value, plausible) in [
+        ("b1_m2", robot.ballbot.b1, INERTIA),
+        ("b2_m2", robot.ballbot.b2, INERTIA),
+        ("b3_m2", robot.ballbot.b3, INERTIA),
+        ("centre_of_mass_m", geometry.centre_of_mass, HEIGHT),
+        ("ball_radius_m", geometry.ball_radius, RADIUS),
+        ("wheel_radius_m", geometry.wheel_radius, RADIUS),
+        ("gravity_m_s2", geometry.gravity, GRAVITY),
+        ("zenith_angle_deg", short(zenith), ZENITH),
+    ] {
+        plausible.check(&format!("{key}.{name}"), value)?;
+    }
+    Ok(())
+}
+
+impl ReferenceTable {
+    fn check_plausible(&self, key: &str) -> Result<(), ScenarioError> {
+        let (kind, points) = match self {
+            Self::SetPoints { points } => ("set_points", points),
+            Self::MinimumJerk { points } => ("minimum_jerk", points),
+            Self::Lines { points } => ("lines", points),
+            Self::Sine(sine) => {
+                BALL_ANGLE.check(&format!("{key}.sine.amplitude_rad"), sine.amplitude_rad)?;
+                return BALL_ANGLE.check(&format!("{key}.sine.offset_rad"), sine.offset_rad);
+            }
+            Self::Lissajous(LissajousTable {
+                amplitude_x_m,
+                amplitude_y_m,
+                ..
+            }) => {
+                PLACE.check(&format!("{key}.lissajous.amplitude_x_m"), *amplitude_x_m)?;
+                return PLACE.check(&format!("{key}.lissajous.amplitude_y_m"), *amplitude_y_m);
+            }
+            Self::Planes { x, y } => {
+                x.check_plausible(&format!("{key}.planes.x"))?;
+                return y.check_plausible(&format!("{key}.planes.y"));
+            }
+            // When it has been read.
+            Self::Csv(_) => return Ok(()),
+        };
+        for (i, point) in points.iter().enumerate() {
+            BALL_ANGLE.check(&format!("{key}.{kind}.points[{i}].phi_rad"), point.phi_rad)?;
         }
         Ok(())
     }
@@ -204,6 +268,7 @@ impl BoundsTable {
 
 impl StateTable {
     fn check_plausible(&self, key: &str) -> Result<(), ScenarioError> {
+        BALL_ANGLE.check(&format!("{key}.phi_rad"), self.phi_rad)?;
         START_TILT.check(&format!("{key}.theta_rad"), self.theta_rad)?;
         BALL_RATE.check(&format!("{key}.phi_dot_rad_s"), self.phi_dot_rad_s)?;
         TILT_RATE.check(&format!("{key}.theta_dot_rad_s"), self.theta_dot_rad_s)

@@ -85,11 +85,17 @@ impl Scenario {
         self.check_robot("parameters", &model)?;
         let (ballbot, wheels) = (model.ballbot, model.wheels);
         let real = match &self.world {
-            Some(world) => world.real_robot(&model, files)?,
+            Some(world) => {
+                let check = |robot: &_| self.check_robot("world.parameters", robot);
+                world.real_robot(&model, check, files)?
+            }
             None => ballbot,
         };
         let bounds = self.bounds.check()?;
         let references = reference::resolve(&self.reference, &ballbot.geometry, duration, files)?;
+        for reference in &references {
+            self.check_reference("reference (csv)", reference)?;
+        }
         let motors = self.motors(references.len(), &wheels)?;
         let bounds = match &self.controller.motors {
             Some(table) => (

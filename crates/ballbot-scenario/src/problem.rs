@@ -1,7 +1,7 @@
 //! `[controller]` and `[bounds]`: the problem that the controller solves at every sample.
 
 use crate::error::ScenarioError;
-use crate::number::positive;
+use crate::number::{positive, text};
 use crate::schema::{
     BoundsTable, ControllerTable, IterationsTable, LinearModelTable, ModelKind, PredictorTable,
     StateBounds, TerminalTable,
@@ -12,7 +12,7 @@ use lpvmpc::{
     Bounds, ControllerSettings, InputReference, Iterations, LpvModel, Predictor, Rk4, Scheduling,
     Softness, SolverSettings, TerminalIngredient, Weights, exact_prices,
 };
-use nalgebra::{DMatrix, Matrix1, Matrix4, Vector1, Vector3, Vector4};
+use nalgebra::{DMatrix, Matrix4, Vector1, Vector3, Vector4};
 
 /// More Runge-Kutta steps per sample than this would be a slip of the pen, and a run without end.
 pub(crate) const MOST_SUBSTEPS: usize = 1000;
@@ -55,7 +55,7 @@ impl BoundsTable {
             if !(lower <= upper) || lower == f64::INFINITY || upper == f64::NEG_INFINITY {
                 return Err(ScenarioError::value(
                     format!("bounds.{key}"),
-                    format!("[{lower}, {upper}]"),
+                    format!("[{}, {}]", text(lower), text(upper)),
                     "the lower bound must not be above the upper one; use -inf and inf for none",
                 ));
             }
@@ -80,17 +80,7 @@ impl BoundsTable {
     }
 }
 
-fn check_weights(table: &ControllerTable) -> Result<(), ScenarioError> {
-    for (i, weight) in table.q.iter().enumerate() {
-        if !(*weight >= 0.0 && weight.is_finite()) {
-            return Err(ScenarioError::value(
-                format!("controller.q[{i}]"),
-                weight,
-                "a state weight must be zero or positive",
-            ));
-        }
-    }
-    positive("controller.r", table.r)?;
+fn check_horizon(table: &ControllerTable) -> Result<(), ScenarioError> {
     positive("controller.t_s", table.t_s)?;
     if table.horizon == 0 || table.horizon > LONGEST_HORIZON {
         return Err(ScenarioError::value(
@@ -112,11 +102,8 @@ impl ControllerTable {
         ballbot: &Ballbot<f64>,
         (x, u): (Bounds<f64, 4>, Bounds<f64, 1>),
     ) -> Result<ControllerSettings<f64, 4, 1, 3>, ScenarioError> {
-        check_weights(self)?;
-        let weights = Weights {
-            q: Matrix4::from_diagonal(&Vector4::from(self.q)),
-            r: Matrix1::new(self.r),
-        };
+        let weights = self.weights(ballbot)?;
+        check_horizon(self)?;
         // At rest Coulomb friction makes the fastest pole; beyond the horizon the robot moves.
         let (stiffest, _) = ballbot.matrices(&Vector3::zeros());
         let predictor = self.predictor(&stiffest)?;

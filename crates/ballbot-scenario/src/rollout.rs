@@ -10,6 +10,7 @@
 //! proof. The same goes for how far a state lies beyond both ends of a step, which is taken as it is.
 
 use crate::error::ScenarioError;
+use crate::number::text;
 use ballbot::Ballbot;
 use lpvmpc::{Bounds, ControllerSettings, LpvModel, Rk4, Rollout, TerminalSet};
 use nalgebra::{Matrix4, Vector1, Vector4};
@@ -41,7 +42,7 @@ pub(crate) fn accurate(
         if !(lower.is_finite() && upper.is_finite()) {
             return Err(ScenarioError::value(
                 format!("bounds.{name}"),
-                format!("[{lower}, {upper}]"),
+                format!("[{}, {}]", text(lower), text(upper)),
                 "with a certified terminal set it must be finite, so that the error of the \
                  prediction has a bound",
             ));

@@ -149,10 +149,13 @@ pub struct ControllerTable {
     pub t_s: f64,
     /// Prediction horizon N, samples.
     pub horizon: usize,
-    /// Diagonal of Q, for (phi, theta, phi_dot, theta_dot).
-    pub q: [f64; 4],
+    /// Diagonal of Q, for (phi, theta, phi_dot, theta_dot). When Q and R are absent: Bryson's rule
+    /// on this robot.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub q: Option<[f64; 4]>,
     /// R, 1/(N m)^2.
-    pub r: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub r: Option<f64>,
     /// The end of the horizon.
     #[serde(default)]
     pub terminal: TerminalTable,

@@ -73,10 +73,15 @@ impl WorldTable {
     pub(crate) fn real_robot(
         &self,
         model: &KnownRobot,
+        check: impl Fn(&KnownRobot) -> Result<(), ScenarioError>,
         files: &dyn Files,
     ) -> Result<Ballbot<f64>, ScenarioError> {
         let read = match &self.parameters {
-            Some(parameters) => Some(parameters.read("world.parameters", files)?),
+            Some(parameters) => {
+                let robot = parameters.read("world.parameters", files)?;
+                check(&robot)?;
+                Some(robot)
+            }
             None => None,
         };
         let robot = read.as_ref().unwrap_or(model);

@@ -226,8 +226,11 @@ fn a_certificate_of_something_else_is_refused() {
         &["another robot", "certify"],
     );
     refused(|s| s.controller.t_s = 0.04, &["controller.t_s", "0.05 s"]);
-    refused(|s| s.controller.q[0] = 300.0, &["controller.q", "200.0"]);
-    refused(|s| s.controller.r = 2000.0, &["controller.r", "1000"]);
+    refused(
+        |s| s.controller.q = Some([300.0, 1.0, 0.1, 0.1]),
+        &["controller.q", "200.0"],
+    );
+    refused(|s| s.controller.r = Some(2000.0), &["controller.r", "1000"]);
     refused(
         |s| s.bounds.theta_rad = [-0.05, 0.05],
         &["bounds.theta_rad", "reaches"],

@@ -166,7 +166,10 @@ fn a_robot_at_rest_far_from_zero_stays_there_whatever_is_set() {
     };
     for (name, moved) in [
         ("nothing", after(&|_| ())),
-        ("weights", after(&|s| s.controller.r *= 2.0)),
+        (
+            "weights",
+            after(&|s| s.controller.r = s.controller.r.map(|r| 2.0 * r)),
+        ),
         ("horizon", after(&|s| s.controller.horizon += 7)),
         ("shorter horizon", after(&|s| s.controller.horizon -= 5)),
         (

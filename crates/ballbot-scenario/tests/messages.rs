@@ -145,7 +145,7 @@ fn values_are_set_by_their_keys() {
 
 #[test]
 fn missing_key() {
-    assert_says(&message("r = 1000.0", "#"), &["missing field `r`"]);
+    assert_says(&message("horizon = 20", "#"), &["missing field `horizon`"]);
 }
 
 #[test]

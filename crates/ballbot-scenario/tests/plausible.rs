@@ -6,7 +6,7 @@
     reason = "a test fails by panicking, in its helper functions too"
 )]
 
-use ballbot_scenario::{Scenario, builtin};
+use ballbot_scenario::{Scenario, builtin, read_robot};
 use std::path::Path;
 
 /// The scenario `two-setpoints` with lines replaced and others added at the end.
@@ -95,6 +95,81 @@ fn other_units_are_asked_about() {
 }
 
 #[test]
+fn places_in_other_units_are_asked_about() {
+    let jump = "{ time_s = 1.0, phi_rad = 6.283185307179586 }";
+    let to_500 = "{ time_s = 1.0, phi_rad = 500.0 }";
+    let points = "points = [\n    { time_s = 0.0, phi_rad = 0.0 },";
+    for (from, to, words) in [
+        (
+            jump,
+            to_500,
+            [
+                "reference.set_points.points[1].phi_rad = 500",
+                "500 degrees are 8.727 rad",
+            ],
+        ),
+        (
+            "phi_rad = 0.0\ntheta_rad = 0.0",
+            "phi_rad = 1000.0\ntheta_rad = 0.0",
+            ["initial_state.phi_rad = 1000", "1000 degrees are 17.45 rad"],
+        ),
+        (
+            points,
+            "points = [\n    { time_s = 0.0, phi_rad = 1e200 },",
+            ["points[0].phi_rad = 1e200", "more than 450 rad"],
+        ),
+    ] {
+        let mut changed = scenario(&[(from, to)], "");
+        let said = refused(&changed);
+        for word in words {
+            assert!(said.contains(word), "no `{word}` in: {said}");
+        }
+        assert!(said.contains("accept_unusual_values = true"), "{said}");
+        assert!(said.len() < 400, "{said}");
+        changed.accept_unusual_values = true;
+        changed.prepare(Path::new(".")).expect("it is meant");
+    }
+    let lissajous = builtin::find("lissajous").expect("built-in").text;
+    let start = lissajous.find("amplitude_x_m = ").expect("a curve");
+    let line = lissajous[start..].lines().next().expect("a line");
+    let text = lissajous.replace(line, "amplitude_x_m = 800.0");
+    let said = refused(&Scenario::parse(&text, "my.toml").expect("valid TOML"));
+    assert!(said.contains("800 mm are 0.8 m"), "{said}");
+}
+
+/// The robot of the world, and one of a file without a scenario, have the limits of the model's.
+#[test]
+fn every_robot_in_other_units_is_asked_about() {
+    let robot = "[parameters]\nb1_m2 = 0.03\nb2_m2 = 0.01\nb3_m2 = 0.14\nb4_m2_s = 0.01\n\
+                 centre_of_mass_m = 0.3\nball_radius_m = 120.0\nwheel_radius_m = 0.05\n\
+                 gravity_m_s2 = 9.81\n";
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("millimetres.toml");
+    std::fs::write(&file, robot).expect("writable");
+    let lines = format!("[world]\nparameters = {file:?}");
+    let mut of_the_world = scenario(&[], &lines);
+    let said = refused(&of_the_world);
+    for word in ["world.parameters.ball_radius_m = 120", "120 mm are 0.12 m"] {
+        assert!(said.contains(word), "no `{word}` in: {said}");
+    }
+    of_the_world.accept_unusual_values = true;
+    if let Err(error) = of_the_world.prepare(Path::new(".")) {
+        assert!(!error.to_string().contains("unusual"), "{error}");
+    }
+    let said = read_robot(&file).expect_err("mm").to_string();
+    for word in [
+        "millimetres.toml",
+        "parameters.ball_radius_m = 120",
+        "120 mm are 0.12 m",
+    ] {
+        assert!(said.contains(word), "no `{word}` in: {said}");
+    }
+    let meant = file.with_file_name("meant.toml");
+    let text = format!("accept_unusual_values = true\n{robot}");
+    std::fs::write(&meant, text).expect("writable");
+    read_robot(&meant).expect("it is meant");
+}
+
+#[test]
 fn a_world_in_other_units_is_asked_about() {
     for (lines, words) in [
         ("[world.delay]\ntransport_s = 20.0", "20 ms are 0.02 s"),
@@ -159,7 +234,8 @@ fn work_without_end_is_refused_whoever_means_it() {
 fn weights_that_no_regulator_can_follow_are_named() {
     for (q, r) in [(1e200, 1e3), (1e20, 1e3), (200.0, 1e-300)] {
         let mut scenario = scenario(&[], "");
-        (scenario.controller.q[0], scenario.controller.r) = (q, r);
+        scenario.controller.q = Some([q, 1.0, 0.1, 0.1]);
+        scenario.controller.r = Some(r);
         scenario.controller.terminal = ballbot_scenario::TerminalTable::DiscreteRiccati;
         let said = match scenario.prepare(Path::new(".")) {
             // A gain that is found has passed its check.

@@ -254,7 +254,7 @@ fn a_controller_that_knows_the_friction_follows_better() {
             phase_rad: 0.0,
             offset_rad: 0.0,
         });
-        scenario.controller.r = 1.0;
+        scenario.controller.r = Some(1.0);
         scenario.world = Some(WorldTable {
             parameters: Some(Parameters::File("dry.toml".into())),
             ..WorldTable::default()

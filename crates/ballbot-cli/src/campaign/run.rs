@@ -140,7 +140,7 @@ impl<'a> Loop<'a> {
         let controller = Guarded::new(prepared.ballbot, settings);
         let controller = controller.map_err(ScenarioError::from)?;
         let start = Self::start(prepared, *variant == Variant::Edge, random)?;
-        let plant = variant.plant(prepared, random);
+        let plant = variant.plant(prepared, random)?;
         Ok(Self {
             prepared,
             guarded: GuardedLoop::new(controller, plant, start, TOLERANCES),

@@ -4,7 +4,7 @@ use super::run::{Course, Loop, Record, Wanted};
 use super::{Campaign, Scenarios, paper};
 use crate::commands::CommandError;
 use ballbot::Ballbot;
-use ballbot_scenario::Prepared;
+use ballbot_scenario::{Prepared, ScenarioError};
 use lpvmpc_sim::{Actuation, Random};
 use nalgebra::{Vector1, Vector4};
 use std::fmt;
@@ -101,13 +101,17 @@ impl Variant {
         )
     }
 
-    pub(super) fn plant(&self, prepared: &Prepared, random: &mut Random) -> Ballbot<f64> {
+    pub(super) fn plant(
+        &self,
+        prepared: &Prepared,
+        random: &mut Random,
+    ) -> Result<Ballbot<f64>, ScenarioError> {
         let nominal = prepared.ballbot;
         let Self::Parameters(part) = *self else {
-            return nominal;
+            return Ok(nominal);
         };
         let tilt = prepared.settings.x.upper[1];
-        loop {
+        for _ in 0..MOST_DRAWS {
             let mut factor = || 1.0 + part * random.symmetric();
             let plant = Ballbot {
                 b1: nominal.b1 * factor(),
@@ -117,9 +121,17 @@ impl Variant {
             };
             // With a singular mass matrix there is no motion to run.
             if plant.consistency(tilt).mass_invertible {
-                return plant;
+                return Ok(plant);
             }
         }
+        Err(ScenarioError::Parameters(format!(
+            "of {MOST_DRAWS} robots whose b1 to b3 are drawn within {:.0} % of these, none has an \
+             invertible mass matrix at all tilts up to {:.1} degrees: det M = b1 b3 - (b2 - l r_b \
+             cos theta)^2 has a zero there. A rigid robot has none; a narrower bounds.theta_rad helps, \
+             too",
+            100.0 * part,
+            tilt.to_degrees()
+        )))
     }
 
     /// The push before sample `k`, in state units.
@@ -149,6 +161,9 @@ impl Variant {
 
 /// Largest distance of a set point from phi = 0, rad.
 const FARTHEST: f64 = 100.0;
+/// As many robots are drawn until one can move: of those around a robot that can, far more than are
+/// needed.
+const MOST_DRAWS: usize = 1000;
 /// Part of the samples that begin with a push.
 const PUSHES: f64 = 0.02;
 
@@ -174,6 +189,31 @@ impl fmt::Display for Variant {
             Self::TorqueNoise(deviation) => write!(f, "torque noise {deviation} N m"),
             Self::Delay(delay) => write!(f, "torque {:.0} ms late", 1e3 * delay),
             Self::Paper(_) => f.write_str("the paper's scheme"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::Scenarios;
+
+    #[test]
+    fn robots_that_cannot_be_drawn_are_refused() {
+        let mut prepared = Scenarios::built_in().unwrap().guaranteed;
+        let variant = Variant::Parameters(0.2);
+        let mut random = Random::new(1, 0);
+        variant.plant(&prepared, &mut random).unwrap();
+        // det M = b1 b3 - (b2 - l r_b cos theta)^2 changes its sign on the way to the floor.
+        let ballbot = &mut prepared.ballbot;
+        (ballbot.b1, ballbot.b2, ballbot.b3) = (0.016, 0.04, 0.143);
+        prepared.settings.x.upper[1] = 3.1;
+        let said = variant
+            .plant(&prepared, &mut random)
+            .unwrap_err()
+            .to_string();
+        for word in ["20 %", "det M", "177.6 degrees"] {
+            assert!(said.contains(word), "{said}");
         }
     }
 }

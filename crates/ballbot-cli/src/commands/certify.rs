@@ -9,7 +9,9 @@ use crate::progress::Progress;
 use crate::proofs::{self, STEPS};
 use crate::results::ResultFolder;
 use crate::table::{Table, number};
-use ballbot_scenario::{Prepared, RobotTable, TerminalCertificate, TerminalTable};
+use ballbot_scenario::{
+    Prepared, RobotTable, TerminalCertificate, TerminalTable, number as numbers,
+};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use lpvmpc::Bounds;
@@ -70,7 +72,10 @@ fn share(text: &str) -> Result<f64, String> {
     if value <= 1.0 {
         Ok(value)
     } else {
-        Err(format!("{value} is not a share, from 0 to 1"))
+        Err(format!(
+            "{} is not a share, from 0 to 1",
+            numbers::text(value)
+        ))
     }
 }
 

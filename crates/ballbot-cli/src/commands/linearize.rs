@@ -4,7 +4,7 @@ use super::CommandError;
 use super::model::{ModelArguments, ModelChoice};
 use crate::json;
 use crate::linear_model::LinearModel;
-use crate::table::{self, Table};
+use crate::table::{self, Table, short};
 use clap::Args;
 use lpvmpc::LpvModel;
 use nalgebra::{Complex, Vector3};
@@ -56,7 +56,7 @@ fn tilt(text: &str) -> Result<f64, String> {
     if value.abs() <= 180.0 {
         Ok(value)
     } else {
-        Err(format!("{value} is not from -180 to 180 degrees"))
+        Err(format!("{} is not from -180 to 180 degrees", short(value)))
     }
 }
 
@@ -109,7 +109,8 @@ impl Report {
             ModelChoice::B => {
                 let title = format!(
                     "LPV model b at the scheduling theta = {} deg, theta_dot = {} deg/s",
-                    degrees[0], degrees[1]
+                    short(degrees[0]),
+                    short(degrees[1])
                 );
                 let matrices = choice.robot.ballbot()?.matrices(&scheduling);
                 (title, LinearModel::from(matrices))

@@ -5,8 +5,9 @@ use super::model::ModelArguments;
 use crate::arguments::{finite, positive};
 use crate::json;
 use crate::regulator::{Regulator, RegulatorError, RegulatorProblem, Time};
-use crate::table::{self, Table, complex, number};
-use ballbot::limits;
+use crate::table::{self, Table, complex, number, short};
+use ballbot::{Ballbot, limits};
+use ballbot_scenario::bryson;
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use lpvmpc::Rk4;
@@ -22,7 +23,7 @@ Examples:
   ballbot lqr --ts 0.02                      another sampling time
   ballbot lqr --model p --continuous         the gain and terminal cost that the paper uses
   ballbot lqr --q 1000,1,0.1,0.1 --r 500     other weights
-  ballbot lqr --parameters robot.toml        another robot
+  ballbot lqr --parameters robot.toml        another robot, weights for it by Bryson's rule
 
 The gain is for u = -K x with x = (phi, theta, phi_dot, theta_dot) in rad and rad/s and u in N m.
 With --model p it is designed for p and checked on the nonlinear model b.")]
@@ -30,12 +31,13 @@ pub struct LqrArguments {
     /// Robot and linear model.
     #[command(flatten)]
     pub model: ModelArguments,
-    /// Weights of phi, theta, phi_dot and theta_dot
-    #[arg(long, value_name = "Q1,Q2,Q3,Q4", default_value = "200,1,0.1,0.1", value_parser = state_weights)]
-    pub q: [f64; 4],
-    /// Weight of the torque
-    #[arg(long, default_value = "1000", value_parser = positive)]
-    pub r: f64,
+    /// Weights of phi, theta, phi_dot and theta_dot [default: 200,1,0.1,0.1 of the paper; with
+    /// --parameters those of Bryson's rule in the robot's own units, as in a scenario]
+    #[arg(long, value_name = "Q1,Q2,Q3,Q4", value_parser = state_weights)]
+    pub q: Option<[f64; 4]>,
+    /// Weight of the torque [default: 1000 of the paper; with --parameters as for --q]
+    #[arg(long, value_parser = positive)]
+    pub r: Option<f64>,
     /// Sampling time, s
     #[arg(long, value_name = "SECONDS", default_value = "0.05", value_parser = positive)]
     pub ts: f64,
@@ -53,7 +55,7 @@ pub struct LqrArguments {
 fn state_weights(text: &str) -> Result<[f64; 4], String> {
     let weights = text.split(',').map(finite).collect::<Result<Vec<_>, _>>()?;
     if let Some(negative) = weights.iter().find(|weight| **weight < 0.0) {
-        return Err(format!("the weight {negative} is negative"));
+        return Err(format!("the weight {} is negative", short(*negative)));
     }
     <[f64; 4]>::try_from(weights).map_err(|weights| {
         format!(
@@ -61,6 +63,28 @@ fn state_weights(text: &str) -> Result<[f64; 4], String> {
             weights.len()
         )
     })
+}
+
+impl LqrArguments {
+    /// Q's diagonal and R.
+    fn weights(&self, ballbot: &Ballbot<f64>) -> Result<([f64; 4], f64), CommandError> {
+        const PAPER: ([f64; 4], f64) = ([200.0, 1.0, 0.1, 0.1], 1000.0);
+        match (self.q, self.r) {
+            (Some(q), Some(r)) => Ok((q, r)),
+            (q, r) if self.model.robot.parameters.is_none() => {
+                Ok((q.unwrap_or(PAPER.0), r.unwrap_or(PAPER.1)))
+            }
+            (None, None) => {
+                let weights = bryson(ballbot)?;
+                Ok((weights.q.diagonal().into(), weights.r[0]))
+            }
+            _ => Err(CommandError::Usage(
+                "only the ratio of --q and --r matters: with --parameters give both, or leave both \
+                 out for Bryson's rule on this robot"
+                    .to_owned(),
+            )),
+        }
+    }
 }
 
 /// Designs and reports.
@@ -75,11 +99,12 @@ pub fn run(arguments: &LqrArguments) -> Result<String, CommandError> {
         Some(substeps) => substeps,
         None => accurate_rk4_substeps(&linear.a, arguments.ts).map_err(RegulatorError::from)?,
     };
+    let (q, r) = arguments.weights(&ballbot)?;
     let problem = RegulatorProblem {
         linear,
         ballbot,
-        q: arguments.q,
-        r: arguments.r,
+        q,
+        r,
         time: if arguments.continuous {
             Time::Continuous
         } else {
@@ -120,8 +145,8 @@ fn report(arguments: &LqrArguments, problem: &RegulatorProblem, regulator: &Regu
          {poles}\n  {}\n\n{}",
         arguments.model.model.description(),
         time(problem, regulator),
-        problem.q.map(|weight| weight.to_string()).join(", "),
-        problem.r,
+        problem.q.map(short).join(", "),
+        short(problem.r),
         Table::of_matrix(with_units, &["K"], &regulator.lqr.k),
         Table::of_matrix(states, &states, &regulator.lqr.p),
         table::poles(&regulator.lqr.poles),
@@ -137,13 +162,14 @@ fn time(problem: &RegulatorProblem, regulator: &Regulator) -> String {
         .step
         .map_or(f64::INFINITY, |step| step.longest_step);
     format!(
-        "sampled every {t_s} s\npredictor: Runge-Kutta, {} per sample, each {} s (stable up to {} s)",
+        "sampled every {} s\npredictor: Runge-Kutta, {} per sample, each {} s (stable up to {} s)",
+        short(t_s),
         match predictor.substeps {
             1 => "1 step".to_owned(),
             steps => format!("{steps} steps"),
         },
-        number(t_s / predictor.substeps as f64),
-        number(longest)
+        short(t_s / predictor.substeps as f64),
+        short(longest)
     )
 }
 

@@ -10,6 +10,7 @@ use crate::optimality::{
 use crate::results::ResultFolder;
 use crate::table::Table;
 use clap::Args;
+use lpvmpc::Iterations;
 use rayon::prelude::*;
 use serde_json::json;
 use std::path::PathBuf;
@@ -52,7 +53,13 @@ const RESULTS: [&str; 5] = [
 /// A file cannot be written.
 pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
     let results = ResultFolder::open(&arguments.out, &RESULTS)?;
-    let programs = arguments.programs.map(|programs| programs as usize);
+    let iterations =
+        arguments
+            .programs
+            .map_or_else(Iterations::default, |most| Iterations::Descent {
+                tolerance: Iterations::<f64>::TOLERANCE,
+                most: most as usize,
+            });
     let sets = [
         ("from rest", distances()?),
         ("random starts", random_starts()?),
@@ -74,7 +81,7 @@ pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
     let mut documents = Vec::new();
     let mut contents = Vec::new();
     for (name, cases) in &sets {
-        let outcomes = run_all(cases, programs)?;
+        let outcomes = run_all(cases, iterations)?;
         let summary = Summary::of(cases, &outcomes);
         table.row(summary.cells(name));
         documents.push(summary.document(name));

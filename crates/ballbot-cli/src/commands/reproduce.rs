@@ -68,13 +68,15 @@ fn write(
 ) -> Result<(), CommandError> {
     let machine = machine();
     let mut files: Vec<(String, Vec<u8>)> = Vec::new();
-    let guarantee = &reproduction.guarantee;
-    for drawing in drawings.iter().chain([&guarantee.drawing()]) {
+    let (guarantee, optimum) = (&reproduction.guarantee, &reproduction.optimum);
+    let beyond = [guarantee.drawing(), optimum.drawing()];
+    for drawing in drawings.iter().chain(&beyond) {
         let stem = format!("figures/{}", drawing.name);
         files.push((format!("{stem}.svg"), drawing.figure.svg()?.into_bytes()));
         files.push((format!("{stem}.png"), drawing.figure.png(PNG_SCALE)?));
     }
-    for sheet in sheets.iter().chain(&guarantee.sheets()) {
+    let beyond = guarantee.sheets().into_iter().chain([optimum.sheet()]);
+    for sheet in sheets.iter().cloned().chain(beyond) {
         let name = format!("tables/{}.csv", sheet.name);
         files.push((name, sheet.csv().into_bytes()));
     }

@@ -3,7 +3,7 @@
 use super::CommandError;
 use crate::proofs::ProvedFiles;
 use ballbot::Ballbot;
-use ballbot_scenario::{Parameters, Prepared, Scenario};
+use ballbot_scenario::{Parameters, Prepared, Scenario, read_robot};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -23,10 +23,7 @@ impl RobotArguments {
     /// The file cannot be read or makes no sense.
     pub fn ballbot(&self) -> Result<Ballbot<f64>, CommandError> {
         match &self.parameters {
-            Some(path) => {
-                let file = Parameters::File(path.clone());
-                Ok(file.read("parameters", &Path::new("."))?.ballbot)
-            }
+            Some(path) => Ok(read_robot(path)?.ballbot),
             None => Ok(Ballbot::paper()),
         }
     }

@@ -42,7 +42,8 @@ pub struct SimulateArguments {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
-    /// Write what the robot's sensors delivered, as CSV; for two planes FILE-x and FILE-y
+    /// Write what the robot's sensors delivered, as CSV; for two planes FILE-x and FILE-y. - for
+    /// standard output, in place of the summary; for one plane only
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
 }
@@ -53,6 +54,9 @@ pub struct SimulateArguments {
 /// The scenario is not valid, a file cannot be written, or the run ended early.
 pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
     let simulated = complete(arguments)?;
+    if let Some(log) = simulated.log {
+        return Ok(log);
+    }
     Ok(match arguments.json {
         true => json::text(&simulated.document),
         false => simulated.summary,
@@ -70,6 +74,8 @@ pub struct Simulated {
     pub summary: String,
     /// The same for other programs.
     pub document: Value,
+    /// What the sensors delivered, where it goes to standard output.
+    pub log: Option<String>,
 }
 
 /// [`run`] with all that is known of it.
@@ -86,6 +92,10 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
     };
     let folder = ResultFolder::open(&folder, &RESULTS)?;
     let logs = match &arguments.log {
+        Some(_) if arguments.logs_to_standard_output() => {
+            check_alone(arguments.json, prepared.planes.len())?;
+            Vec::new()
+        }
         Some(path) => log_paths(path, prepared.planes.len()),
         None => Vec::new(),
     };
@@ -130,6 +140,10 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
             trajectories,
             summary,
             document,
+            log: rows
+                .first()
+                .filter(|_| arguments.logs_to_standard_output())
+                .map(|log| recording::log_csv(log)),
         }),
         Some((what, run)) => Err(CommandError::EndedEarly {
             what,
@@ -182,6 +196,25 @@ fn readings(logs: &[Vec<LogRow<4, 1>>]) -> String {
         .filter(|(_, told)| !told.is_empty())
         .map(|(plane, told)| format!("\nreadings{plane}: {told}"))
         .collect()
+}
+
+impl SimulateArguments {
+    /// Whether the log is what is printed.
+    pub fn logs_to_standard_output(&self) -> bool {
+        self.log.as_deref() == Some(Path::new("-"))
+    }
+}
+
+/// Standard output takes one text.
+fn check_alone(json: bool, planes: usize) -> Result<(), CommandError> {
+    let other = match (json, planes) {
+        (true, _) => "--json goes there, too",
+        (_, 2) => "there are two logs, one per plane",
+        _ => return Ok(()),
+    };
+    Err(CommandError::Usage(format!(
+        "--log - does not go: {other}. Name a file"
+    )))
 }
 
 /// The files of the planes' logs.
@@ -291,7 +324,10 @@ fn figures(
             vec![
                 ("figure", pictures::both_planes(title, prepared, planes)),
                 ("path", pictures::path(title, prepared, [x, y])),
-                ("motors", pictures::motors("Motor torques", x, &torques)),
+                (
+                    "motors",
+                    pictures::motors("Motor torques", prepared, x, &torques),
+                ),
                 ("plans_x", pictures::plans("Plans of the x plane", x)),
                 ("plans_y", pictures::plans("Plans of the y plane", y)),
             ]

@@ -1,6 +1,7 @@
 //! Figures of closed loops: states, torque and cost over time, and the motors' torques.
 
 use super::axis::share_horizontal_view;
+use super::beginning::with_beginning;
 use super::figure::{Band, Dash, Figure, Panel, Role, Series, Style};
 
 /// Labels of the state (phi, theta, phi_dot, theta_dot).
@@ -81,7 +82,7 @@ pub fn closed_loop(
         panels,
         columns: 2,
         width: 900.0,
-        height: 760.0,
+        height: 800.0,
     }
 }
 
@@ -107,10 +108,11 @@ pub fn motor_torques(
     });
     let mut panel = Panel::new(TIME_LABEL, TORQUE_LABEL, series.collect());
     panel.band = limit;
+    let (panels, columns) = with_beginning(vec![panel]);
     Figure {
         title: title.to_owned(),
-        panels: vec![panel],
-        columns: 1,
+        panels,
+        columns,
         width: 900.0,
         height: 380.0,
     }
@@ -161,7 +163,7 @@ pub(super) fn torque_panel(runs: &[PlaneRun<'_>], limits: Option<Limits>) -> Pan
 }
 
 impl Reference<'_> {
-    fn series(&self) -> Series {
+    pub(super) fn series(self) -> Series {
         let style = if self.held {
             Style::Steps(Dash::Dashed)
         } else {

@@ -84,13 +84,9 @@ fn placed<'a>(
         .iter()
         .map(|(_, axes)| Ticks::of(&axes.y, count, false))
         .collect();
+    let label_distance = |ticks: &Ticks| TICK_GAP + widest(font, ticks) + 0.5 * LABEL_SIZE + 7.0;
     // The same room on the left in every column, so that all frames are as wide.
-    let labels = y_ticks
-        .iter()
-        .map(|ticks| widest(font, ticks))
-        .fold(0.0, f64::max);
-    let label_distance = TICK_GAP + labels + 0.5 * LABEL_SIZE + 7.0;
-    let left_room = label_distance + 0.5 * LABEL_SIZE;
+    let left_room = y_ticks.iter().map(label_distance).fold(0.0, f64::max) + 0.5 * LABEL_SIZE;
     let column_width = (figure.width - 2.0 * MARGIN + GAP) / columns as f64 - GAP;
     let width = column_width - left_room - RIGHT_ROOM;
     if !(width >= SMALLEST.0 && height >= SMALLEST.1) {
@@ -124,15 +120,23 @@ fn placed<'a>(
             placed.push(Placed {
                 panel,
                 axes: *axes,
+                label_distance: label_distance(&y_ticks),
                 y_ticks,
                 area,
-                label_distance,
+                letter: letter(placed.len(), panels.len()),
+                letter_distance: left_room,
                 has_x_label,
             });
         }
         frame_top += height + room.below + GAP;
     }
     Ok(placed)
+}
+
+/// What a text calls the panel `index` of `count`: a, b, c and so on, where there are several.
+fn letter(index: usize, count: usize) -> Option<char> {
+    let letter = u8::try_from(index).ok().and_then(|i| b'a'.checked_add(i))?;
+    (count > 1 && letter.is_ascii_lowercase()).then(|| char::from(letter))
 }
 
 /// What a row of panels needs above and below its frames.
@@ -148,7 +152,8 @@ impl RowRoom {
     fn of(chunk: &[(&Panel, Axes)], panels: &[(&Panel, Axes)], next: usize) -> Self {
         let titled = chunk.iter().any(|(panel, _)| !panel.title.is_empty());
         let powers = |axis| common_power(axis).is_some();
-        let raised = titled || chunk.iter().any(|(_, axes)| powers(&axes.y));
+        let lettered = panels.len() > 1;
+        let raised = titled || lettered || chunk.iter().any(|(_, axes)| powers(&axes.y));
         // A label stands once below panels with the same axis.
         let repeated = |column: usize, (panel, axes): &(&Panel, Axes)| {
             let below = panels.get(next + column);

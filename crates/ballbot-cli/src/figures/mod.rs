@@ -12,6 +12,7 @@
 //! the SVG needs no ids at all and can stand inline in a page any number of times.
 
 mod axis;
+mod beginning;
 mod closed_loop;
 mod figure;
 mod font;

@@ -87,7 +87,7 @@ pub fn models(title: &str, runs: &ModelRuns<'_>) -> Figure {
         panels,
         columns: 2,
         width: 900.0,
-        height: 760.0,
+        height: 800.0,
     }
 }
 

@@ -27,6 +27,10 @@ pub(super) struct Placed<'a> {
     pub area: Rect,
     /// From the frame leftwards to the middle of the vertical label.
     pub label_distance: f64,
+    /// Its name in the figure, where there are several.
+    pub letter: Option<char>,
+    /// From the frame leftwards to the letter.
+    pub letter_distance: f64,
     pub has_x_label: bool,
 }
 
@@ -170,6 +174,11 @@ impl Placed<'_> {
         scene.line(corners, Stroke::solid(Color::FRAME, 1.0));
         let middle = left + self.area.width / 2.0;
         let above = top - 7.0;
+        if let Some(letter) = self.letter {
+            let at = (left - self.letter_distance, above);
+            let text = format!("({letter})");
+            scene.text(&text, at, LABEL_SIZE, Anchor::Start, Turn::Upright);
+        }
         scene.text(
             &self.panel.title,
             (middle, above),

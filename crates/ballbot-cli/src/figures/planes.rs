@@ -1,7 +1,9 @@
 //! Figures of two planes together: over time, and as a path on the floor.
 
-use super::axis::share_horizontal_view;
-use super::closed_loop::{Limits, PlaneRun, REFERENCE_LABEL, Reference, state_panel, torque_panel};
+use super::beginning::with_beginning;
+use super::closed_loop::{
+    Limits, PlaneRun, REFERENCE_LABEL, Reference, TIME_LABEL, state_panel, torque_panel,
+};
 use super::figure::{Dash, Figure, Panel, Role, Series, Style};
 
 /// One path on the floor.
@@ -17,7 +19,8 @@ pub struct PathRun<'a> {
     pub y: &'a [f64],
 }
 
-/// States and torque of the x and the y plane side by side.
+/// States and torque of the x and the y plane over each other; with references that are curves, the
+/// distances from them, too. A beginning that would set the scale of all the rest stands beside.
 ///
 /// `runs` and `references` hold the x plane, then the y plane.
 pub fn two_planes(
@@ -26,25 +29,46 @@ pub fn two_planes(
     references: Option<[Reference<'_>; 2]>,
     limits: Option<Limits>,
 ) -> Figure {
-    let mut panels = Vec::new();
-    for index in 0..4 {
-        for plane in 0..2 {
-            let reference = references.map(|both| both[plane]);
-            panels.push(state_panel(index, &runs[plane..=plane], reference, limits));
+    let named = |run, label, role| PlaneRun { label, role, ..run };
+    let [x, y] = runs;
+    let runs = [
+        named(x, "x plane", Role::Lpv),
+        named(y, "y plane", Role::Member(1)),
+    ];
+    let mut panels: Vec<Panel> = (0..4)
+        .map(|index| state_panel(index, &runs, None, limits))
+        .collect();
+    if let Some(references) = references {
+        panels[0].series.extend(references.map(Reference::series));
+        if references.iter().all(|reference| !reference.held) {
+            let errors = runs.iter().zip(&references).map(error).collect();
+            panels.insert(1, Panel::new(TIME_LABEL, "error of φ [rad]", errors));
         }
     }
-    panels.extend((0..2).map(|plane| torque_panel(&runs[plane..=plane], limits)));
-    share_horizontal_view(&mut panels);
-    for (panel, name) in panels.iter_mut().zip(["x plane", "y plane"]) {
-        name.clone_into(&mut panel.title);
-    }
+    panels.push(torque_panel(&runs, limits));
+    let rows = panels.len();
+    let (panels, columns) = with_beginning(panels);
     Figure {
         title: title.to_owned(),
         panels,
-        columns: 2,
+        columns,
         width: 900.0,
-        height: 1080.0,
+        height: 80.0 + 200.0 * rows as f64,
     }
+}
+
+/// How far the ball is from where it is to be.
+fn error((run, reference): (&PlaneRun<'_>, &Reference<'_>)) -> Series {
+    let pairs = run.states.iter().zip(reference.phi);
+    let errors: Vec<f64> = pairs.map(|(state, phi)| state[0] - phi).collect();
+    let line = Style::Line(Dash::Solid);
+    Series::new(
+        run.label,
+        &run.time[..errors.len()],
+        &errors,
+        line,
+        run.role,
+    )
 }
 
 /// Paths in the plane of the floor with equal units, their common start marked.

@@ -53,6 +53,9 @@ const GAP_SERIES: [(&str, Role); 4] = [
     ("θ\u{307} [rad/s]", Role::Member(0)),
 ];
 
+/// The view of a gap reaches at least up to here, so that rounding looks like what it is.
+const GAP_IN_VIEW: f64 = 1e-6;
+
 /// Sizes on a logarithmic scale; what is below the accuracy of the numbers is drawn at that.
 fn gap_panel(run: &PlansRun<'_>) -> Panel {
     let series = GAP_SERIES.iter().enumerate().map(|(i, (label, role))| {
@@ -63,6 +66,10 @@ fn gap_panel(run: &PlansRun<'_>) -> Panel {
     let label = "|rollout – prediction| at the end";
     let mut panel = Panel::new(TIME_LABEL, label, series.collect());
     panel.y_scale = Scale::Log;
+    let sizes = run.gap.iter().map(|gap| gap.map(f64::abs));
+    let sizes = sizes.flatten().filter(|size| size.is_finite());
+    let largest = sizes.fold(GAP_IN_VIEW, f64::max);
+    panel.y_range = Some((0.3 * f64::EPSILON, 3.0 * largest));
     panel
 }
 

@@ -30,6 +30,8 @@ pub struct Case {
     pub nonlinear_excess: f64,
     /// The same of linear MPC.
     pub linear_excess: f64,
+    /// Samples of both loops at which IPOPT did not converge.
+    pub not_converged: usize,
 }
 
 /// From rest, by distance, horizon and sampling time.
@@ -77,6 +79,7 @@ fn read(text: &str) -> Result<Vec<Case>, CommandError> {
             nonlinear_fell: value("fell_nonlinear")? > 0.0,
             nonlinear_excess: value("largest_excess_nonlinear")?,
             linear_excess: value("largest_excess_linear")?,
+            not_converged: (value("not_converged")? + value("not_converged_linear")?) as usize,
         })
     });
     cases.collect()

@@ -1,8 +1,7 @@
 //! Figures of costs over distance, and of a run with a long horizon.
 
 use super::{Case, Outcome};
-use crate::figures::{Band, Dash, Figure, Panel, Role, Series, Style};
-use std::f64::consts::{FRAC_PI_3, PI};
+use crate::figures::{Dash, Figure, Panel, PlaneRun, Reference, Role, Series, Style, closed_loop};
 
 /// Closed-loop costs over those of nonlinear MPC, by distance.
 pub struct CostOverDistance {
@@ -58,43 +57,28 @@ const SHOWN: f64 = 4.0;
 
 /// States and torque of a closed loop.
 pub fn long_horizon(case: &Case, outcome: &Outcome) -> Figure {
-    let time: Vec<f64> = (0..outcome.states.len())
-        .map(|k| k as f64 * case.t_s)
-        .collect();
-    let state = |i: usize| -> Vec<f64> { outcome.states.iter().map(|x| x[i]).collect() };
-    let band = |limit: f64| {
-        Some(Band {
-            lower: -limit,
-            upper: limit,
-        })
+    let shown = (SHOWN / case.t_s).round() as usize;
+    let torque = &outcome.torques[..shown.min(outcome.torques.len())];
+    let states: Vec<[f64; 4]> = outcome.states.iter().map(|x| (*x).into()).collect();
+    let states = &states[..states.len().min(torque.len() + 1)];
+    let time: Vec<f64> = (0..states.len()).map(|k| k as f64 * case.t_s).collect();
+    let goal = vec![outcome.goal; time.len()];
+    let run = PlaneRun {
+        label: "LPV MPC",
+        role: Role::Lpv,
+        time: &time,
+        states,
+        torque,
+        cost: &[],
     };
-    let panel = |label, values: &[f64], style, band| {
-        let length = time.len().min(values.len());
-        let series = Series::new("LPV MPC", &time[..length], values, style, Role::Lpv);
-        let mut panel = Panel::new("time [s]", label, vec![series]);
-        panel.band = band;
-        panel.x_range = Some((0.0, SHOWN));
-        panel
+    let reference = Reference {
+        time: &time,
+        phi: &goal,
+        held: true,
     };
-    let line = Style::Line(Dash::Solid);
-    Figure {
-        title: format!(
-            "{} m with a horizon of {} samples",
-            case.distance, case.horizon
-        ),
-        panels: vec![
-            panel("ball angle φ [rad]", &state(0), line, None),
-            panel("tilt θ [rad]", &state(1), line, band(FRAC_PI_3)),
-            panel("dφ/dt [rad/s]", &state(2), line, band(10.0 * PI)),
-            panel(
-                "torque [N m]",
-                &outcome.torques,
-                Style::Steps(Dash::Solid),
-                band(1.5),
-            ),
-        ],
-        columns: 2,
-        width: 1000.0,
-        height: 640.0,
-    }
+    let title = format!(
+        "{} m with a horizon of {} samples",
+        case.distance, case.horizon
+    );
+    closed_loop(&title, &[run], Some(reference), Some(outcome.limits))
 }

@@ -2,6 +2,8 @@
 
 use super::Case;
 use crate::commands::CommandError;
+use crate::figures::Limits;
+use crate::pictures;
 use crate::progress::Progress;
 use ballbot::Ballbot;
 use ballbot_scenario::{
@@ -33,6 +35,10 @@ pub struct Outcome {
     pub without_plan: usize,
     /// Largest part by which a state bound was exceeded at a sample.
     pub excess: f64,
+    /// Where the ball is to be, rad.
+    pub goal: f64,
+    /// The bounds of the problem.
+    pub limits: Limits,
     /// States at the samples.
     pub states: Vec<Vector4<f64>>,
     /// Torques, N m.
@@ -58,15 +64,15 @@ fn scenario(case: &Case) -> Result<Scenario, ScenarioError> {
     Ok(scenario)
 }
 
-/// Runs all of them, with at most so many `programs` per sample if given.
+/// Runs all of them with `iterations`; scenarios have [`Iterations::default`].
 ///
 /// # Errors
 /// A scenario is not valid.
-pub fn run_all(cases: &[Case], programs: Option<usize>) -> Result<Vec<Outcome>, CommandError> {
+pub fn run_all(cases: &[Case], iterations: Iterations<f64>) -> Result<Vec<Outcome>, CommandError> {
     let progress = Progress::new("running", cases.len());
     let done = AtomicUsize::new(0);
     let outcome = |case| {
-        let outcome = run(case, programs);
+        let outcome = run(case, iterations);
         progress.set(done.fetch_add(1, Ordering::Relaxed) + 1);
         outcome
     };
@@ -77,23 +83,20 @@ pub fn run_all(cases: &[Case], programs: Option<usize>) -> Result<Vec<Outcome>, 
 ///
 /// # Errors
 /// The scenario is not valid.
-pub fn run(case: &Case, programs: Option<usize>) -> Result<Outcome, CommandError> {
+pub fn run(case: &Case, iterations: Iterations<f64>) -> Result<Outcome, CommandError> {
+    let prepared = scenario(case)?.prepare(Path::new("."))?;
     let Prepared {
         ballbot,
         mut settings,
-        planes,
         samples,
         tolerances,
         ..
-    } = scenario(case)?.prepare(Path::new("."))?;
-    if let (Iterations::Descent { most, .. }, Some(programs)) = (&mut settings.iterations, programs)
-    {
-        *most = programs;
-    }
+    } = prepared;
+    settings.iterations = iterations;
     let controller = Controller::<Ballbot<f64>, f64, 4, 1, 3, N, M>::new(ballbot, settings);
     let mut controller = Box::new(controller.map_err(ScenarioError::from)?);
     let mut workspace = Box::new(Workspace::new());
-    let goal = planes[0].state_reference(0.0);
+    let goal = prepared.planes[0].state_reference(0.0);
     let reference = Reference::constant(goal);
     let limits = settings.x.upper;
     let mut x = case.start;
@@ -103,6 +106,8 @@ pub fn run(case: &Case, programs: Option<usize>) -> Result<Outcome, CommandError
         most_programs: 0,
         without_plan: 0,
         excess: 0.0,
+        goal: goal[0],
+        limits: pictures::limits(&prepared),
         states: vec![x],
         torques: Vec::with_capacity(samples),
     };

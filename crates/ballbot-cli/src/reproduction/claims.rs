@@ -211,6 +211,7 @@ impl Reproduction {
         claims.extend(self.lissajous_claims());
         claims.extend(self.single_setpoint_claims());
         claims.extend(self.time_claims());
+        claims.push(self.optimum_claim());
         claims
     }
 
@@ -433,6 +434,11 @@ impl Reproduction {
             )
             .own(),
         ]
+    }
+
+    fn optimum_claim(&self) -> Claim {
+        let quantity = "LPV MPC (descent) over nonlinear MPC, worst closed-loop cost";
+        at_most("Beyond the paper", quantity, 1.01, self.optimum.worst()).own()
     }
 
     fn time_claims(&self) -> Vec<Claim> {

@@ -113,7 +113,9 @@ impl Reproduction {
             },
             Drawing {
                 name: "lissajous-planes",
-                caption: "Scenario 2: states and torques of both planes.".to_owned(),
+                caption: "Scenario 2: states and torques of both planes, in the beginning and over 70 s. The robot \
+                          starts at rest, where the curve begins at its full speed."
+                    .to_owned(),
                 figure: pictures::both_planes(
                     "Scenario 2: both planes",
                     &run.prepared,
@@ -125,7 +127,7 @@ impl Reproduction {
                 caption: "Scenario 2: the torques of the three motors (eq. (6), zenith angle 45°, \
                           no yaw torque)."
                     .to_owned(),
-                figure: pictures::motors("Scenario 2: motor torques", x, &torques),
+                figure: pictures::motors("Scenario 2: motor torques", &run.prepared, x, &torques),
             },
         ]
     }

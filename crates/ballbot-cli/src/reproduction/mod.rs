@@ -5,6 +5,7 @@ pub mod drawings;
 pub mod guarantee;
 pub mod models;
 pub mod nonlinear;
+pub mod optimum;
 pub mod report;
 pub mod runs;
 pub mod tables;
@@ -17,6 +18,7 @@ use crate::regulator::{Regulator, RegulatorProblem, Time};
 use ballbot::{Ballbot, LinearParameters};
 use guarantee::Guarantee;
 use models::ModelComparison;
+use optimum::Optimum;
 use runs::{Run, Runs};
 
 /// All results.
@@ -38,6 +40,8 @@ pub struct Reproduction {
     pub terminal_gap: (f64, f64),
     /// What is guaranteed, beyond the paper.
     pub guarantee: Guarantee,
+    /// Closed-loop costs beside the optimum, beyond the paper.
+    pub optimum: Optimum,
 }
 
 impl Reproduction {
@@ -46,7 +50,7 @@ impl Reproduction {
     /// # Errors
     /// What went wrong; none of it should, as there is no input.
     pub fn compute() -> Result<Self, CommandError> {
-        let progress = Progress::new("reproducing", 5);
+        let progress = Progress::new("reproducing", 6);
         let refinement = RefinementProblem::paper().solve()?;
         progress.set(1);
         let models = ModelComparison::compute()?;
@@ -58,6 +62,8 @@ impl Reproduction {
         progress.set(4);
         let guarantee = Guarantee::compute()?;
         progress.set(5);
+        let optimum = Optimum::compute()?;
+        progress.set(6);
         Ok(Self {
             refinement,
             residual_at_printed_b: residual_at_printed_b(),
@@ -66,6 +72,7 @@ impl Reproduction {
             regulators,
             terminal_gap,
             guarantee,
+            optimum,
         })
     }
 }

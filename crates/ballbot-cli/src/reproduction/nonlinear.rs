@@ -5,6 +5,10 @@
 //! solved by sequential quadratic programming with the rollout's true Jacobians (Bock and Plitt
 //! 1984; Rawlings, Mayne and Diehl, Model Predictive Control, ch. 8): as the cost is quadratic,
 //! a step that is zero is a stationary point of the nonlinear problem.
+//!
+//! It is no copy of the library's descent but a check of it: of the library it takes the solver of
+//! quadratic programs and the rollout, and has Jacobians (central differences), line search and end
+//! of the iteration of its own. A test has both end at the same closed loop.
 
 use crate::commands::CommandError;
 use ballbot::Ballbot;

@@ -8,6 +8,7 @@
 
 mod campaign;
 mod failures;
+mod interrupt;
 mod optimality;
 mod recorded;
 mod rehearsal;

@@ -2,6 +2,7 @@
 //! independent program has converged with IPOPT. `ballbot optimality` runs all cases.
 
 use ballbot_cli::optimality::{Case, Outcome, distances, quantile, random_starts, run_all};
+use lpvmpc::Iterations;
 
 /// Cost over that of nonlinear MPC, from the smallest on.
 fn ratios(cases: &[Case], outcomes: &[Outcome]) -> Vec<f64> {
@@ -32,7 +33,7 @@ fn set_points_from_rest_cost_what_they_must() {
     let shown = |case: &Case| case.t_s == 0.05 && case.horizon <= 40;
     let cases: Vec<Case> = all.into_iter().filter(shown).collect();
     assert_eq!(cases.len(), 30);
-    let outcomes = run_all(&cases, None).unwrap();
+    let outcomes = run_all(&cases, Iterations::default()).unwrap();
     assert_sound(&cases, &outcomes);
     let ratios = ratios(&cases, &outcomes);
     assert!(quantile(&ratios, 0.5) < 1.001, "{ratios:?}");
@@ -45,7 +46,7 @@ fn set_points_from_rest_cost_what_they_must() {
 #[test]
 fn random_starts_cost_what_they_must() {
     let cases: Vec<Case> = random_starts().unwrap().into_iter().take(60).collect();
-    let outcomes = run_all(&cases, None).unwrap();
+    let outcomes = run_all(&cases, Iterations::default()).unwrap();
     assert_sound(&cases, &outcomes);
     let ratios = ratios(&cases, &outcomes);
     assert!(quantile(&ratios, 0.5) < 1.001, "{ratios:?}");
@@ -69,6 +70,10 @@ fn one_program_per_sample_is_not_enough() {
     let all = distances().unwrap();
     let far = |case: &Case| case.t_s == 0.05 && case.horizon == 20 && case.distance >= 2.0;
     let cases: Vec<Case> = all.into_iter().filter(far).collect();
-    let ratios = ratios(&cases, &run_all(&cases, Some(1)).unwrap());
+    let one = Iterations::Descent {
+        tolerance: Iterations::<f64>::TOLERANCE,
+        most: 1,
+    };
+    let ratios = ratios(&cases, &run_all(&cases, one).unwrap());
     assert!(quantile(&ratios, 1.0) > 1.02, "{ratios:?}");
 }

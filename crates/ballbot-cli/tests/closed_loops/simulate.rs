@@ -30,14 +30,15 @@ fn every_built_in_scenario_runs_and_is_recorded() {
         assert_says(&summary, &[&scenario.title, "largest tilt [rad]", &out]);
 
         let results = folder.path().join(&out);
-        let samples = (scenario.duration_s / 0.05).round() as usize;
+        let samples = (scenario.duration_s / scenario.controller.t_s).round() as usize;
         let trajectories: &[&str] = if name == "lissajous" {
             &["trajectory_x.csv", "trajectory_y.csv"]
         } else {
             &["trajectory.csv"]
         };
         for trajectory in trajectories {
-            let (rows, _) = recorded::complete(&results.join(trajectory), samples, 0.05);
+            let (rows, _) =
+                recorded::complete(&results.join(trajectory), samples, scenario.controller.t_s);
             let [lower, upper] = scenario.bounds.torque_nm;
             for row in rows {
                 assert!((lower..=upper).contains(&row.torque), "{name}: {row:?}");
@@ -332,6 +333,29 @@ fn other_programs_get_json_and_scripts_silence() {
     assert_eq!(succeed(here, &[&["-q"], &short[..]].concat()), "");
     // What it prints is the result, and not a report of it.
     assert!(!succeed(here, &["--quiet", "scenario", "show", "lissajous"]).is_empty());
+}
+
+#[test]
+fn a_log_goes_to_standard_output_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    succeed(here, &["simulate", "two-setpoints", "--log", "log.csv"]);
+    let log = std::fs::read_to_string(here.join("log.csv")).unwrap();
+    for more in [&[][..], &["--quiet"]] {
+        let arguments = [&["simulate", "two-setpoints", "--log", "-"], more].concat();
+        assert_eq!(succeed(here, &arguments), log);
+    }
+    assert!(!here.join("-").exists());
+    for (arguments, words) in [
+        (
+            &["simulate", "two-setpoints", "--log", "-", "--json"][..],
+            "--json",
+        ),
+        (&["simulate", "lissajous", "--log", "-"], "one per plane"),
+    ] {
+        assert_says(&fail(here, arguments, 2), &["--log -", words]);
+    }
+    assert!(!here.join("out/lissajous").exists());
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! `ballbot lqr`, against the independently computed gains.
 
-use crate::{assert_close, assert_says, failure, json, numbers, text};
+use crate::{assert_close, assert_says, ballbot, failure, json, numbers, text};
 use serde_json::Value;
 
 fn diagonal(p: &Value) -> Vec<f64> {
@@ -12,14 +12,18 @@ fn largest_real_part(result: &Value) -> f64 {
     pole["re"].as_f64().unwrap()
 }
 
-/// The regulator of the least-squares b rather than the printed one.
+/// The weights of the paper's first scenario.
+const PAPER: [&str; 4] = ["--q", "200,1,0.1,0.1", "--r", "1000"];
+
+/// The regulator of the least-squares b rather than the printed one, with the paper's weights.
 fn of_refined(arguments: &[&str]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("refined.toml");
     let path = path.to_str().unwrap();
     text(&["refine", "-o", path]);
     let all = ["lqr", "--json", "--parameters", path].into_iter();
-    json(&all.chain(arguments.iter().copied()).collect::<Vec<_>>())
+    let all = all.chain(PAPER).chain(arguments.iter().copied());
+    json(&all.collect::<Vec<_>>())
 }
 
 #[test]
@@ -199,5 +203,58 @@ fn numbers_without_a_regulator_end_with_the_reason() {
         for wrong in ["detectable", "stabilisable"] {
             assert!(!message.contains(wrong), "{message}");
         }
+    }
+}
+
+/// A robot of its own has weights of its own, unless others are given; one alone is refused.
+#[test]
+fn another_robot_gets_weights_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("robot.toml");
+    std::fs::write(&path, text(&["scenario", "show", "one-metre"])).unwrap();
+    let path = path.to_str().unwrap();
+    let of = |more: &[&'static str]| [&["lqr", "--parameters", path][..], more].concat();
+    // By hand: it falls with 4.784 1/s, and at 5 degrees the ball gains 4.629 rad/s^2.
+    let own = json(&of(&["--json"]));
+    assert_close(
+        &numbers(&own["q"]),
+        &[97.73, 131.31, 0.118_64, 51.645],
+        1e-3,
+    );
+    assert!((own["r"].as_f64().unwrap() / 311.69 - 1.0).abs() < 1e-3);
+    let given = json(&[of(&["--json"]), PAPER.to_vec()].concat());
+    assert_eq!(numbers(&given["q"]), [200.0, 1.0, 0.1, 0.1]);
+    assert_says(&failure(&of(&["--r", "3"]), 2), &["--q and --r", "both"]);
+    // In millimetres it is asked about here as in a scenario.
+    let wrong = std::fs::read_to_string(path).unwrap();
+    std::fs::write(
+        path,
+        wrong.replace("ball_radius_m = 0.12", "ball_radius_m = 120"),
+    )
+    .unwrap();
+    let said = failure(&of(&[]), 1);
+    assert_says(
+        &said,
+        &["120 mm are 0.12 m", "accept_unusual_values = true"],
+    );
+}
+
+/// No number is printed with two hundred digits, or with those of rounding.
+#[test]
+fn numbers_are_for_people() {
+    for arguments in [
+        &["linearize", "--theta-dot", "1e200"][..],
+        &["lqr", "--q", "200,1,0.30000000000000004,0.1"],
+        &["lqr", "--r=-1e200"],
+    ] {
+        let printed = match ballbot(arguments) {
+            output if output.status.success() => String::from_utf8(output.stdout).unwrap(),
+            output => String::from_utf8(output.stderr).unwrap(),
+        };
+        let longest = printed
+            .split(|c: char| !(c.is_ascii_digit() || c == '.'))
+            .map(str::len)
+            .max();
+        assert!(longest <= Some(12), "{printed}");
     }
 }
