@@ -6,6 +6,7 @@ import builtin from "../../crates/ballbot-scenario/src/builtin/terminal-certific
 import { parse } from "smol-toml";
 import type { Answers, Batch, Call, FromWorker, RobotBatch, RobotSetup, ToWorker } from "./protocol";
 import { Recorder } from "./recorder";
+import type { Scenario } from "./scenario";
 
 interface Robot {
   label: string;
@@ -201,9 +202,11 @@ function endOfTimes(): number {
 function answer(call: Call): unknown {
   switch (call.kind) {
     case "parse": {
-      const setup = parse(call.toml);
-      check(setup, certificate);
-      return setup;
+      const setup = parse(call.toml) as unknown as Scenario;
+      const weights = check(setup, certificate);
+      // The panel shows what is in use, and changes one of them.
+      const [q, r] = [Array.from(weights.subarray(0, 4)) as Scenario["controller"]["q"], weights[4] ?? NaN];
+      return { ...setup, controller: { q, r, ...setup.controller } };
     }
     case "configure":
       return configure(call.robots, call.keep);

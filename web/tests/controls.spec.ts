@@ -39,6 +39,19 @@ test("numbers go into the set-up", async ({ page }) => {
   expect(problems).toEqual([]);
 });
 
+test("weights that a scenario leaves out are shown, and one of them can be changed", async ({ page }) => {
+  const problems = await openFlat(page);
+  await scenario(page, "one-metre");
+  await openSection(page, "Controller");
+  const field = page.locator(".panel").getByLabel("Q theta", { exact: true });
+  expect(Number(await field.inputValue())).toBeGreaterThan(0);
+  await fill(page, "R", "500");
+  expect(await saved(page, "Save TOML")).toMatch(/^r = 500$/m);
+  await page.locator("#play").click();
+  await until(page, 1);
+  expect(problems).toEqual([]);
+});
+
 test("predictor, estimator, moves, torque rate and motors go into the set-up", async ({ page }) => {
   const problems = await openFlat(page);
   await scenario(page, "two-setpoints");

@@ -28,13 +28,16 @@ fn prepare(setup: JsValue, certificate: JsValue) -> Result<Prepared, String> {
     prepared.map_err(|error| error.to_string())
 }
 
-/// Whether an object with the keys of a scenario file is one that can be run.
+/// Whether an object with the keys of a scenario file is one that can be run; its weights, chosen for
+/// the robot where it gives none: Q's diagonal, and R.
 ///
 /// # Errors
 /// What is wrong with a key or a value.
 #[wasm_bindgen]
-pub fn check(setup: JsValue, certificate: JsValue) -> Result<(), String> {
-    prepare(setup, certificate).map(|_| ())
+pub fn check(setup: JsValue, certificate: JsValue) -> Result<Vec<f64>, String> {
+    let weights = prepare(setup, certificate)?.settings.weights;
+    let (q, r) = (weights.q.diagonal(), weights.r.diagonal());
+    Ok(q.iter().chain(r.iter()).copied().collect())
 }
 
 /// A robot in its world, stepped from outside.

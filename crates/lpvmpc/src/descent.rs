@@ -60,6 +60,9 @@ const STEPS: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
 const SUFFICIENT: f64 = 1e-4;
 /// The search ends after so many programs in a row that bring nothing; each is damped more.
 const MOST_FAILURES: usize = 8;
+/// A full step of a sample's first program may save so many tolerances and still end the search: it is
+/// what the plan was short of for the time that has passed, and what it leaves is of second order.
+const FIRST: f64 = 10.0;
 /// After shorter steps than this the other linear model has its turn.
 const SHORT_STEP: f64 = 0.5;
 /// Damping goes up by this factor without a step, and down by no more; the least is the largest entry
@@ -121,7 +124,12 @@ where
                 Outcome::Moved { step, gain, .. } => {
                     failures = 0;
                     status = Status::Improved;
-                    let settled = step == T::one() && gain <= tolerance;
+                    let little = if self.problems == 1 {
+                        tolerance * convert(FIRST)
+                    } else {
+                        tolerance
+                    };
+                    let settled = step == T::one() && gain <= little;
                     if settled && along == Along::Jacobian && !damped {
                         status = Status::Converged;
                         break;

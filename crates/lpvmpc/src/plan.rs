@@ -6,7 +6,7 @@ use crate::model::Scalar;
 use crate::ocp::{Bounds, Softness};
 use crate::settings::{ControllerSettings, TerminalIngredient, Weights};
 use crate::solution::{ActiveSet, Quantity, Side};
-use crate::solver::price;
+use crate::solver::{excess, price};
 use nalgebra::{SMatrix, SVector, convert};
 
 /// What a sample's cost draws state and input to.
@@ -195,28 +195,18 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize, const N: usize> Merit<'a, 
         }
     }
 
-    /// The `limits` where they are hard, the value of `x` itself elsewhere.
-    fn hard(&self, limits: &SVector<T, NX>, x: &SVector<T, NX>) -> SVector<T, NX> {
-        let sides = self.soft.iter().zip(limits.iter().zip(x.iter()));
-        let mut hard = *x;
-        for (place, (soft, (limit, _))) in hard.iter_mut().zip(sides) {
-            if soft.is_none() {
-                *place = *limit;
-            }
-        }
-        hard
-    }
-
     #[cold]
     #[inline(never)]
     fn price_of_excess(&self, x: &SVector<T, NX>) -> T {
-        let hard = Bounds {
-            lower: self.hard(&self.bounds.lower, x),
-            upper: self.hard(&self.bounds.upper, x),
-        };
-        let below = (hard.lower - x).sup(&SVector::zeros());
-        let above = (x - hard.upper).sup(&SVector::zeros());
-        price(&self.soft, x, &self.bounds) + (below + above).dot(&self.prices.bounds)
+        let mut total = price(&self.soft, x, &self.bounds);
+        let sides = self.bounds.lower.iter().zip(self.bounds.upper.iter());
+        let values = self.soft.iter().zip(x.iter()).zip(sides);
+        for (((soft, v), (lower, upper)), price) in values.zip(self.prices.bounds.iter()) {
+            if soft.is_none() {
+                total += excess(*v, *lower, *upper) * *price;
+            }
+        }
+        total
     }
 }
 

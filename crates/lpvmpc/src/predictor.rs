@@ -93,11 +93,13 @@ impl Predictor {
 }
 
 /// The continuous-time pair (A, B) at a state.
+#[cfg(target_os = "none")]
 type PairAt<'a, T, const NX: usize, const NU: usize> =
     dyn Fn(&SVector<T, NX>) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) + 'a;
 
 /// The slope of a Runge-Kutta stage, from the state where the step began, the state of the stage, K_j
 /// and L_j.
+#[cfg(target_os = "none")]
 type SlopeAt<'a, T, const NX: usize, const NU: usize> = dyn Fn(&SVector<T, NX>, &SVector<T, NX>, &SMatrix<T, NX, NX>, &SMatrix<T, NX, NU>) -> SVector<T, NX>
     + 'a;
 
@@ -149,6 +151,8 @@ impl Rk4 {
 
     /// A_d x + B_d u = [`Rk4::advance`] at the given `x` and `u`: the steps' matrices with the
     /// scheduling that the nonlinear steps have at each of their stages.
+    // Not inlined, so that the frozen kinds keep the registers.
+    #[inline(never)]
     pub fn linearize<T, P, const NX: usize, const NU: usize, const NS: usize>(
         self,
         model: &P,
@@ -170,11 +174,16 @@ impl Rk4 {
             add_product(&mut slope, l, u);
             slope
         };
-        self.compose(model, x, t_s, &embedding, &slope)
+        #[cfg(target_os = "none")]
+        let (embedding, slope): (&PairAt<'_, T, NX, NU>, &SlopeAt<'_, T, NX, NU>) =
+            (&embedding, &slope);
+        self.compose(model, x, t_s, embedding, slope)
     }
 
     /// The derivatives of [`Rk4::advance`] with respect to `x` and `u`: the same recursion with the
     /// Jacobian of f in place of the embedding's matrices.
+    // Not inlined, so that the frozen kinds keep the registers.
+    #[inline(never)]
     pub fn differentiate<T, P, const NX: usize, const NU: usize, const NS: usize>(
         self,
         model: &P,
@@ -191,7 +200,10 @@ impl Rk4 {
                      there: &SVector<T, NX>,
                      _: &SMatrix<T, NX, NX>,
                      _: &SMatrix<T, NX, NU>| model.derivative(there, u);
-        self.compose(model, x, t_s, &jacobian, &slope)
+        #[cfg(target_os = "none")]
+        let (jacobian, slope): (&PairAt<'_, T, NX, NU>, &SlopeAt<'_, T, NX, NU>) =
+            (&jacobian, &slope);
+        self.compose(model, x, t_s, jacobian, slope)
     }
 
     /// The steps' matrices from the continuous-time pairs `at` each Runge-Kutta stage.
@@ -199,16 +211,21 @@ impl Rk4 {
     /// With A_j, B_j at stage j, the stages' slopes are K_j x + L_j u (up to a constant where the
     /// pairs are Jacobians): K_1 = A_1, L_1 = B_1, K_2 = A_2 (I + h/2 K_1),
     /// L_2 = B_2 + h/2 A_2 L_1, and so on.
-    // Once in the machine code for both kinds of pairs, and not inlined, so that the frozen kinds of
-    // prediction keep the registers.
-    #[inline(never)]
+    // On a microcontroller, where flash is scarce, both kinds of pairs share its machine code.
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn compose<T, P, const NX: usize, const NU: usize, const NS: usize>(
         self,
         model: &P,
         x: &SVector<T, NX>,
         t_s: T,
-        at: &PairAt<'_, T, NX, NU>,
-        slope: &SlopeAt<'_, T, NX, NU>,
+        at: impl Fn(&SVector<T, NX>) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>),
+        slope: impl Fn(
+            &SVector<T, NX>,
+            &SVector<T, NX>,
+            &SMatrix<T, NX, NX>,
+            &SMatrix<T, NX, NU>,
+        ) -> SVector<T, NX>,
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>)
     where
         T: Scalar,
@@ -264,17 +281,16 @@ impl Rk4 {
         M: LpvModel<T, NX, NU, NS>,
     {
         let h = self.step_length(t_s);
-        let [half, third, sixth] =
-            [0.5, 1.0 / 3.0, 1.0 / 6.0].map(|part| h * convert::<f64, T>(part));
+        let half: T = h * convert::<f64, T>(0.5);
+        let sixth: T = h * convert::<f64, T>(1.0 / 6.0);
+        let two: T = convert(2.0);
         let mut x = *x;
         for _ in 0..self.substeps {
-            let mut rate = model.derivative(&x, u);
-            let mut next = x + rate * sixth;
-            for (reach, weight) in [(half, third), (half, third), (h, sixth)] {
-                rate = model.derivative(&(x + rate * reach), u);
-                next += rate * weight;
-            }
-            x = next;
+            let k1 = model.derivative(&x, u);
+            let k2 = model.derivative(&(x + k1 * half), u);
+            let k3 = model.derivative(&(x + k2 * half), u);
+            let k4 = model.derivative(&(x + k3 * h), u);
+            x += (k1 + (k2 + k3) * two + k4) * sixth;
         }
         x
     }
@@ -331,13 +347,22 @@ fn exact_hold<T: Scalar, const NX: usize, const NU: usize>(
     let mut a_d = SMatrix::identity();
     let mut b_d = *b;
     for k in (1..=DEGREE).rev() {
-        a_d = SMatrix::identity() + product(&m, &a_d) / convert::<f64, T>(f64::from(k));
-        b_d = b + product(&m, &b_d) / convert::<f64, T>(f64::from(k + 1));
+        a_d = SMatrix::identity() + times(&m, &a_d) / convert::<f64, T>(f64::from(k));
+        b_d = b + times(&m, &b_d) / convert::<f64, T>(f64::from(k + 1));
     }
     b_d *= h;
     for _ in 0..doublings {
-        b_d += product(&a_d, &b_d);
-        a_d = product(&a_d, &a_d);
+        b_d += times(&a_d, &b_d);
+        a_d = times(&a_d, &a_d);
     }
     (a_d, b_d)
+}
+
+/// A B, once in the machine code for each size.
+#[inline(never)]
+fn times<T: Scalar, const K: usize, const C: usize>(
+    a: &SMatrix<T, K, K>,
+    b: &SMatrix<T, K, C>,
+) -> SMatrix<T, K, C> {
+    product(a, b)
 }

@@ -348,17 +348,20 @@ pub(crate) fn check_weight<T: Scalar, const K: usize>(
 ) -> Result<(), ControllerError> {
     let size = weight.amax();
     let roundings: T = convert::<f64, T>(10.0 * K as f64);
-    let asymmetry = (weight - weight.transpose()).amax();
+    // Half before the sum, which could overflow.
+    let half = weight * convert::<f64, T>(0.5);
+    let mut symmetric = half + half.transpose();
+    let asymmetry = (weight - symmetric).amax() * convert(2.0);
     let finite = weight.iter().all(|entry| entry.is_finite());
     if !(finite && asymmetry <= roundings * T::default_epsilon() * size) {
         return Err(ControllerError::WeightEntries(name));
     }
-    let half: T = convert(0.5);
-    let symmetric = weight * half + weight.transpose() * half;
     // Semidefinite up to rounding: a tiny multiple of the identity makes it definite.
     let scale = if size > T::zero() { size } else { T::one() };
-    let lifted = symmetric + SMatrix::identity() * (shift * scale * roundings);
-    match Cholesky::<T, Const<K>>::new(lifted) {
+    for i in 0..K {
+        symmetric[(i, i)] += shift * scale * roundings;
+    }
+    match Cholesky::<T, Const<K>>::new(symmetric) {
         Some(_) => Ok(()),
         None => Err(ControllerError::WeightSign(name)),
     }

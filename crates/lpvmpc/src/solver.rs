@@ -418,9 +418,21 @@ pub(crate) fn price<T: Scalar, const K: usize>(
     let mut total = T::zero();
     for ((soft, v), (lower, upper)) in soft.iter().zip(value.iter()).zip(sides) {
         if let Some(Penalty { linear, quadratic }) = soft {
-            let excess = (*lower - *v).max(*v - *upper).max(T::zero());
+            let excess = excess(*v, *lower, *upper);
             total += (*linear + *quadratic * excess * convert(0.5)) * excess;
         }
     }
     total
+}
+
+/// How far `value` is outside its bounds; zero within them.
+pub(crate) fn excess<T: Scalar>(value: T, lower: T, upper: T) -> T {
+    let (below, above) = (lower - value, value - upper);
+    if below > T::zero() {
+        below
+    } else if above > T::zero() {
+        above
+    } else {
+        T::zero()
+    }
 }

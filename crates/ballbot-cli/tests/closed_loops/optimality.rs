@@ -59,21 +59,18 @@ fn random_starts_cost_what_they_must() {
 fn the_dearest_starts_cost_what_they_must() {
     let all = random_starts().unwrap();
     let cases = [482, 507, 506, 129, 594].map(|row| all[row]);
-    let outcomes = run_all(&cases, None).unwrap();
+    let outcomes = run_all(&cases, Iterations::default()).unwrap();
     let ratios = ratios(&cases, &outcomes);
     assert!(quantile(&ratios, 1.0) < 1.02, "{ratios:?}");
 }
 
-/// The measure can fail: with one program per sample far set points cost several per cent more.
+/// The measure can fail: with one program per sample, taken as it is, far set points cost several times
+/// as much.
 #[test]
-fn one_program_per_sample_is_not_enough() {
+fn one_program_taken_as_it_is_is_not_enough() {
     let all = distances().unwrap();
     let far = |case: &Case| case.t_s == 0.05 && case.horizon == 20 && case.distance >= 2.0;
     let cases: Vec<Case> = all.into_iter().filter(far).collect();
-    let one = Iterations::Descent {
-        tolerance: Iterations::<f64>::TOLERANCE,
-        most: 1,
-    };
-    let ratios = ratios(&cases, &run_all(&cases, one).unwrap());
-    assert!(quantile(&ratios, 1.0) > 1.02, "{ratios:?}");
+    let ratios = ratios(&cases, &run_all(&cases, Iterations::Fixed(1)).unwrap());
+    assert!(quantile(&ratios, 1.0) > 2.0, "{ratios:?}");
 }

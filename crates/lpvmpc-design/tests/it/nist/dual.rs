@@ -1,5 +1,10 @@
 //! Numbers with their derivatives by the parameters: forward differentiation, exact to rounding.
 
+#![allow(
+    clippy::suspicious_arithmetic_impl,
+    reason = "the rules of product and quotient mix the operators"
+)]
+
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Parameters of a model, at most.
