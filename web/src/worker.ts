@@ -205,8 +205,9 @@ function answer(call: Call): unknown {
       const setup = parse(call.toml) as unknown as Scenario;
       const weights = check(setup, certificate);
       // The panel shows what is in use, and changes one of them.
-      const [q, r] = [Array.from(weights.subarray(0, 4)) as Scenario["controller"]["q"], weights[4] ?? NaN];
-      return { ...setup, controller: { q, r, ...setup.controller } };
+      setup.controller.q ??= Array.from(weights.subarray(0, 4)) as Scenario["controller"]["q"];
+      setup.controller.r ??= weights[4] ?? NaN;
+      return setup;
     }
     case "configure":
       return configure(call.robots, call.keep);
