@@ -14,6 +14,9 @@ use nalgebra::{Vector1, Vector3, Vector4};
 use std::f64::consts::FRAC_PI_2;
 use std::time::Duration;
 
+/// Part of a bound that its torque may be short of it and still count as at it.
+const NEARLY: f64 = 0.01;
+
 /// A robot in its world, with all its planes.
 pub struct Session {
     prepared: Prepared,
@@ -261,9 +264,11 @@ impl Session {
             (Some(sample), None) => Some((sample.t, sample.status)),
         };
         let bounds = &self.prepared.settings.u;
+        let (lower, upper) = (bounds.lower[0], bounds.upper[0]);
         let at_bound = |sample: &Sample<4, 1>| {
             let u = sample.u[0];
-            u <= bounds.lower[0] || u >= bounds.upper[0]
+            // A descent may stop just short of it.
+            u <= lower + NEARLY * lower.abs() || u >= upper - NEARLY * upper.abs()
         };
         if self.samples.iter().any(at_bound) {
             self.trouble.saturated += self.prepared.settings.t_s;
