@@ -6,6 +6,8 @@
 //! is reached in finitely many. A soft bound's linear price is a cap on its multiplier; its
 //! quadratic price is a compliance of its row.
 
+use crate::list::List;
+use crate::memory::DualMemory;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
@@ -15,16 +17,21 @@ use crate::working_set::{Direction, Row, Terms, WorkingSet};
 use nalgebra::{SVector, convert};
 
 /// Scratch memory and state of the dual method.
-#[derive(Clone, Debug)]
-pub(crate) struct DualActiveSet<T, const NU: usize, const N: usize, const M: usize> {
+#[derive(Debug)]
+pub(crate) struct DualActiveSet<T: 'static, const NU: usize> {
     /// Normalised deviations of the current minimiser.
-    pub v: [SVector<T, NU>; N],
-    pub(crate) working: WorkingSet<T, NU, N, M>,
+    pub v: List<SVector<T, NU>>,
+    pub(crate) working: WorkingSet<T, NU>,
     /// Rows whose multiplier stays where it is: exceeded soft bounds at their linear price, and
     /// bounds that hold to rounding because other rows do.
-    pub(crate) resting: ActiveSet<T, M>,
-    pub(crate) candidate: Row<T, NU, N>,
-    pub(crate) direction: Direction<T, NU, N, M>,
+    pub(crate) resting: ActiveSet<T>,
+    pub(crate) candidate: Row<T, NU>,
+    pub(crate) direction: Direction<T, NU>,
+    /// Scratch: what the multipliers leave of v.
+    pub(crate) rest: List<SVector<T, NU>>,
+    /// Scratch: a step of the working rows' slacks, and their multipliers after it.
+    pub(crate) step: List<T>,
+    pub(crate) multipliers: List<T>,
     /// Relative violation that counts as none.
     pub(crate) tolerance: T,
     /// Relative violation that counts as rounding where no step can remove it.
@@ -47,15 +54,19 @@ enum StepEnd {
     Blocked(usize),
 }
 
-impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T, NU, N, M> {
-    #[inline(always)]
-    pub fn new() -> Self {
+impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
+    pub fn new(memory: DualMemory<T, NU>) -> Self {
+        let [v, alpha, primal, rest] = memory.deviations;
+        let [coefficients, spanned, dual, step, multipliers] = memory.numbers;
         Self {
-            v: [SVector::zeros(); N],
-            working: WorkingSet::new(),
-            resting: ActiveSet::new(),
-            candidate: Row::empty(),
-            direction: Direction::zeros(),
+            working: WorkingSet::new(memory.terms, memory.factor, memory.basis, v.len()),
+            resting: ActiveSet::new(memory.resting),
+            candidate: Row::new(alpha),
+            direction: Direction::new(primal, [coefficients, spanned, dual]),
+            v,
+            rest,
+            step,
+            multipliers,
             tolerance: T::zero(),
             loosest: T::zero(),
             changes: 0,
@@ -67,7 +78,7 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
 
     /// Back to the minimiser without bounds.
     pub fn reset(&mut self, tolerance: T, max_changes: usize) {
-        self.v = [SVector::zeros(); N];
+        self.v.fill(SVector::zeros());
         self.working.clear();
         self.resting.clear();
         self.tolerance = tolerance;
@@ -81,8 +92,8 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
     /// The bound that is violated most, if any is.
     pub fn most_violated<const NX: usize, const NG: usize>(
         &self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
-        trajectory: &Trajectory<'_, T, NX, NU, N>,
+        ocp: &Ocp<T, NX, NU, NG>,
+        trajectory: &Trajectory<'_, T, NX, NU>,
     ) -> Option<Candidate<T>> {
         let mut worst: Option<Candidate<T>> = None;
         let mut least = -T::one();
@@ -138,8 +149,8 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
     /// Makes every component of the terminal equality a row that is always active.
     pub fn impose_terminal_equality<const NX: usize, const NG: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
-        factors: &[StageFactor<T, NX, NU>; N],
+        ocp: &Ocp<T, NX, NU, NG>,
+        factors: &[StageFactor<T, NX, NU>],
         x_n: &SVector<T, NX>,
     ) -> Result<(), Status<T>> {
         let Some(target) = &ocp.terminal.equality else {
@@ -175,8 +186,8 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
     /// Takes the candidate into the working set, dropping rows whose multiplier forbids it.
     pub fn satisfy<const NX: usize, const NG: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
-        factors: &[StageFactor<T, NX, NU>; N],
+        ocp: &Ocp<T, NX, NU, NG>,
+        factors: &[StageFactor<T, NX, NU>],
         violated: &Candidate<T>,
     ) -> Result<(), Status<T>> {
         let Candidate {
@@ -187,7 +198,7 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
         if !slack.is_finite() {
             // The trajectory is finite: a bound at plus or minus infinity, or no number at all.
             return Err(if slack < T::zero() {
-                self.direction.dual = [T::zero(); M];
+                self.direction.dual.fill(T::zero());
                 self.conflict(bound, T::one())
             } else {
                 Status::NotFinite
@@ -254,7 +265,7 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
         self.resting
             .retain(|row| row.bound != violated.bound || row.part != violated.part);
         self.candidate.terms.mirrored = true;
-        for alpha in &mut self.candidate.alpha {
+        for alpha in self.candidate.alpha.iter_mut() {
             *alpha = -*alpha;
         }
     }
@@ -335,7 +346,7 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
 
     /// Leaves in `proof` the multipliers of the last conflict, if there was one: those of the working
     /// set move with the candidate's so that the rows cancel out.
-    pub fn report_conflict(&self, proof: &mut ActiveSet<T, M>) -> bool {
+    pub fn report_conflict(&self, proof: &mut ActiveSet<T>) -> bool {
         let sign = self.contradicting;
         proof.clear();
         if sign == T::zero() {
@@ -374,14 +385,22 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
 
     /// The active rows, with multipliers in the bounds' own direction.
     pub(crate) fn active(&self) -> impl Iterator<Item = ActiveRow<T>> {
-        let working = self.working.rows().iter().map(Terms::reported);
-        let held_by_others = |row: &ActiveRow<T>| row.multiplier == T::zero();
-        working.chain(self.resting.iter().filter(move |row| !held_by_others(row)))
+        active(&self.working, &self.resting)
     }
 
     /// Hands over the active rows.
-    pub fn report(&self, active: &mut ActiveSet<T, M>) -> bool {
+    pub fn report(&self, active: &mut ActiveSet<T>) -> bool {
         active.clear();
         self.active().all(|row| active.push(row))
     }
+}
+
+/// The rows of the working set and those that rest at a multiplier.
+pub(crate) fn active<T: Scalar, const NU: usize>(
+    working: &WorkingSet<T, NU>,
+    resting: &ActiveSet<T>,
+) -> impl Iterator<Item = ActiveRow<T>> {
+    let working = working.rows().iter().map(Terms::reported);
+    let held_by_others = |row: &ActiveRow<T>| row.multiplier == T::zero();
+    working.chain(resting.iter().filter(move |row| !held_by_others(row)))
 }

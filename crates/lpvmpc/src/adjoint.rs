@@ -7,11 +7,10 @@ use crate::solution::ActiveSet;
 use nalgebra::SVector;
 
 /// A backward pass along the horizon, with the states eliminated.
-pub(crate) struct Adjoint<'a, T, const NX: usize, const NU: usize, const N: usize, const NG: usize>
-{
-    ocp: &'a Ocp<T, NX, NU, N, NG>,
+pub(crate) struct Adjoint<'a, T: 'static, const NX: usize, const NU: usize, const NG: usize> {
+    ocp: &'a Ocp<T, NX, NU, NG>,
     /// The point at which the cost counts; without one, the active rows are the whole Lagrangian.
-    trajectory: Option<&'a Trajectory<'a, T, NX, NU, N>>,
+    trajectory: Option<&'a Trajectory<'a, T, NX, NU>>,
     /// Derivative of the Lagrangian in x_`stage`, through what comes after it.
     pub costate: SVector<T, NX>,
     stage: usize,
@@ -31,15 +30,13 @@ pub(crate) struct AdjointStage<T, const NX: usize, const NU: usize> {
     pub rows: SVector<T, NU>,
 }
 
-impl<'a, T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize>
-    Adjoint<'a, T, NX, NU, N, NG>
-{
+impl<'a, T: Scalar, const NX: usize, const NU: usize, const NG: usize> Adjoint<'a, T, NX, NU, NG> {
     /// Begins behind the last stage. `active` stays the same in all calls, but for rows at stages that
     /// have been visited.
-    pub fn new<const M: usize>(
-        ocp: &'a Ocp<T, NX, NU, N, NG>,
-        trajectory: Option<&'a Trajectory<'a, T, NX, NU, N>>,
-        active: &ActiveSet<T, M>,
+    pub fn new(
+        ocp: &'a Ocp<T, NX, NU, NG>,
+        trajectory: Option<&'a Trajectory<'a, T, NX, NU>>,
+        active: &ActiveSet<T>,
     ) -> Self {
         let stage = ocp.length();
         let (mut costate, _) = rows::gradient(ocp, active.iter(), stage);
@@ -56,10 +53,7 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: 
     }
 
     /// The next stage towards the beginning; `None` in front of the first.
-    pub fn step<const M: usize>(
-        &mut self,
-        active: &ActiveSet<T, M>,
-    ) -> Option<AdjointStage<T, NX, NU>> {
+    pub fn step(&mut self, active: &ActiveSet<T>) -> Option<AdjointStage<T, NX, NU>> {
         self.stage = self.stage.checked_sub(1)?;
         let stage = self.ocp.stages.get(self.stage)?;
         let costate = self.costate;

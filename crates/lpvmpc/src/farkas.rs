@@ -27,16 +27,9 @@ const ROUNDINGS: f64 = 100.0;
 /// [`Status::Infeasible`](crate::Status::Infeasible) the solution's active rows are such a proof.
 /// A `proof` with a soft bound or a multiplier of the wrong sign proves nothing: minus infinity.
 #[inline(never)]
-pub fn infeasibility_margin<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const M: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    proof: &ActiveSet<T, M>,
+pub fn infeasibility_margin<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
+    proof: &ActiveSet<T>,
 ) -> T {
     let nothing: T = convert(f64::NEG_INFINITY);
     // What the multipliers themselves are off by, from the search.

@@ -5,6 +5,7 @@
 //! no unknown any more: it is exact, and the regulator is that of the other inputs.
 
 use crate::adjoint::Adjoint;
+use crate::list::List;
 use crate::model::Scalar;
 use crate::ocp::{Ocp, Stage};
 use crate::riccati::{BadPivot, CostToGo, StageFactor};
@@ -16,9 +17,9 @@ use crate::solver::{Solver, SolverSettings, WarmStart};
 const MOST_SEARCHES: usize = 20;
 
 /// For every input of every stage: the bound that it is held at, if any.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct HeldInputs<const NU: usize, const N: usize> {
-    sides: [[Option<Side>; NU]; N],
+#[derive(Debug)]
+pub(crate) struct HeldInputs<const NU: usize> {
+    sides: List<[Option<Side>; NU]>,
     any: bool,
 }
 
@@ -32,12 +33,16 @@ struct Verdict<T> {
     rest: T,
 }
 
-impl<const NU: usize, const N: usize> HeldInputs<NU, N> {
-    pub fn none() -> Self {
-        Self {
-            sides: [[None; NU]; N],
-            any: false,
-        }
+impl<const NU: usize> HeldInputs<NU> {
+    /// None of the stages in `sides`.
+    pub fn none(mut sides: List<[Option<Side>; NU]>) -> Self {
+        sides.fill([None; NU]);
+        Self { sides, any: false }
+    }
+
+    fn release_all(&mut self) {
+        self.sides.fill([None; NU]);
+        self.any = false;
     }
 
     /// The sides at `stage`; `None` where no input is held.
@@ -68,11 +73,11 @@ impl<const NU: usize, const N: usize> HeldInputs<NU, N> {
 
     /// Lets go of the inputs that are pulled into their bounds, by the cost of `trajectory` and the rows
     /// `active`, or by these rows alone: their multiplier is below zero. The others join `active`.
-    fn release<T: Scalar, const NX: usize, const M: usize, const NG: usize>(
+    fn release<T: Scalar, const NX: usize, const NG: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
-        trajectory: Option<&Trajectory<'_, T, NX, NU, N>>,
-        active: &mut ActiveSet<T, M>,
+        ocp: &Ocp<T, NX, NU, NG>,
+        trajectory: Option<&Trajectory<'_, T, NX, NU>>,
+        active: &mut ActiveSet<T>,
         tolerance: T,
     ) -> Verdict<T> {
         let (mut largest, mut rest) = (T::zero(), T::zero());
@@ -157,9 +162,7 @@ pub(crate) fn eliminate_held<T: Scalar, const NX: usize, const NU: usize, const 
     Ok(())
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
-    Solver<T, NX, NU, N, M>
-{
+impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     /// Tries to answer what the dual method could not, for the rounding at `bound`: with the inputs that
     /// it has found at their bounds held there. `spent` counts the changes of the active set.
     ///
@@ -170,9 +173,9 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
     #[inline(never)]
     pub(crate) fn search_with_held_inputs<const NG: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
+        ocp: &Ocp<T, NX, NU, NG>,
         settings: &SolverSettings<T>,
-        solution: &mut Solution<T, NX, NU, N, M>,
+        solution: &mut Solution<T, NX, NU>,
         bound: BoundId,
         spent: &mut usize,
     ) -> Result<(), Status<T>> {
@@ -225,16 +228,16 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
             outcome = inaccurate;
         }
         // Whoever follows the plan needs the regulator of the problem itself.
-        self.held = HeldInputs::none();
+        self.held.release_all();
         self.factorize(ocp).and(outcome)
     }
 
     /// One search from the active rows of the last one, but for those of inputs.
     fn search_again<const NG: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
+        ocp: &Ocp<T, NX, NU, NG>,
         settings: &SolverSettings<T>,
-        solution: &mut Solution<T, NX, NU, N, M>,
+        solution: &mut Solution<T, NX, NU>,
         spent: &mut usize,
     ) -> Result<(), Status<T>> {
         let settings = SolverSettings {

@@ -55,16 +55,9 @@ fn magnitude<T: Scalar, const K: usize>(v: &SVector<T, K>) -> T {
 }
 
 /// The residual of the optimality conditions of `ocp` at `solution`.
-pub fn kkt_residual<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const M: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    solution: &Solution<T, NX, NU, N, M>,
+pub fn kkt_residual<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
+    solution: &Solution<T, NX, NU>,
 ) -> KktResidual<T> {
     let trajectory = Trajectory {
         x: &solution.x,
@@ -80,17 +73,10 @@ pub fn kkt_residual<
     }
 }
 
-fn stationarity<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const M: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    trajectory: &Trajectory<'_, T, NX, NU, N>,
-    active: &ActiveSet<T, M>,
+fn stationarity<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
+    trajectory: &Trajectory<'_, T, NX, NU>,
+    active: &ActiveSet<T>,
 ) -> T {
     let mut largest_term = T::one();
     let mut largest = T::zero();
@@ -103,9 +89,9 @@ fn stationarity<
 }
 
 /// Dynamics, hard bounds, terminal equality.
-fn primal<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    trajectory: &Trajectory<'_, T, NX, NU, N>,
+fn primal<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
+    trajectory: &Trajectory<'_, T, NX, NU>,
 ) -> T {
     let mut largest = T::zero();
     for (i, (stage, u)) in ocp
@@ -139,17 +125,10 @@ fn primal<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG:
 }
 
 /// Multipliers within their intervals, and active bounds that are met (dual, complementarity).
-fn multipliers<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const M: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    trajectory: &Trajectory<'_, T, NX, NU, N>,
-    active: &ActiveSet<T, M>,
+fn multipliers<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
+    trajectory: &Trajectory<'_, T, NX, NU>,
+    active: &ActiveSet<T>,
 ) -> (T, T) {
     let mut outside = T::zero();
     let mut slackness = T::zero();
@@ -174,11 +153,11 @@ fn multipliers<
 
 /// How far an active row's multiplier is above its largest value (or, if the bound is exceeded,
 /// from it), and its bound from where the row says it is.
-fn conditions<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+fn conditions<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
     row: &ActiveRow<T>,
     multiplier: T,
     slack: T,
-    ocp: &Ocp<T, NX, NU, N, NG>,
+    ocp: &Ocp<T, NX, NU, NG>,
 ) -> (T, T) {
     let zero = T::zero();
     let excess = if slack < zero { -slack } else { zero };
@@ -197,17 +176,10 @@ fn conditions<T: Scalar, const NX: usize, const NU: usize, const N: usize, const
 }
 
 /// The largest excess of a soft bound whose price is not in the active set.
-fn unpaid_excess<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const M: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    trajectory: &Trajectory<'_, T, NX, NU, N>,
-    active: &ActiveSet<T, M>,
+fn unpaid_excess<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
+    trajectory: &Trajectory<'_, T, NX, NU>,
+    active: &ActiveSet<T>,
 ) -> T {
     let mut largest = T::zero();
     rows::violated_bounds(ocp, trajectory, &mut |candidate| {

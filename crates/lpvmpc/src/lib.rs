@@ -5,6 +5,9 @@
     reason = "a comparison with a number that is not one must take the failing branch"
 )]
 
+#[cfg(feature = "alloc")]
+extern crate alloc;
+
 mod active_set;
 mod adjoint;
 mod clock;
@@ -18,6 +21,8 @@ mod held_inputs;
 mod kernel;
 mod kkt;
 mod last_plan;
+mod list;
+mod memory;
 mod model;
 mod ocp;
 mod plan;

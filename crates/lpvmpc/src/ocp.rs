@@ -1,5 +1,6 @@
 //! The optimal control problem of one sample: a quadratic program with the structure of time.
 
+use crate::list::List;
 use crate::model::Scalar;
 use nalgebra::{SMatrix, SVector, convert};
 
@@ -143,17 +144,18 @@ pub struct Terminal<T, const NX: usize, const NG: usize = 0> {
 }
 
 /// The problem: from `x0`, choose the inputs of the first `horizon` stages.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Ocp<T, const NX: usize, const NU: usize, const N: usize, const NG: usize = 0> {
+#[derive(Debug, PartialEq)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
+pub struct Ocp<T: 'static, const NX: usize, const NU: usize, const NG: usize = 0> {
     /// The given initial state.
     pub x0: SVector<T, NX>,
     /// The stages; those from `horizon` on are not read.
-    pub stages: [Stage<T, NX, NU, NG>; N],
+    pub stages: List<Stage<T, NX, NU, NG>>,
     /// Which state bounds of the stages are soft, at the same price at all of them.
     pub soft_x: Softness<T, NX>,
     /// The end of the horizon.
     pub terminal: Terminal<T, NX, NG>,
-    /// Stages in use; values above `N` count as `N`, 0 counts as 1.
+    /// Stages in use; no more than there are, 0 counts as 1.
     pub horizon: usize,
 }
 
@@ -203,26 +205,26 @@ impl<T: Scalar, const NX: usize, const NG: usize> Default for Terminal<T, NX, NG
     }
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize> Default
-    for Ocp<T, NX, NU, N, NG>
-{
-    /// `N` default stages from the origin.
-    fn default() -> Self {
+impl<T: Scalar, const NX: usize, const NU: usize, const NG: usize> Ocp<T, NX, NU, NG> {
+    /// From the origin, over as many stages as there is memory for.
+    pub fn new(stages: List<Stage<T, NX, NU, NG>>) -> Self {
         Self {
             x0: SVector::zeros(),
-            stages: [Stage::new(); N],
+            horizon: stages.len(),
+            stages,
             soft_x: [None; NX],
             terminal: Terminal::default(),
-            horizon: N,
         }
     }
-}
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize>
-    Ocp<T, NX, NU, N, NG>
-{
-    /// Stages in use, between 1 and `N`.
+    /// The same on the heap, with default stages.
+    #[cfg(feature = "alloc")]
+    pub fn allocate(stages: usize) -> Self {
+        Self::new(List::repeat(Stage::new(), stages))
+    }
+
+    /// Stages in use, at least 1.
     pub fn length(&self) -> usize {
-        self.horizon.max(1).min(N)
+        self.horizon.max(1).min(self.stages.len())
     }
 }

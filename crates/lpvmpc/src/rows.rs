@@ -9,18 +9,14 @@ use crate::working_set::{Row, Terms};
 use nalgebra::{SVector, convert};
 
 /// A trajectory of the problem: x_1.. and u_0..
-pub(crate) struct Trajectory<'a, T, const NX: usize, const NU: usize, const N: usize> {
-    pub x: &'a [SVector<T, NX>; N],
-    pub u: &'a [SVector<T, NU>; N],
+pub(crate) struct Trajectory<'a, T, const NX: usize, const NU: usize> {
+    pub x: &'a [SVector<T, NX>],
+    pub u: &'a [SVector<T, NU>],
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Trajectory<'_, T, NX, NU, N> {
+impl<T: Scalar, const NX: usize, const NU: usize> Trajectory<'_, T, NX, NU> {
     /// x_`stage`, from 0 to the horizon.
-    pub fn state<const NG: usize>(
-        &self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
-        stage: usize,
-    ) -> SVector<T, NX> {
+    pub fn state<const NG: usize>(&self, ocp: &Ocp<T, NX, NU, NG>, stage: usize) -> SVector<T, NX> {
         let later = stage.checked_sub(1).and_then(|before| self.x.get(before));
         *later.unwrap_or(&ocp.x0)
     }
@@ -103,15 +99,9 @@ fn violated_sides<T: Scalar, const K: usize>(
 }
 
 /// Offers every violated bound of the problem on the trajectory to `visit`.
-pub(crate) fn violated_bounds<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    trajectory: &Trajectory<'_, T, NX, NU, N>,
+pub(crate) fn violated_bounds<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
+    trajectory: &Trajectory<'_, T, NX, NU>,
     visit: &mut impl FnMut(Candidate<T>),
 ) {
     let n = ocp.length();
@@ -157,14 +147,8 @@ pub(crate) fn violated_bounds<
 }
 
 /// The bound's normal: d(value)/dx and d(value)/du at its stage.
-pub(crate) fn normal<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
+pub(crate) fn normal<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
     bound: &BoundId,
 ) -> (SVector<T, NX>, SVector<T, NU>) {
     let terminal = bound.stage >= ocp.length();
@@ -193,15 +177,9 @@ fn component_row<T: Scalar, const R: usize, const C: usize>(
 }
 
 /// The bound's slack on the trajectory; for an equality, value - target.
-pub(crate) fn slack<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    trajectory: &Trajectory<'_, T, NX, NU, N>,
+pub(crate) fn slack<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
+    trajectory: &Trajectory<'_, T, NX, NU>,
     bound: &BoundId,
 ) -> T {
     let x = trajectory.state(ocp, bound.stage);
@@ -216,8 +194,8 @@ pub(crate) fn slack<
 }
 
 /// The size against which a violation of `bound` is measured.
-pub(crate) fn size<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, N, NG>,
+pub(crate) fn size<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
     bound: &BoundId,
 ) -> T {
     let (lower, upper) = limits(ocp, bound);
@@ -225,8 +203,8 @@ pub(crate) fn size<T: Scalar, const NX: usize, const NU: usize, const N: usize, 
 }
 
 /// The size by which a violation of `bound` is ranked.
-pub(crate) fn room<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, N, NG>,
+pub(crate) fn room<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
     bound: &BoundId,
 ) -> T {
     let (lower, upper) = limits(ocp, bound);
@@ -234,14 +212,8 @@ pub(crate) fn room<T: Scalar, const NX: usize, const NU: usize, const N: usize, 
 }
 
 /// Lower and upper limit of the bounded quantity, both the target for an equality.
-pub(crate) fn limits<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
+pub(crate) fn limits<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
     bound: &BoundId,
 ) -> (T, T) {
     if let (Side::Equality, Quantity::State(j), Some(target)) =
@@ -281,19 +253,13 @@ fn unlimited<T: Scalar>() -> (T, T) {
 }
 
 /// Writes the row of `bound` to `row`: one backward pass through the closed loop.
-pub(crate) fn form_row<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    factors: &[StageFactor<T, NX, NU>; N],
+pub(crate) fn form_row<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
+    factors: &[StageFactor<T, NX, NU>],
     bound: BoundId,
     part: Part,
     soft: Option<Penalty<T>>,
-    row: &mut Row<T, NU, N>,
+    row: &mut Row<T, NU>,
 ) {
     let (normal_x, normal_u) = normal(ocp, &bound);
     let sign = match bound.side {
@@ -301,8 +267,8 @@ pub(crate) fn form_row<
         Side::Lower | Side::Equality => T::one(),
     };
     let mut costate = normal_x * sign;
-    row.alpha = [SVector::zeros(); N];
-    row.support = bound.stage.min(N);
+    row.alpha.fill(SVector::zeros());
+    row.support = bound.stage.min(row.alpha.len());
     if let (Some(factor), Some(alpha)) = (factors.get(bound.stage), row.alpha.get_mut(bound.stage))
         && bound.stage < ocp.length()
     {
@@ -335,14 +301,8 @@ pub(crate) fn form_row<
 }
 
 /// The gradient that the rows `active` at `stage` add to the state and the input.
-pub(crate) fn gradient<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
+pub(crate) fn gradient<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
     active: impl Iterator<Item = ActiveRow<T>>,
     stage: usize,
 ) -> (SVector<T, NX>, SVector<T, NU>) {
@@ -364,14 +324,13 @@ pub(crate) fn subtract<
     T: Scalar,
     const NX: usize,
     const NU: usize,
-    const N: usize,
     const NG: usize,
     Active: Iterator<Item = ActiveRow<T>>,
 >(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    factors: &[StageFactor<T, NX, NU>; N],
+    ocp: &Ocp<T, NX, NU, NG>,
+    factors: &[StageFactor<T, NX, NU>],
     active: impl Fn() -> Active,
-    v: &mut [SVector<T, NU>; N],
+    v: &mut [SVector<T, NU>],
 ) {
     let n = ocp.length();
     let (mut costate, _) = gradient(ocp, active(), n);
@@ -384,14 +343,8 @@ pub(crate) fn subtract<
 }
 
 /// The price of exceeding `bound`, if it is soft.
-pub(crate) fn soft_price<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
+pub(crate) fn soft_price<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
     bound: &BoundId,
 ) -> Option<Penalty<T>> {
     let stage = if bound.stage < ocp.length() {

@@ -1,24 +1,24 @@
 //! Moving to the minimiser over a given working set: the warm start, and the refinement after
 //! the search.
 
-use crate::active_set::DualActiveSet;
+use crate::active_set::{DualActiveSet, active};
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
 use crate::rows::{self, Trajectory};
 use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Status};
-use crate::working_set::Terms;
-use nalgebra::{SVector, convert};
+use crate::working_set::{Terms, copy};
+use nalgebra::convert;
 
-impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T, NU, N, M> {
+impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     /// Starts from the rows that were active before, `shift` stages earlier. Rows whose
     /// multiplier would have the wrong sign are dropped, so this never changes the result.
     pub fn warm_start<const NX: usize, const NG: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
-        factors: &[StageFactor<T, NX, NU>; N],
-        trajectory: &Trajectory<'_, T, NX, NU, N>,
-        before: &ActiveSet<T, M>,
+        ocp: &Ocp<T, NX, NU, NG>,
+        factors: &[StageFactor<T, NX, NU>],
+        trajectory: &Trajectory<'_, T, NX, NU>,
+        before: &ActiveSet<T>,
         shift: usize,
     ) -> Result<(), Status<T>> {
         for row in before.iter() {
@@ -57,17 +57,17 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
     /// Where v has become so large that its rounding is larger than a bound, the answer is inaccurate.
     pub fn refine<const NX: usize, const NG: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
-        factors: &[StageFactor<T, NX, NU>; N],
-        trajectory: &Trajectory<'_, T, NX, NU, N>,
+        ocp: &Ocp<T, NX, NU, NG>,
+        factors: &[StageFactor<T, NX, NU>],
+        trajectory: &Trajectory<'_, T, NX, NU>,
     ) -> Result<bool, Status<T>> {
         if self.active().next().is_none() {
             return Ok(false);
         }
         let (defect, bound) = self.worst_defect(ocp, trajectory);
         let largest = self.v.iter().fold(T::zero(), |m, v| m.max(v.amax()));
-        let unexplained = self.unexplained(ocp, factors);
-        let rest = unexplained.iter().fold(T::zero(), |m, v| m.max(v.amax()));
+        self.find_unexplained(ocp, factors);
+        let rest = self.rest.iter().fold(T::zero(), |m, v| m.max(v.amax()));
         if defect <= self.tolerance && rest <= self.tolerance * largest {
             return Ok(false);
         }
@@ -87,8 +87,8 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
     /// The active bound that is farthest from holding, relative to its size.
     fn worst_defect<const NX: usize, const NG: usize>(
         &self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
-        trajectory: &Trajectory<'_, T, NX, NU, N>,
+        ocp: &Ocp<T, NX, NU, NG>,
+        trajectory: &Trajectory<'_, T, NX, NU>,
     ) -> (T, BoundId) {
         let working = self.working.rows().iter().map(|row| {
             let defect = defect(ocp, trajectory, row).abs();
@@ -119,33 +119,32 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
     /// leave its interval there. `trajectory` belongs to the current v.
     fn settle<const NX: usize, const NG: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
-        factors: &[StageFactor<T, NX, NU>; N],
-        trajectory: &Trajectory<'_, T, NX, NU, N>,
+        ocp: &Ocp<T, NX, NU, NG>,
+        factors: &[StageFactor<T, NX, NU>],
+        trajectory: &Trajectory<'_, T, NX, NU>,
     ) -> Result<(), Status<T>> {
         loop {
-            let unexplained = self.unexplained(ocp, factors);
-            let mut step = [T::zero(); M];
-            for (step, row) in step.iter_mut().zip(self.working.rows()) {
+            self.find_unexplained(ocp, factors);
+            for (step, row) in self.step.iter_mut().zip(self.working.rows()) {
                 *step = -defect(ocp, trajectory, row);
             }
-            self.working.solve_lower(&mut step);
-            self.working.project(&unexplained, &mut step);
-            let mut multipliers = step;
-            self.working.solve_upper(&mut multipliers);
-            for (multiplier, row) in multipliers.iter_mut().zip(self.working.rows()) {
+            self.working.solve_lower(&mut self.step);
+            self.working.project(&self.rest, &mut self.step);
+            copy(&mut self.multipliers, &self.step);
+            self.working.solve_upper(&mut self.multipliers);
+            for (multiplier, row) in self.multipliers.iter_mut().zip(self.working.rows()) {
                 *multiplier += row.active.multiplier;
             }
-            let Some(position) = self.farthest_outside(&multipliers) else {
-                for (v, rest) in self.v.iter_mut().zip(unexplained.iter()) {
+            let Some(position) = self.farthest_outside() else {
+                for (v, rest) in self.v.iter_mut().zip(self.rest.iter()) {
                     *v -= rest;
                 }
-                self.working.shift(&step, &mut self.v);
+                self.working.shift(&mut self.step, &mut self.v);
                 return Ok(());
             };
             self.count_change()?;
             let mut row = self.working.remove(position);
-            if let Some(multiplier) = multipliers.get(position) {
+            if let Some(multiplier) = self.multipliers.get(position) {
                 row.active.multiplier = *multiplier;
             }
             self.release(&row)?;
@@ -153,11 +152,11 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
     }
 
     /// The working row whose multiplier is farthest outside its interval.
-    fn farthest_outside(&self, multipliers: &[T; M]) -> Option<usize> {
+    fn farthest_outside(&self) -> Option<usize> {
         let mut farthest = None;
         let mut distance = T::zero();
-        for (position, (row, multiplier)) in self.working.rows().iter().zip(multipliers).enumerate()
-        {
+        let rows = self.working.rows().iter().zip(self.multipliers.iter());
+        for (position, (row, multiplier)) in rows.enumerate() {
             let outside = (-*multiplier).max(*multiplier - row.cap);
             // Negated, so that a multiplier that is not a number counts.
             if !row.equality && !(outside <= distance) {
@@ -168,22 +167,22 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
         farthest
     }
 
-    /// v - sum of multiplier * alpha over the active rows: zero but for rounding.
-    fn unexplained<const NX: usize, const NG: usize>(
-        &self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
-        factors: &[StageFactor<T, NX, NU>; N],
-    ) -> [SVector<T, NU>; N] {
-        let mut rest = self.v;
-        rows::subtract(ocp, factors, || self.active(), &mut rest);
-        rest
+    /// Leaves in `rest` v - sum of multiplier * alpha over the active rows: zero but for rounding.
+    fn find_unexplained<const NX: usize, const NG: usize>(
+        &mut self,
+        ocp: &Ocp<T, NX, NU, NG>,
+        factors: &[StageFactor<T, NX, NU>],
+    ) {
+        copy(&mut self.rest, &self.v);
+        let (working, resting) = (&self.working, &self.resting);
+        rows::subtract(ocp, factors, || active(working, resting), &mut self.rest);
     }
 }
 
 /// What is missing for `row` to hold with equality on the trajectory.
-fn defect<T: Scalar, const NX: usize, const NU: usize, const N: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    trajectory: &Trajectory<'_, T, NX, NU, N>,
+fn defect<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
+    trajectory: &Trajectory<'_, T, NX, NU>,
     row: &Terms<T>,
 ) -> T {
     let slack = rows::slack(ocp, trajectory, &row.active.bound);

@@ -1,7 +1,11 @@
 //! The answer of the solver: inputs, predicted states, active bounds with their multipliers,
 //! and a status that says what the answer is worth.
 
+use crate::list::List;
+#[cfg(feature = "alloc")]
+use crate::memory::Capacity;
 use crate::model::Scalar;
+use crate::working_set::copy;
 use core::fmt;
 use nalgebra::SVector;
 
@@ -96,16 +100,17 @@ impl<T: Scalar> ActiveRow<T> {
     }
 }
 
-/// The active bounds, at most `M`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ActiveSet<T, const M: usize> {
-    rows: [PackedRow<T>; M],
+/// The active bounds, at most as many as there is memory for.
+#[derive(Debug, PartialEq)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
+pub struct ActiveSet<T: 'static> {
+    rows: List<PackedRow<T>>,
     len: usize,
 }
 
 /// An [`ActiveRow`] in a third of its memory, of which a microcontroller has little.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct PackedRow<T> {
+pub struct PackedRow<T> {
     multiplier: T,
     stage: u16,
     /// Component of the quantity.
@@ -115,7 +120,8 @@ struct PackedRow<T> {
 }
 
 impl<T: Scalar> PackedRow<T> {
-    fn empty() -> Self {
+    /// Filler for unused places.
+    pub fn empty() -> Self {
         Self {
             multiplier: T::zero(),
             stage: 0,
@@ -168,13 +174,22 @@ impl<T: Scalar> PackedRow<T> {
     }
 }
 
-impl<T: Scalar, const M: usize> ActiveSet<T, M> {
-    /// An empty set.
-    pub fn new() -> Self {
-        Self {
-            rows: [PackedRow::empty(); M],
-            len: 0,
-        }
+impl<T: Scalar> ActiveSet<T> {
+    /// An empty set in this memory.
+    pub fn new(rows: List<PackedRow<T>>) -> Self {
+        Self { rows, len: 0 }
+    }
+
+    /// An empty set for so many bounds.
+    #[cfg(feature = "alloc")]
+    pub fn with_capacity(rows: usize) -> Self {
+        Self::new(List::repeat(PackedRow::empty(), rows))
+    }
+
+    /// Takes over the rows of another set, as many as there are places for.
+    pub fn copy_from(&mut self, other: &Self) {
+        copy(&mut self.rows, &other.rows);
+        self.len = other.len.min(self.rows.len());
     }
 
     /// The active rows, in no particular order.
@@ -221,12 +236,6 @@ impl<T: Scalar, const M: usize> ActiveSet<T, M> {
             }
             _ => false,
         }
-    }
-}
-
-impl<T: Scalar, const M: usize> Default for ActiveSet<T, M> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -303,12 +312,13 @@ impl<T: fmt::Display> fmt::Display for Status<T> {
 ///
 /// Whatever the status, the inputs are finite and within the input bounds; unless it is
 /// [`Status::Solved`] they are a fallback, not an optimum.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Solution<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
+#[derive(Debug, PartialEq)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
+pub struct Solution<T: 'static, const NX: usize, const NU: usize> {
     /// u_0 to u_{N-1}.
-    pub u: [SVector<T, NU>; N],
+    pub u: List<SVector<T, NU>>,
     /// x_1 to x_N, predicted by the problem's linear dynamics.
-    pub x: [SVector<T, NX>; N],
+    pub x: List<SVector<T, NX>>,
     /// Optimal value of the problem's cost, with the factor 1/2 of [`crate::Stage`] and the
     /// price of exceeded soft bounds.
     pub cost: T,
@@ -316,22 +326,35 @@ pub struct Solution<T, const NX: usize, const NU: usize, const N: usize, const M
     pub status: Status<T>,
     /// Bounds that hold with equality, or are exceeded at a price. It is also the warm start
     /// of the next solve.
-    pub active: ActiveSet<T, M>,
+    pub active: ActiveSet<T>,
     /// Changes of the active set that were made.
     pub changes: usize,
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize> Default
-    for Solution<T, NX, NU, N, M>
-{
-    fn default() -> Self {
+impl<T: Scalar, const NX: usize, const NU: usize> Solution<T, NX, NU> {
+    /// A solution of nothing yet, in memory for as many inputs and states as there are stages.
+    pub fn new(
+        u: List<SVector<T, NU>>,
+        x: List<SVector<T, NX>>,
+        active: List<PackedRow<T>>,
+    ) -> Self {
         Self {
-            u: [SVector::zeros(); N],
-            x: [SVector::zeros(); N],
+            u,
+            x,
             cost: T::zero(),
             status: Status::Solved,
-            active: ActiveSet::new(),
+            active: ActiveSet::new(active),
             changes: 0,
         }
+    }
+
+    /// The same on the heap.
+    #[cfg(feature = "alloc")]
+    pub fn allocate(Capacity { stages, rows }: Capacity) -> Self {
+        Self::new(
+            List::repeat(SVector::zeros(), stages),
+            List::repeat(SVector::zeros(), stages),
+            List::repeat(PackedRow::empty(), rows),
+        )
     }
 }

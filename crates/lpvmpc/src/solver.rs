@@ -5,6 +5,10 @@ use crate::active_set::DualActiveSet;
 use crate::farkas::infeasibility_margin;
 use crate::held_inputs::{HeldInputs, eliminate_held};
 use crate::kernel::add_product;
+use crate::list::List;
+#[cfg(feature = "alloc")]
+use crate::memory::Capacity;
+use crate::memory::SolverMemory;
 use crate::model::Scalar;
 use crate::ocp::{Bounds, Ocp, Penalty, Softness};
 use crate::riccati::{CostToGo, StageFactor};
@@ -53,33 +57,31 @@ impl<T: Scalar> Default for SolverSettings<T> {
     }
 }
 
-/// The solver with its memory: `NX` states, `NU` inputs, at most `N` stages and `M`
-/// simultaneously active bounds. Nothing in it outlives a solve; one solver serves any number of
-/// problems.
-///
-/// `M = N * NU` rows fill the space of the inputs; without soft bounds more (`NX` with a terminal
-/// equality) are needed only where rounding makes rows rest on each other. Where it is not enough,
-/// the answer says [`Status::WorkingSetFull`].
-#[derive(Clone, Debug)]
-pub struct Solver<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
-    factors: [StageFactor<T, NX, NU>; N],
-    pub(crate) dual: DualActiveSet<T, NU, N, M>,
+/// The solver with its memory, for `NX` states and `NU` inputs. Nothing in it outlives a solve; one
+/// solver serves any number of problems. Where a problem needs more places for active bounds than
+/// there are, the answer says [`Status::WorkingSetFull`].
+#[derive(Debug)]
+pub struct Solver<T: 'static, const NX: usize, const NU: usize> {
+    factors: List<StageFactor<T, NX, NU>>,
+    pub(crate) dual: DualActiveSet<T, NU>,
     /// None but within [`Solver::search_with_held_inputs`].
-    pub(crate) held: HeldInputs<NU, N>,
+    pub(crate) held: HeldInputs<NU>,
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
-    Solver<T, NX, NU, N, M>
-{
-    /// A solver that has solved nothing yet.
-    #[inline(always)]
-    pub fn new() -> Self {
-        const { assert!(N > 0, "a horizon has at least one stage") };
+impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
+    /// A solver in this memory.
+    pub fn new(memory: SolverMemory<T, NX, NU>) -> Self {
         Self {
-            factors: [StageFactor::zeros(); N],
-            dual: DualActiveSet::new(),
-            held: HeldInputs::none(),
+            factors: memory.factors,
+            dual: DualActiveSet::new(memory.dual),
+            held: HeldInputs::none(memory.held),
         }
+    }
+
+    /// A solver with memory of its own.
+    #[cfg(feature = "alloc")]
+    pub fn allocate(capacity: Capacity) -> Self {
+        Self::new(SolverMemory::allocate(capacity))
     }
 
     /// Solves `ocp`. `solution` is the answer and, on entry, the warm start.
@@ -90,9 +92,9 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
     #[inline(never)]
     pub fn solve<const NG: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
+        ocp: &Ocp<T, NX, NU, NG>,
         settings: &SolverSettings<T>,
-        solution: &mut Solution<T, NX, NU, N, M>,
+        solution: &mut Solution<T, NX, NU>,
     ) {
         let factorized = self.factorize(ocp);
         self.solve_factorized(factorized, ocp, settings, solution);
@@ -104,9 +106,9 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
     pub(crate) fn solve_factorized<const NG: usize>(
         &mut self,
         factorized: Result<(), Status<T>>,
-        ocp: &Ocp<T, NX, NU, N, NG>,
+        ocp: &Ocp<T, NX, NU, NG>,
         settings: &SolverSettings<T>,
-        solution: &mut Solution<T, NX, NU, N, M>,
+        solution: &mut Solution<T, NX, NU>,
     ) {
         let tolerance = Some(settings.tolerance).filter(|t| *t > T::zero() && t.is_finite());
         self.dual.reset(
@@ -152,8 +154,8 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
     #[inline(never)]
     pub(crate) fn prove<const NG: usize>(
         &self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
-        proof: &mut ActiveSet<T, M>,
+        ocp: &Ocp<T, NX, NU, NG>,
+        proof: &mut ActiveSet<T>,
     ) -> Option<Status<T>> {
         if !(self.dual.report_conflict(proof) && infeasibility_margin(ocp, proof) > T::zero()) {
             proof.clear();
@@ -173,9 +175,9 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
 
     pub(crate) fn search<const NG: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
+        ocp: &Ocp<T, NX, NU, NG>,
         settings: &SolverSettings<T>,
-        solution: &mut Solution<T, NX, NU, N, M>,
+        solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
         self.roll_out(ocp, solution)?;
         if ocp.terminal.equality.is_some() {
@@ -208,14 +210,14 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
     }
 
     /// The factors of the stages of the last problem.
-    pub(crate) fn factors(&self) -> &[StageFactor<T, NX, NU>; N] {
+    pub(crate) fn factors(&self) -> &[StageFactor<T, NX, NU>] {
         &self.factors
     }
 
     /// Backward: the factor of every stage. It does not depend on `x0`.
     pub(crate) fn factorize<const NG: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
+        ocp: &Ocp<T, NX, NU, NG>,
     ) -> Result<(), Status<T>> {
         let mut cost_to_go = CostToGo {
             quadratic: ocp.terminal.p,
@@ -235,8 +237,8 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
     /// Forward: the trajectory of the current normalised deviations.
     fn roll_out<const NG: usize>(
         &self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
-        solution: &mut Solution<T, NX, NU, N, M>,
+        ocp: &Ocp<T, NX, NU, NG>,
+        solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
         let mut x = ocp.x0;
         let policy = self.factors.iter().zip(self.dual.v.iter());
@@ -257,9 +259,9 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
 
     fn warm_start<const NG: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, N, NG>,
+        ocp: &Ocp<T, NX, NU, NG>,
         settings: &SolverSettings<T>,
-        solution: &mut Solution<T, NX, NU, N, M>,
+        solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
         let shift = match settings.warm_start {
             WarmStart::Cold => return Ok(()),
@@ -283,33 +285,18 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
     }
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize> Default
-    for Solver<T, NX, NU, N, M>
-{
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-fn trajectory<T, const NX: usize, const NU: usize, const N: usize, const M: usize>(
-    solution: &Solution<T, NX, NU, N, M>,
-) -> Trajectory<'_, T, NX, NU, N> {
+fn trajectory<T, const NX: usize, const NU: usize>(
+    solution: &Solution<T, NX, NU>,
+) -> Trajectory<'_, T, NX, NU> {
     Trajectory {
         x: &solution.x,
         u: &solution.u,
     }
 }
 
-fn terminal_state<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const M: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    solution: &Solution<T, NX, NU, N, M>,
+fn terminal_state<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
+    solution: &Solution<T, NX, NU>,
 ) -> SVector<T, NX> {
     let last = solution.x.get(ocp.length() - 1);
     last.copied().unwrap_or(ocp.x0)
@@ -328,16 +315,9 @@ fn failed_pivot<T: Scalar>(stage: usize, pivot: T) -> Status<T> {
 }
 
 /// After a failure: the last inputs moved into their bounds, and the states they lead to.
-fn fall_back<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const M: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    solution: &mut Solution<T, NX, NU, N, M>,
+fn fall_back<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
+    solution: &mut Solution<T, NX, NU>,
 ) {
     clip_inputs(ocp, solution);
     let mut x = ocp.x0;
@@ -353,36 +333,22 @@ fn fall_back<
 }
 
 /// Moves the inputs into their bounds.
-fn clip_inputs<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const M: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    solution: &mut Solution<T, NX, NU, N, M>,
+fn clip_inputs<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
+    solution: &mut Solution<T, NX, NU>,
 ) {
     // Slices of unknown length are not unrolled, for the flash of a microcontroller.
     let inputs = solution.u.get_mut(..ocp.length()).unwrap_or_default();
-    for (u, stage) in inputs.iter_mut().zip(&ocp.stages) {
+    for (u, stage) in inputs.iter_mut().zip(ocp.stages.iter()) {
         *u = stage.u.project(u);
     }
 }
 
 /// The problem's cost at the solution's inputs and states (with the factor 1/2 of [`Ocp`]'s
 /// stages), including the price of exceeded soft bounds.
-pub fn cost<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const M: usize,
-    const NG: usize,
->(
-    ocp: &Ocp<T, NX, NU, N, NG>,
-    solution: &Solution<T, NX, NU, N, M>,
+pub fn cost<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+    ocp: &Ocp<T, NX, NU, NG>,
+    solution: &Solution<T, NX, NU>,
 ) -> T {
     let half: T = convert(0.5);
     let mut total = T::zero();

@@ -8,15 +8,16 @@
 //! grows by orthogonalising the new row twice, which is enough (Daniel, Gragg, Kaufman and
 //! Stewart 1976), and shrinks by rotations. E is never needed: it is L^-1 sqrt(D).
 
+use crate::list::List;
 use crate::model::Scalar;
 use crate::solution::ActiveRow;
 use nalgebra::{SVector, convert};
 
 /// A row of the problem in terms of the normalised deviations v.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Row<T, const NU: usize, const N: usize> {
-    /// alpha: d(slack)/dv, zero from `support` on.
-    pub alpha: [SVector<T, NU>; N],
+#[derive(Debug)]
+pub(crate) struct Row<T: 'static, const NU: usize> {
+    /// alpha: d(slack)/dv by stage, zero from `support` on.
+    pub alpha: List<SVector<T, NU>>,
     /// Stages that the row depends on.
     pub support: usize,
     /// What else is known of it.
@@ -67,30 +68,32 @@ impl<T: Scalar> Terms<T> {
     }
 }
 
-impl<T: Scalar, const NU: usize, const N: usize> Row<T, NU, N> {
-    pub fn empty() -> Self {
+impl<T: Scalar, const NU: usize> Row<T, NU> {
+    pub fn new(alpha: List<SVector<T, NU>>) -> Self {
         Self {
-            alpha: [SVector::zeros(); N],
+            alpha,
             support: 0,
             terms: Terms::empty(),
         }
     }
 
     /// alpha'v: the change of the slack that the deviations `v` make.
-    pub fn dot(&self, v: &[SVector<T, NU>; N]) -> T {
+    pub fn dot(&self, v: &[SVector<T, NU>]) -> T {
         dot(&self.alpha, v, self.support)
     }
 }
 
 /// How the current minimiser answers to one more unit of a candidate row's multiplier.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Direction<T, const NU: usize, const N: usize, const M: usize> {
+#[derive(Debug)]
+pub(crate) struct Direction<T: 'static, const NU: usize> {
     /// Change of v: the part of alpha that the working set does not span.
-    pub primal: [SVector<T, NU>; N],
+    pub primal: List<SVector<T, NU>>,
     /// The part that it spans, in terms of the orthonormal rows.
-    coefficients: [T; M],
+    coefficients: List<T>,
+    /// The part of it that was found last.
+    spanned: List<T>,
     /// Change of the working set's multipliers, with the opposite sign.
-    pub dual: [T; M],
+    pub dual: List<T>,
     /// Change of the candidate's slack, >= 0; 0 when the row depends on the working set.
     pub slope: T,
     /// Length of `primal` that rounding alone can make: a row that is closer to the span of the
@@ -102,12 +105,13 @@ pub(crate) struct Direction<T, const NU: usize, const N: usize, const M: usize> 
     support: usize,
 }
 
-impl<T: Scalar, const NU: usize, const N: usize, const M: usize> Direction<T, NU, N, M> {
-    pub fn zeros() -> Self {
+impl<T: Scalar, const NU: usize> Direction<T, NU> {
+    pub fn new(primal: List<SVector<T, NU>>, [coefficients, spanned, dual]: [List<T>; 3]) -> Self {
         Self {
-            primal: [SVector::zeros(); N],
-            coefficients: [T::zero(); M],
-            dual: [T::zero(); M],
+            primal,
+            coefficients,
+            spanned,
+            dual,
             slope: T::zero(),
             noise: T::zero(),
             size: T::zero(),
@@ -117,26 +121,32 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> Direction<T, NU
 }
 
 /// Rows that hold with equality, with their factorisation.
-#[derive(Clone, Debug)]
-pub(crate) struct WorkingSet<T, const NU: usize, const N: usize, const M: usize> {
-    rows: [Terms<T>; M],
-    /// L
-    factor: [[T; M]; M],
-    /// Q
-    basis: [[SVector<T, NU>; N]; M],
+#[derive(Debug)]
+pub(crate) struct WorkingSet<T: 'static, const NU: usize> {
+    rows: List<Terms<T>>,
+    /// L, row by row, each as long as `rows`.
+    factor: List<T>,
+    /// Q, row by row, each of `stages` entries.
+    basis: List<SVector<T, NU>>,
+    /// Length of the rows of Q.
+    stages: usize,
     /// Stages that any row depends on.
     support: usize,
     len: usize,
 }
 
-impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, NU, N, M> {
-    // Inlined, here and where it is called: built in place, it takes its room on the stack once.
-    #[inline(always)]
-    pub fn new() -> Self {
+impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
+    pub fn new(
+        rows: List<Terms<T>>,
+        factor: List<T>,
+        basis: List<SVector<T, NU>>,
+        stages: usize,
+    ) -> Self {
         Self {
-            rows: [Terms::empty(); M],
-            factor: [[T::zero(); M]; M],
-            basis: [[SVector::zeros(); N]; M],
+            rows,
+            factor,
+            basis,
+            stages,
             support: 0,
             len: 0,
         }
@@ -148,7 +158,7 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, N
     }
 
     pub fn is_full(&self) -> bool {
-        self.len >= M
+        self.len >= self.rows.len()
     }
 
     pub fn rows(&self) -> &[Terms<T>] {
@@ -159,16 +169,22 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, N
         self.rows.get_mut(..self.len).unwrap_or(&mut [])
     }
 
-    fn basis(&self) -> &[[SVector<T, NU>; N]] {
-        self.basis.get(..self.len).unwrap_or(&[])
+    /// The rows of Q in use.
+    fn basis(&self) -> impl Iterator<Item = &[SVector<T, NU>]> {
+        (0..self.len).map(|k| line(&self.basis, k, self.stages))
+    }
+
+    /// The rows of L in use.
+    fn factor(&self) -> impl DoubleEndedIterator<Item = &[T]> + ExactSizeIterator {
+        (0..self.len).map(|k| line(&self.factor, k, self.rows.len()))
     }
 
     /// The answer of the minimiser over the working set to the candidate `row`.
-    pub fn direction(&self, row: &Row<T, NU, N>, direction: &mut Direction<T, NU, N, M>) {
+    pub fn direction(&self, row: &Row<T, NU>, direction: &mut Direction<T, NU>) {
         direction.support = self.support.max(row.support);
-        direction.primal = row.alpha;
-        direction.coefficients = [T::zero(); M];
-        direction.dual = [T::zero(); M];
+        copy(&mut direction.primal, &row.alpha);
+        direction.coefficients.fill(T::zero());
+        direction.dual.fill(T::zero());
         let compliance = row.terms.compliance;
         let square = row.dot(&row.alpha) + compliance;
         direction.size = square.sqrt();
@@ -188,20 +204,21 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, N
     }
 
     /// Removes from `direction.primal` what the orthonormal rows span of it.
-    fn orthogonalize(&self, compliance: T, direction: &mut Direction<T, NU, N, M>) {
+    fn orthogonalize(&self, compliance: T, direction: &mut Direction<T, NU>) {
         let support = direction.support;
         let Direction {
             primal,
             coefficients,
+            spanned,
             dual,
             ..
         } = direction;
-        let mut spanned = [T::zero(); M];
+        spanned.fill(T::zero());
         for ((s, d), row) in spanned.iter_mut().zip(dual.iter()).zip(self.rows()) {
             *s = -row.compliance * *d;
         }
-        self.solve_lower(&mut spanned);
-        self.project(primal, &mut spanned);
+        self.solve_lower(spanned);
+        self.project(primal, spanned);
         for ((s, q), c) in spanned
             .iter()
             .zip(self.basis())
@@ -210,7 +227,7 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, N
             add(primal, q, -*s, support);
             *c += *s;
         }
-        *dual = *coefficients;
+        copy(dual, coefficients);
         self.solve_upper(dual);
         direction.slope = dot(primal, primal, support) + compliance;
         for (d, row) in dual.iter().zip(self.rows()) {
@@ -218,30 +235,28 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, N
         }
     }
 
-    fn noise(&self, direction: &Direction<T, NU, N, M>) -> T {
+    fn noise(&self, direction: &Direction<T, NU>) -> T {
         let rows = self.rows().iter().zip(direction.dual.iter());
         let terms = rows.fold(direction.size, |sum, (row, d)| sum + d.abs() * row.size);
         T::default_epsilon() * convert(8.0) * terms
     }
 
     /// Adds `row`, whose `direction` is current. The set must not be full.
-    pub fn append(&mut self, row: &Row<T, NU, N>, direction: &Direction<T, NU, N, M>) {
+    pub fn append(&mut self, row: &Row<T, NU>, direction: &Direction<T, NU>) {
         let m = self.len;
         let length = direction.slope.sqrt();
-        let places = (
-            self.rows.get_mut(m),
-            self.factor.get_mut(m),
-            self.basis.get_mut(m),
-        );
-        if let (Some(terms), Some(l), Some(q)) = places {
+        let places = self.rows.len();
+        if let Some(terms) = self.rows.get_mut(m) {
             *terms = Terms {
                 size: direction.size,
                 ..row.terms
             };
-            *l = direction.coefficients;
+            let l = line_mut(&mut self.factor, m, places);
+            copy(l, &direction.coefficients);
             if let Some(diagonal) = l.get_mut(m) {
                 *diagonal = length;
             }
+            let q = line_mut(&mut self.basis, m, self.stages);
             for (q, primal) in q.iter_mut().zip(direction.primal.iter()) {
                 *q = primal / length;
             }
@@ -255,8 +270,9 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, N
         let Some(removed) = self.rows().get(position).copied() else {
             return Terms::empty();
         };
-        close_gap(&mut self.rows, position, self.len);
-        close_gap(&mut self.factor, position, self.len);
+        let places = self.rows.len();
+        close_gap(&mut self.rows, position, self.len, 1);
+        close_gap(&mut self.factor, position, self.len, places);
         self.len -= 1;
         // Row k of L now reaches one column too far.
         for k in position..self.len {
@@ -267,7 +283,8 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, N
 
     /// Rotates columns `k` and `k` + 1 of L, and the same rows of Q, to clear entry (k, k + 1).
     fn rotate(&mut self, k: usize) {
-        let diagonal = self.factor.get(k).and_then(|row| row.get(k..k + 2));
+        let places = self.rows.len();
+        let diagonal = line(&self.factor, k, places).get(k..k + 2);
         let Some([a, b]) = diagonal else {
             return;
         };
@@ -276,41 +293,44 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, N
             return;
         }
         let (c, s) = (*a / length, *b / length);
-        for row in self.factor.iter_mut().take(self.len).skip(k) {
+        for row in k..self.len {
+            let row = line_mut(&mut self.factor, row, places);
             if let Some([left, right]) = row.get_mut(k..k + 2) {
                 (*left, *right) = (c * *left + s * *right, c * *right - s * *left);
             }
         }
-        if let Some([left, right]) = self.basis.get_mut(k..k + 2) {
-            for (left, right) in left.iter_mut().zip(right.iter_mut()).take(self.support) {
-                (*left, *right) = (*left * c + *right * s, *right * c - *left * s);
-            }
+        let (before, after) = self
+            .basis
+            .split_at_mut_checked((k + 1) * self.stages)
+            .unwrap_or_default();
+        let pairs = line_mut(before, k, self.stages).iter_mut().zip(after);
+        for (left, right) in pairs.take(self.support) {
+            (*left, *right) = (*left * c + *right * s, *right * c - *left * s);
         }
     }
 
     /// The shortest change of v that changes the working rows' slacks, elastic parts included,
-    /// by L `step`: v and the multipliers move by it.
-    pub fn shift(&mut self, step: &[T; M], v: &mut [SVector<T, NU>; N]) {
+    /// by L `step`: v and the multipliers move by it. `step` is overwritten.
+    pub fn shift(&mut self, step: &mut [T], v: &mut [SVector<T, NU>]) {
         for (s, q) in step.iter().zip(self.basis()) {
             add(v, q, *s, self.support);
         }
-        let mut change = *step;
-        self.solve_upper(&mut change);
-        for (row, change) in self.rows_mut().iter_mut().zip(change.iter()) {
+        self.solve_upper(step);
+        for (row, change) in self.rows_mut().iter_mut().zip(step.iter()) {
             row.active.multiplier += *change;
         }
     }
 
     /// step += Q `v`
-    pub fn project(&self, v: &[SVector<T, NU>; N], step: &mut [T; M]) {
+    pub fn project(&self, v: &[SVector<T, NU>], step: &mut [T]) {
         for (s, q) in step.iter_mut().zip(self.basis()) {
             *s += dot(q, v, self.support);
         }
     }
 
     /// L^-1 in place on the first `len` entries.
-    pub fn solve_lower(&self, rhs: &mut [T; M]) {
-        for (i, l) in self.factor.iter().enumerate().take(self.len) {
+    pub fn solve_lower(&self, rhs: &mut [T]) {
+        for (i, l) in self.factor().enumerate() {
             if let (Some((before, [entry, ..])), Some(pivot)) =
                 (rhs.split_at_mut_checked(i), l.get(i))
             {
@@ -321,8 +341,8 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, N
     }
 
     /// L'^-1 in place on the first `len` entries.
-    pub fn solve_upper(&self, rhs: &mut [T; M]) {
-        for (i, l) in self.factor.iter().enumerate().take(self.len).rev() {
+    pub fn solve_upper(&self, rhs: &mut [T]) {
+        for (i, l) in self.factor().enumerate().rev() {
             if let (Some((before, [entry, ..])), Some(pivot)) =
                 (rhs.split_at_mut_checked(i), l.get(i))
             {
@@ -335,22 +355,37 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> WorkingSet<T, N
     }
 }
 
-/// Moves the entries behind `position`, up to `len`, one place forward.
-fn close_gap<V>(entries: &mut [V], position: usize, len: usize) {
-    let mut places = entries.iter_mut().take(len).skip(position);
-    let Some(mut free) = places.next() else {
-        return;
-    };
-    for place in places {
-        core::mem::swap(free, place);
-        free = place;
+/// Moves the lines of `width` entries behind `position`, up to `len`, one place forward.
+fn close_gap<V>(entries: &mut [V], position: usize, len: usize, width: usize) {
+    if let Some(used) = entries.get_mut(position * width..len * width)
+        && width <= used.len()
+    {
+        used.rotate_left(width);
+    }
+}
+
+/// Line `k` of a matrix that is stored line by line, each of `width` entries.
+fn line<V>(entries: &[V], k: usize, width: usize) -> &[V] {
+    entries.get(k * width..(k + 1) * width).unwrap_or_default()
+}
+
+fn line_mut<V>(entries: &mut [V], k: usize, width: usize) -> &mut [V] {
+    entries
+        .get_mut(k * width..(k + 1) * width)
+        .unwrap_or_default()
+}
+
+/// Copies as many entries as both have.
+pub(crate) fn copy<V: Copy>(to: &mut [V], from: &[V]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = *from;
     }
 }
 
 /// a'b over the first `support` stages.
-fn dot<T: Scalar, const NU: usize, const N: usize>(
-    a: &[SVector<T, NU>; N],
-    b: &[SVector<T, NU>; N],
+fn dot<T: Scalar, const NU: usize>(
+    a: &[SVector<T, NU>],
+    b: &[SVector<T, NU>],
     support: usize,
 ) -> T {
     let stages = a.iter().zip(b.iter()).take(support);
@@ -358,9 +393,9 @@ fn dot<T: Scalar, const NU: usize, const N: usize>(
 }
 
 /// v += factor * a over the first `support` stages.
-fn add<T: Scalar, const NU: usize, const N: usize>(
-    v: &mut [SVector<T, NU>; N],
-    a: &[SVector<T, NU>; N],
+fn add<T: Scalar, const NU: usize>(
+    v: &mut [SVector<T, NU>],
+    a: &[SVector<T, NU>],
     factor: T,
     support: usize,
 ) {

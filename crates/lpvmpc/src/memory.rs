@@ -1,0 +1,123 @@
+//! The memory of solver and controller: how much of it a horizon takes, and where it comes from.
+
+use crate::list::List;
+use crate::model::Scalar;
+use crate::riccati::StageFactor;
+use crate::solution::{PackedRow, Side};
+use crate::working_set::Terms;
+use nalgebra::SVector;
+
+/// For what there is room.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Capacity {
+    /// Stages of the horizon, at least 1.
+    pub stages: usize,
+    /// Bounds that may be active at once. `stages * NU` rows fill the space of the inputs; a terminal
+    /// equality takes `NX` more, soft bounds as many as may be exceeded at once.
+    pub rows: usize,
+}
+
+/// Memory of a [`Solver`](crate::Solver): lists of these lengths, whatever is in them.
+#[derive(Debug)]
+pub struct SolverMemory<T: 'static, const NX: usize, const NU: usize> {
+    /// One for each stage.
+    pub factors: List<StageFactor<T, NX, NU>>,
+    /// Inputs at their bounds, one for each stage.
+    pub held: List<[Option<Side>; NU]>,
+    /// What the dual method works with.
+    pub dual: DualMemory<T, NU>,
+}
+
+/// Memory of the dual active-set method.
+#[derive(Debug)]
+pub struct DualMemory<T: 'static, const NU: usize> {
+    /// Deviations of the inputs, one of each for each stage.
+    pub deviations: [List<SVector<T, NU>>; 4],
+    /// Rows of the working set, one for each row.
+    pub terms: List<Terms<T>>,
+    /// Rows outside of it, one for each row.
+    pub resting: List<PackedRow<T>>,
+    /// Orthonormal rows: `rows * stages`.
+    pub basis: List<SVector<T, NU>>,
+    /// Triangular factor: `rows * rows`.
+    pub factor: List<T>,
+    /// Numbers, one of each for each row.
+    pub numbers: [List<T>; 5],
+}
+
+#[cfg(feature = "alloc")]
+impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
+    /// As much as is needed, on the heap.
+    pub fn allocate(Capacity { stages, rows }: Capacity) -> Self {
+        let deviations = || List::repeat(SVector::zeros(), stages);
+        let numbers = || List::repeat(T::zero(), rows);
+        Self {
+            factors: List::repeat(StageFactor::zeros(), stages),
+            held: List::repeat([None; NU], stages),
+            dual: DualMemory {
+                deviations: core::array::from_fn(|_| deviations()),
+                terms: List::repeat(Terms::empty(), rows),
+                resting: List::repeat(PackedRow::empty(), rows),
+                basis: List::repeat(SVector::zeros(), rows * stages),
+                factor: List::repeat(T::zero(), rows * rows),
+                numbers: core::array::from_fn(|_| numbers()),
+            },
+        }
+    }
+}
+
+/// The same as arrays, for memory that is known when a program is built: `N` stages, `M` rows.
+#[derive(Debug)]
+pub struct SolverArrays<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
+    factors: [StageFactor<T, NX, NU>; N],
+    deviations: [[SVector<T, NU>; N]; 4],
+    held: [[Option<Side>; NU]; N],
+    terms: [Terms<T>; M],
+    resting: [PackedRow<T>; M],
+    basis: [[SVector<T, NU>; N]; M],
+    factor: [[T; M]; M],
+    numbers: [[T; M]; 5],
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
+    SolverArrays<T, NX, NU, N, M>
+{
+    /// Arrays to be handed to a solver.
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self {
+            factors: [StageFactor::zeros(); N],
+            deviations: [[SVector::zeros(); N]; 4],
+            held: [[None; NU]; N],
+            terms: [Terms::empty(); M],
+            resting: [PackedRow::empty(); M],
+            basis: [[SVector::zeros(); N]; M],
+            factor: [[T::zero(); M]; M],
+            numbers: [[T::zero(); M]; 5],
+        }
+    }
+
+    /// The arrays as memory of a solver.
+    pub fn lend(&'static mut self) -> SolverMemory<T, NX, NU> {
+        SolverMemory {
+            factors: List::Static(&mut self.factors),
+            held: List::Static(&mut self.held),
+            dual: DualMemory {
+                deviations: self.deviations.each_mut().map(|list| List::Static(list)),
+                terms: List::Static(&mut self.terms),
+                resting: List::Static(&mut self.resting),
+                basis: List::Static(self.basis.as_flattened_mut()),
+                factor: List::Static(self.factor.as_flattened_mut()),
+                numbers: self.numbers.each_mut().map(|list| List::Static(list)),
+            },
+        }
+    }
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize> Default
+    for SolverArrays<T, NX, NU, N, M>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
