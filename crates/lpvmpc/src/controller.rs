@@ -1,6 +1,10 @@
 //! The LPVMPC controller: Algorithm 2 of the paper for any LPV model.
 
 use crate::kernel::product;
+use crate::list::List;
+#[cfg(feature = "alloc")]
+use crate::memory::Capacity;
+use crate::memory::{ControllerMemory, WorkspaceMemory};
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Bounds, Ocp, Penalty, Softness, Stage};
 use crate::plan::{Aim, Policy, Trial, at};
@@ -11,58 +15,70 @@ use crate::settings::{
 use crate::solution::{Solution, Status};
 use crate::solver::{Solver, SolverSettings, WarmStart};
 use crate::steady_state::{SteadyState, SteadyStateProblem};
+use crate::working_set::copy;
 use nalgebra::{SMatrix, SVector, convert};
 
 /// The state reference along the horizon, in state units.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reference<T, const NX: usize, const N: usize> {
-    /// x_ref at the stages 0 to N - 1.
-    pub stages: [SVector<T, NX>; N],
+pub struct Reference<'a, T, const NX: usize> {
+    /// x_ref at the stages from 0 on; from where it ends, `terminal`.
+    pub stages: &'a [SVector<T, NX>],
     /// x_ref at the end of the horizon.
     pub terminal: SVector<T, NX>,
 }
 
-impl<T: Scalar, const NX: usize, const N: usize> Reference<T, NX, N> {
+impl<T: Scalar, const NX: usize> Reference<'_, T, NX> {
     /// The same state at every stage.
     pub fn constant(x: SVector<T, NX>) -> Self {
         Self {
-            stages: [x; N],
+            stages: &[],
             terminal: x,
         }
+    }
+
+    /// x_ref at stage `i`.
+    #[inline(always)]
+    pub fn at(&self, i: usize) -> &SVector<T, NX> {
+        self.stages.get(i).unwrap_or(&self.terminal)
     }
 }
 
 /// Scratch memory of a step: the quadratic program of the sample and the solver.
 ///
 /// Nothing in it outlives a step, so controllers that run one after the other, such as those of
-/// a ballbot's two planes, share one. `NX` states, `NU` inputs, at most `N` stages and `M`
-/// simultaneously active bounds.
-#[derive(Clone, Debug)]
-pub struct Workspace<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
-    pub(crate) ocp: Ocp<T, NX, NU, N>,
-    pub(crate) solver: Solver<T, NX, NU, N, M>,
+/// a ballbot's two planes, share one. `NX` states, `NU` inputs.
+#[derive(Debug)]
+pub struct Workspace<T: 'static, const NX: usize, const NU: usize> {
+    pub(crate) ocp: Ocp<T, NX, NU>,
+    pub(crate) solver: Solver<T, NX, NU>,
     /// A rollout that may become the plan.
-    pub(crate) trial: Trial<T, NX, NU, N>,
+    pub(crate) trial: Trial<T, NX, NU>,
     /// Whether the stages have the affine terms and the damping of a descent.
     pub(crate) along_plan: bool,
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
-    Workspace<T, NX, NU, N, M>
-{
-    /// An empty workspace.
-    #[inline(always)]
-    pub fn new() -> Self {
+impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
+    /// A workspace in this memory.
+    pub fn new(memory: WorkspaceMemory<T, NX, NU>) -> Self {
         Self {
-            ocp: Ocp::default(),
-            solver: Solver::new(),
-            trial: Trial::new(),
+            ocp: Ocp::new(memory.stages),
+            solver: Solver::new(memory.solver),
+            trial: Trial {
+                u: memory.u,
+                x: memory.x,
+            },
             along_plan: false,
         }
     }
 
+    /// A workspace with memory of its own.
+    #[cfg(feature = "alloc")]
+    pub fn allocate(capacity: Capacity) -> Self {
+        Self::new(WorkspaceMemory::allocate(capacity))
+    }
+
     /// The quadratic program of the last step.
-    pub fn ocp(&self) -> &Ocp<T, NX, NU, N> {
+    pub fn ocp(&self) -> &Ocp<T, NX, NU> {
         &self.ocp
     }
 
@@ -77,12 +93,12 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         self.ocp.soft_x = soft_x;
         self.ocp.terminal.soft_x = soft_x;
         if core::mem::take(&mut self.along_plan) {
-            for stage in &mut self.ocp.stages {
+            for stage in self.ocp.stages.iter_mut() {
                 stage.c = SVector::zeros();
             }
         }
         if !self.ocp.stages.first().is_some_and(same) {
-            for stage in &mut self.ocp.stages {
+            for stage in self.ocp.stages.iter_mut() {
                 stage.q = weights.q;
                 stage.r = weights.r;
                 stage.x = *x;
@@ -93,36 +109,19 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
     }
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize> Default
-    for Workspace<T, NX, NU, N, M>
-{
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 /// The LPVMPC controller of one plant.
 ///
-/// `NX` states, `NU` inputs, `NS` scheduling parameters, at most `N` stages, at most `M`
-/// simultaneously active bounds. It holds everything that lives from sample to sample; the
+/// `NX` states, `NU` inputs, `NS` scheduling parameters. It holds everything that lives from sample to sample; the
 /// [`Workspace`] is handed in and may be shared between controllers.
-#[derive(Clone, Debug)]
-pub struct Controller<
-    P,
-    T,
-    const NX: usize,
-    const NU: usize,
-    const NS: usize,
-    const N: usize,
-    const M: usize,
-> {
+#[derive(Debug)]
+pub struct Controller<P, T: 'static, const NX: usize, const NU: usize, const NS: usize> {
     pub(crate) model: P,
     pub(crate) settings: ControllerSettings<T, NX, NU, NS>,
     /// The nonlinear model's states under the last plan, x_1 to x_N: where the next sample's
     /// stages 0 to N - 1 are expected to be.
-    pub(crate) rollout: [SVector<T, NX>; N],
+    pub(crate) rollout: List<SVector<T, NX>>,
     /// How the last plan is followed: of a descent only.
-    pub(crate) policy: Policy<T, NX, NU, N>,
+    pub(crate) policy: Policy<T, NX, NU>,
     /// Rolled-out minus predicted state at the end of the horizon.
     pub(crate) gap: SVector<T, NX>,
     pub(crate) initialised: bool,
@@ -135,11 +134,10 @@ pub struct Controller<
     prepared: Option<Result<(), Status<T>>>,
     /// The state that the last feedback was given, while the rest of its step is to be made up for.
     answered: Option<SVector<T, NX>>,
-    pub(crate) solution: Solution<T, NX, NU, N, M>,
+    pub(crate) solution: Solution<T, NX, NU>,
 }
 
-impl<P, T, const NX: usize, const NU: usize, const NS: usize, const N: usize, const M: usize>
-    Controller<P, T, NX, NU, NS, N, M>
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> Controller<P, T, NX, NU, NS>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
@@ -151,13 +149,16 @@ where
     pub fn new(
         model: P,
         settings: ControllerSettings<T, NX, NU, NS>,
+        memory: ControllerMemory<T, NX, NU>,
     ) -> Result<Self, ControllerError> {
-        check(&settings, N)?;
+        let ControllerMemory { x, u, gain, active } = memory;
+        let ([rollout, x], [planned, u]) = (x, u);
+        check(&settings, rollout.len())?;
         Ok(Self {
             model,
             settings,
-            rollout: [SVector::zeros(); N],
-            policy: Policy::new(),
+            rollout,
+            policy: Policy::new(planned, gain),
             gap: SVector::zeros(),
             initialised: false,
             problems: 0,
@@ -165,8 +166,21 @@ where
             target: None,
             prepared: None,
             answered: None,
-            solution: Solution::default(),
+            solution: Solution::new(u, x, active),
         })
+    }
+
+    /// A controller with memory of its own, for the horizon of its settings.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    #[cfg(feature = "alloc")]
+    pub fn allocate(
+        model: P,
+        settings: ControllerSettings<T, NX, NU, NS>,
+    ) -> Result<Self, ControllerError> {
+        let memory = ControllerMemory::allocate(settings.capacity());
+        Self::new(model, settings, memory)
     }
 
     /// One sample of Algorithm 2: from the measured state `x` and the reference along the
@@ -176,9 +190,9 @@ where
     pub fn step(
         &mut self,
         x: &SVector<T, NX>,
-        reference: &Reference<T, NX, N>,
-        workspace: &mut Workspace<T, NX, NU, N, M>,
-    ) -> &Solution<T, NX, NU, N, M> {
+        reference: &Reference<'_, T, NX>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) -> &Solution<T, NX, NU> {
         self.make_up();
         workspace.pose(&self.settings);
         let aim = &self.aim(reference);
@@ -203,8 +217,8 @@ where
     /// controller's alone. Without a past there is nothing to prepare.
     pub fn prepare(
         &mut self,
-        reference: &Reference<T, NX, N>,
-        workspace: &mut Workspace<T, NX, NU, N, M>,
+        reference: &Reference<'_, T, NX>,
+        workspace: &mut Workspace<T, NX, NU>,
     ) {
         self.prepared = None;
         workspace.pose(&self.settings);
@@ -220,7 +234,7 @@ where
             if !self.initialised {
                 return;
             }
-            let x = *at(&self.rollout, 0);
+            let x = at(&self.rollout, 0);
             self.predict(&x, &mut workspace.ocp);
             self.track(aim, &mut workspace.ocp);
         }
@@ -236,9 +250,9 @@ where
     pub fn feedback(
         &mut self,
         x: &SVector<T, NX>,
-        reference: &Reference<T, NX, N>,
-        workspace: &mut Workspace<T, NX, NU, N, M>,
-    ) -> &Solution<T, NX, NU, N, M> {
+        reference: &Reference<'_, T, NX>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) -> &Solution<T, NX, NU> {
         let Some(factorized) = self.prepared.take() else {
             return self.step(x, reference, workspace);
         };
@@ -257,7 +271,7 @@ where
         self.prepared = None;
         if let Some(x) = self.answered.take() {
             self.roll_out(&x);
-            self.policy.u = self.solution.u;
+            copy(&mut self.policy.u, &self.solution.u);
         }
     }
 
@@ -287,7 +301,7 @@ where
     }
 
     /// What to follow: the target where the reference is at rest, the reference where it moves.
-    fn aim<'a>(&mut self, reference: &'a Reference<T, NX, N>) -> Aim<'a, T, NX, NU, N> {
+    fn aim<'a>(&mut self, reference: &'a Reference<'a, T, NX>) -> Aim<'a, T, NX, NU> {
         self.find_target(&reference.terminal);
         let mut stages = reference.stages.iter().take(self.settings.horizon);
         let rests = stages.all(|x_ref| *x_ref == reference.terminal);
@@ -326,11 +340,11 @@ where
     pub fn reset(&mut self) {
         self.initialised = false;
         (self.prepared, self.answered) = (None, None);
-        self.solution = Solution::default();
+        self.solution.clear();
     }
 
     /// The plan of the last step.
-    pub fn solution(&self) -> &Solution<T, NX, NU, N, M> {
+    pub fn solution(&self) -> &Solution<T, NX, NU> {
         &self.solution
     }
 
@@ -352,19 +366,21 @@ where
 
     /// The states x_1 to x_N that the nonlinear model reaches under the last plan.
     pub fn rollout(&self) -> &[SVector<T, NX>] {
-        &self.rollout[..self.settings.horizon]
+        self.rollout
+            .get(..self.settings.horizon)
+            .unwrap_or_default()
     }
 
     /// The paper's cost J of the last plan (Algorithm 1), constant terms included, on the
     /// states predicted from `x`, for the arguments of the last step.
-    pub fn tracking_cost(&self, x: &SVector<T, NX>, reference: &Reference<T, NX, N>) -> T {
+    pub fn tracking_cost(&self, x: &SVector<T, NX>, reference: &Reference<'_, T, NX>) -> T {
         let Weights { q, r } = &self.settings.weights;
         let u_ref = self.u_ref();
         let mut total = T::zero();
         let mut x = x;
         let steps = self.solution.u.iter().zip(self.solution.x.iter());
-        for ((u, x_next), x_ref) in steps.zip(&reference.stages).take(self.settings.horizon) {
-            let error = x - x_ref;
+        for (i, (u, x_next)) in steps.enumerate().take(self.settings.horizon) {
+            let error = x - reference.at(i);
             let input = u - u_ref;
             total += (q * error).dot(&error) + (r * input).dot(&input);
             x = x_next;
@@ -381,14 +397,14 @@ where
     /// Algorithm 2, step 1: without a past, the plant is expected to stay at `x`.
     fn initialise_scheduling(&mut self, x: &SVector<T, NX>) {
         if !self.initialised {
-            self.rollout = [*x; N];
-            self.solution.u = [SVector::zeros(); N];
+            self.rollout.fill(*x);
+            self.solution.u.fill(SVector::zeros());
         }
     }
 
     /// Algorithm 1, lines 1 to 8: the predictor's matrices along the scheduling window, which
     /// is that of the last rollout (Algorithm 2, steps 5 and 9).
-    fn predict(&self, x: &SVector<T, NX>, ocp: &mut Ocp<T, NX, NU, N>) {
+    fn predict(&self, x: &SVector<T, NX>, ocp: &mut Ocp<T, NX, NU>) {
         ocp.horizon = self.settings.horizon;
         ocp.x0 = *x;
         self.linearize(x, &self.solution.u, 1, ocp);
@@ -401,13 +417,13 @@ where
     fn linearize(
         &self,
         x: &SVector<T, NX>,
-        inputs: &[SVector<T, NU>; N],
+        inputs: &[SVector<T, NU>],
         first: usize,
-        ocp: &mut Ocp<T, NX, NU, N>,
+        ocp: &mut Ocp<T, NX, NU>,
     ) {
         let ControllerSettings { t_s, predictor, .. } = &self.settings;
         let horizon = self.settings.horizon;
-        let states = core::iter::once(x).chain(&self.rollout).skip(first);
+        let states = core::iter::once(x).chain(self.rollout.iter()).skip(first);
         let inputs = inputs.iter().take(horizon);
         let window = states.zip(inputs.clone().skip(first).chain(inputs.last()));
         let held = match &self.settings.scheduling {
@@ -421,7 +437,7 @@ where
 
     /// The further quadratic programs of the sample, each along the plan of the one before.
     #[inline(never)]
-    fn iterate(&mut self, x: &SVector<T, NX>, workspace: &mut Workspace<T, NX, NU, N, M>) {
+    fn iterate(&mut self, x: &SVector<T, NX>, workspace: &mut Workspace<T, NX, NU>) {
         self.problems = 1;
         let Workspace { ocp, solver, .. } = workspace;
         let settings = SolverSettings {
@@ -441,7 +457,7 @@ where
 
     /// Algorithm 1, cost: the reference enters the linear terms.
     #[inline(never)]
-    pub(crate) fn track(&self, aim: &Aim<'_, T, NX, NU, N>, ocp: &mut Ocp<T, NX, NU, N>) {
+    pub(crate) fn track(&self, aim: &Aim<'_, T, NX, NU>, ocp: &mut Ocp<T, NX, NU>) {
         let q = -self.settings.weights.q;
         let linear_u = -product(&self.settings.weights.r, &aim.u_ref);
         let stages = ocp.stages.iter_mut().enumerate();
@@ -469,7 +485,7 @@ where
     #[inline(never)]
     fn roll_out(&mut self, x: &SVector<T, NX>) {
         let mut state = *x;
-        let places = self.rollout.iter_mut().zip(&self.solution.u);
+        let places = self.rollout.iter_mut().zip(self.solution.u.iter());
         for (place, u) in places.take(self.settings.horizon) {
             state = next_state(&self.model, &self.settings, &state, u);
             *place = state;

@@ -22,6 +22,7 @@ use crate::policy::input_at;
 use crate::settings::ControllerSettings;
 use crate::solution::Status;
 use crate::solver::{SolverSettings, WarmStart};
+use crate::working_set::copy;
 use nalgebra::{SMatrix, SVector, convert};
 
 /// Where the matrices of a program come from.
@@ -73,8 +74,7 @@ const PARTS: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.01, 0.0];
 /// A plan that costs so many times the last one is no longer the only candidate.
 const JUMP: f64 = 2.0;
 
-impl<P, T, const NX: usize, const NU: usize, const NS: usize, const N: usize, const M: usize>
-    Controller<P, T, NX, NU, NS, N, M>
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> Controller<P, T, NX, NU, NS>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
@@ -84,9 +84,9 @@ where
     pub(crate) fn descend(
         &mut self,
         x: &SVector<T, NX>,
-        aim: &Aim<'_, T, NX, NU, N>,
+        aim: &Aim<'_, T, NX, NU>,
         tolerance: T,
-        workspace: &mut Workspace<T, NX, NU, N, M>,
+        workspace: &mut Workspace<T, NX, NU>,
     ) {
         self.problems = 0;
         self.track(aim, &mut workspace.ocp);
@@ -161,8 +161,8 @@ where
     fn first_plan(
         &mut self,
         x: &SVector<T, NX>,
-        aim: &Aim<'_, T, NX, NU, N>,
-        workspace: &mut Workspace<T, NX, NU, N, M>,
+        aim: &Aim<'_, T, NX, NU>,
+        workspace: &mut Workspace<T, NX, NU>,
     ) -> bool {
         let last = self.policy.cost;
         let merit = self.merit(aim, Prices::none());
@@ -188,9 +188,9 @@ where
     fn regulate(
         &mut self,
         x: &SVector<T, NX>,
-        aim: &Aim<'_, T, NX, NU, N>,
+        aim: &Aim<'_, T, NX, NU>,
         mut best: Option<T>,
-        workspace: &mut Workspace<T, NX, NU, N, M>,
+        workspace: &mut Workspace<T, NX, NU>,
     ) -> Option<T> {
         let (gain, indifferent) = self.regulator(aim, workspace);
         let away = (x - aim.end()).component_mul(&indifferent);
@@ -205,7 +205,7 @@ where
             {
                 best = cost;
                 self.take_if_some(cost, &workspace.trial);
-                self.policy.gain = [gain; N];
+                self.policy.gain.fill(gain);
                 self.policy.damping = T::zero();
             }
             if away.amax() == T::zero() {
@@ -220,44 +220,41 @@ where
     /// rule), 0 for the others. The program in the workspace is overwritten.
     fn regulator(
         &self,
-        aim: &Aim<'_, T, NX, NU, N>,
-        workspace: &mut Workspace<T, NX, NU, N, M>,
+        aim: &Aim<'_, T, NX, NU>,
+        workspace: &mut Workspace<T, NX, NU>,
     ) -> (SMatrix<T, NU, NX>, SVector<T, NX>) {
         let Workspace { ocp, solver, .. } = workspace;
         let (a, b) = self.sample_matrices(aim.end(), &aim.u_ref, Along::Jacobian);
-        for stage in &mut ocp.stages {
+        for stage in ocp.stages.iter_mut() {
             (stage.a, stage.b) = (a, b);
             stage.c = SVector::zeros();
             stage.r = self.settings.weights.r;
         }
-        ocp.horizon = N;
+        ocp.horizon = ocp.stages.len();
         let indifferent = SVector::from_fn(|j, _| {
             let column = (0..NX).all(|i| a[(i, j)] == one_if(i == j));
             one_if(column)
         });
         let gain = match solver.factorize(ocp) {
-            Ok(()) => at(solver.factors(), 0).gain,
+            Ok(()) => solver
+                .factors()
+                .first()
+                .map_or_else(SMatrix::zeros, |factor| factor.gain),
             Err(_) => SMatrix::zeros(),
         };
         (gain, indifferent)
     }
 
     /// The plan one sample on; its last stage is the regulator's.
-    fn shift(&mut self, aim: &Aim<'_, T, NX, NU, N>) {
+    fn shift(&mut self, aim: &Aim<'_, T, NX, NU>) {
         let last = self.last_stage();
         let gain = *at(&self.policy.gain, last);
         let planned = (aim.end(), &aim.u_ref);
         let end = at(&self.rollout, last);
         let u = input_at(end, planned, &gain, &self.settings.u);
         // What comes in from beyond the horizon is overwritten.
-        self.policy.u.rotate_left(1);
-        self.policy.gain.rotate_left(1);
-        if let Some(place) = self.policy.u.get_mut(last) {
-            *place = u;
-        }
-        if let Some(place) = self.policy.gain.get_mut(last) {
-            *place = gain;
-        }
+        move_on(&mut self.policy.u, last, u);
+        move_on(&mut self.policy.gain, last, gain);
     }
 
     /// The matrices of the program along the plan from `x`. Their affine terms make the linear model
@@ -266,9 +263,9 @@ where
     fn linearize_plan(
         &self,
         x: &SVector<T, NX>,
-        aim: &Aim<'_, T, NX, NU, N>,
+        aim: &Aim<'_, T, NX, NU>,
         along: Along,
-        workspace: &mut Workspace<T, NX, NU, N, M>,
+        workspace: &mut Workspace<T, NX, NU>,
     ) {
         workspace.along_plan = true;
         let ocp = &mut workspace.ocp;
@@ -305,7 +302,7 @@ where
         }
     }
 
-    fn solve_program(&mut self, workspace: &mut Workspace<T, NX, NU, N, M>) {
+    fn solve_program(&mut self, workspace: &mut Workspace<T, NX, NU>) {
         let warm_start = match self.problems {
             0 => self.settings.solver.warm_start,
             _ => WarmStart::Same,
@@ -322,7 +319,7 @@ where
     }
 
     /// The plan is followed with the gains of the last program.
-    pub(crate) fn take_gains(&mut self, workspace: &Workspace<T, NX, NU, N, M>) {
+    pub(crate) fn take_gains(&mut self, workspace: &Workspace<T, NX, NU>) {
         if self.solution.status.is_solved() {
             let factors = workspace.solver.factors();
             for (gain, factor) in self.policy.gain.iter_mut().zip(factors) {
@@ -335,10 +332,10 @@ where
     fn improve(
         &mut self,
         x: &SVector<T, NX>,
-        aim: &Aim<'_, T, NX, NU, N>,
+        aim: &Aim<'_, T, NX, NU>,
         tolerance: T,
         prices: &mut Prices<T, NX>,
-        workspace: &mut Workspace<T, NX, NU, N, M>,
+        workspace: &mut Workspace<T, NX, NU>,
     ) -> Outcome<T> {
         let last = self.last_stage();
         let answer = &self.solution;
@@ -391,9 +388,9 @@ where
     fn search_line<'a>(
         &'a self,
         x: &SVector<T, NX>,
-        merit: &Merit<'_, T, NX, NU, N>,
+        merit: &Merit<'_, T, NX, NU>,
         expected: T,
-        trial: &mut Trial<T, NX, NU, N>,
+        trial: &mut Trial<T, NX, NU>,
         answer: &dyn Fn(usize) -> (&'a SVector<T, NX>, &'a SVector<T, NU>),
     ) -> Option<(T, T)>
     where
@@ -429,8 +426,8 @@ where
     pub(crate) fn prepare_descent(
         &mut self,
         answered: Option<SVector<T, NX>>,
-        aim: &Aim<'_, T, NX, NU, N>,
-        workspace: &mut Workspace<T, NX, NU, N, M>,
+        aim: &Aim<'_, T, NX, NU>,
+        workspace: &mut Workspace<T, NX, NU>,
     ) -> bool {
         self.track(aim, &mut workspace.ocp);
         let last = self.last_stage();
@@ -486,9 +483,9 @@ where
 
     fn merit<'a>(
         &self,
-        aim: &'a Aim<'a, T, NX, NU, N>,
+        aim: &'a Aim<'a, T, NX, NU>,
         prices: Prices<T, NX>,
-    ) -> Merit<'a, T, NX, NU, N> {
+    ) -> Merit<'a, T, NX, NU> {
         Merit::new(&self.settings, aim, prices)
     }
 
@@ -499,8 +496,8 @@ where
     fn roll_out_plan(
         &self,
         x: &SVector<T, NX>,
-        merit: &Merit<'_, T, NX, NU, N>,
-        trial: &mut Trial<T, NX, NU, N>,
+        merit: &Merit<'_, T, NX, NU>,
+        trial: &mut Trial<T, NX, NU>,
         input: &dyn Fn(usize, &SVector<T, NX>) -> SVector<T, NU>,
     ) -> Option<T> {
         let mut state = *x;
@@ -517,10 +514,10 @@ where
     }
 
     /// The trial becomes the plan, if it has a cost.
-    fn take_if_some(&mut self, cost: Option<T>, trial: &Trial<T, NX, NU, N>) {
+    fn take_if_some(&mut self, cost: Option<T>, trial: &Trial<T, NX, NU>) {
         if let Some(cost) = cost {
-            self.policy.u = trial.u;
-            self.rollout = trial.x;
+            copy(&mut self.policy.u, &trial.u);
+            copy(&mut self.rollout, &trial.x);
             self.policy.cost = cost;
             self.initialised = true;
         }
@@ -528,15 +525,17 @@ where
 
     /// The plan becomes the answer.
     fn publish(&mut self, status: Status<T>) {
-        self.solution.u = self.policy.u;
-        self.solution.x = self.rollout;
+        copy(&mut self.solution.u, &self.policy.u);
+        copy(&mut self.solution.x, &self.rollout);
         self.solution.status = status;
     }
 
     /// The state is not finite, or nothing that follows from it is.
     fn give_up(&mut self) {
         self.reset();
-        self.solution.u = [self.settings.u.project(&SVector::zeros()); N];
+        self.solution
+            .u
+            .fill(self.settings.u.project(&SVector::zeros()));
         self.solution.status = Status::NotFinite;
     }
 }
@@ -548,6 +547,18 @@ impl Along {
             Self::Jacobian if far => Self::Scheduling,
             _ => Self::Jacobian,
         }
+    }
+}
+
+/// The entries one stage earlier, with `end` as that of stage `last`.
+fn move_on<V: Copy>(entries: &mut [V], last: usize, end: V) {
+    for i in 0..last {
+        if let Some([place, next]) = entries.get_mut(i..i + 2) {
+            *place = *next;
+        }
+    }
+    if let Some(place) = entries.get_mut(last) {
+        *place = end;
     }
 }
 

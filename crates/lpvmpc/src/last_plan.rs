@@ -2,7 +2,8 @@
 
 use crate::controller::Controller;
 use crate::model::{LpvModel, Scalar};
-use crate::solution::{ActiveRow, Solution};
+use crate::solution::ActiveRow;
+use crate::working_set::copy;
 use crate::{controller::next_state, plan::at};
 use nalgebra::{SMatrix, SVector};
 
@@ -22,8 +23,7 @@ pub struct LastPlan<'a, T, const NX: usize, const NU: usize> {
     pub damping: T,
 }
 
-impl<P, T, const NX: usize, const NU: usize, const NS: usize, const N: usize, const M: usize>
-    Controller<P, T, NX, NU, NS, N, M>
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> Controller<P, T, NX, NU, NS>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
@@ -56,7 +56,7 @@ where
         let (Some(mut x), Some(mut u)) = (plan.x.first().copied(), plan.u.first().copied()) else {
             return;
         };
-        self.solution = Solution::default();
+        self.solution.clear();
         for i in 0..self.settings.horizon {
             u = plan.u.get(i).copied().unwrap_or(u);
             x = match plan.x.get(i) {
@@ -76,7 +76,7 @@ where
             // Those that do not fit are found again.
             self.solution.active.push(row);
         }
-        self.policy.u = self.solution.u;
+        copy(&mut self.policy.u, &self.solution.u);
         (self.policy.cost, self.policy.damping) = (plan.cost, plan.damping);
         self.initialised = at(&self.rollout, self.last_stage())
             .iter()

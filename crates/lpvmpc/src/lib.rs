@@ -16,7 +16,6 @@ mod delay;
 mod descent;
 mod estimator;
 mod farkas;
-mod guarded;
 mod held_inputs;
 mod kernel;
 mod kkt;
@@ -47,12 +46,12 @@ pub use estimator::{
     Verdict,
 };
 pub use farkas::infeasibility_margin;
-pub use guarded::{
-    Decision, GuardedController, GuardedError, GuardedIterations, GuardedSettings, GuardedStep,
-    GuardedWorkspace, Rollout, SetPoints, TerminalSet, share_of_bounds,
-};
 pub use kkt::{KktResidual, kkt_residual};
 pub use last_plan::LastPlan;
+pub use list::List;
+pub use memory::{
+    Capacity, ControllerMemory, DualMemory, SolverArrays, SolverMemory, WorkspaceMemory,
+};
 pub use model::{LpvModel, Scalar};
 pub use ocp::{Bounds, Ocp, Penalty, Softness, Stage, Terminal};
 pub use predictor::{Predictor, Rk4};

@@ -61,6 +61,26 @@ impl<V> DerefMut for List<V> {
     }
 }
 
+impl<'a, V> IntoIterator for &'a List<V> {
+    type Item = &'a V;
+    type IntoIter = core::slice::Iter<'a, V>;
+
+    #[inline(always)]
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+impl<'a, V> IntoIterator for &'a mut List<V> {
+    type Item = &'a mut V;
+    type IntoIter = core::slice::IterMut<'a, V>;
+
+    #[inline(always)]
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter_mut()
+    }
+}
+
 #[cfg(feature = "alloc")]
 impl<V: Clone> Clone for List<V> {
     /// On the heap, wherever the original is.

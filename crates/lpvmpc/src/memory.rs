@@ -2,10 +2,11 @@
 
 use crate::list::List;
 use crate::model::Scalar;
+use crate::ocp::Stage;
 use crate::riccati::StageFactor;
 use crate::solution::{PackedRow, Side};
 use crate::working_set::Terms;
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 /// For what there is room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,5 +120,58 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
 {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+/// Memory of a [`Workspace`](crate::Workspace).
+#[derive(Debug)]
+pub struct WorkspaceMemory<T: 'static, const NX: usize, const NU: usize> {
+    /// The program's stages, one for each stage.
+    pub stages: List<Stage<T, NX, NU>>,
+    /// Of the solver.
+    pub solver: SolverMemory<T, NX, NU>,
+    /// Inputs of a rollout, one for each stage.
+    pub u: List<SVector<T, NU>>,
+    /// Its states, one for each stage.
+    pub x: List<SVector<T, NX>>,
+}
+
+/// Memory of a [`Controller`](crate::Controller).
+#[derive(Debug)]
+pub struct ControllerMemory<T: 'static, const NX: usize, const NU: usize> {
+    /// States of the plan and of the program's answer, one of each for each stage.
+    pub x: [List<SVector<T, NX>>; 2],
+    /// Inputs of both.
+    pub u: [List<SVector<T, NU>>; 2],
+    /// Gains of the plan, one for each stage.
+    pub gain: List<SMatrix<T, NU, NX>>,
+    /// Active rows, one for each row.
+    pub active: List<PackedRow<T>>,
+}
+
+#[cfg(feature = "alloc")]
+impl<T: Scalar, const NX: usize, const NU: usize> WorkspaceMemory<T, NX, NU> {
+    /// As much as is needed, on the heap.
+    pub fn allocate(capacity: Capacity) -> Self {
+        let Capacity { stages, .. } = capacity;
+        Self {
+            stages: List::repeat(Stage::new(), stages),
+            solver: SolverMemory::allocate(capacity),
+            u: List::repeat(SVector::zeros(), stages),
+            x: List::repeat(SVector::zeros(), stages),
+        }
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<T: Scalar, const NX: usize, const NU: usize> ControllerMemory<T, NX, NU> {
+    /// As much as is needed, on the heap.
+    pub fn allocate(Capacity { stages, rows }: Capacity) -> Self {
+        Self {
+            x: core::array::from_fn(|_| List::repeat(SVector::zeros(), stages)),
+            u: core::array::from_fn(|_| List::repeat(SVector::zeros(), stages)),
+            gain: List::repeat(SMatrix::zeros(), stages),
+            active: List::repeat(PackedRow::empty(), rows),
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::controller::Reference;
 use crate::kernel::product;
+use crate::list::List;
 use crate::model::Scalar;
 use crate::ocp::{Bounds, Softness};
 use crate::settings::{ControllerSettings, TerminalIngredient, Weights};
@@ -10,26 +11,20 @@ use crate::solver::{excess, price};
 use nalgebra::{SMatrix, SVector, convert};
 
 /// What a sample's cost draws state and input to.
-pub(crate) struct Aim<'a, T, const NX: usize, const NU: usize, const N: usize> {
+pub(crate) struct Aim<'a, T, const NX: usize, const NU: usize> {
     /// As it was given.
-    pub reference: &'a Reference<T, NX, N>,
+    pub reference: &'a Reference<'a, T, NX>,
     /// The steady state in its place, where it is the same at all stages.
     pub rest: Option<SVector<T, NX>>,
     /// The input that costs nothing.
     pub u_ref: SVector<T, NU>,
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Aim<'_, T, NX, NU, N> {
+impl<T: Scalar, const NX: usize, const NU: usize> Aim<'_, T, NX, NU> {
     /// x_ref at stage `i`.
     #[inline(always)]
     pub fn at(&self, i: usize) -> &SVector<T, NX> {
-        let moving = || {
-            self.reference
-                .stages
-                .get(i)
-                .unwrap_or(&self.reference.terminal)
-        };
-        self.rest.as_ref().unwrap_or_else(moving)
+        self.rest.as_ref().unwrap_or_else(|| self.reference.at(i))
     }
 
     /// x_ref at the end of the horizon.
@@ -41,23 +36,23 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Aim<'_, T, NX,
 
 /// How a plan is followed: stage i has the input u_i + K_i (x - x_i). The states x_i are the
 /// controller's rollout.
-#[derive(Clone, Debug)]
-pub(crate) struct Policy<T, const NX: usize, const NU: usize, const N: usize> {
+#[derive(Debug)]
+pub(crate) struct Policy<T: 'static, const NX: usize, const NU: usize> {
     /// u_0 to u_{N-1}.
-    pub u: [SVector<T, NU>; N],
+    pub u: List<SVector<T, NU>>,
     /// K_0 to K_{N-1}.
-    pub gain: [SMatrix<T, NU, NX>; N],
+    pub gain: List<SMatrix<T, NU, NX>>,
     /// The merit of the plan.
     pub cost: T,
     /// Extra cost of (u - u_i)^2 in the next program along the plan.
     pub damping: T,
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Policy<T, NX, NU, N> {
-    pub fn new() -> Self {
+impl<T: Scalar, const NX: usize, const NU: usize> Policy<T, NX, NU> {
+    pub fn new(u: List<SVector<T, NU>>, gain: List<SMatrix<T, NU, NX>>) -> Self {
         Self {
-            u: [SVector::zeros(); N],
-            gain: [SMatrix::zeros(); N],
+            u,
+            gain,
             cost: T::zero(),
             damping: T::zero(),
         }
@@ -65,27 +60,20 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Policy<T, NX, 
 }
 
 /// A rollout that may become the plan: inputs, and the states x_1 to x_N that follow.
-#[derive(Clone, Debug)]
-pub(crate) struct Trial<T, const NX: usize, const NU: usize, const N: usize> {
-    pub u: [SVector<T, NU>; N],
-    pub x: [SVector<T, NX>; N],
+#[derive(Debug)]
+pub(crate) struct Trial<T: 'static, const NX: usize, const NU: usize> {
+    pub u: List<SVector<T, NU>>,
+    pub x: List<SVector<T, NX>>,
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Trial<T, NX, NU, N> {
-    #[inline(always)]
-    pub fn new() -> Self {
-        Self {
-            u: [SVector::zeros(); N],
-            x: [SVector::zeros(); N],
-        }
-    }
-}
-
-/// The entry of stage `i`. Beyond the last there is none, and the last is taken: so the machine code
-/// has no path to a panic.
+/// The entry of stage `i`; beyond the last, the last.
 #[inline(always)]
-pub(crate) fn at<V, const N: usize>(list: &[V; N], i: usize) -> &V {
-    &list[i.min(N - 1)]
+pub(crate) fn at<T: Scalar, const R: usize, const C: usize>(
+    list: &[SMatrix<T, R, C>],
+    i: usize,
+) -> SMatrix<T, R, C> {
+    let entry = list.get(i).or(list.last());
+    entry.copied().unwrap_or_else(SMatrix::zeros)
 }
 
 /// Prices per unit of what must not be: an exact penalty has them above the multipliers.
@@ -106,7 +94,7 @@ impl<T: Scalar, const NX: usize> Prices<T, NX> {
     }
 
     /// Raises them above the multipliers of a program, whose cost is half of J.
-    pub fn raise<const M: usize>(&mut self, active: &ActiveSet<T, M>) {
+    pub fn raise(&mut self, active: &ActiveSet<T>) {
         const FACTOR: f64 = 4.0;
         for row in active.iter() {
             let Quantity::State(j) = row.bound.quantity else {
@@ -124,20 +112,20 @@ impl<T: Scalar, const NX: usize> Prices<T, NX> {
 }
 
 /// The merit of a trajectory: the cost J, with an exact penalty for what must not be.
-pub(crate) struct Merit<'a, T, const NX: usize, const NU: usize, const N: usize> {
+pub(crate) struct Merit<'a, T, const NX: usize, const NU: usize> {
     weights: Weights<T, NX, NU>,
     terminal: TerminalIngredient<T, NX>,
     bounds: Bounds<T, NX>,
     soft: Softness<T, NX>,
     horizon: usize,
-    aim: &'a Aim<'a, T, NX, NU, N>,
+    aim: &'a Aim<'a, T, NX, NU>,
     prices: Prices<T, NX>,
 }
 
-impl<'a, T: Scalar, const NX: usize, const NU: usize, const N: usize> Merit<'a, T, NX, NU, N> {
+impl<'a, T: Scalar, const NX: usize, const NU: usize> Merit<'a, T, NX, NU> {
     pub fn new<const NS: usize>(
         settings: &ControllerSettings<T, NX, NU, NS>,
-        aim: &'a Aim<'a, T, NX, NU, N>,
+        aim: &'a Aim<'a, T, NX, NU>,
         prices: Prices<T, NX>,
     ) -> Self {
         Self {
@@ -175,7 +163,7 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize, const N: usize> Merit<'a, 
     }
 
     /// Of the inputs `u` and the states `x`_1 to `x`_N that follow `x0`.
-    pub fn of(&self, x0: &SVector<T, NX>, u: &[SVector<T, NU>; N], x: &[SVector<T, NX>; N]) -> T {
+    pub fn of(&self, x0: &SVector<T, NX>, u: &[SVector<T, NU>], x: &[SVector<T, NX>]) -> T {
         let mut before = x0;
         let mut total = T::zero();
         for (i, (u, next)) in u.iter().zip(x).enumerate().take(self.horizon) {

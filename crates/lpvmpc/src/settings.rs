@@ -1,5 +1,6 @@
 //! What defines a controller besides its model, and what can be wrong with it.
 
+use crate::memory::Capacity;
 use crate::model::Scalar;
 use crate::ocp::{Bounds, Penalty, Softness};
 use crate::predictor::{Predictor, Rk4};
@@ -154,6 +155,16 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
             input_reference: InputReference::SteadyState,
             iterations: Iterations::default(),
             solver: SolverSettings::default(),
+        }
+    }
+
+    /// What a controller with these settings needs: the horizon, and a row for every input, every soft
+    /// state bound and every component of a terminal equality.
+    pub fn capacity(&self) -> Capacity {
+        let soft = self.soft_x.iter().flatten().count();
+        Capacity {
+            stages: self.horizon,
+            rows: self.horizon * (NU + soft) + NX,
         }
     }
 

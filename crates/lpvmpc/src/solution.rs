@@ -348,6 +348,16 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solution<T, NX, NU> {
         }
     }
 
+    /// Back to a solution of nothing yet.
+    pub fn clear(&mut self) {
+        self.u.fill(SVector::zeros());
+        self.x.fill(SVector::zeros());
+        self.cost = T::zero();
+        self.status = Status::Solved;
+        self.active.clear();
+        self.changes = 0;
+    }
+
     /// The same on the heap.
     #[cfg(feature = "alloc")]
     pub fn allocate(Capacity { stages, rows }: Capacity) -> Self {
