@@ -19,7 +19,7 @@ use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
 use crate::plan::{Aim, Merit, Prices, Trial, at};
 use crate::policy::input_at;
-use crate::settings::ControllerSettings;
+use crate::settings::{ControllerSettings, TerminalIngredient};
 use crate::solution::Status;
 use crate::solver::{SolverSettings, WarmStart};
 use crate::working_set::copy;
@@ -470,10 +470,19 @@ where
         let factor: T = convert(DAMPING_FACTOR);
         let before = self.policy.damping;
         let lower = before / factor;
+        let equality = matches!(self.settings.terminal, TerminalIngredient::Equality);
         let damping = match outcome {
             Outcome::NothingToGain => lower,
             // A full step that the program was good enough for.
-            Outcome::Moved { step, .. } if *step == T::one() && before == T::zero() => lower,
+            Outcome::Moved { step, .. }
+                if *step == T::one() && (before == T::zero() || equality) =>
+            {
+                lower
+            }
+            // Towards a terminal equality the merit falls short by the price of missing it, too, which
+            // is no curvature: only short steps ask for more damping.
+            Outcome::Moved { step, .. } if equality && *step >= convert(SHORT_STEP) => before,
+            Outcome::Moved { .. } if equality => (before * factor).max(least),
             Outcome::Moved { curvature, .. } => curvature.max(lower),
             Outcome::NoStep | Outcome::Unsolved(_) => (before * factor).max(least),
         };
