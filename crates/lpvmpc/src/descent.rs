@@ -171,8 +171,8 @@ where
             self.shift(aim);
             best = self.roll_out_plan(x, &merit, &mut workspace.trial, &|i, x| {
                 let policy = &self.policy;
-                let planned = (at(&self.rollout, i), at(&policy.u, i));
-                input_at(x, planned, at(&policy.gain, i), &self.settings.u)
+                let planned = (&at(&self.rollout, i), &at(&policy.u, i));
+                input_at(x, planned, &at(&policy.gain, i), &self.settings.u)
             });
             self.take_if_some(best, &workspace.trial);
         }
@@ -248,10 +248,10 @@ where
     /// The plan one sample on; its last stage is the regulator's.
     fn shift(&mut self, aim: &Aim<'_, T, NX, NU>) {
         let last = self.last_stage();
-        let gain = *at(&self.policy.gain, last);
+        let gain = at(&self.policy.gain, last);
         let planned = (aim.end(), &aim.u_ref);
         let end = at(&self.rollout, last);
-        let u = input_at(end, planned, &gain, &self.settings.u);
+        let u = input_at(&end, planned, &gain, &self.settings.u);
         // What comes in from beyond the horizon is overwritten.
         move_on(&mut self.policy.u, last, u);
         move_on(&mut self.policy.gain, last, gain);
@@ -358,7 +358,7 @@ where
             return Outcome::NothingToGain;
         }
         let taken = self.search_line(x, &merit, expected, &mut workspace.trial, &|i| {
-            let x_i = i.checked_sub(1).map_or(x, |j| at(&self.solution.x, j));
+            let x_i = i.checked_sub(1).map_or(*x, |j| at(&self.solution.x, j));
             (x_i, at(&self.solution.u, i))
         });
         let Some((step, cost)) = taken else {
@@ -385,29 +385,26 @@ where
     /// The longest step from the plan towards `answer` (state and input of a stage) that lowers the
     /// merit enough, and the merit of the rollout that it leaves in `trial`.
     #[inline(never)]
-    fn search_line<'a>(
-        &'a self,
+    fn search_line(
+        &self,
         x: &SVector<T, NX>,
         merit: &Merit<'_, T, NX, NU>,
         expected: T,
         trial: &mut Trial<T, NX, NU>,
-        answer: &dyn Fn(usize) -> (&'a SVector<T, NX>, &'a SVector<T, NU>),
-    ) -> Option<(T, T)>
-    where
-        P: 'a,
-    {
+        answer: &dyn Fn(usize) -> (SVector<T, NX>, SVector<T, NU>),
+    ) -> Option<(T, T)> {
         let Self {
             policy, rollout, ..
         } = self;
         for step in STEPS {
             let step: T = convert(step);
             let cost = self.roll_out_plan(x, merit, trial, &|i, x_i| {
-                let x_plan = i.checked_sub(1).map_or(x, |j| at(rollout, j));
+                let x_plan = i.checked_sub(1).map_or(*x, |j| at(rollout, j));
                 let (x_answer, u_answer) = answer(i);
                 let planned = x_plan + (x_answer - x_plan) * step;
                 let u_plan = at(&policy.u, i);
                 let u = u_plan + (u_answer - u_plan) * step;
-                input_at(x_i, (&planned, &u), at(&policy.gain, i), &self.settings.u)
+                input_at(x_i, (&planned, &u), &at(&policy.gain, i), &self.settings.u)
             });
             let sufficient = policy.cost - expected * step * convert(SUFFICIENT);
             if let Some(cost) = cost
@@ -435,9 +432,9 @@ where
         let x = match answered {
             Some(x) => {
                 let u = at(&self.solution.u, 0);
-                next_state(&self.model, &self.settings, &x, u)
+                next_state(&self.model, &self.settings, &x, &u)
             }
-            None => *at(&self.rollout, 0),
+            None => at(&self.rollout, 0),
         };
         if !self.first_plan(&x, aim, workspace) {
             return false;
