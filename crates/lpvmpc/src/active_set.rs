@@ -375,8 +375,9 @@ impl<T: Scalar, const NU: usize, const N: usize, const M: usize> DualActiveSet<T
     /// The active rows, with multipliers in the bounds' own direction.
     pub(crate) fn active(&self) -> impl Iterator<Item = ActiveRow<T>> {
         let working = self.working.rows().iter().map(Terms::reported);
-        let held_by_others = |row: &ActiveRow<T>| row.multiplier == T::zero();
-        working.chain(self.resting.iter().filter(move |row| !held_by_others(row)))
+        // What rests without a multiplier holds because other rows do.
+        let resting = self.resting.iter();
+        working.chain(resting.filter(|row| row.multiplier != T::zero()))
     }
 
     /// Hands over the active rows.

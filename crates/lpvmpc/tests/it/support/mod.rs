@@ -36,7 +36,6 @@ pub fn solve<const NX: usize, const NU: usize, const N: usize, const M: usize, c
     solution
 }
 
-/// The kind of a status, without its details.
 /// Whether two verdicts of one problem can both be right: the same, or the proof that it is infeasible
 /// was found by one of them only.
 pub fn agree<T>(one: &Status<T>, other: &Status<T>) -> bool {
@@ -48,6 +47,7 @@ pub fn agree<T>(one: &Status<T>, other: &Status<T>) -> bool {
         )
 }
 
+/// The kind of a status, without its details.
 pub fn kind<T>(status: &Status<T>) -> &'static str {
     match status {
         Status::Solved | Status::Converged | Status::Improved | Status::NoImprovement => "solved",
