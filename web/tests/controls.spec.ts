@@ -1,7 +1,7 @@
 // Every control does what it says: the set-up that is saved has its value, and the run shows it.
 
 import { expect, test } from "@playwright/test";
-import { clock, fill, largest, openFlat, openSection, saved, scenario, table, until } from "./page";
+import { atOnce, clock, fill, largest, openFlat, openSection, saved, scenario, table, until } from "./page";
 
 const NUMBERS: [section: string, label: string, typed: string, key: string, value: number][] = [
   ["Controller", "Horizon N", "35", "horizon", 35],
@@ -50,6 +50,19 @@ test("weights that a scenario leaves out are shown, and one of them can be chang
   await page.locator("#play").click();
   await until(page, 1);
   expect(problems).toEqual([]);
+});
+
+test("what is typed replaces a number that changed after its field was entered", async ({ page }) => {
+  await openFlat(page);
+  await openSection(page, "Controller");
+  const field = page.locator(".panel").getByLabel("R", { exact: true });
+  const before = await field.inputValue();
+  await field.selectText();
+  await atOnce(page, [["Scenario", "one-metre"]]);
+  await expect(field).not.toHaveValue(before);
+  await page.keyboard.type("500");
+  await page.keyboard.press("Enter");
+  await expect.poll(() => saved(page, "Save TOML")).toMatch(/^r = 500$/m);
 });
 
 test("predictor, estimator, moves, torque rate and motors go into the set-up", async ({ page }) => {

@@ -385,7 +385,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
 
     /// The active rows, with multipliers in the bounds' own direction.
     pub(crate) fn active(&self) -> impl Iterator<Item = ActiveRow<T>> {
-        active(&self.working, &self.resting)
+active(&self.working, &self.resting)
     }
 
     /// Hands over the active rows.
@@ -395,12 +395,13 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     }
 }
 
-/// The rows of the working set and those that rest at a multiplier.
+/// The rows of the working set, and those that rest at a multiplier: what rests without one holds
+/// because other rows do.
 pub(crate) fn active<T: Scalar, const NU: usize>(
     working: &WorkingSet<T, NU>,
     resting: &ActiveSet<T>,
 ) -> impl Iterator<Item = ActiveRow<T>> {
     let working = working.rows().iter().map(Terms::reported);
-    let held_by_others = |row: &ActiveRow<T>| row.multiplier == T::zero();
-    working.chain(resting.iter().filter(move |row| !held_by_others(row)))
+    let resting = resting.iter();
+    working.chain(resting.filter(|row| row.multiplier != T::zero()))
 }

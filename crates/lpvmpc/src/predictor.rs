@@ -210,7 +210,8 @@ impl Rk4 {
     ///
     /// With A_j, B_j at stage j, the stages' slopes are K_j x + L_j u (up to a constant where the
     /// pairs are Jacobians): K_1 = A_1, L_1 = B_1, K_2 = A_2 (I + h/2 K_1),
-    /// L_2 = B_2 + h/2 A_2 L_1, and so on.
+    /// L_2 = B_2 + h/2 A_2 L_1, and so on. `slope` is the slope of a stage, from the state where the
+    /// step began, the state of the stage, K_j and L_j.
     // On a microcontroller, where flash is scarce, both kinds of pairs share its machine code.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]

@@ -59,7 +59,9 @@ pub enum Iterations<T> {
     /// Each one an improvement: a descent on the cost of the nonlinear rollout, in which the answer
     /// of a program is taken as far as the cost falls, and not at all where it does not.
     Descent {
-        /// No more programs once one is expected to lower the cost by less than this part of it.
+        /// No more programs after a full step that lowers the cost by less than this part of it (ten
+        /// times that for the first program of a sample), or once one is expected to lower it by less
+        /// than the square of this part.
         tolerance: T,
         /// At most so many, at least 1.
         most: usize,

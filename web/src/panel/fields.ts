@@ -49,14 +49,17 @@ function typed(input: HTMLInputElement, whenEmpty: number): number {
   return input.value.trim() === "" ? whenEmpty : Number(input.value);
 }
 
-/** Whether somebody is in the middle of typing into a field, which then must not be set. */
-class Typing {
-  now = false;
-
-  constructor(input: HTMLInputElement) {
-    input.addEventListener("input", () => (this.now = true));
-    for (const done of ["change", "blur"]) input.addEventListener(done, () => (this.now = false));
-  }
+/** Lets a number field show a value, unless somebody is in the middle of typing into it. A field that
+ *  was entered stays selected: what is typed next takes the place of the number, whichever it is. */
+function displayOf(input: HTMLInputElement): (text: string) => void {
+  let typing = false;
+  input.addEventListener("input", () => (typing = true));
+  for (const done of ["change", "blur"]) input.addEventListener(done, () => (typing = false));
+  return (text) => {
+    if (typing || input.value === text) return;
+    input.value = text;
+    if (document.activeElement === input) input.select();
+  };
 }
 
 export interface NumberSpec extends FieldSpec {
@@ -92,7 +95,7 @@ export function numberField(spec: NumberSpec, changed: (value: number) => void):
   const slides = spec.min !== undefined && spec.max !== undefined;
   const slider = element("input", { type: "range", step: String(spec.step ?? "any") });
   slider.setAttribute("aria-label", "slider");
-  const typing = new Typing(input);
+  const display = displayOf(input);
   let factor = 1;
   const toSlider = (value: number) => (spec.logarithmic ? Math.log10(Math.max(value, 1e-9)) : value);
   const setLimits = () => {
@@ -130,7 +133,7 @@ export function numberField(spec: NumberSpec, changed: (value: number) => void):
   const line = slides ? row(spec, input, slider) : row(spec, input);
   const set = (value: number) => {
     [now, answered] = [value, true];
-    if (!typing.now) input.value = shown(value / factor);
+    display(shown(value / factor));
     if (!held) slider.value = String(toSlider(value / factor));
   };
   return {
@@ -153,7 +156,7 @@ export function rangeField(spec: FieldSpec, changed: (value: [number, number]) =
     return input;
   };
   const [lower, upper] = [make("lower bound"), make("upper bound")];
-  const typing = [new Typing(lower), new Typing(upper)] as const;
+  const display = { lower: displayOf(lower), upper: displayOf(upper) };
   // Only the side that was typed: the other one may have more digits than are shown. The second may
   // be typed before it is shown what came of the first.
   let now: [number, number] = [-Infinity, Infinity];
@@ -163,8 +166,8 @@ export function rangeField(spec: FieldSpec, changed: (value: [number, number]) =
   const line = row(spec, lower, upper);
   const set = ([low, high]: [number, number]) => {
     now = [low, high];
-    if (!typing[0].now) lower.value = shown(low / factor);
-    if (!typing[1].now) upper.value = shown(high / factor);
+    display.lower(shown(low / factor));
+    display.upper(shown(high / factor));
   };
   return {
     element: line,
