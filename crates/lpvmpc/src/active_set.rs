@@ -56,10 +56,12 @@ enum StepEnd {
 
 impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     pub fn new(memory: DualMemory<T, NU>) -> Self {
+        let stages = memory.deviations[0].len();
+        let most = memory.rows(stages);
         let [v, alpha, primal, rest] = memory.deviations;
         let [coefficients, spanned, dual, step, multipliers] = memory.numbers;
         Self {
-            working: WorkingSet::new(memory.terms, memory.factor, memory.basis, v.len()),
+            working: WorkingSet::new((memory.terms, most), memory.factor, (memory.basis, stages)),
             resting: ActiveSet::new(memory.resting),
             candidate: Row::new(alpha),
             direction: Direction::new(primal, [coefficients, spanned, dual]),
@@ -90,9 +92,9 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     }
 
     /// The bound that is violated most, if any is.
-    pub fn most_violated<const NX: usize, const NG: usize>(
+    pub fn most_violated<const NX: usize>(
         &self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         trajectory: &Trajectory<'_, T, NX, NU>,
     ) -> Option<Candidate<T>> {
         let mut worst: Option<Candidate<T>> = None;
@@ -147,9 +149,9 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     }
 
     /// Makes every component of the terminal equality a row that is always active.
-    pub fn impose_terminal_equality<const NX: usize, const NG: usize>(
+    pub fn impose_terminal_equality<const NX: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         factors: &[StageFactor<T, NX, NU>],
         x_n: &SVector<T, NX>,
     ) -> Result<(), Status<T>> {
@@ -184,9 +186,9 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     }
 
     /// Takes the candidate into the working set, dropping rows whose multiplier forbids it.
-    pub fn satisfy<const NX: usize, const NG: usize>(
+    pub fn satisfy<const NX: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         factors: &[StageFactor<T, NX, NU>],
         violated: &Candidate<T>,
     ) -> Result<(), Status<T>> {

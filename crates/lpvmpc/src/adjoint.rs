@@ -1,14 +1,14 @@
 //! The adjoint recursion: the Lagrangian's gradient in the inputs, from the last stage to the first.
 
 use crate::model::Scalar;
-use crate::ocp::Ocp;
+use crate::ocp::{Common, Ocp};
 use crate::rows::{self, Trajectory};
 use crate::solution::ActiveSet;
 use nalgebra::SVector;
 
 /// A backward pass along the horizon, with the states eliminated.
-pub(crate) struct Adjoint<'a, T: 'static, const NX: usize, const NU: usize, const NG: usize> {
-    ocp: &'a Ocp<T, NX, NU, NG>,
+pub(crate) struct Adjoint<'a, T: 'static, const NX: usize, const NU: usize> {
+    ocp: &'a Ocp<T, NX, NU>,
     /// The point at which the cost counts; without one, the active rows are the whole Lagrangian.
     trajectory: Option<&'a Trajectory<'a, T, NX, NU>>,
     /// Derivative of the Lagrangian in x_`stage`, through what comes after it.
@@ -30,11 +30,11 @@ pub(crate) struct AdjointStage<T, const NX: usize, const NU: usize> {
     pub rows: SVector<T, NU>,
 }
 
-impl<'a, T: Scalar, const NX: usize, const NU: usize, const NG: usize> Adjoint<'a, T, NX, NU, NG> {
+impl<'a, T: Scalar, const NX: usize, const NU: usize> Adjoint<'a, T, NX, NU> {
     /// Begins behind the last stage. `active` stays the same in all calls, but for rows at stages that
     /// have been visited.
     pub fn new(
-        ocp: &'a Ocp<T, NX, NU, NG>,
+        ocp: &'a Ocp<T, NX, NU>,
         trajectory: Option<&'a Trajectory<'a, T, NX, NU>>,
         active: &ActiveSet<T>,
     ) -> Self {
@@ -63,8 +63,9 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize, const NG: usize> Adjoint<'
         if let Some(trajectory) = self.trajectory {
             let x = trajectory.state(self.ocp, self.stage);
             let u = trajectory.u.get(self.stage)?;
-            gradient += stage.r * u + stage.s * x + stage.linear_u;
-            self.costate += stage.q * x + stage.s.tr_mul(u) + stage.linear_x;
+            let Common { q, r, s, .. } = self.ocp.common_at(self.stage);
+            gradient += r * u + s * x + stage.linear_u;
+            self.costate += q * x + s.tr_mul(u) + stage.linear_x;
         }
         Some(AdjointStage {
             stage: self.stage,

@@ -6,7 +6,7 @@ use crate::list::List;
 use crate::memory::Capacity;
 use crate::memory::{ControllerMemory, WorkspaceMemory};
 use crate::model::{LpvModel, Scalar};
-use crate::ocp::{Bounds, Ocp, Penalty, Softness, Stage};
+use crate::ocp::{Bounds, Common, Ocp, Penalty, Softness};
 use crate::plan::{Aim, Policy, Trial, at};
 use crate::settings::{
     ControllerError, ControllerSettings, InputReference, Iterations, Scheduling,
@@ -82,14 +82,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
         &self.ocp
     }
 
-    /// Writes weights and bounds into the program, unless they stand there already: they are
-    /// the same at all stages.
+    /// Writes weights and bounds into the program.
     fn pose<const NS: usize>(&mut self, settings: &ControllerSettings<T, NX, NU, NS>) {
         let ControllerSettings { weights, x, u, .. } = settings;
         let soft_x = halved(&settings.soft_x);
-        let same = |stage: &Stage<T, NX, NU>| {
-            stage.q == weights.q && stage.r == weights.r && stage.x == *x && stage.u == *u
-        };
         self.ocp.soft_x = soft_x;
         self.ocp.terminal.soft_x = soft_x;
         if core::mem::take(&mut self.along_plan) {
@@ -97,15 +93,15 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
                 stage.c = SVector::zeros();
             }
         }
-        if !self.ocp.stages.first().is_some_and(same) {
-            for stage in self.ocp.stages.iter_mut() {
-                stage.q = weights.q;
-                stage.r = weights.r;
-                stage.x = *x;
-                stage.u = *u;
-            }
-            self.ocp.terminal.x = *x;
-        }
+
+        self.ocp.common = Common {
+            q: weights.q,
+            r: weights.r,
+            s: SMatrix::zeros(),
+            x: *x,
+            u: *u,
+        };
+        self.ocp.terminal.x = *x;
     }
 }
 

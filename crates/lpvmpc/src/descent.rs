@@ -17,8 +17,10 @@
 use crate::controller::{Controller, Workspace, next_state};
 use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
+use crate::ocp::{Ocp, Stage};
 use crate::plan::{Aim, Merit, Prices, Trial, at};
 use crate::policy::input_at;
+use crate::riccati::{CostToGo, StageFactor};
 use crate::settings::{ControllerSettings, TerminalIngredient};
 use crate::solution::Status;
 use crate::solver::{SolverSettings, WarmStart};
@@ -71,6 +73,8 @@ const SHORT_STEP: f64 = 0.5;
 const DAMPING_FACTOR: f64 = 10.0;
 /// Parts of the way to the set point to which the regulator is sent where there is no plan.
 const PARTS: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.01, 0.0];
+/// Stages of the regulator, at least.
+const REGULATOR: usize = 20;
 /// A plan that costs so many times the last one is no longer the only candidate.
 const JUMP: f64 = 2.0;
 
@@ -192,7 +196,7 @@ where
         mut best: Option<T>,
         workspace: &mut Workspace<T, NX, NU>,
     ) -> Option<T> {
-        let (gain, indifferent) = self.regulator(aim, workspace);
+        let (gain, indifferent) = self.regulator(aim, &workspace.ocp);
         let away = (x - aim.end()).component_mul(&indifferent);
         let merit = self.merit(aim, Prices::none());
         for part in PARTS {
@@ -215,34 +219,35 @@ where
         best
     }
 
-    /// The gain of the regulator at the end of the reference (u = u_ref + K (x - x_ref)), that of the first of `N` equal
-    /// stages; and 1 for each state whose value is all the same to the plant (the position, as a
-    /// rule), 0 for the others. The program in the workspace is overwritten.
+    /// The gain of the regulator at the end of the reference (u = u_ref + K (x - x_ref)), that of the
+    /// first of many equal stages with the weights of `ocp`; and 1 for each state whose value is all the
+    /// same to the plant (the position, as a rule), 0 for the others.
     fn regulator(
         &self,
         aim: &Aim<'_, T, NX, NU>,
-        workspace: &mut Workspace<T, NX, NU>,
+        ocp: &Ocp<T, NX, NU>,
     ) -> (SMatrix<T, NU, NX>, SVector<T, NX>) {
-        let Workspace { ocp, solver, .. } = workspace;
         let (a, b) = self.sample_matrices(aim.end(), &aim.u_ref, Along::Jacobian);
-        for stage in ocp.stages.iter_mut() {
-            (stage.a, stage.b) = (a, b);
-            stage.c = SVector::zeros();
-            stage.r = self.settings.weights.r;
-        }
-        ocp.horizon = ocp.stages.len();
         let indifferent = SVector::from_fn(|j, _| {
             let column = (0..NX).all(|i| a[(i, j)] == one_if(i == j));
             one_if(column)
         });
-        let gain = match solver.factorize(ocp) {
-            Ok(()) => solver
-                .factors()
-                .first()
-                .map_or_else(SMatrix::zeros, |factor| factor.gain),
-            Err(_) => SMatrix::zeros(),
+        let stage = Stage {
+            a,
+            b,
+            ..Stage::new()
         };
-        (gain, indifferent)
+        let mut cost_to_go = CostToGo {
+            quadratic: ocp.terminal.p,
+            linear: SVector::zeros(),
+        };
+        let mut factor = StageFactor::zeros();
+        for _ in 0..self.settings.horizon.max(REGULATOR) {
+            if factor.eliminate(&stage, &ocp.common, &mut cost_to_go).is_err() {
+                return (SMatrix::zeros(), indifferent);
+            }
+        }
+        (factor.gain, indifferent)
     }
 
     /// The plan one sample on; its last stage is the regulator's.
@@ -279,10 +284,10 @@ where
             Along::Scheduling => T::zero(),
             Along::Jacobian => self.policy.damping,
         };
+        ocp.common.r = settings.weights.r + SMatrix::identity() * damping;
         for (stage, ((x, u), next)) in ocp.stages.iter_mut().zip(samples).take(settings.horizon) {
             (stage.a, stage.b) = self.sample_matrices(x, u, along);
             stage.c = next - stage.a * x - stage.b * u;
-            stage.r = settings.weights.r + SMatrix::identity() * damping;
             stage.linear_u = linear_u - u * damping;
         }
     }

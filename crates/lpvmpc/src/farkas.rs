@@ -27,8 +27,8 @@ const ROUNDINGS: f64 = 100.0;
 /// [`Status::Infeasible`](crate::Status::Infeasible) the solution's active rows are such a proof.
 /// A `proof` with a soft bound or a multiplier of the wrong sign proves nothing: minus infinity.
 #[inline(never)]
-pub fn infeasibility_margin<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+pub fn infeasibility_margin<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     proof: &ActiveSet<T>,
 ) -> T {
     let nothing: T = convert(f64::NEG_INFINITY);
@@ -55,15 +55,16 @@ pub fn infeasibility_margin<T: Scalar, const NX: usize, const NU: usize, const N
         let Some(stage) = ocp.stages.get(at.stage) else {
             continue;
         };
+        let bounds = &ocp.common_at(at.stage).u;
         let (sum, sizes) = sum_and_size(&stage.c, &at.costate);
         least += sum;
         size += sizes;
         let terms = at.dynamics + at.rows.abs();
         for (j, (slope, terms)) in at.gradient.iter().zip(terms.iter()).enumerate() {
             let limit = if *slope > T::zero() {
-                stage.u.lower[j]
+                bounds.lower[j]
             } else {
-                stage.u.upper[j]
+                bounds.upper[j]
             };
             largest = largest.max(*terms);
             if limit.is_finite() {

@@ -7,7 +7,7 @@
 use crate::adjoint::Adjoint;
 use crate::list::List;
 use crate::model::Scalar;
-use crate::ocp::{Ocp, Stage};
+use crate::ocp::{Common, Ocp, Stage};
 use crate::riccati::{BadPivot, CostToGo, StageFactor};
 use crate::rows::Trajectory;
 use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
@@ -73,9 +73,9 @@ impl<const NU: usize> HeldInputs<NU> {
 
     /// Lets go of the inputs that are pulled into their bounds, by the cost of `trajectory` and the rows
     /// `active`, or by these rows alone: their multiplier is below zero. The others join `active`.
-    fn release<T: Scalar, const NX: usize, const NG: usize>(
+    fn release<T: Scalar, const NX: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         trajectory: Option<&Trajectory<'_, T, NX, NU>>,
         active: &mut ActiveSet<T>,
         tolerance: T,
@@ -128,34 +128,35 @@ impl<const NU: usize> HeldInputs<NU> {
 /// the bounds, which no deviation moves.
 #[cold]
 #[inline(never)]
-pub(crate) fn eliminate_held<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+pub(crate) fn eliminate_held<T: Scalar, const NX: usize, const NU: usize>(
     factor: &mut StageFactor<T, NX, NU>,
-    stage: &Stage<T, NX, NU, NG>,
+    stage: &Stage<T, NX, NU>,
+    common: &Common<T, NX, NU>,
     held: &[Option<Side>; NU],
     cost_to_go: &mut CostToGo<T, NX>,
 ) -> Result<(), BadPivot<T>> {
-    let mut fixed = *stage;
+    let (mut fixed, mut weights) = (*stage, *common);
     let values = || {
         held.iter().enumerate().filter_map(|(j, side)| match side {
-            Some(Side::Upper) => Some((j, stage.u.upper[j])),
-            Some(_) => Some((j, stage.u.lower[j])),
+            Some(Side::Upper) => Some((j, common.u.upper[j])),
+            Some(_) => Some((j, common.u.lower[j])),
             None => None,
         })
     };
     for (j, value) in values() {
         fixed.c += stage.b.column(j) * value;
-        fixed.linear_x += stage.s.row(j).transpose() * value;
-        fixed.linear_u += stage.r.column(j) * value;
+        fixed.linear_x += common.s.row(j).transpose() * value;
+        fixed.linear_u += common.r.column(j) * value;
         fixed.b.column_mut(j).fill(T::zero());
-        fixed.s.row_mut(j).fill(T::zero());
-        fixed.r.row_mut(j).fill(T::zero());
-        fixed.r.column_mut(j).fill(T::zero());
+        weights.s.row_mut(j).fill(T::zero());
+        weights.r.row_mut(j).fill(T::zero());
+        weights.r.column_mut(j).fill(T::zero());
     }
     for (j, value) in values() {
-        fixed.r[(j, j)] = T::one();
+        weights.r[(j, j)] = T::one();
         fixed.linear_u[j] = -value;
     }
-    factor.eliminate(&fixed, cost_to_go)?;
+    factor.eliminate(&fixed, &weights, cost_to_go)?;
     for (j, _) in values() {
         factor.inverse_factor[(j, j)] = T::zero();
     }
@@ -171,9 +172,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     /// next one, so that the cost does not rise and, but for rounding, no set of held inputs comes twice.
     #[cold]
     #[inline(never)]
-    pub(crate) fn search_with_held_inputs<const NG: usize>(
+    pub(crate) fn search_with_held_inputs(
         &mut self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU>,
         bound: BoundId,
@@ -233,9 +234,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     }
 
     /// One search from the active rows of the last one, but for those of inputs.
-    fn search_again<const NG: usize>(
+    fn search_again(
         &mut self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU>,
         spent: &mut usize,

@@ -55,8 +55,8 @@ fn magnitude<T: Scalar, const K: usize>(v: &SVector<T, K>) -> T {
 }
 
 /// The residual of the optimality conditions of `ocp` at `solution`.
-pub fn kkt_residual<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+pub fn kkt_residual<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     solution: &Solution<T, NX, NU>,
 ) -> KktResidual<T> {
     let trajectory = Trajectory {
@@ -73,8 +73,8 @@ pub fn kkt_residual<T: Scalar, const NX: usize, const NU: usize, const NG: usize
     }
 }
 
-fn stationarity<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+fn stationarity<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     trajectory: &Trajectory<'_, T, NX, NU>,
     active: &ActiveSet<T>,
 ) -> T {
@@ -89,8 +89,8 @@ fn stationarity<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
 }
 
 /// Dynamics, hard bounds, terminal equality.
-fn primal<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+fn primal<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     trajectory: &Trajectory<'_, T, NX, NU>,
 ) -> T {
     let mut largest = T::zero();
@@ -125,8 +125,8 @@ fn primal<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
 }
 
 /// Multipliers within their intervals, and active bounds that are met (dual, complementarity).
-fn multipliers<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+fn multipliers<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     trajectory: &Trajectory<'_, T, NX, NU>,
     active: &ActiveSet<T>,
 ) -> (T, T) {
@@ -153,11 +153,11 @@ fn multipliers<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
 
 /// How far an active row's multiplier is above its largest value (or, if the bound is exceeded,
 /// from it), and its bound from where the row says it is.
-fn conditions<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
+fn conditions<T: Scalar, const NX: usize, const NU: usize>(
     row: &ActiveRow<T>,
     multiplier: T,
     slack: T,
-    ocp: &Ocp<T, NX, NU, NG>,
+    ocp: &Ocp<T, NX, NU>,
 ) -> (T, T) {
     let zero = T::zero();
     let excess = if slack < zero { -slack } else { zero };
@@ -176,8 +176,8 @@ fn conditions<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
 }
 
 /// The largest excess of a soft bound whose price is not in the active set.
-fn unpaid_excess<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+fn unpaid_excess<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     trajectory: &Trajectory<'_, T, NX, NU>,
     active: &ActiveSet<T>,
 ) -> T {

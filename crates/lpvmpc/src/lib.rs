@@ -50,10 +50,11 @@ pub use kkt::{KktResidual, kkt_residual};
 pub use last_plan::LastPlan;
 pub use list::List;
 pub use memory::{
-    Capacity, ControllerMemory, DualMemory, SolverArrays, SolverMemory, WorkspaceMemory,
+    Capacity, ControllerArrays, ControllerMemory, SolverArrays, SolverMemory, WorkspaceArrays,
+    WorkspaceMemory,
 };
 pub use model::{LpvModel, Scalar};
-pub use ocp::{Bounds, Ocp, Penalty, Softness, Stage, Terminal};
+pub use ocp::{Bounds, Common, GeneralRow, Ocp, Penalty, Softness, Stage, Terminal};
 pub use predictor::{Predictor, Rk4};
 pub use ramp::RampedInput;
 pub use settings::{

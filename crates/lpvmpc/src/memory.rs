@@ -18,32 +18,52 @@ pub struct Capacity {
     pub rows: usize,
 }
 
-/// Memory of a [`Solver`](crate::Solver): lists of these lengths, whatever is in them.
+/// Memory of a [`Solver`](crate::Solver): on the heap, or [lent](SolverArrays::lend) arrays.
 #[derive(Debug)]
 pub struct SolverMemory<T: 'static, const NX: usize, const NU: usize> {
     /// One for each stage.
-    pub factors: List<StageFactor<T, NX, NU>>,
+    pub(crate) factors: List<StageFactor<T, NX, NU>>,
     /// Inputs at their bounds, one for each stage.
-    pub held: List<[Option<Side>; NU]>,
+    pub(crate) held: List<[Option<Side>; NU]>,
     /// What the dual method works with.
-    pub dual: DualMemory<T, NU>,
+    pub(crate) dual: DualMemory<T, NU>,
 }
 
 /// Memory of the dual active-set method.
 #[derive(Debug)]
-pub struct DualMemory<T: 'static, const NU: usize> {
+pub(crate) struct DualMemory<T: 'static, const NU: usize> {
     /// Deviations of the inputs, one of each for each stage.
-    pub deviations: [List<SVector<T, NU>>; 4],
+    pub(crate) deviations: [List<SVector<T, NU>>; 4],
     /// Rows of the working set, one for each row.
-    pub terms: List<Terms<T>>,
+    pub(crate) terms: List<Terms<T>>,
     /// Rows outside of it, one for each row.
-    pub resting: List<PackedRow<T>>,
+    pub(crate) resting: List<PackedRow<T>>,
     /// Orthonormal rows: `rows * stages`.
-    pub basis: List<SVector<T, NU>>,
+    pub(crate) basis: List<SVector<T, NU>>,
     /// Triangular factor: `rows * rows`.
-    pub factor: List<T>,
+    pub(crate) factor: List<T>,
     /// Numbers, one of each for each row.
-    pub numbers: [List<T>; 5],
+    pub(crate) numbers: [List<T>; 5],
+}
+
+impl<T, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
+    /// The longest horizon that all of its lists have places for.
+    pub(crate) fn stages(&self) -> usize {
+        let lists = self.dual.deviations.iter().map(|list| list.len());
+        lists.fold(self.factors.len().min(self.held.len()), usize::min)
+    }
+}
+
+impl<T, const NU: usize> DualMemory<T, NU> {
+    /// As many rows as all of its lists have places for, with rows of this many stages.
+    pub(crate) fn rows(&self, stages: usize) -> usize {
+        let lists = self.numbers.iter().map(|list| list.len());
+        let rows = lists.fold(self.terms.len(), usize::min);
+        let fits = |rows: &usize| {
+            rows * self.terms.len() <= self.factor.len() && rows * stages <= self.basis.len()
+        };
+        (0..=rows).rev().find(fits).unwrap_or(0)
+    }
 }
 
 #[cfg(feature = "alloc")]
@@ -83,7 +103,7 @@ pub struct SolverArrays<T, const NX: usize, const NU: usize, const N: usize, con
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
     SolverArrays<T, NX, NU, N, M>
 {
-    /// Arrays to be handed to a solver.
+    /// Arrays to be lent to a solver.
     #[inline(always)]
     pub fn new() -> Self {
         Self {
@@ -123,30 +143,17 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
     }
 }
 
-/// Memory of a [`Workspace`](crate::Workspace).
+/// Memory of a [`Workspace`](crate::Workspace): on the heap, or [lent](WorkspaceArrays::lend) arrays.
 #[derive(Debug)]
 pub struct WorkspaceMemory<T: 'static, const NX: usize, const NU: usize> {
     /// The program's stages, one for each stage.
-    pub stages: List<Stage<T, NX, NU>>,
+    pub(crate) stages: List<Stage<T, NX, NU>>,
     /// Of the solver.
-    pub solver: SolverMemory<T, NX, NU>,
+    pub(crate) solver: SolverMemory<T, NX, NU>,
     /// Inputs of a rollout, one for each stage.
-    pub u: List<SVector<T, NU>>,
+    pub(crate) u: List<SVector<T, NU>>,
     /// Its states, one for each stage.
-    pub x: List<SVector<T, NX>>,
-}
-
-/// Memory of a [`Controller`](crate::Controller).
-#[derive(Debug)]
-pub struct ControllerMemory<T: 'static, const NX: usize, const NU: usize> {
-    /// States of the plan and of the program's answer, one of each for each stage.
-    pub x: [List<SVector<T, NX>>; 2],
-    /// Inputs of both.
-    pub u: [List<SVector<T, NU>>; 2],
-    /// Gains of the plan, one for each stage.
-    pub gain: List<SMatrix<T, NU, NX>>,
-    /// Active rows, one for each row.
-    pub active: List<PackedRow<T>>,
+    pub(crate) x: List<SVector<T, NX>>,
 }
 
 #[cfg(feature = "alloc")]
@@ -163,6 +170,61 @@ impl<T: Scalar, const NX: usize, const NU: usize> WorkspaceMemory<T, NX, NU> {
     }
 }
 
+/// The same as arrays: horizons of up to `N` samples, up to `M` active bounds.
+#[derive(Debug)]
+pub struct WorkspaceArrays<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
+    stages: [Stage<T, NX, NU>; N],
+    solver: SolverArrays<T, NX, NU, N, M>,
+    u: [SVector<T, NU>; N],
+    x: [SVector<T, NX>; N],
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
+    WorkspaceArrays<T, NX, NU, N, M>
+{
+    /// Arrays to be lent to a workspace.
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self {
+            stages: [Stage::new(); N],
+            solver: SolverArrays::new(),
+            u: [SVector::zeros(); N],
+            x: [SVector::zeros(); N],
+        }
+    }
+
+    /// The arrays as memory of a workspace.
+    pub fn lend(&'static mut self) -> WorkspaceMemory<T, NX, NU> {
+        WorkspaceMemory {
+            stages: List::Static(&mut self.stages),
+            solver: self.solver.lend(),
+            u: List::Static(&mut self.u),
+            x: List::Static(&mut self.x),
+        }
+    }
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize> Default
+    for WorkspaceArrays<T, NX, NU, N, M>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Memory of a [`Controller`](crate::Controller): on the heap, or [lent](ControllerArrays::lend) arrays.
+#[derive(Debug)]
+pub struct ControllerMemory<T: 'static, const NX: usize, const NU: usize> {
+    /// States of the plan and of the program's answer, one of each for each stage.
+    pub(crate) x: [List<SVector<T, NX>>; 2],
+    /// Inputs of both.
+    pub(crate) u: [List<SVector<T, NU>>; 2],
+    /// Gains of the plan, one for each stage.
+    pub(crate) gain: List<SMatrix<T, NU, NX>>,
+    /// Active rows, one for each row.
+    pub(crate) active: List<PackedRow<T>>,
+}
+
 #[cfg(feature = "alloc")]
 impl<T: Scalar, const NX: usize, const NU: usize> ControllerMemory<T, NX, NU> {
     /// As much as is needed, on the heap.
@@ -173,5 +235,47 @@ impl<T: Scalar, const NX: usize, const NU: usize> ControllerMemory<T, NX, NU> {
             gain: List::repeat(SMatrix::zeros(), stages),
             active: List::repeat(PackedRow::empty(), rows),
         }
+    }
+}
+
+/// The same as arrays: horizons of up to `N` samples, up to `M` active bounds.
+#[derive(Debug)]
+pub struct ControllerArrays<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
+    x: [[SVector<T, NX>; N]; 2],
+    u: [[SVector<T, NU>; N]; 2],
+    gain: [SMatrix<T, NU, NX>; N],
+    active: [PackedRow<T>; M],
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
+    ControllerArrays<T, NX, NU, N, M>
+{
+    /// Arrays to be lent to a controller.
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self {
+            x: [[SVector::zeros(); N]; 2],
+            u: [[SVector::zeros(); N]; 2],
+            gain: [SMatrix::zeros(); N],
+            active: [PackedRow::empty(); M],
+        }
+    }
+
+    /// The arrays as memory of a controller.
+    pub fn lend(&'static mut self) -> ControllerMemory<T, NX, NU> {
+        ControllerMemory {
+            x: self.x.each_mut().map(|list| List::Static(list)),
+            u: self.u.each_mut().map(|list| List::Static(list)),
+            gain: List::Static(&mut self.gain),
+            active: List::Static(&mut self.active),
+        }
+    }
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize> Default
+    for ControllerArrays<T, NX, NU, N, M>
+{
+    fn default() -> Self {
+        Self::new()
     }
 }

@@ -17,6 +17,13 @@ pub struct Penalty<T> {
     pub quadratic: T,
 }
 
+impl<T: Scalar> Penalty<T> {
+    /// The price of the excess `s` >= 0.
+    pub(crate) fn of(&self, s: T) -> T {
+        (self.linear + self.quadratic * s * convert(0.5)) * s
+    }
+}
+
 /// Lower and upper bounds on `K` quantities; an infinite bound is absent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds<T, const K: usize> {
@@ -85,46 +92,60 @@ impl<T: Scalar, const K: usize> Bounds<T, K> {
 /// ```text
 /// x_{i+1} = A x_i + B u_i + c
 /// cost      x'Qx/2 + u'Sx + u'Ru/2 + linear_x'x + linear_u'u
-/// bounds    on x_i (not at i = 0, where x is given), on u_i, on row_x x_i + row_u u_i
+/// bounds    on x_i (not at i = 0, where x is given), on u_i, and on general rows
 /// ```
 ///
-/// `NX` states, `NU` inputs, `NG` general rows. Q is symmetric positive semidefinite, R
-/// symmetric, and R + B'PB positive definite along the horizon.
+/// `NX` states, `NU` inputs. What is here changes along the horizon as a rule; weights and bounds, which
+/// do not, are the [`Common`] part.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stage<T, const NX: usize, const NU: usize, const NG: usize = 0> {
+pub struct Stage<T, const NX: usize, const NU: usize> {
     /// State matrix A, `NX` x `NX`.
     pub a: SMatrix<T, NX, NX>,
     /// Input matrix B, `NX` x `NU`.
     pub b: SMatrix<T, NX, NU>,
     /// Affine term c, `NX`.
     pub c: SVector<T, NX>,
+    /// Linear cost on the state, `NX`; `-Q x_ref` when tracking.
+    pub linear_x: SVector<T, NX>,
+    /// Linear cost on the input, `NU`.
+    pub linear_u: SVector<T, NU>,
+}
+
+/// Weights and bounds of a stage, as a rule the same at all of them. Q is symmetric positive
+/// semidefinite, R symmetric, and R + B'PB positive definite along the horizon.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Common<T, const NX: usize, const NU: usize> {
     /// State weight Q, `NX` x `NX`.
     pub q: SMatrix<T, NX, NX>,
     /// Input weight R, `NU` x `NU`.
     pub r: SMatrix<T, NU, NU>,
     /// Cross weight S, `NU` x `NX`.
     pub s: SMatrix<T, NU, NX>,
-    /// Linear cost on the state, `NX`; `-Q x_ref` when tracking.
-    pub linear_x: SVector<T, NX>,
-    /// Linear cost on the input, `NU`.
-    pub linear_u: SVector<T, NU>,
     /// Bounds on the state.
     pub x: Bounds<T, NX>,
     /// Bounds on the input, always hard.
     pub u: Bounds<T, NU>,
-    /// State part of the general rows, `NG` x `NX`.
-    pub row_x: SMatrix<T, NG, NX>,
-    /// Input part of the general rows, `NG` x `NU`.
-    pub row_u: SMatrix<T, NG, NU>,
-    /// Bounds on the general rows.
-    pub rows: Bounds<T, NG>,
-    /// Which general rows are soft.
-    pub soft_rows: Softness<T, NG>,
+}
+
+/// A bounded linear combination of state and input: lower <= x'x_i + u'u_i <= upper. At the end of the
+/// horizon, where there is no input, only the state's part counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GeneralRow<T, const NX: usize, const NU: usize> {
+    /// Coefficients of the state.
+    pub x: SVector<T, NX>,
+    /// Coefficients of the input.
+    pub u: SVector<T, NU>,
+    /// Lower bound, `-infinity` where there is none.
+    pub lower: T,
+    /// Upper bound, `+infinity` where there is none.
+    pub upper: T,
+    /// `None`: both bounds are hard; `Some`: they may be exceeded at this price.
+    pub soft: Option<Penalty<T>>,
 }
 
 /// The end of the horizon: cost x'Px/2 + linear_x'x, bounds and, if given, x_N = `equality`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Terminal<T, const NX: usize, const NG: usize = 0> {
+pub struct Terminal<T, const NX: usize> {
     /// Terminal weight P, `NX` x `NX`, symmetric positive semidefinite.
     pub p: SMatrix<T, NX, NX>,
     /// Linear cost on the terminal state, `NX`.
@@ -133,12 +154,6 @@ pub struct Terminal<T, const NX: usize, const NG: usize = 0> {
     pub x: Bounds<T, NX>,
     /// Which of them are soft.
     pub soft_x: Softness<T, NX>,
-    /// General rows on the terminal state, `NG` x `NX`.
-    pub row_x: SMatrix<T, NG, NX>,
-    /// Bounds on the general rows.
-    pub rows: Bounds<T, NG>,
-    /// Which general rows are soft.
-    pub soft_rows: Softness<T, NG>,
     /// The terminal state that must be reached exactly, if any (eq. (9) of the paper).
     pub equality: Option<SVector<T, NX>>,
 }
@@ -146,50 +161,81 @@ pub struct Terminal<T, const NX: usize, const NG: usize = 0> {
 /// The problem: from `x0`, choose the inputs of the first `horizon` stages.
 #[derive(Debug, PartialEq)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
-pub struct Ocp<T: 'static, const NX: usize, const NU: usize, const NG: usize = 0> {
+pub struct Ocp<T: 'static, const NX: usize, const NU: usize> {
     /// The given initial state.
     pub x0: SVector<T, NX>,
     /// The stages; those from `horizon` on are not read.
-    pub stages: List<Stage<T, NX, NU, NG>>,
+    pub stages: List<Stage<T, NX, NU>>,
+    /// Weights and bounds of every stage that has none of its own.
+    pub common: Common<T, NX, NU>,
+    /// Weights and bounds of their own for the stages from 0 on; empty where they are all the same.
+    pub own: List<Common<T, NX, NU>>,
     /// Which state bounds of the stages are soft, at the same price at all of them.
     pub soft_x: Softness<T, NX>,
+    /// General rows, `rows_per_stage` of stage 0, then of stage 1, up to those of the end of the horizon.
+    pub rows: List<GeneralRow<T, NX, NU>>,
+    /// General rows of each stage and of the end; 0 as a rule.
+    pub rows_per_stage: usize,
     /// The end of the horizon.
-    pub terminal: Terminal<T, NX, NG>,
+    pub terminal: Terminal<T, NX>,
     /// Stages in use; no more than there are, 0 counts as 1.
     pub horizon: usize,
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const NG: usize> Stage<T, NX, NU, NG> {
-    /// A stage with zero dynamics, unit input weight, no other cost and no bounds.
+impl<T: Scalar, const NX: usize, const NU: usize> Stage<T, NX, NU> {
+    /// A stage with zero dynamics and no linear cost.
     pub fn new() -> Self {
         Self {
             a: SMatrix::zeros(),
             b: SMatrix::zeros(),
             c: SVector::zeros(),
-            q: SMatrix::zeros(),
-            r: SMatrix::identity(),
-            s: SMatrix::zeros(),
             linear_x: SVector::zeros(),
             linear_u: SVector::zeros(),
-            x: Bounds::none(),
-            u: Bounds::none(),
-            row_x: SMatrix::zeros(),
-            row_u: SMatrix::zeros(),
-            rows: Bounds::none(),
-            soft_rows: [None; NG],
         }
     }
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const NG: usize> Default
-    for Stage<T, NX, NU, NG>
-{
+impl<T: Scalar, const NX: usize, const NU: usize> Default for Stage<T, NX, NU> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<T: Scalar, const NX: usize, const NG: usize> Default for Terminal<T, NX, NG> {
+impl<T: Scalar, const NX: usize, const NU: usize> Default for Common<T, NX, NU> {
+    /// Unit input weight, no other cost and no bounds.
+    fn default() -> Self {
+        Self {
+            q: SMatrix::zeros(),
+            r: SMatrix::identity(),
+            s: SMatrix::zeros(),
+            x: Bounds::none(),
+            u: Bounds::none(),
+        }
+    }
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize> Default for GeneralRow<T, NX, NU> {
+    /// A row that bounds nothing.
+    fn default() -> Self {
+        let infinity: T = convert(f64::INFINITY);
+        Self {
+            x: SVector::zeros(),
+            u: SVector::zeros(),
+            lower: -infinity,
+            upper: infinity,
+            soft: None,
+        }
+    }
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize> GeneralRow<T, NX, NU> {
+    /// x'x_i + u'u_i; without an input at the end of the horizon.
+    pub(crate) fn value(&self, x: &SVector<T, NX>, u: Option<&SVector<T, NU>>) -> T {
+        self.x.dot(x) + u.map_or(T::zero(), |u| self.u.dot(u))
+    }
+}
+
+impl<T: Scalar, const NX: usize> Default for Terminal<T, NX> {
     /// No terminal cost, bounds or equality.
     fn default() -> Self {
         Self {
@@ -197,22 +243,24 @@ impl<T: Scalar, const NX: usize, const NG: usize> Default for Terminal<T, NX, NG
             linear_x: SVector::zeros(),
             x: Bounds::none(),
             soft_x: [None; NX],
-            row_x: SMatrix::zeros(),
-            rows: Bounds::none(),
-            soft_rows: [None; NG],
             equality: None,
         }
     }
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const NG: usize> Ocp<T, NX, NU, NG> {
-    /// From the origin, over as many stages as there is memory for.
-    pub fn new(stages: List<Stage<T, NX, NU, NG>>) -> Self {
+impl<T: Scalar, const NX: usize, const NU: usize> Ocp<T, NX, NU> {
+    /// From the origin, over as many stages as there is memory for, with the same weights and bounds at
+    /// all of them and without general rows.
+    pub fn new(stages: List<Stage<T, NX, NU>>) -> Self {
         Self {
             x0: SVector::zeros(),
             horizon: stages.len(),
             stages,
+            common: Common::default(),
+            own: List::empty(),
             soft_x: [None; NX],
+            rows: List::empty(),
+            rows_per_stage: 0,
             terminal: Terminal::default(),
         }
     }
@@ -226,5 +274,24 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NG: usize> Ocp<T, NX, NU
     /// Stages in use, at least 1.
     pub fn length(&self) -> usize {
         self.horizon.max(1).min(self.stages.len())
+    }
+
+    /// Weights and bounds of stage `i`.
+    #[inline(always)]
+    pub fn common_at(&self, i: usize) -> &Common<T, NX, NU> {
+        self.own.get(i).unwrap_or(&self.common)
+    }
+
+    /// General row `j` of stage `i`, from 0 to the end of the horizon, if there is one.
+    pub fn row(&self, i: usize, j: usize) -> Option<&GeneralRow<T, NX, NU>> {
+        let of_stage = j < self.rows_per_stage;
+        of_stage.then(|| self.rows.get(i * self.rows_per_stage + j))?
+    }
+
+    /// General rows of stage `i`, from 0 to the end of the horizon.
+    pub(crate) fn rows_of(&self, i: usize) -> &[GeneralRow<T, NX, NU>] {
+        let first = i * self.rows_per_stage;
+        let rows = self.rows.get(first..first + self.rows_per_stage);
+        rows.unwrap_or_default()
     }
 }

@@ -8,7 +8,7 @@
 
 use crate::kernel::{add_product, product, transposed_product};
 use crate::model::Scalar;
-use crate::ocp::Stage;
+use crate::ocp::{Common, Stage};
 use nalgebra::{SMatrix, SVector, convert};
 
 /// Cost-to-go x'Px/2 + p'x.
@@ -55,15 +55,16 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         }
     }
 
-    /// One backward step: takes the cost-to-go behind `stage` to the one in front of it, and
-    /// leaves the stage's factor in `self`.
+    /// One backward step: takes the cost-to-go behind `stage`, whose bounds do not matter here, to the
+    /// one in front of it, and leaves the stage's factor in `self`.
     ///
     /// # Errors
     /// [`BadPivot`] if R + B'PB is not numerically positive definite.
     #[inline(never)]
-    pub fn eliminate<const NG: usize>(
+    pub fn eliminate(
         &mut self,
-        stage: &Stage<T, NX, NU, NG>,
+        stage: &Stage<T, NX, NU>,
+        weights: &Common<T, NX, NU>,
         cost_to_go: &mut CostToGo<T, NX>,
     ) -> Result<(), BadPivot<T>> {
         let Stage { a, b, c, .. } = stage;
@@ -74,8 +75,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
 
         // H u = -(G x + g) is the condition for the stage's minimum. P is symmetric, so
         // B'P = (P B)'.
-        let hessian = stage.r + transposed_product(b, &p_b);
-        let g_x = stage.s + transposed_product(&p_b, a);
+        let hessian = weights.r + transposed_product(b, &p_b);
+        let g_x = weights.s + transposed_product(&p_b, a);
         let g = stage.linear_u + transposed_product(b, &p_next);
         let UnitFactor { inverse, pivots } = UnitFactor::new(&hessian)?;
         let reciprocals = pivots.map(|pivot| T::one() / pivot);
@@ -87,7 +88,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
 
         // A'P(A + BK) + Q + S'K, and the same for the linear part.
         *quadratic = symmetric(
-            &(stage.q + transposed_product(a, &p_a) - transposed_product(&l_g_x, &scaled_g_x)),
+            &(weights.q + transposed_product(a, &p_a) - transposed_product(&l_g_x, &scaled_g_x)),
         );
         *linear =
             stage.linear_x + transposed_product(a, &p_next) - transposed_product(&l_g_x, &scaled_g);

@@ -2,7 +2,7 @@
 //! normalised deviations v. Rows are formed only when they are violated.
 
 use crate::model::Scalar;
-use crate::ocp::{Bounds, Ocp, Penalty, Softness};
+use crate::ocp::{Bounds, Ocp, Penalty, Softness, Terminal};
 use crate::riccati::StageFactor;
 use crate::solution::{ActiveRow, BoundId, Part, Quantity, Side};
 use crate::working_set::{Row, Terms};
@@ -16,7 +16,7 @@ pub(crate) struct Trajectory<'a, T, const NX: usize, const NU: usize> {
 
 impl<T: Scalar, const NX: usize, const NU: usize> Trajectory<'_, T, NX, NU> {
     /// x_`stage`, from 0 to the horizon.
-    pub fn state<const NG: usize>(&self, ocp: &Ocp<T, NX, NU, NG>, stage: usize) -> SVector<T, NX> {
+    pub fn state(&self, ocp: &Ocp<T, NX, NU>, stage: usize) -> SVector<T, NX> {
         let later = stage.checked_sub(1).and_then(|before| self.x.get(before));
         *later.unwrap_or(&ocp.x0)
     }
@@ -75,91 +75,94 @@ fn violated_sides<T: Scalar, const K: usize>(
     let sides = bounds.lower.iter().zip(bounds.upper.iter());
     for (index, ((v, soft), (lower, upper))) in value.iter().zip(soft.iter()).zip(sides).enumerate()
     {
-        if *v >= *lower && *v <= *upper {
+        violated_side(*v, (*lower, *upper), *soft, stage, quantity(index), visit);
+    }
+}
+
+/// Offers each side to `visit` beyond which `value` is.
+fn violated_side<T: Scalar>(
+    value: T,
+    (lower, upper): (T, T),
+    soft: Option<Penalty<T>>,
+    stage: usize,
+    quantity: Quantity,
+    visit: &mut impl FnMut(Candidate<T>),
+) {
+    if value >= lower && value <= upper {
+        return;
+    }
+    for (side, slack) in [(Side::Lower, value - lower), (Side::Upper, upper - value)] {
+        if slack >= T::zero() {
             continue;
         }
-        for (side, slack) in [(Side::Lower, *v - *lower), (Side::Upper, *upper - *v)] {
-            if slack >= T::zero() {
-                continue;
-            }
-            visit(Candidate {
-                bound: BoundId {
-                    stage,
-                    quantity: quantity(index),
-                    side,
-                },
-                part: Part::Hard,
-                soft: *soft,
-                slack,
-                violation: -slack / size_of_bound(*lower, *upper),
-                rank: -slack / room_of_bound(*lower, *upper),
-            });
-        }
+        visit(Candidate {
+            bound: BoundId {
+                stage,
+                quantity,
+                side,
+            },
+            part: Part::Hard,
+            soft,
+            slack,
+            violation: -slack / size_of_bound(lower, upper),
+            rank: -slack / room_of_bound(lower, upper),
+        });
     }
 }
 
 /// Offers every violated bound of the problem on the trajectory to `visit`.
-pub(crate) fn violated_bounds<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+pub(crate) fn violated_bounds<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     trajectory: &Trajectory<'_, T, NX, NU>,
     visit: &mut impl FnMut(Candidate<T>),
 ) {
     let n = ocp.length();
     let mut x = &ocp.x0;
     let steps = trajectory.x.iter().zip(trajectory.u.iter());
-    for (i, (stage, (x_next, u))) in ocp.stages.iter().zip(steps).enumerate().take(n) {
+    for (i, (x_next, u)) in steps.enumerate().take(n) {
+        let bounds = ocp.common_at(i);
         if i > 0 {
-            violated_sides(&stage.x, &ocp.soft_x, x, i, Quantity::State, visit);
+            violated_sides(&bounds.x, &ocp.soft_x, x, i, Quantity::State, visit);
         }
-        violated_sides(&stage.u, &[None; NU], u, i, Quantity::Input, visit);
-        if NG > 0 {
-            let value = stage.row_x * x + stage.row_u * u;
-            violated_sides(
-                &stage.rows,
-                &stage.soft_rows,
-                &value,
-                i,
-                Quantity::Row,
-                visit,
-            );
-        }
+        violated_sides(&bounds.u, &[None; NU], u, i, Quantity::Input, visit);
+        violated_rows(ocp, i, x, Some(u), visit);
         x = x_next;
     }
-    violated_sides(
-        &ocp.terminal.x,
-        &ocp.terminal.soft_x,
-        x,
-        n,
-        Quantity::State,
-        visit,
-    );
-    if NG > 0 {
-        let value = ocp.terminal.row_x * x;
-        violated_sides(
-            &ocp.terminal.rows,
-            &ocp.terminal.soft_rows,
-            &value,
-            n,
-            Quantity::Row,
-            visit,
-        );
+    let Terminal {
+        x: bounds, soft_x, ..
+    } = &ocp.terminal;
+    violated_sides(bounds, soft_x, x, n, Quantity::State, visit);
+    violated_rows(ocp, n, x, None, visit);
+}
+
+/// Offers every violated side of the general rows of a stage to `visit`.
+fn violated_rows<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    stage: usize,
+    x: &SVector<T, NX>,
+    u: Option<&SVector<T, NU>>,
+    visit: &mut impl FnMut(Candidate<T>),
+) {
+    for (j, row) in ocp.rows_of(stage).iter().enumerate() {
+        let sides = (row.lower, row.upper);
+        violated_side(row.value(x, u), sides, row.soft, stage, Quantity::Row(j), visit);
     }
 }
 
 /// The bound's normal: d(value)/dx and d(value)/du at its stage.
-pub(crate) fn normal<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+pub(crate) fn normal<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     bound: &BoundId,
 ) -> (SVector<T, NX>, SVector<T, NU>) {
-    let terminal = bound.stage >= ocp.length();
-    match (bound.quantity, ocp.stages.get(bound.stage)) {
-        (Quantity::State(j), _) => (unit(j), SVector::zeros()),
-        (Quantity::Input(j), _) => (SVector::zeros(), unit(j)),
-        (Quantity::Row(j), Some(stage)) if !terminal => (
-            component_row(&stage.row_x, j),
-            component_row(&stage.row_u, j),
-        ),
-        (Quantity::Row(j), _) => (component_row(&ocp.terminal.row_x, j), SVector::zeros()),
+    match bound.quantity {
+        Quantity::State(j) => (unit(j), SVector::zeros()),
+        Quantity::Input(j) => (SVector::zeros(), unit(j)),
+        Quantity::Row(j) => {
+            let row = ocp.row(bound.stage, j);
+            let (x, u) = row.map_or((SVector::zeros(), SVector::zeros()), |row| (row.x, row.u));
+            let at_end = bound.stage >= ocp.length();
+            (x, if at_end { SVector::zeros() } else { u })
+        }
     }
 }
 
@@ -167,18 +170,9 @@ fn unit<T: Scalar, const K: usize>(j: usize) -> SVector<T, K> {
     SVector::from_fn(|i, _| if i == j { T::one() } else { T::zero() })
 }
 
-fn component_row<T: Scalar, const R: usize, const C: usize>(
-    m: &nalgebra::SMatrix<T, R, C>,
-    j: usize,
-) -> SVector<T, C> {
-    m.row_iter()
-        .nth(j)
-        .map_or_else(SVector::zeros, |row| row.transpose())
-}
-
 /// The bound's slack on the trajectory; for an equality, value - target.
-pub(crate) fn slack<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+pub(crate) fn slack<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     trajectory: &Trajectory<'_, T, NX, NU>,
     bound: &BoundId,
 ) -> T {
@@ -194,8 +188,8 @@ pub(crate) fn slack<T: Scalar, const NX: usize, const NU: usize, const NG: usize
 }
 
 /// The size against which a violation of `bound` is measured.
-pub(crate) fn size<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+pub(crate) fn size<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     bound: &BoundId,
 ) -> T {
     let (lower, upper) = limits(ocp, bound);
@@ -203,8 +197,8 @@ pub(crate) fn size<T: Scalar, const NX: usize, const NU: usize, const NG: usize>
 }
 
 /// The size by which a violation of `bound` is ranked.
-pub(crate) fn room<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+pub(crate) fn room<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     bound: &BoundId,
 ) -> T {
     let (lower, upper) = limits(ocp, bound);
@@ -212,8 +206,8 @@ pub(crate) fn room<T: Scalar, const NX: usize, const NU: usize, const NG: usize>
 }
 
 /// Lower and upper limit of the bounded quantity, both the target for an equality.
-pub(crate) fn limits<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+pub(crate) fn limits<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     bound: &BoundId,
 ) -> (T, T) {
     if let (Side::Equality, Quantity::State(j), Some(target)) =
@@ -221,18 +215,19 @@ pub(crate) fn limits<T: Scalar, const NX: usize, const NU: usize, const NG: usiz
     {
         return component(target, target, j);
     }
-    let end = &ocp.terminal;
-    let stage = ocp
-        .stages
-        .get(bound.stage)
-        .filter(|_| bound.stage < ocp.length());
-    match (bound.quantity, stage) {
-        (Quantity::State(j), Some(stage)) => component(&stage.x.lower, &stage.x.upper, j),
-        (Quantity::State(j), None) => component(&end.x.lower, &end.x.upper, j),
-        (Quantity::Input(j), Some(stage)) => component(&stage.u.lower, &stage.u.upper, j),
-        (Quantity::Row(j), Some(stage)) => component(&stage.rows.lower, &stage.rows.upper, j),
-        (Quantity::Row(j), None) => component(&end.rows.lower, &end.rows.upper, j),
-        (Quantity::Input(_), None) => unlimited(),
+    let bounds = ocp.common_at(bound.stage);
+    let at_end = bound.stage >= ocp.length();
+    match bound.quantity {
+        Quantity::State(j) => {
+            let x = if at_end { &ocp.terminal.x } else { &bounds.x };
+            component(&x.lower, &x.upper, j)
+        }
+        Quantity::Input(_) if at_end => unlimited(),
+        Quantity::Input(j) => component(&bounds.u.lower, &bounds.u.upper, j),
+        Quantity::Row(j) => {
+            let row = ocp.row(bound.stage, j);
+            row.map_or_else(unlimited, |row| (row.lower, row.upper))
+        }
     }
 }
 
@@ -253,8 +248,8 @@ fn unlimited<T: Scalar>() -> (T, T) {
 }
 
 /// Writes the row of `bound` to `row`: one backward pass through the closed loop.
-pub(crate) fn form_row<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+pub(crate) fn form_row<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     factors: &[StageFactor<T, NX, NU>],
     bound: BoundId,
     part: Part,
@@ -301,8 +296,8 @@ pub(crate) fn form_row<T: Scalar, const NX: usize, const NU: usize, const NG: us
 }
 
 /// The gradient that the rows `active` at `stage` add to the state and the input.
-pub(crate) fn gradient<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+pub(crate) fn gradient<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     active: impl Iterator<Item = ActiveRow<T>>,
     stage: usize,
 ) -> (SVector<T, NX>, SVector<T, NU>) {
@@ -324,10 +319,9 @@ pub(crate) fn subtract<
     T: Scalar,
     const NX: usize,
     const NU: usize,
-    const NG: usize,
     Active: Iterator<Item = ActiveRow<T>>,
 >(
-    ocp: &Ocp<T, NX, NU, NG>,
+    ocp: &Ocp<T, NX, NU>,
     factors: &[StageFactor<T, NX, NU>],
     active: impl Fn() -> Active,
     v: &mut [SVector<T, NU>],
@@ -343,22 +337,15 @@ pub(crate) fn subtract<
 }
 
 /// The price of exceeding `bound`, if it is soft.
-pub(crate) fn soft_price<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+pub(crate) fn soft_price<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     bound: &BoundId,
 ) -> Option<Penalty<T>> {
-    let stage = if bound.stage < ocp.length() {
-        ocp.stages.get(bound.stage)
-    } else {
-        None
-    };
-    match (bound.quantity, stage) {
-        (Quantity::State(j), Some(_)) => ocp.soft_x.get(j),
-        (Quantity::State(j), None) => ocp.terminal.soft_x.get(j),
-        (Quantity::Row(j), Some(stage)) => stage.soft_rows.get(j),
-        (Quantity::Row(j), None) => ocp.terminal.soft_rows.get(j),
-        (Quantity::Input(_), _) => None,
+    let at_end = bound.stage >= ocp.length();
+    match bound.quantity {
+        Quantity::State(j) if at_end => ocp.terminal.soft_x.get(j).copied().flatten(),
+        Quantity::State(j) => ocp.soft_x.get(j).copied().flatten(),
+        Quantity::Row(j) => ocp.row(bound.stage, j)?.soft,
+        Quantity::Input(_) => None,
     }
-    .copied()
-    .flatten()
 }

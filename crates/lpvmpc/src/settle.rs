@@ -13,9 +13,9 @@ use nalgebra::convert;
 impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     /// Starts from the rows that were active before, `shift` stages earlier. Rows whose
     /// multiplier would have the wrong sign are dropped, so this never changes the result.
-    pub fn warm_start<const NX: usize, const NG: usize>(
+    pub fn warm_start<const NX: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         factors: &[StageFactor<T, NX, NU>],
         trajectory: &Trajectory<'_, T, NX, NU>,
         before: &ActiveSet<T>,
@@ -55,9 +55,9 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     /// conditions. Returns whether anything was moved.
     ///
     /// Where v has become so large that its rounding is larger than a bound, the answer is inaccurate.
-    pub fn refine<const NX: usize, const NG: usize>(
+    pub fn refine<const NX: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         factors: &[StageFactor<T, NX, NU>],
         trajectory: &Trajectory<'_, T, NX, NU>,
     ) -> Result<bool, Status<T>> {
@@ -85,9 +85,9 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     }
 
     /// The active bound that is farthest from holding, relative to its size.
-    fn worst_defect<const NX: usize, const NG: usize>(
+    fn worst_defect<const NX: usize>(
         &self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         trajectory: &Trajectory<'_, T, NX, NU>,
     ) -> (T, BoundId) {
         let working = self.working.rows().iter().map(|row| {
@@ -117,9 +117,9 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
 
     /// Moves to the minimiser over the working set, without the rows whose multiplier would
     /// leave its interval there. `trajectory` belongs to the current v.
-    fn settle<const NX: usize, const NG: usize>(
+    fn settle<const NX: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         factors: &[StageFactor<T, NX, NU>],
         trajectory: &Trajectory<'_, T, NX, NU>,
     ) -> Result<(), Status<T>> {
@@ -168,9 +168,9 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     }
 
     /// Leaves in `rest` v - sum of multiplier * alpha over the active rows: zero but for rounding.
-    fn find_unexplained<const NX: usize, const NG: usize>(
+    fn find_unexplained<const NX: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         factors: &[StageFactor<T, NX, NU>],
     ) {
         copy(&mut self.rest, &self.v);
@@ -180,8 +180,8 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
 }
 
 /// What is missing for `row` to hold with equality on the trajectory.
-fn defect<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+fn defect<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     trajectory: &Trajectory<'_, T, NX, NU>,
     row: &Terms<T>,
 ) -> T {

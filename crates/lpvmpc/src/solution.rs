@@ -264,6 +264,8 @@ pub enum Status<T> {
     ChangeCap,
     /// More bounds are active at once than the workspace has places for.
     WorkingSetFull,
+    /// The problem has more stages than the problem itself, the solver or the solution has memory for.
+    HorizonTooLong,
     /// R + B'PB is not positive definite at this stage: the offending pivot.
     NumericalFailure {
         /// Stage of the failing factorisation.
@@ -299,6 +301,7 @@ impl<T: fmt::Display> fmt::Display for Status<T> {
             }
             Self::ChangeCap => write!(f, "cap on active-set changes reached"),
             Self::WorkingSetFull => write!(f, "more active bounds than the workspace holds"),
+            Self::HorizonTooLong => write!(f, "the horizon is longer than the workspace"),
             Self::NumericalFailure { stage, pivot } => write!(
                 f,
                 "R + B'PB not positive definite at stage {stage} (pivot {pivot})"

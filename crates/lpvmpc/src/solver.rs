@@ -10,7 +10,7 @@ use crate::list::List;
 use crate::memory::Capacity;
 use crate::memory::SolverMemory;
 use crate::model::Scalar;
-use crate::ocp::{Bounds, Ocp, Penalty, Softness};
+use crate::ocp::{Bounds, Common, GeneralRow, Ocp, Softness};
 use crate::riccati::{CostToGo, StageFactor};
 use crate::rows::Trajectory;
 use crate::solution::{ActiveRow, ActiveSet, Quantity, Solution, Status};
@@ -66,12 +66,16 @@ pub struct Solver<T: 'static, const NX: usize, const NU: usize> {
     pub(crate) dual: DualActiveSet<T, NU>,
     /// None but within [`Solver::search_with_held_inputs`].
     pub(crate) held: HeldInputs<NU>,
+    /// The longest horizon that there is memory for.
+    stages: usize,
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     /// A solver in this memory.
     pub fn new(memory: SolverMemory<T, NX, NU>) -> Self {
+        let stages = memory.stages();
         Self {
+            stages,
             factors: memory.factors,
             dual: DualActiveSet::new(memory.dual),
             held: HeldInputs::none(memory.held),
@@ -90,9 +94,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     /// leaves finite inputs within the input bounds; what they are worth is in
     /// `solution.status`.
     #[inline(never)]
-    pub fn solve<const NG: usize>(
+    pub fn solve(
         &mut self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU>,
     ) {
@@ -103,10 +107,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     /// [`Solver::solve`] with the factor that [`Solver::factorize`] left: of all of `ocp`, only `x0`
     /// may have changed since.
     #[inline(never)]
-    pub(crate) fn solve_factorized<const NG: usize>(
+    pub(crate) fn solve_factorized(
         &mut self,
         factorized: Result<(), Status<T>>,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU>,
     ) {
@@ -116,6 +120,12 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             settings.max_changes,
         );
         let mut spent = 0;
+        let room = self.stages.min(solution.u.len()).min(solution.x.len());
+        let factorized = if ocp.horizon > room.min(ocp.stages.len()) {
+            Err(Status::HorizonTooLong)
+        } else {
+            factorized
+        };
         let outcome = loop {
             let warm = settings.warm_start != WarmStart::Cold && !solution.active.is_empty();
             let outcome = factorized.and_then(|()| self.search(ocp, settings, solution));
@@ -152,9 +162,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     /// that is one.
     #[cold]
     #[inline(never)]
-    pub(crate) fn prove<const NG: usize>(
+    pub(crate) fn prove(
         &self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         proof: &mut ActiveSet<T>,
     ) -> Option<Status<T>> {
         if !(self.dual.report_conflict(proof) && infeasibility_margin(ocp, proof) > T::zero()) {
@@ -173,9 +183,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         Some(Status::Infeasible(cause.bound))
     }
 
-    pub(crate) fn search<const NG: usize>(
+    pub(crate) fn search(
         &mut self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
@@ -215,9 +225,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     }
 
     /// Backward: the factor of every stage. It does not depend on `x0`.
-    pub(crate) fn factorize<const NG: usize>(
+    pub(crate) fn factorize(
         &mut self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
     ) -> Result<(), Status<T>> {
         let mut cost_to_go = CostToGo {
             quadratic: ocp.terminal.p,
@@ -225,9 +235,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         };
         let stages = ocp.stages.iter().zip(self.factors.iter_mut());
         for (stage, (data, factor)) in stages.enumerate().take(ocp.length()).rev() {
+            let weights = ocp.common_at(stage);
             match self.held.of(stage) {
-                None => factor.eliminate(data, &mut cost_to_go),
-                Some(held) => eliminate_held(factor, data, held, &mut cost_to_go),
+                None => factor.eliminate(data, weights, &mut cost_to_go),
+                Some(held) => eliminate_held(factor, data, weights, held, &mut cost_to_go),
             }
             .map_err(|bad| failed_pivot(stage, bad.0))?;
         }
@@ -235,9 +246,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     }
 
     /// Forward: the trajectory of the current normalised deviations.
-    fn roll_out<const NG: usize>(
+    fn roll_out(
         &self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
         let mut x = ocp.x0;
@@ -257,9 +268,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         }
     }
 
-    fn warm_start<const NG: usize>(
+    fn warm_start(
         &mut self,
-        ocp: &Ocp<T, NX, NU, NG>,
+        ocp: &Ocp<T, NX, NU>,
         settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
@@ -294,8 +305,8 @@ fn trajectory<T, const NX: usize, const NU: usize>(
     }
 }
 
-fn terminal_state<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+fn terminal_state<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     solution: &Solution<T, NX, NU>,
 ) -> SVector<T, NX> {
     let last = solution.x.get(ocp.length() - 1);
@@ -315,8 +326,8 @@ fn failed_pivot<T: Scalar>(stage: usize, pivot: T) -> Status<T> {
 }
 
 /// After a failure: the last inputs moved into their bounds, and the states they lead to.
-fn fall_back<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+fn fall_back<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     solution: &mut Solution<T, NX, NU>,
 ) {
     clip_inputs(ocp, solution);
@@ -333,21 +344,22 @@ fn fall_back<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
 }
 
 /// Moves the inputs into their bounds.
-fn clip_inputs<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+fn clip_inputs<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     solution: &mut Solution<T, NX, NU>,
 ) {
     // Slices of unknown length are not unrolled, for the flash of a microcontroller.
-    let inputs = solution.u.get_mut(..ocp.length()).unwrap_or_default();
-    for (u, stage) in inputs.iter_mut().zip(ocp.stages.iter()) {
-        *u = stage.u.project(u);
+    let length = ocp.length().min(solution.u.len());
+    let inputs = solution.u.get_mut(..length).unwrap_or_default();
+    for (i, u) in inputs.iter_mut().enumerate() {
+        *u = ocp.common_at(i).u.project(u);
     }
 }
 
 /// The problem's cost at the solution's inputs and states (with the factor 1/2 of [`Ocp`]'s
 /// stages), including the price of exceeded soft bounds.
-pub fn cost<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
-    ocp: &Ocp<T, NX, NU, NG>,
+pub fn cost<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
     solution: &Solution<T, NX, NU>,
 ) -> T {
     let half: T = convert(0.5);
@@ -355,23 +367,32 @@ pub fn cost<T: Scalar, const NX: usize, const NU: usize, const NG: usize>(
     let mut x = &ocp.x0;
     let steps = solution.u.iter().zip(solution.x.iter());
     for (i, (stage, (u, x_next))) in ocp.stages.iter().zip(steps).enumerate().take(ocp.length()) {
-        total += (stage.q * x * half + stage.linear_x).dot(x);
-        total += (stage.s * x + stage.r * u * half + stage.linear_u).dot(u);
+        let Common { q, r, s, .. } = ocp.common_at(i);
+        total += (q * x * half + stage.linear_x).dot(x);
+        total += (s * x + r * u * half + stage.linear_u).dot(u);
         if i > 0 {
-            total += price(&ocp.soft_x, x, &stage.x);
+            total += price(&ocp.soft_x, x, &ocp.common_at(i).x);
         }
-        if NG > 0 {
-            let value = stage.row_x * x + stage.row_u * u;
-            total += price(&stage.soft_rows, &value, &stage.rows);
-        }
+        total += price_of_rows(ocp.rows_of(i), x, Some(u));
         x = x_next;
     }
     let end = &ocp.terminal;
     total += (end.p * x * half + end.linear_x).dot(x) + price(&end.soft_x, x, &end.x);
-    if NG > 0 {
-        total += price(&end.soft_rows, &(end.row_x * x), &end.rows);
-    }
-    total
+    total + price_of_rows(ocp.rows_of(ocp.length()), x, None)
+}
+
+/// The price of the soft general rows that a stage exceeds.
+fn price_of_rows<T: Scalar, const NX: usize, const NU: usize>(
+    rows: &[GeneralRow<T, NX, NU>],
+    x: &SVector<T, NX>,
+    u: Option<&SVector<T, NU>>,
+) -> T {
+    rows.iter().fold(T::zero(), |total, row| {
+        let price = row.soft.map_or(T::zero(), |penalty| {
+            penalty.of(excess(row.value(x, u), row.lower, row.upper))
+        });
+        total + price
+    })
 }
 
 /// The price of the soft bounds that `value` exceeds.
@@ -383,9 +404,8 @@ pub(crate) fn price<T: Scalar, const K: usize>(
     let sides = bounds.lower.iter().zip(bounds.upper.iter());
     let mut total = T::zero();
     for ((soft, v), (lower, upper)) in soft.iter().zip(value.iter()).zip(sides) {
-        if let Some(Penalty { linear, quadratic }) = soft {
-            let excess = excess(*v, *lower, *upper);
-            total += (*linear + *quadratic * excess * convert(0.5)) * excess;
+        if let Some(penalty) = soft {
+            total += penalty.of(excess(*v, *lower, *upper));
         }
     }
     total

@@ -124,6 +124,8 @@ impl<T: Scalar, const NU: usize> Direction<T, NU> {
 #[derive(Debug)]
 pub(crate) struct WorkingSet<T: 'static, const NU: usize> {
     rows: List<Terms<T>>,
+    /// Rows that there are places for in all lists.
+    most: usize,
     /// L, row by row, each as long as `rows`.
     factor: List<T>,
     /// Q, row by row, each of `stages` entries.
@@ -137,13 +139,13 @@ pub(crate) struct WorkingSet<T: 'static, const NU: usize> {
 
 impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
     pub fn new(
-        rows: List<Terms<T>>,
+        (rows, most): (List<Terms<T>>, usize),
         factor: List<T>,
-        basis: List<SVector<T, NU>>,
-        stages: usize,
+        (basis, stages): (List<SVector<T, NU>>, usize),
     ) -> Self {
         Self {
             rows,
+            most,
             factor,
             basis,
             stages,
@@ -158,7 +160,7 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
     }
 
     pub fn is_full(&self) -> bool {
-        self.len >= self.rows.len()
+        self.len >= self.most
     }
 
     pub fn rows(&self) -> &[Terms<T>] {
