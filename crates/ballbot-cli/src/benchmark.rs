@@ -6,10 +6,10 @@
 
 use crate::commands::CommandError;
 use ballbot::Ballbot;
-use ballbot_scenario::{GUARDED_ACTIVE, Prepared, Scenario, ScenarioError, number};
+use ballbot_scenario::{Prepared, Scenario, ScenarioError};
 use lpvmpc::{
-    Controller, ControllerSettings, GuardedController, GuardedIterations, GuardedWorkspace,
-    Iterations, Reference, Solution, Solver, TerminalIngredient, Workspace,
+    Controller, ControllerSettings, GuardedController, GuardedIterations, Iterations, Reference,
+    Solution, Solver, TerminalIngredient,
 };
 use lpvmpc_sim::advance;
 use nalgebra::Vector4;
@@ -26,10 +26,6 @@ pub const SEQUENCES: [&str; 4] = [
     "tight-bounds",
 ];
 
-/// The horizon of those scenarios.
-const N: usize = 20;
-/// A torque bound per stage, and the four rows of a terminal equality.
-const M: usize = N + 4;
 /// Repetitions of each sample.
 const PASSES: usize = 30;
 
@@ -44,8 +40,7 @@ const SWEPT: usize = 48 << 20;
 const GUARDED_SAMPLES: usize = 400;
 const HOLD: usize = 80;
 
-type Guarded = GuardedController<Ballbot<f64>, f64, 4, 1, 3, N, 5, { N + 2 }>;
-type Control = Controller<Ballbot<f64>, f64, 4, 1, 3, N, M>;
+type Control = Controller<Ballbot<f64>, f64, 4, 1, 3>;
 
 /// Statistics of a time over a sequence, in microseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -122,10 +117,10 @@ pub fn time_guarded() -> Result<GuardedTimes, CommandError> {
     plain_settings.terminal = TerminalIngredient::Cost(settings.terminal.p);
     plain_settings.iterations = Iterations::Fixed(1);
     let refused = ScenarioError::from;
-    let mut plain = Control::new(prepared.ballbot, plain_settings).map_err(refused)?;
-    let mut guarded = Guarded::new(prepared.ballbot, settings).map_err(ScenarioError::from)?;
-    let mut workspace = Box::new(Workspace::<f64, 4, 1, N, M>::new());
-    let mut memory = Box::new(GuardedWorkspace::<f64, 1, 5, { N + 2 }, GUARDED_ACTIVE>::new());
+    let mut plain = Control::allocate(prepared.ballbot, plain_settings).map_err(refused)?;
+    let mut guarded = GuardedController::allocate(prepared.ballbot, settings).map_err(ScenarioError::from)?;
+    let mut workspace = plain.workspace();
+    let mut memory = guarded.workspace::<5>();
     let (mut plain_us, mut guarded_us) = (Vec::new(), Vec::new());
     let mut x = Vector4::zeros();
     for k in 0..GUARDED_SAMPLES {
@@ -180,9 +175,9 @@ impl DescentTimes {
         samples: usize,
         wanted: impl Fn(usize) -> f64,
     ) -> Result<Self, CommandError> {
-        let controller = Control::new(prepared.ballbot, settings).map_err(ScenarioError::from)?;
-        let mut controller = Box::new(controller);
-        let mut workspace = Box::new(Workspace::<f64, 4, 1, N, M>::new());
+        let controller = Control::allocate(prepared.ballbot, settings);
+        let mut controller = controller.map_err(ScenarioError::from)?;
+        let mut workspace = controller.workspace();
         let (mut step, mut feedback) = (Vec::new(), Vec::new());
         let mut x = Vector4::zeros();
         for k in 0..samples {
@@ -214,17 +209,8 @@ impl DescentTimes {
 /// in an ideal world.
 ///
 /// # Errors
-/// The horizon is longer than what is compiled in here, the controller refuses its settings or
-/// the plant cannot be integrated.
+/// The controller refuses its settings or the plant cannot be integrated.
 pub fn time(name: &str, prepared: &Prepared) -> Result<SequenceTimes, CommandError> {
-    let horizon = prepared.settings.horizon;
-    let expected = format!("horizons of up to {N} samples are timed");
-    number::check(
-        "controller.horizon",
-        horizon as f64,
-        horizon <= N,
-        &expected,
-    )?;
     let mut record = Record::default();
     for plane in 0..prepared.planes.len() {
         time_plane(prepared, plane, &mut record)?;
@@ -249,18 +235,20 @@ struct Record {
 fn time_plane(prepared: &Prepared, plane: usize, record: &mut Record) -> Result<(), CommandError> {
     let plane = &prepared.planes[plane];
     let t_s = prepared.settings.t_s;
-    let mut workspace = Box::new(Workspace::<f64, 4, 1, N, M>::new());
-    let mut solver = Box::new(Solver::new());
     let mut controller =
-        Control::new(prepared.ballbot, prepared.settings).map_err(ScenarioError::from)?;
+        Control::allocate(prepared.ballbot, prepared.settings).map_err(ScenarioError::from)?;
+    let mut workspace = controller.workspace();
+    let mut solver = Solver::allocate(prepared.settings.capacity());
+    let horizon = prepared.settings.horizon;
     let mut x = plane.initial_state;
     let mut other_work = OtherWork::new();
     let stride = prepared.samples.div_ceil(COLD_SAMPLES);
     for k in 0..prepared.samples {
         let at = |i: usize| plane.state_reference((k + i) as f64 * t_s);
+        let stages: Vec<_> = (0..horizon).map(at).collect();
         let reference = Reference {
-            stages: std::array::from_fn(at),
-            terminal: at(prepared.settings.horizon),
+            stages: &stages,
+            terminal: at(horizon),
         };
         let before = controller.clone();
         let step = shortest(|| {
@@ -270,7 +258,7 @@ fn time_plane(prepared: &Prepared, plane: usize, record: &mut Record) -> Result<
             start.elapsed()
         });
         let qp = shortest(|| {
-            let mut solution: Solution<f64, 4, 1, N, M> = before.solution().clone();
+            let mut solution: Solution<f64, 4, 1> = before.solution().clone();
             let settings = &controller.settings().solver;
             let start = Instant::now();
             solver.solve(black_box(workspace.ocp()), settings, &mut solution);

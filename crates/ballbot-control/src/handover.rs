@@ -92,8 +92,8 @@ pub(crate) struct Plan<const NX: usize> {
 }
 
 impl<const NX: usize> Plan<NX> {
-    pub(crate) fn of<P, const N: usize, const M: usize>(
-        controller: &Controller<P, f64, NX, 1, 3, N, M>,
+    pub(crate) fn of<P>(
+        controller: &Controller<P, f64, NX, 1, 3>,
     ) -> Option<Self>
     where
         P: LpvModel<f64, NX, 1, 3>,
@@ -112,9 +112,9 @@ impl<const NX: usize> Plan<NX> {
 
     /// Gives it to a controller. At another sampling time its inputs would be another motion: then
     /// that begins without a past.
-    pub(crate) fn hand_to<P, const N: usize, const M: usize>(
+    pub(crate) fn hand_to<P>(
         &self,
-        controller: &mut Controller<P, f64, NX, 1, 3, N, M>,
+        controller: &mut Controller<P, f64, NX, 1, 3>,
     ) where
         P: LpvModel<f64, NX, 1, 3>,
     {

@@ -44,9 +44,7 @@ impl<R: PlaneRegulator + ?Sized> PlaneRegulator for Box<R> {
 }
 
 /// The guarantee is for bounds that stay: it keeps to an equal share.
-impl<const N: usize, const NA: usize, const NP: usize, const M: usize> PlaneRegulator
-    for GuardedFeedback<Ballbot<f64>, 4, 1, 3, N, NA, NP, M>
-{
+impl PlaneRegulator for GuardedFeedback<Ballbot<f64>, 4, 1, 3, 5> {
     fn hand_over(&self) -> Handover {
         let plan = PlanKind::Guarded(Rc::new((
             self.controller.clone(),
@@ -62,26 +60,26 @@ impl<const N: usize, const NA: usize, const NP: usize, const M: usize> PlaneRegu
             return;
         };
         // With other settings its plan is backed by nothing.
-        if let Some((previous, active)) = previous.downcast_ref::<Guarded<N, NA, NP, M>>()
+        if let Some((previous, active)) = previous.downcast_ref::<Guarded>()
             && previous.settings() == self.controller.settings()
             && previous.model() == self.controller.model()
         {
             self.controller = previous.clone();
-            self.workspace.set_warm_start(active.clone());
+            self.workspace.set_warm_start(active);
         }
     }
 }
 
 /// A guarded controller and the warm start of its next program.
-type Guarded<const N: usize, const NA: usize, const NP: usize, const M: usize> = (
-    GuardedController<Ballbot<f64>, f64, 4, 1, 3, N, NA, NP>,
-    ActiveSet<f64, M>,
+type Guarded = (
+    GuardedController<Ballbot<f64>, f64, 4, 1, 3>,
+    ActiveSet<f64>,
 );
 
-impl<const N: usize, const M: usize> PlaneRegulator
+impl PlaneRegulator
     for StateFeedback<
-        Box<Controller<Ballbot<f64>, f64, 4, 1, 3, N, M>>,
-        Box<Workspace<f64, 4, 1, N, M>>,
+        Box<Controller<Ballbot<f64>, f64, 4, 1, 3>>,
+        Box<Workspace<f64, 4, 1>>,
         4,
     >
 {

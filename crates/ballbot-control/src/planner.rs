@@ -67,12 +67,12 @@ pub(crate) trait Planner {
 }
 
 /// The torque is held over a sample.
-pub(crate) struct Held<const N: usize, const M: usize> {
-    pub(crate) controller: Box<Controller<Ballbot<f64>, f64, 4, 1, 3, N, M>>,
-    pub(crate) workspace: Box<Workspace<f64, 4, 1, N, M>>,
+pub(crate) struct Held {
+    pub(crate) controller: Controller<Ballbot<f64>, f64, 4, 1, 3>,
+    pub(crate) workspace: Workspace<f64, 4, 1>,
 }
 
-impl<const N: usize, const M: usize> Planner for Held<N, M> {
+impl Planner for Held {
     fn t_s(&self) -> f64 {
         self.controller.settings().t_s
     }
@@ -126,7 +126,6 @@ impl<const N: usize, const M: usize> Planner for Held<N, M> {
 
     fn largest_torque(&self, disturbance: f64) -> f64 {
         let plan = self.controller.solution().u.iter();
-        let plan = plan.take(self.controller.settings().horizon);
         plan.fold(0.0, |most, u| most.max((u[0] - disturbance).abs()))
     }
 }
@@ -141,9 +140,9 @@ pub(crate) fn shifted(allowed: &Bounds<f64, 1>, disturbance: f64) -> Bounds<f64,
 
 /// One step of `controller` from `x`: its first input, and what is to be said about the plan. What
 /// of the state lies beyond the robot's four is to be zero.
-pub(crate) fn step<P, const NX: usize, const N: usize, const M: usize>(
-    controller: &mut Controller<P, f64, NX, 1, 3, N, M>,
-    workspace: &mut Workspace<f64, NX, 1, N, M>,
+pub(crate) fn step<P, const NX: usize>(
+    controller: &mut Controller<P, f64, NX, 1, 3>,
+    workspace: &mut Workspace<f64, NX, 1>,
     x: &SVector<f64, NX>,
     reference: &dyn Fn(usize) -> Vector4<f64>,
     clock: &dyn Fn() -> Duration,
@@ -156,12 +155,13 @@ where
         let robot = reference(i);
         SVector::<f64, NX>::from_fn(|j, _| robot.get(j).copied().unwrap_or(0.0))
     };
-    let mut window: Reference<f64, NX, N> = Reference::constant(at(horizon));
-    for (i, place) in window.stages.iter_mut().enumerate().take(horizon) {
-        *place = at(i);
-    }
+    let stages: Vec<SVector<f64, NX>> = (0..horizon).map(at).collect();
+    let window = Reference {
+        stages: &stages,
+        terminal: at(horizon),
+    };
     let before = clock();
-    let plan: &Solution<f64, NX, 1, N, M> = controller.step(x, &window, workspace);
+    let plan: &Solution<f64, NX, 1> = controller.step(x, &window, workspace);
     let step_time = clock().saturating_sub(before);
     let (input, status, active_bounds) = (plan.u[0][0], plan.status, plan.active.len());
     let decision = Decision {

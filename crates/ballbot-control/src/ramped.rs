@@ -1,11 +1,10 @@
 //! The torque as a fifth state, its rate as the input.
 
-use crate::boxed::boxed;
 use crate::feedback::Feedback;
 use crate::handover::{Handover, Plan, PlanKind};
 use crate::plane_regulator::PlaneRegulator;
 use crate::planner::{Planner, shifted, step};
-use crate::regulators::{RegulatorError, sized, too_long, with_planner};
+use crate::regulators::{RegulatorError, with_planner};
 use ballbot::Ballbot;
 use lpvmpc::{
     BoundId, Bounds, Controller, ControllerSettings, Quantity, RampedInput, Status, Workspace,
@@ -19,8 +18,7 @@ use std::time::Duration;
 /// sensors, s.
 ///
 /// # Errors
-/// Estimator or controller refuses its settings, or the horizon is longer than
-/// [`LONGEST_HORIZON`](crate::LONGEST_HORIZON).
+/// Estimator or controller refuses its settings.
 pub fn ramped_feedback(
     ballbot: &Ballbot<f64>,
     settings: &ControllerSettings<f64, 5, 1, 3>,
@@ -28,35 +26,26 @@ pub fn ramped_feedback(
     feedback: &Feedback,
     period: f64,
 ) -> Result<Box<dyn PlaneRegulator>, RegulatorError> {
-    let planner: Result<_, RegulatorError> =
-        sized!(settings.horizon, 3 per sample, ramped(ballbot, settings));
-    with_planner(planner?, ballbot, torque, feedback, period)
-}
-
-// Not inlined: each size builds its controller on the stack before it is boxed.
-#[inline(never)]
-fn ramped<const N: usize, const M: usize>(
-    ballbot: &Ballbot<f64>,
-    settings: &ControllerSettings<f64, 5, 1, 3>,
-) -> Result<Box<dyn Planner>, RegulatorError> {
-    Ok(Box::new(Ramped::<N, M> {
-        controller: Box::new(Controller::new(RampedInput(*ballbot), *settings)?),
-        workspace: boxed(Workspace::new),
+    let controller = Controller::allocate(RampedInput(*ballbot), *settings)?;
+    let planner = Ramped {
+        workspace: controller.workspace(),
+        controller,
         torque: 0.0,
         rate: 0.0,
-    }))
+    };
+    with_planner(Box::new(planner), ballbot, torque, feedback, period)
 }
 
-struct Ramped<const N: usize, const M: usize> {
-    controller: Box<Controller<RampedInput<Ballbot<f64>, 4>, f64, 5, 1, 3, N, M>>,
-    workspace: Box<Workspace<f64, 5, 1, N, M>>,
+struct Ramped {
+    controller: Controller<RampedInput<Ballbot<f64>, 4>, f64, 5, 1, 3>,
+    workspace: Workspace<f64, 5, 1>,
     /// The commanded torque, N m.
     torque: f64,
     /// Its rate, N m/s.
     rate: f64,
 }
 
-impl<const N: usize, const M: usize> Planner for Ramped<N, M> {
+impl Planner for Ramped {
     fn t_s(&self) -> f64 {
         self.controller.settings().t_s
     }

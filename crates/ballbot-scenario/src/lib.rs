@@ -54,7 +54,7 @@ pub mod words;
 mod world;
 mod world_table;
 
-pub use ballbot_control::{Feedback, GUARDED_ACTIVE, LONGEST_HORIZON};
+pub use ballbot_control::Feedback;
 pub use certificate::{RobotTable, TerminalCertificate, ViscousBallbot, read_certificate};
 pub use error::ScenarioError;
 pub use excitation::Excitation;

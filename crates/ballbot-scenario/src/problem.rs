@@ -7,7 +7,6 @@ use crate::schema::{
     StateBounds, TerminalTable,
 };
 use ballbot::{Ballbot, LinearParameters};
-use ballbot_control::LONGEST_HORIZON;
 use lpvmpc::{
     Bounds, ControllerSettings, InputReference, Iterations, LpvModel, Predictor, Rk4, Scheduling,
     Softness, SolverSettings, TerminalIngredient, Weights, exact_prices,
@@ -80,16 +79,16 @@ impl BoundsTable {
     }
 }
 
+/// A controller with a longer horizon takes more memory and time than can be meant.
+const LONGEST_HORIZON: usize = 1000;
+
 fn check_horizon(table: &ControllerTable) -> Result<(), ScenarioError> {
     positive("controller.t_s", table.t_s)?;
     if table.horizon == 0 || table.horizon > LONGEST_HORIZON {
         return Err(ScenarioError::value(
             "controller.horizon",
             table.horizon,
-            format!(
-                "it must be from 1 to {LONGEST_HORIZON} samples (the library itself takes any \
-                 compile-time size)"
-            ),
+            format!("it must be from 1 to {LONGEST_HORIZON} samples"),
         ));
     }
     Ok(())

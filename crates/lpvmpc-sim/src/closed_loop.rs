@@ -324,19 +324,11 @@ pub struct Experiment<'a, const NX: usize> {
 
 /// Runs the closed loop in an ideal world: measure the state, step, hold the input for one
 /// sample. It ends early as [`record`] says.
-pub fn run<
-    C,
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NS: usize,
-    const N: usize,
-    const M: usize,
->(
-    controller: &mut Controller<C, f64, NX, NU, NS, N, M>,
+pub fn run<C, P, const NX: usize, const NU: usize, const NS: usize>(
+    controller: &mut Controller<C, f64, NX, NU, NS>,
     plant: &P,
     experiment: &Experiment<'_, NX>,
-    workspace: &mut Workspace<f64, NX, NU, N, M>,
+    workspace: &mut Workspace<f64, NX, NU>,
 ) -> Trajectory<NX, NU>
 where
     C: LpvModel<f64, NX, NU, NS>,

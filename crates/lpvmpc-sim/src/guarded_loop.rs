@@ -32,7 +32,7 @@ impl<const NU: usize> Actuation<NU> {
     }
 }
 
-/// A guarded controller and its plant. Sizes as in [`GuardedController`].
+/// A guarded controller and its plant.
 #[derive(Clone, Debug)]
 pub struct GuardedLoop<
     C,
@@ -40,11 +40,8 @@ pub struct GuardedLoop<
     const NX: usize,
     const NU: usize,
     const NS: usize,
-    const N: usize,
-    const NA: usize,
-    const NP: usize,
 > {
-    controller: GuardedController<C, f64, NX, NU, NS, N, NA, NP>,
+    controller: GuardedController<C, f64, NX, NU, NS>,
     plant: P,
     tolerances: Tolerances,
     x: SVector<f64, NX>,
@@ -58,17 +55,14 @@ impl<
     const NX: usize,
     const NU: usize,
     const NS: usize,
-    const N: usize,
-    const NA: usize,
-    const NP: usize,
-> GuardedLoop<C, P, NX, NU, NS, N, NA, NP>
+> GuardedLoop<C, P, NX, NU, NS>
 where
     C: LpvModel<f64, NX, NU, NS>,
     P: LpvModel<f64, NX, NU, NS>,
 {
     /// The loop with the plant in the state `x`, no input acting on it.
     pub fn new(
-        controller: GuardedController<C, f64, NX, NU, NS, N, NA, NP>,
+        controller: GuardedController<C, f64, NX, NU, NS>,
         plant: P,
         x: SVector<f64, NX>,
         tolerances: Tolerances,
@@ -93,10 +87,10 @@ where
     }
 
     /// The controller's answer to the measured state and the wanted set point.
-    pub fn decide<const M: usize>(
+    pub fn decide<const NA: usize>(
         &mut self,
         wanted: f64,
-        workspace: &mut GuardedWorkspace<f64, NU, NA, NP, M>,
+        workspace: &mut GuardedWorkspace<f64, NU, NA>,
     ) -> GuardedStep<f64, NX, NU> {
         self.controller.step(&self.x, wanted, workspace)
     }
@@ -139,15 +133,12 @@ pub struct GuardedFeedback<
     const NX: usize,
     const NU: usize,
     const NS: usize,
-    const N: usize,
     const NA: usize,
-    const NP: usize,
-    const M: usize,
 > {
     /// What decides.
-    pub controller: GuardedController<C, f64, NX, NU, NS, N, NA, NP>,
+    pub controller: GuardedController<C, f64, NX, NU, NS>,
     /// Its memory.
-    pub workspace: Box<GuardedWorkspace<f64, NU, NA, NP, M>>,
+    pub workspace: GuardedWorkspace<f64, NU, NA>,
     /// The measured state.
     pub measured: MeasuredState<NX>,
     /// The input that was decided last.
@@ -161,11 +152,8 @@ impl<
     const NX: usize,
     const NU: usize,
     const NS: usize,
-    const N: usize,
     const NA: usize,
-    const NP: usize,
-    const M: usize,
-> Regulator<NX, NU, NX> for GuardedFeedback<C, NX, NU, NS, N, NA, NP, M>
+> Regulator<NX, NU, NX> for GuardedFeedback<C, NX, NU, NS, NA>
 where
     C: LpvModel<f64, NX, NU, NS>,
 {
@@ -192,14 +180,13 @@ where
         let x = *self.measured.state();
         let x_ref = reference(now);
         let coordinate = |x: &SVector<f64, NX>| x.dot(&direction) / direction.norm_squared();
-        let mut wanted = SetPoints::constant(coordinate(&x_ref));
-        if self.preview {
-            let at = |i: usize| coordinate(&reference(now + i as f64 * t_s));
-            for (i, place) in wanted.stages.iter_mut().enumerate().take(horizon) {
-                *place = at(i);
-            }
-            wanted.end = at(horizon);
-        }
+        let seen = if self.preview { horizon } else { 0 };
+        let at = |i: usize| coordinate(&reference(now + i as f64 * t_s));
+        let stages: Vec<f64> = (0..seen).map(at).collect();
+        let wanted = SetPoints {
+            stages: &stages,
+            end: at(seen),
+        };
         let before = clock();
         let workspace = &mut self.workspace;
         let step = self.controller.step_with_preview(&x, &wanted, workspace);
@@ -222,7 +209,7 @@ where
     }
 
     fn prediction(&self) -> Vec<SVector<f64, NX>> {
-        self.controller.rollout().to_vec()
+        self.controller.rollout().copied().collect()
     }
 
     fn active_bounds(&self) -> Vec<BoundId> {

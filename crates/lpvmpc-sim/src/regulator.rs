@@ -137,12 +137,12 @@ impl<K, W, const NX: usize> StateFeedback<K, W, NX> {
     }
 }
 
-impl<K, W, C, const NX: usize, const NU: usize, const NS: usize, const N: usize, const M: usize>
-    Regulator<NX, NU, NX> for StateFeedback<K, W, NX>
+impl<K, W, C, const NX: usize, const NU: usize, const NS: usize> Regulator<NX, NU, NX>
+    for StateFeedback<K, W, NX>
 where
     C: LpvModel<f64, NX, NU, NS>,
-    K: DerefMut<Target = Controller<C, f64, NX, NU, NS, N, M>>,
-    W: DerefMut<Target = Workspace<f64, NX, NU, N, M>>,
+    K: DerefMut<Target = Controller<C, f64, NX, NU, NS>>,
+    W: DerefMut<Target = Workspace<f64, NX, NU>>,
 {
     fn t_s(&self) -> f64 {
         self.controller.settings().t_s
@@ -160,7 +160,13 @@ where
         let settings = self.controller.settings();
         let now = self.measured.time().unwrap_or(0.0);
         let x = *self.measured.state();
-        let reference = preview(reference, now, settings.t_s, settings.horizon);
+        let at = |i: usize| reference(now + i as f64 * settings.t_s);
+        let horizon = settings.horizon;
+        let stages: Vec<SVector<f64, NX>> = (0..horizon).map(at).collect();
+        let reference = Reference {
+            stages: &stages,
+            terminal: at(horizon),
+        };
         let before = clock();
         let plan = self.controller.step(&x, &reference, &mut self.workspace);
         let step_time = clock().saturating_sub(before);
@@ -168,7 +174,7 @@ where
         Decision {
             u,
             estimate: x,
-            x_ref: reference.stages[0],
+            x_ref: *reference.at(0),
             cost: self.controller.tracking_cost(&x, &reference),
             status,
             active_bounds,
@@ -186,19 +192,4 @@ where
         let active = self.controller.solution().active.iter();
         active.map(|row| row.bound).collect()
     }
-}
-
-/// The reference over the horizon that begins at the time `now`, s.
-fn preview<const NX: usize, const N: usize>(
-    reference: &dyn Fn(f64) -> SVector<f64, NX>,
-    now: f64,
-    t_s: f64,
-    horizon: usize,
-) -> Reference<f64, NX, N> {
-    let at = |i: usize| reference(now + i as f64 * t_s);
-    let mut window = Reference::constant(at(horizon));
-    for (i, place) in window.stages.iter_mut().enumerate().take(horizon) {
-        *place = at(i);
-    }
-    window
 }

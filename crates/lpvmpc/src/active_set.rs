@@ -18,6 +18,7 @@ use nalgebra::{SVector, convert};
 
 /// Scratch memory and state of the dual method.
 #[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
 pub(crate) struct DualActiveSet<T: 'static, const NU: usize> {
     /// Normalised deviations of the current minimiser.
     pub v: List<SVector<T, NU>>,

@@ -48,6 +48,7 @@ impl<T: Scalar, const NX: usize> Reference<'_, T, NX> {
 /// Nothing in it outlives a step, so controllers that run one after the other, such as those of
 /// a ballbot's two planes, share one. `NX` states, `NU` inputs.
 #[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
 pub struct Workspace<T: 'static, const NX: usize, const NU: usize> {
     pub(crate) ocp: Ocp<T, NX, NU>,
     pub(crate) solver: Solver<T, NX, NU>,
@@ -110,6 +111,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
 /// `NX` states, `NU` inputs, `NS` scheduling parameters. It holds everything that lives from sample to sample; the
 /// [`Workspace`] is handed in and may be shared between controllers.
 #[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
 pub struct Controller<P, T: 'static, const NX: usize, const NU: usize, const NS: usize> {
     pub(crate) model: P,
     pub(crate) settings: ControllerSettings<T, NX, NU, NS>,
@@ -148,8 +150,13 @@ where
         memory: ControllerMemory<T, NX, NU>,
     ) -> Result<Self, ControllerError> {
         let ControllerMemory { x, u, gain, active } = memory;
-        let ([rollout, x], [planned, u]) = (x, u);
-        check(&settings, rollout.len())?;
+        let places = x.iter().map(|list| list.len());
+        let places = places.chain(u.iter().map(|list| list.len()));
+        check(&settings, places.fold(gain.len(), usize::min))?;
+        let horizon = settings.horizon;
+        let [rollout, x] = x.map(|list| list.shortened(horizon));
+        let [planned, u] = u.map(|list| list.shortened(horizon));
+        let gain = gain.shortened(horizon);
         Ok(Self {
             model,
             settings,
@@ -175,8 +182,16 @@ where
         model: P,
         settings: ControllerSettings<T, NX, NU, NS>,
     ) -> Result<Self, ControllerError> {
+        // What is refused is not worth its memory.
+        check(&settings, usize::MAX)?;
         let memory = ControllerMemory::allocate(settings.capacity());
         Self::new(model, settings, memory)
+    }
+
+    /// A workspace for this controller, with memory of its own.
+    #[cfg(feature = "alloc")]
+    pub fn workspace(&self) -> Workspace<T, NX, NU> {
+        Workspace::allocate(self.settings.capacity())
     }
 
     /// One sample of Algorithm 2: from the measured state `x` and the reference along the
@@ -362,9 +377,7 @@ where
 
     /// The states x_1 to x_N that the nonlinear model reaches under the last plan.
     pub fn rollout(&self) -> &[SVector<T, NX>] {
-        self.rollout
-            .get(..self.settings.horizon)
-            .unwrap_or_default()
+        &self.rollout
     }
 
     /// The paper's cost J of the last plan (Algorithm 1), constant terms included, on the

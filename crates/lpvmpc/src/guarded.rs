@@ -11,20 +11,27 @@
 //! states the theorem and what it rests on.
 
 mod aim;
+mod memory;
 mod plan;
 mod program;
 mod search;
 mod settings;
 mod tube;
 
+use crate::list::List;
+#[cfg(feature = "alloc")]
+use crate::memory::Capacity;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Ocp;
 use crate::solution::{ActiveSet, BoundId, Quantity, Side, Solution, Status};
 use crate::solver::Solver;
+use aim::Aims;
 pub use aim::SetPoints;
 use core::fmt;
+use core::mem::swap;
+pub use memory::{GuardedArrays, GuardedMemory, GuardedWorkspaceArrays, GuardedWorkspaceMemory};
 use nalgebra::{SVector, convert};
-use plan::Plan;
+use plan::{Plan, PlannedStage};
 use program::Slope;
 pub use settings::{
     GuardedError, GuardedIterations, GuardedSettings, Rollout, TerminalSet, share_of_bounds,
@@ -90,35 +97,52 @@ pub struct GuardedStep<T, const NX: usize, const NU: usize> {
 }
 
 /// Scratch memory of a guarded step; may be shared between controllers that run one after the
-/// other. Sizes as in [`GuardedController`].
-#[derive(Clone, Debug)]
-pub struct GuardedWorkspace<T, const NU: usize, const NA: usize, const NP: usize, const M: usize> {
-    ocp: Ocp<T, NA, NU, NP>,
-    solver: Solver<T, NA, NU, NP, M>,
-    solution: Solution<T, NA, NU, NP, M>,
+/// other. The quadratic program of a controller with `NX` states has `NA` = `NX` + 1: the set point is
+/// the last one.
+#[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
+pub struct GuardedWorkspace<T: 'static, const NU: usize, const NA: usize> {
+    ocp: Ocp<T, NA, NU>,
+    solver: Solver<T, NA, NU>,
+    solution: Solution<T, NA, NU>,
 }
 
-impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usize>
-    GuardedWorkspace<T, NU, NA, NP, M>
-{
-    /// An empty workspace.
-    #[inline(always)]
-    pub fn new() -> Self {
+impl<T: Scalar, const NU: usize, const NA: usize> GuardedWorkspace<T, NU, NA> {
+    /// A workspace in this memory.
+    pub fn new(memory: GuardedWorkspaceMemory<T, NU, NA>) -> Self {
+        let GuardedWorkspaceMemory {
+            stages,
+            own,
+            solver,
+            u,
+            x,
+            active,
+        } = memory;
         Self {
-            ocp: Ocp::default(),
-            solver: Solver::new(),
-            solution: Solution::default(),
+            ocp: Ocp {
+                own,
+                ..Ocp::new(stages)
+            },
+            solver: Solver::new(solver),
+            solution: Solution::new(u, x, active),
         }
     }
 
+    /// A workspace with memory of its own, for controllers with these or smaller
+    /// [capacities](GuardedSettings::capacity).
+    #[cfg(feature = "alloc")]
+    pub fn allocate(capacity: Capacity) -> Self {
+        Self::new(GuardedWorkspaceMemory::allocate(capacity))
+    }
+
     /// The rows that are active in the last quadratic program: the warm start of the next one.
-    pub fn warm_start(&self) -> &ActiveSet<T, M> {
+    pub fn warm_start(&self) -> &ActiveSet<T> {
         &self.solution.active
     }
 
     /// Takes another warm start for the next quadratic program.
-    pub fn set_warm_start(&mut self, active: ActiveSet<T, M>) {
-        self.solution.active = active;
+    pub fn set_warm_start(&mut self, active: &ActiveSet<T>) {
+        self.solution.active.copy_from(active);
     }
 
     /// Bounds that are active in the last quadratic program, edges of terminal set and trust
@@ -128,34 +152,32 @@ impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usiz
     }
 }
 
-impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usize> Default
-    for GuardedWorkspace<T, NU, NA, NP, M>
-{
-    fn default() -> Self {
-        Self::new()
-    }
+/// LPV MPC to set points with guaranteed bounds and convergence, for `NX` states, `NU` inputs and `NS`
+/// scheduling parameters.
+#[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
+pub struct GuardedController<P, T: 'static, const NX: usize, const NU: usize, const NS: usize> {
+    planner: Planner<P, T, NX, NU, NS>,
+    /// The last plan, feasible or not.
+    last: Plan<T, NX, NU>,
+    /// Whether it is one to go on from.
+    has_plan: bool,
+    /// The plan that programs are made along; at the end of a step, what is applied.
+    along: Plan<T, NX, NU>,
+    /// A plan that is compared with it.
+    trial: Plan<T, NX, NU>,
+    /// A plan that is kept meanwhile.
+    nearer: Plan<T, NX, NU>,
 }
 
-/// LPV MPC to set points with guaranteed bounds and convergence.
-///
-/// `NX` states, `NU` inputs, `NS` scheduling parameters, horizons up to `N`. The quadratic program
-/// has the set point as a further state and two further stages: `NA` = `NX` + 1, `NP` = `N` + 2.
-/// At most `M` bounds are active at once; `N * NU + NX + 1` suffice while bounds are hard.
-#[derive(Clone, Debug)]
-pub struct GuardedController<
-    P,
-    T,
-    const NX: usize,
-    const NU: usize,
-    const NS: usize,
-    const N: usize,
-    const NA: usize,
-    const NP: usize,
-> {
+/// Rolls plans out, judges them and poses programs along them.
+#[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
+struct Planner<P, T: 'static, const NX: usize, const NU: usize, const NS: usize> {
     model: P,
     settings: GuardedSettings<T, NX, NU>,
-    /// The last plan, if there is one to go on from; feasible or not.
-    plan: Option<Plan<T, NX, NU, N>>,
+    /// What plans are aimed at in this sample.
+    aims: Aims<T>,
     /// The last wanted set point that was a number.
     wanted: Option<T>,
     /// Weight of the inputs' distance from the plan that a program is made along, in units of R:
@@ -164,7 +186,7 @@ pub struct GuardedController<
     /// What the next program is linear by: what served last.
     slope: Slope,
     /// How far the plant may be from the plans of the last program, at x_1 to x_N.
-    drift: [SVector<T, NX>; N],
+    drift: List<SVector<T, NX>>,
     /// The same at the end, in the norm of P.
     end_drift: T,
     /// Multiplier of the terminal set in the last program.
@@ -173,16 +195,7 @@ pub struct GuardedController<
     touch: Option<SVector<T, NX>>,
 }
 
-impl<
-    P,
-    T,
-    const NX: usize,
-    const NU: usize,
-    const NS: usize,
-    const N: usize,
-    const NA: usize,
-    const NP: usize,
-> GuardedController<P, T, NX, NU, NS, N, NA, NP>
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> GuardedController<P, T, NX, NU, NS>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
@@ -190,83 +203,220 @@ where
     /// A guarded controller for `model`.
     ///
     /// # Errors
-    /// A [`GuardedError`] names the first setting that makes no sense.
-    pub fn new(model: P, settings: GuardedSettings<T, NX, NU>) -> Result<Self, GuardedError> {
+    /// A [`GuardedError`] names the first setting that makes no sense, or that there is too little memory
+    /// for.
+    pub fn new(
+        model: P,
+        settings: GuardedSettings<T, NX, NU>,
+        memory: GuardedMemory<T, NX, NU>,
+    ) -> Result<Self, GuardedError> {
         const {
             assert!(NU > 0, "the set point enters through the first input");
-            assert!(NA == NX + 1, "NA must be NX + 1");
-            assert!(NP == N + 2, "NP must be N + 2");
         }
-        settings.check(&model, N)?;
-        Ok(Self {
+        let GuardedMemory { plans, drift, aims } = memory;
+        let places = plans.iter().map(|list| list.len());
+        let largest = places.fold(drift.len().min(aims.len()), usize::min);
+        settings.check(&model, largest)?;
+        let horizon = settings.horizon;
+        let [last, along, trial, nearer] = plans.map(|list| Plan::new(list.shortened(horizon)));
+        let planner = Planner {
             model,
             settings,
-            plan: None,
+            aims: Aims::new(aims.shortened(horizon)),
             wanted: None,
             damping: T::zero(),
             slope: Slope::Jacobian,
-            drift: [SVector::zeros(); N],
+            drift: drift.shortened(horizon),
             end_drift: T::zero(),
             pressure: T::zero(),
             touch: None,
-        })
+        };
+        let mut controller = Self {
+            planner,
+            last,
+            has_plan: false,
+            along,
+            trial,
+            nearer,
+        };
+        controller.reset();
+        Ok(controller)
+    }
+
+    /// A guarded controller with memory of its own.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    #[cfg(feature = "alloc")]
+    pub fn allocate(
+        model: P,
+        settings: GuardedSettings<T, NX, NU>,
+    ) -> Result<Self, GuardedError> {
+        // What is refused is not worth its memory.
+        settings.check(&model, usize::MAX)?;
+        let memory = GuardedMemory::allocate(settings.horizon);
+        Self::new(model, settings, memory)
+    }
+
+    /// A workspace for this controller, with memory of its own; `NA` is `NX` + 1.
+    #[cfg(feature = "alloc")]
+    pub fn workspace<const NA: usize>(&self) -> GuardedWorkspace<T, NU, NA> {
+        GuardedWorkspace::allocate(self.planner.settings.capacity())
     }
 
     /// One sample: from the measured state `x` and the wanted set point (any number, reachable
-    /// or not) to the input.
-    pub fn step<const M: usize>(
+    /// or not) to the input. `NA` is `NX` + 1.
+    pub fn step<const NA: usize>(
         &mut self,
         x: &SVector<T, NX>,
         wanted: T,
-        workspace: &mut GuardedWorkspace<T, NU, NA, NP, M>,
+        workspace: &mut GuardedWorkspace<T, NU, NA>,
     ) -> GuardedStep<T, NX, NU> {
         self.step_with_preview(x, &SetPoints::constant(wanted), workspace)
     }
 
     /// One sample where it is known what will be wanted along the horizon. Wanted set points that
     /// are not admissible count as the nearest ones that are; NaN repeats the one before.
-    pub fn step_with_preview<const M: usize>(
+    pub fn step_with_preview<const NA: usize>(
         &mut self,
         x: &SVector<T, NX>,
-        wanted: &SetPoints<T, N>,
-        workspace: &mut GuardedWorkspace<T, NU, NA, NP, M>,
+        wanted: &SetPoints<'_, T>,
+        workspace: &mut GuardedWorkspace<T, NU, NA>,
     ) -> GuardedStep<T, NX, NU> {
-        let aims = &self.admissible(x, wanted);
-        let rest = self.plan.as_ref().map(|last| self.rest(x, last, aims));
-        let guaranteed = self.guaranteed(x, aims, rest.as_ref());
-        let along = guaranteed.map(|(plan, _)| plan).or(rest);
-        let along = along.unwrap_or_else(|| self.under_terminal_law(x, aims));
-
-        let again = self.cheaper(x, aims, guaranteed.as_ref());
-        let along = again.unwrap_or(along);
-        let known = guaranteed.map(|(_, decision)| decision);
-        let improved = self.improve(x, aims, &along, known, workspace);
-        let improved = improved.or(again.map(|plan| (plan, SVector::zeros())));
-        let status = workspace.solution.status;
-        let (mut plan, decision, gap) = match (improved, guaranteed) {
-            (Some((plan, gap)), _) => (plan, Decision::NewPlan, gap),
-            (None, Some((plan, decision))) => (plan, decision, SVector::zeros()),
-            (None, None) => self.last_resort(x, aims, &along, workspace),
-        };
-        if decision != Decision::NewPlan {
-            (plan.drift, plan.end_drift) = self.tube(&plan);
+        const {
+            assert!(NA == NX + 1, "NA must be NX + 1");
         }
-        let step = GuardedStep {
-            u: self.settings.u.project(&plan.u[0]),
+        self.planner.take_aim(x, wanted);
+        let known = self.find_known(x);
+        let is_repeated = known.is_some() && self.repeat_cheaper(x);
+        let improved = self.improve(known, workspace);
+        let status = workspace.solution.status;
+        let (decision, gap) = match (improved, known) {
+            (Some(gap), _) => (Decision::NewPlan, gap),
+            (None, Some(_)) if is_repeated => (Decision::NewPlan, SVector::zeros()),
+            (None, Some(decision)) => (decision, SVector::zeros()),
+            (None, None) => self.last_resort(workspace),
+        };
+        let Self { planner, along, .. } = self;
+        if decision != Decision::NewPlan {
+            planner.find_drift(along);
+        }
+        self.has_plan = along.cost.is_finite() && decision != Decision::SaturatedLqr;
+        self.last.copy_from(along);
+        let u = along.stages.first().map_or_else(SVector::zeros, |stage| stage.u);
+        GuardedStep {
+            u: planner.settings.u.project(&u),
             decision,
-            set_point: plan.set_point,
-            cost: plan.cost,
-            epsilon: self.epsilon(&plan, aims),
+            set_point: along.set_point,
+            cost: along.cost,
+            epsilon: planner.epsilon(along),
             gap,
             status,
-        };
-        let usable = plan.cost.is_finite() && decision != Decision::SaturatedLqr;
-        self.plan = usable.then_some(plan);
-        step
+        }
     }
 
-    /// What is wanted, as admissible numbers.
-    fn admissible(&mut self, x: &SVector<T, NX>, wanted: &SetPoints<T, N>) -> SetPoints<T, N> {
+    /// The plan `along` becomes what is known to work: the rest of the last plan, else the terminal law.
+    /// Where neither works, it is the former, as far as there is one, and the answer is none.
+    fn find_known(&mut self, x: &SVector<T, NX>) -> Option<Decision> {
+        let Self {
+            planner,
+            last,
+            has_plan,
+            along,
+            trial,
+            ..
+        } = self;
+        if *has_plan {
+            planner.rest(x, last, along);
+            if planner.is_feasible(along) {
+                return Some(Decision::Candidate);
+            }
+        }
+        planner.follow_terminal_law(x, trial);
+        let works = planner.is_feasible(trial);
+        if works || !*has_plan {
+            swap(along, trial);
+        }
+        works.then_some(Decision::TerminalLaw)
+    }
+
+    /// The plan `along` becomes the last plan once more, where that is feasible and cheaper; whether it
+    /// has.
+    fn repeat_cheaper(&mut self, x: &SVector<T, NX>) -> bool {
+        let Self {
+            planner,
+            last,
+            along,
+            trial,
+            ..
+        } = self;
+        if !self.has_plan {
+            return false;
+        }
+        planner.repeat(x, last, trial);
+        let cheaper = trial.cost < along.cost && planner.is_robust(trial);
+        if cheaper {
+            swap(along, trial);
+        }
+        cheaper
+    }
+
+    /// Forgets the past: the next step starts as the first one did.
+    pub fn reset(&mut self) {
+        self.has_plan = false;
+        self.planner.reset();
+    }
+
+    /// The model.
+    pub fn model(&self) -> &P {
+        &self.planner.model
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &GuardedSettings<T, NX, NU> {
+        &self.planner.settings
+    }
+
+    /// The plan's states x_1 to x_N on the nonlinear model, as many as the horizon; none if there
+    /// is no plan.
+    pub fn rollout(&self) -> impl Iterator<Item = &SVector<T, NX>> {
+        self.plan().map(|stage| &stage.x)
+    }
+
+    /// The samples of the last plan, none if there is no plan.
+    fn plan(&self) -> impl Iterator<Item = &PlannedStage<T, NX, NU>> {
+        let count = if self.has_plan { usize::MAX } else { 0 };
+        self.last.stages.iter().take(count)
+    }
+
+    /// The bounds that the last plan meets: those of an input to rounding, those of a state to the
+    /// margin that plans keep away from them.
+    pub fn active_bounds(&self) -> impl Iterator<Item = BoundId> {
+        let GuardedSettings { x, u, margin, .. } = &self.planner.settings;
+        // A tenth more than the margin, for what rounding leaves.
+        let room_x = plan::width(x) * (*margin * convert(1.1));
+        let room_u = plan::width(u) * T::default_epsilon().sqrt();
+        self.plan().enumerate().flat_map(move |(i, stage)| {
+            let at_input = (0..NU).filter_map(move |j| {
+                let sides = (u.lower[j] + room_u[j], u.upper[j] - room_u[j]);
+                met(i, Quantity::Input(j), stage.u[j], sides)
+            });
+            let at_state = (0..NX).filter_map(move |j| {
+                let sides = (x.lower[j] + room_x[j], x.upper[j] - room_x[j]);
+                met(i + 1, Quantity::State(j), stage.x[j], sides)
+            });
+            at_input.chain(at_state)
+        })
+    }
+}
+
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> Planner<P, T, NX, NU, NS>
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS>,
+{
+    /// Takes over what is wanted, as admissible numbers.
+    fn take_aim(&mut self, x: &SVector<T, NX>, wanted: &SetPoints<'_, T>) {
         let GuardedSettings {
             direction,
             set_points: [lower, upper],
@@ -280,98 +430,18 @@ where
         let here = x.dot(direction) / direction.norm_squared();
         let here = if here.is_finite() { here } else { T::zero() };
         let last = self.wanted.unwrap_or(here.max(lower).min(upper));
-        let aims = wanted.clamped(last, [lower, upper]);
-        self.wanted = aims.stages.first().copied();
-        aims
+        self.aims.take(wanted, last, [lower, upper]);
+        self.wanted = self.aims.stages.first().copied();
     }
 
-    /// Forgets the past: the next step starts as the first one did.
-    pub fn reset(&mut self) {
-        self.plan = None;
+    fn reset(&mut self) {
         self.wanted = None;
         self.damping = T::zero();
         self.slope = Slope::Jacobian;
-        (self.drift, self.end_drift) = ([SVector::zeros(); N], T::zero());
+        self.drift.fill(SVector::zeros());
+        self.end_drift = T::zero();
         self.pressure = T::zero();
         self.touch = None;
-    }
-
-    /// The model.
-    pub fn model(&self) -> &P {
-        &self.model
-    }
-
-    /// The settings.
-    pub fn settings(&self) -> &GuardedSettings<T, NX, NU> {
-        &self.settings
-    }
-
-    /// The plan's states x_1 to x_N on the nonlinear model, as many as the horizon; none if there
-    /// is no plan.
-    pub fn rollout(&self) -> &[SVector<T, NX>] {
-        let plan = self.plan.as_ref();
-        plan.and_then(|plan| plan.x.get(..self.settings.horizon))
-            .unwrap_or_default()
-    }
-
-    /// The bounds that the last plan meets: those of an input to rounding, those of a state to the
-    /// margin that plans keep away from them.
-    pub fn active_bounds(&self) -> impl Iterator<Item = BoundId> {
-        let GuardedSettings { x, u, margin, .. } = &self.settings;
-        // A tenth more than the margin, for what rounding leaves.
-        let room_x = plan::width(x) * (*margin * convert(1.1));
-        let room_u = plan::width(u) * T::default_epsilon().sqrt();
-        let horizon = self.settings.horizon;
-        self.plan.iter().flat_map(move |plan| {
-            let states = plan.x.iter().take(horizon).enumerate();
-            let inputs = plan.u.iter().take(horizon).enumerate();
-            let at_state = move |(i, state): (usize, &SVector<T, NX>)| {
-                let state = *state;
-                (0..NX).filter_map(move |j| {
-                    let sides = (x.lower[j] + room_x[j], x.upper[j] - room_x[j]);
-                    met(i + 1, Quantity::State(j), state[j], sides)
-                })
-            };
-            let at_input = move |(i, input): (usize, &SVector<T, NU>)| {
-                let input = *input;
-                (0..NU).filter_map(move |j| {
-                    let sides = (u.lower[j] + room_u[j], u.upper[j] - room_u[j]);
-                    met(i, Quantity::Input(j), input[j], sides)
-                })
-            };
-            inputs.flat_map(at_input).chain(states.flat_map(at_state))
-        })
-    }
-
-    /// What is known to work: the rest of the last plan, else the terminal law.
-    fn guaranteed(
-        &self,
-        x: &SVector<T, NX>,
-        aims: &SetPoints<T, N>,
-        rest: Option<&Plan<T, NX, NU, N>>,
-    ) -> Option<(Plan<T, NX, NU, N>, Decision)> {
-        let candidate = rest
-            .filter(|plan| self.is_feasible(plan))
-            .map(|plan| (*plan, Decision::Candidate));
-        if candidate.is_some() {
-            return candidate;
-        }
-        let plan = self.under_terminal_law(x, aims);
-        self.is_feasible(&plan)
-            .then_some((plan, Decision::TerminalLaw))
-    }
-
-    /// The last plan once more, where that is feasible and cheaper than what is known to work.
-    fn cheaper(
-        &self,
-        x: &SVector<T, NX>,
-        aims: &SetPoints<T, N>,
-        guaranteed: Option<&(Plan<T, NX, NU, N>, Decision)>,
-    ) -> Option<Plan<T, NX, NU, N>> {
-        let ((known, _), last) = (guaranteed?, self.plan.as_ref()?);
-        let plan = self.repeated(x, last, aims);
-        let cheaper = plan.cost < known.cost && self.is_robust(&plan);
-        cheaper.then_some(plan)
     }
 }
 

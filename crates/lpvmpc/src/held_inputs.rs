@@ -18,6 +18,7 @@ const MOST_SEARCHES: usize = 20;
 
 /// For every input of every stage: the bound that it is held at, if any.
 #[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
 pub(crate) struct HeldInputs<const NU: usize> {
     sides: List<[Option<Side>; NU]>,
     any: bool,

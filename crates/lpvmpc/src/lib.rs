@@ -16,6 +16,7 @@ mod delay;
 mod descent;
 mod estimator;
 mod farkas;
+mod guarded;
 mod held_inputs;
 mod kernel;
 mod kkt;
@@ -46,6 +47,11 @@ pub use estimator::{
     Verdict,
 };
 pub use farkas::infeasibility_margin;
+pub use guarded::{
+    Decision, GuardedArrays, GuardedController, GuardedError, GuardedIterations, GuardedMemory,
+    GuardedSettings, GuardedStep, GuardedWorkspace, GuardedWorkspaceArrays, GuardedWorkspaceMemory,
+    Rollout, SetPoints, TerminalSet, share_of_bounds,
+};
 pub use kkt::{KktResidual, kkt_residual};
 pub use last_plan::LastPlan;
 pub use list::List;

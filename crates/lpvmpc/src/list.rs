@@ -21,6 +21,22 @@ impl<V> List<V> {
     pub fn empty() -> Self {
         Self::Static(&mut [])
     }
+
+    /// The first `length` places of it.
+    pub fn shortened(self, length: usize) -> Self {
+        match self {
+            Self::Static(memory) => {
+                let length = length.min(memory.len());
+                Self::Static(memory.get_mut(..length).unwrap_or_default())
+            }
+            #[cfg(feature = "alloc")]
+            Self::Owned(memory) => {
+                let mut memory = memory.into_vec();
+                memory.truncate(length);
+                Self::Owned(memory.into_boxed_slice())
+            }
+        }
+    }
 }
 
 #[cfg(feature = "alloc")]

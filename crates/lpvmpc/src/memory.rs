@@ -13,9 +13,12 @@ use nalgebra::{SMatrix, SVector};
 pub struct Capacity {
     /// Stages of the horizon, at least 1.
     pub stages: usize,
-    /// Bounds that may be active at once. `stages * NU` rows fill the space of the inputs; a terminal
-    /// equality takes `NX` more, soft bounds as many as may be exceeded at once.
+    /// Rows of the working set: independent ones, of which `stages * NU` fill the space of the inputs,
+    /// and soft bounds that are exceeded at a quadratic price.
     pub rows: usize,
+    /// Bounds that may be active at once: those rows, and soft bounds that are exceeded at a linear
+    /// price.
+    pub active: usize,
 }
 
 /// Memory of a [`Solver`](crate::Solver): on the heap, or [lent](SolverArrays::lend) arrays.
@@ -34,9 +37,9 @@ pub struct SolverMemory<T: 'static, const NX: usize, const NU: usize> {
 pub(crate) struct DualMemory<T: 'static, const NU: usize> {
     /// Deviations of the inputs, one of each for each stage.
     pub(crate) deviations: [List<SVector<T, NU>>; 4],
-    /// Rows of the working set, one for each row.
+    /// Rows of the working set.
     pub(crate) terms: List<Terms<T>>,
-    /// Rows outside of it, one for each row.
+    /// Active bounds outside of it.
     pub(crate) resting: List<PackedRow<T>>,
     /// Orthonormal rows: `rows * stages`.
     pub(crate) basis: List<SVector<T, NU>>,
@@ -69,7 +72,12 @@ impl<T, const NU: usize> DualMemory<T, NU> {
 #[cfg(feature = "alloc")]
 impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
     /// As much as is needed, on the heap.
-    pub fn allocate(Capacity { stages, rows }: Capacity) -> Self {
+    pub fn allocate(capacity: Capacity) -> Self {
+        let Capacity {
+            stages,
+            rows,
+            active,
+        } = capacity;
         let deviations = || List::repeat(SVector::zeros(), stages);
         let numbers = || List::repeat(T::zero(), rows);
         Self {
@@ -78,7 +86,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
             dual: DualMemory {
                 deviations: core::array::from_fn(|_| deviations()),
                 terms: List::repeat(Terms::empty(), rows),
-                resting: List::repeat(PackedRow::empty(), rows),
+                resting: List::repeat(PackedRow::empty(), active),
                 basis: List::repeat(SVector::zeros(), rows * stages),
                 factor: List::repeat(T::zero(), rows * rows),
                 numbers: core::array::from_fn(|_| numbers()),
@@ -221,19 +229,19 @@ pub struct ControllerMemory<T: 'static, const NX: usize, const NU: usize> {
     pub(crate) u: [List<SVector<T, NU>>; 2],
     /// Gains of the plan, one for each stage.
     pub(crate) gain: List<SMatrix<T, NU, NX>>,
-    /// Active rows, one for each row.
+    /// Active bounds.
     pub(crate) active: List<PackedRow<T>>,
 }
 
 #[cfg(feature = "alloc")]
 impl<T: Scalar, const NX: usize, const NU: usize> ControllerMemory<T, NX, NU> {
     /// As much as is needed, on the heap.
-    pub fn allocate(Capacity { stages, rows }: Capacity) -> Self {
+    pub fn allocate(Capacity { stages, active, .. }: Capacity) -> Self {
         Self {
             x: core::array::from_fn(|_| List::repeat(SVector::zeros(), stages)),
             u: core::array::from_fn(|_| List::repeat(SVector::zeros(), stages)),
             gain: List::repeat(SMatrix::zeros(), stages),
-            active: List::repeat(PackedRow::empty(), rows),
+            active: List::repeat(PackedRow::empty(), active),
         }
     }
 }

@@ -37,6 +37,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Aim<'_, T, NX, NU> {
 /// How a plan is followed: stage i has the input u_i + K_i (x - x_i). The states x_i are the
 /// controller's rollout.
 #[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
 pub(crate) struct Policy<T: 'static, const NX: usize, const NU: usize> {
     /// u_0 to u_{N-1}.
     pub u: List<SVector<T, NU>>,
@@ -61,6 +62,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Policy<T, NX, NU> {
 
 /// A rollout that may become the plan: inputs, and the states x_1 to x_N that follow.
 #[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
 pub(crate) struct Trial<T: 'static, const NX: usize, const NU: usize> {
     pub u: List<SVector<T, NU>>,
     pub x: List<SVector<T, NX>>,

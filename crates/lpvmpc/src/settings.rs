@@ -105,7 +105,7 @@ impl<T: Scalar> Iterations<T> {
 pub struct ControllerSettings<T, const NX: usize, const NU: usize, const NS: usize> {
     /// Sampling time in seconds.
     pub t_s: T,
-    /// Prediction horizon in samples, from 1 to the controller's `N`.
+    /// Prediction horizon in samples, at least 1.
     pub horizon: usize,
     /// The discrete-time predictor.
     pub predictor: Predictor,
@@ -160,13 +160,16 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
         }
     }
 
-    /// What a controller with these settings needs: the horizon, and a row for every input, every soft
-    /// state bound and every component of a terminal equality.
+    /// What a controller with these settings needs: room for its horizon and for every bound that can be
+    /// active at once.
     pub fn capacity(&self) -> Capacity {
-        let soft = self.soft_x.iter().flatten().count();
+        let soft = self.soft_x.iter().flatten();
+        let quadratic = soft.clone().filter(|price| price.quadratic > T::zero());
+        let rows = self.horizon * (NU + quadratic.count()) + NX;
         Capacity {
             stages: self.horizon,
-            rows: self.horizon * (NU + soft) + NX,
+            rows,
+            active: rows + self.horizon * soft.count(),
         }
     }
 

@@ -363,11 +363,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solution<T, NX, NU> {
 
     /// The same on the heap.
     #[cfg(feature = "alloc")]
-    pub fn allocate(Capacity { stages, rows }: Capacity) -> Self {
+    pub fn allocate(Capacity { stages, active, .. }: Capacity) -> Self {
         Self::new(
             List::repeat(SVector::zeros(), stages),
             List::repeat(SVector::zeros(), stages),
-            List::repeat(PackedRow::empty(), rows),
+            List::repeat(PackedRow::empty(), active),
         )
     }
 }

@@ -61,6 +61,7 @@ impl<T: Scalar> Default for SolverSettings<T> {
 /// solver serves any number of problems. Where a problem needs more places for active bounds than
 /// there are, the answer says [`Status::WorkingSetFull`].
 #[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
 pub struct Solver<T: 'static, const NX: usize, const NU: usize> {
     factors: List<StageFactor<T, NX, NU>>,
     pub(crate) dual: DualActiveSet<T, NU>,

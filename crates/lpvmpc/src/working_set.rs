@@ -15,6 +15,7 @@ use nalgebra::{SVector, convert};
 
 /// A row of the problem in terms of the normalised deviations v.
 #[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
 pub(crate) struct Row<T: 'static, const NU: usize> {
     /// alpha: d(slack)/dv by stage, zero from `support` on.
     pub alpha: List<SVector<T, NU>>,
@@ -85,6 +86,7 @@ impl<T: Scalar, const NU: usize> Row<T, NU> {
 
 /// How the current minimiser answers to one more unit of a candidate row's multiplier.
 #[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
 pub(crate) struct Direction<T: 'static, const NU: usize> {
     /// Change of v: the part of alpha that the working set does not span.
     pub primal: List<SVector<T, NU>>,
@@ -122,6 +124,7 @@ impl<T: Scalar, const NU: usize> Direction<T, NU> {
 
 /// Rows that hold with equality, with their factorisation.
 #[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
 pub(crate) struct WorkingSet<T: 'static, const NU: usize> {
     rows: List<Terms<T>>,
     /// Rows that there are places for in all lists.

@@ -2,13 +2,9 @@
 
 use super::run::{Record, Wanted, has_fallen};
 use crate::commands::CommandError;
-use ballbot::Ballbot;
 use ballbot_scenario::{Prepared, ScenarioError};
-use lpvmpc::{Controller, Reference, Workspace};
+use lpvmpc::{Controller, Reference};
 use nalgebra::Vector4;
-
-/// Horizon of the paper's scenario.
-const N: usize = 20;
 
 /// Runs the controller of `prepared` until it has no plan, for then the scheme has no torque.
 pub(super) fn run(
@@ -17,13 +13,9 @@ pub(super) fn run(
     wanted: &Wanted,
     samples: usize,
 ) -> Result<Record, CommandError> {
-    // One bound per input, and the four rows of the terminal equality.
-    let controller = Controller::<Ballbot<f64>, f64, 4, 1, 3, N, { N + 4 }>::new(
-        prepared.ballbot,
-        prepared.settings,
-    );
+    let controller = Controller::allocate(prepared.ballbot, prepared.settings);
     let mut controller = controller.map_err(ScenarioError::from)?;
-    let mut workspace = Box::new(Workspace::new());
+    let mut workspace = controller.workspace();
     let mut record = Record::default();
     let mut x = start;
     let mut before: Option<(f64, f64)> = None;

@@ -3,7 +3,7 @@
 use super::variant::Variant;
 use crate::commands::CommandError;
 use ballbot::Ballbot;
-use ballbot_scenario::{GUARDED_ACTIVE, Prepared, ScenarioError};
+use ballbot_scenario::{Prepared, ScenarioError};
 use lpvmpc::{Decision, GuardedController, GuardedSettings, GuardedWorkspace};
 use lpvmpc_sim::{GuardedLoop, Random, Tolerances};
 use nalgebra::{Vector1, Vector4};
@@ -16,8 +16,6 @@ const TOLERANCES: Tolerances = Tolerances {
     relative: 1e-12,
     absolute: 1e-12,
 };
-type Guarded = GuardedController<Ballbot<f64>, f64, 4, 1, 3, N, 5, { N + 2 }>;
-type Workspace = GuardedWorkspace<f64, 1, 5, { N + 2 }, GUARDED_ACTIVE>;
 
 /// What a closed loop amounts to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -104,8 +102,8 @@ impl Wanted {
 /// The guaranteed loop, ready to run.
 pub(super) struct Loop<'a> {
     prepared: &'a Prepared,
-    guarded: GuardedLoop<Ballbot<f64>, Ballbot<f64>, 4, 1, 3, N, 5, { N + 2 }>,
-    workspace: Box<Workspace>,
+    guarded: GuardedLoop<Ballbot<f64>, Ballbot<f64>, 4, 1, 3>,
+    workspace: GuardedWorkspace<f64, 1, 5>,
 }
 
 impl<'a> Loop<'a> {
@@ -137,14 +135,14 @@ impl<'a> Loop<'a> {
             Variant::Horizon(horizon) => settings.horizon = horizon,
             _ => {}
         }
-        let controller = Guarded::new(prepared.ballbot, settings);
+        let controller = GuardedController::allocate(prepared.ballbot, settings);
         let controller = controller.map_err(ScenarioError::from)?;
         let start = Self::start(prepared, *variant == Variant::Edge, random)?;
         let plant = variant.plant(prepared, random)?;
         Ok(Self {
             prepared,
+            workspace: controller.workspace(),
             guarded: GuardedLoop::new(controller, plant, start, TOLERANCES),
-            workspace: Box::new(Workspace::new()),
         })
     }
 

@@ -5,12 +5,11 @@ use crate::commands::CommandError;
 use crate::figures::Limits;
 use crate::pictures;
 use crate::progress::Progress;
-use ballbot::Ballbot;
 use ballbot_scenario::{
     CertifiedTable, PointTable, Prepared, ReferenceTable, Scenario, ScenarioError, Surroundings,
     TerminalTable,
 };
-use lpvmpc::{Controller, Iterations, Reference, Workspace};
+use lpvmpc::{Controller, Iterations, Reference};
 use nalgebra::Vector4;
 use rayon::prelude::*;
 use std::path::Path;
@@ -18,9 +17,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 /// The longest horizon of the cases.
-const N: usize = 80;
 /// Torque bounds, and soft bounds that are exceeded.
-const M: usize = 2 * N + 4;
 
 /// What a closed loop amounts to.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,9 +90,9 @@ pub fn run(case: &Case, iterations: Iterations<f64>) -> Result<Outcome, CommandE
         ..
     } = prepared;
     settings.iterations = iterations;
-    let controller = Controller::<Ballbot<f64>, f64, 4, 1, 3, N, M>::new(ballbot, settings);
-    let mut controller = Box::new(controller.map_err(ScenarioError::from)?);
-    let mut workspace = Box::new(Workspace::new());
+    let controller = Controller::allocate(ballbot, settings);
+    let mut controller = controller.map_err(ScenarioError::from)?;
+    let mut workspace = controller.workspace();
     let goal = prepared.planes[0].state_reference(0.0);
     let reference = Reference::constant(goal);
     let limits = settings.x.upper;

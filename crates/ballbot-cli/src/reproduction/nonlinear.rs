@@ -14,21 +14,19 @@ use crate::commands::CommandError;
 use ballbot::Ballbot;
 use ballbot_scenario::Prepared;
 use lpvmpc::{
-    ControllerSettings, Ocp, Rk4, Solution, Solver, SolverSettings, TerminalIngredient, WarmStart,
+    Common, ControllerSettings, Ocp, Rk4, Solution, Solver, SolverSettings, TerminalIngredient,
+    WarmStart,
 };
-use nalgebra::{Matrix4, SVector, Vector1, Vector4};
+use nalgebra::{Matrix4, Vector1, Vector4};
 
-const N: usize = 20;
-type Inputs = [Vector1<f64>; N];
-
-/// Nonlinear MPC for one plane with the horizon of 20 samples.
+/// Nonlinear MPC for one plane.
 struct NonlinearMpc<'a> {
     ballbot: &'a Ballbot<f64>,
     settings: &'a ControllerSettings<f64, 4, 1, 3>,
     p: Matrix4<f64>,
-    ocp: Box<Ocp<f64, 4, 1, N>>,
-    solver: Box<Solver<f64, 4, 1, N, N>>,
-    solution: Box<Solution<f64, 4, 1, N, N>>,
+    ocp: Ocp<f64, 4, 1>,
+    solver: Solver<f64, 4, 1>,
+    solution: Solution<f64, 4, 1>,
 }
 
 /// Closed-loop cost and effort of nonlinear MPC.
@@ -42,28 +40,28 @@ pub struct NonlinearRun {
     pub largest_last_step: f64,
 }
 
-/// Runs nonlinear MPC on the first plane of `prepared`, whose horizon must be 20 samples and
-/// whose terminal ingredient a cost.
+/// Runs nonlinear MPC on the first plane of `prepared`, whose terminal ingredient must be a cost.
 ///
 /// # Errors
 /// The plant cannot be integrated, or the problem is another one.
 pub fn run(prepared: &Prepared) -> Result<NonlinearRun, CommandError> {
     let settings = &prepared.settings;
-    let (TerminalIngredient::Cost(p), N) = (settings.terminal, settings.horizon) else {
-        let message = "the nonlinear MPC takes 20 samples and a terminal cost";
+    let TerminalIngredient::Cost(p) = settings.terminal else {
+        let message = "the nonlinear MPC takes a terminal cost";
         return Err(CommandError::Usage(message.to_owned()));
     };
+    let capacity = settings.capacity();
     let mut mpc = NonlinearMpc {
         ballbot: &prepared.ballbot,
         settings,
         p,
-        ocp: Box::default(),
-        solver: Box::new(Solver::new()),
-        solution: Box::default(),
+        ocp: Ocp::allocate(settings.horizon),
+        solver: Solver::allocate(capacity),
+        solution: Solution::allocate(capacity),
     };
     let plane = &prepared.planes[0];
     let mut x = plane.initial_state;
-    let mut u = [Vector1::zeros(); N];
+    let mut u = vec![Vector1::zeros(); settings.horizon];
     let mut run = NonlinearRun {
         closed_loop_cost: 0.0,
         mean_programs: 0.0,
@@ -71,8 +69,8 @@ pub fn run(prepared: &Prepared) -> Result<NonlinearRun, CommandError> {
     };
     for k in 0..prepared.samples {
         let t = k as f64 * settings.t_s;
-        let references: [Vector4<f64>; N + 1] =
-            std::array::from_fn(|i| plane.state_reference(t + i as f64 * settings.t_s));
+        let at = |i: usize| plane.state_reference(t + i as f64 * settings.t_s);
+        let references: Vec<Vector4<f64>> = (0..=settings.horizon).map(at).collect();
         let (programs, last_step) = mpc.solve(&x, &references, &mut u);
         run.mean_programs += programs as f64 / prepared.samples as f64;
         run.largest_last_step = run.largest_last_step.max(last_step);
@@ -105,7 +103,7 @@ impl NonlinearMpc<'_> {
     }
 
     /// The cost of `u` on the nonlinear model; infinite where a bound is violated.
-    fn cost(&self, x0: &Vector4<f64>, references: &[Vector4<f64>; N + 1], u: &Inputs) -> f64 {
+    fn cost(&self, x0: &Vector4<f64>, references: &[Vector4<f64>], u: &[Vector1<f64>]) -> f64 {
         let mut x = *x0;
         let mut cost = 0.0;
         for (u, x_ref) in u.iter().zip(references) {
@@ -115,7 +113,7 @@ impl NonlinearMpc<'_> {
                 return f64::INFINITY;
             }
         }
-        let error = x - references[N];
+        let error = x - references[u.len()];
         cost + error.dot(&(self.p * error))
     }
 
@@ -124,8 +122,8 @@ impl NonlinearMpc<'_> {
     fn solve(
         &mut self,
         x: &Vector4<f64>,
-        references: &[Vector4<f64>; N + 1],
-        u: &mut Inputs,
+        references: &[Vector4<f64>],
+        u: &mut Vec<Vector1<f64>>,
     ) -> (usize, f64) {
         const MOST: usize = 100;
         const CONVERGED: f64 = 1e-9;
@@ -140,7 +138,7 @@ impl NonlinearMpc<'_> {
             if !self.solution.status.is_solved() {
                 return (programs, f64::INFINITY);
             }
-            let proposal = self.solution.u;
+            let proposal = self.solution.u.to_vec();
             let before = self.cost(x, references, u);
             // Far from the solution a full step may cost more; the last ones are full.
             let mut part = 1.0;
@@ -162,7 +160,7 @@ impl NonlinearMpc<'_> {
 
     /// The quadratic program along the rollout of `u`: x+ = A x + B u + c with the rollout's
     /// Jacobians.
-    fn pose(&mut self, x0: &Vector4<f64>, references: &[Vector4<f64>; N + 1], u: &Inputs) {
+    fn pose(&mut self, x0: &Vector4<f64>, references: &[Vector4<f64>], u: &[Vector1<f64>]) {
         let weights = self.settings.weights;
         let mut x = *x0;
         for (i, u) in u.iter().enumerate() {
@@ -171,15 +169,19 @@ impl NonlinearMpc<'_> {
             let stage = &mut self.ocp.stages[i];
             (stage.a, stage.b) = (a, b);
             stage.c = next - a * x - b * u;
-            (stage.q, stage.r) = (weights.q, weights.r);
             stage.linear_x = -(weights.q * references[i]);
-            (stage.x, stage.u) = (self.settings.x, self.settings.u);
             x = next;
         }
-        self.ocp.horizon = N;
         self.ocp.x0 = *x0;
+        self.ocp.common = Common {
+            q: weights.q,
+            r: weights.r,
+            x: self.settings.x,
+            u: self.settings.u,
+            ..Common::default()
+        };
         self.ocp.terminal.p = self.p;
-        self.ocp.terminal.linear_x = -(self.p * references[N]);
+        self.ocp.terminal.linear_x = -(self.p * references[u.len()]);
         self.ocp.terminal.x = self.settings.x;
     }
 
@@ -196,6 +198,7 @@ impl NonlinearMpc<'_> {
 }
 
 /// The inputs `part` of the way from `u` to `v`.
-fn between(u: &Inputs, v: &Inputs, part: f64) -> Inputs {
-    std::array::from_fn(|i| SVector::from(u[i] + (v[i] - u[i]) * part))
+fn between(u: &[Vector1<f64>], v: &[Vector1<f64>], part: f64) -> Vec<Vector1<f64>> {
+    let steps = u.iter().zip(v);
+    steps.map(|(u, v)| u + (v - u) * part).collect()
 }

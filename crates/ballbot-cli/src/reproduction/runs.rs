@@ -4,7 +4,7 @@ use crate::commands::CommandError;
 use crate::commands::simulate::record;
 use crate::recording::{Columns, Metrics};
 use ballbot_scenario::{Prepared, Scenario, ScenarioError};
-use lpvmpc::{Controller, Reference, Workspace};
+use lpvmpc::{Controller, Reference};
 use lpvmpc_sim::Trajectory;
 use std::path::Path;
 
@@ -110,21 +110,18 @@ impl Run {
     /// # Errors
     /// The controller refuses its settings.
     pub fn first_terminal_gap(&self) -> Result<(f64, f64), CommandError> {
-        const N: usize = 20;
         let Prepared {
             ballbot,
             settings,
             planes,
             ..
         } = &self.prepared;
-        let mut controller = Controller::<_, f64, 4, 1, 3, N, { N + 4 }>::new(*ballbot, *settings)
-            .map_err(ScenarioError::from)?;
-        let mut workspace = Workspace::new();
+        let controller = Controller::allocate(*ballbot, *settings);
+        let mut controller = controller.map_err(ScenarioError::from)?;
+        let mut workspace = controller.workspace();
         let reference = Reference::constant(planes[0].state_reference(0.0));
         controller.step(&planes[0].initial_state, &reference, &mut workspace);
-        let predicted = controller.solution().x[N - 1];
-        let reached = controller.rollout()[N - 1];
-        let gap = (predicted - reached).abs();
+        let gap = controller.gap().abs();
         Ok((gap[0], gap[1]))
     }
 }

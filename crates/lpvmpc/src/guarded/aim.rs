@@ -1,29 +1,52 @@
 //! What a plan is aimed at: the wanted set points along the horizon.
 
+use crate::list::List;
 use crate::model::Scalar;
 use nalgebra::convert;
 
-/// The wanted set points along the horizon, any numbers, reachable or not; those beyond its end are
-/// expected to be the last one.
+/// The wanted set points along the horizon, any numbers, reachable or not.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SetPoints<T, const N: usize> {
-    /// Those at the stages 0 to N - 1.
-    pub stages: [T; N],
+pub struct SetPoints<'a, T> {
+    /// Those at the stages from 0 on; from where they end, `end`.
+    pub stages: &'a [T],
     /// That at the end of the horizon, and beyond.
     pub end: T,
 }
 
-impl<T: Scalar, const N: usize> SetPoints<T, N> {
+impl<T: Scalar> SetPoints<'_, T> {
     /// The same set point at every stage.
     pub fn constant(wanted: T) -> Self {
         Self {
-            stages: [wanted; N],
+            stages: &[],
             end: wanted,
         }
     }
+}
 
-    /// All of them numbers within `limits`; what is NaN repeats the one before, the first `last`.
-    pub(super) fn clamped(&self, last: T, [lower, upper]: [T; 2]) -> Self {
+/// Admissible set points, as many as the horizon has samples.
+#[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
+pub(super) struct Aims<T: 'static> {
+    /// Those at the stages 0 to N - 1.
+    pub stages: List<T>,
+    /// That at the end of the horizon, and beyond.
+    pub end: T,
+    /// How many of the stages come before the last change.
+    pub changes: usize,
+}
+
+impl<T: Scalar> Aims<T> {
+    pub fn new(stages: List<T>) -> Self {
+        Self {
+            stages,
+            end: T::zero(),
+            changes: 0,
+        }
+    }
+
+    /// Takes over what is `wanted`, as numbers within the limits; what is NaN repeats the one before, the
+    /// first `last`.
+    pub fn take(&mut self, wanted: &SetPoints<'_, T>, last: T, [lower, upper]: [T; 2]) {
         let mut before = last;
         let mut clamp = |wanted: T| {
             // What is infinite has a nearest admissible neighbour; NaN is ordered with nothing.
@@ -32,19 +55,13 @@ impl<T: Scalar, const N: usize> SetPoints<T, N> {
             }
             before
         };
-        Self {
-            stages: self.stages.map(&mut clamp),
-            end: clamp(self.end),
+        for (i, place) in self.stages.iter_mut().enumerate() {
+            *place = clamp(wanted.stages.get(i).copied().unwrap_or(wanted.end));
         }
-    }
-
-    /// How many of the first `horizon` stages come before the set points' last change.
-    pub(super) fn before_last_change(&self, horizon: usize) -> usize {
-        let stages = self.stages.iter().take(horizon);
-        let changed = stages
-            .enumerate()
-            .filter(|(_, wanted)| **wanted != self.end);
-        changed.last().map_or(0, |(i, _)| i + 1)
+        self.end = clamp(wanted.end);
+        let end = self.end;
+        let last_change = self.stages.iter().rposition(|aim| *aim != end);
+        self.changes = last_change.map_or(0, |i| i + 1);
     }
 }
 

@@ -8,48 +8,35 @@
 //! axis, where the program asks for the ball's tangent plane; the ball's curvature is in the cost,
 //! with the multiplier of the program before. The acceptance test asks for the ball itself.
 
-use super::aim::SetPoints;
-use super::plan::{Plan, Policy, shrunk, width};
-use super::{GuardedController, GuardedWorkspace};
+use super::plan::{Plan, shrunk, width};
+use super::{GuardedWorkspace, Planner};
 use crate::model::{LpvModel, Scalar};
-use crate::ocp::{Bounds, Ocp, Penalty, Stage};
+use crate::ocp::{Bounds, Common, Ocp, Penalty, Stage};
 use crate::solution::{ActiveRow, Quantity, Solution};
-use crate::solver::Solver;
 use nalgebra::{Cholesky, Const, SMatrix, SVector, convert};
 
-impl<
-    P,
-    T,
-    const NX: usize,
-    const NU: usize,
-    const NS: usize,
-    const N: usize,
-    const NA: usize,
-    const NP: usize,
-> GuardedController<P, T, NX, NU, NS, N, NA, NP>
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> Planner<P, T, NX, NU, NS>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
     /// The program along the plan `along`, whose states it lets be where they keep the bounds.
-    pub(super) fn pose(
+    pub(super) fn pose<const NA: usize>(
         &self,
-        x0: &SVector<T, NX>,
-        aims: &SetPoints<T, N>,
-        along: &Plan<T, NX, NU, N>,
-        slope: Slope,
-        ocp: &mut Ocp<T, NA, NU, NP>,
+        along: &Plan<T, NX, NU>,
+        ocp: &mut Ocp<T, NA, NU>,
     ) {
         let settings = &self.settings;
         // The last stage of the horizon follows its samples.
         ocp.horizon = settings.horizon + 2;
+        let x0 = &along.start;
         let origin = settings.direction * along.set_point;
         ocp.x0 = augmented(&(x0 - origin), T::zero());
         let tight = shrunk(&settings.x, settings.margin);
         // The measured state is as it is; x_1 and later are bounded, as far from the bounds as the
         // plan goes beyond its samples.
         let bounds = |i: usize, x: &SVector<T, NX>| {
-            let (above, below) = self.beyond_samples(along, x0, i);
+            let (above, below) = self.beyond_samples(along, i);
             let (lower, upper) = (tight.lower + below, tight.upper - above);
             let kept = settings.x.hold_at(&(x + above)) && settings.x.hold_at(&(x - below));
             let lower = if kept { lower.inf(x) } else { lower };
@@ -60,20 +47,17 @@ where
                 upper: augmented(&(upper - origin), infinity),
             }
         };
-        let changes = aims.before_last_change(settings.horizon);
-        let states = core::iter::once(x0).chain(&along.x);
-        let samples = states.zip(&along.u).zip(&along.x).zip(&aims.stages);
-        let mut stages = ocp.stages.iter_mut();
+        let samples = along.states().zip(&along.stages).zip(&self.aims.stages);
+        let mut stages = ocp.stages.iter_mut().zip(ocp.own.iter_mut());
         if let Some(first) = stages.next() {
-            *first = self.set_point_stage(aims.end - along.set_point, along.set_point);
+            (*first.0, *first.1) = self.set_point_stage(along.set_point);
         }
-        let samples = samples.take(settings.horizon).enumerate();
-        for ((i, (((x, u), x_next), wanted)), stage) in samples.zip(&mut stages) {
-            let aim = (i < changes).then_some(*wanted - along.set_point);
-            let (x_here, x_next) = (x - origin, x_next - origin);
-            *stage = self.sample_stage(slope, x, &x_here, u, &x_next, aim);
+        for ((i, ((x, planned), wanted)), stage) in samples.enumerate().zip(&mut stages) {
+            let aim = (i < self.aims.changes).then_some(*wanted - along.set_point);
+            let relative = (x - origin, planned.x - origin);
+            (*stage.0, *stage.1) = self.sample_stage(x, &planned.u, relative, aim);
             if i > 0 {
-                stage.x = bounds(i, x);
+                stage.1.x = bounds(i, x);
             }
         }
         let end = self.root() * (along.end - origin);
@@ -81,8 +65,11 @@ where
         // The tangent plane touches the ball where the last program ended, or this plan does.
         let touch = self.touch.unwrap_or(end);
         if let Some(last) = stages.next() {
-            *last = self.terminal_stage(&touch);
-            last.x = bounds(settings.horizon, &along.end);
+            *last.0 = self.terminal_stage(&touch);
+            *last.1 = Common {
+                x: bounds(settings.horizon, &along.end),
+                ..Common::default()
+            };
         }
         let edge = radius * (T::one() - settings.margin) - self.reserve(self.end_drift);
         let widest = if end.norm() <= radius { radius } else { edge };
@@ -91,10 +78,10 @@ where
 
     /// Where the solved program ended as y, and the multiplier of the terminal set: what the next
     /// one is posed with.
-    pub(super) fn learn<const M: usize>(
+    pub(super) fn learn<const NA: usize>(
         &mut self,
-        workspace: &GuardedWorkspace<T, NU, NA, NP, M>,
-        along: &Plan<T, NX, NU, N>,
+        workspace: &GuardedWorkspace<T, NU, NA>,
+        along: &Plan<T, NX, NU>,
     ) {
         let GuardedWorkspace { ocp, solution, .. } = workspace;
         let at_end = |row: &ActiveRow<T>| {
@@ -114,25 +101,16 @@ where
     /// than both ends of them.
     fn beyond_samples(
         &self,
-        along: &Plan<T, NX, NU, N>,
-        x0: &SVector<T, NX>,
+        along: &Plan<T, NX, NU>,
         i: usize,
     ) -> (SVector<T, NX>, SVector<T, NX>) {
         let between = self.settings.rollout.between;
         let (mut above, mut below) = (between, between);
         let widest = width(&self.settings.x) * convert::<f64, T>(0.1);
-        for sample in [i.checked_sub(1), Some(i)].into_iter().flatten() {
-            if sample >= self.settings.horizon {
-                continue;
-            }
-            let before = sample.checked_sub(1);
-            let from = before.map_or(Some(x0), |before| along.x.get(before));
-            let ends = (from, along.x.get(sample));
-            let extremes = (along.highest.get(sample), along.lowest.get(sample));
-            if let ((Some(from), Some(to)), (Some(highest), Some(lowest))) = (ends, extremes) {
-                above = above.sup(&(highest - from.sup(to) + between));
-                below = below.sup(&(from.inf(to) - lowest + between));
-            }
+        let samples = along.states().zip(&along.stages);
+        for (from, stage) in samples.skip(i.saturating_sub(1)).take(i.min(1) + 1) {
+            above = above.sup(&(stage.highest - from.sup(&stage.x) + between));
+            below = below.sup(&(from.inf(&stage.x) - stage.lowest + between));
         }
         if let Some(drift) = i.checked_sub(1).and_then(|before| self.drift.get(before)) {
             (above, below) = (above + drift, below + drift);
@@ -141,45 +119,49 @@ where
         (above.inf(&widest), below.inf(&widest))
     }
 
-    /// (x, 0) becomes (x, z): the first input is z, with the offset cost. Both `wanted` and z are
-    /// seen from the plan's set point.
-    fn set_point_stage(&self, wanted: T, along: T) -> Stage<T, NA, NU> {
-        let mut stage = Stage::<T, NA, NU>::new();
+    /// (x, 0) becomes (x, z): the first input is z, with the offset cost. Both what is wanted and z are
+    /// seen from the plan's set point, `along`.
+    fn set_point_stage<const NA: usize>(
+        &self,
+        along: T,
+    ) -> (Stage<T, NA, NU>, Common<T, NA, NU>) {
+        let weight = self.settings.offset_weight;
+        let mut stage = Stage::new();
         stage.a = SMatrix::identity();
-        stage.b = SMatrix::zeros();
         stage.b[(NX, 0)] = T::one();
-        stage.r = SMatrix::identity();
-        stage.r[(0, 0)] = self.settings.offset_weight;
-        stage.linear_u[0] = -self.settings.offset_weight * wanted;
+        stage.linear_u[0] = weight * (along - self.aims.end);
+        let mut common = Common::default();
+        common.r[(0, 0)] = weight;
         let [lower, upper] = self.settings.set_points;
-        stage.u.lower[0] = lower - along;
-        stage.u.upper[0] = upper - along;
-        stage
+        (common.u.lower[0], common.u.upper[0]) = (lower - along, upper - along);
+        (stage, common)
     }
 
-    /// One sample of the plant, linear along (x, u) by `slope`, exact at the plan itself: it leads
-    /// from `x_here` to `x_next`. With an `aim` the stage cost is about it, else about z.
-    fn sample_stage(
+    /// One sample of the plant, linear along (x, u), exact at the plan itself: it leads from the first of
+    /// the `relative` states to the second. With an `aim` the stage cost is about it, else about z.
+    fn sample_stage<const NA: usize>(
         &self,
-        slope: Slope,
         x: &SVector<T, NX>,
-        x_here: &SVector<T, NX>,
         u: &SVector<T, NU>,
-        x_next: &SVector<T, NX>,
+        relative: (SVector<T, NX>, SVector<T, NX>),
         aim: Option<T>,
-    ) -> Stage<T, NA, NU> {
+    ) -> (Stage<T, NA, NU>, Common<T, NA, NU>) {
         let settings = &self.settings;
-        let (a, b) = match slope {
+        let (a, b) = match self.slope {
             Slope::Jacobian => settings.rk4.differentiate(&self.model, x, u, settings.t_s),
             Slope::Embedding => settings.rk4.linearize(&self.model, x, u, settings.t_s),
         };
+        let (x_here, x_next) = relative;
         let mut stage = Stage::<T, NA, NU>::new();
         stage.a.view_mut((0, 0), (NX, NX)).copy_from(&a);
         stage.a[(NX, NX)] = T::one();
         stage.b.view_mut((0, 0), (NX, NU)).copy_from(&b);
         stage.c = augmented(&(x_next - a * x_here - b * u), T::zero());
+        // Damped towards the plan's input.
+        stage.linear_u = settings.weights.r * u * -self.damping;
+        let mut common = Common::<T, NA, NU>::default();
         let q_d = settings.weights.q * settings.direction;
-        let q = &mut stage.q;
+        let q = &mut common.q;
         q.view_mut((0, 0), (NX, NX)).copy_from(&settings.weights.q);
         match aim {
             // ||x - aim d||_Q^2
@@ -191,11 +173,9 @@ where
                 q[(NX, NX)] = q_d.dot(&settings.direction);
             }
         }
-        // Damped towards the plan's input.
-        stage.r = settings.weights.r * (T::one() + self.damping);
-        stage.linear_u = settings.weights.r * u * -self.damping;
-        stage.u = settings.u;
-        stage
+        common.r = settings.weights.r * (T::one() + self.damping);
+        common.u = settings.u;
+        (stage, common)
     }
 
     /// L', where P = L L'.
@@ -205,11 +185,8 @@ where
     }
 
     /// y = H L'(x - z d), without input; `end` is the plan's own L'(x - z d).
-    fn terminal_stage(&self, end: &SVector<T, NX>) -> Stage<T, NA, NU> {
+    fn terminal_stage<const NA: usize>(&self, end: &SVector<T, NX>) -> Stage<T, NA, NU> {
         let mut stage = Stage::<T, NA, NU>::new();
-        stage.a = SMatrix::zeros();
-        stage.b = SMatrix::zeros();
-        stage.r = SMatrix::identity();
         let root = reflected(end, &self.root());
         let shift = -(root * self.settings.direction);
         stage.a.view_mut((0, 0), (NX, NX)).copy_from(&root);
@@ -220,7 +197,13 @@ where
     /// The terminal cost |y|^2, the tangent plane of the terminal set at the `edge`, and the curvature
     /// of the ball behind it, with the multiplier that it had; no y beyond the `widest`. The
     /// reflection takes the place where the plane touches to the `upper` or the lower end.
-    fn pose_end(&self, edge: T, widest: T, upper: bool, ocp: &mut Ocp<T, NA, NU, NP>) {
+    fn pose_end<const NA: usize>(
+        &self,
+        edge: T,
+        widest: T,
+        upper: bool,
+        ocp: &mut Ocp<T, NA, NU>,
+    ) {
         let touches = self.touch.is_some();
         let pressure = if touches { self.pressure } else { T::zero() };
         ocp.terminal.p = SMatrix::identity() * (T::one() + pressure);
@@ -238,7 +221,7 @@ where
     }
 
     /// State bounds and terminal set at a price instead.
-    pub(super) fn soften(&self, ocp: &mut Ocp<T, NA, NU, NP>) {
+    pub(super) fn soften<const NA: usize>(&self, ocp: &mut Ocp<T, NA, NU>) {
         let width = width(&self.settings.x);
         let penalty = |width: T| {
             let width = if width > T::zero() { width } else { T::one() };
@@ -284,46 +267,28 @@ fn augmented<T: Scalar, const NX: usize, const NA: usize>(
     SVector::from_fn(|i, _| x.get(i).copied().unwrap_or(z))
 }
 
-/// The plan of a solved program as a policy, from the plant's own origin; `from` is the set point
-/// of the plan that the program was made along, times the direction.
-pub(super) fn answer<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const NA: usize,
-    const NP: usize,
-    const M: usize,
->(
-    solution: &Solution<T, NA, NU, NP, M>,
-    solver: &Solver<T, NA, NU, NP, M>,
-    from: &SVector<T, NX>,
-) -> Policy<T, NX, NU, N> {
-    let mut policy = Policy {
-        x: [SVector::zeros(); N],
-        u: [SVector::zeros(); N],
-        gain: [SMatrix::zeros(); N],
-    };
-    let states = policy.x.iter_mut().zip(&solution.x);
-    let inputs = policy.u.iter_mut().zip(solution.u.iter().skip(1));
-    let gains = policy.gain.iter_mut().zip(solver.factors().iter().skip(1));
-    for ((x, planned), ((u, input), (gain, factor))) in states.zip(inputs.zip(gains)) {
-        *x = plant_state::<T, NX, NA>(planned) + from;
-        *u = *input;
-        gain.copy_from(&factor.gain.fixed_columns::<NX>(0));
-    }
-    policy
+/// The answer of a solved program as a policy, from the plant's own origin: planned states, inputs and
+/// gains from stage 0 on; `from` is the set point of the plan that the program was made along, times the
+/// direction.
+pub(super) fn answer<'a, T: Scalar, const NX: usize, const NU: usize, const NA: usize>(
+    workspace: &'a GuardedWorkspace<T, NU, NA>,
+    from: &'a SVector<T, NX>,
+) -> impl Iterator<Item = (SVector<T, NX>, SVector<T, NU>, SMatrix<T, NU, NX>)> + 'a {
+    let GuardedWorkspace {
+        solution, solver, ..
+    } = workspace;
+    let inputs = solution.u.iter().skip(1);
+    let factors = solver.factors().iter().skip(1);
+    let stages = solution.x.iter().zip(inputs.zip(factors));
+    stages.map(move |(planned, (u, factor))| {
+        let gain = factor.gain.fixed_columns::<NX>(0).into_owned();
+        (plant_state::<T, NX, NA>(planned) + from, *u, gain)
+    })
 }
 
 /// How far a solved program moves the set point.
-pub(super) fn set_point_move<
-    T: Scalar,
-    const NU: usize,
-    const NA: usize,
-    const NP: usize,
-    const M: usize,
->(
-    solution: &Solution<T, NA, NU, NP, M>,
+pub(super) fn set_point_move<T: Scalar, const NU: usize, const NA: usize>(
+    solution: &Solution<T, NA, NU>,
 ) -> T {
     let first = solution.u.first().and_then(|u| u.get(0));
     first.copied().unwrap_or(T::zero())
@@ -334,15 +299,8 @@ fn plant_state<T: Scalar, const NX: usize, const NA: usize>(x: &SVector<T, NA>) 
 }
 
 /// x_N as the program of this `horizon` predicts it; `from` as in [`answer`].
-pub(super) fn predicted_end<
-    T: Scalar,
-    const NX: usize,
-    const NU: usize,
-    const NA: usize,
-    const NP: usize,
-    const M: usize,
->(
-    solution: &Solution<T, NA, NU, NP, M>,
+pub(super) fn predicted_end<T: Scalar, const NX: usize, const NU: usize, const NA: usize>(
+    solution: &Solution<T, NA, NU>,
     horizon: usize,
     from: &SVector<T, NX>,
 ) -> SVector<T, NX> {

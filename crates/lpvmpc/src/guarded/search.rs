@@ -1,12 +1,12 @@
 //! The search of a sample: quadratic programs along a plan, and what of the way to their answers the
 //! rollout confirms.
 
-use super::aim::SetPoints;
 use super::plan::Plan;
 use super::program::{self, Slope};
-use super::{Decision, GuardedController, GuardedSettings, GuardedWorkspace};
+use super::{Decision, GuardedController, GuardedWorkspace, Planner};
 use crate::model::{LpvModel, Scalar};
 use crate::solver::{SolverSettings, WarmStart};
+use core::mem::swap;
 use nalgebra::{SVector, convert};
 
 /// Relative decrease of the cost below which more programs of a sample are not worth their time.
@@ -14,89 +14,83 @@ const WORTHWHILE: f64 = 1e-7;
 /// Fractions of the way to the quadratic program's answer that are tried.
 const FRACTIONS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 
-impl<
-    P,
-    T,
-    const NX: usize,
-    const NU: usize,
-    const NS: usize,
-    const N: usize,
-    const NA: usize,
-    const NP: usize,
-> GuardedController<P, T, NX, NU, NS, N, NA, NP>
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> GuardedController<P, T, NX, NU, NS>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
-    /// Quadratic programs along `along`, each answer confirmed by the rollout. Returns the best
-    /// confirmed plan that costs less than the known one, with its gap, and goes on after a first
-    /// one as long as there are programs left and the cost falls.
-    pub(super) fn improve<const M: usize>(
+    /// Quadratic programs along the plan `along`, each answer confirmed by the rollout. Where one or more
+    /// are confirmed and cost less than the known plan, `along` becomes the best of them, and the answer
+    /// is its gap. The search goes on after a first one as long as there are programs left and the cost
+    /// falls.
+    pub(super) fn improve<const NA: usize>(
         &mut self,
-        x: &SVector<T, NX>,
-        aims: &SetPoints<T, N>,
-        along: &Plan<T, NX, NU, N>,
         known: Option<Decision>,
-        workspace: &mut GuardedWorkspace<T, NU, NA, NP, M>,
-    ) -> Option<(Plan<T, NX, NU, N>, SVector<T, NX>)> {
-        let GuardedSettings { iterations, .. } = self.settings;
+        workspace: &mut GuardedWorkspace<T, NU, NA>,
+    ) -> Option<SVector<T, NX>> {
+        let Self {
+            planner,
+            along,
+            trial,
+            nearer,
+            ..
+        } = self;
+        let iterations = planner.settings.iterations;
         let most = match known {
             Some(Decision::Candidate) => iterations.known,
             _ => iterations.unknown,
         };
-        let mut along = *along;
         let mut is_known = known.is_some();
         let mut improved = None;
         let mut in_vain = 0;
-        let mut served = self.damping;
+        let mut served = planner.damping;
         let mut warm_start = WarmStart::Same;
         for _ in 0..most {
-            self.pose(x, aims, &along, self.slope, &mut workspace.ocp);
-            self.solve(workspace, warm_start);
+            planner.pose(along, &mut workspace.ocp);
+            planner.solve(workspace, warm_start);
             warm_start = WarmStart::Same;
             if !is_known && !workspace.solution.status.is_solved() {
-                self.soften(&mut workspace.ocp);
-                self.solve(workspace, WarmStart::Cold);
+                planner.soften(&mut workspace.ocp);
+                planner.solve(workspace, WarmStart::Cold);
             }
             let outcome = if workspace.solution.status.is_solved() {
-                self.learn(workspace, &along);
-                self.search(x, aims, &along, is_known, workspace)
+                planner.learn(workspace, along);
+                let outcome = planner.search(along, is_known, workspace, [trial, nearer]);
+                planner.learn_drift(along, workspace);
+                outcome
             } else {
                 Outcome::Nothing
             };
-            if workspace.solution.status.is_solved() {
-                (self.drift, self.end_drift) = self.tube_of_program(&along, workspace);
-            }
             let found = match outcome {
                 Outcome::Found(found) => found,
                 Outcome::Settled => {
-                    self.damp(Some(1.0));
+                    planner.damp(Some(1.0));
                     break;
                 }
                 Outcome::Nothing => {
                     // What does not serve far from the plan may serve close to it, and the other
                     // way round.
-                    self.damp(None);
-                    self.slope = self.slope.other();
+                    planner.damp(None);
+                    planner.slope = planner.slope.other();
                     in_vain += 1;
                     if in_vain == 3 {
                         // At a plan that nothing improves on, damping says nothing of the next
                         // sample's.
-                        self.damping = served;
+                        planner.damping = served;
                         break;
                     }
                     continue;
                 }
             };
-            self.damp(Some(found.fraction));
-            served = self.damping;
+            planner.damp(Some(found.fraction));
+            served = planner.damping;
             in_vain = 0;
-            self.slope = Slope::Jacobian;
-            let settled = is_known && !self.is_worthwhile(along.cost - found.plan.cost, &along);
-            along = found.plan;
+            planner.slope = Slope::Jacobian;
+            let settled = is_known && !planner.is_worthwhile(along.cost - trial.cost, along);
+            swap(along, trial);
             if found.feasible {
                 is_known = true;
-                improved = Some((found.plan, found.gap));
+                improved = Some(found.gap);
             }
             if settled {
                 break;
@@ -105,75 +99,97 @@ where
         improved
     }
 
-    /// The first part of the way to the program's answer that costs less and is feasible; while no
-    /// feasible plan is known, the first that is feasible, or else nearer to it.
-    fn search<const M: usize>(
-        &self,
-        x: &SVector<T, NX>,
-        aims: &SetPoints<T, N>,
-        along: &Plan<T, NX, NU, N>,
-        is_known: bool,
-        workspace: &GuardedWorkspace<T, NU, NA, NP, M>,
-    ) -> Outcome<T, NX, NU, N> {
-        let horizon = self.settings.horizon;
-        let origin = self.settings.direction * along.set_point;
-        let GuardedWorkspace {
-            solution, solver, ..
-        } = workspace;
-        let towards = program::answer(solution, solver, &origin);
-        let predicted = program::predicted_end(solution, horizon, &origin);
-        let before = self.merit(along);
-        let mut nearer = None;
-        for fraction in FRACTIONS {
-            let plan = self.between(x, aims, along, &towards, convert(fraction));
-            let found = self.judge(plan, fraction, &predicted);
-            if self.is_better(&found, along, is_known) {
-                return Outcome::Found(found);
-            }
-            if is_known && fraction == 1.0 && !self.is_worthwhile(plan.cost - along.cost, along) {
-                return Outcome::Settled;
-            }
-            if !is_known && nearer.is_none() && self.merit(&plan) < before {
-                nearer = Some(found);
+    /// Outside of what is guaranteed: soft bounds, then the saturated terminal law. The answer is the plan
+    /// `along`, with its gap.
+    pub(super) fn last_resort<const NA: usize>(
+        &mut self,
+        workspace: &mut GuardedWorkspace<T, NU, NA>,
+    ) -> (Decision, SVector<T, NX>) {
+        let Self {
+            planner,
+            along,
+            trial,
+            ..
+        } = self;
+        if along.cost.is_finite() {
+            planner.pose(along, &mut workspace.ocp);
+            planner.soften(&mut workspace.ocp);
+            planner.solve(workspace, WarmStart::Cold);
+            if workspace.solution.status.is_solved() {
+                let origin = planner.settings.direction * along.set_point;
+                let towards = program::answer(workspace, &origin);
+                planner.go_between(along, towards, T::one(), trial);
+                if trial.cost.is_finite() {
+                    swap(along, trial);
+                    let horizon = planner.settings.horizon;
+                    let predicted = program::predicted_end(&workspace.solution, horizon, &origin);
+                    return (Decision::SoftBounds, along.end - predicted);
+                }
             }
         }
-        nearer.map_or(Outcome::Nothing, Outcome::Found)
+        let x = along.start;
+        planner.follow_terminal_law(&x, along);
+        (Decision::SaturatedLqr, SVector::zeros())
+    }
+}
+
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> Planner<P, T, NX, NU, NS>
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS>,
+{
+    /// The first part of the way to the program's answer that costs less and is feasible; while no
+    /// feasible plan is known, the first that is feasible, or else nearer to it. What is found is left in
+    /// the first of the two plans.
+    fn search<const NA: usize>(
+        &self,
+        along: &Plan<T, NX, NU>,
+        is_known: bool,
+        workspace: &GuardedWorkspace<T, NU, NA>,
+        [trial, nearer]: [&mut Plan<T, NX, NU>; 2],
+    ) -> Outcome<T, NX> {
+        let horizon = self.settings.horizon;
+        let origin = self.settings.direction * along.set_point;
+        let predicted = program::predicted_end(&workspace.solution, horizon, &origin);
+        let before = self.merit(along);
+        let mut near = None;
+        for fraction in FRACTIONS {
+            let towards = program::answer(workspace, &origin);
+            self.go_between(along, towards, convert(fraction), trial);
+            let found = Found {
+                fraction,
+                feasible: self.judge(trial),
+                gap: trial.end - predicted,
+            };
+            if found.feasible && (!is_known || trial.cost < along.cost) {
+                return Outcome::Found(found);
+            }
+            if is_known && fraction == 1.0 && !self.is_worthwhile(trial.cost - along.cost, along) {
+                return Outcome::Settled;
+            }
+            if !is_known && near.is_none() && self.merit(trial) < before {
+                swap(trial, nearer);
+                near = Some(found);
+            }
+        }
+        swap(trial, nearer);
+        near.map_or(Outcome::Nothing, Outcome::Found)
     }
 
-    /// A rollout with what it is worth; `predicted` is where the program expected its end.
-    fn judge(
-        &self,
-        mut plan: Plan<T, NX, NU, N>,
-        fraction: f64,
-        predicted: &SVector<T, NX>,
-    ) -> Found<T, NX, NU, N> {
-        let gap = plan.end - predicted;
-        let feasible = self.is_feasible(&plan) && {
-            (plan.drift, plan.end_drift) = self.tube(&plan);
-            self.is_robust(&plan)
-        };
-        Found {
-            plan,
-            fraction,
-            feasible,
-            gap,
+    /// Whether the rollout keeps all bounds wherever the plant can be that follows it, which is worked out
+    /// where it does so itself.
+    fn judge(&self, plan: &mut Plan<T, NX, NU>) -> bool {
+        self.is_feasible(plan) && {
+            self.find_drift(plan);
+            self.is_robust(plan)
         }
     }
 
     /// Whether a change of the cost by so much, up or down, is worth another program.
-    fn is_worthwhile(&self, change: T, along: &Plan<T, NX, NU, N>) -> bool {
+    fn is_worthwhile(&self, change: T, along: &Plan<T, NX, NU>) -> bool {
         let relative = along.cost * convert::<f64, T>(WORTHWHILE);
         let absolute = self.settings.terminal.level * T::default_epsilon().powf(convert(0.75));
         !(change.abs() <= relative + absolute)
-    }
-
-    fn is_better(
-        &self,
-        found: &Found<T, NX, NU, N>,
-        along: &Plan<T, NX, NU, N>,
-        is_known: bool,
-    ) -> bool {
-        found.feasible && (!is_known || found.plan.cost < along.cost)
     }
 
     /// More damping where a program's answer did not hold, less where all of it did.
@@ -193,39 +209,9 @@ where
         };
     }
 
-    /// Outside of what is guaranteed: soft bounds, then the saturated terminal law.
-    pub(super) fn last_resort<const M: usize>(
+    fn solve<const NA: usize>(
         &self,
-        x: &SVector<T, NX>,
-        aims: &SetPoints<T, N>,
-        along: &Plan<T, NX, NU, N>,
-        workspace: &mut GuardedWorkspace<T, NU, NA, NP, M>,
-    ) -> (Plan<T, NX, NU, N>, Decision, SVector<T, NX>) {
-        if along.cost.is_finite() {
-            self.pose(x, aims, along, self.slope, &mut workspace.ocp);
-            self.soften(&mut workspace.ocp);
-            self.solve(workspace, WarmStart::Cold);
-            if workspace.solution.status.is_solved() {
-                let GuardedWorkspace {
-                    solution, solver, ..
-                } = workspace;
-                let origin = self.settings.direction * along.set_point;
-                let towards = program::answer(solution, solver, &origin);
-                let plan = self.between(x, aims, along, &towards, T::one());
-                if plan.cost.is_finite() {
-                    let predicted =
-                        program::predicted_end(solution, self.settings.horizon, &origin);
-                    return (plan, Decision::SoftBounds, plan.end - predicted);
-                }
-            }
-        }
-        let plan = self.under_terminal_law(x, aims);
-        (plan, Decision::SaturatedLqr, SVector::zeros())
-    }
-
-    fn solve<const M: usize>(
-        &self,
-        workspace: &mut GuardedWorkspace<T, NU, NA, NP, M>,
+        workspace: &mut GuardedWorkspace<T, NU, NA>,
         warm_start: WarmStart,
     ) {
         let settings = SolverSettings {
@@ -239,10 +225,9 @@ where
 }
 
 /// What a program's answer is good for.
-#[derive(Clone, Copy)]
-enum Outcome<T, const NX: usize, const NU: usize, const N: usize> {
+enum Outcome<T, const NX: usize> {
     /// A plan to go on from.
-    Found(Found<T, NX, NU, N>),
+    Found(Found<T, NX>),
     /// It is the plan that there is, up to what is not worth its time.
     Settled,
     /// No part of the way is better.
@@ -250,9 +235,7 @@ enum Outcome<T, const NX: usize, const NU: usize, const N: usize> {
 }
 
 /// A part of the way to a program's answer, rolled out.
-#[derive(Clone, Copy)]
-struct Found<T, const NX: usize, const NU: usize, const N: usize> {
-    plan: Plan<T, NX, NU, N>,
+struct Found<T, const NX: usize> {
     /// Part of the way.
     fraction: f64,
     feasible: bool,

@@ -1,5 +1,6 @@
 //! What defines a guarded controller besides its model.
 
+use crate::memory::Capacity;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Bounds;
 use crate::predictor::Rk4;
@@ -84,7 +85,7 @@ fn largest_share<T: Scalar, const K: usize>(v: &SVector<T, K>, bounds: &Bounds<T
 pub struct GuardedSettings<T, const NX: usize, const NU: usize> {
     /// Sampling time in seconds.
     pub t_s: T,
-    /// Prediction horizon in samples, from 1 to the controller's `N`.
+    /// Prediction horizon in samples, at least 1.
     pub horizon: usize,
     /// Runge-Kutta steps of the prediction, along which quadratic programs are made.
     pub rk4: Rk4,
@@ -173,6 +174,21 @@ impl From<ControllerError> for GuardedError {
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
+    /// What the quadratic program of a controller with these settings needs: two stages more than the
+    /// horizon, and room for every bound that can be active at once.
+    pub fn capacity(&self) -> Capacity {
+        let sides = self.x.lower.iter().zip(self.x.upper.iter());
+        let bounded = sides.filter(|(lower, upper)| lower.is_finite() || upper.is_finite());
+        let stages = self.horizon + 2;
+        let soft = self.horizon * bounded.count() + NX;
+        let rows = stages * NU + soft;
+        Capacity {
+            stages,
+            rows,
+            active: rows + soft,
+        }
+    }
+
     /// `largest` is the longest horizon that there is memory for.
     pub(super) fn check<P, const NS: usize>(
         &self,

@@ -8,9 +8,8 @@
 //! or not: the sum of both S holds either. A and B are the derivatives of the prediction along the plan
 //! itself, so what is of second order in the deviation is left out.
 
-use super::aim::SetPoints;
-use super::plan::Plan;
-use super::{GuardedController, GuardedSettings, GuardedWorkspace, share_of_bounds};
+use super::plan::{Plan, PlannedStage};
+use super::{GuardedSettings, GuardedWorkspace, Planner, share_of_bounds};
 use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
 use nalgebra::{SMatrix, SVector, convert};
@@ -18,67 +17,71 @@ use nalgebra::{SMatrix, SVector, convert};
 /// A and B of a sample.
 type Slopes<T, const NX: usize, const NU: usize> = (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>);
 
-impl<
-    P,
-    T,
-    const NX: usize,
-    const NU: usize,
-    const NS: usize,
-    const N: usize,
-    const NA: usize,
-    const NP: usize,
-> GuardedController<P, T, NX, NU, NS, N, NA, NP>
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> Planner<P, T, NX, NU, NS>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
-    /// How far the plant may be from x_1 to x_N of `plan`, and from x_N in the norm of P.
-    pub(super) fn tube(&self, plan: &Plan<T, NX, NU, N>) -> ([SVector<T, NX>; N], T) {
-        let states = core::iter::once(&plan.start).chain(&plan.x);
-        let slopes = states.zip(&plan.u).map(|(x, u)| self.slopes(x, u));
-        self.tube_along(plan, slopes.zip(plan.gain))
+    /// Works out how far the plant may be from the states of `plan`.
+    pub(super) fn find_drift(&self, plan: &mut Plan<T, NX, NU>) {
+        let mut shape = SMatrix::zeros();
+        let mut x = plan.start;
+        for stage in plan.stages.iter_mut() {
+            let slopes = self.slopes(&x, &stage.u);
+            shape = self.carried(&shape, (&x, &stage.u), &slopes, &stage.gain);
+            stage.drift = shape.diagonal().map(root);
+            x = stage.x;
+        }
+        plan.end_drift = self.size_at_end(&shape);
     }
 
-    /// The same under the policy of the program that was made along `plan`, with its derivatives.
-    pub(super) fn tube_of_program<const M: usize>(
-        &self,
-        plan: &Plan<T, NX, NU, N>,
-        workspace: &GuardedWorkspace<T, NU, NA, NP, M>,
-    ) -> ([SVector<T, NX>; N], T) {
+    /// The same under the policy of the program that was made along `plan`, with its derivatives: what
+    /// the next program keeps free.
+    pub(super) fn learn_drift<const NA: usize>(
+        &mut self,
+        plan: &Plan<T, NX, NU>,
+        workspace: &GuardedWorkspace<T, NU, NA>,
+    ) {
         let stages = workspace.ocp.stages.iter().skip(1);
         let factors = workspace.solver.factors().iter().skip(1);
-        let policy = stages.zip(factors).map(|(stage, factor)| {
+        let states = plan.states().zip(&plan.stages);
+        let mut shape = SMatrix::zeros();
+        for (i, ((x, PlannedStage { u, .. }), (stage, factor))) in
+            states.zip(stages.zip(factors)).enumerate()
+        {
             let a = stage.a.fixed_view::<NX, NX>(0, 0).into_owned();
             let b = stage.b.fixed_view::<NX, NU>(0, 0).into_owned();
             let gain = factor.gain.fixed_columns::<NX>(0).into_owned();
-            ((a, b), gain)
-        });
-        self.tube_along(plan, policy)
+            shape = self.carried(&shape, (x, u), &(a, b), &gain);
+            if let Some(drift) = self.drift.get_mut(i) {
+                *drift = shape.diagonal().map(root);
+            }
+        }
+        self.end_drift = self.size_at_end(&shape);
     }
 
-    fn tube_along(
+    /// The ellipsoid `shape` one sample after (x, u), with the error of that sample.
+    fn carried(
         &self,
-        plan: &Plan<T, NX, NU, N>,
-        policy: impl Iterator<Item = (Slopes<T, NX, NU>, SMatrix<T, NU, NX>)>,
-    ) -> ([SVector<T, NX>; N], T) {
-        let mut drifts = [SVector::zeros(); N];
+        shape: &SMatrix<T, NX, NX>,
+        (x, u): (&SVector<T, NX>, &SVector<T, NU>),
+        (a, b): &Slopes<T, NX, NU>,
+        gain: &SMatrix<T, NU, NX>,
+    ) -> SMatrix<T, NX, NX> {
         // The box lies in the ellipsoid through its corners.
         let parts: T = convert(NX as f64);
-        let mut shape = SMatrix::<T, NX, NX>::zeros();
-        let states = core::iter::once(&plan.start).chain(&plan.x);
-        let steps = drifts.iter_mut().zip(states.zip(&plan.u)).zip(policy);
-        for ((drift, (x, u)), ((a, b), gain)) in steps.take(self.settings.horizon) {
-            let error = self.error(x, u);
-            let noise = SMatrix::from_diagonal(&error.component_mul(&error)) * parts;
-            let mut moved = around(&(a + product(&b, &gain)), &shape);
-            if self.may_saturate(u, &self.reach(&gain, &shape)) {
-                moved += around(&a, &shape);
-            }
-            shape = sum(&moved, &noise);
-            *drift = shape.diagonal().map(root);
+        let error = self.error(x, u);
+        let noise = SMatrix::from_diagonal(&error.component_mul(&error)) * parts;
+        let mut moved = around(&(a + product(b, gain)), shape);
+        if self.may_saturate(u, &self.reach(gain, shape)) {
+            moved += around(a, shape);
         }
-        let square = product(&self.settings.terminal.p, &shape).trace();
-        (drifts, root(square))
+        sum(&moved, &noise)
+    }
+
+    /// The size of an ellipsoid in the norm of P.
+    fn size_at_end(&self, shape: &SMatrix<T, NX, NX>) -> T {
+        root(product(&self.settings.terminal.p, shape).trace())
     }
 
     /// How much dearer than the rest of `plan` the next sample's candidate may be, for the integration
@@ -86,24 +89,20 @@ where
     ///
     /// The gradient is that of the policy's own closed loop, from the end backwards. Where the input may
     /// be at its bound, the feedback may act or not; what that changes is added with its size.
-    pub(super) fn epsilon(&self, plan: &Plan<T, NX, NU, N>, aims: &SetPoints<T, N>) -> T {
-        let settings = &self.settings;
+    pub(super) fn epsilon(&self, plan: &Plan<T, NX, NU>) -> T {
+        let (settings, aims) = (&self.settings, &self.aims);
         let two: T = convert(2.0);
         let d = &settings.direction;
         let (q, r) = (&settings.weights.q, &settings.weights.r);
-        let changes = aims.before_last_change(settings.horizon);
         let mut gradient = settings.terminal.p * (plan.end - d * plan.set_point) * two;
         // The squares, and what saturation may change.
         let mut rest = plan.end_drift * plan.end_drift;
-        let stages = plan
-            .x
-            .iter()
-            .zip(&plan.drift)
-            .zip(plan.u.iter().zip(&plan.gain).skip(1));
+        let stages = plan.stages.iter().zip(plan.stages.iter().skip(1));
         let stages = stages.zip(aims.stages.iter().skip(1)).enumerate();
-        let count = settings.horizon - 1;
-        for (i, (((x, drift), (u, gain)), wanted)) in stages.take(count).rev() {
-            let aim = if i + 1 < changes {
+        for (i, ((PlannedStage { x, drift, .. }, PlannedStage { u, gain, .. }), wanted)) in
+            stages.rev()
+        {
+            let aim = if i + 1 < aims.changes {
                 *wanted
             } else {
                 plan.set_point
@@ -119,10 +118,8 @@ where
             }
             rest += (q.abs() * drift).dot(drift) + (r.abs() * reach).dot(&reach);
         }
-        let first = plan
-            .u
-            .first()
-            .map_or_else(SVector::zeros, |u| self.error(&plan.start, u));
+        let first = plan.stages.first();
+        let first = first.map_or_else(SVector::zeros, |stage| self.error(&plan.start, &stage.u));
         gradient.abs().dot(&first) + rest
     }
 

@@ -1,0 +1,155 @@
+//! The memory of a guarded controller and its workspace.
+
+use super::plan::PlannedStage;
+use crate::list::List;
+use crate::memory::{SolverArrays, SolverMemory};
+use crate::model::Scalar;
+use crate::ocp::{Common, Stage};
+use crate::solution::PackedRow;
+use nalgebra::SVector;
+
+#[cfg(feature = "alloc")]
+use crate::memory::Capacity;
+
+/// Memory of a [`GuardedController`](crate::GuardedController): on the heap, or
+/// [lent](GuardedArrays::lend) arrays.
+#[derive(Debug)]
+pub struct GuardedMemory<T: 'static, const NX: usize, const NU: usize> {
+    /// The last plan and those that are compared in a step, one entry for each sample.
+    pub(super) plans: [List<PlannedStage<T, NX, NU>>; 4],
+    /// One for each sample.
+    pub(super) drift: List<SVector<T, NX>>,
+    /// One for each sample.
+    pub(super) aims: List<T>,
+}
+
+#[cfg(feature = "alloc")]
+impl<T: Scalar, const NX: usize, const NU: usize> GuardedMemory<T, NX, NU> {
+    /// As much as this horizon needs, on the heap.
+    pub fn allocate(horizon: usize) -> Self {
+        Self {
+            plans: core::array::from_fn(|_| List::repeat(PlannedStage::zeros(), horizon)),
+            drift: List::repeat(SVector::zeros(), horizon),
+            aims: List::repeat(T::zero(), horizon),
+        }
+    }
+}
+
+/// The same as arrays, for horizons of up to `N` samples.
+#[derive(Debug)]
+pub struct GuardedArrays<T, const NX: usize, const NU: usize, const N: usize> {
+    plans: [[PlannedStage<T, NX, NU>; N]; 4],
+    drift: [SVector<T, NX>; N],
+    aims: [T; N],
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> GuardedArrays<T, NX, NU, N> {
+    /// Arrays to be lent to a guarded controller.
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self {
+            plans: [[PlannedStage::zeros(); N]; 4],
+            drift: [SVector::zeros(); N],
+            aims: [T::zero(); N],
+        }
+    }
+
+    /// The arrays as memory of a controller.
+    pub fn lend(&'static mut self) -> GuardedMemory<T, NX, NU> {
+        GuardedMemory {
+            plans: self.plans.each_mut().map(|list| List::Static(list)),
+            drift: List::Static(&mut self.drift),
+            aims: List::Static(&mut self.aims),
+        }
+    }
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Default
+    for GuardedArrays<T, NX, NU, N>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Memory of a [`GuardedWorkspace`](crate::GuardedWorkspace): on the heap, or
+/// [lent](GuardedWorkspaceArrays::lend) arrays.
+#[derive(Debug)]
+pub struct GuardedWorkspaceMemory<T: 'static, const NU: usize, const NA: usize> {
+    pub(super) stages: List<Stage<T, NA, NU>>,
+    pub(super) own: List<Common<T, NA, NU>>,
+    pub(super) solver: SolverMemory<T, NA, NU>,
+    pub(super) u: List<SVector<T, NU>>,
+    pub(super) x: List<SVector<T, NA>>,
+    pub(super) active: List<PackedRow<T>>,
+}
+
+#[cfg(feature = "alloc")]
+impl<T: Scalar, const NU: usize, const NA: usize> GuardedWorkspaceMemory<T, NU, NA> {
+    /// As much as is needed, on the heap.
+    pub fn allocate(capacity: Capacity) -> Self {
+        let Capacity { stages, active, .. } = capacity;
+        Self {
+            stages: List::repeat(Stage::new(), stages),
+            own: List::repeat(Common::default(), stages),
+            solver: SolverMemory::allocate(capacity),
+            u: List::repeat(SVector::zeros(), stages),
+            x: List::repeat(SVector::zeros(), stages),
+            active: List::repeat(PackedRow::empty(), active),
+        }
+    }
+}
+
+/// The same as arrays: `NP` stages, two more than the horizon has samples, and up to `M` active bounds.
+#[derive(Debug)]
+pub struct GuardedWorkspaceArrays<
+    T,
+    const NU: usize,
+    const NA: usize,
+    const NP: usize,
+    const M: usize,
+> {
+    stages: [Stage<T, NA, NU>; NP],
+    own: [Common<T, NA, NU>; NP],
+    solver: SolverArrays<T, NA, NU, NP, M>,
+    u: [SVector<T, NU>; NP],
+    x: [SVector<T, NA>; NP],
+    active: [PackedRow<T>; M],
+}
+
+impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usize>
+    GuardedWorkspaceArrays<T, NU, NA, NP, M>
+{
+    /// Arrays to be lent to a workspace.
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self {
+            stages: [Stage::new(); NP],
+            own: [Common::default(); NP],
+            solver: SolverArrays::new(),
+            u: [SVector::zeros(); NP],
+            x: [SVector::zeros(); NP],
+            active: [PackedRow::empty(); M],
+        }
+    }
+
+    /// The arrays as memory of a workspace.
+    pub fn lend(&'static mut self) -> GuardedWorkspaceMemory<T, NU, NA> {
+        GuardedWorkspaceMemory {
+            stages: List::Static(&mut self.stages),
+            own: List::Static(&mut self.own),
+            solver: self.solver.lend(),
+            u: List::Static(&mut self.u),
+            x: List::Static(&mut self.x),
+            active: List::Static(&mut self.active),
+        }
+    }
+}
+
+impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usize> Default
+    for GuardedWorkspaceArrays<T, NU, NA, NP, M>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
