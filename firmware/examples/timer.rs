@@ -11,7 +11,9 @@ use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::{Peripherals, peripheral::syst::SystClkSource, singleton};
 use cortex_m_rt::{entry, exception};
-use firmware::{Controller, Reference, Workspace, recorded::LISSAJOUS as ROBOT};
+use firmware::{
+    Controller, ControllerMemory, N, Window, Workspace, WorkspaceMemory, recorded::LISSAJOUS as ROBOT,
+};
 use nalgebra::{Vector3, Vector4};
 
 /// Core clock, Hz.
@@ -29,7 +31,7 @@ trait Board {
     /// State (phi, theta, phi_dot, theta_dot) of the x and the y plane, rad and rad/s.
     fn states(&mut self) -> [Vector4<f32>; 2];
     /// References of the two planes over the horizon that begins now.
-    fn references(&mut self) -> [Reference; 2];
+    fn references(&mut self) -> [Window; 2];
     /// Sets the torques of the three motors, N m, and feeds the watchdog.
     fn drive(&mut self, motors: &Vector3<f32>);
     /// Takes the power from the motors until a person starts again.
@@ -57,8 +59,8 @@ fn run(
         let mut torques = Vector3::zeros();
         let mut solved = true;
         let inputs = board.states().into_iter().zip(board.references());
-        for ((torque, (x, reference)), plane) in torques.iter_mut().zip(inputs).zip(&mut *planes) {
-            let plan = plane.step(&x, &reference, workspace);
+        for ((torque, (x, window)), plane) in torques.iter_mut().zip(inputs).zip(&mut *planes) {
+            let plan = plane.step(&x, &window.reference(), workspace);
             *torque = plan.u[0][0];
             solved &= plan.status.is_solved();
         }
@@ -74,28 +76,31 @@ fn run(
 #[entry]
 fn main() -> ! {
     let mut board = StandIn;
-    let (Some(mut peripherals), Some(workspace), Some(planes)) = (
+    let (Some(mut peripherals), Some(memory), Some([x, y])) = (
         Peripherals::take(),
-        singleton!(WORKSPACE: Workspace = Workspace::new()),
-        singleton!(PLANES: Option<[Controller; 2]> = controllers()),
+        singleton!(WORKSPACE: WorkspaceMemory = WorkspaceMemory::new()),
+        singleton!(PLANES: [ControllerMemory; 2] = [ControllerMemory::new(); 2]),
     ) else {
         board.stop()
     };
-    let (Some(planes), Ok(wheels)) = (planes, Wheels::of_paper(ROBOT.zenith_angle)) else {
+    let (Some(x), Some(y), Ok(wheels)) = (
+        controller(x),
+        controller(y),
+        Wheels::of_paper(ROBOT.zenith_angle),
+    ) else {
         board.stop() // the settings make no sense
     };
+    let workspace = &mut Workspace::new(memory.lend());
     peripherals.SYST.set_clock_source(SystClkSource::Core);
     peripherals.SYST.set_reload(SAMPLE - 1);
     peripherals.SYST.clear_current();
     peripherals.SYST.enable_interrupt();
     peripherals.SYST.enable_counter();
-    run(&mut board, planes, workspace, &wheels)
+    run(&mut board, &mut [x, y], workspace, &wheels)
 }
 
-fn controllers() -> Option<[Controller; 2]> {
-    let x = Controller::new(ROBOT.ballbot, ROBOT.settings()).ok()?;
-    let y = Controller::new(ROBOT.ballbot, ROBOT.settings()).ok()?;
-    Some([x, y])
+fn controller(memory: &'static mut ControllerMemory) -> Option<Controller> {
+    Controller::new(ROBOT.ballbot, ROBOT.settings(), memory.lend()).ok()
 }
 
 /// No robot at all; opaque to the compiler, so that nothing is left out.
@@ -106,8 +111,12 @@ impl Board for StandIn {
         black_box([Vector4::zeros(); 2])
     }
 
-    fn references(&mut self) -> [Reference; 2] {
-        black_box([Reference::constant(Vector4::zeros()); 2])
+    fn references(&mut self) -> [Window; 2] {
+        let rest = Window {
+            stages: [Vector4::zeros(); N],
+            terminal: Vector4::zeros(),
+        };
+        black_box([rest; 2])
     }
 
     fn drive(&mut self, motors: &Vector3<f32>) {

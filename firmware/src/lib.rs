@@ -5,6 +5,8 @@
 pub mod recorded;
 mod recording;
 
+use lpvmpc::Reference;
+use nalgebra::Vector4;
 pub use recording::{Plane, Recording};
 
 /// Horizon, samples.
@@ -14,10 +16,32 @@ pub const N: usize = 20;
 pub const M: usize = N;
 
 /// The controller of one plane.
-pub type Controller = lpvmpc::Controller<ballbot::Ballbot<f32>, f32, 4, 1, 3, N, M>;
+pub type Controller = lpvmpc::Controller<ballbot::Ballbot<f32>, f32, 4, 1, 3>;
 
-/// The reference over the horizon of one plane.
-pub type Reference = lpvmpc::Reference<f32, 4, N>;
+/// Its memory.
+pub type ControllerMemory = lpvmpc::ControllerArrays<f32, 4, 1, N, M>;
 
-/// Memory of the solver, shared by the planes.
-pub type Workspace = lpvmpc::Workspace<f32, 4, 1, N, M>;
+/// The program of a sample and the solver, shared by the planes.
+pub type Workspace = lpvmpc::Workspace<f32, 4, 1>;
+
+/// Their memory.
+pub type WorkspaceMemory = lpvmpc::WorkspaceArrays<f32, 4, 1, N, M>;
+
+/// The reference of one plane over a horizon.
+#[derive(Clone, Copy, Debug)]
+pub struct Window {
+    /// x_ref at the stages.
+    pub stages: [Vector4<f32>; N],
+    /// x_ref at the end of the horizon.
+    pub terminal: Vector4<f32>,
+}
+
+impl Window {
+    /// The same as the controller takes it.
+    pub fn reference(&self) -> Reference<'_, f32, 4> {
+        Reference {
+            stages: &self.stages,
+            terminal: self.terminal,
+        }
+    }
+}

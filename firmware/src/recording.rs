@@ -1,6 +1,6 @@
 //! A scenario's settings, states and references, as they stand in the flash.
 
-use crate::{N, Reference};
+use crate::{N, Window};
 use ballbot::Ballbot;
 use lpvmpc::{
     Bounds, ControllerSettings, InputReference, Iterations, Penalty, Predictor, Rk4, Scheduling,
@@ -103,12 +103,12 @@ impl Recording {
 impl Plane {
     /// The reference over the horizon that begins at sample `k`: phi_ref and rest. Beyond the
     /// recording it is zero.
-    pub fn reference(&self, k: usize) -> Reference {
+    pub fn window(&self, k: usize) -> Window {
         let at = |i: usize| {
             let phi_ref = self.phi_ref.get(k + i).copied().unwrap_or(0.0);
             Vector4::new(phi_ref, 0.0, 0.0, 0.0)
         };
-        Reference {
+        Window {
             stages: core::array::from_fn(at),
             terminal: at(N),
         }

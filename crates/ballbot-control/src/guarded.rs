@@ -3,8 +3,7 @@
 use crate::plane_regulator::PlaneRegulator;
 use ballbot::Ballbot;
 use lpvmpc::{GuardedController, GuardedError, GuardedSettings};
-use lpvmpc_sim::{GuardedFeedback, MeasuredState};
-use nalgebra::Vector1;
+use lpvmpc_sim::GuardedFeedback;
 
 /// The guarded controller on the measured state itself, with `preview` of the reference or without.
 ///
@@ -16,11 +15,5 @@ pub fn guarded_feedback(
     preview: bool,
 ) -> Result<Box<dyn PlaneRegulator>, GuardedError> {
     let controller = GuardedController::allocate(*ballbot, *settings)?;
-    Ok(Box::new(GuardedFeedback::<_, 4, 1, 3, 5> {
-        workspace: controller.workspace(),
-        controller,
-        measured: MeasuredState::new(),
-        input: Vector1::zeros(),
-        preview,
-    }))
+    Ok(Box::new(GuardedFeedback::<_, 4, 1, 3, 5>::new(controller, preview)))
 }

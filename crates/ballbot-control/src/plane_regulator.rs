@@ -2,7 +2,7 @@
 
 use crate::handover::{Handover, Plan, PlanKind};
 use ballbot::Ballbot;
-use lpvmpc::{ActiveSet, Controller, GuardedController, Workspace};
+use lpvmpc::{ActiveSet, Controller, GuardedController};
 use lpvmpc_sim::{GuardedFeedback, Regulator, StateFeedback};
 use std::rc::Rc;
 
@@ -76,13 +76,7 @@ type Guarded = (
     ActiveSet<f64>,
 );
 
-impl PlaneRegulator
-    for StateFeedback<
-        Box<Controller<Ballbot<f64>, f64, 4, 1, 3>>,
-        Box<Workspace<f64, 4, 1>>,
-        4,
-    >
-{
+impl PlaneRegulator for StateFeedback<Box<Controller<Ballbot<f64>, f64, 4, 1, 3>>, 4, 1> {
     fn hand_over(&self) -> Handover {
         let controller = self.controller();
         let torque = controller.solution().u[0][0];

@@ -32,9 +32,7 @@ pub fn state_feedback(
     settings: &ControllerSettings<f64, 4, 1, 3>,
 ) -> Result<Box<dyn PlaneRegulator>, ControllerError> {
     let controller = Controller::allocate(*ballbot, *settings)?;
-    let workspace = Box::new(controller.workspace());
-    let controller = Box::new(controller);
-    Ok(Box::new(StateFeedback::new(controller, workspace)))
+    Ok(Box::new(StateFeedback::new(Box::new(controller))))
 }
 
 /// The controller with what stands around it; `period` is that of the sensors, s.

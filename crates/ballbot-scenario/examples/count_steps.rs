@@ -12,8 +12,6 @@ use nalgebra::Vector4;
 use std::hint::black_box;
 use std::{env, error::Error, path::Path, time::Duration};
 
-const N: usize = 20;
-
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = env::args().skip(1).collect();
     let [name, samples] = arguments.as_slice() else {
@@ -26,14 +24,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         clock: &|| Duration::ZERO,
         progress: &|_| (),
     })?;
-    let mut controller = Box::new(Controller::new(prepared.ballbot, prepared.settings)?);
-    let mut workspace = Box::new(Workspace::new());
+    let mut controller = Controller::allocate(prepared.ballbot, prepared.settings)?;
+    let mut workspace = controller.workspace();
+    let horizon = prepared.settings.horizon;
     for (plane, trajectory) in prepared.planes.iter().zip(&trajectories) {
         for (k, sample) in trajectory.samples.iter().enumerate() {
             let at = |i: usize| plane.state_reference((k + i) as f64 * prepared.settings.t_s);
+            let stages: Vec<_> = (0..horizon).map(at).collect();
             let reference = Reference {
-                stages: std::array::from_fn(at),
-                terminal: at(N),
+                stages: &stages,
+                terminal: at(horizon),
             };
             counted_step(&mut controller, &sample.x, &reference, &mut workspace);
         }
@@ -44,10 +44,10 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// The counter finds it by its name.
 #[inline(never)]
 fn counted_step(
-    controller: &mut Controller<Ballbot<f64>, f64, 4, 1, 3, N, N>,
+    controller: &mut Controller<Ballbot<f64>, f64, 4, 1, 3>,
     x: &Vector4<f64>,
-    reference: &Reference<f64, 4, N>,
-    workspace: &mut Workspace<f64, 4, 1, N, N>,
+    reference: &Reference<'_, f64, 4>,
+    workspace: &mut Workspace<f64, 4, 1>,
 ) {
     black_box(controller.step(black_box(x), reference, workspace));
 }

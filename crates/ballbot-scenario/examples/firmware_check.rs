@@ -13,7 +13,7 @@
 
 use ballbot::Ballbot;
 use ballbot_scenario::{Plane, Prepared, Scenario, Surroundings};
-use lpvmpc::{Controller, Reference, Workspace};
+use lpvmpc::{Controller, ControllerSettings, Reference, Workspace};
 use nalgebra::{Vector3, Vector4};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -264,26 +264,28 @@ fn check_recording<'a>(
 /// The controller of one plane in `f64`, with its own past.
 struct Replay<'a> {
     plane: &'a Plane,
-    controller: Box<Controller<Ballbot<f64>, f64, 4, 1, 3, 20, 20>>,
-    workspace: Box<Workspace<f64, 4, 1, 20, 20>>,
+    controller: Controller<Ballbot<f64>, f64, 4, 1, 3>,
+    workspace: Workspace<f64, 4, 1>,
 }
 
 impl<'a> Replay<'a> {
     fn new(prepared: &Prepared, plane: &'a Plane) -> Result<Self, Failure> {
+        let controller = Controller::allocate(prepared.ballbot, prepared.settings)?;
         Ok(Self {
             plane,
-            controller: Box::new(Controller::new(prepared.ballbot, prepared.settings)?),
-            workspace: Box::default(),
+            workspace: controller.workspace(),
+            controller,
         })
     }
 
     fn step(&mut self, step: &Step) -> Result<f64, Failure> {
-        let t_s = self.controller.settings().t_s;
+        let ControllerSettings { t_s, horizon, .. } = *self.controller.settings();
         let plane = self.plane;
         let at = |i: usize| plane.state_reference((step.sample + i) as f64 * t_s);
+        let stages: Vec<_> = (0..horizon).map(at).collect();
         let reference = Reference {
-            stages: std::array::from_fn(at),
-            terminal: at(20),
+            stages: &stages,
+            terminal: at(horizon),
         };
         let plan = self
             .controller

@@ -7,12 +7,11 @@
 
 use ballbot::Ballbot;
 use ballbot_scenario::{CertifiedTable, Prepared, Scenario, TerminalTable};
-use lpvmpc::{GuardedController, GuardedWorkspace, Rk4};
+use lpvmpc::{GuardedController, Rk4};
 use nalgebra::Vector4;
 use std::path::Path;
 
-type Guarded = GuardedController<Ballbot<f64>, f64, 4, 1, 3, 60, 5, 62>;
-type Workspace = GuardedWorkspace<f64, 1, 5, 62, 200>;
+type Guarded = GuardedController<Ballbot<f64>, f64, 4, 1, 3>;
 
 fn rows(name: &str) -> Vec<Vec<f64>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/guaranteed-optimum");
@@ -25,7 +24,7 @@ fn controller(prepared: &Prepared, horizon: f64, programs: usize) -> Guarded {
     let mut settings = prepared.guarded.unwrap();
     settings.horizon = horizon as usize;
     settings.iterations.known = programs;
-    Guarded::new(prepared.ballbot, settings).unwrap()
+    Guarded::allocate(prepared.ballbot, settings).unwrap()
 }
 
 fn prepared() -> Prepared {
@@ -51,9 +50,9 @@ fn quantile(values: &mut [f64], part: f64) -> f64 {
 #[test]
 fn the_first_plan_is_the_optimum() {
     let prepared = prepared();
-    let mut workspace = Box::new(Workspace::new());
     let mut first = |prepared: &Prepared, row: &[f64]| {
         let mut controller = controller(prepared, row[0], 1);
+        let mut workspace = controller.workspace::<5>();
         let step = controller.step(&start(row), row[5], &mut workspace);
         step.decision.is_guaranteed().then_some(step.cost / row[7])
     };
@@ -106,11 +105,11 @@ fn closed_loops_with_three_programs_cost_still_less() {
 
 /// The closed loops' costs in IPOPT's, where there is a first plan; every later sample must have one.
 fn closed_loop_costs(prepared: &Prepared, programs: usize, rows: &[Vec<f64>]) -> Vec<f64> {
-    let mut workspace = Box::new(Workspace::new());
     let weights = prepared.settings.weights;
     let plant = Rk4 { substeps: 40 };
     let mut ratio = |row: &Vec<f64>| {
         let mut controller = controller(prepared, row[0], programs);
+        let mut workspace = controller.workspace::<5>();
         let (mut x, mut cost) = (start(row), 0.0);
         for k in 0..row[6] as usize {
             let step = controller.step(&x, row[5], &mut workspace);

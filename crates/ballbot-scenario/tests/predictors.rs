@@ -6,17 +6,15 @@ use ballbot::Ballbot;
 use ballbot_scenario::{Prepared, Scenario};
 use lpvmpc::{
     Bounds, Controller, ControllerSettings, Iterations, Predictor, Reference, Rk4, Solution,
-    Status, TerminalIngredient, Workspace, kkt_residual,
+    Status, TerminalIngredient, kkt_residual,
 };
 use nalgebra::Vector4;
 use std::path::Path;
 
 const N: usize = 20;
-/// Torque and state bounds that may be active at once, and the four rows of the equality.
-const M: usize = 64;
 const FINE: Rk4 = Rk4 { substeps: 2 };
 
-type Loop = Controller<Ballbot<f64>, f64, 4, 1, 3, N, M>;
+type Loop = Controller<Ballbot<f64>, f64, 4, 1, 3>;
 
 fn scenario_3() -> Prepared {
     let scenario = Scenario::load("single-setpoint-terminal").unwrap();
@@ -36,10 +34,10 @@ fn settings(predictor: Predictor, iterations: Iterations<f64>) -> ControllerSett
 }
 
 /// The first plan from rest towards `phi` rad.
-fn plan(settings: ControllerSettings<f64, 4, 1, 3>, phi: f64) -> (Loop, Solution<f64, 4, 1, N, M>) {
-    let mut controller = Loop::new(Ballbot::paper(), settings).unwrap();
+fn plan(settings: ControllerSettings<f64, 4, 1, 3>, phi: f64) -> (Loop, Solution<f64, 4, 1>) {
+    let mut controller = Loop::allocate(Ballbot::paper(), settings).unwrap();
     let target = Reference::constant(Vector4::new(phi, 0.0, 0.0, 0.0));
-    let mut workspace = Box::new(Workspace::new());
+    let mut workspace = controller.workspace();
     let solution = controller
         .step(&Vector4::zeros(), &target, &mut workspace)
         .clone();
@@ -125,8 +123,8 @@ fn one_program_per_sample_closes_the_gap_along_the_loop() {
     let design = scenario_3();
     let mut settings = settings(Predictor::StageConsistent(FINE), Iterations::Fixed(1));
     settings.terminal = TerminalIngredient::Equality;
-    let mut controller = Loop::new(design.ballbot, settings).unwrap();
-    let mut workspace = Box::new(Workspace::new());
+    let mut controller = Loop::allocate(design.ballbot, settings).unwrap();
+    let mut workspace = controller.workspace();
     let target = Reference::constant(Vector4::new(1.0, 0.0, 0.0, 0.0));
     let mut x = Vector4::zeros();
     for _ in 0..30 {

@@ -4,7 +4,7 @@ use crate::guarded_loop::Guard;
 use crate::plant::{Plant, PlantError, Tolerances, Unloaded};
 use crate::regulator::{Regulator, StateFeedback};
 use crate::world::{World, WorldError};
-use lpvmpc::{BoundId, Bounds, Controller, LpvModel, Observation, Status, Workspace};
+use lpvmpc::{BoundId, Bounds, Controller, LpvModel, Observation, Status};
 use nalgebra::SVector;
 use std::time::Duration;
 
@@ -328,7 +328,6 @@ pub fn run<C, P, const NX: usize, const NU: usize, const NS: usize>(
     controller: &mut Controller<C, f64, NX, NU, NS>,
     plant: &P,
     experiment: &Experiment<'_, NX>,
-    workspace: &mut Workspace<f64, NX, NU>,
 ) -> Trajectory<NX, NU>
 where
     C: LpvModel<f64, NX, NU, NS>,
@@ -340,7 +339,7 @@ where
         controller.settings().t_s,
         experiment.tolerances,
     );
-    let regulator = StateFeedback::new(controller, workspace);
+    let regulator = StateFeedback::new(controller);
     let course = Course {
         samples: experiment.samples,
         reference: experiment.reference,

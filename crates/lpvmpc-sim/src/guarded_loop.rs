@@ -147,6 +147,24 @@ pub struct GuardedFeedback<
     pub preview: bool,
 }
 
+impl<C, const NX: usize, const NU: usize, const NS: usize, const NA: usize>
+    GuardedFeedback<C, NX, NU, NS, NA>
+where
+    C: LpvModel<f64, NX, NU, NS>,
+{
+    /// The regulator with this controller and a workspace of its own, with `preview` of the reference or
+    /// without.
+    pub fn new(controller: GuardedController<C, f64, NX, NU, NS>, preview: bool) -> Self {
+        Self {
+            workspace: controller.workspace(),
+            controller,
+            measured: MeasuredState::new(),
+            input: SVector::zeros(),
+            preview,
+        }
+    }
+}
+
 impl<
     C,
     const NX: usize,

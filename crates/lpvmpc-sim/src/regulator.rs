@@ -97,21 +97,24 @@ where
     }
 }
 
-/// The controller on the measured state itself. `K` and `W` hold a [`Controller`] and its [`Workspace`], by
-/// reference or in a box.
+/// The controller on the measured state itself. `K` holds a [`Controller`], in a box or by reference.
 #[derive(Debug)]
-pub struct StateFeedback<K, W, const NX: usize> {
+pub struct StateFeedback<K, const NX: usize, const NU: usize> {
     controller: K,
-    workspace: W,
+    workspace: Workspace<f64, NX, NU>,
     measured: MeasuredState<NX>,
 }
 
-impl<K, W, const NX: usize> StateFeedback<K, W, NX> {
-    /// Puts a controller and its workspace together.
-    pub fn new(controller: K, workspace: W) -> Self {
+impl<K, C, const NX: usize, const NU: usize, const NS: usize> StateFeedback<K, NX, NU>
+where
+    C: LpvModel<f64, NX, NU, NS>,
+    K: DerefMut<Target = Controller<C, f64, NX, NU, NS>>,
+{
+    /// The regulator with this controller and a workspace of its own.
+    pub fn new(controller: K) -> Self {
         Self {
+            workspace: controller.workspace(),
             controller,
-            workspace,
             measured: MeasuredState::new(),
         }
     }
@@ -137,12 +140,11 @@ impl<K, W, const NX: usize> StateFeedback<K, W, NX> {
     }
 }
 
-impl<K, W, C, const NX: usize, const NU: usize, const NS: usize> Regulator<NX, NU, NX>
-    for StateFeedback<K, W, NX>
+impl<K, C, const NX: usize, const NU: usize, const NS: usize> Regulator<NX, NU, NX>
+    for StateFeedback<K, NX, NU>
 where
     C: LpvModel<f64, NX, NU, NS>,
     K: DerefMut<Target = Controller<C, f64, NX, NU, NS>>,
-    W: DerefMut<Target = Workspace<f64, NX, NU>>,
 {
     fn t_s(&self) -> f64 {
         self.controller.settings().t_s

@@ -88,7 +88,7 @@ fn run_mass<P: LpvModel<f64, 2, 1, 1>>(
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),
     };
-    let mut controller = Controller::<_, f64, 2, 1, 1, 10, 20>::new(Mass, settings).unwrap();
+    let mut controller = Controller::allocate(Mass, settings).unwrap();
     let experiment = Experiment {
         initial_state: Vector2::zeros(),
         samples: SAMPLES,
@@ -97,7 +97,7 @@ fn run_mass<P: LpvModel<f64, 2, 1, 1>>(
         clock,
         progress,
     };
-    run(&mut controller, plant, &experiment, &mut Workspace::new())
+    run(&mut controller, plant, &experiment)
 }
 
 fn stopped() -> Duration {
@@ -166,7 +166,6 @@ fn no_samples_no_motion() {
             &mut controller,
             &Ballbot::paper(),
             &experiment,
-            &mut Workspace::new(),
         )
     };
     let nothing = run_of(0);
@@ -260,7 +259,7 @@ fn a_start_that_is_no_number_ends_the_run_at_once() {
         progress: &|_| (),
     };
     let plant = Ballbot::paper();
-    let trajectory = run(&mut controller, &plant, &experiment, &mut Workspace::new());
+    let trajectory = run(&mut controller, &plant, &experiment);
     assert!(trajectory.samples.is_empty());
     assert_eq!(trajectory.states().count(), 1);
     assert!(
@@ -285,7 +284,7 @@ fn bad_tolerances_end_the_run_at_once() {
         progress: &|_| (),
     };
     let plant = Ballbot::paper();
-    let trajectory = run(&mut controller, &plant, &experiment, &mut Workspace::new());
+    let trajectory = run(&mut controller, &plant, &experiment);
     assert!(trajectory.samples.is_empty());
     assert!(matches!(
         trajectory.ending,
@@ -297,7 +296,7 @@ fn bad_tolerances_end_the_run_at_once() {
 }
 
 /// The paper's controller of scenario 1, with torque bounds that it runs into.
-fn ballbot_controller() -> Controller<Ballbot<f64>, f64, 4, 1, 3, 20, 24> {
+fn ballbot_controller() -> Controller<Ballbot<f64>, f64, 4, 1, 3> {
     let state = Vector4::new(
         f64::INFINITY,
         limits::THETA,
@@ -329,7 +328,7 @@ fn ballbot_controller() -> Controller<Ballbot<f64>, f64, 4, 1, 3, 20, 24> {
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),
     };
-    Controller::new(Ballbot::paper(), settings).unwrap()
+    Controller::allocate(Ballbot::paper(), settings).unwrap()
 }
 
 fn run_ballbot(clock: &dyn Fn() -> Duration) -> Trajectory<4, 1> {
@@ -342,12 +341,10 @@ fn run_ballbot(clock: &dyn Fn() -> Duration) -> Trajectory<4, 1> {
         progress: &|_| (),
     };
     let plant = Ballbot::paper();
-    let mut workspace = Workspace::new();
     run(
         &mut ballbot_controller(),
         &plant,
         &experiment,
-        &mut workspace,
     )
 }
 

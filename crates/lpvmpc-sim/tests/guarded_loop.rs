@@ -5,12 +5,12 @@
 )]
 
 use lpvmpc::{
-    BoundId, Bounds, GuardedController, GuardedIterations, GuardedSettings, GuardedWorkspace,
+    BoundId, Bounds, GuardedController, GuardedIterations, GuardedSettings,
     LpvModel, Quantity, Rk4, Rollout, Side, SolverSettings, TerminalSet, Weights,
 };
 use lpvmpc_design::lqr_discrete;
 use lpvmpc_sim::{
-    Actuation, ClosedLoop, Course, Ending, GuardedFeedback, GuardedLoop, MeasuredState, Regulator,
+    Actuation, ClosedLoop, Course, Ending, GuardedFeedback, GuardedLoop, Regulator,
     Tolerances, Unloaded, World, record,
 };
 use nalgebra::{DMatrix, Matrix1, Matrix2, Matrix2x1, RowVector2, Vector1, Vector2};
@@ -36,8 +36,8 @@ impl LpvModel<f64, 2, 1, 1> for Mass {
     }
 }
 
-type Guarded = GuardedController<Mass, f64, 2, 1, 1, 10, 3, 12>;
-type Workspace = GuardedWorkspace<f64, 1, 3, 12, 40>;
+type Guarded = GuardedController<Mass, f64, 2, 1, 1>;
+type Feedback = GuardedFeedback<Mass, 2, 1, 1, 3>;
 
 /// At most 0.5 m/s and 1 m/s^2. The mass is linear, so the LQR's cost decreases by the stage cost
 /// in every level set, and in this one the law keeps the bounds.
@@ -89,20 +89,14 @@ fn controller() -> Guarded {
         soft_price: 1e3,
         solver: SolverSettings::default(),
     };
-    Guarded::new(Mass, settings).unwrap()
+    Guarded::allocate(Mass, settings).unwrap()
 }
 
 #[test]
 fn a_run_is_the_sequence_of_its_samples() {
     let wanted = |t: f64| if t < 2.0 { 20.0 } else { -1.0 };
     let world = World::ideal(Unloaded::<_, 1>(&Mass), Vector2::zeros(), T_S, TOLERANCES);
-    let regulator = GuardedFeedback {
-        controller: controller(),
-        workspace: Box::new(Workspace::new()),
-        measured: MeasuredState::new(),
-        input: Vector1::zeros(),
-        preview: false,
-    };
+    let regulator = Feedback::new(controller(), false);
     let course = Course {
         samples: 120,
         reference: &|t| Vector2::new(wanted(t), 0.0),
@@ -113,7 +107,7 @@ fn a_run_is_the_sequence_of_its_samples() {
     let run = record(&mut closed_loop, &course).trajectory;
     assert_eq!(run.ending, Ending::Complete);
     let mut stepped = GuardedLoop::new(controller(), Mass, Vector2::zeros(), TOLERANCES);
-    let mut workspace = Workspace::new();
+    let mut workspace = controller().workspace::<3>();
     for sample in &run.samples {
         assert_eq!(*stepped.state(), sample.x);
         let step = stepped.decide(wanted(sample.t), &mut workspace);
@@ -134,13 +128,7 @@ fn a_run_is_the_sequence_of_its_samples() {
 /// applied, and no others.
 #[test]
 fn active_bounds_are_where_the_plan_meets_them() {
-    let mut regulator = GuardedFeedback {
-        controller: controller(),
-        workspace: Box::new(Workspace::new()),
-        measured: MeasuredState::new(),
-        input: Vector1::zeros(),
-        preview: false,
-    };
+    let mut regulator = Feedback::new(controller(), false);
     let (mut speeds, mut forces) = (0, 0);
     for k in 0..60 {
         let decision = regulator.decide(&|_| Vector2::new(20.0, 0.0), &|| Duration::ZERO);

@@ -96,7 +96,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
 }
 
 /// The same as arrays, for memory that is known when a program is built: `N` stages, `M` rows.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct SolverArrays<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
     factors: [StageFactor<T, NX, NU>; N],
     deviations: [[SVector<T, NU>; N]; 4],
@@ -179,7 +179,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> WorkspaceMemory<T, NX, NU> {
 }
 
 /// The same as arrays: horizons of up to `N` samples, up to `M` active bounds.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct WorkspaceArrays<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
     stages: [Stage<T, NX, NU>; N],
     solver: SolverArrays<T, NX, NU, N, M>,
@@ -247,7 +247,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ControllerMemory<T, NX, NU> {
 }
 
 /// The same as arrays: horizons of up to `N` samples, up to `M` active bounds.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct ControllerArrays<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
     x: [[SVector<T, NX>; N]; 2],
     u: [[SVector<T, NU>; N]; 2],

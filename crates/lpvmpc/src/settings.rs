@@ -235,11 +235,11 @@ pub fn exact_prices<T: Scalar, const NX: usize>(
 pub enum ControllerError {
     /// The sampling time is not a positive number.
     SamplingTime,
-    /// The horizon is not between 1 and the largest that the controller is made for.
+    /// The horizon is not between 1 and the largest that there is memory for.
     Horizon {
         /// What was asked for.
         given: usize,
-        /// The largest possible.
+        /// The largest that there is memory for; `usize::MAX` on the heap.
         largest: usize,
     },
     /// The predictor needs at least one sub-step.
@@ -273,10 +273,11 @@ impl fmt::Display for ControllerError {
                 write!(f, "the sampling time must be a positive number of seconds")
             }
             Self::Horizon { given, largest } => {
-                write!(
-                    f,
-                    "the horizon is {given}; it must be from 1 to {largest} samples"
-                )
+                write!(f, "the horizon is {given} samples; it must be at least 1")?;
+                match *largest {
+                    usize::MAX => Ok(()),
+                    largest => write!(f, ", and there is memory for {largest}"),
+                }
             }
             Self::Substeps => write!(f, "the predictor needs at least one sub-step per sample"),
             Self::WeightEntries(name) => {

@@ -48,17 +48,18 @@ impl Dense {
         let mut map = Map::<NX>::zeros(n);
         let mut free = ocp.x0;
         for (i, stage) in ocp.stages.iter().enumerate().take(n) {
-            assert!(stage.s.amax() == 0.0 && ocp.soft_x == [None; NX]);
-            dense.h += map.tr_mul(&(stage.q * &map));
-            dense.g += map.tr_mul(&(stage.q * free + stage.linear_x));
-            dense.h[(i, i)] += stage.r[0];
+            let common = ocp.common_at(i);
+            assert!(common.s.amax() == 0.0 && ocp.soft_x == [None; NX]);
+            dense.h += map.tr_mul(&(common.q * &map));
+            dense.g += map.tr_mul(&(common.q * free + stage.linear_x));
+            dense.h[(i, i)] += common.r[0];
             dense.g[i] += stage.linear_u[0];
             if i > 0 {
-                dense.bound(&map, &free, &stage.x, i, Quantity::State);
+                dense.bound(&map, &free, &common.x, i, Quantity::State);
             }
             let mut own = Map::<1>::zeros(n);
             own[i] = 1.0;
-            dense.bound(&own, &Vector1::zeros(), &stage.u, i, Quantity::Input);
+            dense.bound(&own, &Vector1::zeros(), &common.u, i, Quantity::Input);
             map = stage.a * map;
             map.column_mut(i).copy_from(&stage.b);
             free = stage.a * free + stage.c;

@@ -17,7 +17,6 @@ use dense::{Dense, Optimum};
 use lpvmpc::{
     BoundId, Bounds, Controller, ControllerSettings, InputReference, Iterations, Ocp, Predictor,
     Reference, Rk4, Scheduling, Solution, SolverSettings, Status, TerminalIngredient, Weights,
-    Workspace,
 };
 use lpvmpc_sim::{Tolerances, advance};
 use nalgebra::{Matrix1, Matrix4, Vector1, Vector4};
@@ -36,9 +35,9 @@ const AGREEMENT: f64 = 1e-8;
 /// The dense route's optimality conditions hold to this, relative to their largest terms.
 const OPTIMALITY: f64 = 1e-10;
 
-type Loop = Controller<Ballbot<f64>, f64, NX, 1, 3, N, M>;
-type Problem = Ocp<f64, NX, 1, N>;
-type Plan = Solution<f64, NX, 1, N, M>;
+type Loop = Controller<Ballbot<f64>, f64, NX, 1, 3>;
+type Problem = Ocp<f64, NX, 1>;
+type Plan = Solution<f64, NX, 1>;
 
 /// What a run has shown.
 struct Comparison {
@@ -69,7 +68,7 @@ fn compare(mut controller: Loop, phi_ref: fn(usize) -> f64) -> Comparison {
         relative: 1e-10,
         absolute: 1e-10,
     };
-    let mut workspace = Workspace::new();
+    let mut workspace = controller.workspace();
     let mut x = Vector4::zeros();
     let mut comparison = Comparison {
         solved: 0,
@@ -79,8 +78,9 @@ fn compare(mut controller: Loop, phi_ref: fn(usize) -> f64) -> Comparison {
     };
     for k in 0..SAMPLES {
         let at = |i: usize| Vector4::new(phi_ref(k + i), 0.0, 0.0, 0.0);
+        let stages: Vec<_> = (0..N).map(at).collect();
         let reference = Reference {
-            stages: std::array::from_fn(at),
+            stages: &stages,
             terminal: at(N),
         };
         let plan = controller.step(&x, &reference, &mut workspace).clone();
@@ -168,7 +168,7 @@ fn controller(x: [f64; 3], u: f64, terminal: TerminalIngredient<f64, NX>) -> Loo
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),
     };
-    Controller::new(Ballbot::paper(), settings).unwrap()
+    Controller::allocate(Ballbot::paper(), settings).unwrap()
 }
 
 /// phi_ref at a sample, rad: once around at 1 s and back at 3 s.

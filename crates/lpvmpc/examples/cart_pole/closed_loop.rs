@@ -2,7 +2,7 @@
 
 use crate::plant::CartPole;
 use crate::regulator::Regulator;
-use lpvmpc::{Reference, Rk4, Status, Weights, Workspace};
+use lpvmpc::{Reference, Rk4, Status, Weights};
 use nalgebra::{Vector1, Vector4};
 
 /// What was measured, applied and reported at one sample.
@@ -25,7 +25,7 @@ pub fn run(
     mut x: Vector4<f64>,
     samples: usize,
 ) -> Vec<Sample> {
-    let mut workspace = Workspace::new();
+    let mut workspace = controller.workspace();
     let rest = Reference::constant(Vector4::zeros());
     let t_s = controller.settings().t_s;
     let one_sample = |_| {

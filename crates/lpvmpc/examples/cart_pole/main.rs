@@ -51,7 +51,7 @@ fn line(
     let plant = CartPole::laboratory();
     let settings = regulator::settings(&plant, track, scheduling)
         .map_err(|BadPivot(pivot)| format!("the Riccati recursion met the pivot {pivot}"))?;
-    let mut controller = Controller::new(plant, settings)?;
+    let mut controller = Controller::allocate(plant, settings)?;
     let start = Vector4::new(0.0, degrees.to_radians(), 0.0, 0.0);
     let samples = closed_loop::run(&plant, &mut controller, start, 100);
 

@@ -3,17 +3,15 @@
 use crate::plant::CartPole;
 use lpvmpc::riccati::{BadPivot, CostToGo, StageFactor};
 use lpvmpc::{
-    Bounds, Controller, ControllerSettings, Iterations, LpvModel, Predictor, Rk4, Scheduling,
+    Bounds, Common, Controller, ControllerSettings, Iterations, LpvModel, Predictor, Rk4, Scheduling,
     Stage, TerminalIngredient, Weights,
 };
 use nalgebra::{Matrix1, Matrix4, Vector1, Vector2, Vector4};
 
 /// Stages of the horizon.
 pub const STAGES: usize = 30;
-/// Places for every stage's input bound, and for the end of the track where it is exceeded.
-pub const ROWS: usize = 3 * STAGES;
 /// The controller: 4 states, 1 input, 2 scheduling parameters.
-pub type Regulator = Controller<CartPole<f64>, f64, 4, 1, 2, STAGES, ROWS>;
+pub type Regulator = Controller<CartPole<f64>, f64, 4, 1, 2>;
 
 /// Largest force, in N.
 pub const FORCE: f64 = 15.0;
@@ -63,12 +61,15 @@ pub fn terminal_weight(
     b: &Vector4<f64>,
     weights: &Weights<f64, 4, 1>,
 ) -> Result<Matrix4<f64>, BadPivot<f64>> {
-    let stage: Stage<f64, 4, 1> = Stage {
+    let stage = Stage {
         a: *a,
         b: *b,
+        ..Stage::new()
+    };
+    let common = Common {
         q: weights.q,
         r: weights.r,
-        ..Stage::new()
+        ..Common::default()
     };
     let mut factor = StageFactor::zeros();
     let mut cost_to_go = CostToGo {
@@ -77,7 +78,7 @@ pub fn terminal_weight(
     };
     for _ in 0..10_000 {
         let before = cost_to_go.quadratic;
-        factor.eliminate(&stage, &mut cost_to_go)?;
+        factor.eliminate(&stage, &common, &mut cost_to_go)?;
         let p = cost_to_go.quadratic;
         if (p - before).norm() <= 1e-13 * p.norm() {
             break;

@@ -36,7 +36,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedMemory<T, NX, NU> {
 }
 
 /// The same as arrays, for horizons of up to `N` samples.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct GuardedArrays<T, const NX: usize, const NU: usize, const N: usize> {
     plans: [[PlannedStage<T, NX, NU>; N]; 4],
     drift: [SVector<T, NX>; N],
@@ -101,7 +101,7 @@ impl<T: Scalar, const NU: usize, const NA: usize> GuardedWorkspaceMemory<T, NU, 
 }
 
 /// The same as arrays: `NP` stages, two more than the horizon has samples, and up to `M` active bounds.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct GuardedWorkspaceArrays<
     T,
     const NU: usize,

@@ -4,7 +4,6 @@ use crate::pendulum::Pendulum;
 use lpvmpc::{
     Bounds, Controller, ControllerSettings, InputReference, Iterations, LpvModel, Predictor,
     RampedInput, Reference, Rk4, Scheduling, SolverSettings, TerminalIngredient, Weights,
-    Workspace,
 };
 use nalgebra::{Matrix1, Matrix3, Vector1, Vector2, Vector3};
 
@@ -69,8 +68,8 @@ fn rate_and_input_stay_within_bounds() {
         solver: SolverSettings::default(),
     };
     let ramped = RampedInput(Pendulum);
-    let mut controller = Controller::<_, f64, 3, 1, 1, 20, 60>::new(ramped, settings).unwrap();
-    let mut workspace = Workspace::new();
+    let mut controller = Controller::allocate(ramped, settings).unwrap();
+    let mut workspace = controller.workspace();
     let upright = Reference::constant(Vector3::zeros());
     let mut joint = Vector3::new(0.4, 0.0, 0.0);
     let mut most = 0.0_f64;

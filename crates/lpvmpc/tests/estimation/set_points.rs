@@ -4,7 +4,7 @@ use crate::pendulum::Pendulum;
 use lpvmpc::{
     Bounds, Controller, ControllerSettings, InputReference, Iterations, LpvModel, Predictor,
     RampedInput, Reference, Rk4, Scheduling, SolverSettings, SteadyStateProblem,
-    TerminalIngredient, Weights, Workspace,
+    TerminalIngredient, Weights,
 };
 use nalgebra::{Matrix1, Matrix1x2, Matrix2, Matrix3, SMatrix, Vector1, Vector2, Vector3};
 
@@ -38,8 +38,8 @@ fn settings(iterations: Iterations<f64>) -> ControllerSettings<f64, 2, 1, 1> {
 
 /// Where the pendulum is after 10 s under `settings`, from upright.
 fn arrives(settings: ControllerSettings<f64, 2, 1, 1>, angle: f64) -> (Vector2<f64>, f64) {
-    let mut controller = Controller::<_, f64, 2, 1, 1, N, N>::new(Pendulum, settings).unwrap();
-    let mut workspace = Workspace::new();
+    let mut controller = Controller::allocate(Pendulum, settings).unwrap();
+    let mut workspace = controller.workspace();
     let reference = Reference::constant(Vector2::new(angle, 0.0));
     let mut x = Vector2::zeros();
     let mut u = Vector1::zeros();
@@ -89,10 +89,8 @@ fn without_an_input_reference_it_is_drawn_off_its_set_point() {
 
 #[test]
 fn what_cannot_be_held_becomes_the_nearest_that_can_and_is_told() {
-    let mut controller =
-        Controller::<_, f64, 2, 1, 1, N, N>::new(Pendulum, settings(Iterations::default()))
-            .unwrap();
-    let mut workspace = Workspace::new();
+    let mut controller = Controller::allocate(Pendulum, settings(Iterations::default())).unwrap();
+    let mut workspace = controller.workspace();
     let x = Vector2::zeros();
     let mut target = |angle: f64| {
         let reference = Reference::constant(Vector2::new(angle, 0.0));
@@ -121,10 +119,8 @@ fn what_cannot_be_held_becomes_the_nearest_that_can_and_is_told() {
 
 #[test]
 fn new_bounds_move_the_target() {
-    let mut controller =
-        Controller::<_, f64, 2, 1, 1, N, N>::new(Pendulum, settings(Iterations::default()))
-            .unwrap();
-    let mut workspace = Workspace::new();
+    let mut controller = Controller::allocate(Pendulum, settings(Iterations::default())).unwrap();
+    let mut workspace = controller.workspace();
     let reference = Reference::constant(Vector2::new(0.5, 0.0));
     controller.step(&Vector2::zeros(), &reference, &mut workspace);
     assert!(controller.target().unwrap().reached);
@@ -172,8 +168,8 @@ fn a_ramped_torque_holds_the_pendulum_too() {
         solver: plain.solver,
     };
     let ramped = RampedInput::<_, 2>(Pendulum);
-    let mut controller = Controller::<_, f64, 3, 1, 1, N, 90>::new(ramped, settings).unwrap();
-    let mut workspace = Workspace::new();
+    let mut controller = Controller::allocate(ramped, settings).unwrap();
+    let mut workspace = controller.workspace();
     let reference = Reference::constant(Vector3::new(0.5, 0.0, 0.0));
     let mut x = Vector3::zeros();
     for _ in 0..200 {

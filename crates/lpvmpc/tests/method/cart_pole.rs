@@ -6,7 +6,7 @@ use crate::regulator::{self, FORCE, Regulator};
 use crate::rng::Rng;
 use lpvmpc::{
     Controller, ControllerSettings, LpvModel, Quantity, Reference, Scheduling, Side, Status,
-    TerminalIngredient, Workspace,
+    TerminalIngredient,
 };
 use nalgebra::{Vector1, Vector2, Vector4};
 use std::f64::consts::PI;
@@ -78,7 +78,7 @@ fn the_terminal_weight_solves_the_riccati_equation() {
 fn closed_loop(degrees: f64, track: f64, scheduling: Scheduling<f64, 2>) -> (Vec<Sample>, f64) {
     let plant = CartPole::laboratory();
     let settings = regulator::settings(&plant, track, scheduling).unwrap();
-    let mut controller: Regulator = Controller::new(plant, settings).unwrap();
+    let mut controller: Regulator = Controller::allocate(plant, settings).unwrap();
     let start = Vector4::new(0.0, degrees.to_radians(), 0.0, 0.0);
     let samples = closed_loop::run(&plant, &mut controller, start, 100);
     let cost = closed_loop::cost(&samples, &settings.weights);
@@ -166,7 +166,7 @@ fn a_start_outside_of_a_state_bound_has_a_plan_and_comes_back() {
     let settings = regulator::settings(&plant, 0.4, Scheduling::Predicted).unwrap();
     for (s, theta) in [(0.41, 0.0), (-0.45, 0.02), (0.41, 0.1)] {
         let start = Vector4::new(s, theta, 0.0, 0.0);
-        let mut controller: Regulator = Controller::new(plant, settings).unwrap();
+        let mut controller: Regulator = Controller::allocate(plant, settings).unwrap();
         let samples = closed_loop::run(&plant, &mut controller, start, 100);
         for (k, sample) in samples.iter().enumerate() {
             assert!(sample.status.is_solved(), "{start}, sample {k}");
@@ -191,8 +191,8 @@ fn a_hard_bound_that_cannot_be_kept_is_named_with_its_first_stage() {
         (-0.43, Side::Lower),
         (0.6, Side::Upper),
     ] {
-        let mut controller: Regulator = Controller::new(plant, hard).unwrap();
-        let mut workspace = Workspace::new();
+        let mut controller: Regulator = Controller::allocate(plant, hard).unwrap();
+        let mut workspace = controller.workspace();
         let start = Vector4::new(s, 0.0, 0.0, 0.0);
         let upright = Reference::constant(Vector4::zeros());
         let plan = controller.step(&start, &upright, &mut workspace);

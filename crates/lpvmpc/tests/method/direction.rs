@@ -56,7 +56,7 @@ fn check(cart: Cart, x: Bounds<f64, 2>) -> Result<(), GuardedError> {
         soft_price: 1.0,
         solver: SolverSettings::default(),
     };
-    GuardedController::<_, f64, 2, 1, 1, 4, 3, 6>::new(cart, settings).map(|_| ())
+    GuardedController::allocate(cart, settings).map(|_| ())
 }
 
 const FREE: Cart = Cart {

@@ -5,16 +5,15 @@ use crate::regulator;
 use crate::rng::Rng;
 use lpvmpc::riccati::{CostToGo, StageFactor};
 use lpvmpc::{
-    Bounds, Decision, GuardedController, GuardedError, GuardedIterations, GuardedSettings,
-    GuardedStep, GuardedWorkspace, LpvModel, Rk4, Rollout, Scheduling, SolverSettings, Stage,
-    TerminalSet,
+    Bounds, Capacity, Common, Decision, GuardedArrays, GuardedController, GuardedError, GuardedIterations,
+    GuardedSettings, GuardedStep, GuardedWorkspace, GuardedWorkspaceArrays, LpvModel, Rk4, Rollout, Scheduling, SolverSettings, Stage,
+    Status, TerminalSet,
 };
 use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
 
 const N: usize = 20;
 const RK4: Rk4 = Rk4 { substeps: 2 };
-type Guarded = GuardedController<CartPole<f64>, f64, 4, 1, 2, N, 5, { N + 2 }>;
-type Memory = GuardedWorkspace<f64, 1, 5, { N + 2 }, 200>;
+type Guarded = GuardedController<CartPole<f64>, f64, 4, 1, 2>;
 type Settings = GuardedSettings<f64, 4, 1>;
 
 fn plant() -> CartPole<f64> {
@@ -32,19 +31,23 @@ fn settings() -> Settings {
     let (a, b) = plant().matrices(&Vector2::zeros());
     let (a, b) = RK4.discretize(&a, &b, base.t_s);
     let p: Matrix4<f64> = regulator::terminal_weight(&a, &b, &base.weights).unwrap();
-    let stage: Stage<f64, 4, 1> = Stage {
+    let stage = Stage {
         a,
         b,
+        ..Stage::new()
+    };
+    let weights = Common {
         q: base.weights.q,
         r: base.weights.r,
-        ..Stage::new()
+        ..Common::default()
     };
     let mut factor = StageFactor::zeros();
     let mut cost_to_go = CostToGo {
         quadratic: p,
         linear: Vector4::zeros(),
     };
-    factor.eliminate(&stage, &mut cost_to_go).unwrap();
+    let outcome = factor.eliminate(&stage, &weights, &mut cost_to_go);
+    outcome.unwrap();
     let limit = Vector4::new(f64::INFINITY, 0.6, 4.0, f64::INFINITY);
     Settings {
         t_s: base.t_s,
@@ -81,7 +84,7 @@ fn settings() -> Settings {
 }
 
 fn guarded(settings: Settings) -> Guarded {
-    Guarded::new(plant(), settings).unwrap()
+    Guarded::allocate(plant(), settings).unwrap()
 }
 
 /// A state of the terminal set around 0, from the middle to the edge.
@@ -121,7 +124,7 @@ fn assert_safe(step: &GuardedStep<f64, 4, 1>) {
 fn jump_about(settings: Settings, seed: u64, decisions: &mut [usize; 5]) {
     let mut rng = Rng::new(seed);
     let mut controller = guarded(settings);
-    let mut memory = Memory::new();
+    let mut memory = controller.workspace();
     let mut x = in_terminal_set(&mut rng);
     for _ in 0..4 {
         let wanted = rng.uniform(-100.0, 100.0);
@@ -177,7 +180,7 @@ fn the_nearest_admissible_position_is_reached() {
         (f64::NAN, 0.0),
     ] {
         let mut controller = guarded(settings());
-        let mut memory = Memory::new();
+        let mut memory = controller.workspace();
         let mut x = Vector4::zeros();
         for _ in 0..1200 {
             let step = controller.step(&x, wanted, &mut memory);
@@ -191,28 +194,29 @@ fn the_nearest_admissible_position_is_reached() {
 #[test]
 fn the_plan_happens() {
     let mut controller = guarded(settings());
-    let mut memory = Memory::new();
+    let mut memory = controller.workspace();
     let mut x = Vector4::zeros();
     for _ in 0..60 {
         let step = controller.step(&x, 20.0, &mut memory);
-        let promised = controller.rollout()[0];
+        let promised = *controller.rollout().next().unwrap();
         x = moves(&x, &step.u);
         assert!((x - promised).norm() <= 1e-12 * (1.0 + x.norm()));
     }
 }
 
-/// A horizon below the memory's size is that horizon, whatever the memory's size: sample for sample
-/// the controller that is made for it, on the way to a far set point and through a push.
+/// Arrays that are lent, larger than the horizon, give the answers of the memory that is made for it:
+/// bit for bit, on the way to a far set point and through a push.
 #[test]
 fn a_shorter_horizon_is_the_one_of_a_smaller_memory() {
     const SHORT: usize = 13;
     let mut short = settings();
     short.horizon = SHORT;
-    let mut large = guarded(short);
-    let mut large_memory = Memory::new();
-    type Small = GuardedController<CartPole<f64>, f64, 4, 1, 2, SHORT, 5, { SHORT + 2 }>;
-    let mut small = Small::new(plant(), short).unwrap();
-    let mut small_memory = GuardedWorkspace::<f64, 1, 5, { SHORT + 2 }, 200>::new();
+    let arrays = Box::leak(Box::new(GuardedArrays::<f64, 4, 1, N>::new()));
+    let mut large = Guarded::new(plant(), short, arrays.lend()).unwrap();
+    let arrays = GuardedWorkspaceArrays::<f64, 1, 5, { N + 2 }, 200>::new();
+    let mut large_memory = GuardedWorkspace::new(Box::leak(Box::new(arrays)).lend());
+    let mut small = guarded(short);
+    let mut small_memory = small.workspace();
     let mut x = Vector4::zeros();
     let mut soft = 0;
     for k in 0..200 {
@@ -221,19 +225,83 @@ fn a_shorter_horizon_is_the_one_of_a_smaller_memory() {
         }
         let step = large.step(&x, 20.0, &mut large_memory);
         assert_eq!(step, small.step(&x, 20.0, &mut small_memory));
-        assert_eq!(large.rollout(), small.rollout());
-        assert!(large.rollout().is_empty() || large.rollout().len() == SHORT);
+        assert!(large.rollout().eq(small.rollout()));
+        let planned = large.rollout().count();
+        assert!(planned == 0 || planned == SHORT);
         soft += usize::from(step.decision == Decision::SoftBounds);
         x = moves(&x, &step.u);
     }
     assert!(soft > 0, "the push has no effect");
 }
 
+/// One workspace for two controllers with different horizons leaves no trace of the one in the plan of
+/// the other. Only the warm start is the workspace's own, and it changes the time alone.
+#[test]
+fn controllers_that_share_a_workspace_do_not_see_each_other() {
+    let mut short = settings();
+    (short.horizon, short.soft_price) = (13, 2e4);
+    let (mut long, mut short) = (guarded(settings()), guarded(short));
+    let (mut long_alone, mut short_alone) = (long.clone(), short.clone());
+    let mut shared = long.workspace();
+    let (mut own, mut other) = (long.workspace(), short.workspace());
+    let (mut x, mut y) = (Vector4::zeros(), Vector4::new(1.0, 0.1, 0.0, 0.0));
+    let mut warm = [shared.warm_start().clone(), shared.warm_start().clone()];
+    for k in 0..120 {
+        if k == 40 {
+            x[1] += 0.65;
+        }
+        shared.set_warm_start(&warm[0]);
+        let step = long.step(&x, 5.0, &mut shared);
+        warm[0].copy_from(shared.warm_start());
+        assert_eq!(step, long_alone.step(&x, 5.0, &mut own), "sample {k}");
+        x = moves(&x, &step.u);
+
+        shared.set_warm_start(&warm[1]);
+        let step = short.step(&y, -5.0, &mut shared);
+        warm[1].copy_from(shared.warm_start());
+        assert_eq!(step, short_alone.step(&y, -5.0, &mut other), "sample {k}");
+        y = moves(&y, &step.u);
+    }
+}
+
+/// A workspace without room for the horizon, or for active bounds: it is said, the inputs stay within
+/// their bounds, and the terminal law and the rest of the last plan are followed all the same.
+#[test]
+fn a_workspace_that_is_too_small_costs_the_new_plans() {
+    let room = settings().capacity();
+    for (capacity, expected) in [
+        (Capacity { stages: 0, ..room }, Status::HorizonTooLong),
+        (Capacity { stages: N, ..room }, Status::HorizonTooLong),
+        (Capacity { stages: N + 1, ..room }, Status::HorizonTooLong),
+        (Capacity { rows: 0, ..room }, Status::WorkingSetFull),
+        (Capacity { active: 0, ..room }, Status::WorkingSetFull),
+    ] {
+        let mut controller = guarded(settings());
+        let mut memory = GuardedWorkspace::allocate(capacity);
+        let mut x = Vector4::new(0.2, 0.05, 0.0, 0.0);
+        let mut statuses = Vec::new();
+        for k in 0..100 {
+            if k == 60 {
+                x[1] = 0.7;
+            }
+            let step = controller.step(&x, 20.0, &mut memory);
+            assert_safe(&step);
+            statuses.push(step.status);
+            assert!(k >= 60 || step.decision.is_guaranteed(), "{capacity:?} {step:?}");
+            x = moves(&x, &step.u);
+        }
+        assert!(statuses.contains(&expected), "{capacity:?}: {statuses:?}");
+        if expected == Status::HorizonTooLong {
+            assert!(statuses.iter().all(|status| *status == expected), "{statuses:?}");
+        }
+    }
+}
+
 /// A push beyond the bounds: soft bounds bring the pole back into what is guaranteed.
 #[test]
 fn after_a_push_the_bounds_are_soft_until_they_hold_again() {
     let mut controller = guarded(settings());
-    let mut memory = Memory::new();
+    let mut memory = controller.workspace();
     let mut x = Vector4::zeros();
     let mut seen = [0; 5];
     for k in 0..400 {
@@ -254,7 +322,7 @@ fn after_a_push_the_bounds_are_soft_until_they_hold_again() {
 #[test]
 fn nonsense_is_survived() {
     let mut controller = guarded(settings());
-    let mut memory = Memory::new();
+    let mut memory = controller.workspace();
     let mut x = Vector4::new(0.1, 0.05, 0.0, 0.0);
     for k in 0..100 {
         let measured = match k {
@@ -279,7 +347,7 @@ fn settings_that_make_no_sense_are_refused() {
     let refused = |change: fn(&mut Settings)| {
         let mut changed = settings();
         change(&mut changed);
-        Guarded::new(plant(), changed).err().unwrap()
+        Guarded::allocate(plant(), changed).err().unwrap()
     };
     let not_positive = [
         refused(|s| s.t_s = 0.0),
@@ -306,7 +374,9 @@ fn settings_that_make_no_sense_are_refused() {
     for horizon in [0, N + 1] {
         let mut changed = settings();
         changed.horizon = horizon;
-        let error = Guarded::new(plant(), changed).err().unwrap();
+        let arrays = Box::leak(Box::new(GuardedArrays::<f64, 4, 1, N>::new()));
+        let outcome = Guarded::new(plant(), changed, arrays.lend());
+        let error = outcome.err().unwrap();
         assert!(
             error.to_string().contains("from 1 to 20 samples"),
             "{error}"

@@ -1,20 +1,22 @@
 //! A whole horizon without bounds against the dense system of its optimality conditions.
 
 use crate::rng::Rng;
-use lpvmpc::{Ocp, Solution, Solver, SolverSettings, Stage, Status};
+use lpvmpc::{Capacity, Common, List, Ocp, Solution, Solver, SolverSettings, Stage, Status};
 use nalgebra::{DMatrix, DVector};
 
-/// A horizon of `horizon` stages that differ in everything.
-fn random_ocp<const NX: usize, const NU: usize, const N: usize>(
+/// A horizon of `horizon` stages, of the `memory` that there is, that differ in everything.
+fn random_ocp<const NX: usize, const NU: usize>(
     rng: &mut Rng,
     horizon: usize,
-) -> Ocp<f64, NX, NU, N> {
+    memory: usize,
+) -> Ocp<f64, NX, NU> {
     let mut ocp = Ocp {
         x0: rng.matrix(),
         horizon,
-        ..Ocp::default()
+        own: List::repeat(Common::default(), memory),
+        ..Ocp::allocate(memory)
     };
-    for stage in &mut ocp.stages {
+    for (stage, common) in ocp.stages.iter_mut().zip(&mut ocp.own) {
         let g_x = rng.matrix::<12, NX>();
         let g_u = rng.matrix::<12, NU>();
         *stage = Stage {
@@ -22,12 +24,14 @@ fn random_ocp<const NX: usize, const NU: usize, const N: usize>(
             a: rng.matrix() / (NX as f64).sqrt(),
             b: rng.matrix(),
             c: rng.matrix(),
+            linear_x: rng.matrix(),
+            linear_u: rng.matrix(),
+        };
+        *common = Common {
             q: g_x.transpose() * g_x,
             r: g_u.transpose() * g_u,
             s: g_u.transpose() * g_x,
-            linear_x: rng.matrix(),
-            linear_u: rng.matrix(),
-            ..Stage::new()
+            ..Common::default()
         };
     }
     let root = rng.matrix::<NX, NX>();
@@ -46,7 +50,7 @@ struct Dense {
 }
 
 impl Dense {
-    fn new<const NX: usize, const NU: usize, const N: usize>(ocp: &Ocp<f64, NX, NU, N>) -> Self {
+    fn new<const NX: usize, const NU: usize>(ocp: &Ocp<f64, NX, NU>) -> Self {
         let n = ocp.horizon;
         let width = NX + NU;
         let (variables, rows) = (n * width + NX, (n + 1) * NX);
@@ -58,10 +62,11 @@ impl Dense {
         d.rows_mut(0, NX).copy_from(&ocp.x0);
         for (i, stage) in ocp.stages.iter().enumerate().take(n) {
             let (x, u, next) = (i * width, i * width + NX, (i + 1) * width);
-            h.view_mut((x, x), (NX, NX)).copy_from(&stage.q);
-            h.view_mut((u, u), (NU, NU)).copy_from(&stage.r);
-            h.view_mut((u, x), (NU, NX)).copy_from(&stage.s);
-            h.view_mut((x, u), (NX, NU)).copy_from(&stage.s.transpose());
+            let Common { q, r, s, .. } = ocp.common_at(i);
+            h.view_mut((x, x), (NX, NX)).copy_from(q);
+            h.view_mut((u, u), (NU, NU)).copy_from(r);
+            h.view_mut((u, x), (NU, NX)).copy_from(s);
+            h.view_mut((x, u), (NX, NU)).copy_from(&s.transpose());
             g.rows_mut(x, NX).copy_from(&stage.linear_x);
             g.rows_mut(u, NU).copy_from(&stage.linear_u);
             // x_{i+1} - A x_i - B u_i = c
@@ -101,14 +106,20 @@ impl Dense {
     }
 }
 
-fn matches_the_dense_solution<const NX: usize, const NU: usize, const N: usize>(
+fn matches_the_dense_solution<const NX: usize, const NU: usize>(
     rng: &mut Rng,
     horizon: usize,
+    memory: usize,
 ) {
-    let mut solver = Solver::<f64, NX, NU, N, 1>::new();
-    let mut solution = Solution::default();
+    let capacity = Capacity {
+        stages: memory,
+        rows: 1,
+        active: 1,
+    };
+    let mut solver = Solver::allocate(capacity);
+    let mut solution = Solution::allocate(capacity);
     for _ in 0..10 {
-        let ocp = random_ocp::<NX, NU, N>(rng, horizon);
+        let ocp = random_ocp::<NX, NU>(rng, horizon, memory);
         solver.solve(&ocp, &SolverSettings::default(), &mut solution);
         assert_eq!(solution.status, Status::Solved);
         assert_eq!(solution.changes, 0);
@@ -141,15 +152,15 @@ fn matches_the_dense_solution<const NX: usize, const NU: usize, const N: usize>(
 #[test]
 fn the_horizon_without_bounds_is_the_dense_solution() {
     let mut rng = Rng::new(21);
-    matches_the_dense_solution::<1, 1, 1>(&mut rng, 1);
-    matches_the_dense_solution::<4, 1, 20>(&mut rng, 20);
-    matches_the_dense_solution::<2, 3, 10>(&mut rng, 10);
-    matches_the_dense_solution::<6, 2, 12>(&mut rng, 12);
+    matches_the_dense_solution::<1, 1>(&mut rng, 1, 1);
+    matches_the_dense_solution::<4, 1>(&mut rng, 20, 20);
+    matches_the_dense_solution::<2, 3>(&mut rng, 10, 10);
+    matches_the_dense_solution::<6, 2>(&mut rng, 12, 12);
 }
 
 #[test]
 fn so_is_a_horizon_shorter_than_the_memory() {
     let mut rng = Rng::new(22);
-    matches_the_dense_solution::<4, 1, 20>(&mut rng, 1);
-    matches_the_dense_solution::<4, 2, 20>(&mut rng, 7);
+    matches_the_dense_solution::<4, 1>(&mut rng, 1, 20);
+    matches_the_dense_solution::<4, 2>(&mut rng, 7, 20);
 }

@@ -2,12 +2,13 @@
 
 use crate::rng::Rng;
 use lpvmpc::riccati::{BadPivot, CostToGo, StageFactor};
-use lpvmpc::{Ocp, Solution, Solver, SolverSettings, Stage, Status};
+use lpvmpc::{Capacity, Common, List, Ocp, Solution, Solver, SolverSettings, Stage, Status};
 use nalgebra::{Matrix1, Matrix2, SMatrix, SVector, Vector1};
 
-/// A stage and the cost-to-go behind it.
+/// A stage, its weights, and the cost-to-go behind it.
 struct Problem<const NX: usize, const NU: usize> {
     stage: Stage<f64, NX, NU>,
+    weights: Common<f64, NX, NU>,
     behind: CostToGo<f64, NX>,
 }
 
@@ -24,12 +25,14 @@ impl<const NX: usize, const NU: usize> Problem<NX, NU> {
                 a: rng.matrix(),
                 b: rng.matrix(),
                 c: rng.matrix(),
+                linear_x: rng.matrix(),
+                linear_u: rng.matrix(),
+            },
+            weights: Common {
                 q: g_x.transpose() * g_x,
                 r: g_u.transpose() * g_u,
                 s: g_u.transpose() * g_x,
-                linear_x: rng.matrix(),
-                linear_u: rng.matrix(),
-                ..Stage::new()
+                ..Common::default()
             },
             behind: CostToGo {
                 quadratic: root_p.transpose() * root_p,
@@ -45,13 +48,9 @@ impl<const NX: usize, const NU: usize> Problem<NX, NU> {
 
     /// The stage's cost and the cost-to-go behind it.
     fn cost(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> f64 {
+        let Common { q, r, s, .. } = &self.weights;
         let Stage {
-            q,
-            r,
-            s,
-            linear_x,
-            linear_u,
-            ..
+            linear_x, linear_u, ..
         } = &self.stage;
         0.5 * x.dot(&(q * x))
             + u.dot(&(s * x))
@@ -80,7 +79,8 @@ impl<const NX: usize, const NU: usize> Problem<NX, NU> {
     fn eliminate(&self) -> (StageFactor<f64, NX, NU>, CostToGo<f64, NX>) {
         let mut factor = StageFactor::zeros();
         let mut cost_to_go = self.behind;
-        factor.eliminate(&self.stage, &mut cost_to_go).unwrap();
+        let outcome = factor.eliminate(&self.stage, &self.weights, &mut cost_to_go);
+        outcome.unwrap();
         (factor, cost_to_go)
     }
 }
@@ -131,7 +131,7 @@ fn gain_and_feedforward_minimise() {
     for _ in 0..200 {
         let problem = Problem::<4, 2>::random(&mut rng);
         let (factor, _) = problem.eliminate();
-        let Stage { b, r, .. } = &problem.stage;
+        let (b, r) = (&problem.stage.b, &problem.weights.r);
         let hessian = r + b.transpose() * problem.behind.quadratic * b;
         let x = rng.matrix::<4, 1>();
         let u = factor.gain * x + factor.feedforward;
@@ -201,7 +201,7 @@ fn the_inverse_factor_is_that_of_the_input_hessian() {
     for _ in 0..200 {
         let problem = Problem::<3, 4>::random(&mut rng);
         let (factor, _) = problem.eliminate();
-        let Stage { b, r, .. } = &problem.stage;
+        let (b, r) = (&problem.stage.b, &problem.weights.r);
         let hessian = r + b.transpose() * problem.behind.quadratic * b;
         let l = factor.inverse_factor;
         assert_eq!(l, l.lower_triangle());
@@ -215,7 +215,7 @@ fn the_inverse_factor_is_that_of_the_input_hessian() {
 fn an_indefinite_input_weight_is_fine_if_the_sum_is_definite() {
     let mut rng = Rng::new(16);
     let mut problem = Problem::<1, 1>::random(&mut rng);
-    problem.stage.r = Matrix1::new(-3.0);
+    problem.weights.r = Matrix1::new(-3.0);
     problem.stage.b = Matrix1::new(2.0);
     problem.behind.quadratic = Matrix1::new(1.0);
     let (_, front) = problem.eliminate();
@@ -228,17 +228,20 @@ fn an_indefinite_input_weight_is_fine_if_the_sum_is_definite() {
 
 /// The pivot that `eliminate` complains about for R = `r`, B = I, P = `p`.
 fn pivot(r: Matrix2<f64>, p: Matrix2<f64>) -> f64 {
-    let stage: Stage<f64, 2, 2> = Stage {
+    let stage = Stage {
         a: Matrix2::identity(),
         b: Matrix2::identity(),
-        r,
         ..Stage::new()
+    };
+    let weights = Common {
+        r,
+        ..Common::default()
     };
     let mut cost_to_go = CostToGo {
         quadratic: p,
         linear: SVector::zeros(),
     };
-    let outcome = StageFactor::zeros().eliminate(&stage, &mut cost_to_go);
+    let outcome = StageFactor::zeros().eliminate(&stage, &weights, &mut cost_to_go);
     let BadPivot(pivot) = outcome.expect_err("not positive definite");
     pivot
 }
@@ -263,15 +266,21 @@ fn what_is_not_positive_definite_is_refused_with_its_pivot() {
 /// In the horizon, the failure names the stage, counted from the front.
 #[test]
 fn the_solver_names_stage_and_pivot() {
-    let mut ocp = Ocp::<f64, 1, 1, 5>::default();
+    let mut ocp = Ocp::<f64, 1, 1>::allocate(5);
+    ocp.own = List::repeat(Common::default(), 5);
     for stage in &mut ocp.stages {
         stage.a = Matrix1::new(1.0);
         stage.b = Matrix1::new(1.0);
     }
     // P is 0 behind stage 2, so its R is the pivot.
-    ocp.stages[2].r = Matrix1::new(-0.25);
-    let mut solution = Solution::<f64, 1, 1, 5, 1>::default();
-    Solver::new().solve(&ocp, &SolverSettings::default(), &mut solution);
+    ocp.own[2].r = Matrix1::new(-0.25);
+    let capacity = Capacity {
+        stages: 5,
+        rows: 1,
+        active: 1,
+    };
+    let mut solution = Solution::allocate(capacity);
+    Solver::allocate(capacity).solve(&ocp, &SolverSettings::default(), &mut solution);
     let expected = Status::NumericalFailure {
         stage: 2,
         pivot: -0.25,

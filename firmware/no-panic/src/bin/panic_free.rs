@@ -9,9 +9,6 @@ use lpvmpc::{Bounds, Controller, Reference, Scalar, Workspace};
 use nalgebra::{Vector1, Vector3, Vector4};
 use no_panic as _;
 
-const N: usize = 20;
-const M: usize = 24;
-
 #[cortex_m_rt::entry]
 fn main() -> ! {
     loop {
@@ -23,9 +20,9 @@ fn main() -> ! {
 /// One step of a controller that is never built: what matters is the code, not a run.
 #[inline(never)]
 fn step<T: Scalar>() {
-    let controller: Option<&mut Controller<Ballbot<T>, T, 4, 1, 3, N, M>> = black_box(None);
-    let workspace: Option<&mut Workspace<T, 4, 1, N, M>> = black_box(None);
-    let inputs: Option<&(Vector4<T>, Reference<T, 4, N>)> = black_box(None);
+    let controller: Option<&mut Controller<Ballbot<T>, T, 4, 1, 3>> = black_box(None);
+    let workspace: Option<&mut Workspace<T, 4, 1>> = black_box(None);
+    let inputs: Option<&(Vector4<T>, Reference<'_, T, 4>)> = black_box(None);
     let wheels: Option<&Wheels<T>> = black_box(None);
     if let (Some(controller), Some(workspace)) = (controller, workspace)
         && let (Some((x, reference)), Some(wheels)) = (inputs, wheels)

@@ -11,40 +11,41 @@ use ballbot::Wheels;
 use cortex_m::singleton;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::{debug, hprintln};
-use firmware::{Controller, Recording, Workspace, recorded};
+use firmware::{Controller, ControllerMemory, Recording, Workspace, WorkspaceMemory, recorded};
 use instructions::InstructionCounter;
 use lpvmpc::ControllerSettings;
 use nalgebra::{Vector3, Vector4};
 
-type Planes = [Option<Controller>; 2];
+type Memory = &'static mut ControllerMemory;
 
 #[entry]
 fn main() -> ! {
-    let (Some(peripherals), Some(workspace), Some(planes)) = (
+    let (Some(peripherals), Some(memory), Some([x, y, tight, descent])) = (
         cortex_m::Peripherals::take(),
-        singleton!(WORKSPACE: Workspace = Workspace::new()),
-        singleton!(PLANES: Planes = [None, None]),
+        singleton!(WORKSPACE: WorkspaceMemory = WorkspaceMemory::new()),
+        singleton!(PLANES: [ControllerMemory; 4] = [ControllerMemory::new(); 4]),
     ) else {
         failure::stop()
     };
+    let workspace = &mut Workspace::new(memory.lend());
     let mut counter = InstructionCounter::new(peripherals.SYST);
     if !counter.is_exact() {
         hprintln!("the instruction counter is not exact: is this QEMU with -icount shift=6?");
         failure::stop();
     }
-    hprintln!("bytes controller {}", size_of::<Controller>());
-    hprintln!("bytes workspace {}", size_of::<Workspace>());
-    let mut deepest = 0;
-    for recording in [&recorded::LISSAJOUS, &recorded::TIGHT_BOUNDS] {
-        set_up(recording, planes);
-        deepest = deepest.max(replay(recording, planes, workspace, &mut counter));
-    }
-    deepest = deepest.max(descend(
-        &recorded::LISSAJOUS,
-        planes,
-        workspace,
-        &mut counter,
-    ));
+    let controller = size_of::<Controller>() + size_of::<ControllerMemory>();
+    hprintln!("bytes controller {controller}");
+    let bytes = size_of::<Workspace>() + size_of::<WorkspaceMemory>();
+    hprintln!("bytes workspace {bytes}");
+    let recording = &recorded::LISSAJOUS;
+    let mut planes = [x, y].map(|memory| set_up(recording, &recording.settings(), memory));
+    let mut deepest = replay(recording, &mut planes, workspace, &mut counter);
+    let recording = &recorded::TIGHT_BOUNDS;
+    let mut plane = [set_up(recording, &recording.settings(), tight)];
+    deepest = deepest.max(replay(recording, &mut plane, workspace, &mut counter));
+    let recording = &recorded::LISSAJOUS;
+    let mut plane = set_up(recording, &recording.descent(8), descent);
+    deepest = deepest.max(descend(recording, &mut plane, workspace, &mut counter));
     hprintln!("bytes stack {deepest}");
     debug::exit(debug::EXIT_SUCCESS);
     failure::stop()
@@ -54,21 +55,20 @@ fn main() -> ! {
 #[inline(never)]
 fn descend(
     recording: &Recording,
-    planes: &mut Planes,
+    controller: &mut Controller,
     workspace: &mut Workspace,
     counter: &mut InstructionCounter,
 ) -> u32 {
-    set_up_with(recording, &recording.descent(8), planes);
-    let ([Some(controller), _], Some(plane)) = (planes, recording.planes.first()) else {
+    let Some(plane) = recording.planes.first() else {
         failure::stop()
     };
     let mut deepest = 0;
     for (k, state) in plane.states.iter().enumerate() {
-        let (x, reference) = (Vector4::from(*state), plane.reference(k));
+        let (x, window) = (Vector4::from(*state), plane.window(k));
         let mut instructions = None;
         let stack = stack::depth(&mut || {
             (instructions, _) = counter.count(|| {
-                controller.step(&x, &reference, workspace);
+                controller.step(&x, &window.reference(), workspace);
             });
         });
         deepest = deepest.max(stack);
@@ -83,25 +83,18 @@ fn descend(
     deepest
 }
 
-/// New controllers with the recording's settings.
+/// A new controller with these settings.
 #[inline(never)]
-fn set_up(recording: &Recording, planes: &mut Planes) {
-    set_up_with(recording, &recording.settings(), planes);
-}
-
-#[inline(never)]
-fn set_up_with(
+fn set_up(
     recording: &Recording,
     settings: &ControllerSettings<f32, 4, 1, 3>,
-    planes: &mut Planes,
-) {
-    for place in planes {
-        match Controller::new(recording.ballbot, *settings) {
-            Ok(controller) => *place = Some(controller),
-            Err(error) => {
-                hprintln!("{}: {error}", recording.name);
-                failure::stop()
-            }
+    memory: Memory,
+) -> Controller {
+    match Controller::new(recording.ballbot, *settings, memory.lend()) {
+        Ok(controller) => controller,
+        Err(error) => {
+            hprintln!("{}: {error}", recording.name);
+            failure::stop()
         }
     }
 }
@@ -111,7 +104,7 @@ fn set_up_with(
 #[inline(never)]
 fn replay(
     recording: &Recording,
-    planes: &mut Planes,
+    planes: &mut [Controller],
     workspace: &mut Workspace,
     counter: &mut InstructionCounter,
 ) -> u32 {
@@ -121,17 +114,17 @@ fn replay(
     let mut deepest = 0;
     for k in 0..recording.samples() {
         let mut torques = Vector3::zeros();
-        let places = torques.iter_mut().zip(recording.planes).zip(&mut *planes);
+        let places = torques.iter_mut().zip(recording.planes).zip(planes.iter_mut());
         for (index, ((torque, plane), controller)) in places.enumerate() {
-            let (Some(state), Some(controller)) = (plane.states.get(k), controller) else {
+            let Some(state) = plane.states.get(k) else {
                 failure::stop()
             };
             let x = Vector4::from(*state);
-            let reference = plane.reference(k);
+            let window = plane.window(k);
             let mut instructions = None;
             let stack = stack::depth(&mut || {
                 (instructions, _) = counter.count(|| {
-                    controller.step(&x, &reference, workspace);
+                    controller.step(&x, &window.reference(), workspace);
                 });
             });
             deepest = deepest.max(stack);
