@@ -12,7 +12,8 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::{Peripherals, peripheral::syst::SystClkSource, singleton};
 use cortex_m_rt::{entry, exception};
 use firmware::{
-    Controller, ControllerMemory, N, Window, Workspace, WorkspaceMemory, recorded::LISSAJOUS as ROBOT,
+    Controller, ControllerMemory, N, Window, Workspace, WorkspaceMemory,
+    recorded::LISSAJOUS as ROBOT,
 };
 use nalgebra::{Vector3, Vector4};
 

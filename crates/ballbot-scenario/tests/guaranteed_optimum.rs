@@ -50,7 +50,7 @@ fn quantile(values: &mut [f64], part: f64) -> f64 {
 #[test]
 fn the_first_plan_is_the_optimum() {
     let prepared = prepared();
-    let mut first = |prepared: &Prepared, row: &[f64]| {
+    let first = |prepared: &Prepared, row: &[f64]| {
         let mut controller = controller(prepared, row[0], 1);
         let mut workspace = controller.workspace::<5>();
         let step = controller.step(&start(row), row[5], &mut workspace);

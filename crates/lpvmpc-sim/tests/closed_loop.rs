@@ -8,7 +8,6 @@ use ballbot::{Ballbot, limits};
 use lpvmpc::{
     Bounds, Controller, ControllerSettings, InputReference, Iterations, LpvModel, Predictor,
     Quantity, Rk4, Scheduling, Side, SolverSettings, Status, TerminalIngredient, Weights,
-    Workspace,
 };
 use lpvmpc_sim::{Ending, Experiment, PlantError, Tolerances, Trajectory, run};
 use nalgebra::{Matrix1, Matrix2, Matrix4, Vector1, Vector2, Vector4};

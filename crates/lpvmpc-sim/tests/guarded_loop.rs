@@ -10,7 +10,7 @@ use lpvmpc::{
 };
 use lpvmpc_design::lqr_discrete;
 use lpvmpc_sim::{
-    Actuation, ClosedLoop, Course, Ending, GuardedFeedback, GuardedLoop, Regulator,
+    Actuation, ClosedLoop, Course, Ending, GuardedFeedback, GuardedLoop, MeasuredState, Regulator,
     Tolerances, Unloaded, World, record,
 };
 use nalgebra::{DMatrix, Matrix1, Matrix2, Matrix2x1, RowVector2, Vector1, Vector2};

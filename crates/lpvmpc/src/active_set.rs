@@ -388,7 +388,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
 
     /// The active rows, with multipliers in the bounds' own direction.
     pub(crate) fn active(&self) -> impl Iterator<Item = ActiveRow<T>> {
-active(&self.working, &self.resting)
+        active(&self.working, &self.resting)
     }
 
     /// Hands over the active rows.

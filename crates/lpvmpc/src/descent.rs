@@ -243,7 +243,10 @@ where
         };
         let mut factor = StageFactor::zeros();
         for _ in 0..self.settings.horizon.max(REGULATOR) {
-            if factor.eliminate(&stage, &ocp.common, &mut cost_to_go).is_err() {
+            if factor
+                .eliminate(&stage, &ocp.common, &mut cost_to_go)
+                .is_err()
+            {
                 return (SMatrix::zeros(), indifferent);
             }
         }

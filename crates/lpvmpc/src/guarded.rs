@@ -248,10 +248,7 @@ where
     /// # Errors
     /// As [`new`](Self::new).
     #[cfg(feature = "alloc")]
-    pub fn allocate(
-        model: P,
-        settings: GuardedSettings<T, NX, NU>,
-    ) -> Result<Self, GuardedError> {
+    pub fn allocate(model: P, settings: GuardedSettings<T, NX, NU>) -> Result<Self, GuardedError> {
         // What is refused is not worth its memory.
         settings.check(&model, usize::MAX)?;
         let memory = GuardedMemory::allocate(settings.horizon);
@@ -303,7 +300,10 @@ where
         }
         self.has_plan = along.cost.is_finite() && decision != Decision::SaturatedLqr;
         self.last.copy_from(along);
-        let u = along.stages.first().map_or_else(SVector::zeros, |stage| stage.u);
+        let u = along
+            .stages
+            .first()
+            .map_or_else(SVector::zeros, |stage| stage.u);
         GuardedStep {
             u: planner.settings.u.project(&u),
             decision,

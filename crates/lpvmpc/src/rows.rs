@@ -5,7 +5,7 @@ use crate::model::Scalar;
 use crate::ocp::{Bounds, Ocp, Penalty, Softness, Terminal};
 use crate::riccati::StageFactor;
 use crate::solution::{ActiveRow, BoundId, Part, Quantity, Side};
-use crate::working_set::{Row, Terms};
+use crate::working_set::{Row, Terms, first};
 use nalgebra::{SVector, convert};
 
 /// A trajectory of the problem: x_1.. and u_0..
@@ -80,6 +80,7 @@ fn violated_sides<T: Scalar, const K: usize>(
 }
 
 /// Offers each side to `visit` beyond which `value` is.
+#[inline(always)]
 fn violated_side<T: Scalar>(
     value: T,
     (lower, upper): (T, T),
@@ -118,8 +119,8 @@ pub(crate) fn violated_bounds<T: Scalar, const NX: usize, const NU: usize>(
 ) {
     let n = ocp.length();
     let mut x = &ocp.x0;
-    let steps = trajectory.x.iter().zip(trajectory.u.iter());
-    for (i, (x_next, u)) in steps.enumerate().take(n) {
+    let steps = first(trajectory.x, n).iter().zip(trajectory.u);
+    for (i, (x_next, u)) in steps.enumerate() {
         let bounds = ocp.common_at(i);
         if i > 0 {
             violated_sides(&bounds.x, &ocp.soft_x, x, i, Quantity::State, visit);
@@ -136,6 +137,7 @@ pub(crate) fn violated_bounds<T: Scalar, const NX: usize, const NU: usize>(
 }
 
 /// Offers every violated side of the general rows of a stage to `visit`.
+#[inline(always)]
 fn violated_rows<T: Scalar, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
     stage: usize,
@@ -143,9 +145,19 @@ fn violated_rows<T: Scalar, const NX: usize, const NU: usize>(
     u: Option<&SVector<T, NU>>,
     visit: &mut impl FnMut(Candidate<T>),
 ) {
+    if ocp.rows_per_stage == 0 {
+        return;
+    }
     for (j, row) in ocp.rows_of(stage).iter().enumerate() {
         let sides = (row.lower, row.upper);
-        violated_side(row.value(x, u), sides, row.soft, stage, Quantity::Row(j), visit);
+        violated_side(
+            row.value(x, u),
+            sides,
+            row.soft,
+            stage,
+            Quantity::Row(j),
+            visit,
+        );
     }
 }
 

@@ -4,16 +4,17 @@
 use crate::active_set::DualActiveSet;
 use crate::farkas::infeasibility_margin;
 use crate::held_inputs::{HeldInputs, eliminate_held};
-use crate::kernel::add_product;
+use crate::kernel::{add_product, product};
 use crate::list::List;
 #[cfg(feature = "alloc")]
 use crate::memory::Capacity;
 use crate::memory::SolverMemory;
 use crate::model::Scalar;
-use crate::ocp::{Bounds, Common, GeneralRow, Ocp, Softness};
+use crate::ocp::{Bounds, Ocp, Softness};
 use crate::riccati::{CostToGo, StageFactor};
 use crate::rows::Trajectory;
 use crate::solution::{ActiveRow, ActiveSet, Quantity, Solution, Status};
+use crate::working_set::first;
 use nalgebra::{SVector, convert};
 
 /// Settings of the solver.
@@ -226,10 +227,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     }
 
     /// Backward: the factor of every stage. It does not depend on `x0`.
-    pub(crate) fn factorize(
-        &mut self,
-        ocp: &Ocp<T, NX, NU>,
-    ) -> Result<(), Status<T>> {
+    pub(crate) fn factorize(&mut self, ocp: &Ocp<T, NX, NU>) -> Result<(), Status<T>> {
         let mut cost_to_go = CostToGo {
             quadratic: ocp.terminal.p,
             linear: ocp.terminal.linear_x,
@@ -253,15 +251,16 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
         let mut x = ocp.x0;
-        let policy = self.factors.iter().zip(self.dual.v.iter());
+        let n = ocp.length();
+        let policy = first(&self.factors, n).iter().zip(first(&self.dual.v, n));
         let places = solution.u.iter_mut().zip(solution.x.iter_mut());
-        for ((factor, v), (u, x_next)) in policy.zip(places).take(ocp.length()) {
+        for ((factor, v), (u, x_next)) in policy.zip(places) {
             *u = factor.policy(&x, v);
             x = factor.next(&x, v);
             *x_next = x;
         }
         // A number that is not finite anywhere spreads to the last state or its input.
-        let finite = solution.u.iter().take(ocp.length()).all(is_finite) && is_finite(&x);
+        let finite = first(&solution.u, n).iter().all(is_finite) && is_finite(&x);
         if finite {
             Ok(())
         } else {
@@ -364,31 +363,38 @@ pub fn cost<T: Scalar, const NX: usize, const NU: usize>(
     solution: &Solution<T, NX, NU>,
 ) -> T {
     let half: T = convert(0.5);
+    let soft = ocp.soft_x.iter().any(Option::is_some);
     let mut total = T::zero();
     let mut x = &ocp.x0;
     let steps = solution.u.iter().zip(solution.x.iter());
-    for (i, (stage, (u, x_next))) in ocp.stages.iter().zip(steps).enumerate().take(ocp.length()) {
-        let Common { q, r, s, .. } = ocp.common_at(i);
-        total += (q * x * half + stage.linear_x).dot(x);
-        total += (s * x + r * u * half + stage.linear_u).dot(u);
-        if i > 0 {
-            total += price(&ocp.soft_x, x, &ocp.common_at(i).x);
+    let stages = first(&ocp.stages, ocp.length()).iter().zip(steps);
+    for (i, (stage, (u, x_next))) in stages.enumerate() {
+        let common = ocp.common_at(i);
+        total += (product(&common.q, x) * half + stage.linear_x).dot(x);
+        total += (product(&common.s, x) + product(&common.r, u) * half + stage.linear_u).dot(u);
+        if i > 0 && soft {
+            total += price(&ocp.soft_x, x, &common.x);
         }
-        total += price_of_rows(ocp.rows_of(i), x, Some(u));
+        total += price_of_rows(ocp, i, x, Some(u));
         x = x_next;
     }
     let end = &ocp.terminal;
     total += (end.p * x * half + end.linear_x).dot(x) + price(&end.soft_x, x, &end.x);
-    total + price_of_rows(ocp.rows_of(ocp.length()), x, None)
+    total + price_of_rows(ocp, ocp.length(), x, None)
 }
 
 /// The price of the soft general rows that a stage exceeds.
+#[inline(always)]
 fn price_of_rows<T: Scalar, const NX: usize, const NU: usize>(
-    rows: &[GeneralRow<T, NX, NU>],
+    ocp: &Ocp<T, NX, NU>,
+    stage: usize,
     x: &SVector<T, NX>,
     u: Option<&SVector<T, NU>>,
 ) -> T {
-    rows.iter().fold(T::zero(), |total, row| {
+    if ocp.rows_per_stage == 0 {
+        return T::zero();
+    }
+    ocp.rows_of(stage).iter().fold(T::zero(), |total, row| {
         let price = row.soft.map_or(T::zero(), |penalty| {
             penalty.of(excess(row.value(x, u), row.lower, row.upper))
         });

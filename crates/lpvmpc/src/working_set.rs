@@ -37,6 +37,8 @@ pub(crate) struct Terms<T> {
     /// The row is the mirror image of an exceeded soft bound that is being taken back: its
     /// multiplier counts down from the cap.
     pub mirrored: bool,
+    /// Stages that the row of Q at this place depends on: those of the rows up to here.
+    pub support: u16,
     /// Length of alpha, with the elastic part; set when the row joins the working set.
     pub size: T,
     /// Which bound it is, and its multiplier in the row's own direction.
@@ -50,6 +52,7 @@ impl<T: Scalar> Terms<T> {
             cap: T::zero(),
             equality: false,
             mirrored: false,
+            support: 0,
             size: T::zero(),
             active: ActiveRow::empty(),
         }
@@ -80,7 +83,7 @@ impl<T: Scalar, const NU: usize> Row<T, NU> {
 
     /// alpha'v: the change of the slack that the deviations `v` make.
     pub fn dot(&self, v: &[SVector<T, NU>]) -> T {
-        dot(&self.alpha, v, self.support)
+        dot(first(&self.alpha, self.support), v)
     }
 }
 
@@ -174,9 +177,10 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
         self.rows.get_mut(..self.len).unwrap_or(&mut [])
     }
 
-    /// The rows of Q in use.
+    /// The rows of Q in use, as far as they are not zero.
     fn basis(&self) -> impl Iterator<Item = &[SVector<T, NU>]> {
-        (0..self.len).map(|k| line(&self.basis, k, self.stages))
+        let rows = self.rows().iter().enumerate();
+        rows.map(|(k, row)| first(line(&self.basis, k, self.stages), row.support.into()))
     }
 
     /// The rows of L in use.
@@ -188,8 +192,9 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
     pub fn direction(&self, row: &Row<T, NU>, direction: &mut Direction<T, NU>) {
         direction.support = self.support.max(row.support);
         copy(&mut direction.primal, &row.alpha);
-        direction.coefficients.fill(T::zero());
-        direction.dual.fill(T::zero());
+        for list in [&mut direction.coefficients, &mut direction.dual] {
+            first_mut(list, self.len).fill(T::zero());
+        }
         let compliance = row.terms.compliance;
         let square = row.dot(&row.alpha) + compliance;
         direction.size = square.sqrt();
@@ -218,7 +223,8 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
             dual,
             ..
         } = direction;
-        spanned.fill(T::zero());
+        let [coefficients, spanned, dual] =
+            [coefficients, spanned, dual].map(|list| first_mut(list, self.len));
         for ((s, d), row) in spanned.iter_mut().zip(dual.iter()).zip(self.rows()) {
             *s = -row.compliance * *d;
         }
@@ -229,12 +235,13 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
             .zip(self.basis())
             .zip(coefficients.iter_mut())
         {
-            add(primal, q, -*s, support);
+            add(primal, q, -*s);
             *c += *s;
         }
         copy(dual, coefficients);
         self.solve_upper(dual);
-        direction.slope = dot(primal, primal, support) + compliance;
+        let primal = first(primal, support);
+        direction.slope = dot(primal, primal) + compliance;
         for (d, row) in dual.iter().zip(self.rows()) {
             direction.slope += row.compliance * *d * *d;
         }
@@ -254,10 +261,11 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
         if let Some(terms) = self.rows.get_mut(m) {
             *terms = Terms {
                 size: direction.size,
+                support: u16::try_from(direction.support).unwrap_or(u16::MAX),
                 ..row.terms
             };
             let l = line_mut(&mut self.factor, m, places);
-            copy(l, &direction.coefficients);
+            copy(l, first(&direction.coefficients, m));
             if let Some(diagonal) = l.get_mut(m) {
                 *diagonal = length;
             }
@@ -318,7 +326,7 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
     /// by L `step`: v and the multipliers move by it. `step` is overwritten.
     pub fn shift(&mut self, step: &mut [T], v: &mut [SVector<T, NU>]) {
         for (s, q) in step.iter().zip(self.basis()) {
-            add(v, q, *s, self.support);
+            add(v, q, *s);
         }
         self.solve_upper(step);
         for (row, change) in self.rows_mut().iter_mut().zip(step.iter()) {
@@ -329,7 +337,7 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
     /// step += Q `v`
     pub fn project(&self, v: &[SVector<T, NU>], step: &mut [T]) {
         for (s, q) in step.iter_mut().zip(self.basis()) {
-            *s += dot(q, v, self.support);
+            *s += dot(q, v);
         }
     }
 
@@ -380,31 +388,33 @@ fn line_mut<V>(entries: &mut [V], k: usize, width: usize) -> &mut [V] {
         .unwrap_or_default()
 }
 
-/// Copies as many entries as both have.
-pub(crate) fn copy<V: Copy>(to: &mut [V], from: &[V]) {
-    for (to, from) in to.iter_mut().zip(from) {
-        *to = *from;
-    }
+/// The first `length` entries, none where there are fewer.
+#[inline(always)]
+pub(crate) fn first<V>(list: &[V], length: usize) -> &[V] {
+    list.get(..length).unwrap_or_default()
 }
 
-/// a'b over the first `support` stages.
-fn dot<T: Scalar, const NU: usize>(
-    a: &[SVector<T, NU>],
-    b: &[SVector<T, NU>],
-    support: usize,
-) -> T {
-    let stages = a.iter().zip(b.iter()).take(support);
+/// The first `length` entries, none where there are fewer.
+#[inline(always)]
+pub(crate) fn first_mut<V>(list: &mut [V], length: usize) -> &mut [V] {
+    list.get_mut(..length).unwrap_or_default()
+}
+
+/// Copies as many entries as both have.
+pub(crate) fn copy<V: Copy>(to: &mut [V], from: &[V]) {
+    let length = to.len().min(from.len());
+    first_mut(to, length).copy_from_slice(first(from, length));
+}
+
+/// a'b over the stages that both have.
+fn dot<T: Scalar, const NU: usize>(a: &[SVector<T, NU>], b: &[SVector<T, NU>]) -> T {
+    let stages = a.iter().zip(b);
     stages.fold(T::zero(), |sum, (a, b)| sum + a.dot(b))
 }
 
-/// v += factor * a over the first `support` stages.
-fn add<T: Scalar, const NU: usize>(
-    v: &mut [SVector<T, NU>],
-    a: &[SVector<T, NU>],
-    factor: T,
-    support: usize,
-) {
-    for (v, a) in v.iter_mut().zip(a.iter()).take(support) {
+/// v += factor * a over the stages that both have.
+fn add<T: Scalar, const NU: usize>(v: &mut [SVector<T, NU>], a: &[SVector<T, NU>], factor: T) {
+    for (v, a) in v.iter_mut().zip(a) {
         *v += a * factor;
     }
 }

@@ -25,8 +25,6 @@ use std::path::Path;
 
 const NX: usize = 4;
 const N: usize = 20;
-/// Bounds that may be active at once.
-const M: usize = N + NX;
 /// Samples of a run: 4 s.
 const SAMPLES: usize = 80;
 const T_S: f64 = 0.05;

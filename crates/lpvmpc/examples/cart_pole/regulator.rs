@@ -3,8 +3,8 @@
 use crate::plant::CartPole;
 use lpvmpc::riccati::{BadPivot, CostToGo, StageFactor};
 use lpvmpc::{
-    Bounds, Common, Controller, ControllerSettings, Iterations, LpvModel, Predictor, Rk4, Scheduling,
-    Stage, TerminalIngredient, Weights,
+    Bounds, Common, Controller, ControllerSettings, Iterations, LpvModel, Predictor, Rk4,
+    Scheduling, Stage, TerminalIngredient, Weights,
 };
 use nalgebra::{Matrix1, Matrix4, Vector1, Vector2, Vector4};
 

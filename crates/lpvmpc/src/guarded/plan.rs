@@ -202,7 +202,9 @@ where
         fraction: T,
         plan: &mut Plan<T, NX, NU>,
     ) {
-        let from = along.states().zip(along.stages.iter().map(|stage| &stage.u));
+        let from = along
+            .states()
+            .zip(along.stages.iter().map(|stage| &stage.u));
         let mut stages = from.zip(towards);
         self.simulate(&along.start, plan, |x| match stages.next() {
             Some(((x_from, u_from), (x_to, u_to, gain))) => {

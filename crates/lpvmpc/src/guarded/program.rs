@@ -21,11 +21,7 @@ where
     P: LpvModel<T, NX, NU, NS>,
 {
     /// The program along the plan `along`, whose states it lets be where they keep the bounds.
-    pub(super) fn pose<const NA: usize>(
-        &self,
-        along: &Plan<T, NX, NU>,
-        ocp: &mut Ocp<T, NA, NU>,
-    ) {
+    pub(super) fn pose<const NA: usize>(&self, along: &Plan<T, NX, NU>, ocp: &mut Ocp<T, NA, NU>) {
         let settings = &self.settings;
         // The last stage of the horizon follows its samples.
         ocp.horizon = settings.horizon + 2;
@@ -121,10 +117,7 @@ where
 
     /// (x, 0) becomes (x, z): the first input is z, with the offset cost. Both what is wanted and z are
     /// seen from the plan's set point, `along`.
-    fn set_point_stage<const NA: usize>(
-        &self,
-        along: T,
-    ) -> (Stage<T, NA, NU>, Common<T, NA, NU>) {
+    fn set_point_stage<const NA: usize>(&self, along: T) -> (Stage<T, NA, NU>, Common<T, NA, NU>) {
         let weight = self.settings.offset_weight;
         let mut stage = Stage::new();
         stage.a = SMatrix::identity();
@@ -197,13 +190,7 @@ where
     /// The terminal cost |y|^2, the tangent plane of the terminal set at the `edge`, and the curvature
     /// of the ball behind it, with the multiplier that it had; no y beyond the `widest`. The
     /// reflection takes the place where the plane touches to the `upper` or the lower end.
-    fn pose_end<const NA: usize>(
-        &self,
-        edge: T,
-        widest: T,
-        upper: bool,
-        ocp: &mut Ocp<T, NA, NU>,
-    ) {
+    fn pose_end<const NA: usize>(&self, edge: T, widest: T, upper: bool, ocp: &mut Ocp<T, NA, NU>) {
         let touches = self.touch.is_some();
         let pressure = if touches { self.pressure } else { T::zero() };
         ocp.terminal.p = SMatrix::identity() * (T::one() + pressure);

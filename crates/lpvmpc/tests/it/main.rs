@@ -10,6 +10,7 @@ mod support;
 
 mod campaign;
 mod fuzz;
+mod memory;
 mod optimality;
 mod regressions;
 mod relations;

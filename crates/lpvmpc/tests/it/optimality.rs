@@ -6,11 +6,11 @@ use crate::support::solve;
 use lpvmpc::{Ocp, Penalty, Solution, kkt_residual};
 use nalgebra::SVector;
 
-type Problem = Ocp<f64, 3, 2, 8, 1>;
-type Answer = Solution<f64, 3, 2, 8, 60>;
+type Problem = Ocp<f64, 3, 2>;
+type Answer = Solution<f64, 3, 2>;
 
-fn solved(family: Family, seed: u64) -> (Box<Problem>, Answer) {
-    let ocp = problem::<3, 2, 8, 1>(&mut Rng::new(seed), family, 8);
+fn solved(family: Family, seed: u64) -> (Problem, Answer) {
+    let ocp = problem(&mut Rng::new(seed), family, 8, 1);
     let solution = solve(&ocp);
     assert!(kkt_residual(&ocp, &solution).largest() < 1e-10);
     (ocp, solution)
@@ -46,7 +46,7 @@ fn nothing_that_is_no_number_passes() {
     wrong.x[0][1] = f64::NAN;
     assert!(kkt_residual(&ocp, &wrong).largest().is_nan());
     let mut bad = ocp.clone();
-    bad.stages[0].q[(0, 0)] = f64::NAN;
+    bad.own[0].q[(0, 0)] = f64::NAN;
     bad.stages[0].a[(0, 0)] = f64::NAN;
     assert!(kkt_residual(&bad, &solution).largest().is_nan());
 }

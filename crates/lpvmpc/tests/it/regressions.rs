@@ -2,21 +2,33 @@
 
 use crate::support::problems::{Family, problem};
 use crate::support::rng::Rng;
-use crate::support::{cold, kind, solve};
-use lpvmpc::{Ocp, Penalty, Solution, Solver, SolverSettings, Status, WarmStart, kkt_residual};
+use crate::support::{capacity, cold, kind, solve};
+use lpvmpc::{
+    Capacity, GeneralRow, List, Ocp, Penalty, Solution, Solver, SolverSettings, Status, WarmStart,
+    kkt_residual,
+};
 use nalgebra::{Matrix1, Vector1};
 
-type Scalar1 = Ocp<f64, 1, 1, 3>;
+/// Room for three stages with one input and one state, whichever bounds are soft.
+const SMALL: Capacity = Capacity {
+    stages: 3,
+    rows: 6,
+    active: 6,
+};
+
+type Scalar1 = Ocp<f64, 1, 1>;
 
 /// x+ = x + u, three stages from x = 1, everything weighted with 1.
 fn integrator() -> Scalar1 {
     let mut ocp = Scalar1 {
         x0: Vector1::new(1.0),
-        ..Scalar1::default()
+        ..Ocp::allocate(3)
     };
     for stage in &mut ocp.stages {
-        (stage.a, stage.b, stage.q) = (Matrix1::new(1.0), Matrix1::new(1.0), Matrix1::new(1.0));
+        (stage.a, stage.b) = (Matrix1::new(1.0), Matrix1::new(1.0));
     }
+    ocp.common.q = Matrix1::new(1.0);
+    ocp.own = List::repeat(ocp.common, 3);
     ocp.terminal.p = Matrix1::new(1.0);
     ocp
 }
@@ -26,9 +38,8 @@ fn integrator() -> Scalar1 {
 #[test]
 fn warm_start_from_a_bound_that_has_become_soft() {
     let mut ocp = integrator();
-    ocp.stages[1].x.lower[0] = 0.9;
-    let mut solver = Solver::<f64, 1, 1, 3, 6>::new();
-    let mut solution = Solution::default();
+    ocp.own[1].x.lower[0] = 0.9;
+    let (mut solver, mut solution) = (Solver::allocate(SMALL), Solution::allocate(SMALL));
     let same = SolverSettings {
         warm_start: WarmStart::Same,
         ..SolverSettings::default()
@@ -40,7 +51,7 @@ fn warm_start_from_a_bound_that_has_become_soft() {
         quadratic: 0.0,
     });
     solver.solve(&ocp, &same, &mut solution);
-    let reference: Solution<f64, 1, 1, 3, 6> = solve(&ocp);
+    let reference = solve(&ocp);
     assert!((solution.cost - reference.cost).abs() < 1e-12);
     assert!(
         solution.x[0][0] < 0.9 - 0.01,
@@ -53,21 +64,20 @@ fn warm_start_from_a_bound_that_has_become_soft() {
 #[test]
 fn warm_start_from_a_bound_that_has_gone() {
     let mut ocp = integrator();
-    for stage in &mut ocp.stages {
-        (stage.u.lower[0], stage.x.lower[0]) = (-0.2, 0.5);
+    for common in &mut ocp.own {
+        (common.u.lower[0], common.x.lower[0]) = (-0.2, 0.5);
     }
-    let mut solver = Solver::<f64, 1, 1, 3, 6>::new();
-    let mut solution = Solution::default();
+    let (mut solver, mut solution) = (Solver::allocate(SMALL), Solution::allocate(SMALL));
     let same = SolverSettings {
         warm_start: WarmStart::Same,
         ..SolverSettings::default()
     };
     solver.solve(&ocp, &same, &mut solution);
     assert!(solution.active.len() >= 2);
-    ocp.stages[0].u.lower[0] = f64::NEG_INFINITY;
+    ocp.own[0].u.lower[0] = f64::NEG_INFINITY;
     solver.solve(&ocp, &same, &mut solution);
     assert!(kkt_residual(&ocp, &solution).largest() < 1e-12);
-    let reference: Solution<f64, 1, 1, 3, 6> = solve(&ocp);
+    let reference = solve(&ocp);
     assert!((solution.cost - reference.cost).abs() < 1e-12);
 }
 
@@ -77,10 +87,10 @@ fn warm_start_from_a_bound_that_has_gone() {
 fn warm_start_from_a_longer_horizon() {
     for seed in 0..200 {
         let mut rng = Rng::new(seed);
-        let mut ocp = problem::<3, 1, 12, 0>(&mut rng, Family::Arbitrary, 12);
+        let mut ocp = problem::<3, 1>(&mut rng, Family::Arbitrary, 12, 0);
         ocp.horizon = 12;
-        let mut solver = Box::new(Solver::<f64, 3, 1, 12, 60>::new());
-        let mut solution = Solution::default();
+        let room = capacity(&ocp);
+        let (mut solver, mut solution) = (Solver::allocate(room), Solution::allocate(room));
         let same = SolverSettings {
             warm_start: WarmStart::Same,
             ..cold()
@@ -88,7 +98,7 @@ fn warm_start_from_a_longer_horizon() {
         solver.solve(&ocp, &same, &mut solution);
         ocp.horizon = 5;
         solver.solve(&ocp, &same, &mut solution);
-        let reference: Solution<f64, 3, 1, 12, 60> = solve(&ocp);
+        let reference = solve(&ocp);
         assert_eq!(kind(&solution.status), kind(&reference.status), "{seed}");
         if reference.status.is_solved() {
             let residual = kkt_residual(&ocp, &solution).largest();
@@ -104,10 +114,10 @@ fn warm_start_from_a_longer_horizon() {
 fn inputs_are_within_their_bounds_to_the_last_bit() {
     for seed in 0..500 {
         let mut rng = Rng::new(seed);
-        let ocp = problem::<3, 2, 8, 0>(&mut rng, Family::Loose, 8);
-        let solution: Solution<f64, 3, 2, 8, 40> = solve(&ocp);
-        for (stage, u) in ocp.stages.iter().zip(&solution.u).take(ocp.horizon) {
-            assert!(stage.u.contains(u, 0.0), "{seed}: {u}");
+        let ocp = problem::<3, 2>(&mut rng, Family::Loose, 8, 0);
+        let solution = solve(&ocp);
+        for (i, u) in solution.u.iter().enumerate().take(ocp.horizon) {
+            assert!(ocp.common_at(i).u.contains(u, 0.0), "{seed}: {u}");
         }
     }
 }
@@ -116,11 +126,11 @@ fn inputs_are_within_their_bounds_to_the_last_bit() {
 #[test]
 fn nan_in_a_weight_is_not_finite() {
     let mut ocp = integrator();
-    ocp.stages[2].r[0] = f64::NAN;
-    let solution: Solution<f64, 1, 1, 3, 6> = solve(&ocp);
+    ocp.own[2].r[0] = f64::NAN;
+    let solution = solve(&ocp);
     assert_eq!(solution.status, Status::NotFinite);
-    ocp.stages[2].r[0] = -7.0;
-    let solution: Solution<f64, 1, 1, 3, 6> = solve(&ocp);
+    ocp.own[2].r[0] = -7.0;
+    let solution = solve(&ocp);
     let expected = Status::NumericalFailure {
         stage: 2,
         pivot: -6.0,
@@ -131,12 +141,12 @@ fn nan_in_a_weight_is_not_finite() {
 /// An infinite target, in a component that one input cannot move any more, was "reached".
 #[test]
 fn infinite_target_is_not_finite() {
-    let mut ocp = Ocp::<f64, 2, 1, 3>::default();
+    let mut ocp = Ocp::<f64, 2, 1>::allocate(3);
     for stage in &mut ocp.stages {
         stage.b[(0, 0)] = 1.0;
     }
     ocp.terminal.equality = Some([1.0, f64::INFINITY].into());
-    let solution: Solution<f64, 2, 1, 3, 6> = solve(&ocp);
+    let solution = solve(&ocp);
     assert_eq!(solution.status, Status::NotFinite);
 }
 
@@ -144,25 +154,26 @@ fn infinite_target_is_not_finite() {
 /// infeasible.
 #[test]
 fn overflow_is_not_infeasibility() {
-    let mut ocp = Ocp::<f64, 1, 1, 3, 1>::default();
-    ocp.stages[0].row_u[0] = 1e200;
-    ocp.stages[0].rows.lower[0] = 1.0;
-    let solution: Solution<f64, 1, 1, 3, 6> = solve(&ocp);
+    let mut ocp = Ocp::<f64, 1, 1>::allocate(3);
+    (ocp.rows, ocp.rows_per_stage) = (List::repeat(GeneralRow::default(), 4), 1);
+    ocp.rows[0].u[0] = 1e200;
+    ocp.rows[0].lower = 1.0;
+    let solution = solve(&ocp);
     assert_eq!(solution.status, Status::NotFinite);
 }
 
 /// Warm starting went past the cap on changes.
 #[test]
 fn cap_on_changes_holds_for_the_warm_start_too() {
-    let ocp = problem::<4, 2, 10, 0>(&mut Rng::new(17), Family::Tight, 10);
-    let mut solution: Solution<f64, 4, 2, 10, 40> = solve(&ocp);
+    let ocp = problem::<4, 2>(&mut Rng::new(17), Family::Tight, 10, 0);
+    let mut solution = solve(&ocp);
     assert!(solution.active.len() > 5, "{}", solution.active.len());
     let settings = SolverSettings {
         warm_start: WarmStart::Same,
         max_changes: 3,
         ..cold()
     };
-    Solver::new().solve(&ocp, &settings, &mut solution);
+    Solver::allocate(capacity(&ocp)).solve(&ocp, &settings, &mut solution);
     assert_eq!(
         (kind(&solution.status), solution.changes),
         ("change cap", 3)
@@ -175,8 +186,8 @@ fn cap_on_changes_holds_for_the_warm_start_too() {
 #[test]
 fn dependent_rows_are_recognised() {
     for (family, seed) in DEPENDENT {
-        let ocp = problem::<4, 1, 20, 0>(&mut Rng::new(seed), family, 20);
-        let solution: Solution<f64, 4, 1, 20, 200> = solve(&ocp);
+        let ocp = problem::<4, 1>(&mut Rng::new(seed), family, 20, 0);
+        let solution = solve(&ocp);
         if let Some(feasible) = family.feasible() {
             assert_eq!(solution.status.is_solved(), feasible, "{family:?} {seed}");
         }

@@ -1,25 +1,22 @@
 //! Relations that hold exactly between the answers to different problems.
 
-use crate::support::problems::{Family, problem};
+use crate::support::problems::{Family, each_common, problem};
 use crate::support::rng::Rng;
-use crate::support::{agree, cold};
+use crate::support::{agree, capacity, cold, solve};
 use lpvmpc::{
-    Bounds, Ocp, Penalty, Side, Solution, Solver, SolverSettings, WarmStart, kkt_residual,
+    Bounds, Common, Ocp, Penalty, Side, Solution, Solver, SolverSettings, WarmStart, kkt_residual,
 };
 use proptest::prelude::*;
 
 const NX: usize = 4;
 const NU: usize = 2;
-const N: usize = 10;
-const NG: usize = 1;
-const M: usize = 160;
-type Problem = Ocp<f64, NX, NU, N, NG>;
-type Answer = Solution<f64, NX, NU, N, M>;
+type Problem = Ocp<f64, NX, NU>;
+type Answer = Solution<f64, NX, NU>;
 
 fn random_problem(seed: u64) -> Problem {
     let mut rng = Rng::new(seed);
     let family = Family::ALL[rng.index(Family::ALL.len())];
-    *problem(&mut rng, family, N)
+    problem(&mut rng, family, 10, 1)
 }
 
 fn answer(ocp: &Problem, start: WarmStart, before: &Answer) -> Answer {
@@ -27,14 +24,13 @@ fn answer(ocp: &Problem, start: WarmStart, before: &Answer) -> Answer {
         warm_start: start,
         ..cold()
     };
-    let mut solver = Box::new(Solver::new());
-    let mut solution = before.clone();
-    solver.solve(ocp, &settings, &mut solution);
+    let room = capacity(ocp);
+    let mut solution = Answer::allocate(room);
+    (solution.u, solution.x) = (before.u.clone(), before.x.clone());
+    (solution.status, solution.cost) = (before.status, before.cost);
+    solution.active.copy_from(&before.active);
+    Solver::allocate(room).solve(ocp, &settings, &mut solution);
     solution
-}
-
-fn cold_answer(ocp: &Problem) -> Answer {
-    answer(ocp, WarmStart::Cold, &Answer::default())
 }
 
 /// The same verdict, and the same optimum.
@@ -65,13 +61,15 @@ fn mirrored(ocp: &Problem) -> Problem {
         stage.c = -stage.c;
         stage.linear_x = -stage.linear_x;
         stage.linear_u = -stage.linear_u;
-        stage.x = flip(&stage.x);
-        stage.u = flip(&stage.u);
-        stage.rows = flip(&stage.rows);
+    }
+    for Common { x, u, .. } in each_common(&mut mirror) {
+        (*x, *u) = (flip(x), flip(u));
+    }
+    for row in &mut mirror.rows {
+        (row.lower, row.upper) = (-row.upper, -row.lower);
     }
     mirror.terminal.linear_x = -ocp.terminal.linear_x;
     mirror.terminal.x = flip(&ocp.terminal.x);
-    mirror.terminal.rows = flip(&ocp.terminal.rows);
     mirror.terminal.equality = ocp.terminal.equality.map(|target| -target);
     mirror
 }
@@ -86,18 +84,21 @@ fn dearer(ocp: &Problem, factor: f64) -> Problem {
     };
     let mut scaled = ocp.clone();
     for stage in &mut scaled.stages {
-        stage.q *= factor;
-        stage.r *= factor;
-        stage.s *= factor;
         stage.linear_x *= factor;
         stage.linear_u *= factor;
-        stage.soft_rows = stage.soft_rows.map(price);
+    }
+    for Common { q, r, s, .. } in each_common(&mut scaled) {
+        *q *= factor;
+        *r *= factor;
+        *s *= factor;
+    }
+    for row in &mut scaled.rows {
+        row.soft = price(row.soft);
     }
     scaled.soft_x = scaled.soft_x.map(price);
     scaled.terminal.p *= factor;
     scaled.terminal.linear_x *= factor;
     scaled.terminal.soft_x = scaled.terminal.soft_x.map(price);
-    scaled.terminal.soft_rows = scaled.terminal.soft_rows.map(price);
     scaled
 }
 
@@ -109,8 +110,8 @@ proptest! {
     #[test]
     fn warm_start_never_changes_the_answer(seed: u64, other: u64) {
         let ocp = random_problem(seed);
-        let reference = cold_answer(&ocp);
-        let unrelated = cold_answer(&random_problem(other));
+        let reference = solve(&ocp);
+        let unrelated = solve(&random_problem(other));
         for before in [&reference, &unrelated] {
             for start in [WarmStart::Cold, WarmStart::Same, WarmStart::Shifted] {
                 assert_same(&ocp, &reference, &answer(&ocp, start, before))?;
@@ -121,8 +122,8 @@ proptest! {
     #[test]
     fn the_mirror_image_has_the_mirrored_answer(seed: u64) {
         let ocp = random_problem(seed);
-        let reference = cold_answer(&ocp);
-        let mut reflection = cold_answer(&mirrored(&ocp));
+        let reference = solve(&ocp);
+        let mut reflection = solve(&mirrored(&ocp));
         reflection.u.iter_mut().for_each(|u| *u = -*u);
         reflection.x.iter_mut().for_each(|x| *x = -*x);
         prop_assert!(agree(&reference.status, &reflection.status));
@@ -142,8 +143,8 @@ proptest! {
     fn the_cost_scales_with_the_prices(seed: u64, exponent in -4.0..4.0f64) {
         let factor = 10f64.powf(exponent);
         let ocp = random_problem(seed);
-        let reference = cold_answer(&ocp);
-        let scaled = cold_answer(&dearer(&ocp, factor));
+        let reference = solve(&ocp);
+        let scaled = solve(&dearer(&ocp, factor));
         prop_assert!(agree(&reference.status, &scaled.status));
         if reference.status.is_solved() {
             let size = reference.cost.abs().max(1.0);
@@ -160,9 +161,9 @@ proptest! {
 fn unique_multipliers_scale_one_by_one() {
     for seed in 0..200 {
         let mut rng = Rng::new(seed);
-        let ocp: Problem = *problem(&mut rng, Family::Loose, N);
-        let reference = cold_answer(&ocp);
-        let scaled = cold_answer(&dearer(&ocp, 64.0));
+        let ocp: Problem = problem(&mut rng, Family::Loose, 10, 1);
+        let reference = solve(&ocp);
+        let scaled = solve(&dearer(&ocp, 64.0));
         for row in reference.active.iter() {
             let same = scaled.active.iter().find(|other| other.bound == row.bound);
             let multiplier = same.map_or(0.0, |other| other.multiplier);

@@ -5,9 +5,9 @@ use crate::regulator;
 use crate::rng::Rng;
 use lpvmpc::riccati::{CostToGo, StageFactor};
 use lpvmpc::{
-    Bounds, Capacity, Common, Decision, GuardedArrays, GuardedController, GuardedError, GuardedIterations,
-    GuardedSettings, GuardedStep, GuardedWorkspace, GuardedWorkspaceArrays, LpvModel, Rk4, Rollout, Scheduling, SolverSettings, Stage,
-    Status, TerminalSet,
+    Bounds, Capacity, Common, Decision, GuardedArrays, GuardedController, GuardedError,
+    GuardedIterations, GuardedSettings, GuardedStep, GuardedWorkspace, GuardedWorkspaceArrays,
+    LpvModel, Rk4, Rollout, Scheduling, SolverSettings, Stage, Status, TerminalSet,
 };
 use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
 
@@ -124,7 +124,7 @@ fn assert_safe(step: &GuardedStep<f64, 4, 1>) {
 fn jump_about(settings: Settings, seed: u64, decisions: &mut [usize; 5]) {
     let mut rng = Rng::new(seed);
     let mut controller = guarded(settings);
-    let mut memory = controller.workspace();
+    let mut memory = controller.workspace::<5>();
     let mut x = in_terminal_set(&mut rng);
     for _ in 0..4 {
         let wanted = rng.uniform(-100.0, 100.0);
@@ -180,7 +180,7 @@ fn the_nearest_admissible_position_is_reached() {
         (f64::NAN, 0.0),
     ] {
         let mut controller = guarded(settings());
-        let mut memory = controller.workspace();
+        let mut memory = controller.workspace::<5>();
         let mut x = Vector4::zeros();
         for _ in 0..1200 {
             let step = controller.step(&x, wanted, &mut memory);
@@ -194,7 +194,7 @@ fn the_nearest_admissible_position_is_reached() {
 #[test]
 fn the_plan_happens() {
     let mut controller = guarded(settings());
-    let mut memory = controller.workspace();
+    let mut memory = controller.workspace::<5>();
     let mut x = Vector4::zeros();
     for _ in 0..60 {
         let step = controller.step(&x, 20.0, &mut memory);
@@ -216,7 +216,7 @@ fn a_shorter_horizon_is_the_one_of_a_smaller_memory() {
     let arrays = GuardedWorkspaceArrays::<f64, 1, 5, { N + 2 }, 200>::new();
     let mut large_memory = GuardedWorkspace::new(Box::leak(Box::new(arrays)).lend());
     let mut small = guarded(short);
-    let mut small_memory = small.workspace();
+    let mut small_memory = small.workspace::<5>();
     let mut x = Vector4::zeros();
     let mut soft = 0;
     for k in 0..200 {
@@ -242,8 +242,8 @@ fn controllers_that_share_a_workspace_do_not_see_each_other() {
     (short.horizon, short.soft_price) = (13, 2e4);
     let (mut long, mut short) = (guarded(settings()), guarded(short));
     let (mut long_alone, mut short_alone) = (long.clone(), short.clone());
-    let mut shared = long.workspace();
-    let (mut own, mut other) = (long.workspace(), short.workspace());
+    let mut shared = long.workspace::<5>();
+    let (mut own, mut other) = (long.workspace::<5>(), short.workspace::<5>());
     let (mut x, mut y) = (Vector4::zeros(), Vector4::new(1.0, 0.1, 0.0, 0.0));
     let mut warm = [shared.warm_start().clone(), shared.warm_start().clone()];
     for k in 0..120 {
@@ -272,12 +272,18 @@ fn a_workspace_that_is_too_small_costs_the_new_plans() {
     for (capacity, expected) in [
         (Capacity { stages: 0, ..room }, Status::HorizonTooLong),
         (Capacity { stages: N, ..room }, Status::HorizonTooLong),
-        (Capacity { stages: N + 1, ..room }, Status::HorizonTooLong),
+        (
+            Capacity {
+                stages: N + 1,
+                ..room
+            },
+            Status::HorizonTooLong,
+        ),
         (Capacity { rows: 0, ..room }, Status::WorkingSetFull),
         (Capacity { active: 0, ..room }, Status::WorkingSetFull),
     ] {
         let mut controller = guarded(settings());
-        let mut memory = GuardedWorkspace::allocate(capacity);
+        let mut memory = GuardedWorkspace::<f64, 1, 5>::allocate(capacity);
         let mut x = Vector4::new(0.2, 0.05, 0.0, 0.0);
         let mut statuses = Vec::new();
         for k in 0..100 {
@@ -287,12 +293,18 @@ fn a_workspace_that_is_too_small_costs_the_new_plans() {
             let step = controller.step(&x, 20.0, &mut memory);
             assert_safe(&step);
             statuses.push(step.status);
-            assert!(k >= 60 || step.decision.is_guaranteed(), "{capacity:?} {step:?}");
+            assert!(
+                k >= 60 || step.decision.is_guaranteed(),
+                "{capacity:?} {step:?}"
+            );
             x = moves(&x, &step.u);
         }
         assert!(statuses.contains(&expected), "{capacity:?}: {statuses:?}");
         if expected == Status::HorizonTooLong {
-            assert!(statuses.iter().all(|status| *status == expected), "{statuses:?}");
+            assert!(
+                statuses.iter().all(|status| *status == expected),
+                "{statuses:?}"
+            );
         }
     }
 }
@@ -301,7 +313,7 @@ fn a_workspace_that_is_too_small_costs_the_new_plans() {
 #[test]
 fn after_a_push_the_bounds_are_soft_until_they_hold_again() {
     let mut controller = guarded(settings());
-    let mut memory = controller.workspace();
+    let mut memory = controller.workspace::<5>();
     let mut x = Vector4::zeros();
     let mut seen = [0; 5];
     for k in 0..400 {
@@ -322,7 +334,7 @@ fn after_a_push_the_bounds_are_soft_until_they_hold_again() {
 #[test]
 fn nonsense_is_survived() {
     let mut controller = guarded(settings());
-    let mut memory = controller.workspace();
+    let mut memory = controller.workspace::<5>();
     let mut x = Vector4::new(0.1, 0.05, 0.0, 0.0);
     for k in 0..100 {
         let measured = match k {
@@ -374,13 +386,13 @@ fn settings_that_make_no_sense_are_refused() {
     for horizon in [0, N + 1] {
         let mut changed = settings();
         changed.horizon = horizon;
+        let message = format!(
+            "the horizon is {horizon} samples; it must be at least 1, and there is memory for {N}"
+        );
         let arrays = Box::leak(Box::new(GuardedArrays::<f64, 4, 1, N>::new()));
         let outcome = Guarded::new(plant(), changed, arrays.lend());
         let error = outcome.err().unwrap();
-        assert!(
-            error.to_string().contains("from 1 to 20 samples"),
-            "{error}"
-        );
+        assert!(error.to_string().contains(&message), "{error}");
     }
     // The tilt is no direction of equilibria.
     let tilted = refused(|s| s.direction = Vector4::new(0.0, 1.0, 0.0, 0.0));

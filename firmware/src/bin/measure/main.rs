@@ -114,7 +114,10 @@ fn replay(
     let mut deepest = 0;
     for k in 0..recording.samples() {
         let mut torques = Vector3::zeros();
-        let places = torques.iter_mut().zip(recording.planes).zip(planes.iter_mut());
+        let places = torques
+            .iter_mut()
+            .zip(recording.planes)
+            .zip(planes.iter_mut());
         for (index, ((torque, plane), controller)) in places.enumerate() {
             let Some(state) = plane.states.get(k) else {
                 failure::stop()

@@ -5,7 +5,7 @@ use ::clarabel::algebra::CscMatrix;
 use ::clarabel::solver::{
     DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus, ZeroConeT,
 };
-use lpvmpc::{Bounds, Ocp, Penalty, Softness};
+use lpvmpc::{Bounds, Common, Ocp, Penalty, Softness};
 use nalgebra::SMatrix;
 
 /// What Clarabel says about a problem.
@@ -181,9 +181,7 @@ fn settings() -> DefaultSettings<f64> {
 }
 
 /// Clarabel's verdict on `ocp`.
-pub fn solve<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
-    ocp: &Ocp<f64, NX, NU, N, NG>,
-) -> Verdict {
+pub fn solve<const NX: usize, const NU: usize>(ocp: &Ocp<f64, NX, NU>) -> Verdict {
     // Variables: u_0, x_1, u_1, x_2, ...
     let mut program = Program {
         linear: vec![0.0; ocp.horizon * (NX + NU)],
@@ -219,9 +217,9 @@ fn variable(index: usize) -> Expression {
 }
 
 /// Adds stage `i`, which begins in the state `x`; returns the state behind it.
-fn add_stage<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+fn add_stage<const NX: usize, const NU: usize>(
     program: &mut Program,
-    ocp: &Ocp<f64, NX, NU, N, NG>,
+    ocp: &Ocp<f64, NX, NU>,
     i: usize,
     x: &[Expression; NX],
 ) -> [Expression; NX] {
@@ -231,33 +229,34 @@ fn add_stage<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
     let u: [Expression; NU] = std::array::from_fn(|j| variable(input + j));
     let x_next: [Expression; NX] = std::array::from_fn(|j| variable(next + j));
 
-    program.quadratic.push_upper(input, &stage.r);
+    let Common {
+        q,
+        r,
+        s,
+        x: bounds_x,
+        u: bounds_u,
+    } = ocp.common_at(i);
+    program.quadratic.push_upper(input, r);
     for j in 0..NU {
         program.linear[input + j] += stage.linear_u[j];
     }
     if let Some(state) = input.checked_sub(NX) {
-        program.quadratic.push_upper(state, &stage.q);
-        let cross = stage.s.transpose();
+        program.quadratic.push_upper(state, q);
+        let cross = s.transpose();
         program.quadratic.push_block(state, input, &cross, 1.0);
         for j in 0..NX {
             program.linear[state + j] += stage.linear_x[j];
         }
-        program.bounds(x, &stage.x, &ocp.soft_x);
+        program.bounds(x, bounds_x, &ocp.soft_x);
     } else {
         let x0 = &ocp.x0;
-        program.constant += (stage.q * x0 * 0.5 + stage.linear_x).dot(x0);
-        for (j, gradient) in (stage.s * x0).iter().enumerate() {
+        program.constant += (q * x0 * 0.5 + stage.linear_x).dot(x0);
+        for (j, gradient) in (s * x0).iter().enumerate() {
             program.linear[input + j] += gradient;
         }
     }
-    program.bounds(&u, &stage.u, &super::problems::hard());
-    let rows: [Expression; NG] = std::array::from_fn(|j| {
-        let mut row = combine(stage.row_x.row(j).iter().copied(), x);
-        let of_u = combine(stage.row_u.row(j).iter().copied(), &u);
-        row.terms.extend(of_u.terms);
-        row
-    });
-    program.bounds(&rows, &stage.rows, &stage.soft_rows);
+    program.bounds(&u, bounds_u, &super::problems::hard());
+    add_rows(program, ocp, i, x, &u);
     for j in 0..NX {
         let mut defect = combine(stage.a.row(j).iter().copied(), x);
         let of_u = combine(stage.b.row(j).iter().copied(), &u);
@@ -269,9 +268,25 @@ fn add_stage<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
     x_next
 }
 
-fn add_terminal<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+/// The general rows of stage `i`; at the end of the horizon there is no `u`.
+fn add_rows<const NX: usize, const NU: usize>(
     program: &mut Program,
-    ocp: &Ocp<f64, NX, NU, N, NG>,
+    ocp: &Ocp<f64, NX, NU>,
+    i: usize,
+    x: &[Expression],
+    u: &[Expression],
+) {
+    for row in (0..ocp.rows_per_stage).filter_map(|j| ocp.row(i, j)) {
+        let mut value = combine(row.x.iter().copied(), x);
+        let of_u = combine(row.u.iter().copied(), u);
+        value.terms.extend(of_u.terms);
+        program.bound(&value, (row.lower, row.upper), row.soft);
+    }
+}
+
+fn add_terminal<const NX: usize, const NU: usize>(
+    program: &mut Program,
+    ocp: &Ocp<f64, NX, NU>,
     x: &[Expression; NX],
 ) {
     let end = &ocp.terminal;
@@ -281,9 +296,7 @@ fn add_terminal<const NX: usize, const NU: usize, const N: usize, const NG: usiz
         program.linear[state + j] += end.linear_x[j];
     }
     program.bounds(x, &end.x, &end.soft_x);
-    let rows: [Expression; NG] =
-        std::array::from_fn(|j| combine(end.row_x.row(j).iter().copied(), x));
-    program.bounds(&rows, &end.rows, &end.soft_rows);
+    add_rows(program, ocp, ocp.horizon, x, &[]);
     if let Some(target) = &end.equality {
         for j in 0..NX {
             let mut defect = x[j].clone();

@@ -2,8 +2,8 @@
 //! problem by non-negative least squares (Lawson and Hanson, Solving Least Squares Problems,
 //! ch. 23). It shares no step with the solver under test.
 
-use lpvmpc::{Bounds, Ocp};
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use lpvmpc::{Bounds, Common, Ocp};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector1};
 
 /// Minimise u'Hu/2 + g'u with C u >= d.
 pub struct Dense {
@@ -14,9 +14,7 @@ pub struct Dense {
 }
 
 /// `ocp` in its inputs alone. `None` if a bound is soft.
-pub fn condense<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
-    ocp: &Ocp<f64, NX, NU, N, NG>,
-) -> Option<Dense> {
+pub fn condense<const NX: usize, const NU: usize>(ocp: &Ocp<f64, NX, NU>) -> Option<Dense> {
     let n = ocp.length();
     let size = n * NU;
     let mut dense = Dense {
@@ -31,22 +29,18 @@ pub fn condense<const NX: usize, const NU: usize, const N: usize, const NG: usiz
     for (i, stage) in ocp.stages.iter().enumerate().take(n) {
         let mut select = DMatrix::<f64>::zeros(NU, size);
         select.view_mut((0, i * NU), (NU, NU)).fill_with_identity();
-        let (q, r, s) = (dynamic(&stage.q), dynamic(&stage.r), dynamic(&stage.s));
+        let Common { q, r, s, x, u } = ocp.common_at(i);
+        let (q, r, s) = (dynamic(q), dynamic(r), dynamic(s));
         let cross = select.tr_mul(&(&s * &map));
         dense.h += map.tr_mul(&(&q * &map)) + select.tr_mul(&(&r * &select));
         dense.h += &cross + cross.transpose();
         dense.g += map.tr_mul(&(&q * &free + dynamic(&stage.linear_x)));
         dense.g += select.tr_mul(&(&s * &free + dynamic(&stage.linear_u)));
         if i > 0 {
-            dense.bound(&map, &free, &stage.x);
+            dense.bound(&map, &free, x);
         }
-        dense.bound(&select, &DMatrix::zeros(NU, 1), &stage.u);
-        let (row_x, row_u) = (dynamic(&stage.row_x), dynamic(&stage.row_u));
-        let rows = &row_x * &map + &row_u * &select;
-        dense.bound(&rows, &(&row_x * &free), &stage.rows);
-        if stage.soft_rows.iter().any(Option::is_some) {
-            return None;
-        }
+        dense.bound(&select, &DMatrix::zeros(NU, 1), u);
+        dense.rows(ocp, i, (&map, &free), Some(&select));
         let (a, b) = (dynamic(&stage.a), dynamic(&stage.b));
         map = &a * map + b * select;
         free = a * free + dynamic(&stage.c);
@@ -56,8 +50,7 @@ pub fn condense<const NX: usize, const NU: usize, const N: usize, const NG: usiz
     dense.h += map.tr_mul(&(&p * &map));
     dense.g += map.tr_mul(&(&p * &free + dynamic(&end.linear_x)));
     dense.bound(&map, &free, &end.x);
-    let row_x = dynamic(&end.row_x);
-    dense.bound(&(&row_x * &map), &(&row_x * &free), &end.rows);
+    dense.rows(ocp, n, (&map, &free), None);
     if let Some(target) = end.equality {
         let pinned = Bounds {
             lower: target,
@@ -65,8 +58,8 @@ pub fn condense<const NX: usize, const NU: usize, const N: usize, const NG: usiz
         };
         dense.bound(&map, &free, &pinned);
     }
-    let soft_x = ocp.soft_x.iter().chain(&end.soft_x);
-    let soft = soft_x.chain(&end.soft_rows).any(Option::is_some);
+    let mut soft_x = ocp.soft_x.iter().chain(&end.soft_x);
+    let soft = soft_x.any(Option::is_some) || ocp.rows.iter().any(|row| row.soft.is_some());
     (!soft).then_some(dense)
 }
 
@@ -75,6 +68,27 @@ fn dynamic<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) -> DMatrix<f6
 }
 
 impl Dense {
+    /// The general rows of stage `i`, where x = map u + free and the stage's input is `select` u.
+    fn rows<const NX: usize, const NU: usize>(
+        &mut self,
+        ocp: &Ocp<f64, NX, NU>,
+        i: usize,
+        (map, free): (&DMatrix<f64>, &DMatrix<f64>),
+        select: Option<&DMatrix<f64>>,
+    ) {
+        for row in (0..ocp.rows_per_stage).filter_map(|j| ocp.row(i, j)) {
+            let of_x = dynamic(&row.x.transpose());
+            let of_u = select.map(|select| dynamic(&row.u.transpose()) * select);
+            let through_x = &of_x * map;
+            let whole = of_u.map_or_else(|| through_x.clone(), |of_u| &through_x + of_u);
+            let limits = Bounds {
+                lower: Vector1::new(row.lower),
+                upper: Vector1::new(row.upper),
+            };
+            self.bound(&whole, &(&of_x * free), &limits);
+        }
+    }
+
     /// lower <= map * u + free <= upper
     fn bound<const K: usize>(
         &mut self,

@@ -3,22 +3,14 @@
 pub mod census;
 pub mod clarabel;
 pub mod least_distance;
+pub mod precision;
 pub mod problems;
 pub mod rng;
 
-use lpvmpc::{Ocp, Solution, Solver, SolverSettings, Status, WarmStart};
-
-/// `work` on a thread with a stack large enough for the longest horizons.
-pub fn on_large_stack<R: Send + 'static>(work: impl FnOnce() -> R + Send + 'static) -> R {
-    let thread = std::thread::Builder::new().stack_size(256 << 20);
-    match thread.spawn(work).unwrap().join() {
-        Ok(result) => result,
-        Err(panic) => std::panic::resume_unwind(panic),
-    }
-}
+use lpvmpc::{Capacity, Ocp, Scalar, Solution, Solver, SolverSettings, Status, WarmStart};
 
 /// Settings without a past, and with room for any number of changes that ends.
-pub fn cold() -> SolverSettings<f64> {
+pub fn cold<T: Scalar>() -> SolverSettings<T> {
     SolverSettings {
         warm_start: WarmStart::Cold,
         max_changes: 20_000,
@@ -26,14 +18,33 @@ pub fn cold() -> SolverSettings<f64> {
     }
 }
 
-/// The answer to `ocp` from a cold start.
-pub fn solve<const NX: usize, const NU: usize, const N: usize, const M: usize, const NG: usize>(
-    ocp: &Ocp<f64, NX, NU, N, NG>,
-) -> Solution<f64, NX, NU, N, M> {
-    let mut solver = Box::new(Solver::new());
-    let mut solution = Solution::default();
-    solver.solve(ocp, &cold(), &mut solution);
+/// Room for every bound of `ocp` at once, twice: a soft one may have two rows.
+pub fn capacity<T: Scalar, const NX: usize, const NU: usize>(ocp: &Ocp<T, NX, NU>) -> Capacity {
+    let stages = ocp.stages.len();
+    let rows = 2 * (stages * (NX + NU) + NX + ocp.rows.len());
+    Capacity {
+        stages,
+        rows,
+        active: rows,
+    }
+}
+
+/// The answer to `ocp` with these settings from a cold start.
+pub fn solve_with<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    settings: &SolverSettings<T>,
+) -> Solution<T, NX, NU> {
+    let room = capacity(ocp);
+    let mut solution = Solution::allocate(room);
+    Solver::allocate(room).solve(ocp, settings, &mut solution);
     solution
+}
+
+/// The answer to `ocp` from a cold start.
+pub fn solve<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+) -> Solution<T, NX, NU> {
+    solve_with(ocp, &cold())
 }
 
 /// Whether two verdicts of one problem can both be right: the same, or the proof that it is infeasible
@@ -55,6 +66,7 @@ pub fn kind<T>(status: &Status<T>) -> &'static str {
         Status::Inaccurate(_) => "inaccurate",
         Status::ChangeCap => "change cap",
         Status::WorkingSetFull => "working set full",
+        Status::HorizonTooLong => "horizon too long",
         Status::NumericalFailure { .. } => "numerical failure",
         Status::NotFinite => "not finite",
     }

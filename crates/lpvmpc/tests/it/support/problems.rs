@@ -1,8 +1,8 @@
 //! Random optimal control problems by family.
 
 use super::rng::Rng;
-use lpvmpc::{Bounds, Ocp, Penalty, Softness, Stage};
-use nalgebra::{DMatrix, SMatrix, SVector};
+use lpvmpc::{Bounds, Common, GeneralRow, List, Ocp, Penalty, Softness};
+use nalgebra::{DMatrix, SMatrix, SVector, Vector1};
 
 /// What a random problem is like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -56,14 +56,17 @@ impl Family {
     }
 }
 
-/// A problem with 1 to `longest` stages.
-pub fn problem<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+/// A problem with 1 to `longest` stages and `rows` general rows at each of them and at the end.
+pub fn problem<const NX: usize, const NU: usize>(
     rng: &mut Rng,
     family: Family,
     longest: usize,
-) -> Box<Ocp<f64, NX, NU, N, NG>> {
-    let mut ocp = Box::new(Ocp::default());
-    ocp.horizon = 1 + rng.index(longest.min(N));
+    rows: usize,
+) -> Ocp<f64, NX, NU> {
+    let mut ocp = Ocp::allocate(longest);
+    ocp.horizon = 1 + rng.index(longest);
+    ocp.rows = List::repeat(GeneralRow::default(), (longest + 1) * rows);
+    ocp.rows_per_stage = rows;
     dynamics(rng, &mut ocp);
     costs(rng, &mut ocp);
     if family == Family::NearlyParallel {
@@ -102,10 +105,7 @@ pub fn problem<const NX: usize, const NU: usize, const N: usize, const NG: usize
     ocp
 }
 
-fn dynamics<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
-    rng: &mut Rng,
-    ocp: &mut Ocp<f64, NX, NU, N, NG>,
-) {
+fn dynamics<const NX: usize, const NU: usize>(rng: &mut Rng, ocp: &mut Ocp<f64, NX, NU>) {
     // A dense matrix, or a small step of a continuous system; its free motion grows at most
     // a thousandfold over the horizon, and by a fifth per stage.
     let mut a: SMatrix<f64, NX, NX> = if rng.chance(0.5) {
@@ -131,10 +131,7 @@ fn spectral_radius<const K: usize>(a: &SMatrix<f64, K, K>) -> f64 {
     eigenvalues.iter().map(|z| z.norm()).fold(0.0, f64::max)
 }
 
-fn costs<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
-    rng: &mut Rng,
-    ocp: &mut Ocp<f64, NX, NU, N, NG>,
-) {
+fn costs<const NX: usize, const NU: usize>(rng: &mut Rng, ocp: &mut Ocp<f64, NX, NU>) {
     // [Q S'; S R] = G'G + diag(0, r) is semidefinite, whatever the rows of G.
     let state_factor: SMatrix<f64, 4, NX> = rng.matrix();
     let input_factor: SMatrix<f64, 4, NU> = if rng.chance(0.5) {
@@ -144,10 +141,10 @@ fn costs<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
     };
     let r = rng.power_of_ten(-2.0, 1.0);
     let slope = if rng.chance(0.5) { 1.0 } else { 0.0 };
+    ocp.common.q = state_factor.tr_mul(&state_factor);
+    ocp.common.s = input_factor.tr_mul(&state_factor);
+    ocp.common.r = input_factor.tr_mul(&input_factor) + SMatrix::identity() * r;
     for stage in &mut ocp.stages {
-        stage.q = state_factor.tr_mul(&state_factor);
-        stage.s = input_factor.tr_mul(&state_factor);
-        stage.r = input_factor.tr_mul(&input_factor) + SMatrix::identity() * r;
         stage.linear_x = rng.matrix() * slope;
         stage.linear_u = rng.matrix() * slope;
     }
@@ -156,30 +153,62 @@ fn costs<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
         ocp.terminal.p = terminal.tr_mul(&terminal);
     }
     ocp.terminal.linear_x = rng.matrix() * slope;
-    for stage in &mut ocp.stages {
-        stage.row_x = rng.matrix();
-        stage.row_u = rng.matrix();
-    }
-    ocp.terminal.row_x = rng.matrix();
+    random_rows(rng, ocp);
 }
 
-fn nearly_parallel_rows<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+/// General rows with normal coefficients, of all stages that there are; the last ones drawn are those
+/// of the end of the horizon.
+fn random_rows<const NX: usize, const NU: usize>(rng: &mut Rng, ocp: &mut Ocp<f64, NX, NU>) {
+    if ocp.rows_per_stage == 0 {
+        return;
+    }
+    let end = ocp.stages.len();
+    for (i, rows) in ocp.rows.chunks_mut(ocp.rows_per_stage).enumerate() {
+        for k in 0..NX {
+            rows.iter_mut().for_each(|row| row.x[k] = rng.normal());
+        }
+        for k in 0..if i < end { NU } else { 0 } {
+            rows.iter_mut().for_each(|row| row.u[k] = rng.normal());
+        }
+    }
+    let last = rows_of(ocp, end).to_vec();
+    rows_of(ocp, ocp.horizon).copy_from_slice(&last);
+}
+
+/// The general rows of stage `i`.
+fn rows_of<const NX: usize, const NU: usize>(
+    ocp: &mut Ocp<f64, NX, NU>,
+    i: usize,
+) -> &mut [GeneralRow<f64, NX, NU>] {
+    let first = i * ocp.rows_per_stage;
+    &mut ocp.rows[first..first + ocp.rows_per_stage]
+}
+
+/// The weights and bounds of all stages, those that a problem has in common included.
+pub fn each_common<const NX: usize, const NU: usize>(
+    ocp: &mut Ocp<f64, NX, NU>,
+) -> impl Iterator<Item = &mut Common<f64, NX, NU>> {
+    ocp.own.iter_mut().chain(std::iter::once(&mut ocp.common))
+}
+
+fn nearly_parallel_rows<const NX: usize, const NU: usize>(
     rng: &mut Rng,
-    ocp: &mut Ocp<f64, NX, NU, N, NG>,
+    ocp: &mut Ocp<f64, NX, NU>,
 ) {
     let angle = rng.power_of_ten(-7.0, -3.0);
-    let same = SMatrix::<f64, NG, NX>::from_fn(|i, j| if i % NX == j { 1.0 } else { 0.0 });
-    for stage in &mut ocp.stages {
-        stage.row_x = same + rng.matrix() * angle;
-        stage.row_u = rng.matrix() * angle;
+    random_rows(rng, ocp);
+    let count = ocp.rows_per_stage;
+    for (index, row) in ocp.rows.iter_mut().enumerate() {
+        row.x *= angle;
+        row.u *= angle;
+        row.x[index % count % NX] += 1.0;
     }
-    ocp.terminal.row_x = same + rng.matrix() * angle;
 }
 
 /// Inputs in [-1, 1] and the states x_0.. that they lead to.
-fn feasible_trajectory<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+fn feasible_trajectory<const NX: usize, const NU: usize>(
     rng: &mut Rng,
-    ocp: &mut Ocp<f64, NX, NU, N, NG>,
+    ocp: &mut Ocp<f64, NX, NU>,
 ) -> (Vec<SVector<f64, NX>>, Vec<SVector<f64, NU>>) {
     let mut x = vec![ocp.x0];
     let mut u = Vec::new();
@@ -209,44 +238,55 @@ fn around<const K: usize>(
     bounds
 }
 
-fn bounds_around<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+fn bounds_around<const NX: usize, const NU: usize>(
     rng: &mut Rng,
-    ocp: &mut Ocp<f64, NX, NU, N, NG>,
+    ocp: &mut Ocp<f64, NX, NU>,
     x: &[SVector<f64, NX>],
     u: &[SVector<f64, NU>],
     margin: fn(&mut Rng) -> f64,
 ) {
     let presence = [0.15, 0.5, 1.0][rng.index(3)];
     let n = ocp.horizon;
-    for (i, stage) in ocp.stages.iter_mut().enumerate().take(n) {
-        stage.x = around(rng, &x[i], margin, presence);
-        stage.u = around(rng, &u[i], margin, presence);
-        let rows = stage.row_x * x[i] + stage.row_u * u[i];
-        stage.rows = around(rng, &rows, margin, presence);
+    ocp.own = List::repeat(ocp.common, ocp.stages.len());
+    for i in 0..n {
+        ocp.own[i].x = around(rng, &x[i], margin, presence);
+        ocp.own[i].u = around(rng, &u[i], margin, presence);
+        for row in rows_of(ocp, i) {
+            let value = row.x.dot(&x[i]) + row.u.dot(&u[i]);
+            bound_row(row, &around(rng, &Vector1::new(value), margin, presence));
+        }
     }
     ocp.terminal.x = around(rng, &x[n], margin, presence);
-    let rows = ocp.terminal.row_x * x[n];
-    ocp.terminal.rows = around(rng, &rows, margin, presence);
+    for row in rows_of(ocp, n) {
+        let value = row.x.dot(&x[n]);
+        bound_row(row, &around(rng, &Vector1::new(value), margin, presence));
+    }
+}
+
+fn bound_row<const NX: usize, const NU: usize>(
+    row: &mut GeneralRow<f64, NX, NU>,
+    bounds: &Bounds<f64, 1>,
+) {
+    (row.lower, row.upper) = (bounds.lower[0], bounds.upper[0]);
 }
 
 /// The same random box at every stage.
-fn arbitrary_bounds<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
-    rng: &mut Rng,
-    ocp: &mut Ocp<f64, NX, NU, N, NG>,
-) {
+fn arbitrary_bounds<const NX: usize, const NU: usize>(rng: &mut Rng, ocp: &mut Ocp<f64, NX, NU>) {
     let zero = |rng: &mut Rng| rng.uniform(0.3, 2.0);
     let x = around(rng, &SVector::zeros(), zero, 0.5);
     let u = around(rng, &SVector::zeros(), zero, 0.8);
-    let rows = around(rng, &SVector::zeros(), zero, 0.5);
-    for stage in &mut ocp.stages {
-        (stage.x, stage.u, stage.rows) = (x, u, rows);
+    (ocp.common.x, ocp.common.u, ocp.terminal.x) = (x, u, x);
+    for j in 0..ocp.rows_per_stage {
+        let bounds = around(rng, &Vector1::zeros(), zero, 0.5);
+        for row in ocp.rows.iter_mut().skip(j).step_by(ocp.rows_per_stage) {
+            bound_row(row, &bounds);
+        }
     }
-    (ocp.terminal.x, ocp.terminal.rows) = (x, rows);
 }
 
-fn soften<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
+fn soften<const NX: usize, const NU: usize>(
     rng: &mut Rng,
-    ocp: &mut Ocp<f64, NX, NU, N, NG>,
+    ocp: &mut Ocp<f64, NX, NU>,
     family: Family,
 ) {
     let linear = if family == Family::SoftQuadratic {
@@ -260,30 +300,24 @@ fn soften<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
         rng.power_of_ten(-1.0, 4.0)
     };
     let price = Some(Penalty { linear, quadratic });
-    for stage in &mut ocp.stages {
-        stage.soft_rows = [price; NG];
+    for row in &mut ocp.rows {
+        row.soft = price;
     }
     ocp.soft_x = [price; NX];
     ocp.terminal.soft_x = [price; NX];
-    ocp.terminal.soft_rows = [price; NG];
 }
 
 /// Moves one state bound beyond the reach of the inputs, whose bounds become finite.
-fn unreachable_bound<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
-    rng: &mut Rng,
-    ocp: &mut Ocp<f64, NX, NU, N, NG>,
-) {
-    for stage in &mut ocp.stages {
-        for j in 0..NU {
-            stage.u.lower[j] = stage.u.lower[j].max(-2.0);
-            stage.u.upper[j] = stage.u.upper[j].min(2.0);
-        }
+fn unreachable_bound<const NX: usize, const NU: usize>(rng: &mut Rng, ocp: &mut Ocp<f64, NX, NU>) {
+    for Common { u, .. } in each_common(ocp) {
+        u.lower = u.lower.map(|lower| lower.max(-2.0));
+        u.upper = u.upper.map(|upper| upper.min(2.0));
     }
     let stage = 1 + rng.index(ocp.horizon);
     let component = rng.index(NX);
     let (lowest, highest) = reach(ocp, stage, component);
     let margin = rng.power_of_ten(-3.0, 0.0) * (1.0 + highest.abs().max(lowest.abs()));
-    let bounds = match ocp.stages.get_mut(stage) {
+    let bounds = match ocp.own.get_mut(stage) {
         Some(inner) if stage < ocp.horizon => &mut inner.x,
         _ => &mut ocp.terminal.x,
     };
@@ -297,17 +331,18 @@ fn unreachable_bound<const NX: usize, const NU: usize, const N: usize, const NG:
 }
 
 /// Least and largest value of a component of x_`stage` over all inputs within their bounds.
-fn reach<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
-    ocp: &Ocp<f64, NX, NU, N, NG>,
+fn reach<const NX: usize, const NU: usize>(
+    ocp: &Ocp<f64, NX, NU>,
     stage: usize,
     component: usize,
 ) -> (f64, f64) {
     let mut costate = SVector::<f64, NX>::from_fn(|i, _| f64::from(i == component));
     let (mut lowest, mut highest) = (0.0, 0.0);
-    for inner in ocp.stages.iter().take(stage).rev() {
+    for (i, inner) in ocp.stages.iter().enumerate().take(stage).rev() {
         let effect = inner.b.tr_mul(&costate);
+        let Bounds { lower, upper } = ocp.common_at(i).u;
         for j in 0..NU {
-            let ends = [effect[j] * inner.u.lower[j], effect[j] * inner.u.upper[j]];
+            let ends = [effect[j] * lower[j], effect[j] * upper[j]];
             lowest += ends[0].min(ends[1]);
             highest += ends[0].max(ends[1]);
         }
@@ -320,48 +355,38 @@ fn reach<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
 }
 
 /// States and inputs in units between 1e-2 and 1e2, the cost in units between 1e-4 and 1e4.
-pub fn change_units<const NX: usize, const NU: usize, const N: usize, const NG: usize>(
-    rng: &mut Rng,
-    ocp: &mut Ocp<f64, NX, NU, N, NG>,
-) {
+pub fn change_units<const NX: usize, const NU: usize>(rng: &mut Rng, ocp: &mut Ocp<f64, NX, NU>) {
     let x = SVector::<f64, NX>::from_fn(|_, _| rng.power_of_ten(-2.0, 2.0));
     let u = SVector::<f64, NU>::from_fn(|_, _| rng.power_of_ten(-2.0, 2.0));
     let cost = rng.power_of_ten(-4.0, 4.0);
     ocp.x0.component_mul_assign(&x);
+    let inverse = x.map(f64::recip);
     for stage in &mut ocp.stages {
-        stage_in_units(stage, &x, &u, cost);
+        stage.a = divide(&stage.a, &inverse, &x);
+        stage.b = divide(&stage.b, &inverse, &u);
+        stage.c.component_mul_assign(&x);
+        stage.linear_x = stage.linear_x.component_div(&x) * cost;
+        stage.linear_u = stage.linear_u.component_div(&u) * cost;
+    }
+    for common in each_common(ocp) {
+        common.q = divide(&common.q, &x, &x) * cost;
+        common.r = divide(&common.r, &u, &u) * cost;
+        common.s = divide(&common.s, &u, &x) * cost;
+        scale_bounds(&mut common.x, &x);
+        scale_bounds(&mut common.u, &u);
+    }
+    for row in &mut ocp.rows {
+        row.x.component_div_assign(&x);
+        row.u.component_div_assign(&u);
     }
     let end = &mut ocp.terminal;
     end.p = divide(&end.p, &x, &x) * cost;
     end.linear_x.component_div_assign(&x);
     end.linear_x *= cost;
     scale_bounds(&mut end.x, &x);
-    end.row_x = divide(&end.row_x, &SVector::repeat(1.0), &x);
     if let Some(target) = &mut end.equality {
         target.component_mul_assign(&x);
     }
-}
-
-fn stage_in_units<const NX: usize, const NU: usize, const NG: usize>(
-    stage: &mut Stage<f64, NX, NU, NG>,
-    x: &SVector<f64, NX>,
-    u: &SVector<f64, NU>,
-    cost: f64,
-) {
-    let one = SVector::repeat(1.0);
-    let inverse = x.map(f64::recip);
-    stage.a = divide(&stage.a, &inverse, x);
-    stage.b = divide(&stage.b, &inverse, u);
-    stage.c.component_mul_assign(x);
-    stage.q = divide(&stage.q, x, x) * cost;
-    stage.r = divide(&stage.r, u, u) * cost;
-    stage.s = divide(&stage.s, u, x) * cost;
-    stage.linear_x = stage.linear_x.component_div(x) * cost;
-    stage.linear_u = stage.linear_u.component_div(u) * cost;
-    scale_bounds(&mut stage.x, x);
-    scale_bounds(&mut stage.u, u);
-    stage.row_x = divide(&stage.row_x, &one, x);
-    stage.row_u = divide(&stage.row_u, &one, u);
 }
 
 /// m_ij / (rows_i columns_j)

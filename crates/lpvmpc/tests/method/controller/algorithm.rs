@@ -1,9 +1,10 @@
 //! Algorithm 2: scheduling from the rollout of the previous plan, and what a controller keeps
 //! from sample to sample.
 
-use super::{Memory, Sized, controller, moving_reference, settings, tilted};
+use super::{along, controller, moving, settings, tilted};
 use crate::cart_pole::textbook;
 use crate::plant::CartPole;
+use crate::regulator::Regulator;
 use crate::runge_kutta::integrate;
 use lpvmpc::{
     Bounds, Controller, ControllerSettings, InputReference, Iterations, LpvModel, Reference, Rk4,
@@ -17,9 +18,9 @@ fn plant_moves(x: &Vector4<f64>, u: &Vector1<f64>) -> Vector4<f64> {
 }
 
 /// Asserts that the program's matrices are those of the scheduling `window`.
-fn assert_window<const N: usize, const M: usize>(
-    controller: &Sized<N, M>,
-    workspace: &Memory<N, M>,
+fn assert_window(
+    controller: &Regulator,
+    workspace: &Workspace<f64, 4, 1>,
     window: &[Vector2<f64>],
 ) {
     let plant = CartPole::laboratory();
@@ -41,12 +42,13 @@ fn the_scheduling_is_that_of_the_last_rollout_one_stage_on() {
     let plant = CartPole::laboratory();
     let settings = settings(N);
     let substeps = settings.predictor.rk4().substeps;
-    let mut controller: Sized<N, N> = controller(settings);
-    let mut workspace = Memory::new();
+    let mut controller = controller(settings);
+    let mut workspace = controller.workspace();
     let mut x = tilted();
     let mut window = vec![Vector2::new(x[1], x[3]); N];
     for k in 0..40 {
-        let reference = moving_reference(k);
+        let states = moving(N, k);
+        let reference = along(&states);
         let plan = controller.step(&x, &reference, &mut workspace).clone();
         assert_eq!(plan.status, Status::Solved);
         assert_eq!(workspace.ocp().x0, x);
@@ -68,14 +70,14 @@ fn the_scheduling_is_that_of_the_last_rollout_one_stage_on() {
 fn held_scheduling_stays() {
     const N: usize = 8;
     let held = Vector2::new(0.2, -0.5);
-    let mut controller: Sized<N, N> = controller(ControllerSettings {
+    let mut controller = controller(ControllerSettings {
         scheduling: Scheduling::Held(held),
         ..settings(N)
     });
-    let mut workspace = Memory::new();
+    let mut workspace = controller.workspace();
     let mut x = tilted();
     for k in 0..10 {
-        let u = controller.step(&x, &moving_reference(k), &mut workspace).u[0];
+        let u = controller.step(&x, &along(&moving(N, k)), &mut workspace).u[0];
         assert_window(&controller, &workspace, &[held; N]);
         x = plant_moves(&x, &u);
     }
@@ -86,13 +88,13 @@ fn held_scheduling_stays() {
 #[test]
 fn the_plan_is_the_optimum_of_the_program() {
     const N: usize = 20;
-    let mut controller: Sized<N, N> = controller(settings(N));
-    let mut workspace = Memory::new();
+    let mut controller = controller(settings(N));
+    let mut workspace = controller.workspace();
     let mut x = tilted();
     let mut most_active = 0;
     for k in 0..40 {
         let plan = controller
-            .step(&x, &moving_reference(k), &mut workspace)
+            .step(&x, &along(&moving(N, k)), &mut workspace)
             .clone();
         let residual = kkt_residual(workspace.ocp(), &plan);
         // Relative to the largest term; the solver's own tolerance is 4e-11.
@@ -108,14 +110,15 @@ fn the_plan_is_the_optimum_of_the_program() {
 fn the_tracking_cost_is_twice_the_programs_plus_the_constant() {
     const N: usize = 12;
     for terminal in [settings(N).terminal, TerminalIngredient::Equality] {
-        let mut controller: Sized<N, { N + 4 }> = controller(ControllerSettings {
+        let mut controller = controller(ControllerSettings {
             terminal,
             ..settings(N)
         });
-        let mut workspace = Memory::new();
+        let mut workspace = controller.workspace();
         let mut x = Vector4::new(0.05, 0.02, 0.3, 0.0);
         for k in 0..10 {
-            let reference = moving_reference(k);
+            let states = moving(N, k);
+            let reference = along(&states);
             let plan = controller.step(&x, &reference, &mut workspace).clone();
             assert_eq!(plan.status, Status::Solved);
             let q = controller.settings().weights.q;
@@ -141,13 +144,15 @@ fn the_tracking_cost_is_twice_the_programs_plus_the_constant() {
 #[test]
 fn the_terminal_equality_is_met() {
     const N: usize = 20;
-    let mut controller: Sized<N, { N + 4 }> = controller(ControllerSettings {
+    let mut controller = controller(ControllerSettings {
         terminal: TerminalIngredient::Equality,
         ..settings(N)
     });
-    let reference = moving_reference(3);
+    let states = moving(N, 3);
+    let reference = along(&states);
     let x = Vector4::new(0.05, 0.1, 0.0, 0.0);
-    let plan = controller.step(&x, &reference, &mut Memory::new());
+    let mut workspace = controller.workspace();
+    let plan = controller.step(&x, &reference, &mut workspace);
     assert_eq!(plan.status, Status::Solved);
     assert!((plan.x[N - 1] - reference.terminal).norm() <= 1e-9);
 }
@@ -155,9 +160,10 @@ fn the_terminal_equality_is_met() {
 #[test]
 fn reset_forgets_the_past() {
     const N: usize = 20;
-    let mut controller: Sized<N, N> = controller(settings(N));
-    let mut workspace = Memory::new();
-    let reference = moving_reference(0);
+    let mut controller = controller(settings(N));
+    let mut workspace = controller.workspace();
+    let states = moving(N, 0);
+    let reference = along(&states);
     let first = controller
         .step(&tilted(), &reference, &mut workspace)
         .clone();
@@ -169,57 +175,6 @@ fn reset_forgets_the_past() {
     controller.reset();
     let again = controller.step(&tilted(), &reference, &mut workspace);
     assert_eq!(again, &first);
-}
-
-#[test]
-fn a_workspace_carries_nothing_between_controllers() {
-    const N: usize = 20;
-    let new = || -> Sized<N, N> { controller(settings(N)) };
-    let (mut first, mut second) = (new(), new());
-    let (mut first_alone, mut second_alone) = (new(), new());
-    let mut shared = Memory::new();
-    let (mut memory, mut other_memory) = (Memory::new(), Memory::new());
-    let (mut x, mut y) = (tilted(), Vector4::new(-0.3, -0.2, 0.5, 0.0));
-    for k in 0..30 {
-        let (one, other) = (moving_reference(k), moving_reference(2 * k + 7));
-        let u = first.step(&x, &one, &mut shared).u[0];
-        let v = second.step(&y, &other, &mut shared).u[0];
-        assert_eq!(first.solution(), first_alone.step(&x, &one, &mut memory));
-        let alone = second_alone.step(&y, &other, &mut other_memory);
-        assert_eq!(second.solution(), alone);
-        (x, y) = (plant_moves(&x, &u), plant_moves(&y, &v));
-    }
-}
-
-/// The horizon of the settings against one compiled in, bit by bit.
-#[test]
-fn a_short_horizon_is_that_of_a_smaller_controller() {
-    const SHORT: usize = 11;
-    const LONG: usize = 25;
-    let mut short: Sized<SHORT, SHORT> = controller(settings(SHORT));
-    let mut long: Sized<LONG, SHORT> = controller(settings(SHORT));
-    let (mut workspace, mut long_workspace) = (Memory::new(), Memory::new());
-    let mut x = tilted();
-    for k in 0..30 {
-        let reference = moving_reference::<SHORT>(k);
-        let mut padded = Reference::constant(Vector4::repeat(f64::NAN));
-        padded.stages[..SHORT].copy_from_slice(&reference.stages);
-        padded.terminal = reference.terminal;
-        let expected = short.step(&x, &reference, &mut workspace).clone();
-        let found = long.step(&x, &padded, &mut long_workspace).clone();
-        assert_eq!(found.u[..SHORT], expected.u);
-        assert_eq!(found.x[..SHORT], expected.x);
-        assert_eq!(found.cost, expected.cost);
-        assert_eq!(found.status, expected.status);
-        assert_eq!(found.active, expected.active);
-        assert_eq!(found.changes, expected.changes);
-        assert_eq!(long.rollout(), short.rollout());
-        assert_eq!(
-            long.tracking_cost(&x, &padded),
-            short.tracking_cost(&x, &reference)
-        );
-        x = plant_moves(&x, &expected.u[0]);
-    }
 }
 
 /// The example's settings in single precision.
@@ -259,17 +214,18 @@ fn single(settings: &ControllerSettings<f64, 4, 1, 2>) -> ControllerSettings<f32
 fn single_precision_is_close_to_double() {
     const N: usize = 20;
     let settings = settings(N);
-    let mut double: Sized<N, N> = controller(settings);
+    let mut double = controller(settings);
     let plant = CartPole::<f32>::laboratory();
-    let mut narrow: Controller<CartPole<f32>, f32, 4, 1, 2, N, N> =
-        Controller::new(plant, single(&settings)).unwrap();
-    let (mut workspace, mut narrow_workspace) = (Memory::new(), Workspace::new());
+    let mut narrow = Controller::allocate(plant, single(&settings)).unwrap();
+    let (mut workspace, mut narrow_workspace) = (double.workspace(), narrow.workspace());
     let mut x = tilted();
     for k in 0..60 {
-        let reference = moving_reference::<N>(k);
+        let states = moving(N, k);
+        let reference = along(&states);
+        let narrow_states: Vec<Vector4<f32>> = states.iter().map(|x| x.cast()).collect();
         let narrow_reference = Reference {
-            stages: reference.stages.map(|r| r.cast()),
-            terminal: reference.terminal.cast(),
+            stages: &narrow_states[..N],
+            terminal: narrow_states[N],
         };
         let u = double.step(&x, &reference, &mut workspace).u[0];
         let plan = narrow.step(&x.cast(), &narrow_reference, &mut narrow_workspace);
@@ -277,39 +233,5 @@ fn single_precision_is_close_to_double() {
         let error = (f64::from(plan.u[0][0]) - u[0]).abs();
         assert!(error <= 1e-3 * settings.u.upper[0], "sample {k}: {error}");
         x = plant_moves(&x, &u);
-    }
-}
-
-/// One workspace for two controllers with other weights, bounds, ends and horizons leaves no
-/// trace of the one in the plan of the other.
-#[test]
-fn controllers_that_share_a_workspace_do_not_see_each_other() {
-    const N: usize = 12;
-    let other = ControllerSettings {
-        horizon: N - 4,
-        weights: Weights {
-            q: settings(N).weights.q * 3.0,
-            r: settings(N).weights.r * 0.5,
-        },
-        terminal: TerminalIngredient::Equality,
-        u: Bounds {
-            lower: Vector1::new(-50.0),
-            upper: Vector1::new(60.0),
-        },
-        ..settings(N)
-    };
-    let mut alone: [Sized<N, { N + 4 }>; 2] = [controller(settings(N)), controller(other)];
-    let mut together = alone.clone();
-    let mut own = [Memory::new(), Memory::new()];
-    let mut shared = Memory::new();
-    let x = Vector4::new(0.05, 0.02, 0.3, 0.0);
-    for k in 0..4 {
-        let reference = moving_reference(k);
-        for (i, memory) in own.iter_mut().enumerate() {
-            let expected = alone[i].step(&x, &reference, memory);
-            let found = together[i].step(&x, &reference, &mut shared);
-            assert_eq!(found, expected, "controller {i}, sample {k}");
-            assert!(found.status.is_solved());
-        }
     }
 }

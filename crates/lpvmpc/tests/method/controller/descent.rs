@@ -1,7 +1,7 @@
 //! The descent: every program is an improvement or is not taken, the plan is a rollout of the
 //! nonlinear model, and a step can be taken in two parts.
 
-use super::{Memory, Sized, assert_safe, controller, settings};
+use super::{assert_safe, controller, settings};
 use crate::plant::CartPole;
 use crate::rng::Rng;
 use lpvmpc::{
@@ -11,10 +11,7 @@ use lpvmpc::{
 use nalgebra::{Matrix4, SMatrix, Vector1, Vector4};
 
 const N: usize = 20;
-/// Exceeded soft bounds are active rows, too.
-const M: usize = 2 * N;
 const RK4: Rk4 = Rk4 { substeps: 2 };
-type Descent = Sized<N, M>;
 
 fn descent(most: usize) -> ControllerSettings<f64, 4, 1, 2> {
     let mut soft_x = [None; 4];
@@ -39,12 +36,12 @@ fn random_state(rng: &mut Rng) -> Vector4<f64> {
     limits.map(|limit| rng.uniform(-limit, limit))
 }
 
-fn set_point(position: f64) -> Reference<f64, 4, N> {
+fn set_point(position: f64) -> Reference<'static, f64, 4> {
     Reference::constant(Vector4::new(position, 0.0, 0.0, 0.0))
 }
 
 /// The merit written out anew: cost of the rollout of the planned inputs, and the track's ends.
-fn merit(x0: &Vector4<f64>, plan: &[Vector1<f64>; N], reference: &Reference<f64, 4, N>) -> f64 {
+fn merit(x0: &Vector4<f64>, plan: &[Vector1<f64>], reference: &Reference<'_, f64, 4>) -> f64 {
     let settings = descent(1);
     let TerminalIngredient::Cost(p) = settings.terminal else {
         panic!("the example has a terminal cost");
@@ -53,7 +50,7 @@ fn merit(x0: &Vector4<f64>, plan: &[Vector1<f64>; N], reference: &Reference<f64,
     let mut x = *x0;
     let mut total = 0.0;
     for (i, u) in plan.iter().enumerate() {
-        let error = x - reference.stages[i];
+        let error = x - reference.at(i);
         let beyond = if i > 0 {
             (x[0].abs() - 2.4).max(0.0)
         } else {
@@ -70,11 +67,11 @@ fn merit(x0: &Vector4<f64>, plan: &[Vector1<f64>; N], reference: &Reference<f64,
 #[test]
 fn every_program_is_an_improvement_or_is_not_taken() {
     let mut rng = Rng::new(21);
-    let mut memory = Memory::new();
+    let mut memory = controller(descent(1)).workspace();
     for _ in 0..200 {
         let (x, reference) = (random_state(&mut rng), set_point(rng.uniform(0.0, 2.0)));
         let costs = [1, 2, 3, 5, 8, 13].map(|most| {
-            let mut tried: Descent = controller(descent(most));
+            let mut tried = controller(descent(most));
             let plan = tried.step(&x, &reference, &mut memory).clone();
             assert_safe(&plan, &settings(N).u);
             assert!(plan.status.is_solved(), "{}", plan.status);
@@ -91,10 +88,10 @@ fn every_program_is_an_improvement_or_is_not_taken() {
 #[test]
 fn the_plan_is_a_rollout() {
     let mut rng = Rng::new(22);
-    let mut memory = Memory::new();
+    let mut memory = controller(descent(1)).workspace();
     for _ in 0..50 {
         let x = random_state(&mut rng);
-        let mut tried: Descent = controller(descent(8));
+        let mut tried = controller(descent(8));
         let plan = tried.step(&x, &set_point(1.0), &mut memory);
         let mut state = x;
         for (u, planned) in plan.u.iter().zip(&plan.x) {
@@ -109,14 +106,14 @@ fn the_plan_is_a_rollout() {
 #[test]
 fn converged_plans_are_stationary() {
     let mut rng = Rng::new(23);
-    let mut memory = Memory::new();
+    let mut memory = controller(descent(1)).workspace();
     let mut converged = 0;
     for _ in 0..60 {
         let (x, reference) = (
             random_state(&mut rng) * 0.5,
             set_point(rng.uniform(0.0, 1.0)),
         );
-        let mut tried: Descent = controller(descent(40));
+        let mut tried = controller(descent(40));
         let plan = tried.step(&x, &reference, &mut memory).clone();
         if plan.status != Status::Converged {
             continue;
@@ -124,7 +121,7 @@ fn converged_plans_are_stationary() {
         converged += 1;
         let cost = merit(&x, &plan.u, &reference);
         for (i, step) in (0..N).flat_map(|i| [(i, 0.05), (i, -0.05)]) {
-            let mut moved = plan.u;
+            let mut moved = plan.u.clone();
             moved[i][0] = (moved[i][0] + step).clamp(-15.0, 15.0);
             let other = merit(&x, &moved, &reference);
             assert!(other > cost * (1.0 - 1e-3), "stage {i}: {other} < {cost}");
@@ -137,8 +134,8 @@ fn converged_plans_are_stationary() {
 /// time, and rest at the set point where the pole did not fall.
 #[test]
 fn jumps_and_pushes_leave_a_plan() {
-    let mut memory = Memory::new();
-    let mut tried: Descent = controller(descent(8));
+    let mut memory = controller(descent(1)).workspace();
+    let mut tried = controller(descent(8));
     let plant = CartPole::laboratory();
     let mut x = Vector4::zeros();
     for k in 0..300 {
@@ -158,9 +155,9 @@ fn jumps_and_pushes_leave_a_plan() {
 /// sample is enough then.
 #[test]
 fn rounding_is_not_improved_on() {
-    let mut memory = Memory::new();
+    let mut memory = controller(descent(1)).workspace();
     let plant = CartPole::laboratory();
-    let mut tried: Descent = controller(descent(8));
+    let mut tried = controller(descent(8));
     let mut x = Vector4::new(0.0, 0.1, 0.0, 0.0);
     for k in 0..600 {
         let plan = tried.step(&x, &set_point(2.0), &mut memory);
@@ -176,12 +173,12 @@ fn rounding_is_not_improved_on() {
 /// good sample is a first one.
 #[test]
 fn numbers_that_are_none_are_refused() {
-    let mut memory = Memory::new();
-    let mut fresh: Descent = controller(descent(8));
+    let mut memory = controller(descent(1)).workspace();
+    let mut fresh = controller(descent(8));
     let x = Vector4::new(0.1, 0.2, 0.0, 0.0);
-    let expected = fresh.step(&x, &set_point(1.0), &mut memory).u;
+    let expected = fresh.step(&x, &set_point(1.0), &mut memory).u.clone();
     for bad in [f64::NAN, f64::INFINITY, 1e300] {
-        let mut tried: Descent = controller(descent(8));
+        let mut tried = controller(descent(8));
         tried.step(&x, &set_point(1.0), &mut memory);
         let broken = Vector4::new(0.1, bad, 0.0, 0.0);
         for (x, goal) in [(broken, 1.0), (x, bad)] {
@@ -205,9 +202,9 @@ fn numbers_that_are_none_are_refused() {
 /// A terminal equality is met by the nonlinear model, from as far as torque and time allow.
 #[test]
 fn a_terminal_equality_holds_for_the_model() {
-    let mut memory = Memory::new();
+    let mut memory = controller(descent(1)).workspace();
     for distance in [0.05, 0.1, 0.3] {
-        let mut tried: Descent = controller(ControllerSettings {
+        let mut tried = controller(ControllerSettings {
             terminal: TerminalIngredient::Equality,
             iterations: Iterations::Descent {
                 tolerance: 1e-6,
@@ -229,17 +226,16 @@ fn a_terminal_equality_holds_for_the_model() {
 /// not depend on the measured state.
 #[test]
 fn a_step_of_the_paper_can_be_taken_in_two_parts() {
-    let (mut whole, mut parts): (Descent, Descent) =
-        (controller(settings(N)), controller(settings(N)));
-    let (mut memory, mut own) = (Memory::new(), Memory::new());
+    let [mut whole, mut parts] = [settings(N), settings(N)].map(controller);
+    let (mut memory, mut own) = (whole.workspace(), parts.workspace());
     let plant = CartPole::laboratory();
     let mut x = Vector4::new(0.1, 0.3, 0.0, 0.0);
     for k in 0..60 {
         let reference = set_point(if k < 30 { 0.0 } else { 0.5 });
         parts.prepare(&reference, &mut own);
-        let found = parts.feedback(&x, &reference, &mut own).u;
-        let expected = whole.step(&x, &reference, &mut memory).u;
-        for (found, expected) in found.iter().zip(&expected) {
+        let found = parts.feedback(&x, &reference, &mut own).u.clone();
+        let expected = &whole.step(&x, &reference, &mut memory).u;
+        for (found, expected) in found.iter().zip(expected) {
             assert!((found - expected).amax() < 1e-12, "sample {k}");
         }
         x = RK4.advance(&plant, &x, &expected[0], 0.05);
@@ -252,8 +248,8 @@ fn a_step_of_the_paper_can_be_taken_in_two_parts() {
 fn a_descent_can_be_taken_in_two_parts() {
     let plant = CartPole::laboratory();
     let run = |split: bool| {
-        let mut tried: Descent = controller(descent(8));
-        let mut memory = Memory::new();
+        let mut tried = controller(descent(8));
+        let mut memory = tried.workspace();
         let mut x = Vector4::new(0.0, 0.4, 0.0, 0.0);
         let mut total = 0.0;
         for k in 0..200 {

@@ -1,7 +1,7 @@
 //! Samples that go wrong: the status says how, the input can be applied all the same, and the
 //! next good sample is as good as ever.
 
-use super::{Memory, Sized, assert_safe, controller, moving_reference, settings, tilted};
+use super::{along, assert_safe, controller, moving, settings, tilted};
 use lpvmpc::{
     Bounds, ControllerSettings, Quantity, Reference, Scheduling, Side, Solution, Status,
     TerminalIngredient,
@@ -51,12 +51,13 @@ fn a_state_that_is_not_finite() {
 }
 
 fn survives_broken_states(settings: ControllerSettings<f64, 4, 1, 2>, broken: &Vector4<f64>) {
-    let reference = moving_reference(0);
-    let mut workspace = Memory::new();
-    let mut fresh: Sized<N, N> = controller(settings);
+    let states = moving(N, 0);
+    let reference = along(&states);
+    let mut fresh = controller(settings);
+    let mut workspace = fresh.workspace();
     let expected = fresh.step(&tilted(), &reference, &mut workspace).clone();
 
-    let mut tried: Sized<N, N> = controller(settings);
+    let mut tried = controller(settings);
     for good_samples in [0, 3] {
         for _ in 0..good_samples {
             tried.step(&tilted(), &reference, &mut workspace);
@@ -77,11 +78,12 @@ fn survives_broken_states(settings: ControllerSettings<f64, 4, 1, 2>, broken: &V
 /// that plan may be of no use either; the one after it is built on good states alone.
 #[test]
 fn a_spike_is_forgotten_after_one_good_sample() {
-    let reference = moving_reference(0);
-    let mut workspace = Memory::new();
+    let states = moving(N, 0);
+    let reference = along(&states);
+    let mut workspace = controller(settings(N)).workspace();
     for component in 0..4 {
         for spike in [1e3, -1e6, 1e20, -1e200, f64::MAX] {
-            let mut tried: Sized<N, N> = controller(settings(N));
+            let mut tried = controller(settings(N));
             let mut x = tilted();
             x[component] = spike;
             for state in [tilted(), x, tilted()] {
@@ -98,16 +100,17 @@ fn a_spike_is_forgotten_after_one_good_sample() {
 /// `reset` forgets the last plan's inputs too: a broken first sample must not replay them.
 #[test]
 fn a_broken_state_after_a_reset_is_a_broken_first_sample() {
-    let reference = moving_reference(0);
-    let mut workspace = Memory::new();
+    let states = moving(N, 0);
+    let reference = along(&states);
+    let mut workspace = controller(settings(N)).workspace();
     for broken in broken_states() {
-        let mut fresh: Sized<N, N> = controller(settings(N));
-        let expected = fresh.step(&broken, &reference, &mut workspace).u;
-        let mut used: Sized<N, N> = controller(settings(N));
+        let mut fresh = controller(settings(N));
+        let expected = &fresh.step(&broken, &reference, &mut workspace).u;
+        let mut used = controller(settings(N));
         used.step(&tilted(), &reference, &mut workspace);
         used.reset();
         let plan = used.step(&broken, &reference, &mut workspace);
-        assert_eq!(plan.u, expected, "{broken}");
+        assert_eq!(&plan.u, expected, "{broken}");
     }
 }
 
@@ -118,20 +121,18 @@ fn a_reference_that_is_not_finite() {
             terminal,
             ..settings(N)
         };
-        let mut tried: Sized<N, { N + 4 }> = controller(settings);
-        let mut workspace = Memory::new();
+        let mut tried = controller(settings);
+        let mut workspace = tried.workspace();
         let x = Vector4::new(0.0, 0.1, 0.0, 0.0);
         for entry in [f64::NAN, f64::INFINITY] {
-            let good = moving_reference::<N>(0);
-            let mut in_a_stage = good;
-            in_a_stage.stages[N / 2][0] = entry;
-            let mut at_the_end = good;
-            at_the_end.terminal[1] = entry;
-            for broken in [in_a_stage, at_the_end] {
-                let plan = tried.step(&x, &broken, &mut workspace);
+            for (stage, component) in [(N / 2, 0), (N, 1)] {
+                let good = moving(N, 0);
+                let mut broken = good.clone();
+                broken[stage][component] = entry;
+                let plan = tried.step(&x, &along(&broken), &mut workspace);
                 assert_eq!(plan.status, Status::NotFinite);
                 assert_safe(plan, &settings.u);
-                let plan = tried.step(&x, &good, &mut workspace);
+                let plan = tried.step(&x, &along(&good), &mut workspace);
                 assert_eq!(plan.status, Status::Solved);
             }
         }
@@ -145,8 +146,8 @@ fn a_terminal_equality_that_cannot_be_met() {
         terminal: TerminalIngredient::Equality,
         ..settings(N)
     };
-    let mut tried: Sized<N, { N + 4 }> = controller(settings);
-    let mut workspace = Memory::new();
+    let mut tried = controller(settings);
+    let mut workspace = tried.workspace();
     let far = Reference::constant(Vector4::new(100.0, 0.0, 0.0, 0.0));
     let x = Vector4::new(0.0, 0.02, 0.0, 0.0);
     let plan = tried.step(&x, &far, &mut workspace);
@@ -177,9 +178,10 @@ fn a_terminal_equality_that_cannot_be_met() {
 /// The track's end is behind the cart, which drives on.
 #[test]
 fn a_state_bound_that_cannot_be_met() {
-    let mut tried: Sized<N, N> = controller(settings(N));
+    let mut tried = controller(settings(N));
     let beyond = Vector4::new(3.0, 0.0, 1.0, 0.0);
-    let plan = tried.step(&beyond, &moving_reference(0), &mut Memory::new());
+    let mut workspace = tried.workspace();
+    let plan = tried.step(&beyond, &along(&moving(N, 0)), &mut workspace);
     assert_safe(plan, &settings(N).u);
     let Status::Infeasible(bound) = plan.status else {
         panic!("{}", plan.status);
@@ -193,9 +195,10 @@ fn a_state_bound_that_cannot_be_met() {
 }
 
 /// The answer at full room, and that it needs several changes and rows.
-fn full_answer() -> Solution<f64, 4, 1, N, N> {
-    let mut full: Sized<N, N> = controller(settings(N));
-    let plan = full.step(&tilted(), &moving_reference(0), &mut Memory::new());
+fn full_answer() -> Solution<f64, 4, 1> {
+    let mut full = controller(settings(N));
+    let mut workspace = full.workspace();
+    let plan = full.step(&tilted(), &along(&moving(N, 0)), &mut workspace);
     assert_eq!(plan.status, Status::Solved);
     assert!(plan.changes >= 2 && plan.active.len() >= 2);
     plan.clone()
@@ -207,8 +210,9 @@ fn the_cap_on_changes_is_kept() {
     for max_changes in 0..=needed {
         let mut settings = settings(N);
         settings.solver.max_changes = max_changes;
-        let mut tried: Sized<N, N> = controller(settings);
-        let plan = tried.step(&tilted(), &moving_reference(0), &mut Memory::new());
+        let mut tried = controller(settings);
+        let mut workspace = tried.workspace();
+        let plan = tried.step(&tilted(), &along(&moving(N, 0)), &mut workspace);
         assert_safe(plan, &settings.u);
         assert!(plan.changes <= max_changes);
         if max_changes < needed {
@@ -217,22 +221,4 @@ fn the_cap_on_changes_is_kept() {
             assert_eq!(plan, &full_answer());
         }
     }
-}
-
-#[test]
-fn a_working_set_that_is_too_small_says_so() {
-    let mut none: Sized<N, 0> = controller(settings(N));
-    let plan = none.step(&tilted(), &moving_reference(0), &mut Memory::new());
-    assert_eq!(plan.status, Status::WorkingSetFull);
-    assert_safe(plan, &settings(N).u);
-
-    let mut one: Sized<N, 1> = controller(settings(N));
-    let plan = one.step(&tilted(), &moving_reference(0), &mut Memory::new());
-    assert_eq!(plan.status, Status::WorkingSetFull);
-    assert_safe(plan, &settings(N).u);
-
-    // Without an active bound, no room is needed.
-    let plan = one.step(&(tilted() * 0.1), &moving_reference(0), &mut Memory::new());
-    assert_eq!(plan.status, Status::Solved);
-    assert!(plan.active.is_empty());
 }

@@ -3,17 +3,14 @@
 mod algorithm;
 mod descent;
 mod failures;
+mod memory;
 mod run_time_bounds;
 mod settings;
 
 use crate::plant::CartPole;
-use crate::regulator;
-use lpvmpc::{Bounds, Controller, ControllerSettings, Reference, Scheduling, Solution, Workspace};
+use crate::regulator::{self, Regulator};
+use lpvmpc::{Bounds, Controller, ControllerSettings, Reference, Scheduling, Solution};
 use nalgebra::{SVector, Vector4};
-
-/// The example's regulator with another horizon and another room for active bounds.
-type Sized<const N: usize, const M: usize> = Controller<CartPole<f64>, f64, 4, 1, 2, N, M>;
-type Memory<const N: usize, const M: usize> = Workspace<f64, 4, 1, N, M>;
 
 /// The example's settings with a horizon of `horizon` samples, on a track that ends at 2.4 m.
 fn settings(horizon: usize) -> ControllerSettings<f64, 4, 1, 2> {
@@ -25,10 +22,8 @@ fn settings(horizon: usize) -> ControllerSettings<f64, 4, 1, 2> {
     }
 }
 
-fn controller<const N: usize, const M: usize>(
-    settings: ControllerSettings<f64, 4, 1, 2>,
-) -> Sized<N, M> {
-    Controller::new(CartPole::laboratory(), settings).unwrap()
+fn controller(settings: ControllerSettings<f64, 4, 1, 2>) -> Regulator {
+    Controller::allocate(CartPole::laboratory(), settings).unwrap()
 }
 
 /// A pole leaning by 30 degrees: the force is at its bound for several samples.
@@ -36,8 +31,9 @@ fn tilted() -> Vector4<f64> {
     Vector4::new(0.1, 30_f64.to_radians(), -0.2, 0.1)
 }
 
-/// A reference that differs from stage to stage and moves with the sample `k`.
-fn moving_reference<const N: usize>(k: usize) -> Reference<f64, 4, N> {
+/// States from the sample `k` on that differ from stage to stage, the last one at the end of the
+/// horizon.
+fn moving(horizon: usize, k: usize) -> Vec<Vector4<f64>> {
     let at = |i: usize| {
         let t = 0.05 * (k + i) as f64;
         Vector4::new(
@@ -47,17 +43,20 @@ fn moving_reference<const N: usize>(k: usize) -> Reference<f64, 4, N> {
             -0.01 * t.sin(),
         )
     };
+    (0..=horizon).map(at).collect()
+}
+
+/// Such states as a reference.
+fn along(states: &[Vector4<f64>]) -> Reference<'_, f64, 4> {
+    let (terminal, stages) = states.split_last().unwrap();
     Reference {
-        stages: std::array::from_fn(at),
-        terminal: at(N),
+        stages,
+        terminal: *terminal,
     }
 }
 
 /// What holds whatever happens: inputs that an actuator can take.
-fn assert_safe<const NU: usize, const N: usize, const M: usize>(
-    solution: &Solution<f64, 4, NU, N, M>,
-    bounds: &Bounds<f64, NU>,
-) {
+fn assert_safe<const NU: usize>(solution: &Solution<f64, 4, NU>, bounds: &Bounds<f64, NU>) {
     let safe = |u: &SVector<f64, NU>| u.iter().all(|u| u.is_finite()) && bounds.contains(u, 0.0);
     assert!(solution.u.iter().all(safe), "{:?}", solution.u);
 }

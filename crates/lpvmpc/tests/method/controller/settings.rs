@@ -1,10 +1,10 @@
 //! Settings that make no sense are refused by name; those at the edge of sense are not.
 
-use super::{Memory, Sized, settings, tilted};
+use super::{settings, tilted};
 use crate::plant::CartPole;
 use lpvmpc::{
-    Bounds, Controller, ControllerError, ControllerSettings, Predictor, Reference, Rk4, Scheduling,
-    Status, TerminalIngredient,
+    Bounds, Controller, ControllerArrays, ControllerError, ControllerSettings, Predictor,
+    Reference, Rk4, Scheduling, Status, TerminalIngredient,
 };
 use nalgebra::{Matrix1, Matrix4, SVector, Vector1, Vector2, Vector4};
 
@@ -15,7 +15,8 @@ type Settings = ControllerSettings<f64, 4, 1, 2>;
 fn refusal(change: impl Fn(&mut Settings)) -> (ControllerError, String) {
     let mut settings = settings(N);
     change(&mut settings);
-    let outcome: Result<Sized<N, N>, _> = Controller::new(CartPole::laboratory(), settings);
+    let arrays = Box::leak(Box::new(ControllerArrays::<f64, 4, 1, N, N>::new()));
+    let outcome = Controller::new(CartPole::laboratory(), settings, arrays.lend());
     let error = outcome.expect_err("settings that make no sense");
     (error, error.to_string())
 }
@@ -151,10 +152,11 @@ fn held_scheduling() {
 fn assert_accepted(change: impl Fn(&mut Settings)) {
     let mut settings = settings(N);
     change(&mut settings);
-    let mut controller: Sized<N, N> =
-        Controller::new(CartPole::laboratory(), settings).expect("settings that make sense");
+    let mut controller =
+        Controller::allocate(CartPole::laboratory(), settings).expect("settings that make sense");
+    let mut workspace = controller.workspace();
     let rest = Reference::constant(Vector4::zeros());
-    let plan = controller.step(&(tilted() * 0.1), &rest, &mut Memory::new());
+    let plan = controller.step(&(tilted() * 0.1), &rest, &mut workspace);
     assert_eq!(plan.status, Status::Solved);
 }
 
