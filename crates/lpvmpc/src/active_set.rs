@@ -388,7 +388,10 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
 
     /// The active rows, with multipliers in the bounds' own direction.
     pub(crate) fn active(&self) -> impl Iterator<Item = ActiveRow<T>> {
-        active(&self.working, &self.resting)
+        let working = self.working.rows().iter().map(Terms::reported);
+        // What rests without a multiplier holds because other rows do.
+        let resting = self.resting.iter();
+        working.chain(resting.filter(|row| row.multiplier != T::zero()))
     }
 
     /// Hands over the active rows.
@@ -396,15 +399,4 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         active.clear();
         self.active().all(|row| active.push(row))
     }
-}
-
-/// The rows of the working set, and those that rest at a multiplier: what rests without one holds
-/// because other rows do.
-pub(crate) fn active<T: Scalar, const NU: usize>(
-    working: &WorkingSet<T, NU>,
-    resting: &ActiveSet<T>,
-) -> impl Iterator<Item = ActiveRow<T>> {
-    let working = working.rows().iter().map(Terms::reported);
-    let resting = resting.iter();
-    working.chain(resting.filter(|row| row.multiplier != T::zero()))
 }

@@ -39,7 +39,7 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> Adjoint<'a, T, NX, NU> {
         active: &ActiveSet<T>,
     ) -> Self {
         let stage = ocp.length();
-        let (mut costate, _) = rows::gradient(ocp, active.iter(), stage);
+        let (mut costate, _) = rows::gradient(ocp, active.at(stage));
         if let Some(trajectory) = trajectory {
             let end = &ocp.terminal;
             costate += end.p * trajectory.state(ocp, stage) + end.linear_x;
@@ -57,7 +57,7 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> Adjoint<'a, T, NX, NU> {
         self.stage = self.stage.checked_sub(1)?;
         let stage = self.ocp.stages.get(self.stage)?;
         let costate = self.costate;
-        let (rows_x, rows_u) = rows::gradient(self.ocp, active.iter(), self.stage);
+        let (rows_x, rows_u) = rows::gradient(self.ocp, active.at(self.stage));
         let mut gradient = stage.b.tr_mul(&costate) + rows_u;
         self.costate = stage.a.tr_mul(&costate) + rows_x;
         if let Some(trajectory) = self.trajectory {

@@ -8,6 +8,8 @@ use crate::memory::{ControllerMemory, WorkspaceMemory};
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Bounds, Common, Ocp, Penalty, Softness};
 use crate::plan::{Aim, Policy, Trial, at};
+#[cfg(feature = "alloc")]
+use crate::settings::LONGEST_HORIZON;
 use crate::settings::{
     ControllerError, ControllerSettings, InputReference, Iterations, Scheduling,
     TerminalIngredient, Weights, check, check_bounds,
@@ -61,13 +63,19 @@ pub struct Workspace<T: 'static, const NX: usize, const NU: usize> {
 impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
     /// A workspace in this memory.
     pub fn new(memory: WorkspaceMemory<T, NX, NU>) -> Self {
+        let WorkspaceMemory {
+            stages,
+            solver,
+            u,
+            x,
+        } = memory;
+        // The shortest of the lists is what there is memory for.
+        let places = [stages.len(), solver.stages(), u.len(), x.len()];
+        let longest = places.into_iter().min().unwrap_or(0);
         Self {
-            ocp: Ocp::new(memory.stages),
-            solver: Solver::new(memory.solver),
-            trial: Trial {
-                u: memory.u,
-                x: memory.x,
-            },
+            ocp: Ocp::new(stages.shortened(longest)),
+            solver: Solver::new(solver),
+            trial: Trial { u, x },
             along_plan: false,
         }
     }
@@ -83,6 +91,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
         &self.ocp
     }
 
+    /// Whether there is memory for a horizon.
+    fn holds(&self, horizon: usize) -> bool {
+        horizon <= self.ocp.stages.len()
+    }
+
     /// Writes weights and bounds into the program.
     fn pose<const NS: usize>(&mut self, settings: &ControllerSettings<T, NX, NU, NS>) {
         let ControllerSettings { weights, x, u, .. } = settings;
@@ -94,7 +107,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
                 stage.c = SVector::zeros();
             }
         }
-
         self.ocp.common = Common {
             q: weights.q,
             r: weights.r,
@@ -183,7 +195,7 @@ where
         settings: ControllerSettings<T, NX, NU, NS>,
     ) -> Result<Self, ControllerError> {
         // What is refused is not worth its memory.
-        check(&settings, usize::MAX)?;
+        check(&settings, LONGEST_HORIZON)?;
         let memory = ControllerMemory::allocate(settings.capacity());
         Self::new(model, settings, memory)
     }
@@ -197,13 +209,18 @@ where
     /// One sample of Algorithm 2: from the measured state `x` and the reference along the
     /// horizon to the plan, whose first input is to be applied until the next sample.
     ///
-    /// The inputs are finite and within the input bounds, whatever the status says.
+    /// The inputs are finite and within the input bounds, whatever the status says. With a workspace for
+    /// shorter horizons only it is [`Status::HorizonTooLong`].
     pub fn step(
         &mut self,
         x: &SVector<T, NX>,
         reference: &Reference<'_, T, NX>,
         workspace: &mut Workspace<T, NX, NU>,
     ) -> &Solution<T, NX, NU> {
+        if !workspace.holds(self.settings.horizon) {
+            self.give_up(Status::HorizonTooLong);
+            return &self.solution;
+        }
         self.make_up();
         workspace.pose(&self.settings);
         let aim = &self.aim(reference);
@@ -232,6 +249,9 @@ where
         workspace: &mut Workspace<T, NX, NU>,
     ) {
         self.prepared = None;
+        if !workspace.holds(self.settings.horizon) {
+            return;
+        }
         workspace.pose(&self.settings);
         let aim = &self.aim(reference);
         if let Iterations::Descent { .. } = self.settings.iterations {

@@ -100,7 +100,7 @@ where
             Along::Scheduling
         };
         if !self.first_plan(x, aim, workspace) {
-            return self.give_up();
+            return self.give_up(Status::NotFinite);
         }
         let mut prices = Prices::none();
         let mut status = Status::NoImprovement;
@@ -545,12 +545,12 @@ where
     }
 
     /// The state is not finite, or nothing that follows from it is.
-    fn give_up(&mut self) {
+    pub(crate) fn give_up(&mut self, status: Status<T>) {
         self.reset();
         self.solution
             .u
             .fill(self.settings.u.project(&SVector::zeros()));
-        self.solution.status = Status::NotFinite;
+        self.solution.status = status;
     }
 }
 

@@ -23,6 +23,8 @@ use crate::list::List;
 use crate::memory::Capacity;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Ocp;
+#[cfg(feature = "alloc")]
+use crate::settings::LONGEST_HORIZON;
 use crate::solution::{ActiveSet, BoundId, Quantity, Side, Solution, Status};
 use crate::solver::Solver;
 use aim::Aims;
@@ -250,7 +252,7 @@ where
     #[cfg(feature = "alloc")]
     pub fn allocate(model: P, settings: GuardedSettings<T, NX, NU>) -> Result<Self, GuardedError> {
         // What is refused is not worth its memory.
-        settings.check(&model, usize::MAX)?;
+        settings.check(&model, LONGEST_HORIZON)?;
         let memory = GuardedMemory::allocate(settings.horizon);
         Self::new(model, settings, memory)
     }

@@ -283,15 +283,17 @@ impl<T: Scalar, const NX: usize, const NU: usize> Ocp<T, NX, NU> {
     }
 
     /// General row `j` of stage `i`, from 0 to the end of the horizon, if there is one.
+    #[inline]
     pub fn row(&self, i: usize, j: usize) -> Option<&GeneralRow<T, NX, NU>> {
-        let of_stage = j < self.rows_per_stage;
-        of_stage.then(|| self.rows.get(i * self.rows_per_stage + j))?
+        self.rows_of(i).get(j)
     }
 
     /// General rows of stage `i`, from 0 to the end of the horizon.
     pub(crate) fn rows_of(&self, i: usize) -> &[GeneralRow<T, NX, NU>] {
-        let first = i * self.rows_per_stage;
-        let rows = self.rows.get(first..first + self.rows_per_stage);
+        let count = self.rows_per_stage;
+        let first = i.checked_mul(count);
+        let range = first.and_then(|first| Some(first..first.checked_add(count)?));
+        let rows = range.and_then(|range| self.rows.get(range));
         rows.unwrap_or_default()
     }
 }

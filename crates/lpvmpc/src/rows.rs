@@ -307,14 +307,13 @@ pub(crate) fn form_row<T: Scalar, const NX: usize, const NU: usize>(
     };
 }
 
-/// The gradient that the rows `active` at `stage` add to the state and the input.
+/// The gradient that the rows `active` at a stage add to the state and the input.
 pub(crate) fn gradient<T: Scalar, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
     active: impl Iterator<Item = ActiveRow<T>>,
-    stage: usize,
 ) -> (SVector<T, NX>, SVector<T, NU>) {
     let mut gradient = (SVector::zeros(), SVector::zeros());
-    for row in active.filter(|row| row.bound.stage == stage) {
+    for row in active {
         let (normal_x, normal_u) = normal(ocp, &row.bound);
         let factor = match row.bound.side {
             Side::Upper => row.multiplier,
@@ -326,7 +325,7 @@ pub(crate) fn gradient<T: Scalar, const NX: usize, const NU: usize>(
     gradient
 }
 
-/// v -= sum of multiplier * alpha over the rows `active`, in one backward pass.
+/// v -= sum of multiplier * alpha over the rows that are active at each stage, in one backward pass.
 pub(crate) fn subtract<
     T: Scalar,
     const NX: usize,
@@ -335,14 +334,14 @@ pub(crate) fn subtract<
 >(
     ocp: &Ocp<T, NX, NU>,
     factors: &[StageFactor<T, NX, NU>],
-    active: impl Fn() -> Active,
+    active_at: impl Fn(usize) -> Active,
     v: &mut [SVector<T, NU>],
 ) {
     let n = ocp.length();
-    let (mut costate, _) = gradient(ocp, active(), n);
+    let (mut costate, _) = gradient(ocp, active_at(n));
     let stages = factors.iter().zip(v.iter_mut()).enumerate().take(n);
     for (i, (factor, v)) in stages.rev() {
-        let (rows_x, rows_u) = gradient(ocp, active(), i);
+        let (rows_x, rows_u) = gradient(ocp, active_at(i));
         *v += factor.input.tr_mul(&costate) + factor.inverse_factor * rows_u;
         costate = factor.closed_loop.tr_mul(&costate) + factor.gain.tr_mul(&rows_u) + rows_x;
     }

@@ -239,7 +239,7 @@ pub enum ControllerError {
     Horizon {
         /// What was asked for.
         given: usize,
-        /// The largest that there is memory for; `usize::MAX` on the heap.
+        /// The largest that there is memory for; 65 535 on the heap.
         largest: usize,
     },
     /// The predictor needs at least one sub-step.
@@ -273,11 +273,10 @@ impl fmt::Display for ControllerError {
                 write!(f, "the sampling time must be a positive number of seconds")
             }
             Self::Horizon { given, largest } => {
-                write!(f, "the horizon is {given} samples; it must be at least 1")?;
-                match *largest {
-                    usize::MAX => Ok(()),
-                    largest => write!(f, ", and there is memory for {largest}"),
-                }
+                write!(
+                    f,
+                    "the horizon is {given}; it must be from 1 to {largest} samples"
+                )
             }
             Self::Substeps => write!(f, "the predictor needs at least one sub-step per sample"),
             Self::WeightEntries(name) => {
@@ -346,6 +345,10 @@ pub(crate) fn check<T: Scalar, const NX: usize, const NU: usize, const NS: usize
         _ => Ok(()),
     }
 }
+
+/// The longest horizon at all: active bounds have 16 bits for their stage.
+#[cfg(feature = "alloc")]
+pub(crate) const LONGEST_HORIZON: usize = 0xffff;
 
 pub(crate) fn check_horizon(given: usize, largest: usize) -> Result<(), ControllerError> {
     if given == 0 || given > largest {

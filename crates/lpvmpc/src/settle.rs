@@ -1,7 +1,7 @@
 //! Moving to the minimiser over a given working set: the warm start, and the refinement after
 //! the search.
 
-use crate::active_set::{DualActiveSet, active};
+use crate::active_set::DualActiveSet;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
@@ -174,8 +174,12 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         factors: &[StageFactor<T, NX, NU>],
     ) {
         copy(&mut self.rest, &self.v);
-        let (working, resting) = (&self.working, &self.resting);
-        rows::subtract(ocp, factors, || active(working, resting), &mut self.rest);
+        let (working, resting) = (self.working.rows(), &self.resting);
+        let active_at = |stage: usize| {
+            let here = working.iter().filter(move |row| row.active.bound.stage == stage);
+            here.map(Terms::reported).chain(resting.at(stage))
+        };
+        rows::subtract(ocp, factors, active_at, &mut self.rest);
     }
 }
 

@@ -5,7 +5,7 @@ use crate::list::List;
 #[cfg(feature = "alloc")]
 use crate::memory::Capacity;
 use crate::model::Scalar;
-use crate::working_set::copy;
+use crate::working_set::{copy, first};
 use core::fmt;
 use nalgebra::SVector;
 
@@ -101,11 +101,18 @@ impl<T: Scalar> ActiveRow<T> {
 }
 
 /// The active bounds, at most as many as there is memory for.
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
 pub struct ActiveSet<T: 'static> {
     rows: List<PackedRow<T>>,
     len: usize,
+}
+
+impl<T: Scalar> PartialEq for ActiveSet<T> {
+    /// The same rows in the same order, whatever there are places for.
+    fn eq(&self, other: &Self) -> bool {
+        first(&self.rows, self.len) == first(&other.rows, other.len)
+    }
 }
 
 /// An [`ActiveRow`] in a third of its memory, of which a microcontroller has little.
@@ -195,6 +202,16 @@ impl<T: Scalar> ActiveSet<T> {
     /// The active rows, in no particular order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = ActiveRow<T>> {
         self.rows.iter().take(self.len).map(PackedRow::unpack)
+    }
+
+    /// The active rows at a stage.
+    #[inline(always)]
+    pub(crate) fn at(&self, stage: usize) -> impl Iterator<Item = ActiveRow<T>> {
+        let here = move |row: &&PackedRow<T>| usize::from(row.stage) == stage;
+        first(&self.rows, self.len)
+            .iter()
+            .filter(here)
+            .map(PackedRow::unpack)
     }
 
     /// How many rows are active.
@@ -315,7 +332,7 @@ impl<T: fmt::Display> fmt::Display for Status<T> {
 ///
 /// Whatever the status, the inputs are finite and within the input bounds; unless it is
 /// [`Status::Solved`] they are a fallback, not an optimum.
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
 pub struct Solution<T: 'static, const NX: usize, const NU: usize> {
     /// u_0 to u_{N-1}.
@@ -332,6 +349,16 @@ pub struct Solution<T: 'static, const NX: usize, const NU: usize> {
     pub active: ActiveSet<T>,
     /// Changes of the active set that were made.
     pub changes: usize,
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize> PartialEq for Solution<T, NX, NU> {
+    fn eq(&self, other: &Self) -> bool {
+        let numbers = |solution: &Self| (solution.cost, solution.status, solution.changes);
+        self.u == other.u
+            && self.x == other.x
+            && self.active == other.active
+            && numbers(self) == numbers(other)
+    }
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> Solution<T, NX, NU> {

@@ -123,7 +123,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         );
         let mut spent = 0;
         let room = self.stages.min(solution.u.len()).min(solution.x.len());
-        let factorized = if ocp.horizon > room.min(ocp.stages.len()) {
+        let factorized = if ocp.horizon.max(1) > room.min(ocp.stages.len()) {
             Err(Status::HorizonTooLong)
         } else {
             factorized
@@ -349,7 +349,7 @@ fn clip_inputs<T: Scalar, const NX: usize, const NU: usize>(
     solution: &mut Solution<T, NX, NU>,
 ) {
     // Slices of unknown length are not unrolled, for the flash of a microcontroller.
-    let length = ocp.length().min(solution.u.len());
+    let length = ocp.horizon.max(1).min(solution.u.len());
     let inputs = solution.u.get_mut(..length).unwrap_or_default();
     for (i, u) in inputs.iter_mut().enumerate() {
         *u = ocp.common_at(i).u.project(u);

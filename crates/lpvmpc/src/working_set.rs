@@ -208,8 +208,19 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
         }
         direction.noise = self.noise(direction);
         let rounding = direction.noise * direction.noise;
-        if direction.slope <= rounding && rounding.is_finite() {
+        let is_rounding = direction.slope <= rounding && rounding.is_finite();
+        if is_rounding || self.spans(direction.support) {
             direction.slope = compliance;
+        }
+    }
+
+    /// Whether the rows span all deviations of the first `stages` stages, so that every further row
+    /// depends on them.
+    fn spans(&self, stages: usize) -> bool {
+        let space = stages * NU;
+        self.len >= space && {
+            let elastic = self.rows().iter().filter(|row| row.compliance > T::zero());
+            self.len >= space + elastic.count()
         }
     }
 
