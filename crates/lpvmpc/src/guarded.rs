@@ -168,8 +168,20 @@ pub struct GuardedController<P, T: 'static, const NX: usize, const NU: usize, co
     along: Plan<T, NX, NU>,
     /// A plan that is compared with it.
     trial: Plan<T, NX, NU>,
-    /// A plan that is kept meanwhile.
+    /// A plan that is kept meanwhile: the known one, or, without one, the first that is nearer to the
+    /// bounds.
     nearer: Plan<T, NX, NU>,
+}
+
+/// What the last plan, once more, is good for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Repeated {
+    /// There is none, or it is no better than the known plan.
+    No,
+    /// It is a better plan.
+    Plan,
+    /// Without room for the integration error it is no plan, but still what to look along.
+    ToLookAlong,
 }
 
 /// Rolls plans out, judges them and poses programs along them.
@@ -287,13 +299,25 @@ where
         }
         self.planner.take_aim(x, wanted);
         let known = self.find_known(x);
-        let is_repeated = known.is_some() && self.repeat_cheaper(x);
-        let improved = self.improve(known, workspace);
+        let repeated = match known {
+            Some(_) => self.repeat_cheaper(x),
+            None => Repeated::No,
+        };
+        let least = match repeated {
+            Repeated::ToLookAlong => self.nearer.cost,
+            Repeated::No | Repeated::Plan => self.along.cost,
+        };
+        let improved = self.improve(known.map(|decision| (decision, least)), workspace);
         let status = workspace.solution.status;
         let (decision, gap) = match (improved, known) {
             (Some(gap), _) => (Decision::NewPlan, gap),
-            (None, Some(_)) if is_repeated => (Decision::NewPlan, SVector::zeros()),
-            (None, Some(decision)) => (decision, SVector::zeros()),
+            (None, Some(_)) if repeated == Repeated::Plan => (Decision::NewPlan, SVector::zeros()),
+            (None, Some(decision)) => {
+                if repeated == Repeated::ToLookAlong {
+                    swap(&mut self.along, &mut self.nearer);
+                }
+                (decision, SVector::zeros())
+            }
             (None, None) => self.last_resort(workspace),
         };
         let Self { planner, along, .. } = self;
@@ -342,25 +366,31 @@ where
         works.then_some(Decision::TerminalLaw)
     }
 
-    /// The plan `along` becomes the last plan once more, where that is feasible and cheaper; whether it
-    /// has.
-    fn repeat_cheaper(&mut self, x: &SVector<T, NX>) -> bool {
+    /// The plan `along` becomes the last plan once more, where that keeps the bounds and is cheaper than
+    /// the known plan, which is then kept in `nearer`.
+    fn repeat_cheaper(&mut self, x: &SVector<T, NX>) -> Repeated {
         let Self {
             planner,
             last,
             along,
             trial,
+            nearer,
             ..
         } = self;
         if !self.has_plan {
-            return false;
+            return Repeated::No;
         }
         planner.repeat(x, last, trial);
-        let cheaper = trial.cost < along.cost && planner.is_robust(trial);
-        if cheaper {
-            swap(along, trial);
+        if !(trial.cost < along.cost && planner.is_feasible(trial)) {
+            return Repeated::No;
         }
-        cheaper
+        swap(along, nearer);
+        swap(along, trial);
+        if planner.is_robust(along) {
+            Repeated::Plan
+        } else {
+            Repeated::ToLookAlong
+        }
     }
 
     /// Forgets the past: the next step starts as the first one did.

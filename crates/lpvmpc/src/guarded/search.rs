@@ -20,12 +20,12 @@ where
     P: LpvModel<T, NX, NU, NS>,
 {
     /// Quadratic programs along the plan `along`, each answer confirmed by the rollout. Where one or more
-    /// are confirmed and cost less than the known plan, `along` becomes the best of them, and the answer
-    /// is its gap. The search goes on after a first one as long as there are programs left and the cost
-    /// falls.
+    /// are confirmed and cost less than what is `known` (its kind, and the least cost), `along` becomes
+    /// the best of them, and the answer is its gap. The search goes on after a first one as long as there
+    /// are programs left and the cost falls.
     pub(super) fn improve<const NA: usize>(
         &mut self,
-        known: Option<Decision>,
+        known: Option<(Decision, T)>,
         workspace: &mut GuardedWorkspace<T, NU, NA>,
     ) -> Option<SVector<T, NX>> {
         let Self {
@@ -37,10 +37,10 @@ where
         } = self;
         let iterations = planner.settings.iterations;
         let most = match known {
-            Some(Decision::Candidate) => iterations.known,
+            Some((Decision::Candidate, _)) => iterations.known,
             _ => iterations.unknown,
         };
-        let mut is_known = known.is_some();
+        let mut least = known.map(|(_, cost)| cost);
         let mut improved = None;
         let mut in_vain = 0;
         let mut served = planner.damping;
@@ -49,13 +49,13 @@ where
             planner.pose(along, &mut workspace.ocp);
             planner.solve(workspace, warm_start);
             warm_start = WarmStart::Same;
-            if !is_known && !workspace.solution.status.is_solved() {
+            if least.is_none() && !workspace.solution.status.is_solved() {
                 planner.soften(&mut workspace.ocp);
                 planner.solve(workspace, WarmStart::Cold);
             }
             let outcome = if workspace.solution.status.is_solved() {
                 planner.learn(workspace, along);
-                let outcome = planner.search(along, is_known, workspace, [trial, nearer]);
+                let outcome = planner.search(along, least, workspace, [trial, nearer]);
                 planner.learn_drift(along, workspace);
                 outcome
             } else {
@@ -86,10 +86,11 @@ where
             served = planner.damping;
             in_vain = 0;
             planner.slope = Slope::Jacobian;
-            let settled = is_known && !planner.is_worthwhile(along.cost - trial.cost, along);
+            let settled =
+                least.is_some_and(|least| !planner.is_worthwhile(least - trial.cost, least));
             swap(along, trial);
             if found.feasible {
-                is_known = true;
+                least = Some(along.cost);
                 improved = Some(found.gap);
             }
             if settled {
@@ -138,13 +139,13 @@ where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
-    /// The first part of the way to the program's answer that costs less and is feasible; while no
-    /// feasible plan is known, the first that is feasible, or else nearer to it. What is found is left in
-    /// the first of the two plans.
+    /// The first part of the way to the program's answer that is feasible and costs less than the `least`
+    /// cost so far; while no feasible plan is known, the first that is feasible, or else nearer to it.
+    /// What is found is left in the first of the two plans; the second is kept where a plan is known.
     fn search<const NA: usize>(
         &self,
         along: &Plan<T, NX, NU>,
-        is_known: bool,
+        least: Option<T>,
         workspace: &GuardedWorkspace<T, NU, NA>,
         [trial, nearer]: [&mut Plan<T, NX, NU>; 2],
     ) -> Outcome<T, NX> {
@@ -161,18 +162,22 @@ where
                 feasible: self.judge(trial),
                 gap: trial.end - predicted,
             };
-            if found.feasible && (!is_known || trial.cost < along.cost) {
+            if found.feasible && least.is_none_or(|least| trial.cost < least) {
                 return Outcome::Found(found);
             }
-            if is_known && fraction == 1.0 && !self.is_worthwhile(trial.cost - along.cost, along) {
+            if fraction == 1.0
+                && least.is_some_and(|least| !self.is_worthwhile(trial.cost - least, least))
+            {
                 return Outcome::Settled;
             }
-            if !is_known && near.is_none() && self.merit(trial) < before {
+            if least.is_none() && near.is_none() && self.merit(trial) < before {
                 swap(trial, nearer);
                 near = Some(found);
             }
         }
-        swap(trial, nearer);
+        if near.is_some() {
+            swap(trial, nearer);
+        }
         near.map_or(Outcome::Nothing, Outcome::Found)
     }
 
@@ -185,9 +190,9 @@ where
         }
     }
 
-    /// Whether a change of the cost by so much, up or down, is worth another program.
-    fn is_worthwhile(&self, change: T, along: &Plan<T, NX, NU>) -> bool {
-        let relative = along.cost * convert::<f64, T>(WORTHWHILE);
+    /// Whether a change of the `cost` by so much, up or down, is worth another program.
+    fn is_worthwhile(&self, change: T, cost: T) -> bool {
+        let relative = cost * convert::<f64, T>(WORTHWHILE);
         let absolute = self.settings.terminal.level * T::default_epsilon().powf(convert(0.75));
         !(change.abs() <= relative + absolute)
     }
