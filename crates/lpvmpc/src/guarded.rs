@@ -239,7 +239,9 @@ where
 
         let again = self.cheaper(x, aims, guaranteed.as_ref());
         let along = again.unwrap_or(along);
-        let known = guaranteed.map(|(_, decision)| decision);
+        // Without room for the integration error it is no plan, but still what to look along.
+        let again = again.filter(|plan| self.is_robust(plan));
+        let known = guaranteed.map(|(plan, decision)| (decision, again.unwrap_or(plan).cost));
         let improved = self.improve(x, aims, &along, known, workspace);
         let improved = improved.or(again.map(|plan| (plan, SVector::zeros())));
         let status = workspace.solution.status;
@@ -370,7 +372,7 @@ where
     ) -> Option<Plan<T, NX, NU, N>> {
         let ((known, _), last) = (guaranteed?, self.plan.as_ref()?);
         let plan = self.repeated(x, last, aims);
-        let cheaper = plan.cost < known.cost && self.is_robust(&plan);
+        let cheaper = plan.cost < known.cost && self.is_feasible(&plan);
         cheaper.then_some(plan)
     }
 }

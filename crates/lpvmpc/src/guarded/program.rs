@@ -31,7 +31,7 @@ where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
-    /// The program along the plan `along`, whose states it lets be where they keep the bounds.
+    /// The program along the plan `along`, whose states it lets be where they keep half of the margin.
     pub(super) fn pose(
         &self,
         x0: &SVector<T, NX>,
@@ -46,14 +46,20 @@ where
         let origin = settings.direction * along.set_point;
         ocp.x0 = augmented(&(x0 - origin), T::zero());
         let tight = shrunk(&settings.x, settings.margin);
+        // The other half is for a plan that is repeated: it must keep the bounds, too.
+        let half = shrunk(&settings.x, settings.margin * convert::<f64, T>(0.5));
         // The measured state is as it is; x_1 and later are bounded, as far from the bounds as the
         // plan goes beyond its samples.
         let bounds = |i: usize, x: &SVector<T, NX>| {
             let (above, below) = self.beyond_samples(along, x0, i);
             let (lower, upper) = (tight.lower + below, tight.upper - above);
             let kept = settings.x.hold_at(&(x + above)) && settings.x.hold_at(&(x - below));
-            let lower = if kept { lower.inf(x) } else { lower };
-            let upper = if kept { upper.sup(x) } else { upper };
+            let (least, most) = if kept {
+                (half.lower + below, half.upper - above)
+            } else {
+                (lower, upper)
+            };
+            let (lower, upper) = (lower.inf(&x.sup(&least)), upper.sup(&x.inf(&most)));
             let infinity: T = convert(f64::INFINITY);
             Bounds {
                 lower: augmented(&(lower - origin), -infinity),

@@ -29,23 +29,23 @@ where
     P: LpvModel<T, NX, NU, NS>,
 {
     /// Quadratic programs along `along`, each answer confirmed by the rollout. Returns the best
-    /// confirmed plan that costs less than the known one, with its gap, and goes on after a first
-    /// one as long as there are programs left and the cost falls.
+    /// confirmed plan that costs less than what is `known` (its kind, and the least cost), with its
+    /// gap, and goes on after a first one as long as there are programs left and the cost falls.
     pub(super) fn improve<const M: usize>(
         &mut self,
         x: &SVector<T, NX>,
         aims: &SetPoints<T, N>,
         along: &Plan<T, NX, NU, N>,
-        known: Option<Decision>,
+        known: Option<(Decision, T)>,
         workspace: &mut GuardedWorkspace<T, NU, NA, NP, M>,
     ) -> Option<(Plan<T, NX, NU, N>, SVector<T, NX>)> {
         let GuardedSettings { iterations, .. } = self.settings;
         let most = match known {
-            Some(Decision::Candidate) => iterations.known,
+            Some((Decision::Candidate, _)) => iterations.known,
             _ => iterations.unknown,
         };
         let mut along = *along;
-        let mut is_known = known.is_some();
+        let mut least = known.map(|(_, cost)| cost);
         let mut improved = None;
         let mut in_vain = 0;
         let mut served = self.damping;
@@ -54,13 +54,13 @@ where
             self.pose(x, aims, &along, self.slope, &mut workspace.ocp);
             self.solve(workspace, warm_start);
             warm_start = WarmStart::Same;
-            if !is_known && !workspace.solution.status.is_solved() {
+            if least.is_none() && !workspace.solution.status.is_solved() {
                 self.soften(&mut workspace.ocp);
                 self.solve(workspace, WarmStart::Cold);
             }
             let outcome = if workspace.solution.status.is_solved() {
                 self.learn(workspace, &along);
-                self.search(x, aims, &along, is_known, workspace)
+                self.search(x, aims, &along, least, workspace)
             } else {
                 Outcome::Nothing
             };
@@ -92,10 +92,11 @@ where
             served = self.damping;
             in_vain = 0;
             self.slope = Slope::Jacobian;
-            let settled = is_known && !self.is_worthwhile(along.cost - found.plan.cost, &along);
+            let settled =
+                least.is_some_and(|least| !self.is_worthwhile(least - found.plan.cost, least));
             along = found.plan;
             if found.feasible {
-                is_known = true;
+                least = Some(found.plan.cost);
                 improved = Some((found.plan, found.gap));
             }
             if settled {
@@ -105,14 +106,15 @@ where
         improved
     }
 
-    /// The first part of the way to the program's answer that costs less and is feasible; while no
-    /// feasible plan is known, the first that is feasible, or else nearer to it.
+    /// The first part of the way to the program's answer that is feasible and costs less than the
+    /// `least` cost so far; while no feasible plan is known, the first that is feasible, or else nearer
+    /// to it.
     fn search<const M: usize>(
         &self,
         x: &SVector<T, NX>,
         aims: &SetPoints<T, N>,
         along: &Plan<T, NX, NU, N>,
-        is_known: bool,
+        least: Option<T>,
         workspace: &GuardedWorkspace<T, NU, NA, NP, M>,
     ) -> Outcome<T, NX, NU, N> {
         let horizon = self.settings.horizon;
@@ -127,13 +129,15 @@ where
         for fraction in FRACTIONS {
             let plan = self.between(x, aims, along, &towards, convert(fraction));
             let found = self.judge(plan, fraction, &predicted);
-            if self.is_better(&found, along, is_known) {
+            if found.feasible && least.is_none_or(|least| plan.cost < least) {
                 return Outcome::Found(found);
             }
-            if is_known && fraction == 1.0 && !self.is_worthwhile(plan.cost - along.cost, along) {
+            if fraction == 1.0
+                && least.is_some_and(|least| !self.is_worthwhile(plan.cost - least, least))
+            {
                 return Outcome::Settled;
             }
-            if !is_known && nearer.is_none() && self.merit(&plan) < before {
+            if least.is_none() && nearer.is_none() && self.merit(&plan) < before {
                 nearer = Some(found);
             }
         }
@@ -160,20 +164,11 @@ where
         }
     }
 
-    /// Whether a change of the cost by so much, up or down, is worth another program.
-    fn is_worthwhile(&self, change: T, along: &Plan<T, NX, NU, N>) -> bool {
-        let relative = along.cost * convert::<f64, T>(WORTHWHILE);
+    /// Whether a change of the `cost` by so much, up or down, is worth another program.
+    fn is_worthwhile(&self, change: T, cost: T) -> bool {
+        let relative = cost * convert::<f64, T>(WORTHWHILE);
         let absolute = self.settings.terminal.level * T::default_epsilon().powf(convert(0.75));
         !(change.abs() <= relative + absolute)
-    }
-
-    fn is_better(
-        &self,
-        found: &Found<T, NX, NU, N>,
-        along: &Plan<T, NX, NU, N>,
-        is_known: bool,
-    ) -> bool {
-        found.feasible && (!is_known || found.plan.cost < along.cost)
     }
 
     /// More damping where a program's answer did not hold, less where all of it did.
