@@ -59,13 +59,17 @@ impl<T: Scalar> Ballbot<T> {
         Vector4::new(phi_dot, theta_dot, phi_ddot, theta_ddot)
     }
 
-    /// (df/dx, df/du): 4 x 4 per second, and 4 x 1. Of Coulomb friction it has the secant F(v)/v in
+    /// (f, df/dx, df/du): f as [`Ballbot::f`] has it, 4 x 4 per second, and 4 x 1. Of Coulomb friction it has the secant F(v)/v in
     /// place of the derivative: that is next to zero while the drive moves, so that a linear model
     /// with it has friction push on where the motion turns round, and its plans chatter.
     ///
     /// From M q_ddot = force: M dq_ddot = dforce - dM q_ddot.
     #[inline(always)]
-    pub(crate) fn jacobian_of_f(&self, x: &Vector4<T>, torque: T) -> (Matrix4<T>, Vector4<T>) {
+    pub(crate) fn tangent_of_f(
+        &self,
+        x: &Vector4<T>,
+        torque: T,
+    ) -> (Vector4<T>, Matrix4<T>, Vector4<T>) {
         let (theta, phi_dot, theta_dot) = (x[1], x[2], x[3]);
         let (sin_theta, cos_theta) = sin_cos(theta);
         let Self { geometry, .. } = self;
@@ -105,7 +109,8 @@ impl<T: Scalar> Ballbot<T> {
             zero, by_theta[0], by_phi_dot[0], by_theta_dot[0],
             zero, by_theta[1], by_phi_dot[1], by_theta_dot[1],
         );
-        (a, Vector4::new(zero, zero, by_torque[0], by_torque[1]))
+        let f = Vector4::new(phi_dot, theta_dot, phi_ddot, theta_ddot);
+        (f, a, Vector4::new(zero, zero, by_torque[0], by_torque[1]))
     }
 
     /// What the drive does to the ball, and the opposite to the body, m^2/s^2: torque (N m) less

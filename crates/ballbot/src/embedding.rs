@@ -138,7 +138,13 @@ impl<T: Scalar> LpvModel<T, 4, 1, 3> for Ballbot<T> {
 
     #[inline(always)]
     fn jacobian(&self, x: &Vector4<T>, u: &Vector1<T>) -> (Matrix4<T>, Vector4<T>) {
-        self.jacobian_of_f(x, u[0])
+        let (_, a, b) = self.tangent_of_f(x, u[0]);
+        (a, b)
+    }
+
+    #[inline(always)]
+    fn tangent(&self, x: &Vector4<T>, u: &Vector1<T>) -> (Vector4<T>, Matrix4<T>, Vector4<T>) {
+        self.tangent_of_f(x, u[0])
     }
 
     /// Upright and at rest without torque, wherever the ball is; nowhere else.

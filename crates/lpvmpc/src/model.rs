@@ -72,6 +72,21 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
         (a, b)
     }
 
+    /// [`derivative`](Self::derivative) and [`jacobian`](Self::jacobian) at `x` and `u`:
+    /// (f, df/dx, df/du).
+    ///
+    /// A plant whose Jacobian needs f anyway may override this; it must return the same numbers, to
+    /// rounding.
+    #[inline(always)]
+    fn tangent(
+        &self,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> (SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+        let (a, b) = self.jacobian(x, u);
+        (self.derivative(x, u), a, b)
+    }
+
     /// The steady state, f(x, u) = 0 within bounds, that is nearest to a reference; `None` where
     /// none is found.
     ///

@@ -92,16 +92,10 @@ impl Predictor {
     }
 }
 
-/// The continuous-time pair (A, B) at a state.
+/// f and the continuous-time pair (A, B) at a state.
 #[cfg(target_os = "none")]
-type PairAt<'a, T, const NX: usize, const NU: usize> =
-    dyn Fn(&SVector<T, NX>) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) + 'a;
-
-/// The slope of a Runge-Kutta stage, from the state where the step began, the state of the stage, K_j
-/// and L_j.
-#[cfg(target_os = "none")]
-type SlopeAt<'a, T, const NX: usize, const NU: usize> = dyn Fn(&SVector<T, NX>, &SVector<T, NX>, &SMatrix<T, NX, NX>, &SMatrix<T, NX, NU>) -> SVector<T, NX>
-    + 'a;
+type TangentAt<'a, T, const NX: usize, const NU: usize> =
+    dyn Fn(&SVector<T, NX>) -> (SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) + 'a;
 
 /// Classical Runge-Kutta method of order four with `substeps` equal steps per sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -164,20 +158,16 @@ impl Rk4 {
         T: Scalar,
         P: LpvModel<T, NX, NU, NS>,
     {
-        let embedding = |x: &SVector<T, NX>| model.matrices(&model.scheduling(x));
-        // The embedding is exact, so the products that are at hand anyway are the slopes.
-        let slope = |from: &SVector<T, NX>,
-                     _: &SVector<T, NX>,
-                     k: &SMatrix<T, NX, NX>,
-                     l: &SMatrix<T, NX, NU>| {
-            let mut slope = product(k, from);
-            add_product(&mut slope, l, u);
-            slope
+        // The embedding is exact, so its product is f.
+        let embedding = |x: &SVector<T, NX>| {
+            let (a, b) = model.matrices(&model.scheduling(x));
+            let mut rate = model.a_times(&a, x);
+            add_product(&mut rate, &b, u);
+            (rate, a, b)
         };
         #[cfg(target_os = "none")]
-        let (embedding, slope): (&PairAt<'_, T, NX, NU>, &SlopeAt<'_, T, NX, NU>) =
-            (&embedding, &slope);
-        self.compose(model, x, t_s, embedding, slope)
+        let embedding: &TangentAt<'_, T, NX, NU> = &embedding;
+        self.compose(model, x, t_s, embedding)
     }
 
     /// The derivatives of [`Rk4::advance`] with respect to `x` and `u`: the same recursion with the
@@ -195,23 +185,17 @@ impl Rk4 {
         T: Scalar,
         P: LpvModel<T, NX, NU, NS>,
     {
-        let jacobian = |x: &SVector<T, NX>| model.jacobian(x, u);
-        let slope = |_: &SVector<T, NX>,
-                     there: &SVector<T, NX>,
-                     _: &SMatrix<T, NX, NX>,
-                     _: &SMatrix<T, NX, NU>| model.derivative(there, u);
+        let tangent = |x: &SVector<T, NX>| model.tangent(x, u);
         #[cfg(target_os = "none")]
-        let (jacobian, slope): (&PairAt<'_, T, NX, NU>, &SlopeAt<'_, T, NX, NU>) =
-            (&jacobian, &slope);
-        self.compose(model, x, t_s, jacobian, slope)
+        let tangent: &TangentAt<'_, T, NX, NU> = &tangent;
+        self.compose(model, x, t_s, tangent)
     }
 
-    /// The steps' matrices from the continuous-time pairs `at` each Runge-Kutta stage.
+    /// The steps' matrices from f and the continuous-time pairs `at` each Runge-Kutta stage.
     ///
     /// With A_j, B_j at stage j, the stages' slopes are K_j x + L_j u (up to a constant where the
     /// pairs are Jacobians): K_1 = A_1, L_1 = B_1, K_2 = A_2 (I + h/2 K_1),
-    /// L_2 = B_2 + h/2 A_2 L_1, and so on. `slope` is the slope of a stage, from the state where the
-    /// step began, the state of the stage, K_j and L_j.
+    /// L_2 = B_2 + h/2 A_2 L_1, and so on. f takes the state from stage to stage.
     // On a microcontroller, where flash is scarce, both kinds of pairs share its machine code.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
@@ -220,13 +204,7 @@ impl Rk4 {
         model: &P,
         x: &SVector<T, NX>,
         t_s: T,
-        at: impl Fn(&SVector<T, NX>) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>),
-        slope: impl Fn(
-            &SVector<T, NX>,
-            &SVector<T, NX>,
-            &SMatrix<T, NX, NX>,
-            &SMatrix<T, NX, NU>,
-        ) -> SVector<T, NX>,
+        at: impl Fn(&SVector<T, NX>) -> (SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>),
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>)
     where
         T: Scalar,
@@ -238,8 +216,7 @@ impl Rk4 {
         let (mut a_d, mut b_d) = (SMatrix::identity(), SMatrix::zeros());
         let mut x = *x;
         for _ in 0..self.substeps {
-            let (mut k, mut l) = at(&x);
-            let mut rate = slope(&x, &x, &k, &l);
+            let (mut rate, mut k, mut l) = at(&x);
             let (mut a_step, mut b_step) = (SMatrix::identity(), SMatrix::zeros());
             let mut next = x;
             add_scaled(&mut a_step, &k, sixth);
@@ -248,7 +225,8 @@ impl Rk4 {
             for (reach, weight) in [(half, third), (half, third), (h, sixth)] {
                 let mut there = x;
                 add_scaled(&mut there, &rate, reach);
-                let (mut a, mut b) = at(&there);
+                let (next_rate, mut a, mut b) = at(&there);
+                rate = next_rate;
                 // In place, since copies cost as much as the products where nothing is unrolled.
                 scale(&mut k, reach);
                 scale(&mut l, reach);
@@ -256,7 +234,6 @@ impl Rk4 {
                 add_scaled(&mut a, &a_k, T::one());
                 add_scaled(&mut b, &a_l, T::one());
                 (k, l) = (a, b);
-                rate = slope(&x, &there, &k, &l);
                 add_scaled(&mut a_step, &k, weight);
                 add_scaled(&mut b_step, &l, weight);
                 add_scaled(&mut next, &rate, weight);

@@ -98,6 +98,21 @@ fn the_jacobian_is_that_of_the_equations_of_motion() {
 }
 
 #[test]
+fn the_tangent_is_the_derivative_with_the_jacobian() {
+    let mut rng = Rng::with_seed(8);
+    for _ in 0..300 {
+        let mut robot = robots::rigid(&mut rng);
+        (robot.drive.viscous, robot.drive.coulomb) = (rng.f64(), rng.f64());
+        let x = Vector4::from_fn(|_, _| 2.0 * rng.f64() - 1.0);
+        let u = Vector1::new(2.0 * rng.f64() - 1.0);
+        let (f, a, b) = robot.tangent(&x, &u);
+        let expected = robot.derivative(&x, &u);
+        assert!((f - expected).amax() <= 1e-13 * (1.0 + expected.amax()));
+        assert_eq!((a, b), robot.jacobian(&x, &u));
+    }
+}
+
+#[test]
 fn the_embedding_is_exact_at_the_smallest_tilts() {
     // sin(theta)/theta where theta is zero of either sign, denormal, or so small that its sine
     // is itself.
