@@ -52,6 +52,11 @@ export function expectSame(here: string, there: string, apart = SAME): void {
   expectRows(ours, theirs, rows, apart);
 }
 
+/** A time shortly before the end of a run, s. */
+export function beforeEnd(csv: string): number {
+  return (table(csv)["t_s"]?.at(-3) ?? NaN) - 1e-9;
+}
+
 /** The same run as that of the set-up, up to a time, s. */
 export function expectSameUntil(until: number, here: string, toml: string, file = "trajectory.csv"): void {
   const short = toml.replace(/^duration_s = .*$/m, `duration_s = ${until + 1}`);

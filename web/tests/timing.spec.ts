@@ -1,7 +1,7 @@
 // What depends on the clock of the machine: these run alone, after the others.
 
-import { expect, test } from "@playwright/test";
-import { fill, open, saved, scenario, table, until } from "./page";
+import { expect } from "@playwright/test";
+import { fill, open, saved, scenario, table, test, until } from "./page";
 
 test("the loop runs at one kilohertz", async ({ page }) => {
   const problems = await open(page);
