@@ -48,8 +48,7 @@ test("a recorded run is played back", async ({ page }) => {
   await openFlat(page);
   await scenario(page, "two-setpoints");
   await page.locator("#play").click();
-  await until(page, 2);
-  await pause(page);
+  await expect(page.locator("#message")).toContainText("End of the scenario", { timeout: 60_000 });
   const csv = await saved(page, "Save CSV");
   await openFile(page, "trajectory.csv", csv);
   await expect(page.locator("#title")).toHaveText("recorded: trajectory.csv");
