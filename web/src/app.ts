@@ -23,6 +23,8 @@ export interface AppEvents {
   running(): void;
   /** The scenario or the recording has come to its end. */
   ended(): void;
+  /** Something was asked for or answered. */
+  asked(): void;
 }
 
 /** Targets further away than this are slips of the pen, m. */
@@ -63,6 +65,11 @@ export class App {
   /** Changes that are not taken in yet. */
   private waiting = 0;
   private queue: Promise<unknown> = Promise.resolve();
+  /** The orders that are not answered yet. */
+  private told: Promise<unknown> = Promise.resolve();
+  private unanswered = 0;
+  /** The last order to run or stop was heard. */
+  private isHeard = true;
 
   constructor(private readonly events: AppEvents) {
     this.engine.onBatch = (batch) => {
@@ -73,9 +80,14 @@ export class App {
   }
 
   /** There is no robot any more that would take orders. */
-  private failed(reason: string): void {
+  private forgetWorker(): void {
     this.facts = [];
+    this.isHeard = true;
     if (!this.playback) this.setRunning(false);
+  }
+
+  private failed(reason: string): void {
+    this.forgetWorker();
     this.events.message(reason, "error");
   }
 
@@ -84,8 +96,7 @@ export class App {
     const { working } = this;
     const text = `The controller did not answer for ${LONGEST_SILENCE} s and was ended: with these settings one sample takes too long. ` +
       "A shorter horizon, fewer sub-steps or fewer QPs make it faster.";
-    this.facts = [];
-    if (!this.playback) this.setRunning(false);
+    this.forgetWorker();
     this.events.message(text, "error", working && {
       label: "Go on with the last settings that worked",
       take: () => void this.attempt(async () => {
@@ -105,7 +116,11 @@ export class App {
   /** One thing after the other: a slider may move faster than its last value is taken in. */
   private inOrder<T>(work: () => Promise<T>): Promise<T> {
     this.waiting++;
-    const result = this.queue.then(work, work).finally(() => this.waiting--);
+    this.events.asked();
+    const result = this.queue.then(work, work).finally(() => {
+      this.waiting--;
+      this.events.asked();
+    });
     this.queue = result.catch(() => {});
     return result;
   }
@@ -116,9 +131,19 @@ export class App {
     void this.queue.then(work);
   }
 
+  /** The same for what writes down the orders before it: when these are answered, too. */
+  afterOrders(work: () => void): void {
+    void this.queue.then(() => this.told).then(work);
+  }
+
   /** No change is on its way. */
   get isSettled(): boolean {
     return this.waiting === 0;
+  }
+
+  /** Nor is anything else that was asked for: what is known is what came of it. */
+  get isAnswered(): boolean {
+    return this.isSettled && this.unanswered === 0 && this.isHeard;
   }
 
   /** Does it, or says why not and changes nothing. */
@@ -223,12 +248,14 @@ export class App {
   }
 
   /** Hands an order to the worker, and what it says of it to `taken`. */
-  private async tell<K extends Call["kind"]>(call: Extract<Call, { kind: K }>, taken: (answer: Answers[K]) => void): Promise<void> {
-    try {
-      taken(await this.engine.call<K>(call));
-    } catch (error) {
-      this.complain(error);
-    }
+  private tell<K extends Call["kind"]>(call: Extract<Call, { kind: K }>, taken: (answer: Answers[K]) => void): void {
+    this.unanswered++;
+    this.events.asked();
+    const answered = this.engine.call<K>(call).then(taken).catch((error: unknown) => this.complain(error)).finally(() => {
+      this.unanswered--;
+      this.events.asked();
+    });
+    this.told = Promise.all([this.told, answered]);
   }
 
   private phi({ x, y }: FloorPoint): PhiPair {
@@ -253,7 +280,7 @@ export class App {
       return;
     }
     this.ordered = at;
-    void this.tell<"target">({ kind: "target", phi: this.phi(at) }, ({ time_s, replaced }) => this.live.target(at, time_s, replaced));
+    this.tell<"target">({ kind: "target", phi: this.phi(at) }, ({ time_s, replaced }) => this.live.target(at, time_s, replaced));
     this.run(true);
   }
 
@@ -267,7 +294,7 @@ export class App {
     this.ordered = undefined;
     const timed = timedPath(points, from);
     const called = timed.map((point) => ({ time_s: point.time_s, phi: this.phi(point) }));
-    void this.tell<"path">({ kind: "path", points: called }, (taken) =>
+    this.tell<"path">({ kind: "path", points: called }, (taken) =>
       this.live.path(timed.map((point) => ({ ...point, time_s: taken.time_s + point.time_s }))));
     this.run(true);
   }
@@ -285,14 +312,21 @@ export class App {
     }
     // The body leans towards +x where theta is negative.
     const push = { x: -towards.x, y: -towards.y };
-    void this.tell<"push">({ kind: "push", push }, ({ time_s }) => this.live.push(push.x, push.y, time_s));
+    this.tell<"push">({ kind: "push", push }, ({ time_s }) => this.live.push(push.x, push.y, time_s));
     this.run(true);
   }
 
   /** What the button says: a run that is seen stops at once. */
   toggle(): void {
-    if (this.isRunning) this.run(false);
-    else this.afterChanges(() => this.run(!this.isRunning));
+    if (!this.isRunning) {
+      this.afterChanges(() => this.run(!this.isRunning));
+      return;
+    }
+    this.run(false);
+    // An order from before, which waits for a change, lets it run again.
+    this.afterChanges(() => {
+      if (this.isRunning) this.run(false);
+    });
   }
 
   setSpeed(speed: number): void {
@@ -309,6 +343,8 @@ export class App {
     [this.clock, this.clockAt] = [this.time(), performance.now()];
     this.speed = order.speed ?? this.speed;
     if (order.running !== undefined) this.setRunning(order.running);
+    this.isHeard = false;
+    this.events.asked();
     source.run({ number: ++this.runOrders, ...order, speed: this.speed });
   }
 
@@ -326,7 +362,7 @@ export class App {
         return;
       }
       this.run(false);
-      void this.tell<"step">({ kind: "step" }, () => {});
+      this.tell<"step">({ kind: "step" }, () => {});
     });
   }
 
@@ -371,7 +407,10 @@ export class App {
     }
     if (batch.references) this.references = batch.references;
     [this.clock, this.clockAt] = [batch.clock, performance.now()];
-    if (batch.order === this.runOrders) this.setRunning(batch.running);
+    if (batch.order === this.runOrders) {
+      this.isHeard = true;
+      this.setRunning(batch.running);
+    }
     if (batch.complete && !this.isComplete) this.events.ended();
     this.isComplete = batch.complete;
     this.onBatch(batch);

@@ -47,7 +47,7 @@ const view = makeView();
 document.body.classList.add(`view-${view.kind}`);
 const plots = new Plots(byId("plots"), () => redraw());
 const status = new StatusList(byId("status"));
-const app = new App({ message: (text, kind, offer) => messages.show(text, kind, offer), setup: setupShown, restarted, running: runningShown, ended });
+const app = new App({ message: (text, kind, offer) => messages.show(text, kind, offer), setup: setupShown, restarted, running: runningShown, ended, asked });
 const pictures = new Pictures(app);
 let panel: Panel | undefined;
 let shownShape = "";
@@ -109,6 +109,12 @@ function runningShown(): void {
 function ended(): void {
   messages.show(app.playback ? "End of the recording. Run plays it again."
     : "End of the scenario. Run goes on from here, Reset starts again.", "info");
+}
+
+/** Until what came of it is seen the page is not settled. */
+function asked(): void {
+  document.documentElement.dataset["settled"] = "false";
+  redraw();
 }
 
 /** Where the first robot is to go: the last target before it is heard of from the worker. */
@@ -181,6 +187,7 @@ function frame(now: number): void {
     plots.draw(time);
     showWords(time);
     showReview(plots.pointed);
+    document.documentElement.dataset["settled"] = String(app.isAnswered);
   }
   const picture = { ...pictures.at(time), stroke: pointer.stroke, strokeKind: pointer.strokeKind, strokeHeight: pointer.strokeHeight };
   moving = view.draw(picture, inSequence);
@@ -243,9 +250,9 @@ function makePanel(): Panel {
     }),
     push: (x, y) => app.push({ x, y }),
     openFiles: () => void choose(".toml,.csv", true).then(openFiles),
-    saveToml: () => app.afterChanges(() => save("scenario.toml", app.toml(), "application/toml")),
+    saveToml: () => app.afterOrders(() => save("scenario.toml", app.toml(), "application/toml")),
     saveCsv: () => app.afterChanges(saveCsv),
-    copyLink: () => app.afterChanges(() => void copyLink()),
+    copyLink: () => app.afterOrders(() => void copyLink()),
   });
 }
 

@@ -261,6 +261,8 @@ self.onmessage = async ({ data }: MessageEvent<ToWorker>) => {
     await started;
     if (failure !== "") throw new Error(failure);
     if ("run" in data) {
+      // The time before the order, if it did not run, is none of the run's.
+      if (!running) lastTick = performance.now();
       ({ running = running, speed, number: order } = data.run);
       send();
     } else {

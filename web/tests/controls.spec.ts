@@ -1,7 +1,7 @@
 // Every control does what it says: the set-up that is saved has its value, and the run shows it.
 
-import { expect, test } from "@playwright/test";
-import { atOnce, clock, fill, largest, openFlat, openSection, saved, scenario, table, until } from "./page";
+import { expect } from "@playwright/test";
+import { atOnce, fill, largest, openFlat, openSection, pass, saved, scenario, settled, table, test, until } from "./page";
 
 const NUMBERS: [section: string, label: string, typed: string, key: string, value: number][] = [
   ["Controller", "Horizon N", "35", "horizon", 35],
@@ -118,8 +118,7 @@ test("the guaranteed loop runs, and says where it belongs", async ({ page }) => 
   const phi = table(await saved(page, "Save CSV"))["phi_rad"] ?? [];
   expect(phi.at(-1) ?? NaN).toBeGreaterThan(3);
   await fill(page, "Horizon N", "25");
-  const now = await clock(page);
-  await until(page, now + 1);
+  await pass(page, 1);
   await expect(page.locator("#alert")).toBeHidden();
   await fill(page, "Sampling t_s", "40");
   await expect(page.locator("#message")).toContainText("the certificate is for 0.05 s");
@@ -164,9 +163,9 @@ test("settings change while it runs, and the robot stays where it is", async ({ 
   await openFlat(page);
   await page.locator("#play").click();
   await fill(page, "Target X", "0.5");
-  await until(page, 4);
+  await pass(page, 4);
   await fill(page, "Horizon N", "30");
-  await until(page, 6);
+  await pass(page, 2);
   await expect(page.locator("#alert")).toBeHidden();
   const csv = table(await saved(page, "Save CSV"));
   const phi = csv["phi_rad"] ?? [];
@@ -225,6 +224,7 @@ test("shortcuts go on after a click, and a field keeps its keys", async ({ page 
   await page.keyboard.press(" ");
   await expect(play).toHaveText("Run");
   await page.keyboard.press("r");
+  await expect(page.locator("#clock")).toHaveText("0.00 s");
   await page.getByLabel("Horizon N, slider").focus();
   await page.keyboard.press(".");
   await expect(page.locator("#clock")).toHaveText("0.05 s");
@@ -232,9 +232,9 @@ test("shortcuts go on after a click, and a field keeps its keys", async ({ page 
   for (const key of [".", "r", " "]) await page.keyboard.press(key);
   await page.locator("#speed").focus();
   await page.keyboard.press(".");
-  await page.waitForTimeout(300);
-  await expect(page.locator("#clock")).toHaveText("0.05 s");
-  await expect(play).toHaveText("Run");
+  await settled(page);
+  expect(await page.locator("#clock").textContent()).toBe("0.05 s");
+  expect(await play.textContent()).toBe("Run");
 });
 
 test("what changes at every frame is not read out", async ({ page }) => {

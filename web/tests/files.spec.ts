@@ -1,10 +1,10 @@
 // Files and links: out and in again, and what happens with broken ones.
 
 import { readFileSync } from "node:fs";
-import { expect, test, type Page } from "@playwright/test";
+import { expect, type Page } from "@playwright/test";
 import { readTrajectory } from "../src/files";
 import { Playback } from "../src/playback";
-import { clock, drop, fill, fragment, openFlat, openFile, ready, saved, scenario, until } from "./page";
+import { clearMessage, drop, fill, fragment, openFile, openFlat, pass, pause, ready, saved, scenario, test, until } from "./page";
 
 test("a link holds the whole set-up", async ({ page, context }) => {
   await context.grantPermissions(["clipboard-read", "clipboard-write"]);
@@ -48,8 +48,7 @@ test("a recorded run is played back", async ({ page }) => {
   await openFlat(page);
   await scenario(page, "two-setpoints");
   await page.locator("#play").click();
-  await until(page, 2);
-  await page.locator("#play").click();
+  await expect(page.locator("#message")).toContainText("End of the scenario", { timeout: 60_000 });
   const csv = await saved(page, "Save CSV");
   await openFile(page, "trajectory.csv", csv);
   await expect(page.locator("#title")).toHaveText("recorded: trajectory.csv");
@@ -64,7 +63,7 @@ test("a recorded run of two planes is dropped on the page and played back", asyn
   await scenario(page, "lissajous");
   await page.locator("#play").click();
   await until(page, 2);
-  await page.locator("#play").click();
+  await pause(page);
   const downloads: Promise<string>[] = [];
   page.on("download", (download) => downloads.push(download.path().then((path) => readFileSync(path, "utf8"))));
   await page.getByRole("button", { name: "Save CSV" }).click();
@@ -94,7 +93,7 @@ test("a recording begins at its first row, goes on row by row and plays again fr
   await page.locator("#speed").selectOption("0.02");
   await openFile(page, "late.csv", recording(60, 8));
   await expect(page.locator("#clock")).toHaveText(/^60\.0/);
-  await page.locator("#play").click();
+  await pause(page);
   await page.locator("#reset").click();
   await expect(page.locator("#clock")).toHaveText("60.00 s");
   for (const time of ["60.05 s", "60.10 s", "60.15 s"]) {
@@ -153,8 +152,7 @@ test("another speed does not make a recording's work more", async ({ page }) => 
   const before = await framesAskedFor(page);
   for (const speed of ["0.5", "0.25", "0.1", "0.5", "1"]) await page.locator("#speed").selectOption(speed);
   expect(await framesAskedFor(page)).toBe(before);
-  const now = await clock(page);
-  await until(page, now + 0.5);
+  await pass(page, 0.5);
 });
 
 const NOT_ONE_RUN: [files: [name: string, text: string][], message: string][] = [
@@ -169,6 +167,7 @@ test("recordings that are not one run get a message and change nothing", async (
   await openFlat(page);
   const title = (await page.locator("#title").textContent()) ?? "";
   for (const [files, message] of NOT_ONE_RUN) {
+    await clearMessage(page);
     await drop(page, files);
     await expect(page.locator("#message")).toContainText(message);
     await expect(page.locator("#title")).toHaveText(title);
@@ -214,6 +213,7 @@ test("broken files get a message and change nothing", async ({ page }) => {
   await fill(page, "R", "777");
   const before = await saved(page, "Save TOML");
   for (const [name, text, message] of BROKEN) {
+    await clearMessage(page);
     await openFile(page, name, text);
     await expect(page.locator("#message")).toContainText(message);
     expect(await saved(page, "Save TOML")).toBe(before);

@@ -1,12 +1,12 @@
 // The WebAssembly module beside the program, without a page: the same runs, column by column.
 
 import { readFileSync } from "node:fs";
-import { test } from "@playwright/test";
 import { parse } from "smol-toml";
 import { trajectoryCsv } from "../src/files";
 import init, { Simulation } from "../src/generated/ballbot_web.js";
 import { History } from "../src/history";
 import { Recorder } from "../src/recorder";
+import { test } from "./page";
 import { expectSame, GUARANTEED, simulated } from "./program";
 
 const BUILTIN = "../crates/ballbot-scenario/src/builtin";

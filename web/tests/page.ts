@@ -2,17 +2,44 @@
 
 import { readFile } from "node:fs/promises";
 import { deflateRawSync } from "node:zlib";
-import { expect, type Page } from "@playwright/test";
+import { expect, test as plain, type Page } from "@playwright/test";
+
+/** Milliseconds by which every message between page and worker comes late, if asked for: what happens
+ *  to be in time on a quick machine is late then. */
+const LATENCY = Number(process.env["LATENCY"] ?? 0);
+
+export const test = plain.extend({
+  context: async ({ context }, use) => {
+    if (LATENCY > 0) await context.addInitScript(delayMessages, LATENCY);
+    await use(context);
+  },
+});
+
+function delayMessages(latency: number): void {
+  window.Worker = class extends Worker {
+    override postMessage(message: unknown): void {
+      setTimeout(() => super.postMessage(message), latency);
+    }
+
+    override set onmessage(take: (event: MessageEvent) => void) {
+      super.onmessage = (event) => void setTimeout(() => take(event), latency);
+    }
+  };
+}
 
 /** Opens the page, with ten pictures a second: they keep the processor, which draws for these
  *  tests, busy enough. The returned list fills with everything that goes wrong in the page. */
 export async function open(page: Page): Promise<string[]> {
+  return openSlowly(page, "./");
+}
+
+export async function openSlowly(page: Page, address: string): Promise<string[]> {
   await page.addInitScript(() => {
     const frame = window.requestAnimationFrame.bind(window);
     window.requestAnimationFrame = (callback) => window.setTimeout(() => frame(callback), 100);
     window.cancelAnimationFrame = (id) => window.clearTimeout(id);
   });
-  return openAt(page, "./");
+  return openAt(page, address);
 }
 
 /** Opens the page with the picture from above, which is drawn in no time. For what has nothing to
@@ -43,10 +70,17 @@ export async function openAt(page: Page, address: string): Promise<string[]> {
 
 export async function ready(page: Page): Promise<void> {
   await page.waitForFunction(() => document.documentElement.dataset["ready"] === "true");
+  await settled(page);
+}
+
+/** Waits until everything that was asked for is taken in or refused, and what came of it is seen. */
+export async function settled(page: Page): Promise<void> {
+  await expect(page.locator("html")).toHaveAttribute("data-settled", "true");
 }
 
 export async function scenario(page: Page, name: string): Promise<void> {
   await page.getByLabel("Scenario", { exact: true }).selectOption(name);
+  await settled(page);
   await expect(page.locator("#clock")).toHaveText("0.00 s");
 }
 
@@ -57,6 +91,25 @@ export async function clock(page: Page): Promise<number> {
 /** Waits until the simulated time is at least `seconds`. */
 export async function until(page: Page, seconds: number): Promise<void> {
   await expect.poll(() => clock(page), { timeout: 90_000, intervals: [100] }).toBeGreaterThanOrEqual(seconds);
+}
+
+/** Waits until so many seconds of simulated time have passed since now. */
+export async function pass(page: Page, seconds: number): Promise<void> {
+  await until(page, (await clock(page)) + seconds);
+}
+
+/** Pauses the run, and waits until its last samples have come. */
+export async function pause(page: Page): Promise<void> {
+  const play = page.locator("#play");
+  await expect(play).toHaveText("Pause");
+  await play.click();
+  await settled(page);
+  await expect(play).toHaveText("Run");
+}
+
+/** Clears the line of messages, so that what is said next is new. */
+export async function clearMessage(page: Page): Promise<void> {
+  await page.locator("#message").evaluate((line) => line.replaceChildren());
 }
 
 /** Does several things in one go, before any of them can be answered: presses `#button`, or gives a
@@ -87,6 +140,7 @@ export async function fill(page: Page, label: string, value: string): Promise<vo
   await field.fill(value);
   await field.press("Enter");
   await field.blur();
+  await settled(page);
 }
 
 /** The strength of the push that buttons give, rad/s, typed in the page's unit. */

@@ -52,11 +52,19 @@ export function expectSame(here: string, there: string, apart = SAME): void {
   expectRows(ours, theirs, rows, apart);
 }
 
-/** The same run as that of the set-up, up to a time, s. */
+/** A time shortly before the end of a run, s. */
+export function beforeEnd(csv: string): number {
+  return (table(csv)["t_s"]?.at(-3) ?? NaN) - 1e-9;
+}
+
+/** Of a run that follows orders, as docs/browser.md says. */
+const ORDERED: Apart = { ...SAME, phi_dot_rad_s: 1e-8, theta_dot_rad_s: 1e-8 };
+
+/** The same run as that of the set-up with its orders, up to a time, s. */
 export function expectSameUntil(until: number, here: string, toml: string, file = "trajectory.csv"): void {
   const short = toml.replace(/^duration_s = .*$/m, `duration_s = ${until + 1}`);
   const [ours, theirs] = [table(here), table(simulated(short)(file))];
   const rows = ours["t_s"]?.findIndex((time) => time > until) ?? -1;
   expect(rows).toBeGreaterThan(5);
-  expectRows(ours, theirs, rows);
+  expectRows(ours, theirs, rows, ORDERED);
 }

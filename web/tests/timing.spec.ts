@@ -1,7 +1,13 @@
 // What depends on the clock of the machine: these run alone, after the others.
 
-import { expect, test } from "@playwright/test";
-import { fill, open, saved, scenario, table, until } from "./page";
+import { availableParallelism, loadavg } from "node:os";
+import { expect } from "@playwright/test";
+import { fill, open, pause, saved, scenario, settled, table, test, until } from "./page";
+
+/** Said of a measurement that is not as expected: a machine with more to do than it has cores cannot tell. */
+function busyness(): string {
+  return `load average ${loadavg()[0]?.toFixed(1)} on ${availableParallelism()} cores`;
+}
 
 test("the loop runs at one kilohertz", async ({ page }) => {
   const problems = await open(page);
@@ -17,8 +23,8 @@ test("the loop runs at one kilohertz", async ({ page }) => {
   });
   // A busy machine may hold it up now and then: in its best two seconds it runs in real time.
   const rates = seen.flatMap(([begin, from]) => seen.filter(([end]) => end - begin > 2).map(([end, to]) => (to - from) / (end - begin)));
-  expect(Math.max(...rates)).toBeGreaterThan(0.9);
-  await page.locator("#play").click();
+  expect(Math.max(...rates), busyness()).toBeGreaterThan(0.9);
+  await pause(page);
   const times = table(await saved(page, "Save CSV"))["t_s"] ?? [];
   expect(times.length).toBeGreaterThan(3000);
   expect((times[2001] ?? NaN) - (times[2000] ?? NaN)).toBeCloseTo(0.001, 9);
@@ -33,10 +39,11 @@ test("the time per step that is shown is the measured one, and below 100 us for 
   await expect(page.locator("#message")).toContainText("End of the scenario", { timeout: 60_000 });
   const steps = (table(await saved(page, "Save CSV"))["step_us"] ?? []).filter(Number.isFinite).sort((a, b) => a - b);
   const middle = ((steps[39] ?? NaN) + (steps[40] ?? NaN)) / 2;
+  await settled(page);
   const shown = parseFloat((await page.locator("#status .time").textContent()) ?? "");
   expect(shown).toBeCloseTo(middle, 1);
   expect(middle).toBeGreaterThan(0);
-  expect(middle).toBeLessThan(100);
+  expect(middle, busyness()).toBeLessThan(100);
   test.info().annotations.push({ type: "median time per step", description: `${middle} us` });
 });
 
@@ -44,11 +51,11 @@ test("a step of the default predictor takes less than 100 us", async ({ page }) 
   await open(page);
   await fill(page, "Target X", "0.5");
   await until(page, 4);
-  await page.locator("#play").click();
+  await pause(page);
   const steps = (table(await saved(page, "Save CSV"))["step_us"] ?? []).filter(Number.isFinite).sort((a, b) => a - b);
   expect(steps.length).toBeGreaterThan(70);
   const middle = steps[Math.floor(steps.length / 2)] ?? NaN;
   expect(middle).toBeGreaterThan(0);
-  expect(middle).toBeLessThan(100);
+  expect(middle, busyness()).toBeLessThan(100);
   test.info().annotations.push({ type: "median time per step", description: `${middle} us` });
 });

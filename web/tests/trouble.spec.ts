@@ -1,9 +1,9 @@
 // What goes wrong is said, and what was there stays.
 
-import { expect, test } from "@playwright/test";
+import { expect } from "@playwright/test";
 import { followed } from "../src/pictures";
-import { drop, fill, fragment, open, openFile, openFlat, openSection, saved, scenario, setPush, table, until } from "./page";
-import { expectSameUntil } from "./program";
+import { drop, fill, fragment, open, openFile, openFlat, openSection, pass, pause, saved, scenario, setPush, table, test, until } from "./page";
+import { beforeEnd, expectSameUntil } from "./program";
 
 test("without the control loop's program the page says so", async ({ page }) => {
   await page.route("**/worker*.js", (route) => route.abort());
@@ -47,19 +47,19 @@ test("a push by hand stands in the file at its time", async ({ page }) => {
   await until(page, 0.5);
   await setPush(page, 1);
   await page.getByRole("button", { name: "\u2192" }).click();
-  await until(page, 1.5);
-  await page.locator("#play").click();
+  await pass(page, 1);
+  await pause(page);
   const csv = await saved(page, "Save CSV");
   const toml = await saved(page, "Save TOML");
   expect(toml).toContain("theta_dot_rad_s = -1");
-  expectSameUntil(1.4, csv, toml, "trajectory_x.csv");
+  expectSameUntil(beforeEnd(csv), csv, toml, "trajectory_x.csv");
 });
 
 test("an emptied field that needs a number is refused, and shows what holds", async ({ page }) => {
   await openFlat(page);
-  for (const [label, value] of [["Horizon N", "20"], ["Sampling t_s", "50"], ["Q phi", /\d/], ["R", /\d/]] as const) {
+  for (const [label, key, value] of [["Horizon N", "horizon", "20"], ["Sampling t_s", "t_s", "50"], ["Q phi", "q", /\d/], ["R", "r", /\d/]] as const) {
     await fill(page, label, "");
-    await expect(page.locator("#message")).toContainText("controller.");
+    await expect(page.locator("#message")).toContainText(`controller.${key}`);
     await expect(page.locator("#message")).toContainText("NaN");
     await expect(page.locator(".panel").getByLabel(label, { exact: true })).toHaveValue(value);
   }
@@ -107,6 +107,7 @@ test("a controller that does not answer is ended, and the last settings that wor
   await until(page, 0.5);
   const worked = await saved(page, "Save TOML");
   await openFile(page, "endless.toml", endless(worked));
+  await expect(page.getByLabel("Horizon N", { exact: true })).toHaveValue("200");
   await page.locator("#play").click();
   await expect(page.locator("#message")).toContainText("did not answer for 2 s and was ended");
   await expect(page.locator("#play")).toHaveText("Run");
@@ -134,7 +135,7 @@ test("a fallen robot is said to lie on the floor, and no word covers another", a
   for (const label of ["linear MPC", "LQR"]) await page.locator(".panel").getByLabel(label, { exact: true }).check();
   await fill(page, "Target X", "2.5");
   await until(page, 4);
-  await page.locator("#play").click();
+  await pause(page);
   // The LQR knows no bound of the tilt.
   const badges = page.locator("#status > div");
   await expect(badges.filter({ hasText: "LQR" })).toHaveText("LQRon the floor");
@@ -168,7 +169,7 @@ test("where the clock is coarse the time per step is a mean", async ({ page }) =
   expect(await page.evaluate(() => crossOriginIsolated)).toBe(false);
   await fill(page, "Target X", "0.5");
   await until(page, 4);
-  await page.locator("#play").click();
+  await pause(page);
   const shown = (await page.locator("#status .time").textContent()) ?? "";
   expect(shown).toContain("(mean; coarse clock)");
   const steps = (table(await saved(page, "Save CSV"))["step_us"] ?? []).filter(Number.isFinite);
