@@ -118,7 +118,8 @@ pub fn time_guarded() -> Result<GuardedTimes, CommandError> {
     plain_settings.iterations = Iterations::Fixed(1);
     let refused = ScenarioError::from;
     let mut plain = Control::allocate(prepared.ballbot, plain_settings).map_err(refused)?;
-    let mut guarded = GuardedController::allocate(prepared.ballbot, settings).map_err(ScenarioError::from)?;
+    let mut guarded =
+        GuardedController::allocate(prepared.ballbot, settings).map_err(ScenarioError::from)?;
     let mut workspace = plain.workspace();
     let mut memory = guarded.workspace::<5>();
     let (mut plain_us, mut guarded_us) = (Vec::new(), Vec::new());

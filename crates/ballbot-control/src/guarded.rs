@@ -15,5 +15,7 @@ pub fn guarded_feedback(
     preview: bool,
 ) -> Result<Box<dyn PlaneRegulator>, GuardedError> {
     let controller = GuardedController::allocate(*ballbot, *settings)?;
-    Ok(Box::new(GuardedFeedback::<_, 4, 1, 3, 5>::new(controller, preview)))
+    Ok(Box::new(GuardedFeedback::<_, 4, 1, 3, 5>::new(
+        controller, preview,
+    )))
 }

@@ -92,9 +92,7 @@ pub(crate) struct Plan<const NX: usize> {
 }
 
 impl<const NX: usize> Plan<NX> {
-    pub(crate) fn of<P>(
-        controller: &Controller<P, f64, NX, 1, 3>,
-    ) -> Option<Self>
+    pub(crate) fn of<P>(controller: &Controller<P, f64, NX, 1, 3>) -> Option<Self>
     where
         P: LpvModel<f64, NX, 1, 3>,
     {
@@ -112,10 +110,8 @@ impl<const NX: usize> Plan<NX> {
 
     /// Gives it to a controller. At another sampling time its inputs would be another motion: then
     /// that begins without a past.
-    pub(crate) fn hand_to<P>(
-        &self,
-        controller: &mut Controller<P, f64, NX, 1, 3>,
-    ) where
+    pub(crate) fn hand_to<P>(&self, controller: &mut Controller<P, f64, NX, 1, 3>)
+    where
         P: LpvModel<f64, NX, 1, 3>,
     {
         if self.t_s == controller.settings().t_s {

@@ -6,9 +6,7 @@ use crate::output_feedback::{Belief, OutputFeedback};
 use crate::plane_regulator::PlaneRegulator;
 use crate::planner::{Held, Planner};
 use ballbot::Ballbot;
-use lpvmpc::{
-    Bounds, Controller, ControllerError, ControllerSettings, Estimator, EstimatorError,
-};
+use lpvmpc::{Bounds, Controller, ControllerError, ControllerSettings, Estimator, EstimatorError};
 use lpvmpc_sim::{MeasuredState, StateFeedback};
 use nalgebra::Vector4;
 

@@ -7,8 +7,8 @@
 
 use ballbot_control::guarded_feedback;
 use ballbot_scenario::{
-    CertifiedTable, IterationsTable, Parameters, PointTable, ReferenceTable,
-    Scenario, ScenarioError, Surroundings, TerminalTable, TorqueRateTable, builtin,
+    CertifiedTable, IterationsTable, Parameters, PointTable, ReferenceTable, Scenario,
+    ScenarioError, Surroundings, TerminalTable, TorqueRateTable, builtin,
 };
 use lpvmpc::{GuardedController, Rk4, share_of_bounds};
 use lpvmpc_sim::{Ending, Trajectory};

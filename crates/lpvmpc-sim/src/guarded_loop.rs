@@ -34,13 +34,7 @@ impl<const NU: usize> Actuation<NU> {
 
 /// A guarded controller and its plant.
 #[derive(Clone, Debug)]
-pub struct GuardedLoop<
-    C,
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NS: usize,
-> {
+pub struct GuardedLoop<C, P, const NX: usize, const NU: usize, const NS: usize> {
     controller: GuardedController<C, f64, NX, NU, NS>,
     plant: P,
     tolerances: Tolerances,
@@ -49,13 +43,7 @@ pub struct GuardedLoop<
     acting: SVector<f64, NU>,
 }
 
-impl<
-    C,
-    P,
-    const NX: usize,
-    const NU: usize,
-    const NS: usize,
-> GuardedLoop<C, P, NX, NU, NS>
+impl<C, P, const NX: usize, const NU: usize, const NS: usize> GuardedLoop<C, P, NX, NU, NS>
 where
     C: LpvModel<f64, NX, NU, NS>,
     P: LpvModel<f64, NX, NU, NS>,
@@ -128,13 +116,7 @@ pub struct Guard {
 /// A guarded controller on the measured state itself. The wanted set points are the reference's coordinates along the
 /// direction of the set points.
 #[derive(Debug)]
-pub struct GuardedFeedback<
-    C,
-    const NX: usize,
-    const NU: usize,
-    const NS: usize,
-    const NA: usize,
-> {
+pub struct GuardedFeedback<C, const NX: usize, const NU: usize, const NS: usize, const NA: usize> {
     /// What decides.
     pub controller: GuardedController<C, f64, NX, NU, NS>,
     /// Its memory.
@@ -165,13 +147,8 @@ where
     }
 }
 
-impl<
-    C,
-    const NX: usize,
-    const NU: usize,
-    const NS: usize,
-    const NA: usize,
-> Regulator<NX, NU, NX> for GuardedFeedback<C, NX, NU, NS, NA>
+impl<C, const NX: usize, const NU: usize, const NS: usize, const NA: usize> Regulator<NX, NU, NX>
+    for GuardedFeedback<C, NX, NU, NS, NA>
 where
     C: LpvModel<f64, NX, NU, NS>,
 {

@@ -161,11 +161,7 @@ fn no_samples_no_motion() {
             clock: &stopped,
             progress: &|_| (),
         };
-        run(
-            &mut controller,
-            &Ballbot::paper(),
-            &experiment,
-        )
+        run(&mut controller, &Ballbot::paper(), &experiment)
     };
     let nothing = run_of(0);
     assert_eq!(nothing.states().count(), 1);
@@ -340,11 +336,7 @@ fn run_ballbot(clock: &dyn Fn() -> Duration) -> Trajectory<4, 1> {
         progress: &|_| (),
     };
     let plant = Ballbot::paper();
-    run(
-        &mut ballbot_controller(),
-        &plant,
-        &experiment,
-    )
+    run(&mut ballbot_controller(), &plant, &experiment)
 }
 
 /// Every number of the record but the times per step.

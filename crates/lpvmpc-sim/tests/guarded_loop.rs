@@ -5,8 +5,8 @@
 )]
 
 use lpvmpc::{
-    BoundId, Bounds, GuardedController, GuardedIterations, GuardedSettings,
-    LpvModel, Quantity, Rk4, Rollout, Side, SolverSettings, TerminalSet, Weights,
+    BoundId, Bounds, GuardedController, GuardedIterations, GuardedSettings, LpvModel, Quantity,
+    Rk4, Rollout, Side, SolverSettings, TerminalSet, Weights,
 };
 use lpvmpc_design::lqr_discrete;
 use lpvmpc_sim::{

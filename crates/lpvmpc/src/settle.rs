@@ -176,7 +176,9 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         copy(&mut self.rest, &self.v);
         let (working, resting) = (self.working.rows(), &self.resting);
         let active_at = |stage: usize| {
-            let here = working.iter().filter(move |row| row.active.bound.stage == stage);
+            let here = working
+                .iter()
+                .filter(move |row| row.active.bound.stage == stage);
             here.map(Terms::reported).chain(resting.at(stage))
         };
         rows::subtract(ocp, factors, active_at, &mut self.rest);
