@@ -249,7 +249,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
                 solution.active.push(row);
             }
         }
-        let left = settings.max_changes.saturating_sub(*spent);
+        let left = self.dual.changes_left();
         self.dual.reset(self.dual.tolerance, left);
         let outcome = self.search(ocp, &settings, solution);
         *spent += self.dual.changes;

@@ -100,7 +100,7 @@ fn answer<T: Scalar, const NX: usize, const NU: usize>(
     let mut solution = Solution::default();
     let settings = SolverSettings {
         warm_start: WarmStart::Cold,
-        max_changes: 2000,
+        max_changes: Some(2000),
         ..SolverSettings::default()
     };
     let mut solver = Box::new(Solver::new());

@@ -21,7 +21,7 @@ pub fn on_large_stack<R: Send + 'static>(work: impl FnOnce() -> R + Send + 'stat
 pub fn cold() -> SolverSettings<f64> {
     SolverSettings {
         warm_start: WarmStart::Cold,
-        max_changes: 20_000,
+        max_changes: Some(20_000),
         ..SolverSettings::default()
     }
 }

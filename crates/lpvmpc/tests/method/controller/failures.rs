@@ -206,7 +206,7 @@ fn the_cap_on_changes_is_kept() {
     let needed = full_answer().changes;
     for max_changes in 0..=needed {
         let mut settings = settings(N);
-        settings.solver.max_changes = max_changes;
+        settings.solver.max_changes = Some(max_changes);
         let mut tried: Sized<N, N> = controller(settings);
         let plan = tried.step(&tilted(), &moving_reference(0), &mut Memory::new());
         assert_safe(plan, &settings.u);
