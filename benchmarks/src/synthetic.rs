@@ -67,7 +67,7 @@ pub fn problems<const NX: usize, const NU: usize, const N: usize, const M: usize
 /// Settings with room for any number of changes that ends.
 pub fn settings() -> SolverSettings<f64> {
     SolverSettings {
-        max_changes: 60_000,
+        max_changes: Some(60_000),
         ..SolverSettings::default()
     }
 }

@@ -96,7 +96,7 @@ pub enum Command {
 pub fn finite(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
-        Ok(value) => Err(format!("{value} is not a finite number")),
+        Ok(value) => Err(format!("{} is not a finite number", number::text(value))),
         Err(_) => Err(format!("`{text}` is not a number")),
     }
 }

@@ -100,8 +100,8 @@ pub fn path(title: &str, prepared: &Prepared, planes: [&Columns; 2]) -> Figure {
 }
 
 /// How far the plans of a run were from the model's rollout, and, for a run with a guarantee, what
-/// each torque was backed by and where the plan was to end.
-pub fn plans(title: &str, columns: &Columns) -> Figure {
+/// each torque was backed by and where the plan was to end; `None` where neither is to be told.
+pub fn plans(title: &str, columns: &Columns) -> Option<Figure> {
     let samples = columns.gap.len();
     let first = |values: &[f64]| values.get(..samples).unwrap_or(values).to_vec();
     let (time, wanted) = (first(&columns.time), first(&columns.phi_reference));

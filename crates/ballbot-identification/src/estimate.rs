@@ -10,6 +10,7 @@ use crate::segments::{segments, spread};
 use crate::start::{linear_fits, typical};
 use crate::suspects::Suspects;
 use ballbot::Geometry;
+use lpvmpc_design::number_text;
 use lpvmpc_design::{
     Prior, ShootingError, ShootingFit, ShootingProblem, ShootingSettings, Unknown,
 };
@@ -88,7 +89,9 @@ pub enum Status {
 pub enum EstimateError {
     /// The segments are longer than what there is.
     #[error(
-        "no stretch of the log is long enough for a segment of {segment} s after the first {lead} s"
+        "no stretch of the log is long enough for a segment of {segment} s after the first {lead} s",
+        segment = number_text(*segment),
+        lead = number_text(*lead)
     )]
     NoSegments {
         /// Length of a segment, s.

@@ -9,6 +9,7 @@ use crate::poles::linear_model;
 use crate::segments::segments;
 use crate::words::{number, percent};
 use ballbot::Geometry;
+use lpvmpc_design::number_text;
 use lpvmpc_design::{RiccatiError, lqr_continuous, poles};
 use nalgebra::{DMatrix, DVector, Vector3, Vector4};
 use std::f64::consts::{PI, TAU};
@@ -71,7 +72,7 @@ pub struct Excitation {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExcitationError {
     /// A number out of range.
-    #[error("{what} is {value}: it must be {expected}")]
+    #[error("{what} is {value}: it must be {expected}", value = number_text(*value))]
     Value {
         /// What it is.
         what: &'static str,

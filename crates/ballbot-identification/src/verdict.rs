@@ -9,6 +9,7 @@ use crate::structures::Structure;
 use crate::suspects::{Suspect, Suspects};
 use crate::words::{number, percent, times};
 use lpvmpc_design::ShootingTermination;
+use lpvmpc_design::number_text;
 use thiserror::Error;
 
 /// How much a verdict matters.
@@ -104,7 +105,9 @@ pub enum Verdict {
     },
     /// The segments had to be shorter than was asked for.
     #[error(
-        "the robot could not be simulated over {wanted} s, and was fitted in segments of {used} s: the model is far from the robot, or its unstable mode is very fast"
+        "the robot could not be simulated over {wanted} s, and was fitted in segments of {used} s: the model is far from the robot, or its unstable mode is very fast",
+        wanted = number_text(*wanted),
+        used = number_text(*used)
     )]
     Shortened {
         /// Asked for, s.

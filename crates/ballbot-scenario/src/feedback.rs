@@ -5,7 +5,7 @@ use crate::feedback_table::{
     DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
 };
 use crate::heading::Turning;
-use crate::number::{not_negative, positive};
+use crate::number::{not_negative, positive, text};
 use crate::problem::{MOST_SUBSTEPS, dynamic};
 use crate::schema::{ControllerTable, TerminalTable};
 use crate::three_motors::Motors;
@@ -36,8 +36,9 @@ impl ControllerTable {
                 "controller.delay_s",
                 delay,
                 format!(
-                    "the fastest pole asks for {steps} steps over the delay, at most \
-                     {MOST_SUBSTEPS} can be taken"
+                    "the fastest pole asks for {} steps over the delay, at most \
+                     {MOST_SUBSTEPS} can be taken",
+                    text(steps)
                 ),
             ));
         }

@@ -1,17 +1,7 @@
 //! Numbers of a file that must lie in some range.
 
 use crate::error::ScenarioError;
-
-/// A number as a person would write it: at most twelve significant digits, which hides what rounding
-/// adds, and a power of ten where it is very large or small.
-pub fn text(value: f64) -> String {
-    let rounded: f64 = format!("{value:.11e}").parse().unwrap_or(value);
-    match rounded.abs() {
-        0.0 => "0".to_owned(),
-        size if (1e-4..1e9).contains(&size) => rounded.to_string(),
-        _ => format!("{rounded:e}"),
-    }
-}
+pub use lpvmpc_design::number_text as text;
 
 /// What a message says of a value.
 pub(crate) trait Given {
@@ -79,29 +69,4 @@ pub fn positive(key: &str, value: f64) -> Result<f64, ScenarioError> {
 pub fn not_negative(key: &str, value: f64) -> Result<f64, ScenarioError> {
     let right = value >= 0.0 && value.is_finite();
     check(key, value, right, "it must be finite and not negative")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::text;
-
-    #[test]
-    fn numbers_are_as_a_person_writes_them() {
-        for (value, written) in [
-            (0.0, "0"),
-            (-0.0, "0"),
-            (0.1 + 0.2, "0.3"),
-            (-60.0, "-60"),
-            (1e6, "1000000"),
-            (1e200, "1e200"),
-            (-2.5e-300, "-2.5e-300"),
-            (1e-5, "1e-5"),
-            (f64::INFINITY, "inf"),
-            (f64::NEG_INFINITY, "-inf"),
-            (f64::NAN, "NaN"),
-            (std::f64::consts::PI, "3.14159265359"),
-        ] {
-            assert_eq!(text(value), written);
-        }
-    }
 }

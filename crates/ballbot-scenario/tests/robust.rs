@@ -1,4 +1,6 @@
 //! The examples of docs/robust-control.md: what has to hold in a world as it is.
+//!
+//! Run with `--nocapture` for the figures.
 #![allow(
     clippy::expect_used,
     clippy::panic,
@@ -60,6 +62,7 @@ fn it_stands_a_push_and_follows_a_metre_within_20_mm() {
         world(&mut scenario).seed = seed;
         let (prepared, recordings) = stands(&scenario);
         let error = rms_mm(&prepared, &recordings[0], 6.0, 10.0);
+        println!("seed {seed}: {error:.1} mm");
         assert!(error < 20.0, "seed {seed}: {error} mm");
     }
 }
@@ -72,6 +75,7 @@ fn it_follows_a_lissajous_curve_through_a_push_within_25_mm() {
         let (prepared, recordings) = stands(&scenario);
         // On the floor, both planes together, the push included.
         let [x, y] = [0, 1].map(|i| rms_mm(&prepared, &recordings[i], 0.0, 70.0));
+        println!("curve, seed {seed}: {:.1} mm", x.hypot(y));
         assert!(x.hypot(y) < 25.0, "seed {seed}: {x} mm and {y} mm");
     }
 }
@@ -91,7 +95,9 @@ fn it_stands_with_every_parameter_wrong_by_20_percent() {
         let (prepared, recordings) = stands(&scenario);
         let error = rms_mm(&prepared, &recordings[0], 6.0, 12.0);
         let tilt = recordings[0].trajectory.states().map(|x| x[1].abs());
-        assert!(tilt.fold(0.0, f64::max) < 0.7, "corner {corner:04b}");
+        let tilt = tilt.fold(0.0, f64::max);
+        println!("corner {corner:04b}: {error:.1} mm, {tilt:.2} rad");
+        assert!(tilt < 0.7, "corner {corner:04b}: {tilt} rad");
         // It does not only keep from falling: it moves, and comes to rest at the set point.
         assert!(error < 25.0, "corner {corner:04b}: {error} mm");
     }

@@ -1,5 +1,6 @@
 //! The exact discretisation of a linear model under a held input.
 
+use crate::number_text;
 use nalgebra::DMatrix;
 use thiserror::Error;
 
@@ -12,7 +13,10 @@ pub enum DiscretizeError {
     #[error(transparent)]
     Matrix(#[from] MatrixError),
     /// The sampling time is not a positive, finite number.
-    #[error("the sampling time is {value} s: it must be finite and > 0")]
+    #[error(
+        "the sampling time is {value} s: it must be finite and > 0",
+        value = number_text(*value)
+    )]
     SampleTime {
         /// The sampling time, s.
         value: f64,

@@ -11,6 +11,7 @@ mod fit;
 mod gauss_newton;
 mod levenberg_marquardt;
 
+use crate::number_text;
 use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
 
@@ -111,7 +112,10 @@ pub enum LeastSquaresError {
         equations: usize,
     },
     /// A weight is not a positive number.
-    #[error("weight {index} (counted from 0) is {value}: it must be finite and > 0")]
+    #[error(
+        "weight {index} (counted from 0) is {value}: it must be finite and > 0",
+        value = number_text(*value)
+    )]
     Weight {
         /// Which weight, counted from 0.
         index: usize,
@@ -119,7 +123,7 @@ pub enum LeastSquaresError {
         value: f64,
     },
     /// A setting is out of its range.
-    #[error("the setting {name} is {value}: it must be {allowed}")]
+    #[error("the setting {name} is {value}: it must be {allowed}", value = number_text(*value))]
     Setting {
         /// Name of the field of [`LeastSquaresSettings`].
         name: &'static str,
@@ -139,7 +143,8 @@ pub enum LeastSquaresError {
     /// The iteration ended without reaching a minimum.
     #[error(
         "the fit did not converge: {termination}. Last good iterate after {iterations} steps: \
-         b = {parameters:?}, weighted residual norm {residual_norm}"
+         b = {parameters:?}, weighted residual norm {residual_norm}",
+        residual_norm = number_text(*residual_norm)
     )]
     DidNotConverge {
         /// Why it ended.

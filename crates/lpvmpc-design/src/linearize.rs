@@ -1,5 +1,6 @@
 //! Linearisation of x_dot = f(x, u), or x+ = f(x, u), from values of f alone.
 
+use crate::number_text;
 use nalgebra::{SMatrix, SVector};
 use thiserror::Error;
 
@@ -21,7 +22,10 @@ pub struct Linearization<const NX: usize, const NU: usize> {
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum LinearizeError {
     /// f is NaN or infinite at the point.
-    #[error("f(x, u)[{row}] is {value} at the point of linearisation: it must be finite")]
+    #[error(
+        "f(x, u)[{row}] is {value} at the point of linearisation: it must be finite",
+        value = number_text(*value)
+    )]
     NonFinite {
         /// Component of f, counted from 0.
         row: usize,

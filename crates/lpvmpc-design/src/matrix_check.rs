@@ -1,5 +1,6 @@
 //! Checks of the matrices handed in, so that a mistake is named at its entry and no NaN gets in.
 
+use crate::number_text;
 use nalgebra::{DMatrix, SymmetricEigen};
 use thiserror::Error;
 
@@ -77,8 +78,7 @@ pub enum MatrixError {
     /// An eigenvalue is zero or negative where all must be positive.
     #[error(
         "{name} is not positive definite: its smallest eigenvalue is {smallest_eigenvalue}, \
-         which must be > 0"
-    )]
+         which must be > 0", smallest_eigenvalue = number_text(*smallest_eigenvalue))]
     NotPositiveDefinite {
         /// Name of the matrix in the equation.
         name: &'static str,
@@ -88,8 +88,7 @@ pub enum MatrixError {
     /// An eigenvalue is negative where none may be.
     #[error(
         "{name} is not positive semidefinite: its smallest eigenvalue is {smallest_eigenvalue}, \
-         which must be >= 0"
-    )]
+         which must be >= 0", smallest_eigenvalue = number_text(*smallest_eigenvalue))]
     NotPositiveSemidefinite {
         /// Name of the matrix in the equation.
         name: &'static str,

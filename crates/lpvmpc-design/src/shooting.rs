@@ -15,6 +15,7 @@ mod block;
 mod fit;
 mod unknown;
 
+use crate::number_text;
 use nalgebra::{DMatrix, DVector, SVector};
 use rayon::prelude::*;
 use thiserror::Error;
@@ -105,7 +106,7 @@ pub enum ShootingError {
         found: usize,
     },
     /// A number of the problem is out of its range.
-    #[error("{what} is {value}: it must be {allowed}")]
+    #[error("{what} is {value}: it must be {allowed}", value = number_text(*value))]
     Value {
         /// What it is.
         what: String,

@@ -254,6 +254,11 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         -slack <= self.direction.noise * length
     }
 
+    /// Changes of the active set that are still allowed.
+    pub fn changes_left(&self) -> usize {
+        self.max_changes - self.changes
+    }
+
     /// Counts one more change of the active set.
     pub(crate) fn count_change(&mut self) -> Result<(), Status<T>> {
         if self.changes >= self.max_changes {

@@ -254,7 +254,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 solution.active.push(row);
             }
         }
-        let left = settings.max_changes.saturating_sub(*spent);
+        let left = self.dual.changes_left();
         self.dual.reset(self.dual.tolerance, left);
         let outcome = self.search(ocp, &settings, solution);
         *spent += self.dual.changes;

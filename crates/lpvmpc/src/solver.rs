@@ -26,10 +26,19 @@ pub struct SolverSettings<T> {
     /// so strongly that rounding decides, sqrt(eps) is let through (1.5e-8 and 3.5e-4); an
     /// input is within its bounds to the last bit all the same.
     pub tolerance: T,
-    /// The search ends after this many changes of the active set. Default: 500.
-    pub max_changes: usize,
+    /// The search ends after this many changes of the active set. Default, `None`: ten for every
+    /// state, input and general row of every stage in use, 10 n (`NX` + `NU` + `NG`).
+    ///
+    /// That is measured, not proved: of 2424 searches on random problems with horizons of 1 to 200 one
+    /// was ended by it, and half of those of each size need less than 4 % of it (`tests/it/changes.rs`).
+    pub max_changes: Option<usize>,
     /// What the active set of the previous solution is used for. Default: shifted.
     pub warm_start: WarmStart,
+}
+
+fn default_cap<T: Scalar, const NX: usize, const NU: usize>(ocp: &Ocp<T, NX, NU>) -> usize {
+    let rows = (NX + NU).saturating_add(ocp.rows_per_stage);
+    rows.saturating_mul(CHANGES_PER_ROW * ocp.length())
 }
 
 /// Where the search for the active set begins. It changes the time, never the answer.
@@ -43,6 +52,9 @@ pub enum WarmStart {
     Shifted,
 }
 
+/// Changes of the active set for every state, input and general row of a stage, by default.
+const CHANGES_PER_ROW: usize = 10;
+
 #[inline(never)]
 pub(crate) fn default_tolerance<T: Scalar>() -> T {
     T::default_epsilon().powf(convert(2.0 / 3.0))
@@ -52,7 +64,7 @@ impl<T: Scalar> Default for SolverSettings<T> {
     fn default() -> Self {
         Self {
             tolerance: default_tolerance(),
-            max_changes: 500,
+            max_changes: None,
             warm_start: WarmStart::Shifted,
         }
     }
@@ -92,7 +104,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
 
     /// Solves `ocp`. `solution` is the answer and, on entry, the warm start.
     ///
-    /// Always ends, after at most `settings.max_changes` changes of the active set, and always
+    /// Always ends, after at most as many changes of the active set as `settings` say, and always
     /// leaves finite inputs within the input bounds; what they are worth is in
     /// `solution.status`.
     #[inline(never)]
@@ -119,7 +131,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         let tolerance = Some(settings.tolerance).filter(|t| *t > T::zero() && t.is_finite());
         self.dual.reset(
             tolerance.unwrap_or_else(default_tolerance),
-            settings.max_changes,
+            settings.max_changes.unwrap_or(default_cap(ocp)),
         );
         let mut spent = 0;
         let room = self.stages.min(solution.u.len()).min(solution.x.len());
@@ -137,7 +149,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             }
             // A start must not decide whether there is an answer.
             solution.active.clear();
-            let left = settings.max_changes.saturating_sub(spent);
+            let left = self.dual.changes_left();
             self.dual.reset(self.dual.tolerance, left);
         };
         let outcome = match outcome {

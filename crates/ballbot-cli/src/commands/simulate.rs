@@ -321,22 +321,31 @@ fn figures(
         [x, y] => {
             let torques: Vec<_> = motors.iter().map(|sample| sample.torques).collect();
             let planes = [shown(x), shown(y)];
-            vec![
+            let mut figures = vec![
                 ("figure", pictures::both_planes(title, prepared, planes)),
                 ("path", pictures::path(title, prepared, [x, y])),
                 (
                     "motors",
                     pictures::motors("Motor torques", prepared, x, &torques),
                 ),
+            ];
+            let plans = [
                 ("plans_x", pictures::plans("Plans of the x plane", x)),
                 ("plans_y", pictures::plans("Plans of the y plane", y)),
-            ]
+            ];
+            let shown = plans
+                .into_iter()
+                .filter_map(|(name, plan)| Some((name, plan?)));
+            figures.extend(shown);
+            figures
         }
         runs => {
             let shown: Vec<Shown<'_>> = runs.iter().map(shown).collect();
             let mut figures = vec![("figure", pictures::one_plane(title, prepared, &shown))];
-            let plans = |columns| ("plans", pictures::plans("Plans", columns));
-            figures.extend(columns.first().map(plans));
+            let plans = columns
+                .first()
+                .and_then(|run| pictures::plans("Plans", run));
+            figures.extend(plans.map(|plans| ("plans", plans)));
             figures
         }
     }

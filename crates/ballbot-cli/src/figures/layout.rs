@@ -61,8 +61,8 @@ fn draw_heading(figure: &Figure, panels: &[(&Panel, Axes)], font: &Font, scene: 
     top + legend.height()
 }
 
-/// The panels in their places: one width and one height for all frames, aligned in rows and
-/// columns.
+/// The panels in their places: one height for all frames, and one width but in a last row that is not
+/// full, whose panels share the whole width.
 fn placed<'a>(
     figure: &Figure,
     panels: &[(&'a Panel, Axes)],
@@ -87,9 +87,9 @@ fn placed<'a>(
     let label_distance = |ticks: &Ticks| TICK_GAP + widest(font, ticks) + 0.5 * LABEL_SIZE + 7.0;
     // The same room on the left in every column, so that all frames are as wide.
     let left_room = y_ticks.iter().map(label_distance).fold(0.0, f64::max) + 0.5 * LABEL_SIZE;
-    let column_width = (figure.width - 2.0 * MARGIN + GAP) / columns as f64 - GAP;
-    let width = column_width - left_room - RIGHT_ROOM;
-    if !(width >= SMALLEST.0 && height >= SMALLEST.1) {
+    let pitch = |columns: usize| (figure.width - 2.0 * MARGIN + GAP) / columns as f64;
+    let frame_width = |columns: usize| pitch(columns) - GAP - left_room - RIGHT_ROOM;
+    if !(frame_width(columns) >= SMALLEST.0 && height >= SMALLEST.1) {
         return Err(FigureError::Size {
             width: figure.width,
             height: figure.height,
@@ -104,11 +104,11 @@ fn placed<'a>(
     for (room, chunk) in rows.iter().zip(panels.chunks(columns)) {
         frame_top += room.above;
         for (column, ((panel, axes), y_ticks)) in chunk.iter().zip(&mut ticks).enumerate() {
-            let left = MARGIN + column as f64 * (column_width + GAP) + left_room;
+            let left = MARGIN + column as f64 * pitch(chunk.len()) + left_room;
             let frame = Rect {
                 left,
                 top: frame_top,
-                width,
+                width: frame_width(chunk.len()),
                 height,
             };
             let area = if panel.equal_aspect {
@@ -154,9 +154,10 @@ impl RowRoom {
         let powers = |axis| common_power(axis).is_some();
         let lettered = panels.len() > 1;
         let raised = titled || lettered || chunk.iter().any(|(_, axes)| powers(&axes.y));
-        // A label stands once below panels with the same axis.
+        // A label stands once below panels with the same axis that stand below each other.
+        let aligned = panels.len() >= next + chunk.len();
         let repeated = |column: usize, (panel, axes): &(&Panel, Axes)| {
-            let below = panels.get(next + column);
+            let below = panels.get(next + column).filter(|_| aligned);
             below.is_some_and(|(other, its)| other.x_label == panel.x_label && its.x == axes.x)
         };
         let labelled: Vec<bool> = chunk

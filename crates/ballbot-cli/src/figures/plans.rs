@@ -29,20 +29,24 @@ pub struct GuardRun<'a> {
 }
 
 /// One panel of the gap, and for a run with a guarantee one of the set points and one of the
-/// decisions.
-pub fn plans(title: &str, run: &PlansRun<'_>) -> Figure {
-    let mut panels = vec![gap_panel(run)];
+/// decisions. The plans of a descent are rollouts: where there is no gap, there is no panel of it, and
+/// `None` where no panel is left.
+pub fn plans(title: &str, run: &PlansRun<'_>) -> Option<Figure> {
+    let mut gaps = run.gap.iter().flatten();
+    // Negated, so that a gap that is NaN is shown, too.
+    let differs = gaps.any(|gap| !(gap.abs() <= f64::EPSILON));
+    let mut panels: Vec<Panel> = differs.then(|| gap_panel(run)).into_iter().collect();
     if let Some(guard) = &run.guard {
         panels.extend(guard_panels(run.time, guard));
     }
     share_horizontal_view(&mut panels);
-    Figure {
+    (!panels.is_empty()).then(|| Figure {
         title: title.to_owned(),
         height: 80.0 + 260.0 * panels.len() as f64,
         panels,
         columns: 1,
         width: 900.0,
-    }
+    })
 }
 
 /// Names and colours of the components of a gap, with their units.

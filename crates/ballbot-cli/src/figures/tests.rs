@@ -179,6 +179,26 @@ fn points_stand_where_the_ticks_say() {
     }
 }
 
+/// A figure of five panels had an empty place for a sixth.
+#[test]
+fn a_last_row_that_is_not_full_takes_the_whole_width() {
+    let one = || panel(&ramp(3), &[0.0, 1.0, 0.5], LINE);
+    let widths = |count: usize| {
+        let svg = figure((0..count).map(|_| one()).collect()).svg().unwrap();
+        let drawn = lines(&Document::parse(&svg).unwrap(), LPV);
+        // The first such line is the sample in the legend.
+        let width = |line: &Vec<(f64, f64)>| (line[0].0, line[2].0);
+        drawn[1..].iter().map(width).collect::<Vec<_>>()
+    };
+    let (full, short) = (widths(4), widths(3));
+    assert_eq!(short[..2], full[..2]);
+    assert_eq!(short[2].0, full[0].0);
+    assert_eq!(short[2].1, full[1].1);
+    // Panels that do not stand below each other have their own label of the axis.
+    let svg = figure((0..3).map(|_| one()).collect()).svg().unwrap();
+    assert_eq!(svg.matches("t [s]").count(), 3);
+}
+
 #[test]
 fn the_logarithmic_axis_puts_decades_at_equal_distances() {
     let mut panel = panel(&ramp(4), &[1e-3, 0.1, 1e-5, 10.0], LINE);

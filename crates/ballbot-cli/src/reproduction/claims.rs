@@ -2,7 +2,7 @@
 
 use super::Reproduction;
 use super::runs::Run;
-use crate::table::Table;
+use crate::table::{Table, short};
 use ballbot::Ballbot;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
@@ -148,22 +148,6 @@ pub fn table(claims: &[Claim]) -> String {
         table.row(claim.cells());
     }
     table.to_string()
-}
-
-/// Up to seven significant digits, without trailing zeros.
-fn short(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    if !(1e-4..1e6).contains(&value.abs()) {
-        return format!("{value:.2e}");
-    }
-    let decimals = (5 - value.abs().log10().floor() as i32).max(0) as usize;
-    let text = format!("{value:.decimals$}");
-    match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
-    }
 }
 
 fn value(

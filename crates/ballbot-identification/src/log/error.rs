@@ -1,6 +1,7 @@
 //! Why a log cannot be used, said to a person.
 
 use crate::words::number;
+use lpvmpc_design::number_text;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -71,8 +72,7 @@ pub enum Problem {
     /// A zenith angle of the wheels at which they do not turn the ball.
     #[error(
         "[log.wheels] zenith_angle_deg = {degrees}: it must be strictly between 0 and 90 degrees \
-         (the paper's robot has 45)"
-    )]
+         (the paper's robot has 45)", degrees = number_text(*degrees))]
     ZenithAngle {
         /// The angle, degrees.
         degrees: f64,
@@ -152,7 +152,10 @@ pub enum Problem {
         expected: String,
     },
     /// A factor that destroys the column.
-    #[error("column `{column}`: its factor is {factor}; it must be finite and not 0")]
+    #[error(
+        "column `{column}`: its factor is {factor}; it must be finite and not 0",
+        factor = number_text(*factor)
+    )]
     Factor {
         /// The column.
         column: String,
@@ -264,8 +267,7 @@ pub enum Problem {
         jumps.as_ref().map_or(String::new(), |(column, count)| format!(
             ". `{column}` jumps {count} times: is its unit wrong (degrees taken for radians), or does \
              its sensor fail?"
-        ))
-    )]
+        )), needed = number_text(*needed))]
     NoStretch {
         /// Needed, s.
         needed: f64,

@@ -1,5 +1,6 @@
 //! The poles of A(s) - B(s) K with the scheduling s frozen at each point of a grid.
 
+use crate::number_text;
 use lpvmpc::LpvModel;
 use nalgebra::{Complex, DMatrix, SMatrix, SVector};
 use thiserror::Error;
@@ -21,7 +22,9 @@ pub enum FrozenError {
     /// An end of the box is NaN or infinite, or the ends are in the wrong order.
     #[error(
         "scheduling {index} (counted from 0) ranges from {lower} to {upper}: \
-         both ends must be finite, and the lower one not above the upper"
+         both ends must be finite, and the lower one not above the upper",
+        lower = number_text(*lower),
+        upper = number_text(*upper)
     )]
     Box {
         /// Component of the scheduling, counted from 0.

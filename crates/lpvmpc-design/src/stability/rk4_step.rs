@@ -1,5 +1,6 @@
 //! Whether a Runge-Kutta step is short enough for the poles it has to follow.
 
+use crate::number_text;
 use nalgebra::{Complex, DMatrix};
 use thiserror::Error;
 
@@ -24,7 +25,10 @@ pub enum Rk4StepError {
     #[error(transparent)]
     Matrix(#[from] MatrixError),
     /// The sampling time is not a positive, finite number.
-    #[error("the sampling time is {value} s: it must be finite and > 0")]
+    #[error(
+        "the sampling time is {value} s: it must be finite and > 0",
+        value = number_text(*value)
+    )]
     SampleTime {
         /// The sampling time, s.
         value: f64,
@@ -36,8 +40,7 @@ pub enum Rk4StepError {
     #[error(
         "the sampling time of {sample_time} s would take {substeps:e} Runge-Kutta steps, at most \
          {MOST_RK4_SUBSTEPS} are taken: the fastest pole is {fastest:.4} 1/s. Take a shorter \
-         sampling time (it is in seconds)"
-    )]
+         sampling time (it is in seconds)", sample_time = number_text(*sample_time))]
     TooMany {
         /// Sampling time, s.
         sample_time: f64,
@@ -52,8 +55,7 @@ pub enum Rk4StepError {
          sample its mode grows by e^{exponent:.0}, beyond the digits of a number. Take less than \
          {longest:.2} s (the sampling time is in seconds: {sample_time} ms are {} s)",
         pole_text(*pole),
-        sample_time / 1e3
-    )]
+        sample_time / 1e3, sample_time = number_text(*sample_time))]
     Outgrown {
         /// Sampling time, s.
         sample_time: f64,
@@ -70,8 +72,7 @@ pub enum Rk4StepError {
          is too long for the pole {} 1/s: this decaying mode is multiplied by \
          {amplification:.4} in each step, allowed is 1. The longest stable step is \
          {longest_step:.6} s: take at least {fewest_substeps} substeps",
-        pole_text(*pole)
-    )]
+        pole_text(*pole), sample_time = number_text(*sample_time), step = number_text(*step))]
     TooLong {
         /// Sampling time, s.
         sample_time: f64,

@@ -1,5 +1,6 @@
 //! What can be wrong with the claims of a certificate.
 
+use crate::number_text;
 use thiserror::Error;
 
 /// A claim that is false, or that could not be shown. The two are told apart: see
@@ -7,7 +8,7 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ClaimError {
     /// A number that cannot be.
-    #[error("{name} = {value}: it must be {expected}")]
+    #[error("{name} = {value}: it must be {expected}", value = number_text(*value))]
     Value {
         /// The key in the file.
         name: String,
@@ -49,7 +50,10 @@ pub enum ClaimError {
         name: &'static str,
     },
     /// The set is larger than a limit.
-    #[error("{name} = {limit}: the set reaches {reach:.9}, as at its state {state:?}")]
+    #[error(
+        "{name} = {limit}: the set reaches {reach:.9}, as at its state {state:?}",
+        limit = number_text(*limit)
+    )]
     Limit {
         /// Key and component of the limit.
         name: String,
@@ -63,8 +67,7 @@ pub enum ClaimError {
     /// The set was not shown to keep a limit.
     #[error(
         "{name} = {limit} could not be shown: all that is known is that nothing in the set \
-         exceeds {reach:.9}"
-    )]
+         exceeds {reach:.9}", limit = number_text(*limit))]
     LimitNotShown {
         /// Key and component of the limit.
         name: String,

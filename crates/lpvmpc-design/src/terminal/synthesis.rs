@@ -6,6 +6,7 @@ use crate::lqr::lqr_discrete;
 use crate::matrix_check::{
     MatrixError, check_positive_definite, check_positive_semidefinite, checked_symmetric,
 };
+use crate::number_text;
 use crate::riccati::RiccatiError;
 use crate::stability::SchedulingGrid;
 use lpvmpc::LpvModel;
@@ -63,7 +64,7 @@ impl<const NX: usize, const NU: usize> TerminalIngredients<NX, NU> {
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SynthesisError {
     /// A number of the problem is out of range.
-    #[error("{name} = {value}: it must be {expected}")]
+    #[error("{name} = {value}: it must be {expected}", value = number_text(*value))]
     Value {
         /// The field.
         name: &'static str,

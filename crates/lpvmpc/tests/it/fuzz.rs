@@ -116,7 +116,9 @@ fn consistent(bounds: &Bounds<f64, NU>) -> bool {
 
 fn check(ocp: &Problem, settings: &SolverSettings<f64>, solution: &Solution<f64, NX, NU>) {
     assert!(
-        solution.changes <= settings.max_changes,
+        settings
+            .max_changes
+            .is_none_or(|most| solution.changes <= most),
         "{}",
         solution.changes
     );
@@ -147,7 +149,7 @@ fn nonsense_in_the_problem() {
             spoil_problem(&mut rng, largest, &mut ocp);
         }
         let settings = SolverSettings {
-            max_changes: [0, 1, 5, 300][rng.index(4)],
+            max_changes: Some([0, 1, 5, 300][rng.index(4)]),
             warm_start: [WarmStart::Cold, WarmStart::Same, WarmStart::Shifted][rng.index(3)],
             ..SolverSettings::default()
         };
@@ -191,7 +193,7 @@ fn nothing_but_nonsense() {
         }
         let settings = SolverSettings {
             tolerance: nonsense(&mut rng, 1e300),
-            max_changes: 200,
+            max_changes: Some(200),
             warm_start: WarmStart::Same,
         };
         solver.solve(&ocp, &settings, &mut solution);
@@ -257,7 +259,7 @@ fn sizes_that_do_not_fit() {
         let (of_solver, of_solution) = (room(), room());
         let mut solution = Solution::allocate(of_solution);
         let settings = SolverSettings {
-            max_changes: 300,
+            max_changes: Some(300),
             ..SolverSettings::default()
         };
         for _ in 0..2 {

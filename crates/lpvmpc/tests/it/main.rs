@@ -9,6 +9,7 @@
 mod support;
 
 mod campaign;
+mod changes;
 mod fuzz;
 mod memory;
 mod optimality;

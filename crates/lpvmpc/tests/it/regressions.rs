@@ -170,7 +170,7 @@ fn cap_on_changes_holds_for_the_warm_start_too() {
     assert!(solution.active.len() > 5, "{}", solution.active.len());
     let settings = SolverSettings {
         warm_start: WarmStart::Same,
-        max_changes: 3,
+        max_changes: Some(3),
         ..cold()
     };
     Solver::allocate(capacity(&ocp)).solve(&ocp, &settings, &mut solution);

@@ -68,7 +68,7 @@ fn answer<T: Scalar, const NX: usize, const NU: usize>(
 ) -> Solution<T, NX, NU> {
     let settings = SolverSettings {
         warm_start: WarmStart::Cold,
-        max_changes: 2000,
+        max_changes: Some(2000),
         ..SolverSettings::default()
     };
     let solution = solve_with(ocp, &settings);

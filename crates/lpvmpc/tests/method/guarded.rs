@@ -159,7 +159,7 @@ fn a_bad_solver_costs_time_and_nothing_else() {
     let mut decisions = [0; 5];
     for seed in 0..10 {
         let mut bad = settings();
-        bad.solver.max_changes = 2;
+        bad.solver.max_changes = Some(2);
         bad.solver.tolerance = 1e-2;
         jump_about(bad, seed, &mut decisions);
     }

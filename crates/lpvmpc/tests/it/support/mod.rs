@@ -13,7 +13,7 @@ use lpvmpc::{Capacity, Ocp, Scalar, Solution, Solver, SolverSettings, Status, Wa
 pub fn cold<T: Scalar>() -> SolverSettings<T> {
     SolverSettings {
         warm_start: WarmStart::Cold,
-        max_changes: 20_000,
+        max_changes: Some(20_000),
         ..SolverSettings::default()
     }
 }

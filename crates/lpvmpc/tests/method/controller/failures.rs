@@ -209,7 +209,7 @@ fn the_cap_on_changes_is_kept() {
     let needed = full_answer().changes;
     for max_changes in 0..=needed {
         let mut settings = settings(N);
-        settings.solver.max_changes = max_changes;
+        settings.solver.max_changes = Some(max_changes);
         let mut tried = controller(settings);
         let mut workspace = tried.workspace();
         let plan = tried.step(&tilted(), &along(&moving(N, 0)), &mut workspace);
