@@ -201,7 +201,7 @@ fn long_horizons_fit_a_thread() {
     settings.horizon = 0;
     let refused = guarded_feedback(&prepared.ballbot, &settings, true);
     let refused = refused.err().unwrap().to_string();
-    assert!(refused.contains("at least 1"), "{refused}");
+    assert!(refused.contains("from 1 to 65535 samples"), "{refused}");
     ramped.reference = ReferenceTable::SetPoints {
         points: vec![PointTable {
             time_s: 0.0,

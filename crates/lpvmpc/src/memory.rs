@@ -16,8 +16,8 @@ pub struct Capacity {
     /// Rows of the working set: independent ones, of which `stages * NU` fill the space of the inputs,
     /// and soft bounds that are exceeded at a quadratic price.
     pub rows: usize,
-    /// Bounds that may be active at once: those rows, and soft bounds that are exceeded at a linear
-    /// price.
+    /// Bounds that may be active at once: those rows, soft bounds that are exceeded at a linear price,
+    /// and bounds that hold because others do. With a place for every bound there are always enough.
     pub active: usize,
 }
 

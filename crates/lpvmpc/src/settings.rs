@@ -164,12 +164,12 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
     /// active at once.
     pub fn capacity(&self) -> Capacity {
         let soft = self.soft_x.iter().flatten();
-        let quadratic = soft.clone().filter(|price| price.quadratic > T::zero());
+        let quadratic = soft.filter(|price| price.quadratic > T::zero());
         let rows = self.horizon * (NU + quadratic.count()) + NX;
         Capacity {
             stages: self.horizon,
             rows,
-            active: rows + self.horizon * soft.count(),
+            active: rows + (self.horizon + 1) * NX,
         }
     }
 

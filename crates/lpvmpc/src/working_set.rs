@@ -179,13 +179,14 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
 
     /// The rows of Q in use, as far as they are not zero.
     fn basis(&self) -> impl Iterator<Item = &[SVector<T, NU>]> {
-        let rows = self.rows().iter().enumerate();
-        rows.map(|(k, row)| first(line(&self.basis, k, self.stages), row.support.into()))
+        let lines = self.basis.chunks(self.stages.max(1));
+        let rows = self.rows().iter().zip(lines);
+        rows.map(|(row, line)| first(line, row.support.into()))
     }
 
-    /// The rows of L in use.
-    fn factor(&self) -> impl DoubleEndedIterator<Item = &[T]> + ExactSizeIterator {
-        (0..self.len).map(|k| line(&self.factor, k, self.rows.len()))
+    /// The rows of L in use, one after the other.
+    fn factor(&self) -> &[T] {
+        first(&self.factor, self.len * self.rows.len())
     }
 
     /// The answer of the minimiser over the working set to the candidate `row`.
@@ -354,7 +355,7 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
 
     /// L^-1 in place on the first `len` entries.
     pub fn solve_lower(&self, rhs: &mut [T]) {
-        for (i, l) in self.factor().enumerate() {
+        for (i, l) in self.factor().chunks(self.rows.len().max(1)).enumerate() {
             if let (Some((before, [entry, ..])), Some(pivot)) =
                 (rhs.split_at_mut_checked(i), l.get(i))
             {
@@ -366,7 +367,8 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
 
     /// L'^-1 in place on the first `len` entries.
     pub fn solve_upper(&self, rhs: &mut [T]) {
-        for (i, l) in self.factor().enumerate().rev() {
+        let lines = self.factor().rchunks(self.rows.len().max(1));
+        for (i, l) in (0..self.len).rev().zip(lines) {
             if let (Some((before, [entry, ..])), Some(pivot)) =
                 (rhs.split_at_mut_checked(i), l.get(i))
             {

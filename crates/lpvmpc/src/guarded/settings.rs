@@ -185,7 +185,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
         Capacity {
             stages,
             rows,
-            active: rows + soft,
+            active: rows + soft + (stages + 1) * NX,
         }
     }
 

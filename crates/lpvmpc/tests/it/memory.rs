@@ -290,8 +290,9 @@ fn nothing_is_left_from_a_longer_problem() {
     }
 }
 
-/// Rows that fill the space of the inputs are all that can be independent: with that many places, and
-/// some for the terminal state, a hard problem has the verdict that it has with any number of them.
+/// Rows that fill the space of the inputs are all that can be independent: with that many places in the
+/// working set, and a place in the list for every bound, a hard problem has the verdict that it has with
+/// any number of them.
 #[test]
 fn rows_that_fill_the_space_of_the_inputs_are_enough() {
     for (family, k) in [(Family::Infeasible, 56), (Family::Tight, 0)] {
@@ -300,7 +301,7 @@ fn rows_that_fill_the_space_of_the_inputs_are_enough() {
         let least = Capacity {
             stages: 100,
             rows: 103,
-            active: 103,
+            active: 403,
         };
         let mut solution = Solution::allocate(least);
         Solver::allocate(least).solve(&ocp, &cold(), &mut solution);

@@ -386,9 +386,7 @@ fn settings_that_make_no_sense_are_refused() {
     for horizon in [0, N + 1] {
         let mut changed = settings();
         changed.horizon = horizon;
-        let message = format!(
-            "the horizon is {horizon} samples; it must be at least 1, and there is memory for {N}"
-        );
+        let message = format!("the horizon is {horizon}; it must be from 1 to {N} samples");
         let arrays = Box::leak(Box::new(GuardedArrays::<f64, 4, 1, N>::new()));
         let outcome = Guarded::new(plant(), changed, arrays.lend());
         let error = outcome.err().unwrap();
