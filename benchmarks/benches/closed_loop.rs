@@ -3,7 +3,7 @@
 use criterion::Criterion;
 use lpvmpc::SolverSettings;
 use lpvmpc_benchmarks::BenchmarkError;
-use lpvmpc_benchmarks::closed_loop::{M, N, Recording};
+use lpvmpc_benchmarks::closed_loop::Recording;
 use lpvmpc_benchmarks::comparison::Comparison;
 use lpvmpc_benchmarks::contenders::{ClarabelSolve, ClarabelUpdate, Osqp, Own, QuadProgPp};
 
@@ -30,7 +30,7 @@ fn compare(
 ) -> Result<(), BenchmarkError> {
     let recording = Recording::new(scenario)?;
     let problems = &recording.problems;
-    let mut own = Own::<4, 1, N, M>::new(problems, SolverSettings::default());
+    let mut own = Own::new(problems, SolverSettings::default());
     let (expected, active) = own.solve_all()?;
     println!("{scenario}: {active:.1} active bounds on average");
 

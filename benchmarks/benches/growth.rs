@@ -10,26 +10,26 @@ use lpvmpc_benchmarks::synthetic::{self, Activity};
 fn main() -> Result<(), BenchmarkError> {
     let mut criterion = Criterion::default().configure_from_args();
     for activity in [Activity::Inactive, Activity::Active] {
-        compare::<4, 1, 20, 20>(&mut criterion, activity)?;
-        compare::<4, 1, 50, 50>(&mut criterion, activity)?;
-        compare::<4, 1, 100, 100>(&mut criterion, activity)?;
-        compare::<4, 1, 200, 200>(&mut criterion, activity)?;
-        compare::<8, 2, 20, 40>(&mut criterion, activity)?;
-        compare::<12, 4, 20, 80>(&mut criterion, activity)?;
+        for stages in [20, 50, 100, 200] {
+            compare::<4, 1>(&mut criterion, stages, activity)?;
+        }
+        compare::<8, 2>(&mut criterion, 20, activity)?;
+        compare::<12, 4>(&mut criterion, 20, activity)?;
     }
     criterion.final_summary();
     Ok(())
 }
 
-fn compare<const NX: usize, const NU: usize, const N: usize, const M: usize>(
+fn compare<const NX: usize, const NU: usize>(
     criterion: &mut Criterion,
+    stages: usize,
     activity: Activity,
 ) -> Result<(), BenchmarkError> {
-    let problems = synthetic::problems::<NX, NU, N, M>(activity)?;
+    let problems = synthetic::problems::<NX, NU>(stages, activity)?;
     let warm = synthetic::settings();
-    let mut own = Own::<NX, NU, N, M>::new(&problems, warm);
+    let mut own = Own::new(&problems, warm);
     let (expected, active) = own.solve_all()?;
-    let name = format!("{NX}x{NU}, N = {N}, {active:.0} active");
+    let name = format!("{NX}x{NU}, N = {stages}, {active:.0} active");
 
     let mut comparison = Comparison::new(criterion, "growth", &name, expected);
     comparison.time("lpvmpc", &mut own)?;
@@ -38,10 +38,7 @@ fn compare<const NX: usize, const NU: usize, const N: usize, const M: usize>(
             warm_start: WarmStart::Cold,
             ..warm
         };
-        comparison.time(
-            "lpvmpc, cold",
-            &mut Own::<NX, NU, N, M>::new(&problems, cold),
-        )?;
+        comparison.time("lpvmpc, cold", &mut Own::new(&problems, cold))?;
     }
     comparison.time(
         "Clarabel, update and solve",

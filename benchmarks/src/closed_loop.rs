@@ -9,20 +9,32 @@ use lpvmpc_sim::advance;
 use nalgebra::{SVector, Vector4};
 use std::path::Path;
 
-/// The horizon of those scenarios.
-pub const N: usize = 20;
-/// A torque bound per stage, and the four rows of a terminal equality.
-pub const M: usize = N + 4;
-
-type Control = Controller<Ballbot<f64>, f64, 4, 1, 3, N, M>;
+type Control = Controller<Ballbot<f64>, f64, 4, 1, 3>;
 
 /// A closed loop, sample by sample.
 pub struct Recording {
     /// The quadratic programs.
-    pub problems: Vec<Ocp<f64, 4, 1, N>>,
-    /// Initial state and reference of each sample.
-    samples: Vec<(Vector4<f64>, Reference<f64, 4, N>)>,
+    pub problems: Vec<Ocp<f64, 4, 1>>,
+    samples: Vec<Sample>,
     controller: Control,
+}
+
+/// What a step of the controller is given.
+struct Sample {
+    x: Vector4<f64>,
+    /// The reference at each stage of the horizon.
+    stages: Vec<Vector4<f64>>,
+    /// The reference at its end.
+    terminal: Vector4<f64>,
+}
+
+impl Sample {
+    fn reference(&self) -> Reference<'_, f64, 4> {
+        Reference {
+            stages: &self.stages,
+            terminal: self.terminal,
+        }
+    }
 }
 
 impl Recording {
@@ -37,26 +49,34 @@ impl Recording {
         } = prepared;
         let plane = prepared.planes.first();
         let plane = plane.ok_or_else(|| BenchmarkError::NoPlane(name.to_owned()))?;
-        let mut workspace = Box::new(Workspace::new());
-        let mut recording = Self {
-            problems: Vec::with_capacity(prepared.samples),
-            samples: Vec::with_capacity(prepared.samples),
-            controller: Control::new(ballbot, settings).map_err(ScenarioError::from)?,
-        };
+        let mut controller = Control::allocate(ballbot, settings).map_err(ScenarioError::from)?;
+        let mut workspace = controller.workspace();
+        let mut problems = Vec::with_capacity(prepared.samples);
+        let mut samples = Vec::with_capacity(prepared.samples);
         let mut x = plane.initial_state;
         for k in 0..prepared.samples {
             let at = |i: usize| plane.state_reference((k + i) as f64 * settings.t_s);
-            let reference = Reference {
-                stages: std::array::from_fn(at),
-                terminal: at(N),
+            let sample = Sample {
+                x,
+                stages: (0..settings.horizon).map(at).collect(),
+                terminal: at(settings.horizon),
             };
-            let controller = &mut recording.controller;
-            let u = controller.step(&x, &reference, &mut workspace).u[0];
-            recording.problems.push(workspace.ocp().clone());
-            recording.samples.push((x, reference));
-            x = advance(&ballbot, &x, &u, settings.t_s, prepared.tolerances)?;
+            let plan = controller.step(&x, &sample.reference(), &mut workspace);
+            x = advance(
+                &ballbot,
+                &x,
+                &plan.first_input(),
+                settings.t_s,
+                prepared.tolerances,
+            )?;
+            problems.push(workspace.ocp().clone());
+            samples.push(sample);
         }
-        Ok(recording)
+        Ok(Self {
+            problems,
+            samples,
+            controller,
+        })
     }
 
     /// The controller, to go through the same samples again.
@@ -64,16 +84,16 @@ impl Recording {
         Replay {
             samples: &self.samples,
             controller: self.controller.clone(),
-            workspace: Box::new(Workspace::new()),
+            workspace: self.controller.workspace(),
         }
     }
 }
 
 /// Whole steps of the controller: scheduling, predictor, quadratic program, rollout.
 pub struct Replay<'a> {
-    samples: &'a [(Vector4<f64>, Reference<f64, 4, N>)],
+    samples: &'a [Sample],
     controller: Control,
-    workspace: Box<Workspace<f64, 4, 1, N, M>>,
+    workspace: Workspace<f64, 4, 1>,
 }
 
 impl Contender<1> for Replay<'_> {
@@ -81,8 +101,10 @@ impl Contender<1> for Replay<'_> {
         if problem == 0 {
             self.controller.reset();
         }
-        let (x, reference) = &self.samples[problem];
-        let solution = self.controller.step(x, reference, &mut self.workspace);
-        Ok(solution.u[0])
+        let sample = &self.samples[problem];
+        let plan = self
+            .controller
+            .step(&sample.x, &sample.reference(), &mut self.workspace);
+        Ok(plan.first_input())
     }
 }

@@ -26,13 +26,12 @@ pub struct CondensedQp<const NX: usize, const NU: usize> {
 
 impl<const NX: usize, const NU: usize> CondensedQp<NX, NU> {
     /// Memory for problems of the size of `ocp`.
-    pub fn new<const N: usize>(ocp: &Ocp<f64, NX, NU, N>) -> Self {
+    pub fn new(ocp: &Ocp<f64, NX, NU>) -> Self {
         let horizon = ocp.length();
         let inputs = horizon * NU;
-        let stages = ocp.stages.iter().take(horizon);
-        let sides: usize = stages
-            .enumerate()
-            .map(|(i, stage)| sides(&stage.u) + if i > 0 { sides(&stage.x) } else { 0 })
+        let commons = (0..horizon).map(|i| (i, ocp.common_at(i)));
+        let sides: usize = commons
+            .map(|(i, common)| sides(&common.u) + if i > 0 { sides(&common.x) } else { 0 })
             .sum();
         let sides = sides + self::sides(&ocp.terminal.x);
         let equalities = if ocp.terminal.equality.is_some() {
@@ -53,13 +52,13 @@ impl<const NX: usize, const NU: usize> CondensedQp<NX, NU> {
     }
 
     /// Condenses `ocp`; the work grows with the horizon squared.
-    pub fn condense<const N: usize>(&mut self, ocp: &Ocp<f64, NX, NU, N>) {
+    pub fn condense(&mut self, ocp: &Ocp<f64, NX, NU>) {
         self.respond(ocp);
         self.weigh(ocp);
         self.constrain(ocp);
     }
 
-    fn respond<const N: usize>(&mut self, ocp: &Ocp<f64, NX, NU, N>) {
+    fn respond(&mut self, ocp: &Ocp<f64, NX, NU>) {
         let horizon = ocp.length();
         let mut x = ocp.x0;
         for (i, stage) in ocp.stages.iter().enumerate().take(horizon) {
@@ -74,29 +73,30 @@ impl<const NX: usize, const NU: usize> CondensedQp<NX, NU> {
     }
 
     /// Hessian and gradient, by the adjoint of the dynamics: one backward pass per input.
-    fn weigh<const N: usize>(&mut self, ocp: &Ocp<f64, NX, NU, N>) {
+    fn weigh(&mut self, ocp: &Ocp<f64, NX, NU>) {
         let horizon = ocp.length();
         let last = horizon - 1;
         let mut slope = ocp.terminal.p * self.free[last] + ocp.terminal.linear_x;
         for (i, stage) in ocp.stages.iter().enumerate().take(horizon).rev() {
+            let common = ocp.common_at(i);
             let x = if i > 0 { self.free[i - 1] } else { ocp.x0 };
-            let gradient = stage.b.tr_mul(&slope) + stage.s * x + stage.linear_u;
+            let gradient = stage.b.tr_mul(&slope) + common.s * x + stage.linear_u;
             for (k, value) in gradient.iter().enumerate() {
                 self.gradient[i * NU + k] = *value;
             }
-            slope = stage.q * x + stage.linear_x + stage.a.tr_mul(&slope);
+            slope = common.q * x + stage.linear_x + stage.a.tr_mul(&slope);
         }
         for j in 0..horizon {
             let mut slope = ocp.terminal.p * self.response[last * horizon + j];
             for i in (j..horizon).rev() {
-                let stage = &ocp.stages[i];
+                let (stage, common) = (&ocp.stages[i], ocp.common_at(i));
                 let mut block = stage.b.tr_mul(&slope);
                 if i > j {
                     let response = &self.response[(i - 1) * horizon + j];
-                    block += stage.s * response;
-                    slope = stage.q * response + stage.a.tr_mul(&slope);
+                    block += common.s * response;
+                    slope = common.q * response + stage.a.tr_mul(&slope);
                 } else {
-                    block += stage.r;
+                    block += common.r;
                 }
                 self.store(i, j, &block);
             }
@@ -113,17 +113,18 @@ impl<const NX: usize, const NU: usize> CondensedQp<NX, NU> {
         }
     }
 
-    fn constrain<const N: usize>(&mut self, ocp: &Ocp<f64, NX, NU, N>) {
+    fn constrain(&mut self, ocp: &Ocp<f64, NX, NU>) {
         let horizon = ocp.length();
         let mut column = 0;
-        for (i, stage) in ocp.stages.iter().enumerate().take(horizon) {
-            for (component, side) in each_side(&stage.u) {
+        for i in 0..horizon {
+            let common = ocp.common_at(i);
+            for (component, side) in each_side(&common.u) {
                 self.inequality[[i * NU + component, column]] = side.sign;
                 self.inequality_offset[column] = -side.sign * side.limit;
                 column += 1;
             }
             if i > 0 {
-                column = self.constrain_state(i - 1, horizon, &stage.x, column);
+                column = self.constrain_state(i - 1, horizon, &common.x, column);
             }
         }
         self.constrain_state(horizon - 1, horizon, &ocp.terminal.x, column);

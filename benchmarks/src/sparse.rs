@@ -36,9 +36,7 @@ pub struct SparseQp {
 
 /// The problems of a sequence, all with the same pattern: an entry is left out if it is zero in
 /// every one of them. General rows and soft bounds are not translated.
-pub fn sequence<const NX: usize, const NU: usize, const N: usize>(
-    problems: &[Ocp<f64, NX, NU, N>],
-) -> Vec<SparseQp> {
+pub fn sequence<const NX: usize, const NU: usize>(problems: &[Ocp<f64, NX, NU>]) -> Vec<SparseQp> {
     let drafts: Vec<Draft> = problems.iter().map(Draft::new).collect();
     let columns = drafts.first().map_or(0, |draft| draft.q.len());
     let rows = drafts.first().map_or(0, |draft| draft.lower.len());
@@ -101,36 +99,35 @@ struct Draft {
 }
 
 impl Draft {
-    fn new<const NX: usize, const NU: usize, const N: usize>(ocp: &Ocp<f64, NX, NU, N>) -> Self {
+    fn new<const NX: usize, const NU: usize>(ocp: &Ocp<f64, NX, NU>) -> Self {
         let mut draft = Self::default();
         draft.add_cost(ocp);
         draft.add_dynamics(ocp);
-        for (i, stage) in ocp.stages.iter().enumerate().take(ocp.length()) {
+        for i in 0..ocp.length() {
             let input = i * (NX + NU);
-            draft.add_bounds(input, &stage.u);
+            let common = ocp.common_at(i);
+            draft.add_bounds(input, &common.u);
             if let Some(state) = input.checked_sub(NX) {
-                draft.add_bounds(state, &stage.x);
+                draft.add_bounds(state, &common.x);
             }
         }
         draft.add_bounds(ocp.length() * (NX + NU) - NX, &ocp.terminal.x);
         draft
     }
 
-    fn add_cost<const NX: usize, const NU: usize, const N: usize>(
-        &mut self,
-        ocp: &Ocp<f64, NX, NU, N>,
-    ) {
+    fn add_cost<const NX: usize, const NU: usize>(&mut self, ocp: &Ocp<f64, NX, NU>) {
         for (i, stage) in ocp.stages.iter().enumerate().take(ocp.length()) {
             let input = i * (NX + NU);
+            let common = ocp.common_at(i);
             let mut linear_u = stage.linear_u;
             if let Some(state) = input.checked_sub(NX) {
-                push_upper(&mut self.p, state, &stage.q);
-                push(&mut self.p, (state, input), &stage.s.transpose());
+                push_upper(&mut self.p, state, &common.q);
+                push(&mut self.p, (state, input), &common.s.transpose());
                 self.q.extend(stage.linear_x.iter());
             } else {
-                linear_u += stage.s * ocp.x0;
+                linear_u += common.s * ocp.x0;
             }
-            push_upper(&mut self.p, input, &stage.r);
+            push_upper(&mut self.p, input, &common.r);
             self.q.extend(linear_u.iter());
         }
         let last = ocp.length() * (NX + NU) - NX;
@@ -139,10 +136,7 @@ impl Draft {
     }
 
     /// A x_i + B u_i - x_{i+1} = -c, and x_N if it is imposed.
-    fn add_dynamics<const NX: usize, const NU: usize, const N: usize>(
-        &mut self,
-        ocp: &Ocp<f64, NX, NU, N>,
-    ) {
+    fn add_dynamics<const NX: usize, const NU: usize>(&mut self, ocp: &Ocp<f64, NX, NU>) {
         for (i, stage) in ocp.stages.iter().enumerate().take(ocp.length()) {
             let row = self.lower.len();
             let input = i * (NX + NU);

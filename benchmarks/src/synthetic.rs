@@ -3,7 +3,7 @@
 use crate::BenchmarkError;
 use crate::comparison::Contender;
 use crate::contenders::Own;
-use lpvmpc::{Bounds, Ocp, SolverSettings, Stage, Terminal};
+use lpvmpc::{Bounds, Common, Ocp, SolverSettings, Stage, Terminal};
 use nalgebra::{SMatrix, SVector};
 
 /// Problems in a sequence.
@@ -31,19 +31,20 @@ struct Limits {
     state: f64,
 }
 
-/// [`SAMPLES`] problems of a loop that is closed with our solver; each begins where the first
+/// [`SAMPLES`] problems with so many stages, of a loop that is closed with our solver; each begins where the first
 /// input of the one before has led.
 ///
 /// # Errors
 /// [`BenchmarkError::NotSolved`].
-pub fn problems<const NX: usize, const NU: usize, const N: usize, const M: usize>(
+pub fn problems<const NX: usize, const NU: usize>(
+    stages: usize,
     activity: Activity,
-) -> Result<Vec<Ocp<f64, NX, NU, N>>, BenchmarkError> {
+) -> Result<Vec<Ocp<f64, NX, NU>>, BenchmarkError> {
     let unbounded = Limits {
         input: f64::INFINITY,
         state: f64::INFINITY,
     };
-    let needed = needed_limits::<NX, NU, N, M>(problem(0, SVector::zeros(), unbounded))?;
+    let needed = needed_limits::<NX, NU>(problem(stages, 0, SVector::zeros(), unbounded))?;
     let (input, state) = match activity {
         Activity::Inactive => (FAR, FAR),
         Activity::Active => (TIGHT_INPUT, TIGHT_STATE),
@@ -55,8 +56,8 @@ pub fn problems<const NX: usize, const NU: usize, const N: usize, const M: usize
     let mut problems = Vec::with_capacity(SAMPLES);
     let mut x = SVector::zeros();
     for k in 0..SAMPLES {
-        let ocp = problem(k, x, limits);
-        let mut own = Own::<NX, NU, N, M>::new(std::slice::from_ref(&ocp), settings());
+        let ocp = problem(stages, k, x, limits);
+        let mut own = Own::new(std::slice::from_ref(&ocp), settings());
         let u = own.solve(0)?;
         x = state_matrix(k as f64) * x + input_matrix(k as f64) * u;
         problems.push(ocp);
@@ -72,10 +73,10 @@ pub fn settings() -> SolverSettings<f64> {
     }
 }
 
-fn needed_limits<const NX: usize, const NU: usize, const N: usize, const M: usize>(
-    ocp: Ocp<f64, NX, NU, N>,
+fn needed_limits<const NX: usize, const NU: usize>(
+    ocp: Ocp<f64, NX, NU>,
 ) -> Result<Limits, BenchmarkError> {
-    let mut own = Own::<NX, NU, N, M>::new(std::slice::from_ref(&ocp), settings());
+    let mut own = Own::new(std::slice::from_ref(&ocp), settings());
     own.solve(0)?;
     let plan = own.solution();
     let input = plan.u.iter().map(SVector::amax).fold(0.0, f64::max);
@@ -84,37 +85,41 @@ fn needed_limits<const NX: usize, const NU: usize, const N: usize, const M: usiz
 }
 
 /// The problem at sample `k`, from `x0`: all states follow waves.
-fn problem<const NX: usize, const NU: usize, const N: usize>(
+fn problem<const NX: usize, const NU: usize>(
+    stages: usize,
     k: usize,
     x0: SVector<f64, NX>,
     limits: Limits,
-) -> Ocp<f64, NX, NU, N> {
+) -> Ocp<f64, NX, NU> {
     let q = SMatrix::identity();
     let mut x = Bounds::none();
     x.lower[0] = -limits.state;
     x.upper[0] = limits.state;
     let mut ocp = Ocp {
         x0,
-        terminal: Terminal {
-            p: q * 5.0,
-            linear_x: wave(k + N) * -5.0,
-            x,
-            ..Terminal::default()
-        },
-        ..Ocp::default()
-    };
-    for (i, stage) in ocp.stages.iter_mut().enumerate() {
-        *stage = Stage {
-            a: state_matrix((k + i) as f64),
-            b: input_matrix((k + i) as f64),
+        common: Common {
             q,
             r: SMatrix::identity() * 0.1,
-            linear_x: -wave(k + i),
             x,
             u: Bounds {
                 lower: SVector::repeat(-limits.input),
                 upper: SVector::repeat(limits.input),
             },
+            ..Common::default()
+        },
+        terminal: Terminal {
+            p: q * 5.0,
+            linear_x: wave(k + stages) * -5.0,
+            x,
+            ..Terminal::default()
+        },
+        ..Ocp::allocate(stages)
+    };
+    for (i, stage) in ocp.stages.iter_mut().enumerate() {
+        *stage = Stage {
+            a: state_matrix((k + i) as f64),
+            b: input_matrix((k + i) as f64),
+            linear_x: -wave(k + i),
             ..Stage::default()
         };
     }

@@ -62,7 +62,7 @@ fn run(
         let inputs = board.states().into_iter().zip(board.references());
         for ((torque, (x, window)), plane) in torques.iter_mut().zip(inputs).zip(&mut *planes) {
             let plan = plane.step(&x, &window.reference(), workspace);
-            *torque = plan.u[0][0];
+            *torque = plan.first_input()[0];
             solved &= plan.status.is_solved();
         }
         without_plan = if solved { 0 } else { without_plan + 1 };

@@ -37,8 +37,8 @@ impl ClarabelUpdate {
     ///
     /// # Errors
     /// [`BenchmarkError::Refused`].
-    pub fn new<const NX: usize, const NU: usize, const N: usize>(
-        problems: &[Ocp<f64, NX, NU, N>],
+    pub fn new<const NX: usize, const NU: usize>(
+        problems: &[Ocp<f64, NX, NU>],
     ) -> Result<Self, BenchmarkError> {
         let programs = programs(problems);
         let first = programs.first().ok_or_else(|| refused("no problem"))?;
@@ -52,8 +52,8 @@ impl ClarabelSolve {
     ///
     /// # Errors
     /// [`BenchmarkError::Refused`].
-    pub fn new<const NX: usize, const NU: usize, const N: usize>(
-        problems: &[Ocp<f64, NX, NU, N>],
+    pub fn new<const NX: usize, const NU: usize>(
+        problems: &[Ocp<f64, NX, NU>],
     ) -> Result<Self, BenchmarkError> {
         let solvers: Result<_, _> = programs(problems).iter().map(ConeProgram::solver).collect();
         Ok(Self { solvers: solvers? })
@@ -91,9 +91,7 @@ fn first_input<const NU: usize>(
     }
 }
 
-fn programs<const NX: usize, const NU: usize, const N: usize>(
-    problems: &[Ocp<f64, NX, NU, N>],
-) -> Vec<ConeProgram> {
+fn programs<const NX: usize, const NU: usize>(problems: &[Ocp<f64, NX, NU>]) -> Vec<ConeProgram> {
     let sequence = sparse::sequence(problems).into_iter();
     sequence.map(ConeProgram::new).collect()
 }

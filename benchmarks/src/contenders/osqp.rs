@@ -29,8 +29,8 @@ impl Osqp {
     ///
     /// # Errors
     /// [`BenchmarkError::Refused`].
-    pub fn new<const NX: usize, const NU: usize, const N: usize>(
-        problems: &[Ocp<f64, NX, NU, N>],
+    pub fn new<const NX: usize, const NU: usize>(
+        problems: &[Ocp<f64, NX, NU>],
         tolerance: f64,
     ) -> Result<Self, BenchmarkError> {
         let sequence: Vec<Data> = sparse::sequence(problems).into_iter().map(data).collect();

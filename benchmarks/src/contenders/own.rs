@@ -2,31 +2,39 @@
 
 use crate::BenchmarkError;
 use crate::comparison::Contender;
-use lpvmpc::{Ocp, Solution, Solver, SolverSettings};
+use lpvmpc::{Capacity, Ocp, Solution, Solver, SolverSettings};
 use nalgebra::SVector;
 
 /// Our solver. The first problem of a sequence is solved cold, each other one as the settings
 /// say.
-pub struct Own<'a, const NX: usize, const NU: usize, const N: usize, const M: usize> {
-    problems: &'a [Ocp<f64, NX, NU, N>],
+pub struct Own<'a, const NX: usize, const NU: usize> {
+    problems: &'a [Ocp<f64, NX, NU>],
     settings: SolverSettings<f64>,
-    solver: Box<Solver<f64, NX, NU, N, M>>,
-    solution: Box<Solution<f64, NX, NU, N, M>>,
+    solver: Solver<f64, NX, NU>,
+    solution: Solution<f64, NX, NU>,
 }
 
-impl<'a, const NX: usize, const NU: usize, const N: usize, const M: usize> Own<'a, NX, NU, N, M> {
-    /// The solver for these problems.
-    pub fn new(problems: &'a [Ocp<f64, NX, NU, N>], settings: SolverSettings<f64>) -> Self {
+impl<'a, const NX: usize, const NU: usize> Own<'a, NX, NU> {
+    /// The solver, with room for every bound of these problems.
+    pub fn new(problems: &'a [Ocp<f64, NX, NU>], settings: SolverSettings<f64>) -> Self {
+        let stages = problems.iter().map(Ocp::length).max().unwrap_or(1);
+        // A row for each input, and those of a terminal equality; then the bounds of the states.
+        let rows = stages * NU + NX;
+        let capacity = Capacity {
+            stages,
+            rows,
+            active: rows + stages * NX,
+        };
         Self {
             problems,
             settings,
-            solver: Box::new(Solver::new()),
-            solution: Box::new(Solution::default()),
+            solver: Solver::allocate(capacity),
+            solution: Solution::allocate(capacity),
         }
     }
 
     /// The last solution.
-    pub fn solution(&self) -> &Solution<f64, NX, NU, N, M> {
+    pub fn solution(&self) -> &Solution<f64, NX, NU> {
         &self.solution
     }
 
@@ -45,9 +53,7 @@ impl<'a, const NX: usize, const NU: usize, const N: usize, const M: usize> Own<'
     }
 }
 
-impl<const NX: usize, const NU: usize, const N: usize, const M: usize> Contender<NU>
-    for Own<'_, NX, NU, N, M>
-{
+impl<const NX: usize, const NU: usize> Contender<NU> for Own<'_, NX, NU> {
     fn solve(&mut self, problem: usize) -> Result<SVector<f64, NU>, BenchmarkError> {
         if problem == 0 {
             self.solution.active.clear();
@@ -55,7 +61,7 @@ impl<const NX: usize, const NU: usize, const N: usize, const M: usize> Contender
         let ocp = &self.problems[problem];
         self.solver.solve(ocp, &self.settings, &mut self.solution);
         if self.solution.status.is_solved() {
-            Ok(self.solution.u[0])
+            Ok(self.solution.first_input())
         } else {
             Err(BenchmarkError::NotSolved {
                 solver: "lpvmpc",

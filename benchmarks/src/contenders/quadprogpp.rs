@@ -10,17 +10,17 @@ use quadprogpp::Constraints;
 const NAME: &str = "QuadProg++";
 
 /// Condensing, then the solution of the dense problem.
-pub struct QuadProgPp<'a, const NX: usize, const NU: usize, const N: usize> {
-    problems: &'a [Ocp<f64, NX, NU, N>],
+pub struct QuadProgPp<'a, const NX: usize, const NU: usize> {
+    problems: &'a [Ocp<f64, NX, NU>],
     qp: CondensedQp<NX, NU>,
 }
 
-impl<'a, const NX: usize, const NU: usize, const N: usize> QuadProgPp<'a, NX, NU, N> {
+impl<'a, const NX: usize, const NU: usize> QuadProgPp<'a, NX, NU> {
     /// Memory for these problems.
     ///
     /// # Errors
     /// [`BenchmarkError::Refused`]: there is none.
-    pub fn new(problems: &'a [Ocp<f64, NX, NU, N>]) -> Result<Self, BenchmarkError> {
+    pub fn new(problems: &'a [Ocp<f64, NX, NU>]) -> Result<Self, BenchmarkError> {
         let first = problems.first().ok_or_else(|| refused("no problem"))?;
         let qp = CondensedQp::new(first);
         Ok(Self { problems, qp })
@@ -32,7 +32,7 @@ impl<'a, const NX: usize, const NU: usize, const N: usize> QuadProgPp<'a, NX, NU
     }
 }
 
-impl<const NX: usize, const NU: usize, const N: usize> Contender<NU> for QuadProgPp<'_, NX, NU, N> {
+impl<const NX: usize, const NU: usize> Contender<NU> for QuadProgPp<'_, NX, NU> {
     fn solve(&mut self, problem: usize) -> Result<SVector<f64, NU>, BenchmarkError> {
         self.condense(problem);
         let qp = &self.qp;

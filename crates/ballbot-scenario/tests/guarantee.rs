@@ -282,8 +282,8 @@ fn a_certificate_of_something_else_is_refused() {
         &["bounds.phi_rad", "fit"],
     );
     refused(
-        |s| s.controller.horizon = 201,
-        &["controller.horizon", "1 to 200"],
+        |s| s.controller.horizon = 1001,
+        &["controller.horizon", "1 to 1000"],
     );
     refused(
         |s| {

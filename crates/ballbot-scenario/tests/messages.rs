@@ -185,8 +185,8 @@ fn horizon_out_of_range() {
         &["controller.horizon", "0", "from 1"],
     );
     assert_says(
-        &message("horizon = 20", "horizon = 201"),
-        &["controller.horizon", "201", "200"],
+        &message("horizon = 20", "horizon = 1001"),
+        &["controller.horizon", "1001", "1000"],
     );
 }
 

@@ -325,6 +325,20 @@ pub(crate) fn gradient<T: Scalar, const NX: usize, const NU: usize>(
     gradient
 }
 
+/// At which stages rows may be active, modulo 32: most stages have none, and need not be looked through.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Places(u32);
+
+impl Places {
+    pub fn add(&mut self, stage: usize) {
+        self.0 |= 1 << (stage % 32);
+    }
+
+    fn may_be_at(self, stage: usize) -> bool {
+        self.0 >> (stage % 32) & 1 == 1
+    }
+}
+
 /// v -= sum of multiplier * alpha over the rows that are active at each stage, in one backward pass.
 pub(crate) fn subtract<
     T: Scalar,
@@ -334,6 +348,7 @@ pub(crate) fn subtract<
 >(
     ocp: &Ocp<T, NX, NU>,
     factors: &[StageFactor<T, NX, NU>],
+    places: Places,
     active_at: impl Fn(usize) -> Active,
     v: &mut [SVector<T, NU>],
 ) {
@@ -341,9 +356,13 @@ pub(crate) fn subtract<
     let (mut costate, _) = gradient(ocp, active_at(n));
     let stages = factors.iter().zip(v.iter_mut()).enumerate().take(n);
     for (i, (factor, v)) in stages.rev() {
-        let (rows_x, rows_u) = gradient(ocp, active_at(i));
-        *v += factor.input.tr_mul(&costate) + factor.inverse_factor * rows_u;
-        costate = factor.closed_loop.tr_mul(&costate) + factor.gain.tr_mul(&rows_u) + rows_x;
+        *v += factor.input.tr_mul(&costate);
+        costate = factor.closed_loop.tr_mul(&costate);
+        if places.may_be_at(i) {
+            let (rows_x, rows_u) = gradient(ocp, active_at(i));
+            *v += factor.inverse_factor * rows_u;
+            costate += factor.gain.tr_mul(&rows_u) + rows_x;
+        }
     }
 }
 

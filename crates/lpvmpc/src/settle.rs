@@ -5,7 +5,7 @@ use crate::active_set::DualActiveSet;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
-use crate::rows::{self, Trajectory};
+use crate::rows::{self, Places, Trajectory};
 use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Status};
 use crate::working_set::{Terms, copy};
 use nalgebra::convert;
@@ -175,13 +175,18 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     ) {
         copy(&mut self.rest, &self.v);
         let (working, resting) = (self.working.rows(), &self.resting);
+        let mut places = Places::default();
+        working
+            .iter()
+            .for_each(|row| places.add(row.active.bound.stage));
+        resting.iter().for_each(|row| places.add(row.bound.stage));
         let active_at = |stage: usize| {
             let here = working
                 .iter()
                 .filter(move |row| row.active.bound.stage == stage);
             here.map(Terms::reported).chain(resting.at(stage))
         };
-        rows::subtract(ocp, factors, active_at, &mut self.rest);
+        rows::subtract(ocp, factors, places, active_at, &mut self.rest);
     }
 }
 

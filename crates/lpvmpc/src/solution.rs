@@ -378,6 +378,12 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solution<T, NX, NU> {
         }
     }
 
+    /// u_0: the input to apply until the next sample. Unlike an index it cannot panic; without any
+    /// input it is zero.
+    pub fn first_input(&self) -> SVector<T, NU> {
+        self.u.first().copied().unwrap_or_else(SVector::zeros)
+    }
+
     /// Back to a solution of nothing yet.
     pub fn clear(&mut self) {
         self.u.fill(SVector::zeros());

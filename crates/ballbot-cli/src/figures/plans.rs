@@ -28,13 +28,16 @@ pub struct GuardRun<'a> {
     pub decisions: &'a [f64],
 }
 
+/// A gap that is none: what a descent leaves at its tolerance, rad and rad/s.
+const NO_GAP: f64 = 1e-4;
+
 /// One panel of the gap, and for a run with a guarantee one of the set points and one of the
 /// decisions. The plans of a descent are rollouts: where there is no gap, there is no panel of it, and
 /// `None` where no panel is left.
 pub fn plans(title: &str, run: &PlansRun<'_>) -> Option<Figure> {
     let mut gaps = run.gap.iter().flatten();
     // Negated, so that a gap that is NaN is shown, too.
-    let differs = gaps.any(|gap| !(gap.abs() <= f64::EPSILON));
+    let differs = gaps.any(|gap| !(gap.abs() <= NO_GAP));
     let mut panels: Vec<Panel> = differs.then(|| gap_panel(run)).into_iter().collect();
     if let Some(guard) = &run.guard {
         panels.extend(guard_panels(run.time, guard));

@@ -16,9 +16,6 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-/// The longest horizon of the cases.
-/// Torque bounds, and soft bounds that are exceeded.
-
 /// What a closed loop amounts to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {

@@ -40,7 +40,7 @@ fn step<T: Scalar>() {
         controller.prepare(reference, workspace);
         black_box(controller.feedback(x, reference, workspace));
         let plan = controller.step(x, reference, workspace);
-        let torque = plan.u[0][0];
+        let torque = plan.first_input()[0];
         let needed = PlaneTorques::need(plan.u.iter().map(|u| u[0]), taken);
         black_box(plan);
         black_box(left.first([needed, taken]));

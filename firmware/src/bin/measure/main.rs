@@ -136,7 +136,7 @@ fn replay(
                 failure::stop()
             };
             let plan = controller.solution();
-            *torque = plan.u[0][0];
+            *torque = plan.first_input()[0];
             hprintln!(
                 "step {} {index} {k} {} {} {} {} {torque} {} {instructions} {}",
                 recording.name,
