@@ -26,7 +26,7 @@ fn compare<const NX: usize, const NU: usize>(
     activity: Activity,
 ) -> Result<(), BenchmarkError> {
     let problems = synthetic::problems::<NX, NU>(stages, activity)?;
-    let warm = synthetic::settings();
+    let warm = SolverSettings::default();
     let mut own = Own::new(&problems, warm);
     let (expected, active) = own.solve_all()?;
     let name = format!("{NX}x{NU}, N = {stages}, {active:.0} active");

@@ -57,7 +57,7 @@ pub fn problems<const NX: usize, const NU: usize>(
     let mut x = SVector::zeros();
     for k in 0..SAMPLES {
         let ocp = problem(stages, k, x, limits);
-        let mut own = Own::new(std::slice::from_ref(&ocp), settings());
+        let mut own = Own::new(std::slice::from_ref(&ocp), SolverSettings::default());
         let u = own.solve(0)?;
         x = state_matrix(k as f64) * x + input_matrix(k as f64) * u;
         problems.push(ocp);
@@ -65,18 +65,10 @@ pub fn problems<const NX: usize, const NU: usize>(
     Ok(problems)
 }
 
-/// Settings with room for any number of changes that ends.
-pub fn settings() -> SolverSettings<f64> {
-    SolverSettings {
-        max_changes: Some(60_000),
-        ..SolverSettings::default()
-    }
-}
-
 fn needed_limits<const NX: usize, const NU: usize>(
     ocp: Ocp<f64, NX, NU>,
 ) -> Result<Limits, BenchmarkError> {
-    let mut own = Own::new(std::slice::from_ref(&ocp), settings());
+    let mut own = Own::new(std::slice::from_ref(&ocp), SolverSettings::default());
     own.solve(0)?;
     let plan = own.solution();
     let input = plan.u.iter().map(SVector::amax).fold(0.0, f64::max);

@@ -16,13 +16,13 @@ pub const N: usize = 20;
 pub const M: usize = N;
 
 /// The controller of one plane.
-pub type Controller = lpvmpc::Controller<ballbot::Ballbot<f32>, f32, 4, 1, 3>;
+pub type Controller = ballbot::Controller<f32>;
 
 /// Its memory.
 pub type ControllerMemory = lpvmpc::ControllerArrays<f32, 4, 1, N, M>;
 
 /// The program of a sample and the solver, shared by the planes.
-pub type Workspace = lpvmpc::Workspace<f32, 4, 1>;
+pub type Workspace = ballbot::Workspace<f32>;
 
 /// Their memory.
 pub type WorkspaceMemory = lpvmpc::WorkspaceArrays<f32, 4, 1, N, M>;

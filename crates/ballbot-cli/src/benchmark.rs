@@ -5,11 +5,11 @@
 //! samples of the sequence.
 
 use crate::commands::CommandError;
-use ballbot::Ballbot;
+use ballbot::{Controller, ControllerSettings};
 use ballbot_scenario::{Prepared, Scenario, ScenarioError};
 use lpvmpc::{
-    Controller, ControllerSettings, GuardedController, GuardedIterations, Iterations, Reference,
-    Solution, Solver, TerminalIngredient,
+    GuardedController, GuardedIterations, Iterations, Reference, Solution, Solver,
+    TerminalIngredient,
 };
 use lpvmpc_sim::advance;
 use nalgebra::Vector4;
@@ -40,7 +40,7 @@ const SWEPT: usize = 48 << 20;
 const GUARDED_SAMPLES: usize = 400;
 const HOLD: usize = 80;
 
-type Control = Controller<Ballbot<f64>, f64, 4, 1, 3>;
+type Control = Controller<f64>;
 
 /// Statistics of a time over a sequence, in microseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -172,7 +172,7 @@ impl DescentTimes {
     /// From rest, towards the ball angle (rad) that is `wanted` at each sample.
     fn of(
         prepared: &Prepared,
-        settings: ControllerSettings<f64, 4, 1, 3>,
+        settings: ControllerSettings<f64>,
         samples: usize,
         wanted: impl Fn(usize) -> f64,
     ) -> Result<Self, CommandError> {

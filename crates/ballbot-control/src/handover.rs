@@ -1,7 +1,6 @@
 //! What a regulator leaves to the one that takes its place when settings change on the run.
 
-use ballbot::Ballbot;
-use lpvmpc::{ActiveRow, Controller, DelayLine, Estimator, LastPlan, LpvModel};
+use lpvmpc::{ActiveRow, Controller, DelayLine, LastPlan, LpvModel};
 use lpvmpc_sim::MeasuredState;
 use nalgebra::{SMatrix, SVector, Vector1};
 use std::any::Any;
@@ -12,7 +11,7 @@ use std::rc::Rc;
 const INSTANTS: usize = 256;
 
 /// The filter on (phi, theta, theta_dot).
-pub(crate) type Filter = Estimator<Ballbot<f64>, f64, 4, 1, 3, 3, 2, INSTANTS>;
+pub(crate) type Filter = ballbot::Estimator<f64, 2, INSTANTS>;
 
 /// Torques that can be on their way at once.
 const MOST_COMMANDS: usize = 256;

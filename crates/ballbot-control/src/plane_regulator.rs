@@ -1,8 +1,8 @@
 //! Regulators of one plane of a robot.
 
 use crate::handover::{Handover, Plan, PlanKind};
-use ballbot::Ballbot;
-use lpvmpc::{ActiveSet, Controller, GuardedController};
+use ballbot::{Ballbot, Controller, GuardedController};
+use lpvmpc::ActiveSet;
 use lpvmpc_sim::{GuardedFeedback, Regulator, StateFeedback};
 use std::rc::Rc;
 
@@ -71,12 +71,9 @@ impl PlaneRegulator for GuardedFeedback<Ballbot<f64>, 4, 1, 3, 5> {
 }
 
 /// A guarded controller and the warm start of its next program.
-type Guarded = (
-    GuardedController<Ballbot<f64>, f64, 4, 1, 3>,
-    ActiveSet<f64>,
-);
+type Guarded = (GuardedController<f64>, ActiveSet<f64>);
 
-impl PlaneRegulator for StateFeedback<Box<Controller<Ballbot<f64>, f64, 4, 1, 3>>, 4, 1> {
+impl PlaneRegulator for StateFeedback<Box<Controller<f64>>, 4, 1> {
     fn hand_over(&self) -> Handover {
         let controller = self.controller();
         let torque = controller.solution().u[0][0];

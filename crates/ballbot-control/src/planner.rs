@@ -1,7 +1,6 @@
 //! What plans the torque of a plane.
 
 use crate::handover::{Handover, Plan, PlanKind};
-use ballbot::Ballbot;
 use lpvmpc::{BoundId, Bounds, Controller, LpvModel, Reference, Solution, Workspace};
 use lpvmpc_sim::Decision;
 use nalgebra::{SVector, Vector1, Vector4};
@@ -68,8 +67,8 @@ pub(crate) trait Planner {
 
 /// The torque is held over a sample.
 pub(crate) struct Held {
-    pub(crate) controller: Controller<Ballbot<f64>, f64, 4, 1, 3>,
-    pub(crate) workspace: Workspace<f64, 4, 1>,
+    pub(crate) controller: ballbot::Controller<f64>,
+    pub(crate) workspace: ballbot::Workspace<f64>,
 }
 
 impl Planner for Held {

@@ -5,8 +5,8 @@ use crate::handover::Commands;
 use crate::output_feedback::{Belief, OutputFeedback};
 use crate::plane_regulator::PlaneRegulator;
 use crate::planner::{Held, Planner};
-use ballbot::Ballbot;
-use lpvmpc::{Bounds, Controller, ControllerError, ControllerSettings, Estimator, EstimatorError};
+use ballbot::{Ballbot, ControllerSettings};
+use lpvmpc::{Bounds, Controller, ControllerError, Estimator, EstimatorError};
 use lpvmpc_sim::{MeasuredState, StateFeedback};
 use nalgebra::Vector4;
 
@@ -27,7 +27,7 @@ pub enum RegulatorError {
 /// The controller refuses its `settings`.
 pub fn state_feedback(
     ballbot: &Ballbot<f64>,
-    settings: &ControllerSettings<f64, 4, 1, 3>,
+    settings: &ControllerSettings<f64>,
 ) -> Result<Box<dyn PlaneRegulator>, ControllerError> {
     let controller = Controller::allocate(*ballbot, *settings)?;
     Ok(Box::new(StateFeedback::new(Box::new(controller))))
@@ -39,7 +39,7 @@ pub fn state_feedback(
 /// Estimator or controller refuses its settings.
 pub fn output_feedback(
     ballbot: &Ballbot<f64>,
-    settings: &ControllerSettings<f64, 4, 1, 3>,
+    settings: &ControllerSettings<f64>,
     feedback: &Feedback,
     period: f64,
 ) -> Result<Box<dyn PlaneRegulator>, RegulatorError> {

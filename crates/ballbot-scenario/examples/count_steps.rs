@@ -5,9 +5,9 @@
 //! count_steps tight-bounds 80
 //! ```
 
-use ballbot::Ballbot;
+use ballbot::{Controller, Workspace};
 use ballbot_scenario::{Scenario, Surroundings};
-use lpvmpc::{Controller, Reference, Workspace};
+use lpvmpc::Reference;
 use nalgebra::Vector4;
 use std::hint::black_box;
 use std::{env, error::Error, path::Path, time::Duration};
@@ -44,10 +44,10 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// The counter finds it by its name.
 #[inline(never)]
 fn counted_step(
-    controller: &mut Controller<Ballbot<f64>, f64, 4, 1, 3>,
+    controller: &mut Controller<f64>,
     x: &Vector4<f64>,
     reference: &Reference<'_, f64, 4>,
-    workspace: &mut Workspace<f64, 4, 1>,
+    workspace: &mut Workspace<f64>,
 ) {
     black_box(controller.step(black_box(x), reference, workspace));
 }

@@ -11,9 +11,9 @@
     reason = "a comparison with a number that is not one must take the failing branch"
 )]
 
-use ballbot::Ballbot;
+use ballbot::{Controller, Workspace};
 use ballbot_scenario::{Plane, Prepared, Scenario, Surroundings};
-use lpvmpc::{Controller, ControllerSettings, Reference, Workspace};
+use lpvmpc::{ControllerSettings, Reference};
 use nalgebra::{Vector3, Vector4};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -264,8 +264,8 @@ fn check_recording<'a>(
 /// The controller of one plane in `f64`, with its own past.
 struct Replay<'a> {
     plane: &'a Plane,
-    controller: Controller<Ballbot<f64>, f64, 4, 1, 3>,
-    workspace: Workspace<f64, 4, 1>,
+    controller: Controller<f64>,
+    workspace: Workspace<f64>,
 }
 
 impl<'a> Replay<'a> {

@@ -57,7 +57,7 @@ impl ControllerTable {
     pub(crate) fn ramp(
         &self,
         ballbot: &Ballbot<f64>,
-        settings: &ControllerSettings<f64, 4, 1, 3>,
+        settings: &ballbot::ControllerSettings<f64>,
     ) -> Result<Option<ControllerSettings<f64, 5, 1, 3>>, ScenarioError> {
         let ramp = self.torque_rate.as_ref();
         ramp.map(|ramp| ramp.settings(&self.terminal, ballbot, settings))
@@ -192,7 +192,7 @@ impl TorqueRateTable {
         &self,
         terminal: &TerminalTable,
         ballbot: &Ballbot<f64>,
-        plain: &ControllerSettings<f64, 4, 1, 3>,
+        plain: &ballbot::ControllerSettings<f64>,
     ) -> Result<ControllerSettings<f64, 5, 1, 3>, ScenarioError> {
         let limit = self.limit_nm_s;
         if !(limit > 0.0) {

@@ -7,10 +7,8 @@ use crate::files::Files;
 use crate::problem::dynamic;
 use crate::schema::{CertifiedTable, ControllerTable, ModelKind, TerminalTable};
 use crate::{RobotTable, builtin, rollout};
-use ballbot::Ballbot;
-use lpvmpc::{
-    ControllerSettings, GuardedIterations, GuardedSettings, Predictor, TerminalSet, Weights,
-};
+use ballbot::{Ballbot, ControllerSettings, GuardedSettings};
+use lpvmpc::{GuardedIterations, Predictor, TerminalSet, Weights};
 use lpvmpc_design::is_at_most;
 use nalgebra::{SMatrix, Vector4};
 use std::fmt;
@@ -50,7 +48,7 @@ impl fmt::Display for Standing {
 /// What a certified terminal set makes of a controller.
 pub(crate) struct Guarantee {
     /// The guarded controller's settings.
-    pub settings: GuardedSettings<f64, 4, 1>,
+    pub settings: GuardedSettings<f64>,
     certificate: TerminalCertificate,
     file: Option<String>,
 }
@@ -73,7 +71,7 @@ impl ControllerTable {
     pub(crate) fn guarded(
         &self,
         ballbot: &Ballbot<f64>,
-        settings: &ControllerSettings<f64, 4, 1, 3>,
+        settings: &ControllerSettings<f64>,
         files: &dyn Files,
     ) -> Result<Option<Guarantee>, ScenarioError> {
         let TerminalTable::Certified(table) = &self.terminal else {
@@ -130,7 +128,7 @@ impl CertifiedTable {
     fn guarantee(
         &self,
         ballbot: &Ballbot<f64>,
-        plain: &ControllerSettings<f64, 4, 1, 3>,
+        plain: &ControllerSettings<f64>,
         files: &dyn Files,
     ) -> Result<Guarantee, ScenarioError> {
         let Predictor::StageConsistent(rk4) = plain.predictor else {
@@ -240,7 +238,7 @@ fn check_cost(
 fn check_bounds(
     terminal: &TerminalSet<f64, 4, 1>,
     between_samples: &Vector4<f64>,
-    plain: &ControllerSettings<f64, 4, 1, 3>,
+    plain: &ControllerSettings<f64>,
 ) -> Result<f64, ScenarioError> {
     let inverse = dynamic(&terminal.p).lu().try_inverse().ok_or_else(|| {
         ScenarioError::value(

@@ -12,9 +12,9 @@ use crate::schema::{ControllerTable, Scenario, StateTable, TerminalTable};
 use crate::three_motors::Motors;
 use crate::world::PlaneWorld;
 use crate::world_table::PlaneName;
-use ballbot::{Ballbot, Wheels};
+use ballbot::{Ballbot, GuardedSettings, Wheels};
 use ballbot_control::Feedback;
-use lpvmpc::{ControllerSettings, GuardedSettings, MoveLimits};
+use lpvmpc::{ControllerSettings, MoveLimits};
 use lpvmpc_sim::Tolerances;
 use nalgebra::Vector4;
 
@@ -28,14 +28,14 @@ pub struct Prepared {
     /// The torque map to the motors.
     pub wheels: Wheels<f64>,
     /// The controller's settings.
-    pub settings: ControllerSettings<f64, 4, 1, 3>,
+    pub settings: ballbot::ControllerSettings<f64>,
     /// What stands around the controller.
     pub feedback: Feedback,
     /// Where the torque's rate is bounded: the settings of the controller that plans it.
     pub ramp: Option<ControllerSettings<f64, 5, 1, 3>>,
     /// Where the terminal set is certified: the settings of the guarded controller, which then
     /// runs. `settings` are those of the same problem without guard.
-    pub guarded: Option<GuardedSettings<f64, 4, 1>>,
+    pub guarded: Option<GuardedSettings<f64>>,
     /// What is known of the certificate that this rests on.
     pub certificate: Option<Standing>,
     /// One plane, or x and y.

@@ -6,10 +6,10 @@ use crate::schema::{
     BoundsTable, ControllerTable, IterationsTable, LinearModelTable, ModelKind, PredictorTable,
     StateBounds, TerminalTable,
 };
-use ballbot::{Ballbot, LinearParameters};
+use ballbot::{Ballbot, ControllerSettings, LinearParameters};
 use lpvmpc::{
-    Bounds, ControllerSettings, InputReference, Iterations, LpvModel, Predictor, Rk4, Scheduling,
-    Softness, SolverSettings, TerminalIngredient, Weights, exact_prices,
+    Bounds, InputReference, Iterations, LpvModel, Predictor, Rk4, Scheduling, Softness,
+    SolverSettings, TerminalIngredient, Weights, exact_prices,
 };
 use nalgebra::{DMatrix, Matrix4, Vector1, Vector3, Vector4};
 
@@ -100,7 +100,7 @@ impl ControllerTable {
         &self,
         ballbot: &Ballbot<f64>,
         (x, u): (Bounds<f64, 4>, Bounds<f64, 1>),
-    ) -> Result<ControllerSettings<f64, 4, 1, 3>, ScenarioError> {
+    ) -> Result<ControllerSettings<f64>, ScenarioError> {
         let weights = self.weights(ballbot)?;
         check_horizon(self)?;
         // At rest Coulomb friction makes the fastest pole; beyond the horizon the robot moves.

@@ -11,8 +11,8 @@
 
 use crate::error::ScenarioError;
 use crate::number::text;
-use ballbot::Ballbot;
-use lpvmpc::{Bounds, ControllerSettings, LpvModel, Rk4, Rollout, TerminalSet};
+use ballbot::{Ballbot, ControllerSettings};
+use lpvmpc::{Bounds, LpvModel, Rk4, Rollout, TerminalSet};
 use nalgebra::{Matrix4, Vector1, Vector4};
 
 /// More steps than this are not tried.
@@ -30,7 +30,7 @@ const SAFETY: f64 = 2.0;
 /// wanted are needed.
 pub(crate) fn accurate(
     ballbot: &Ballbot<f64>,
-    plain: &ControllerSettings<f64, 4, 1, 3>,
+    plain: &ControllerSettings<f64>,
     terminal: &TerminalSet<f64, 4, 1>,
     margin: f64,
     wanted: Option<usize>,
@@ -115,7 +115,7 @@ fn extrapolated(
 /// step.
 fn error(
     ballbot: &Ballbot<f64>,
-    plain: &ControllerSettings<f64, 4, 1, 3>,
+    plain: &ControllerSettings<f64>,
     rk4: Rk4,
 ) -> (Vector4<f64>, Vector4<f64>) {
     let fine = Rk4 {
@@ -174,7 +174,7 @@ fn stays(bounds: &Bounds<f64, 4>, x: &Vector4<f64>) -> bool {
 /// the norm of P: what the largest errors add up to, each as long as it lives.
 fn drift(
     ballbot: &Ballbot<f64>,
-    plain: &ControllerSettings<f64, 4, 1, 3>,
+    plain: &ControllerSettings<f64>,
     terminal: &TerminalSet<f64, 4, 1>,
     rollout: &Rollout<f64, 4>,
 ) -> (Vector4<f64>, f64) {

@@ -5,13 +5,13 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
-use ballbot::Ballbot;
+use ballbot::GuardedController;
 use ballbot_scenario::{CertifiedTable, Prepared, Scenario, TerminalTable};
-use lpvmpc::{GuardedController, Rk4};
+use lpvmpc::Rk4;
 use nalgebra::Vector4;
 use std::path::Path;
 
-type Guarded = GuardedController<Ballbot<f64>, f64, 4, 1, 3>;
+type Guarded = GuardedController<f64>;
 
 fn rows(name: &str) -> Vec<Vec<f64>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/guaranteed-optimum");

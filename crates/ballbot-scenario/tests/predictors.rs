@@ -2,11 +2,11 @@
 //! gap, on the ballbot with the paper's terminal equality (scenario 3).
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 
-use ballbot::Ballbot;
+use ballbot::{Ballbot, Controller, ControllerSettings};
 use ballbot_scenario::{Prepared, Scenario};
 use lpvmpc::{
-    Bounds, Controller, ControllerSettings, Iterations, Predictor, Reference, Rk4, Solution,
-    Status, TerminalIngredient, kkt_residual,
+    Bounds, Iterations, Predictor, Reference, Rk4, Solution, Status, TerminalIngredient,
+    kkt_residual,
 };
 use nalgebra::Vector4;
 use std::path::Path;
@@ -14,7 +14,7 @@ use std::path::Path;
 const N: usize = 20;
 const FINE: Rk4 = Rk4 { substeps: 2 };
 
-type Loop = Controller<Ballbot<f64>, f64, 4, 1, 3>;
+type Loop = Controller<f64>;
 
 fn scenario_3() -> Prepared {
     let scenario = Scenario::load("single-setpoint-terminal").unwrap();
@@ -22,7 +22,7 @@ fn scenario_3() -> Prepared {
 }
 
 /// Scenario 3's settings with another predictor; phi without bounds, for far set points.
-fn settings(predictor: Predictor, iterations: Iterations<f64>) -> ControllerSettings<f64, 4, 1, 3> {
+fn settings(predictor: Predictor, iterations: Iterations<f64>) -> ControllerSettings<f64> {
     let mut settings = ControllerSettings {
         predictor,
         iterations,
@@ -34,7 +34,7 @@ fn settings(predictor: Predictor, iterations: Iterations<f64>) -> ControllerSett
 }
 
 /// The first plan from rest towards `phi` rad.
-fn plan(settings: ControllerSettings<f64, 4, 1, 3>, phi: f64) -> (Loop, Solution<f64, 4, 1>) {
+fn plan(settings: ControllerSettings<f64>, phi: f64) -> (Loop, Solution<f64, 4, 1>) {
     let mut controller = Loop::allocate(Ballbot::paper(), settings).unwrap();
     let target = Reference::constant(Vector4::new(phi, 0.0, 0.0, 0.0));
     let mut workspace = controller.workspace();
@@ -65,7 +65,7 @@ fn the_frozen_predictor_keeps_its_gap() {
 }
 
 /// A descent with the stage-consistent predictor, until nothing is left to gain.
-fn converging(most: usize) -> ControllerSettings<f64, 4, 1, 3> {
+fn converging(most: usize) -> ControllerSettings<f64> {
     let tolerance = 1e-5;
     let descent = Iterations::Descent { tolerance, most };
     settings(Predictor::StageConsistent(FINE), descent)

@@ -20,6 +20,7 @@ mod friction;
 mod heading;
 mod linear;
 mod parameters;
+mod regulator;
 mod shares;
 mod trigonometry;
 mod wheels;
@@ -30,5 +31,9 @@ pub use embedding::{Accelerations, Tilt};
 pub use friction::{CREEP_SPEED, DriveFriction};
 pub use heading::Heading;
 pub use parameters::{Ballbot, Field, Geometry, LinearParameters, limits};
+pub use regulator::{
+    Controller, ControllerSettings, Estimator, GuardedController, GuardedSettings,
+    GuardedWorkspace, Workspace,
+};
 pub use shares::PlaneTorques;
 pub use wheels::{AZIMUTHS_OF_PAPER_DEG, BadWheels, Wheel, Wheels};

@@ -291,7 +291,7 @@ fn bad_tolerances_end_the_run_at_once() {
 }
 
 /// The paper's controller of scenario 1, with torque bounds that it runs into.
-fn ballbot_controller() -> Controller<Ballbot<f64>, f64, 4, 1, 3> {
+fn ballbot_controller() -> ballbot::Controller<f64> {
     let state = Vector4::new(
         f64::INFINITY,
         limits::THETA,

@@ -2,9 +2,9 @@
 
 use super::variant::Variant;
 use crate::commands::CommandError;
-use ballbot::Ballbot;
+use ballbot::{Ballbot, GuardedSettings, GuardedWorkspace};
 use ballbot_scenario::{Prepared, ScenarioError};
-use lpvmpc::{Decision, GuardedController, GuardedSettings, GuardedWorkspace};
+use lpvmpc::{Decision, GuardedController};
 use lpvmpc_sim::{GuardedLoop, Random, Tolerances};
 use nalgebra::{Vector1, Vector4};
 use serde::Serialize;
@@ -103,7 +103,7 @@ impl Wanted {
 pub(super) struct Loop<'a> {
     prepared: &'a Prepared,
     guarded: GuardedLoop<Ballbot<f64>, Ballbot<f64>, 4, 1, 3>,
-    workspace: GuardedWorkspace<f64, 1, 5>,
+    workspace: GuardedWorkspace<f64>,
 }
 
 impl<'a> Loop<'a> {
@@ -260,7 +260,7 @@ pub(super) fn has_fallen(x: &Vector4<f64>) -> bool {
     !(x[1].abs() < std::f64::consts::FRAC_PI_2)
 }
 
-pub(super) fn settings(prepared: &Prepared) -> Result<&GuardedSettings<f64, 4, 1>, ScenarioError> {
+pub(super) fn settings(prepared: &Prepared) -> Result<&GuardedSettings<f64>, ScenarioError> {
     prepared.guarded.as_ref().ok_or_else(no_certificate)
 }
 

@@ -11,18 +11,15 @@
 //! of the iteration of its own. A test has both end at the same closed loop.
 
 use crate::commands::CommandError;
-use ballbot::Ballbot;
+use ballbot::{Ballbot, ControllerSettings};
 use ballbot_scenario::Prepared;
-use lpvmpc::{
-    Common, ControllerSettings, Ocp, Rk4, Solution, Solver, SolverSettings, TerminalIngredient,
-    WarmStart,
-};
+use lpvmpc::{Common, Ocp, Rk4, Solution, Solver, SolverSettings, TerminalIngredient, WarmStart};
 use nalgebra::{Matrix4, Vector1, Vector4};
 
 /// Nonlinear MPC for one plane.
 struct NonlinearMpc<'a> {
     ballbot: &'a Ballbot<f64>,
-    settings: &'a ControllerSettings<f64, 4, 1, 3>,
+    settings: &'a ControllerSettings<f64>,
     p: Matrix4<f64>,
     ocp: Ocp<f64, 4, 1>,
     solver: Solver<f64, 4, 1>,
