@@ -79,8 +79,8 @@ fn main() -> ! {
     let mut board = StandIn;
     let (Some(mut peripherals), Some(memory), Some([x, y])) = (
         Peripherals::take(),
-        singleton!(WORKSPACE: WorkspaceMemory = WorkspaceMemory::new()),
-        singleton!(PLANES: [ControllerMemory; 2] = [ControllerMemory::new(); 2]),
+        singleton!(WORKSPACE: WorkspaceMemory = WorkspaceMemory::default()),
+        singleton!(PLANES: [ControllerMemory; 2] = [ControllerMemory::default(); 2]),
     ) else {
         board.stop()
     };

@@ -14,22 +14,21 @@
 //! the next program of the Jacobian gets so much of it: what it changes of the inputs costs extra,
 //! as in the method of Levenberg and Marquardt.
 
-use crate::controller::{Controller, Workspace, next_state};
+use crate::controller::{Controller, next_state};
 use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
-use crate::ocp::{Ocp, Stage};
 use crate::plan::{Aim, Merit, Prices, Trial, at};
 use crate::policy::input_at;
-use crate::riccati::{CostToGo, StageFactor};
 use crate::settings::{ControllerSettings, TerminalIngredient};
 use crate::solution::Status;
 use crate::solver::{SolverSettings, WarmStart};
 use crate::working_set::copy;
+use crate::workspace::Workspace;
 use nalgebra::{SMatrix, SVector, convert};
 
 /// Where the matrices of a program come from.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Along {
+pub(crate) enum Along {
     /// The embedding, at the scheduling along the plan.
     Scheduling,
     /// The derivatives of the rollout.
@@ -71,12 +70,6 @@ const SHORT_STEP: f64 = 0.5;
 /// Damping goes up by this factor without a step, and down by no more; the least is the largest entry
 /// of R.
 const DAMPING_FACTOR: f64 = 10.0;
-/// Parts of the way to the set point to which the regulator is sent where there is no plan.
-const PARTS: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.01, 0.0];
-/// Stages of the regulator, at least.
-const REGULATOR: usize = 20;
-/// A plan that costs so many times the last one is no longer the only candidate.
-const JUMP: f64 = 2.0;
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize> Controller<P, T, NX, NU, NS>
 where
@@ -160,111 +153,6 @@ where
         self.publish(status);
     }
 
-    /// The rest of the last plan from `x`; where there is none, or it has become dear, the best of
-    /// the regulator's own closed loops if that is cheaper. `false` if nothing is finite.
-    fn first_plan(
-        &mut self,
-        x: &SVector<T, NX>,
-        aim: &Aim<'_, T, NX, NU>,
-        workspace: &mut Workspace<T, NX, NU>,
-    ) -> bool {
-        let last = self.policy.cost;
-        let merit = self.merit(aim, Prices::none());
-        let mut best = None;
-        if self.initialised {
-            self.shift(aim);
-            best = self.roll_out_plan(x, &merit, &mut workspace.trial, &|i, x| {
-                let policy = &self.policy;
-                let planned = (&at(&self.rollout, i), &at(&policy.u, i));
-                input_at(x, planned, &at(&policy.gain, i), &self.settings.u)
-            });
-            self.take_if_some(best, &workspace.trial);
-        }
-        if best.is_none_or(|cost| cost > last * convert(JUMP)) {
-            best = self.regulate(x, aim, best, workspace);
-        }
-        best.is_some()
-    }
-
-    /// The regulator's closed loops towards the set point and towards points on the way to it. The
-    /// plan becomes the cheapest of them, if it is cheaper than `best`; returns what it costs then.
-    #[inline(never)]
-    fn regulate(
-        &mut self,
-        x: &SVector<T, NX>,
-        aim: &Aim<'_, T, NX, NU>,
-        mut best: Option<T>,
-        workspace: &mut Workspace<T, NX, NU>,
-    ) -> Option<T> {
-        let (gain, indifferent) = self.regulator(aim, &workspace.ocp);
-        let away = (x - aim.end()).component_mul(&indifferent);
-        let merit = self.merit(aim, Prices::none());
-        for part in PARTS {
-            let x_aim = aim.end() + away * (T::one() - convert::<f64, T>(part));
-            let cost = self.roll_out_plan(x, &merit, &mut workspace.trial, &|_, x| {
-                input_at(x, (&x_aim, &aim.u_ref), &gain, &self.settings.u)
-            });
-            if let Some(found) = cost
-                && best.is_none_or(|best| found < best)
-            {
-                best = cost;
-                self.take_if_some(cost, &workspace.trial);
-                self.policy.gain.fill(gain);
-                self.policy.damping = T::zero();
-            }
-            if away.amax() == T::zero() {
-                break;
-            }
-        }
-        best
-    }
-
-    /// The gain of the regulator at the end of the reference (u = u_ref + K (x - x_ref)), that of the
-    /// first of many equal stages with the weights of `ocp`; and 1 for each state whose value is all the
-    /// same to the plant (the position, as a rule), 0 for the others.
-    fn regulator(
-        &self,
-        aim: &Aim<'_, T, NX, NU>,
-        ocp: &Ocp<T, NX, NU>,
-    ) -> (SMatrix<T, NU, NX>, SVector<T, NX>) {
-        let (a, b) = self.sample_matrices(aim.end(), &aim.u_ref, Along::Jacobian);
-        let indifferent = SVector::from_fn(|j, _| {
-            let column = (0..NX).all(|i| a[(i, j)] == one_if(i == j));
-            one_if(column)
-        });
-        let stage = Stage {
-            a,
-            b,
-            ..Stage::new()
-        };
-        let mut cost_to_go = CostToGo {
-            quadratic: ocp.terminal.p,
-            linear: SVector::zeros(),
-        };
-        let mut factor = StageFactor::zeros();
-        for _ in 0..self.settings.horizon.max(REGULATOR) {
-            if factor
-                .eliminate(&stage, &ocp.common, &mut cost_to_go)
-                .is_err()
-            {
-                return (SMatrix::zeros(), indifferent);
-            }
-        }
-        (factor.gain, indifferent)
-    }
-
-    /// The plan one sample on; its last stage is the regulator's.
-    fn shift(&mut self, aim: &Aim<'_, T, NX, NU>) {
-        let last = self.last_stage();
-        let gain = at(&self.policy.gain, last);
-        let planned = (aim.end(), &aim.u_ref);
-        let end = at(&self.rollout, last);
-        let u = input_at(&end, planned, &gain, &self.settings.u);
-        // What comes in from beyond the horizon is overwritten.
-        move_on(&mut self.policy.u, last, u);
-        move_on(&mut self.policy.gain, last, gain);
-    }
-
     /// The matrices of the program along the plan from `x`. Their affine terms make the linear model
     /// exact on the plan itself.
     #[inline(never)]
@@ -297,7 +185,7 @@ where
 
     /// The matrices of one sample from `x` with the input `u`. They follow the scheduling within the
     /// sample, whatever the predictor.
-    fn sample_matrices(
+    pub(crate) fn sample_matrices(
         &self,
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
@@ -495,7 +383,7 @@ where
         self.policy.damping = if sound { damping } else { T::zero() };
     }
 
-    fn merit<'a>(
+    pub(crate) fn merit<'a>(
         &self,
         aim: &'a Aim<'a, T, NX, NU>,
         prices: Prices<T, NX>,
@@ -507,7 +395,7 @@ where
     /// stage and its state. Returns the merit; `None` if it is not finite.
     // Once in the machine code: a call per stage is nothing beside a Runge-Kutta step.
     #[inline(never)]
-    fn roll_out_plan(
+    pub(crate) fn roll_out_plan(
         &self,
         x: &SVector<T, NX>,
         merit: &Merit<'_, T, NX, NU>,
@@ -528,7 +416,7 @@ where
     }
 
     /// The trial becomes the plan, if it has a cost.
-    fn take_if_some(&mut self, cost: Option<T>, trial: &Trial<T, NX, NU>) {
+    pub(crate) fn take_if_some(&mut self, cost: Option<T>, trial: &Trial<T, NX, NU>) {
         if let Some(cost) = cost {
             copy(&mut self.policy.u, &trial.u);
             copy(&mut self.rollout, &trial.x);
@@ -562,20 +450,4 @@ impl Along {
             _ => Self::Jacobian,
         }
     }
-}
-
-/// The entries one stage earlier, with `end` as that of stage `last`.
-fn move_on<V: Copy>(entries: &mut [V], last: usize, end: V) {
-    for i in 0..last {
-        if let Some([place, next]) = entries.get_mut(i..i + 2) {
-            *place = *next;
-        }
-    }
-    if let Some(place) = entries.get_mut(last) {
-        *place = end;
-    }
-}
-
-fn one_if<T: Scalar>(condition: bool) -> T {
-    if condition { T::one() } else { T::zero() }
 }

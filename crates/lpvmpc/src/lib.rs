@@ -16,6 +16,7 @@ mod delay;
 mod descent;
 mod estimator;
 mod farkas;
+mod first_plan;
 mod guarded;
 mod held_inputs;
 mod kernel;
@@ -38,9 +39,10 @@ mod solution;
 mod solver;
 mod steady_state;
 mod working_set;
+mod workspace;
 
 pub use clock::{Clock, Tick};
-pub use controller::{Controller, Reference, Workspace};
+pub use controller::{Controller, Reference};
 pub use delay::DelayLine;
 pub use estimator::{
     Covariance, Estimator, EstimatorError, EstimatorSettings, Gate, Observation, Reading, Restart,
@@ -71,3 +73,4 @@ pub use shaping::{Motion, MoveLimits, SmoothMove};
 pub use solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
 pub use solver::{Solver, SolverSettings, WarmStart, cost};
 pub use steady_state::{SteadyState, SteadyStateProblem};
+pub use workspace::Workspace;

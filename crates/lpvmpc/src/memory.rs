@@ -111,21 +111,6 @@ pub struct SolverArrays<T, const NX: usize, const NU: usize, const N: usize, con
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
     SolverArrays<T, NX, NU, N, M>
 {
-    /// Arrays to be lent to a solver.
-    #[inline(always)]
-    pub fn new() -> Self {
-        Self {
-            factors: [StageFactor::zeros(); N],
-            deviations: [[SVector::zeros(); N]; 4],
-            held: [[None; NU]; N],
-            terms: [Terms::empty(); M],
-            resting: [PackedRow::empty(); M],
-            basis: [[SVector::zeros(); N]; M],
-            factor: [[T::zero(); M]; M],
-            numbers: [[T::zero(); M]; 5],
-        }
-    }
-
     /// The arrays as memory of a solver.
     pub fn lend(&'static mut self) -> SolverMemory<T, NX, NU> {
         SolverMemory {
@@ -146,8 +131,18 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize> Default
     for SolverArrays<T, NX, NU, N, M>
 {
+    #[inline(always)]
     fn default() -> Self {
-        Self::new()
+        Self {
+            factors: [StageFactor::zeros(); N],
+            deviations: [[SVector::zeros(); N]; 4],
+            held: [[None; NU]; N],
+            terms: [Terms::empty(); M],
+            resting: [PackedRow::empty(); M],
+            basis: [[SVector::zeros(); N]; M],
+            factor: [[T::zero(); M]; M],
+            numbers: [[T::zero(); M]; 5],
+        }
     }
 }
 
@@ -190,17 +185,6 @@ pub struct WorkspaceArrays<T, const NX: usize, const NU: usize, const N: usize, 
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
     WorkspaceArrays<T, NX, NU, N, M>
 {
-    /// Arrays to be lent to a workspace.
-    #[inline(always)]
-    pub fn new() -> Self {
-        Self {
-            stages: [Stage::new(); N],
-            solver: SolverArrays::new(),
-            u: [SVector::zeros(); N],
-            x: [SVector::zeros(); N],
-        }
-    }
-
     /// The arrays as memory of a workspace.
     pub fn lend(&'static mut self) -> WorkspaceMemory<T, NX, NU> {
         WorkspaceMemory {
@@ -215,8 +199,14 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize> Default
     for WorkspaceArrays<T, NX, NU, N, M>
 {
+    #[inline(always)]
     fn default() -> Self {
-        Self::new()
+        Self {
+            stages: [Stage::new(); N],
+            solver: SolverArrays::default(),
+            u: [SVector::zeros(); N],
+            x: [SVector::zeros(); N],
+        }
     }
 }
 
@@ -258,17 +248,6 @@ pub struct ControllerArrays<T, const NX: usize, const NU: usize, const N: usize,
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
     ControllerArrays<T, NX, NU, N, M>
 {
-    /// Arrays to be lent to a controller.
-    #[inline(always)]
-    pub fn new() -> Self {
-        Self {
-            x: [[SVector::zeros(); N]; 2],
-            u: [[SVector::zeros(); N]; 2],
-            gain: [SMatrix::zeros(); N],
-            active: [PackedRow::empty(); M],
-        }
-    }
-
     /// The arrays as memory of a controller.
     pub fn lend(&'static mut self) -> ControllerMemory<T, NX, NU> {
         ControllerMemory {
@@ -283,7 +262,13 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize> Default
     for ControllerArrays<T, NX, NU, N, M>
 {
+    #[inline(always)]
     fn default() -> Self {
-        Self::new()
+        Self {
+            x: [[SVector::zeros(); N]; 2],
+            u: [[SVector::zeros(); N]; 2],
+            gain: [SMatrix::zeros(); N],
+            active: [PackedRow::empty(); M],
+        }
     }
 }

@@ -44,16 +44,6 @@ pub struct GuardedArrays<T, const NX: usize, const NU: usize, const N: usize> {
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> GuardedArrays<T, NX, NU, N> {
-    /// Arrays to be lent to a guarded controller.
-    #[inline(always)]
-    pub fn new() -> Self {
-        Self {
-            plans: [[PlannedStage::zeros(); N]; 4],
-            drift: [SVector::zeros(); N],
-            aims: [T::zero(); N],
-        }
-    }
-
     /// The arrays as memory of a controller.
     pub fn lend(&'static mut self) -> GuardedMemory<T, NX, NU> {
         GuardedMemory {
@@ -67,8 +57,13 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> GuardedArrays<
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Default
     for GuardedArrays<T, NX, NU, N>
 {
+    #[inline(always)]
     fn default() -> Self {
-        Self::new()
+        Self {
+            plans: [[PlannedStage::zeros(); N]; 4],
+            drift: [SVector::zeros(); N],
+            aims: [T::zero(); N],
+        }
     }
 }
 
@@ -120,19 +115,6 @@ pub struct GuardedWorkspaceArrays<
 impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usize>
     GuardedWorkspaceArrays<T, NU, NA, NP, M>
 {
-    /// Arrays to be lent to a workspace.
-    #[inline(always)]
-    pub fn new() -> Self {
-        Self {
-            stages: [Stage::new(); NP],
-            own: [Common::default(); NP],
-            solver: SolverArrays::new(),
-            u: [SVector::zeros(); NP],
-            x: [SVector::zeros(); NP],
-            active: [PackedRow::empty(); M],
-        }
-    }
-
     /// The arrays as memory of a workspace.
     pub fn lend(&'static mut self) -> GuardedWorkspaceMemory<T, NU, NA> {
         GuardedWorkspaceMemory {
@@ -149,7 +131,15 @@ impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usiz
 impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usize> Default
     for GuardedWorkspaceArrays<T, NU, NA, NP, M>
 {
+    #[inline(always)]
     fn default() -> Self {
-        Self::new()
+        Self {
+            stages: [Stage::new(); NP],
+            own: [Common::default(); NP],
+            solver: SolverArrays::default(),
+            u: [SVector::zeros(); NP],
+            x: [SVector::zeros(); NP],
+            active: [PackedRow::empty(); M],
+        }
     }
 }

@@ -40,7 +40,9 @@ fn assert_same(ocp: &Problem, found: &Answer, expected: &Answer) {
 #[test]
 fn lent_arrays_give_the_answers_of_memory_on_the_heap() {
     const MANY: usize = 140;
-    let arrays = Box::leak(Box::new(SolverArrays::<f64, NX, NU, { N + 3 }, MANY>::new()));
+    let arrays = Box::leak(Box::new(
+        SolverArrays::<f64, NX, NU, { N + 3 }, MANY>::default(),
+    ));
     let mut solver = Solver::new(arrays.lend());
     let room = Capacity {
         stages: N + 5,

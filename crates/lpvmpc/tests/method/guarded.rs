@@ -211,9 +211,9 @@ fn a_shorter_horizon_is_the_one_of_a_smaller_memory() {
     const SHORT: usize = 13;
     let mut short = settings();
     short.horizon = SHORT;
-    let arrays = Box::leak(Box::new(GuardedArrays::<f64, 4, 1, N>::new()));
+    let arrays = Box::leak(Box::new(GuardedArrays::<f64, 4, 1, N>::default()));
     let mut large = Guarded::new(plant(), short, arrays.lend()).unwrap();
-    let arrays = GuardedWorkspaceArrays::<f64, 1, 5, { N + 2 }, 200>::new();
+    let arrays = GuardedWorkspaceArrays::<f64, 1, 5, { N + 2 }, 200>::default();
     let mut large_memory = GuardedWorkspace::new(Box::leak(Box::new(arrays)).lend());
     let mut small = guarded(short);
     let mut small_memory = small.workspace::<5>();
@@ -387,7 +387,7 @@ fn settings_that_make_no_sense_are_refused() {
         let mut changed = settings();
         changed.horizon = horizon;
         let message = format!("the horizon is {horizon}; it must be from 1 to {N} samples");
-        let arrays = Box::leak(Box::new(GuardedArrays::<f64, 4, 1, N>::new()));
+        let arrays = Box::leak(Box::new(GuardedArrays::<f64, 4, 1, N>::default()));
         let outcome = Guarded::new(plant(), changed, arrays.lend());
         let error = outcome.err().unwrap();
         assert!(error.to_string().contains(&message), "{error}");

@@ -22,8 +22,8 @@ type Memory = &'static mut ControllerMemory;
 fn main() -> ! {
     let (Some(peripherals), Some(memory), Some([x, y, tight, descent])) = (
         cortex_m::Peripherals::take(),
-        singleton!(WORKSPACE: WorkspaceMemory = WorkspaceMemory::new()),
-        singleton!(PLANES: [ControllerMemory; 4] = [ControllerMemory::new(); 4]),
+        singleton!(WORKSPACE: WorkspaceMemory = WorkspaceMemory::default()),
+        singleton!(PLANES: [ControllerMemory; 4] = [ControllerMemory::default(); 4]),
     ) else {
         failure::stop()
     };

@@ -25,13 +25,17 @@ fn plant_moves(x: &Vector4<f64>, u: &Vector1<f64>) -> Vector4<f64> {
 
 /// A controller in lent memory for `STAGES` samples and `ROWS` active bounds.
 fn lent<const STAGES: usize, const ROWS: usize>(settings: Settings) -> Regulator {
-    let arrays = Box::leak(Box::new(ControllerArrays::<f64, 4, 1, STAGES, ROWS>::new()));
+    let arrays = Box::leak(Box::new(
+        ControllerArrays::<f64, 4, 1, STAGES, ROWS>::default(),
+    ));
     Controller::new(CartPole::laboratory(), settings, arrays.lend()).unwrap()
 }
 
 /// A workspace in lent memory.
 fn lent_workspace<const STAGES: usize, const ROWS: usize>() -> Workspace<f64, 4, 1> {
-    let arrays = Box::leak(Box::new(WorkspaceArrays::<f64, 4, 1, STAGES, ROWS>::new()));
+    let arrays = Box::leak(Box::new(
+        WorkspaceArrays::<f64, 4, 1, STAGES, ROWS>::default(),
+    ));
     Workspace::new(arrays.lend())
 }
 
@@ -279,7 +283,7 @@ fn a_workspace_that_is_too_short_says_so() {
 #[test]
 fn memory_that_is_shorter_than_the_horizon_is_refused() {
     fn outcome<const STAGES: usize>() -> Result<Regulator, ControllerError> {
-        let arrays = Box::leak(Box::new(ControllerArrays::<f64, 4, 1, STAGES, N>::new()));
+        let arrays = Box::leak(Box::new(ControllerArrays::<f64, 4, 1, STAGES, N>::default()));
         Controller::new(CartPole::laboratory(), settings(N), arrays.lend())
     }
     for (found, largest) in [(outcome::<0>(), 0), (outcome::<{ N - 1 }>(), N - 1)] {

@@ -15,7 +15,7 @@ type Settings = ControllerSettings<f64, 4, 1, 2>;
 fn refusal(change: impl Fn(&mut Settings)) -> (ControllerError, String) {
     let mut settings = settings(N);
     change(&mut settings);
-    let arrays = Box::leak(Box::new(ControllerArrays::<f64, 4, 1, N, N>::new()));
+    let arrays = Box::leak(Box::new(ControllerArrays::<f64, 4, 1, N, N>::default()));
     let outcome = Controller::new(CartPole::laboratory(), settings, arrays.lend());
     let error = outcome.expect_err("settings that make no sense");
     (error, error.to_string())

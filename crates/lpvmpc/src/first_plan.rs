@@ -1,0 +1,145 @@
+//! What a descent begins with: the rest of the last plan, or the regulator's own closed loops.
+
+use crate::controller::Controller;
+use crate::descent::Along;
+use crate::model::{LpvModel, Scalar};
+use crate::ocp::{Ocp, Stage};
+use crate::plan::{Aim, Prices, at};
+use crate::policy::input_at;
+use crate::riccati::{CostToGo, StageFactor};
+use crate::workspace::Workspace;
+use nalgebra::{SMatrix, SVector, convert};
+
+/// Parts of the way to the set point to which the regulator is sent where there is no plan.
+const PARTS: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.01, 0.0];
+/// Stages of the regulator, at least.
+const REGULATOR: usize = 20;
+/// A plan that costs so many times the last one is no longer the only candidate.
+const JUMP: f64 = 2.0;
+
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> Controller<P, T, NX, NU, NS>
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS>,
+{
+    /// The rest of the last plan from `x`; where there is none, or it has become dear, the best of
+    /// the regulator's own closed loops if that is cheaper. `false` if nothing is finite.
+    pub(crate) fn first_plan(
+        &mut self,
+        x: &SVector<T, NX>,
+        aim: &Aim<'_, T, NX, NU>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) -> bool {
+        let last = self.policy.cost;
+        let merit = self.merit(aim, Prices::none());
+        let mut best = None;
+        if self.initialised {
+            self.shift(aim);
+            best = self.roll_out_plan(x, &merit, &mut workspace.trial, &|i, x| {
+                let policy = &self.policy;
+                let planned = (&at(&self.rollout, i), &at(&policy.u, i));
+                input_at(x, planned, &at(&policy.gain, i), &self.settings.u)
+            });
+            self.take_if_some(best, &workspace.trial);
+        }
+        if best.is_none_or(|cost| cost > last * convert(JUMP)) {
+            best = self.regulate(x, aim, best, workspace);
+        }
+        best.is_some()
+    }
+
+    /// The regulator's closed loops towards the set point and towards points on the way to it. The
+    /// plan becomes the cheapest of them, if it is cheaper than `best`; returns what it costs then.
+    #[inline(never)]
+    fn regulate(
+        &mut self,
+        x: &SVector<T, NX>,
+        aim: &Aim<'_, T, NX, NU>,
+        mut best: Option<T>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) -> Option<T> {
+        let (gain, indifferent) = self.regulator(aim, &workspace.ocp);
+        let away = (x - aim.end()).component_mul(&indifferent);
+        let merit = self.merit(aim, Prices::none());
+        for part in PARTS {
+            let x_aim = aim.end() + away * (T::one() - convert::<f64, T>(part));
+            let cost = self.roll_out_plan(x, &merit, &mut workspace.trial, &|_, x| {
+                input_at(x, (&x_aim, &aim.u_ref), &gain, &self.settings.u)
+            });
+            if let Some(found) = cost
+                && best.is_none_or(|best| found < best)
+            {
+                best = cost;
+                self.take_if_some(cost, &workspace.trial);
+                self.policy.gain.fill(gain);
+                self.policy.damping = T::zero();
+            }
+            if away.amax() == T::zero() {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The gain of the regulator at the end of the reference (u = u_ref + K (x - x_ref)), that of the
+    /// first of many equal stages with the weights of `ocp`; and 1 for each state whose value is all the
+    /// same to the plant (the position, as a rule), 0 for the others.
+    fn regulator(
+        &self,
+        aim: &Aim<'_, T, NX, NU>,
+        ocp: &Ocp<T, NX, NU>,
+    ) -> (SMatrix<T, NU, NX>, SVector<T, NX>) {
+        let (a, b) = self.sample_matrices(aim.end(), &aim.u_ref, Along::Jacobian);
+        let indifferent = SVector::from_fn(|j, _| {
+            let column = (0..NX).all(|i| a[(i, j)] == one_if(i == j));
+            one_if(column)
+        });
+        let stage = Stage {
+            a,
+            b,
+            ..Stage::new()
+        };
+        let mut cost_to_go = CostToGo {
+            quadratic: ocp.terminal.p,
+            linear: SVector::zeros(),
+        };
+        let mut factor = StageFactor::zeros();
+        for _ in 0..self.settings.horizon.max(REGULATOR) {
+            if factor
+                .eliminate(&stage, &ocp.common, &mut cost_to_go)
+                .is_err()
+            {
+                return (SMatrix::zeros(), indifferent);
+            }
+        }
+        (factor.gain, indifferent)
+    }
+
+    /// The plan one sample on; its last stage is the regulator's.
+    fn shift(&mut self, aim: &Aim<'_, T, NX, NU>) {
+        let last = self.last_stage();
+        let gain = at(&self.policy.gain, last);
+        let planned = (aim.end(), &aim.u_ref);
+        let end = at(&self.rollout, last);
+        let u = input_at(&end, planned, &gain, &self.settings.u);
+        // What comes in from beyond the horizon is overwritten.
+        move_on(&mut self.policy.u, last, u);
+        move_on(&mut self.policy.gain, last, gain);
+    }
+}
+
+/// The entries one stage earlier, with `end` as that of stage `last`.
+fn move_on<V: Copy>(entries: &mut [V], last: usize, end: V) {
+    for i in 0..last {
+        if let Some([place, next]) = entries.get_mut(i..i + 2) {
+            *place = *next;
+        }
+    }
+    if let Some(place) = entries.get_mut(last) {
+        *place = end;
+    }
+}
+
+fn one_if<T: Scalar>(condition: bool) -> T {
+    if condition { T::one() } else { T::zero() }
+}
