@@ -20,7 +20,7 @@ cargo build --locked --release -p ballbot-cli -p ballbot-scenario --example firm
 
 # Flash: code, constants and initial data. The host's `size` counts sections by their flags,
 # whatever the processor.
-flash=$(size --format=berkeley "$images/examples/timer" | awk 'NR == 2 { print $1 + $2 }')
+flash() { size --format=berkeley "$images/examples/$1" | awk 'NR == 2 { print $1 + $2 }'; }
 compiler=$("$cross" "$target" --version)
 output=$(mktemp)
 trap 'rm -f "$output"' EXIT
@@ -31,5 +31,6 @@ for board in mps2-an386 mps2-an500; do
         exit 1
     fi
     "$CARGO_TARGET_DIR/release/examples/firmware_check" \
-        firmware/limits.toml "$compiler" "$flash" "$output"
+        firmware/limits.toml "$compiler" \
+        "$(flash bare_controllers)" "$(flash timer)" "$output"
 done

@@ -1,38 +1,38 @@
-//! A robot's main loop: both planes every 50 ms, on a timer. What the robot has to offer is the
-//! trait `Board`; the one here is a stand-in.
+//! A robot's main loop on a timer: the sensors every 12.5 ms, a decision every 50 ms. What the robot
+//! has to offer is the trait `Board`; the one here is a stand-in.
 //!
-//! `.ci/firmware.sh` takes the flash and the RAM of the controllers from this image.
+//! `.ci/firmware.sh` takes the flash of a whole robot's regulator from this image.
 #![no_std]
 #![no_main]
 
-use ballbot::Wheels;
+use ballbot::RobotState;
 use core::hint::black_box;
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::{Peripherals, peripheral::syst::SystClkSource, singleton};
 use cortex_m_rt::{entry, exception};
-use firmware::{
-    Controller, ControllerMemory, N, Window, Workspace, WorkspaceMemory,
-    recorded::LISSAJOUS as ROBOT,
-};
-use nalgebra::{Vector3, Vector4};
+use firmware::{RobotMemory, RobotRegulator, RobotSettings, recorded::WHOLE_ROBOT};
+use lpvmpc::{Measurement, Regulator};
+use nalgebra::Vector3;
 
+/// The robot.
+const ROBOT: RobotSettings = WHOLE_ROBOT.robot;
 /// Core clock, Hz.
 const CLOCK: u32 = 100_000_000;
-/// Sampling time in core clocks: 50 ms, as in the controller's settings.
-const SAMPLE: u32 = CLOCK / 20;
-/// After more samples than this without a plan, one after the other, the robot stops.
+/// Period of the sensors in core clocks: 12.5 ms, as in the robot's settings.
+const PERIOD: u32 = CLOCK / 80;
+/// After more decisions than this without a plan, one after the other, the robot stops.
 const MOST_WITHOUT_PLAN: u32 = 2;
 
-/// Samples that the timer has begun.
+/// Periods that the timer has begun.
 static BEGUN: AtomicU32 = AtomicU32::new(0);
 
 /// What the program needs of the robot.
 trait Board {
-    /// State (phi, theta, phi_dot, theta_dot) of the x and the y plane, rad and rad/s.
-    fn states(&mut self) -> [Vector4<f32>; 2];
-    /// References of the two planes over the horizon that begins now.
-    fn references(&mut self) -> [Window; 2];
+    /// Readings of both planes, along the floor's axes, and of the heading.
+    fn measurement(&mut self) -> Measurement<f32, 10>;
+    /// Where the robot has to be at a time on the clock of the measurements, s.
+    fn reference(&self, t: f64) -> RobotState<f32>;
     /// Sets the torques of the three motors, N m, and feeds the watchdog.
     fn drive(&mut self, motors: &Vector3<f32>);
     /// Takes the power from the motors until a person starts again.
@@ -44,80 +44,70 @@ fn SysTick() {
     BEGUN.fetch_add(1, Ordering::Release);
 }
 
-fn run(
-    board: &mut impl Board,
-    planes: &mut [Controller; 2],
-    workspace: &mut Workspace,
-    wheels: &Wheels<f32>,
-) -> ! {
-    let mut sample = BEGUN.load(Ordering::Acquire);
-    let mut without_plan = 0;
+fn run(board: &mut impl Board, regulator: &mut RobotRegulator, per_decision: u32) -> ! {
+    let mut period = BEGUN.load(Ordering::Acquire);
+    let (mut to_decision, mut without_plan) = (0, 0);
     loop {
-        while BEGUN.load(Ordering::Acquire) == sample {
+        while BEGUN.load(Ordering::Acquire) == period {
             cortex_m::asm::wfi();
         }
-        sample = sample.wrapping_add(1);
-        let mut torques = Vector3::zeros();
-        let mut solved = true;
-        let inputs = board.states().into_iter().zip(board.references());
-        for ((torque, (x, window)), plane) in torques.iter_mut().zip(inputs).zip(&mut *planes) {
-            let plan = plane.step(&x, &window.reference(), workspace);
-            *torque = plan.first_input()[0];
-            solved &= plan.status.is_solved();
-        }
-        without_plan = if solved { 0 } else { without_plan + 1 };
-        let late = BEGUN.load(Ordering::Acquire) != sample;
+        period = period.wrapping_add(1);
+        regulator.observe(&board.measurement());
+        let motors = if to_decision == 0 {
+            to_decision = per_decision;
+            let command = regulator.decide(&|t| board.reference(t));
+            without_plan = match command.status.is_solved() {
+                true => 0,
+                false => without_plan + 1,
+            };
+            Some(command.u)
+        } else {
+            regulator.between()
+        };
+        to_decision -= 1;
+        let late = BEGUN.load(Ordering::Acquire) != period;
         if late || without_plan > MOST_WITHOUT_PLAN {
             board.stop();
         }
-        board.drive(&wheels.motors(&torques));
+        if let Some(motors) = motors {
+            board.drive(&motors);
+        }
     }
 }
 
 #[entry]
 fn main() -> ! {
     let mut board = StandIn;
-    let (Some(mut peripherals), Some(memory), Some([x, y])) = (
+    let (Some(mut peripherals), Some(memory)) = (
         Peripherals::take(),
-        singleton!(WORKSPACE: WorkspaceMemory = WorkspaceMemory::default()),
-        singleton!(PLANES: [ControllerMemory; 2] = [ControllerMemory::default(); 2]),
+        singleton!(ROBOT_MEMORY: RobotMemory = RobotMemory::default()),
     ) else {
         board.stop()
     };
-    let (Some(x), Some(y), Ok(wheels)) = (
-        controller(x),
-        controller(y),
-        Wheels::of_paper(ROBOT.zenith_angle),
-    ) else {
+    let Ok(mut regulator) = ROBOT.regulator(memory) else {
         board.stop() // the settings make no sense
     };
-    let workspace = &mut Workspace::new(memory.lend());
     peripherals.SYST.set_clock_source(SystClkSource::Core);
-    peripherals.SYST.set_reload(SAMPLE - 1);
+    peripherals.SYST.set_reload(PERIOD - 1);
     peripherals.SYST.clear_current();
     peripherals.SYST.enable_interrupt();
     peripherals.SYST.enable_counter();
-    run(&mut board, &mut [x, y], workspace, &wheels)
-}
-
-fn controller(memory: &'static mut ControllerMemory) -> Option<Controller> {
-    Controller::new(ROBOT.ballbot, ROBOT.settings(), memory.lend()).ok()
+    run(&mut board, &mut regulator, ROBOT.per_sample() as u32)
 }
 
 /// No robot at all; opaque to the compiler, so that nothing is left out.
 struct StandIn;
 
 impl Board for StandIn {
-    fn states(&mut self) -> [Vector4<f32>; 2] {
-        black_box([Vector4::zeros(); 2])
+    fn measurement(&mut self) -> Measurement<f32, 10> {
+        black_box(Measurement {
+            t: 0.0,
+            readings: [None; 10],
+        })
     }
 
-    fn references(&mut self) -> [Window; 2] {
-        let rest = Window {
-            stages: [Vector4::zeros(); N],
-            terminal: Vector4::zeros(),
-        };
-        black_box([rest; 2])
+    fn reference(&self, _t: f64) -> RobotState<f32> {
+        black_box(RobotState::zeros())
     }
 
     fn drive(&mut self, motors: &Vector3<f32>) {

@@ -1,13 +1,17 @@
-//! The ballbot's controller in `f32` for a microcontroller, with two recorded scenarios to run
-//! it on.
+//! The ballbot's regulators in `f32` for a microcontroller, with recorded scenarios to run them
+//! on: bare controllers, and a whole robot's.
 #![no_std]
 
 pub mod recorded;
 mod recording;
+mod robot;
+mod robot_recording;
 
 use lpvmpc::Reference;
 use nalgebra::Vector4;
-pub use recording::{Plane, Recording};
+pub use recording::{Descent, Plane, Recording};
+pub use robot::{PlaneMemory, RobotMemory, RobotRegulator};
+pub use robot_recording::{RobotRecording, RobotSettings};
 
 /// Horizon, samples.
 pub const N: usize = 20;

@@ -4,6 +4,9 @@
 mod lissajous;
 #[rustfmt::skip]
 mod tight_bounds;
+#[rustfmt::skip]
+mod whole_robot;
 
 pub use lissajous::RECORDING as LISSAJOUS;
 pub use tight_bounds::RECORDING as TIGHT_BOUNDS;
+pub use whole_robot::RECORDING as WHOLE_ROBOT;

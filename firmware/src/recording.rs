@@ -39,6 +39,17 @@ pub struct Recording {
     pub planes: &'static [Plane],
 }
 
+/// Iterations that descend on the cost of the nonlinear rollout.
+#[derive(Clone, Copy, Debug)]
+pub struct Descent {
+    /// See [`Iterations::Descent`].
+    pub tolerance: f32,
+    /// Quadratic programs per sample at most.
+    pub most: usize,
+    /// Prices of the state bounds per unit of excess; `None` for one that is hard, or none.
+    pub prices: [Option<f32>; 4],
+}
+
 /// What happened in one plane.
 #[derive(Clone, Copy, Debug)]
 pub struct Plane {
@@ -76,20 +87,27 @@ impl Recording {
         }
     }
 
-    /// The same problem with what is default in scenarios: a descent with `programs` quadratic
-    /// programs at most, four Runge-Kutta steps per sample, and soft state bounds.
-    pub fn descent(&self, programs: usize) -> ControllerSettings<f32, 4, 1, 3> {
-        let price = Some(Penalty {
-            linear: 1e5,
-            quadratic: 0.0,
-        });
+    /// The same problem with what is default in scenarios: a descent, a plan that is consistent
+    /// with its stages over `substeps` Runge-Kutta steps per sample, and soft state bounds.
+    pub fn with_descent(
+        &self,
+        descent: &Descent,
+        substeps: usize,
+    ) -> ControllerSettings<f32, 4, 1, 3> {
+        let Descent {
+            tolerance,
+            most,
+            prices,
+        } = *descent;
         ControllerSettings {
-            predictor: Predictor::StageConsistent(Rk4 { substeps: 4 }),
-            soft_x: [None, price, price, price],
-            iterations: Iterations::Descent {
-                tolerance: 1e-3,
-                most: programs,
-            },
+            predictor: Predictor::StageConsistent(Rk4 { substeps }),
+            soft_x: prices.map(|price| {
+                price.map(|linear| Penalty {
+                    linear,
+                    quadratic: 0.0,
+                })
+            }),
+            iterations: Iterations::Descent { tolerance, most },
             ..self.settings()
         }
     }

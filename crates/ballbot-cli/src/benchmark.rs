@@ -106,7 +106,7 @@ pub struct GuardedTimes {
 /// A controller refuses its settings or the plant cannot be integrated.
 pub fn time_guarded() -> Result<GuardedTimes, CommandError> {
     let prepared = Scenario::load("far-setpoints")?.prepare(Path::new("."))?;
-    let Some(mut settings) = prepared.guarded else {
+    let Some(mut settings) = prepared.guarded().copied() else {
         return Err(CommandError::Usage("no terminal set".to_owned()));
     };
     settings.iterations = GuardedIterations {

@@ -136,8 +136,8 @@ pub fn motors(
     let (first, second, third) = (of(0), of(1), of(2));
     let time = columns.time.get(..=torques.len()).unwrap_or(&columns.time);
     let limit = prepared.motors.map(|motors| Band {
-        lower: -motors.limit,
-        upper: motors.limit,
+        lower: -motors.limits.motor,
+        upper: motors.limits.motor,
     });
     motor_torques(title, time, [&first, &second, &third], limit)
 }

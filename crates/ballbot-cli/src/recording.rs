@@ -1,7 +1,8 @@
 //! Recorded runs as files and arrays.
 
 use ballbot_scenario::{MotorSample, Plane, Prepared, words};
-use lpvmpc_sim::{Ending, Guard, LogRow, Trajectory};
+use lpvmpc::Guard;
+use lpvmpc_sim::{Ending, LogRow, Trajectory};
 
 /// The columns of `trajectory.csv`.
 pub const COLUMNS: [&str; 16] = [
@@ -85,7 +86,7 @@ pub fn log_csv(log: &[LogRow<4, 1>]) -> String {
         "t_s,phi_rad,theta_rad,theta_dot_rad_s,torque_commanded_nm,torque_applied_nm\n".to_owned();
     let cell = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:?}"));
     for row in log {
-        let [phi, theta, _, theta_dot] = row.measured;
+        let [phi, theta, _, theta_dot] = row.readings.map(|reading| Some(reading?.value));
         if [phi, theta, theta_dot].iter().all(Option::is_none) {
             continue;
         }
@@ -135,7 +136,7 @@ pub struct Columns {
     pub gap: Vec<[f64; 4]>,
     /// What each torque was backed by, and the artificial set point in rad, where there is a
     /// guarantee.
-    pub guard: Vec<Guard>,
+    pub guard: Vec<Guard<f64>>,
 }
 
 impl From<&Trajectory<4, 1>> for Columns {
@@ -230,7 +231,7 @@ impl Metrics {
             rms_error_rad: (squares / errors.len() as f64).sqrt(),
             largest_error_rad: errors.iter().fold(0.0, |most, error| most.max(error.abs())),
             violations: outside.count(),
-            not_guaranteed: prepared.guarded.map(|_| {
+            not_guaranteed: prepared.guarded().map(|_| {
                 let guards = samples.iter().filter_map(|sample| sample.guard);
                 samples.len()
                     - guards

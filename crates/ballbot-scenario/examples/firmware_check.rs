@@ -1,8 +1,9 @@
-//! Checks what the firmware printed: its torques against the same controllers in `f64` on the
-//! same recorded states, and its cost against the last measurement and the goals.
+//! Checks what the firmware printed: the torques of bare controllers against the same ones in `f64`
+//! on the same recorded states, those of a whole robot's motors against the simulation that its
+//! readings are from, and its cost against the last measurement and the goals.
 //!
 //! ```sh
-//! firmware_check firmware/limits.toml COMPILER FLASH_BYTES OUTPUT
+//! firmware_check firmware/limits.toml COMPILER FLASH_BYTES ROBOT_FLASH_BYTES OUTPUT
 //! ```
 //!
 //! COMPILER is the line that `rustc --version` prints; OUTPUT is what the image printed.
@@ -27,6 +28,10 @@ const TORQUE_NM: f64 = 2e-5;
 /// Largest distance of a recorded state from the scenario's closed loop as it is today, rad and
 /// rad/s; recordings are rounded to f32.
 const STATE: f64 = 1e-5;
+/// Largest difference of a motor's torque from the simulation's, N m: readings are rounded to f32,
+/// too, the filter adds up what they leave, and a program that is skipped or added changes the plan
+/// by the part of the cost that the descent stops at.
+const ROBOT_TORQUE_NM: f64 = 1e-3;
 /// A cost may grow by this much before it must be looked at.
 const GROWTH: f64 = 0.05;
 
@@ -34,21 +39,26 @@ type Failure = Box<dyn Error>;
 
 fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = env::args().skip(1).collect();
-    let [limits, compiler, flash, output] = arguments.as_slice() else {
-        return Err("usage: firmware_check LIMITS COMPILER FLASH_BYTES OUTPUT".into());
+    let [limits, compiler, flash, robot_flash, output] = arguments.as_slice() else {
+        return Err("usage: firmware_check LIMITS COMPILER FLASH ROBOT_FLASH OUTPUT".into());
     };
     let limits: Limits = toml::from_str(&fs::read_to_string(limits)?)?;
     let output = Output::parse(&fs::read_to_string(output)?)?;
     for name in ["lissajous", "tight-bounds"] {
         check_scenario(name, &output)?;
     }
+    check_robot(&output.robot)?;
     let programs = output.descents.iter().map(|step| step.programs);
     println!(
         "descent: {} steps, {} programs at most",
         output.descents.len(),
         programs.max().ok_or("no descent")?
     );
-    check_costs(&limits, compiler, &output.costs(flash.parse()?))
+    check_costs(
+        &limits,
+        compiler,
+        &output.costs(flash.parse()?, robot_flash.parse()?),
+    )
 }
 
 /// One line `step SCENARIO PLANE SAMPLE PHI THETA PHI_DOT THETA_DOT TORQUE ACTIVE INSTRUCTIONS
@@ -77,19 +87,29 @@ struct Descent {
     instructions: u64,
 }
 
+/// One line `robot MEASUREMENT DECIDES TAU_1 TAU_2 TAU_3 INSTRUCTIONS SOLVED`.
+struct RobotStep {
+    decides: bool,
+    torques: Vector3<f64>,
+    instructions: u64,
+}
+
 struct Output {
     steps: Vec<Step>,
+    robot: Vec<RobotStep>,
     descents: Vec<Descent>,
     motors: Vec<Motors>,
     controller: u64,
     workspace: u64,
     stack: u64,
+    robot_bytes: u64,
+    robot_stack: u64,
 }
 
 impl Output {
     fn parse(text: &str) -> Result<Self, Failure> {
         let (mut steps, mut motors, mut sizes) = (Vec::new(), Vec::new(), Vec::new());
-        let mut descents = Vec::new();
+        let (mut descents, mut robot) = (Vec::new(), Vec::new());
         for line in text.lines() {
             let words: Vec<&str> = line.split_whitespace().collect();
             match words.as_slice() {
@@ -125,6 +145,11 @@ impl Output {
                     programs: programs.parse()?,
                     instructions: instructions.parse()?,
                 }),
+                ["robot", _, decides, x, y, z, instructions, "1"] => robot.push(RobotStep {
+                    decides: *decides == "1",
+                    torques: Vector3::new(x.parse()?, y.parse()?, z.parse()?),
+                    instructions: instructions.parse()?,
+                }),
                 ["bytes", name, bytes] => sizes.push(((*name).to_owned(), bytes.parse()?)),
                 _ => return Err(format!("the firmware printed: {line}").into()),
             }
@@ -138,14 +163,17 @@ impl Output {
             controller: size("controller")?,
             workspace: size("workspace")?,
             stack: size("stack")?,
+            robot_bytes: size("robot")?,
+            robot_stack: size("robot_stack")?,
             steps,
+            robot,
             descents,
             motors,
         })
     }
 
     /// What a step and the controllers cost, by the names of `firmware/limits.toml`.
-    fn costs(&self, flash: u64) -> [(&'static str, u64); 8] {
+    fn costs(&self, flash: u64, robot_flash: u64) -> [(&'static str, u64); 14] {
         let of = |active: fn(usize) -> bool| {
             let steps = self.steps.iter().filter(move |step| active(step.active));
             let mut sorted: Vec<u64> = steps.map(|step| step.instructions).collect();
@@ -156,7 +184,29 @@ impl Output {
         let at = |sorted: &[u64], place: usize| sorted.get(place).copied().unwrap_or(0);
         let mut descents: Vec<u64> = self.descents.iter().map(|step| step.instructions).collect();
         descents.sort_unstable();
+        let robot = |decides: bool| {
+            let steps = self
+                .robot
+                .iter()
+                .filter(move |step| step.decides == decides);
+            let mut sorted: Vec<u64> = steps.map(|step| step.instructions).collect();
+            sorted.sort_unstable();
+            sorted
+        };
+        let (decides, observes) = (robot(true), robot(false));
         [
+            ("robot_instructions_median", at(&decides, decides.len() / 2)),
+            (
+                "robot_instructions_worst",
+                at(&decides, decides.len().saturating_sub(1)),
+            ),
+            (
+                "robot_instructions_between",
+                at(&observes, observes.len().saturating_sub(1)),
+            ),
+            ("robot_flash_bytes", robot_flash),
+            ("robot_ram_bytes", self.robot_bytes),
+            ("robot_stack_bytes", self.robot_stack),
             (
                 "instructions_descent_median",
                 at(&descents, descents.len() / 2),
@@ -218,6 +268,42 @@ fn check_scenario(name: &str, output: &Output) -> Result<(), Failure> {
         "{name}: {} steps, f32 - f64: torque {worst:.1e} N m, motors {worst_motor:.1e} N m \
          (tolerance {TORQUE_NM:e})",
         steps.count()
+    );
+    Ok(())
+}
+
+/// The whole robot's motors against those of the simulation that its readings are from.
+fn check_robot(steps: &[RobotStep]) -> Result<(), Failure> {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/whole-robot.toml");
+    let scenario = Scenario::load(file.to_str().ok_or("the path of the project is no text")?)?;
+    let mut prepared = scenario.prepare(Path::new("."))?;
+    let plane = prepared.planes.first().ok_or("no plane")?;
+    let per_sample = (prepared.settings.t_s / plane.world.settings.period).round() as usize;
+    prepared.samples = steps.len() / per_sample;
+    let record = prepared.record(&Surroundings {
+        clock: &|| Duration::ZERO,
+        progress: &|_| (),
+    })?;
+    if steps.is_empty() || steps.len() != record.robot_log.len() {
+        return Err(format!("whole-robot: {} of its measurements", steps.len()).into());
+    }
+    let mut worst = 0.0_f64;
+    for (k, (step, row)) in steps.iter().zip(&record.robot_log).enumerate() {
+        let difference = (step.torques - row.commanded).amax();
+        if !(difference <= ROBOT_TORQUE_NM) {
+            return Err(format!(
+                "whole-robot, measurement {k}: a motor's torque differs by {difference:e} N m from \
+                 the simulation; if the scenario has changed, record again with the example \
+                 firmware_record"
+            )
+            .into());
+        }
+        worst = worst.max(difference);
+    }
+    println!(
+        "whole-robot: {} measurements, firmware - simulation: motors {worst:.1e} N m (tolerance \
+         {ROBOT_TORQUE_NM:e})",
+        steps.len()
     );
     Ok(())
 }

@@ -6,11 +6,16 @@
 //!     > firmware/src/recorded/lissajous.rs
 //! cargo run --release -p ballbot-scenario --example firmware_record -- tight-bounds 80 \
 //!     > firmware/src/recorded/tight_bounds.rs
+//! cargo run --release -p ballbot-scenario --example firmware_record -- \
+//!     docs/examples/whole-robot.toml 40 > firmware/src/recorded/whole_robot.rs
 //! ```
+//!
+//! Of a robot whose planes share their motors it writes what the sensors deliver, and what stands
+//! around the controllers.
 
 use ballbot::{Ballbot, Geometry};
-use ballbot_scenario::{Parameters, Plane, Prepared, Scenario, Surroundings};
-use lpvmpc::TerminalIngredient;
+use ballbot_scenario::{Parameters, Plane, Prepared, Scenario, Surroundings, ThreeMotors};
+use lpvmpc::{Iterations, Reading, TerminalIngredient};
 use lpvmpc_sim::Trajectory;
 use std::error::Error;
 use std::fmt::Write;
@@ -24,6 +29,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scenario = Scenario::load(name)?;
     let mut prepared = scenario.prepare(Path::new("."))?;
     prepared.samples = samples.parse()?;
+    let Parameters::Table(robot) = &scenario.parameters else {
+        return Err("the firmware takes a scenario with its own table of parameters".into());
+    };
+    let zenith_angle = robot.zenith_angle_deg.to_radians();
+    if let Some(motors) = prepared.motors {
+        print!("{}", whole_robot(name, &prepared, zenith_angle, &motors)?);
+        return Ok(());
+    }
     let trajectories = prepared.run(&Surroundings {
         clock: &|| Duration::ZERO,
         progress: &|_| (),
@@ -37,10 +50,6 @@ fn main() -> Result<(), Box<dyn Error>> {
          pub const RECORDING: Recording = Recording {{\n    name: {name:?},\n"
     );
     write_robot(&mut text, &prepared.ballbot)?;
-    let Parameters::Table(robot) = &scenario.parameters else {
-        return Err("the firmware takes a scenario with its own table of parameters".into());
-    };
-    let zenith_angle = robot.zenith_angle_deg.to_radians();
     writeln!(text, "    zenith_angle: {},", literal(zenith_angle))?;
     write_settings(&mut text, &prepared)?;
     writeln!(text, "    planes: &[")?;
@@ -136,6 +145,121 @@ fn write_plane(
     }
     writeln!(text, "            ],\n        }},")?;
     Ok(())
+}
+
+/// A robot whose planes share their motors, and what its sensors deliver.
+fn whole_robot(
+    name: &str,
+    prepared: &Prepared,
+    zenith_angle: f64,
+    ThreeMotors { limits, turning }: &ThreeMotors,
+) -> Result<String, Box<dyn Error>> {
+    let record = prepared.record(&Surroundings {
+        clock: &|| Duration::ZERO,
+        progress: &|_| (),
+    })?;
+    let samples = prepared.samples;
+    let estimator = prepared.feedback.estimator.ok_or("it has no estimator")?;
+    let plane = prepared.planes.first().ok_or("it has no plane")?;
+    let period = plane.world.settings.period;
+    if record.robot_log.len() < samples {
+        return Err("the run ended early".into());
+    }
+    let mut text = format!(
+        "//! The robot of `{name}` and what its sensors deliver in the first {samples} samples.\n\
+         //! Written by `firmware_record {name} {samples}`, an example of `ballbot-scenario`.\n\n\
+         use crate::recording::{{Descent, Recording}};\n\
+         use crate::robot_recording::{{RobotRecording, RobotSettings}};\n\
+         use ballbot::{{Ballbot, DriveFriction, Geometry, MotorLimits, YawLaw}};\n\
+         use lpvmpc::Gate;\n\n\
+         /// The recording.\n\
+         pub const RECORDING: RobotRecording = RobotRecording {{\n\
+         robot: RobotSettings {{\n\
+         plane: Recording {{\n    name: \"whole-robot\",\n"
+    );
+    write_robot(&mut text, &prepared.ballbot)?;
+    writeln!(text, "    zenith_angle: {},", literal(zenith_angle))?;
+    write_settings(&mut text, prepared)?;
+    writeln!(text, "    planes: &[],\n}},")?;
+    let Iterations::Descent { tolerance, most } = prepared.settings.iterations else {
+        return Err("the firmware's whole robot takes a descent".into());
+    };
+    let prices = prepared.settings.soft_x.map(|price| match price {
+        Some(price) => format!("Some({})", literal(price.linear)),
+        None => "None".to_owned(),
+    });
+    writeln!(
+        text,
+        "descent: Descent {{ tolerance: {}, most: {most}, prices: [{}] }},",
+        literal(tolerance),
+        prices.join(", ")
+    )?;
+    let feedback = &prepared.feedback;
+    for (name, number) in [
+        ("delay", feedback.delay),
+        ("period", period),
+        ("longest_step", estimator.longest_step),
+    ] {
+        writeln!(text, "{name}: {},", literal(number))?;
+    }
+    for (name, variances) in [
+        ("state_noise", &estimator.state_noise),
+        ("measurement_noise", &estimator.measurement_noise),
+        ("initial_state", &estimator.initial_state),
+    ] {
+        writeln!(text, "{name}: {},", list(variances))?;
+    }
+    for (name, variances) in [
+        ("disturbance_noise", &estimator.disturbance_noise),
+        ("initial_disturbance", &estimator.initial_disturbance),
+    ] {
+        writeln!(text, "{name}: {},", list(variances))?;
+    }
+    let gate = &estimator.gate;
+    writeln!(
+        text,
+        "gate: Gate {{ deviations: {}, patience: {}, oldest: {}, longest_gap: {} }},",
+        literal(gate.deviations),
+        gate.patience,
+        literal(gate.oldest),
+        literal(gate.longest_gap)
+    )?;
+    writeln!(
+        text,
+        "limits: MotorLimits {{ motor: {}, yaw: {} }},",
+        literal(limits.motor),
+        literal(limits.yaw)
+    )?;
+    writeln!(
+        text,
+        "yaw: YawLaw {{ stiffness: {}, damping: {} }},",
+        literal(turning.law.stiffness),
+        literal(turning.law.damping)
+    )?;
+    writeln!(text, "heading: {},", literal(turning.initial))?;
+    writeln!(
+        text,
+        "target: ({}, {}),",
+        literal(turning.target.0),
+        literal(turning.target.1)
+    )?;
+    writeln!(text, "}},\nphi_ref: [")?;
+    let end = (samples + prepared.settings.horizon) as f64 * prepared.settings.t_s + feedback.delay;
+    for plane in &prepared.planes {
+        let count = (end / period).round() as usize + 1;
+        let references = (0..count).map(|k| plane.reference.at(k as f64 * period));
+        writeln!(text, "    &{},", list(&references.collect::<Vec<_>>()))?;
+    }
+    writeln!(text, "],\nrows: &[")?;
+    for row in &record.robot_log {
+        let readings = row.readings.map(|reading| match reading {
+            Some(Reading { value, age }) => format!("Some([{}, {}])", literal(value), literal(age)),
+            None => "None".to_owned(),
+        });
+        writeln!(text, "    [{}],", readings.join(", "))?;
+    }
+    writeln!(text, "],\n}};")?;
+    Ok(text)
 }
 
 fn list<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> String {

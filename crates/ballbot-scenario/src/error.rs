@@ -2,7 +2,7 @@
 
 use crate::builtin;
 use crate::number::Given;
-use ballbot_control::RegulatorError;
+use ballbot::RegulatorError;
 use std::fmt::Display;
 use std::io;
 use std::path::PathBuf;
@@ -100,6 +100,7 @@ impl From<RegulatorError> for ScenarioError {
         match error {
             RegulatorError::Estimator(error) => error.into(),
             RegulatorError::Controller(error) => error.into(),
+            RegulatorError::Guarded(error) => error.into(),
         }
     }
 }

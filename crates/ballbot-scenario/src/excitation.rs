@@ -3,13 +3,10 @@
 use crate::error::ScenarioError;
 use crate::reference::SAME_TIME;
 use crate::time_series::TimeSeries;
-use ballbot_control::{Handover, PlaneRegulator};
-use lpvmpc::{BoundId, Observation};
-use lpvmpc_sim::{Decision, Measurement, Regulator};
+use lpvmpc::{BoundId, Command, Measurement, Observation, Regulator};
 use nalgebra::{Vector1, Vector4};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
 
 /// Torque over time; each value holds until the next, and the last as long as the interval
 /// before it.
@@ -46,67 +43,81 @@ impl Excitation {
     }
 }
 
-/// A regulator whose command has an excitation added, which it does not know of.
-pub(crate) struct Excited {
-    pub(crate) regulator: Box<dyn PlaneRegulator>,
-    pub(crate) excitation: Excitation,
-    /// The regulator's own command.
-    pub(crate) command: Vector1<f64>,
-    /// Time of the last measurement, s.
-    pub(crate) time: f64,
+/// A regulator whose command may have an excitation added, which it does not know of.
+pub struct Excited<R> {
+    pub(crate) regulator: R,
+    pub(crate) excitation: Option<Excitation>,
+    /// Stamp of the last measurement, s.
+    time: f64,
+    /// The regulator's own command, N m.
+    command: Vector1<f64>,
 }
 
-impl Excited {
+impl<R> Excited<R> {
+    /// The regulator with this excitation, or without any.
+    pub(crate) fn new(regulator: R, excitation: Option<Excitation>) -> Self {
+        Self {
+            regulator,
+            excitation,
+            time: 0.0,
+            command: Vector1::zeros(),
+        }
+    }
+
+    /// The regulator.
+    pub fn regulator(&self) -> &R {
+        &self.regulator
+    }
+
     fn excited(&mut self, command: Vector1<f64>) -> Vector1<f64> {
         self.command = command;
-        command.add_scalar(self.excitation.at(self.time))
+        match &self.excitation {
+            Some(excitation) => command.add_scalar(excitation.at(self.time)),
+            None => command,
+        }
     }
 }
 
-impl PlaneRegulator for Excited {
-    fn hand_over(&self) -> Handover {
-        let torque = self.command[0];
-        self.regulator.hand_over().with_torque(torque)
-    }
-
-    fn take_over(&mut self, handover: &Handover) {
-        self.command[0] = handover.torque();
-        self.regulator.take_over(handover);
-    }
-}
-
-impl Regulator<4, 1, 4> for Excited {
+impl<R: Regulator<f64, 4, 1, 4>> Regulator<f64, 4, 1, 4> for Excited<R> {
     fn t_s(&self) -> f64 {
         self.regulator.t_s()
     }
 
-    fn observe(&mut self, measurement: &Measurement<4>) -> Observation<4> {
+    fn observe(&mut self, measurement: &Measurement<f64, 4>) -> Observation<4> {
         self.time = measurement.t;
         self.regulator.observe(measurement)
     }
 
-    fn decide(
-        &mut self,
-        reference: &dyn Fn(f64) -> Vector4<f64>,
-        clock: &dyn Fn() -> Duration,
-    ) -> Decision<4, 1> {
-        let decision = self.regulator.decide(reference, clock);
-        Decision {
-            u: self.excited(decision.u),
-            ..decision
+    fn decide(&mut self, reference: &dyn Fn(f64) -> Vector4<f64>) -> Command<f64, 4, 1> {
+        let command = self.regulator.decide(reference);
+        Command {
+            u: self.excited(command.u),
+            ..command
         }
     }
 
     fn between(&mut self) -> Option<Vector1<f64>> {
-        let command = self.regulator.between().unwrap_or(self.command);
-        Some(self.excited(command))
+        let next = self.regulator.between();
+        if self.excitation.is_none() {
+            return next;
+        }
+        Some(self.excited(next.unwrap_or(self.command)))
     }
 
-    fn prediction(&self) -> Vec<Vector4<f64>> {
-        self.regulator.prediction()
+    fn take_over(&mut self, previous: &Self) {
+        self.regulator.take_over(&previous.regulator);
+        (self.time, self.command) = (previous.time, previous.command);
     }
 
-    fn active_bounds(&self) -> Vec<BoundId> {
-        self.regulator.active_bounds()
+    fn cost(&self) -> f64 {
+        self.regulator.cost()
+    }
+
+    fn predicted(&self, i: usize) -> Option<Vector4<f64>> {
+        self.regulator.predicted(i)
+    }
+
+    fn active_bound(&self, i: usize) -> Option<BoundId> {
+        self.regulator.active_bound(i)
     }
 }

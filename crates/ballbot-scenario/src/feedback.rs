@@ -8,15 +8,14 @@ use crate::heading::Turning;
 use crate::number::{not_negative, positive, text};
 use crate::problem::{MOST_SUBSTEPS, dynamic};
 use crate::schema::{ControllerTable, TerminalTable};
-use crate::three_motors::Motors;
-use ballbot::{Ballbot, Wheels};
-use ballbot_control::Feedback;
+use crate::three_motors::ThreeMotors;
+use ballbot::{Ballbot, EstimatorSettings, MotorLimits, PlaneFeedback, RampedSettings, Wheels};
 use lpvmpc::{
-    Bounds, ControllerSettings, EstimatorSettings, Gate, InputReference, LpvModel, MoveLimits,
-    RampedInput, TerminalIngredient, Weights,
+    Bounds, ControllerSettings, Gate, InputReference, LpvModel, MoveLimits, RampedInput,
+    TerminalIngredient, Weights,
 };
 use nalgebra::{
-    Complex, Matrix1, Matrix1x2, Matrix3x4, Matrix4x2, Matrix5, SMatrix, Vector1, Vector2, Vector3,
+    Complex, DMatrix, Matrix1, Matrix1x2, Matrix4, Matrix4x2, Matrix5, Vector1, Vector2, Vector3,
     Vector4, Vector5,
 };
 use std::f64::consts::FRAC_PI_2;
@@ -26,7 +25,7 @@ const ESTIMATOR_STEP: f64 = 0.5;
 
 impl ControllerTable {
     /// What stands around the controller.
-    pub(crate) fn feedback(&self, ballbot: &Ballbot<f64>) -> Result<Feedback, ScenarioError> {
+    pub(crate) fn feedback(&self, ballbot: &Ballbot<f64>) -> Result<PlaneFeedback, ScenarioError> {
         let estimator = self.estimator.as_ref();
         let delay = not_negative("controller.delay_s", self.delay_s)?;
         let longest_step = longest_step(ballbot)?;
@@ -42,7 +41,7 @@ impl ControllerTable {
                 ),
             ));
         }
-        Ok(Feedback {
+        Ok(PlaneFeedback {
             estimator: estimator
                 .map(|estimator| estimator.settings(ballbot))
                 .transpose()?,
@@ -58,7 +57,7 @@ impl ControllerTable {
         &self,
         ballbot: &Ballbot<f64>,
         settings: &ballbot::ControllerSettings<f64>,
-    ) -> Result<Option<ControllerSettings<f64, 5, 1, 3>>, ScenarioError> {
+    ) -> Result<Option<RampedSettings<f64>>, ScenarioError> {
         let ramp = self.torque_rate.as_ref();
         ramp.map(|ramp| ramp.settings(&self.terminal, ballbot, settings))
             .transpose()
@@ -80,10 +79,7 @@ fn longest_step(ballbot: &Ballbot<f64>) -> Result<f64, ScenarioError> {
 }
 
 impl EstimatorTable {
-    fn settings(
-        &self,
-        ballbot: &Ballbot<f64>,
-    ) -> Result<EstimatorSettings<f64, 4, 1, 3, 2>, ScenarioError> {
+    fn settings(&self, ballbot: &Ballbot<f64>) -> Result<EstimatorSettings<f64>, ScenarioError> {
         let variance = |key: &str, deviation: f64| {
             positive(&format!("controller.estimator.{key}"), deviation).map(|d| d * d)
         };
@@ -92,12 +88,7 @@ impl EstimatorTable {
         };
         let mut settings = EstimatorSettings {
             longest_step: longest_step(ballbot)?,
-            #[rustfmt::skip]
-            c: Matrix3x4::new(
-                1.0, 0.0, 0.0, 0.0,
-                0.0, 1.0, 0.0, 0.0,
-                0.0, 0.0, 0.0, 1.0,
-            ),
+            c: Matrix4::identity(),
             state_offset: Matrix4x2::zeros(),
             input_offset: Matrix1x2::zeros(),
             state_noise: Vector4::new(
@@ -107,9 +98,11 @@ impl EstimatorTable {
                 drift("theta_dot_drift_rad_s", self.theta_dot_drift_rad_s)?,
             ),
             disturbance_noise: Vector2::zeros(),
-            measurement_noise: Vector3::new(
+            measurement_noise: Vector4::new(
                 variance("phi_noise_rad", self.phi_noise_rad)?,
                 variance("theta_noise_rad", self.theta_noise_rad)?,
+                // A rate of the ball would be no more than its angle's difference.
+                f64::INFINITY,
                 variance("theta_dot_noise_rad_s", self.theta_dot_noise_rad_s)?,
             ),
             initial_state: Vector4::new(1.0, 0.1, 10.0, 1.0),
@@ -166,17 +159,17 @@ const INITIAL_DISTURBANCE: Vector2<f64> = Vector2::new(0.01, 0.0009);
 
 /// The disturbances must be told apart at rest.
 fn check_offset_free(
-    settings: &EstimatorSettings<f64, 4, 1, 3, 2>,
+    settings: &EstimatorSettings<f64>,
     ballbot: &Ballbot<f64>,
 ) -> Result<(), ScenarioError> {
     // x_dot = A (x + E_x d) + B (u + E_u d).
     let (a, b) = ballbot.without_coulomb().matrices(&Vector3::zeros());
     let b_d = a * settings.state_offset + b * settings.input_offset;
     let [a, b_d] = [dynamic(&a), dynamic(&b_d)];
-    let [c, c_d] = [
-        dynamic(&settings.c),
-        dynamic(&SMatrix::<f64, 3, 2>::zeros()),
-    ];
+    let needed = settings.measurement_noise.map(f64::is_finite);
+    let needed: Vec<usize> = (0..4).filter(|i| needed[*i]).collect();
+    let c = dynamic(&settings.c).select_rows(&needed);
+    let c_d = DMatrix::zeros(needed.len(), 2);
     lpvmpc_design::check_offset_free(&a, &b_d, &c, &c_d).map_err(|error| {
         ScenarioError::value(
             "controller.estimator.disturbances",
@@ -193,7 +186,7 @@ impl TorqueRateTable {
         terminal: &TerminalTable,
         ballbot: &Ballbot<f64>,
         plain: &ballbot::ControllerSettings<f64>,
-    ) -> Result<ControllerSettings<f64, 5, 1, 3>, ScenarioError> {
+    ) -> Result<RampedSettings<f64>, ScenarioError> {
         let limit = self.limit_nm_s;
         if !(limit > 0.0) {
             return Err(ScenarioError::value(
@@ -276,14 +269,13 @@ impl MotorsTable {
         &self,
         turning: Turning,
         wheels: &Wheels<f64>,
-    ) -> Result<Motors, ScenarioError> {
-        let motors = Motors {
-            limit: positive("controller.motors.limit_nm", self.limit_nm)?,
+    ) -> Result<ThreeMotors, ScenarioError> {
+        let limits = MotorLimits {
+            motor: positive("controller.motors.limit_nm", self.limit_nm)?,
             yaw: not_negative("controller.motors.yaw_reserve_nm", self.yaw_reserve_nm)?,
-            turning,
         };
-        if motors.left(wheels).alone() > 0.0 {
-            Ok(motors)
+        if limits.left(wheels).alone() > 0.0 {
+            Ok(ThreeMotors { limits, turning })
         } else {
             Err(self.nothing_left())
         }
@@ -297,7 +289,7 @@ impl MotorsTable {
         wheels: &Wheels<f64>,
         shares: bool,
     ) -> Result<Bounds<f64, 1>, ScenarioError> {
-        let left = self.check(Turning::none(), wheels)?.left(wheels);
+        let left = self.check(Turning::none(), wheels)?.limits.left(wheels);
         let equal = left.equal();
         let equal_part = Bounds {
             lower: torque.lower.map(|lower| lower.max(-equal)),

@@ -3,6 +3,7 @@
 use crate::error::ScenarioError;
 use crate::heading_table::HeadingTable;
 use crate::number::{finite, not_negative, positive};
+use ballbot::YawLaw;
 use lpvmpc_sim::Sensor;
 use nalgebra::Vector2;
 
@@ -17,8 +18,8 @@ pub struct Turning {
     pub initial: f64,
     /// Target at time zero, rad, and its rate, rad/s.
     pub target: (f64, f64),
-    /// Yaw torque per missing angle, N m/rad, and per missing rate, N m s/rad.
-    pub gains: (f64, f64),
+    /// The law of the yaw torque.
+    pub law: YawLaw<f64>,
     /// Standard deviation of the noise of the measured heading, and its constant error, rad.
     pub sensor: (f64, f64),
 }
@@ -31,7 +32,10 @@ impl Turning {
             friction: 0.0,
             initial: 0.0,
             target: (0.0, 0.0),
-            gains: (0.0, 0.0),
+            law: YawLaw {
+                stiffness: 0.0,
+                damping: 0.0,
+            },
             sensor: (0.0, 0.0),
         }
     }
@@ -47,13 +51,6 @@ impl Turning {
     pub(crate) fn target(&self, t: f64) -> Vector2<f64> {
         let (angle, rate) = self.target;
         Vector2::new(angle + rate * t, rate)
-    }
-
-    /// The wanted yaw torque in N m for the measured heading and rate and their targets.
-    pub(crate) fn yaw(&self, measured: &Vector2<f64>, target: &Vector2<f64>) -> f64 {
-        let (stiffness, damping) = self.gains;
-        let error = measured - target;
-        stiffness * error[0] + damping * error[1]
     }
 
     /// The sensors of heading and rate on the rows `first` and the next of a state.
@@ -90,10 +87,10 @@ impl HeadingTable {
                 self.target_deg.to_radians(),
                 self.target_rate_deg_s.to_radians(),
             ),
-            gains: (
-                size("stiffness_nm_rad", self.stiffness_nm_rad)?,
-                size("damping_nm_s_rad", self.damping_nm_s_rad)?,
-            ),
+            law: YawLaw {
+                stiffness: size("stiffness_nm_rad", self.stiffness_nm_rad)?,
+                damping: size("damping_nm_s_rad", self.damping_nm_s_rad)?,
+            },
             sensor: (size("noise_rad", self.noise_rad)?, self.bias_rad),
         })
     }

@@ -54,7 +54,6 @@ pub mod words;
 mod world;
 mod world_table;
 
-pub use ballbot_control::Feedback;
 pub use certificate::{RobotTable, TerminalCertificate, ViscousBallbot, read_certificate};
 pub use error::ScenarioError;
 pub use excitation::Excitation;
@@ -66,7 +65,7 @@ pub use guarantee::Standing;
 pub use heading::Turning;
 pub use heading_table::HeadingTable;
 pub use parameters::{KnownRobot, Parameters, read_robot};
-pub use prepare::{Plane, Prepared};
+pub use prepare::{Plane, Prepared, Problem};
 pub use reference::PhiReference;
 pub use run::{PlaneLoop, Record, Surroundings};
 pub use schema::{
@@ -75,7 +74,7 @@ pub use schema::{
     ReferenceTable, Scenario, SineTable, StateBounds, StateTable, TerminalTable,
 };
 pub use session::{Phase, Session, Trouble};
-pub use three_motors::{MotorSample, Motors};
+pub use three_motors::{MotorSample, ThreeMotors};
 pub use uncertainty::{RobotDistribution, Uncertainty};
 pub use weights::bryson;
 pub use world::{PlaneWorld, Robot};

@@ -9,12 +9,11 @@ use crate::number::{finite, positive};
 use crate::parameters::check_motion;
 use crate::reference::{self, PhiReference};
 use crate::schema::{ControllerTable, Scenario, StateTable, TerminalTable};
-use crate::three_motors::Motors;
+use crate::three_motors::ThreeMotors;
 use crate::world::PlaneWorld;
 use crate::world_table::PlaneName;
-use ballbot::{Ballbot, GuardedSettings, Wheels};
-use ballbot_control::Feedback;
-use lpvmpc::{ControllerSettings, MoveLimits};
+use ballbot::{Ballbot, GuardedSettings, PlaneFeedback, PlanePlanner, RampedSettings, Wheels};
+use lpvmpc::MoveLimits;
 use lpvmpc_sim::Tolerances;
 use nalgebra::Vector4;
 
@@ -27,27 +26,54 @@ pub struct Prepared {
     pub ballbot: Ballbot<f64>,
     /// The torque map to the motors.
     pub wheels: Wheels<f64>,
-    /// The controller's settings.
+    /// The controller's settings; those of the plain problem where another one is posed.
     pub settings: ballbot::ControllerSettings<f64>,
+    /// Which problem is posed.
+    pub problem: Problem,
     /// What stands around the controller.
-    pub feedback: Feedback,
-    /// Where the torque's rate is bounded: the settings of the controller that plans it.
-    pub ramp: Option<ControllerSettings<f64, 5, 1, 3>>,
-    /// Where the terminal set is certified: the settings of the guarded controller, which then
-    /// runs. `settings` are those of the same problem without guard.
-    pub guarded: Option<GuardedSettings<f64>>,
+    pub feedback: PlaneFeedback,
     /// What is known of the certificate that this rests on.
     pub certificate: Option<Standing>,
     /// One plane, or x and y.
     pub planes: Vec<Plane>,
     /// The three motors, where the planes share them.
-    pub motors: Option<Motors>,
+    pub motors: Option<ThreeMotors>,
     /// Where set points become smooth moves: what these may ask for.
     pub moves: Option<MoveLimits<f64>>,
     /// Samples in the run.
     pub samples: usize,
     /// Tolerances of the plant.
     pub tolerances: Tolerances,
+}
+
+/// What a plane's controller plans.
+#[derive(Clone, Debug)]
+pub enum Problem {
+    /// The torque, held over a sample.
+    Plain,
+    /// The torque's rate, which is bounded.
+    Ramped(RampedSettings<f64>),
+    /// The torque, with a certified terminal set.
+    Guarded(GuardedSettings<f64>),
+}
+
+impl Prepared {
+    /// The settings of the guarded controller, where that runs.
+    pub fn guarded(&self) -> Option<&GuardedSettings<f64>> {
+        match &self.problem {
+            Problem::Guarded(settings) => Some(settings),
+            Problem::Plain | Problem::Ramped(_) => None,
+        }
+    }
+
+    /// What a plane's regulator plans with.
+    pub(crate) fn planner(&self) -> PlanePlanner {
+        match &self.problem {
+            Problem::Plain => PlanePlanner::Held(self.settings),
+            Problem::Ramped(settings) => PlanePlanner::Ramped(*settings),
+            Problem::Guarded(settings) => PlanePlanner::Guarded(*settings),
+        }
+    }
 }
 
 /// One plane of the robot.
@@ -109,7 +135,8 @@ impl Scenario {
         let guarded = self.controller.guarded(&ballbot, &settings, files)?;
         let feedback = self.controller.feedback(&ballbot)?;
         let ramp = self.controller.ramp(&ballbot, &settings)?;
-        if guarded.is_some() && !(feedback.is_direct() && ramp.is_none()) {
+        let direct = feedback.estimator.is_none() && feedback.delay == 0.0;
+        if guarded.is_some() && !(direct && ramp.is_none()) {
             return Err(ScenarioError::value(
                 "controller.terminal.certified",
                 "(given)",
@@ -148,15 +175,19 @@ impl Scenario {
         let planes = self.planes(references, &real, (settings.t_s, tolerances), files)?;
         // After all that is cheap to check.
         let certificate = guarded.as_ref().map(|found| found.standing(files));
+        let problem = match (guarded, ramp) {
+            (Some(found), _) => Problem::Guarded(found.settings),
+            (None, Some(settings)) => Problem::Ramped(settings),
+            (None, None) => Problem::Plain,
+        };
         Ok(Prepared {
             title: self.title.clone(),
             ballbot,
             wheels,
             settings,
+            problem,
             feedback,
-            ramp,
             planes,
-            guarded: guarded.map(|found| found.settings),
             certificate: certificate.transpose()?,
             motors,
             moves,
@@ -166,7 +197,11 @@ impl Scenario {
     }
 
     /// The motors that two planes share.
-    fn motors(&self, planes: usize, wheels: &Wheels<f64>) -> Result<Option<Motors>, ScenarioError> {
+    fn motors(
+        &self,
+        planes: usize,
+        wheels: &Wheels<f64>,
+    ) -> Result<Option<ThreeMotors>, ScenarioError> {
         match (&self.controller.motors, &self.heading) {
             (Some(motors), heading) if planes == 2 => {
                 let turning = heading.as_ref().map(HeadingTable::check).transpose()?;
@@ -185,7 +220,7 @@ impl Scenario {
 
     /// Whether a plane may have more than an equal share of the motors: neither a ramp nor a
     /// guarantee can follow bounds that change from sample to sample.
-    fn shares(&self, motors: &Option<Motors>) -> bool {
+    fn shares(&self, motors: &Option<ThreeMotors>) -> bool {
         let ControllerTable {
             torque_rate,
             terminal,

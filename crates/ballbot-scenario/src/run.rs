@@ -5,11 +5,10 @@ use crate::excitation::Excited;
 use crate::prepare::{Plane, Prepared};
 use crate::three_motors::MotorSample;
 use crate::world::{PlaneWorld, Robot};
-use ballbot_control::{
-    PlaneRegulator, guarded_feedback, output_feedback, ramped_feedback, state_feedback,
-};
-use lpvmpc_sim::{ClosedLoop, Course, Recording, Trajectory, World};
-use nalgebra::{Vector1, Vector3};
+use ballbot::PlaneRegulator;
+use lpvmpc::Regulator;
+use lpvmpc_sim::{ClosedLoop, Course, LogRow, Recording, Trajectory, World};
+use nalgebra::Vector3;
 use std::time::Duration;
 
 /// What the run reads and reports besides its results.
@@ -27,11 +26,14 @@ pub struct Record {
     pub planes: Vec<Recording<4, 1, 4>>,
     /// The motors at every sample of the control, where the planes share them.
     pub motors: Option<Vec<MotorSample>>,
+    /// What the whole robot's sensors delivered, and its motors were commanded; empty where the
+    /// planes run one after the other.
+    pub robot_log: Vec<LogRow<10, 3>>,
 }
 
 /// The closed loop of one plane, whatever the horizon. The sensors are those of (phi, theta,
 /// phi_dot, theta_dot), the load that of [`ballbot::Disturbed::f`].
-pub type PlaneLoop = ClosedLoop<Box<dyn PlaneRegulator>, Robot, 4, 1, 4, 2>;
+pub type PlaneLoop = ClosedLoop<Excited<PlaneRegulator>, Robot, 4, 1, 4, 2>;
 
 type PlaneInWorld = World<Robot, 4, 1, 4, 2>;
 
@@ -76,6 +78,7 @@ impl Prepared {
         Ok(Record {
             planes,
             motors: None,
+            robot_log: Vec::new(),
         })
     }
 
@@ -107,9 +110,7 @@ impl Prepared {
         } = plane.world.clone();
         let world = before.world.continued(robot, settings)?;
         let mut closed_loop = self.loop_in(plane, world)?;
-        closed_loop
-            .regulator
-            .take_over(&before.regulator.hand_over());
+        closed_loop.regulator.take_over(&before.regulator);
         Ok(closed_loop)
     }
 
@@ -123,47 +124,25 @@ impl Prepared {
                  sample by sample",
             ));
         }
-        let regulator: Box<dyn PlaneRegulator> = match (&self.guarded, &self.ramp) {
-            (None, None) if self.feedback.is_plain() => {
-                state_feedback(&self.ballbot, &self.settings)?
-            }
-            _ => self.sharing_plane(plane.world.settings.period)?,
-        };
         let PlaneWorld {
+            settings,
             without_plan,
             range,
             excitation,
             ..
         } = plane.world.clone();
-        let regulator = match excitation {
-            Some(excitation) => Box::new(Excited {
-                regulator,
-                excitation,
-                command: Vector1::zeros(),
-                time: 0.0,
-            }),
-            None => regulator,
-        };
+        let regulator = PlaneRegulator::new(
+            &self.ballbot,
+            &self.planner(),
+            &self.feedback,
+            &self.settings.u,
+            settings.period,
+        )?;
+        let regulator = Excited::new(regulator, excitation);
         let mut closed_loop = ClosedLoop::new(regulator, world)?;
         closed_loop.without_plan = without_plan;
         closed_loop.range = range;
         Ok(closed_loop)
-    }
-
-    /// The regulator of a plane that may share its motors with another; `period` is that of the
-    /// sensors, s.
-    pub(crate) fn sharing_plane(
-        &self,
-        period: f64,
-    ) -> Result<Box<dyn PlaneRegulator>, ScenarioError> {
-        let (ballbot, feedback) = (&self.ballbot, &self.feedback);
-        Ok(match (&self.guarded, &self.ramp) {
-            (Some(settings), _) => guarded_feedback(ballbot, settings, feedback.preview)?,
-            (None, Some(ramp)) => {
-                ramped_feedback(ballbot, ramp, &self.settings.u, feedback, period)?
-            }
-            (None, None) => output_feedback(ballbot, &self.settings, feedback, period)?,
-        })
     }
 
     /// The motors' torques (tau_1, tau_2, tau_3) in N m at every sample that both planes have,

@@ -8,7 +8,7 @@ use crate::reference::PhiReference;
 use crate::run::PlaneLoop;
 use crate::schema::PointTable;
 use crate::words;
-use lpvmpc::{Observation, Status};
+use lpvmpc::{Observation, Regulator, Status};
 use lpvmpc_sim::{Disturbance, Ending, LogRow, Sample, WorldError};
 use nalgebra::{Vector1, Vector3, Vector4};
 use std::f64::consts::FRAC_PI_2;
@@ -167,7 +167,7 @@ impl Session {
     /// horizon; empty when there is no such plane.
     pub fn prediction(&self, plane: usize) -> Vec<Vector4<f64>> {
         let regulator = self.loops.get(plane).map(|plane| &plane.regulator);
-        regulator.map_or_else(Vec::new, |regulator| regulator.prediction())
+        regulator.map_or_else(Vec::new, |regulator| regulator.prediction().collect())
     }
 
     /// Whether the robot still stands.
@@ -201,7 +201,8 @@ impl Session {
             return String::new();
         }
         let regulator = self.loops.get(plane).map(|plane| &plane.regulator);
-        let bounds = regulator.map_or_else(Vec::new, |regulator| regulator.active_bounds());
+        let bounds =
+            regulator.map_or_else(Vec::new, |regulator| regulator.active_bounds().collect());
         words::active_bounds(&bounds, self.prepared.settings.t_s)
     }
 

@@ -2,22 +2,14 @@
 
 use crate::heading::Turning;
 use crate::prepare::Prepared;
-use crate::three_motors::Motors;
+use crate::three_motors::ThreeMotors;
 use crate::world::{PlaneWorld, Robot};
-use ballbot::{Heading, Wheels};
+use ballbot::{HEADING, Heading, RobotState, Wheels, plane_of};
 use lpvmpc_sim::{Actuator, Disturbance, Plant, Sensor, WorldSettings};
 use nalgebra::{SVector, Vector1, Vector3, Vector4};
 
-/// x plane, y plane, heading (rad) and its rate (rad/s).
-pub(crate) type State = SVector<f64, 10>;
-
-/// The place of the heading in the state.
-pub(crate) const HEADING: usize = 8;
-
-/// One plane's part of the state.
-pub(crate) fn plane(x: &State, index: usize) -> Vector4<f64> {
-    x.fixed_rows::<4>(4 * index).into_owned()
-}
+/// The state in the numbers of the simulation.
+pub(crate) type State = RobotState<f64>;
 
 /// The whole robot; the inputs are the motors' torques, N m. The loads are those of the planes.
 #[derive(Clone, Debug)]
@@ -33,7 +25,7 @@ impl Plant<10, 3, 4> for WholeRobot {
         let floor = Heading::new(x[HEADING]).to_floor(&torques.xy());
         let mut x_dot = State::zeros();
         for (index, robot) in self.planes.iter().enumerate() {
-            let x = plane(x, index);
+            let x = plane_of(x, index);
             let torque = Vector1::new(floor[index]);
             let load = loads.fixed_rows::<2>(2 * index).into_owned();
             let motion = robot.derivative(&x, &torque, &load);
@@ -50,7 +42,7 @@ impl Plant<10, 3, 4> for WholeRobot {
 /// The planes' worlds as one, with the whole robot in it.
 pub(crate) fn whole_world(
     prepared: &Prepared,
-    motors: &Motors,
+    motors: &ThreeMotors,
     [x, y]: [&PlaneWorld; 2],
 ) -> (WholeRobot, WorldSettings<10, 3, 10, 4>) {
     let settings = &x.settings;
@@ -74,7 +66,7 @@ pub(crate) fn whole_world(
     (sensors[HEADING], sensors[HEADING + 1]) = (angle, rate);
     let [drive] = settings.actuators;
     let motor = Actuator {
-        limit: drive.limit.min(motors.limit),
+        limit: drive.limit.min(motors.limits.motor),
         dead_zone: drive.dead_zone,
         lag: drive.lag,
     };

@@ -3,17 +3,20 @@
 use crate::error::ScenarioError;
 use crate::prepare::{Plane, Prepared};
 use crate::run::{Record, Surroundings};
-use crate::three_motors::{MotorSample, Motors, PlanesAndYaw};
-use crate::whole_robot::{HEADING, State, WholeRobot, plane, whole_world};
+use crate::three_motors::{
+    MotorSample, ThreeMotors, WholeRegulator, log_of_plane, sample_of_plane,
+};
+use crate::whole_robot::{State, WholeRobot, whole_world};
+use ballbot::{HEADING, RobotRegulator, plane_feedback, plane_of};
 use lpvmpc_sim::{ClosedLoop, Ending, Recording, Trajectory, World};
 
-type WholeLoop = ClosedLoop<PlanesAndYaw, WholeRobot, 10, 3, 10, 4>;
+type WholeLoop = ClosedLoop<WholeRegulator, WholeRobot, 10, 3, 10, 4>;
 
 impl Prepared {
     /// Runs both planes together.
     pub(crate) fn record_whole(
         &self,
-        motors: &Motors,
+        motors: &ThreeMotors,
         planes: [&Plane; 2],
         surroundings: &Surroundings<'_>,
     ) -> Result<Record, ScenarioError> {
@@ -21,6 +24,7 @@ impl Prepared {
         let mut closed_loop = self.whole_loop(motors, planes)?;
         let mut samples = [Vec::new(), Vec::new()];
         let mut logs = [Vec::new(), Vec::new()];
+        let mut robot_log = Vec::new();
         let mut turns = Vec::with_capacity(self.samples);
         let mut ending = Ending::Complete;
         for k in 0..self.samples {
@@ -37,12 +41,13 @@ impl Prepared {
             };
             let regulator = &closed_loop.regulator;
             for (index, (samples, log)) in samples.iter_mut().zip(&mut logs).enumerate() {
-                samples.extend(regulator.of_plane(index, &sample));
+                samples.extend(sample_of_plane(regulator, index, &sample));
                 log.extend(rows.iter().map(|row| {
                     let heading = sample.x[HEADING] + sample.x[HEADING + 1] * (row.t - sample.t);
-                    regulator.log_of_plane(index, row, heading)
+                    log_of_plane(regulator, index, row, heading)
                 }));
             }
+            robot_log.extend(rows);
             turns.push(MotorSample {
                 t: sample.t,
                 heading: sample.x[HEADING],
@@ -57,8 +62,8 @@ impl Prepared {
             trajectory: Trajectory {
                 samples,
                 final_time,
-                final_state: plane(x, index),
-                final_reference: plane(&x_ref, index),
+                final_state: plane_of(x, index),
+                final_reference: plane_of(&x_ref, index),
                 ending: of_plane(&ending),
             },
             log,
@@ -67,11 +72,12 @@ impl Prepared {
         Ok(Record {
             planes: planes.collect(),
             motors: Some(turns),
+            robot_log,
         })
     }
 
     /// The state reference of the whole robot at the time `t` s.
-    fn whole_reference(&self, motors: &Motors, [x, y]: [&Plane; 2], t: f64) -> State {
+    fn whole_reference(&self, motors: &ThreeMotors, [x, y]: [&Plane; 2], t: f64) -> State {
         let mut reference = State::zeros();
         for (index, plane) in [x, y].into_iter().enumerate() {
             let part = plane.state_reference(t);
@@ -82,9 +88,22 @@ impl Prepared {
         reference
     }
 
-    fn whole_loop(&self, motors: &Motors, [x, y]: [&Plane; 2]) -> Result<WholeLoop, ScenarioError> {
+    fn whole_loop(
+        &self,
+        motors: &ThreeMotors,
+        [x, y]: [&Plane; 2],
+    ) -> Result<WholeLoop, ScenarioError> {
         let period = x.world.settings.period;
-        let regulators = [self.sharing_plane(period)?, self.sharing_plane(period)?];
+        let plane = || {
+            plane_feedback(
+                &self.ballbot,
+                &self.planner(),
+                &self.feedback,
+                &self.settings.u,
+                period,
+            )
+        };
+        let regulators = [plane()?, plane()?];
         let (robot, settings) = whole_world(self, motors, [&x.world, &y.world]);
         let mut start = State::zeros();
         for (index, plane) in [x, y].into_iter().enumerate() {
@@ -94,7 +113,15 @@ impl Prepared {
         }
         start[HEADING] = motors.turning.initial;
         let world = World::new(robot, start, settings)?;
-        let regulator = PlanesAndYaw::new(regulators, self.wheels, *motors);
+        let ThreeMotors { limits, turning } = *motors;
+        let regulator = RobotRegulator::new(
+            regulators,
+            (),
+            self.wheels,
+            limits,
+            turning.law,
+            turning.initial,
+        );
         let mut closed_loop = ClosedLoop::new(regulator, world)?;
         closed_loop.without_plan = x.world.without_plan;
         for (index, plane) in [x, y].into_iter().enumerate() {

@@ -5,12 +5,12 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
-use ballbot_control::guarded_feedback;
+use ballbot::GuardedController;
 use ballbot_scenario::{
     CertifiedTable, IterationsTable, Parameters, PointTable, ReferenceTable, Scenario,
     ScenarioError, Surroundings, TerminalTable, TorqueRateTable, builtin,
 };
-use lpvmpc::{GuardedController, Rk4, share_of_bounds};
+use lpvmpc::{Rk4, share_of_bounds};
 use lpvmpc_sim::{Ending, Trajectory};
 use nalgebra::Vector4;
 use std::path::Path;
@@ -84,7 +84,7 @@ fn one_program_per_sample_arrives_as_early_as_three() {
 fn cruising_with_one_program_is_smooth() {
     let scenario = Scenario::load("far-setpoints").unwrap();
     let prepared = scenario.prepare(Path::new(".")).unwrap();
-    let settings = prepared.guarded.unwrap();
+    let settings = *prepared.guarded().unwrap();
     // Variation of the tilt rate per sample, and the part of the samples with a kink.
     let cruise = |programs: usize| {
         let (mut variation, mut kinks, mut count) = (0.0, 0.0, 0.0);
@@ -126,7 +126,7 @@ fn errors_as_large_as_assumed_break_nothing() {
     let prepared = scenario.prepare(Path::new(".")).unwrap();
     let mut random = fastrand::Rng::with_seed(3);
     for (horizon, programs) in [(5, 1), (12, 1), (20, 3), (20, 0), (60, 1)] {
-        let mut settings = prepared.guarded.unwrap();
+        let mut settings = *prepared.guarded().unwrap();
         (settings.horizon, settings.iterations.known) = (horizon, programs);
         let mut controller = GuardedController::allocate(prepared.ballbot, settings).unwrap();
         let mut workspace = controller.workspace::<5>();
@@ -195,11 +195,11 @@ fn long_horizons_fit_a_thread() {
     const LONG: usize = 300;
     let mut ramped = Scenario::load("far-setpoints").unwrap();
     let prepared = ramped.prepare(Path::new(".")).unwrap();
-    let mut settings = prepared.guarded.unwrap();
+    let mut settings = *prepared.guarded().unwrap();
     settings.horizon = LONG;
-    guarded_feedback(&prepared.ballbot, &settings, true).unwrap();
+    GuardedController::allocate(prepared.ballbot, settings).unwrap();
     settings.horizon = 0;
-    let refused = guarded_feedback(&prepared.ballbot, &settings, true);
+    let refused = GuardedController::allocate(prepared.ballbot, settings);
     let refused = refused.err().unwrap().to_string();
     assert!(refused.contains("from 1 to 65535 samples"), "{refused}");
     ramped.reference = ReferenceTable::SetPoints {
@@ -232,7 +232,7 @@ fn an_unreachable_set_point_is_approached_as_far_as_the_bounds_allow() {
     let [_, upper] = scenario
         .prepare(Path::new("."))
         .unwrap()
-        .guarded
+        .guarded()
         .unwrap()
         .set_points;
     assert!(upper < 10.0 && upper > 7.0, "{upper}");

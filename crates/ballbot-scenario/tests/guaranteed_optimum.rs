@@ -21,7 +21,7 @@ fn rows(name: &str) -> Vec<Vec<f64>> {
 }
 
 fn controller(prepared: &Prepared, horizon: f64, programs: usize) -> Guarded {
-    let mut settings = prepared.guarded.unwrap();
+    let mut settings = *prepared.guarded().unwrap();
     settings.horizon = horizon as usize;
     settings.iterations.known = programs;
     Guarded::allocate(prepared.ballbot, settings).unwrap()

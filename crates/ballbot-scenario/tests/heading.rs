@@ -64,7 +64,7 @@ fn a_turning_robot_follows_the_curve_and_no_motor_is_asked_for_more_than_it_has(
         let off = sample.heading - sample.target;
         assert!(off.abs() < 0.2, "heading off by {off} at {} s", sample.t);
     }
-    let limit = prepared.motors.expect("given").limit;
+    let limit = prepared.motors.expect("given").limits.motor;
     let most = largest_motor(&record);
     assert!(most <= limit * (1.0 + 1e-9), "{most} N m");
     assert!(most > 0.9 * limit, "the limit was needed: {most} N m");
@@ -88,7 +88,7 @@ fn with_a_wrong_heading_it_falls() {
 fn without_sharing_a_motor_is_asked_for_more_than_it_has() {
     let mut scenario = example();
     let limit = scenario.prepare(Path::new(".")).expect("valid").motors;
-    let limit = limit.expect("given").limit;
+    let limit = limit.expect("given").limits.motor;
     let wheels = ballbot::Wheels::<f64>::paper();
     let alone = wheels.plane_torques(limit, 0.0).alone();
     scenario.bounds.torque_nm = [-alone, alone];
@@ -121,7 +121,7 @@ fn a_plane_that_needs_more_than_an_equal_share_gets_it() {
     let (prepared, record) = run(&scenario);
     assert!(stands(&record));
     let motors = prepared.motors.expect("given");
-    let left = prepared.wheels.plane_torques(motors.limit, 0.0);
+    let left = prepared.wheels.plane_torques(motors.limits.motor, 0.0);
     let samples = record.planes[0].trajectory.samples.iter();
     let most = samples.map(|sample| sample.u[0].abs()).fold(0.0, f64::max);
     assert!(
@@ -162,7 +162,7 @@ fn in_no_run_of_a_campaign_a_motor_gets_more_than_its_limit() {
         heading.target_rate_deg_s = between(-90.0, 90.0);
         // Fallen or not: the torques count.
         let (prepared, record) = run(&scenario);
-        let limit = prepared.motors.expect("given").limit;
+        let limit = prepared.motors.expect("given").limits.motor;
         let most = largest_motor(&record);
         assert!(
             most <= limit * (1.0 + 1e-9),

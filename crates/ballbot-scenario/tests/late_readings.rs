@@ -4,9 +4,9 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
-use ballbot::Ballbot;
+use ballbot::{Ballbot, EstimatorSettings};
 use ballbot_scenario::{EstimatorTable, Scenario, Surroundings};
-use lpvmpc::{Estimator, EstimatorSettings, LpvModel, Predictor, Reading, Rk4, Verdict};
+use lpvmpc::{Estimator, LpvModel, Predictor, Reading, Rk4, Verdict};
 use lpvmpc_sim::Random;
 use nalgebra::{DMatrix, RowVector4, SVector, Vector1, Vector2, Vector3, Vector4};
 use std::path::Path;
@@ -30,7 +30,7 @@ const CASES: [([usize; 3], f64); 8] = [
 ];
 
 /// The filter of a scenario without disturbances, which starts from what is drawn below.
-fn settings(ballbot: &Ballbot<f64>) -> EstimatorSettings<f64, 4, 1, 3, 2> {
+fn settings(ballbot: &Ballbot<f64>) -> EstimatorSettings<f64> {
     let mut scenario = Scenario::load("single-setpoint").unwrap();
     scenario.controller.estimator = Some(EstimatorTable::default());
     let prepared = scenario.prepare(Path::new(".")).unwrap();
@@ -70,8 +70,7 @@ fn error_of_a_run(delays: [usize; 3], missing: f64, random: &mut Random) -> f64 
     let drift = deviations(&settings.state_noise) * PERIOD.sqrt();
     let mut draw = |scale: &Vector4<f64>| scale.map(|scale| scale * random.normal());
     let mut x = draw(&start);
-    let mut estimator =
-        Estimator::<_, f64, 4, 1, 3, 3, 2, 16>::new(ballbot, settings, SVector::zeros()).unwrap();
+    let mut estimator = Estimator::allocate(ballbot, settings, SVector::zeros(), 16).unwrap();
     let mut past: Vec<[f64; 3]> = Vec::new();
     for _ in 0..SAMPLES {
         let noise = draw(&Vector4::repeat(1.0));
@@ -79,10 +78,10 @@ fn error_of_a_run(delays: [usize; 3], missing: f64, random: &mut Random) -> f64 
         past.push([
             x[0] + deviation[0] * noise[0],
             x[1] + deviation[1] * noise[1],
-            x[3] + deviation[2] * noise[2],
+            x[3] + deviation[3] * noise[2],
         ]);
         let chance = draw(&Vector4::repeat(1.0));
-        let readings = std::array::from_fn(|i| {
+        let [phi, theta, theta_dot] = std::array::from_fn(|i| {
             let taken = past.len().checked_sub(1 + delays[i])?;
             // Three tenths of a normal distribution lie beyond 0.5244.
             let lost = missing > 0.0 && chance[i] > 0.5244;
@@ -91,7 +90,8 @@ fn error_of_a_run(delays: [usize; 3], missing: f64, random: &mut Random) -> f64 
                 age: delays[i] as f64 * PERIOD,
             })
         });
-        estimator.update(&readings);
+        // The filter does without phi_dot.
+        estimator.update(&[phi, theta, None, theta_dot]);
         let u = Vector1::new(-(k * estimator.state())[0]);
         x = RK4.advance(&ballbot, &x, &u, PERIOD) + draw(&drift);
         estimator.advance(&u, PERIOD);

@@ -213,7 +213,7 @@ fn it_follows_a_metre_with_sensors_of_different_rates_late_and_stale() {
     assert!(error < 20.0, "{error} mm");
     let log = &recordings[0].log;
     let delivered = |sensor: usize| {
-        let rows = log.iter().filter(|row| row.measured[sensor].is_some());
+        let rows = log.iter().filter(|row| row.readings[sensor].is_some());
         rows.count() as f64 / log.len() as f64
     };
     // 1 % of the samples are missing; stale readings come at any time.

@@ -4,54 +4,58 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
-use ballbot_control::PlaneRegulator;
+use ballbot::PlaneRegulator;
 use ballbot_scenario::{EstimatorTable, Prepared, Scenario, TerminalTable, WorldTable};
-use lpvmpc::{BoundId, Observation, Restart, Verdict};
-use lpvmpc_sim::{ClosedLoop, Course, Decision, Measurement, Recording, Regulator, World, record};
+use lpvmpc::{BoundId, Command, Measurement, Observation, Reading, Regulator, Restart, Verdict};
+use lpvmpc_sim::{ClosedLoop, Course, Recording, World, record};
 use nalgebra::{Vector1, Vector4};
 use std::path::Path;
 use std::time::Duration;
 
 /// A regulator whose sensors' clock shows another time, and whose readings are spoilt.
 struct Elsewhere {
-    regulator: Box<dyn PlaneRegulator>,
+    regulator: PlaneRegulator,
     /// What its clock shows, of the time of the run (s).
     clock: Shift,
     /// The time of the run, of what its clock shows.
     back: Shift,
-    spoil: fn(&mut Measurement<4>),
+    spoil: fn(&mut Measurement<f64, 4>),
 }
 
-impl Regulator<4, 1, 4> for Elsewhere {
+impl Regulator<f64, 4, 1, 4> for Elsewhere {
     fn t_s(&self) -> f64 {
         self.regulator.t_s()
     }
 
-    fn observe(&mut self, measurement: &Measurement<4>) -> Observation<4> {
+    fn observe(&mut self, measurement: &Measurement<f64, 4>) -> Observation<4> {
         let mut seen = *measurement;
         (self.spoil)(&mut seen);
         seen.t = (self.clock)(measurement.t);
         self.regulator.observe(&seen)
     }
 
-    fn decide(
-        &mut self,
-        reference: &dyn Fn(f64) -> Vector4<f64>,
-        clock: &dyn Fn() -> Duration,
-    ) -> Decision<4, 1> {
-        self.regulator.decide(&|t| reference((self.back)(t)), clock)
+    fn decide(&mut self, reference: &dyn Fn(f64) -> Vector4<f64>) -> Command<f64, 4, 1> {
+        self.regulator.decide(&|t| reference((self.back)(t)))
     }
 
     fn between(&mut self) -> Option<Vector1<f64>> {
         self.regulator.between()
     }
 
-    fn prediction(&self) -> Vec<Vector4<f64>> {
-        self.regulator.prediction()
+    fn take_over(&mut self, previous: &Self) {
+        self.regulator.take_over(&previous.regulator);
     }
 
-    fn active_bounds(&self) -> Vec<BoundId> {
-        self.regulator.active_bounds()
+    fn cost(&self) -> f64 {
+        self.regulator.cost()
+    }
+
+    fn predicted(&self, i: usize) -> Option<Vector4<f64>> {
+        self.regulator.predicted(i)
+    }
+
+    fn active_bound(&self, i: usize) -> Option<BoundId> {
+        self.regulator.active_bound(i)
     }
 }
 
@@ -87,10 +91,11 @@ fn run(
     prepared: &Prepared,
     clock: Shift,
     back: Shift,
-    spoil: fn(&mut Measurement<4>),
+    spoil: fn(&mut Measurement<f64, 4>),
 ) -> Recording<4, 1, 4> {
     let plane = &prepared.planes[0];
     let regulator = prepared.closed_loop(plane).unwrap().regulator;
+    let regulator = regulator.regulator().clone();
     let world = plane.world.clone();
     let ball = World::new(world.robot, plane.initial_state, world.settings).unwrap();
     let elsewhere = Elsewhere {
@@ -113,7 +118,7 @@ fn run(
 /// One clock's time as the other's.
 type Shift = fn(f64) -> f64;
 
-fn as_it_is(_: &mut Measurement<4>) {}
+fn as_it_is(_: &mut Measurement<f64, 4>) {}
 
 /// A first stamp of 10 to 40 s made the estimate NaN, one of 100 s or a Unix time left it at zero,
 /// without torque and "solved", for ever.
@@ -169,10 +174,15 @@ fn what_becomes_of_the_readings_reaches_the_log() {
         |t| t,
         |t| t,
         |seen| match (seen.t * 100.0).round() as u64 {
-            150 => seen.values[1] = Some(f64::NAN),
-            160 => seen.values[0] = seen.values[0].map(|phi| phi + 1.0),
-            170 => seen.ages[3] = f64::INFINITY,
-            180 => seen.values[0] = None,
+            150 => seen.readings[1] = Some(Reading::fresh(f64::NAN)),
+            160 => seen.readings[0] = seen.readings[0].map(|phi| Reading::fresh(phi.value + 1.0)),
+            170 => {
+                seen.readings[3] = seen.readings[3].map(|rate| Reading {
+                    age: f64::INFINITY,
+                    ..rate
+                });
+            }
+            180 => seen.readings[0] = None,
             _ => {}
         },
     );

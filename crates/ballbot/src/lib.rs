@@ -1,5 +1,6 @@
 //! The ballbot, a robot that balances on one ball: parameters, nonlinear dynamics, LPV
-//! embedding, wheel torques and a check of physical consistency. No std, no heap.
+//! embedding, wheel torques, regulators of a plane and of the whole robot, and a check of physical
+//! consistency. No std, no heap but with the feature `alloc`.
 //!
 //! One plane of the robot has the state x = (phi, theta, phi_dot, theta_dot) in rad and rad/s
 //! (ball angle, body tilt) and the input u = tau, the virtual wheel's torque in N m. The ball
@@ -20,7 +21,11 @@ mod friction;
 mod heading;
 mod linear;
 mod parameters;
+#[cfg(feature = "alloc")]
+mod plane_regulator;
 mod regulator;
+mod regulator_error;
+mod robot_regulator;
 mod shares;
 mod trigonometry;
 mod wheels;
@@ -31,9 +36,14 @@ pub use embedding::{Accelerations, Tilt};
 pub use friction::{CREEP_SPEED, DriveFriction};
 pub use heading::Heading;
 pub use parameters::{Ballbot, Field, Geometry, LinearParameters, limits};
+#[cfg(feature = "alloc")]
+pub use plane_regulator::{PlaneFeedback, PlanePlanner, PlaneRegulator, plane_feedback};
 pub use regulator::{
-    Controller, ControllerSettings, Estimator, GuardedController, GuardedSettings,
-    GuardedWorkspace, Workspace,
+    AnyPlanner, Belief, Controller, ControllerSettings, Estimator, EstimatorArrays,
+    EstimatorSettings, Guarded, GuardedController, GuardedSettings, GuardedWorkspace, Held,
+    OutputFeedback, Ramped, RampedSettings, Workspace,
 };
+pub use regulator_error::RegulatorError;
+pub use robot_regulator::{HEADING, MotorLimits, RobotRegulator, RobotState, YawLaw, plane_of};
 pub use shares::PlaneTorques;
 pub use wheels::{AZIMUTHS_OF_PAPER_DEG, BadWheels, Wheel, Wheels};

@@ -20,7 +20,33 @@ pub type GuardedSettings<T> = lpvmpc::GuardedSettings<T, 4, 1>;
 /// Its program and solver: the set point is a fifth state there.
 pub type GuardedWorkspace<T> = lpvmpc::GuardedWorkspace<T, 1, 5>;
 
-/// The estimator of one plane on readings of (phi, theta, theta_dot), with `ND` disturbances and a memory
-/// of `K` instants.
-pub type Estimator<T, const ND: usize, const K: usize> =
-    lpvmpc::Estimator<Ballbot<T>, T, 4, 1, 3, 3, ND, K>;
+/// The controller's settings where the torque moves in ramps: it is a fifth state.
+pub type RampedSettings<T> = lpvmpc::ControllerSettings<T, 5, 1, 3>;
+
+/// The estimator of one plane on readings of (phi, theta, phi_dot, theta_dot), with two disturbances: a
+/// torque, N m, and an angle of the tilt, rad.
+pub type Estimator<T> = lpvmpc::Estimator<Ballbot<T>, T, 4, 1, 3, 4, 2>;
+
+/// Its settings.
+pub type EstimatorSettings<T> = lpvmpc::EstimatorSettings<T, 4, 1, 4, 2>;
+
+/// Its memory as arrays, for `K` instants.
+pub type EstimatorArrays<T, const K: usize> = lpvmpc::EstimatorArrays<T, 4, 1, 4, 2, K>;
+
+/// What is known of a plane's state.
+pub type Belief<T> = lpvmpc::Belief<Ballbot<T>, T, 4, 1, 3, 4, 2>;
+
+/// The planner `K` of one plane with all that stands around it.
+pub type OutputFeedback<T, K> = lpvmpc::OutputFeedback<Ballbot<T>, K, T, 4, 1, 3, 4, 2>;
+
+/// The planner whose torque is held over a sample.
+pub type Held<T> = lpvmpc::Held<Ballbot<T>, T, 4, 1, 3>;
+
+/// The planner whose torque moves in ramps.
+pub type Ramped<T> = lpvmpc::Ramped<Ballbot<T>, T, 4, 1, 3, 5>;
+
+/// The planner with a guarantee.
+pub type Guarded<T> = lpvmpc::Guarded<Ballbot<T>, T, 4, 1, 3, 5>;
+
+/// Any of the three.
+pub type AnyPlanner<T> = lpvmpc::AnyPlanner<Ballbot<T>, T, 4, 1, 3, 5, 5>;

@@ -1,10 +1,11 @@
 //! Regulator and world together: Algorithm 2 around the continuous plant.
 
-use crate::guarded_loop::Guard;
 use crate::plant::{Plant, PlantError, Tolerances, Unloaded};
-use crate::regulator::{Regulator, StateFeedback};
 use crate::world::{World, WorldError};
-use lpvmpc::{BoundId, Bounds, Controller, LpvModel, Observation, Status};
+use lpvmpc::{
+    BoundId, Bounds, Controller, Guard, LpvModel, Observation, Reading, Regulator, StateFeedback,
+    Status,
+};
 use nalgebra::SVector;
 use std::time::Duration;
 
@@ -27,12 +28,12 @@ pub struct Sample<const NX: usize, const NU: usize> {
     pub status: Status<f64>,
     /// Bounds that are active in the plan.
     pub active_bounds: usize,
-    /// Time that the controller took, by the clock that was handed in.
+    /// Time that the decision took, by the clock that was handed in.
     pub step_time: Duration,
     /// Nonlinear rollout minus prediction at the end of the horizon, in state units.
     pub gap: SVector<f64, NX>,
     /// What only a guarded controller knows.
-    pub guard: Option<Guard>,
+    pub guard: Option<Guard<f64>>,
 }
 
 /// How a run ended.
@@ -114,7 +115,7 @@ pub struct LogRow<const NY: usize, const NU: usize> {
     /// Time of the measurement, s.
     pub t: f64,
     /// The readings; `None` where one is missing.
-    pub measured: [Option<f64>; NY],
+    pub readings: [Option<Reading<f64>>; NY],
     /// What the regulator made of them.
     pub observation: Observation<NY>,
     /// The input commanded from here on.
@@ -141,7 +142,7 @@ pub struct ClosedLoop<R, P, const NX: usize, const NU: usize, const NY: usize, c
 impl<R, P, const NX: usize, const NU: usize, const NY: usize, const NL: usize>
     ClosedLoop<R, P, NX, NU, NY, NL>
 where
-    R: Regulator<NX, NU, NY>,
+    R: Regulator<f64, NX, NU, NY>,
     P: Plant<NX, NU, NL>,
 {
     /// A regulator in a world at time zero. It ends without a plan, and has no range.
@@ -191,10 +192,13 @@ where
             return Err(Ending::OutOfRange { t, component });
         }
         let mut observation = self.regulator.observe(self.world.measurement());
-        let decision = self.regulator.decide(reference, clock);
-        let status = decision.status;
+        let before = clock();
+        let command = self.regulator.decide(reference);
+        let step_time = clock().saturating_sub(before);
+        let cost = self.regulator.cost();
+        let status = command.status;
         // A guarded controller has an answer whatever its quadratic program said.
-        let guarded = decision.guard.is_some();
+        let guarded = command.guard.is_some();
         let usable = match self.without_plan {
             WithoutPlan::End => guarded || status.is_solved(),
             WithoutPlan::Apply => status != Status::NotFinite,
@@ -202,7 +206,7 @@ where
         if !usable {
             return Err(Ending::NoPlan { t, status });
         }
-        self.world.command(decision.u);
+        self.world.command(command.u);
         for i in 0..self.per_sample {
             if i > 0 {
                 observation = self.regulator.observe(self.world.measurement());
@@ -215,15 +219,15 @@ where
         Ok(Sample {
             t,
             x,
-            estimate: decision.estimate,
-            u: decision.u,
-            x_ref: decision.x_ref,
-            cost: decision.cost,
+            estimate: command.estimate,
+            u: command.u,
+            x_ref: command.x_ref,
+            cost,
             status,
-            active_bounds: decision.active_bounds,
-            step_time: decision.step_time,
-            gap: decision.gap,
-            guard: decision.guard,
+            active_bounds: command.active_bounds,
+            step_time,
+            gap: command.gap,
+            guard: command.guard,
         })
     }
 
@@ -240,7 +244,7 @@ where
         moved.map_err(|error| Ending::PlantFailed { t, error })?;
         log(LogRow {
             t,
-            measured: measurement.values,
+            readings: measurement.readings,
             observation,
             commanded: *world.commanded(),
             applied: *world.applied(),
@@ -279,7 +283,7 @@ pub fn record<R, P, const NX: usize, const NU: usize, const NY: usize, const NL:
     course: &Course<'_, NX>,
 ) -> Recording<NX, NU, NY>
 where
-    R: Regulator<NX, NU, NY>,
+    R: Regulator<f64, NX, NU, NY>,
     P: Plant<NX, NU, NL>,
 {
     let mut samples = Vec::with_capacity(course.samples);
@@ -325,12 +329,12 @@ pub struct Experiment<'a, const NX: usize> {
 /// Runs the closed loop in an ideal world: measure the state, step, hold the input for one
 /// sample. It ends early as [`record`] says.
 pub fn run<C, P, const NX: usize, const NU: usize, const NS: usize>(
-    controller: &mut Controller<C, f64, NX, NU, NS>,
+    controller: Controller<C, f64, NX, NU, NS>,
     plant: &P,
     experiment: &Experiment<'_, NX>,
 ) -> Trajectory<NX, NU>
 where
-    C: LpvModel<f64, NX, NU, NS>,
+    C: LpvModel<f64, NX, NU, NS> + Clone,
     P: LpvModel<f64, NX, NU, NS>,
 {
     let world = World::ideal(
@@ -339,7 +343,7 @@ where
         controller.settings().t_s,
         experiment.tolerances,
     );
-    let regulator = StateFeedback::new(controller);
+    let regulator = StateFeedback::state_feedback(controller);
     let course = Course {
         samples: experiment.samples,
         reference: experiment.reference,

@@ -1,16 +1,9 @@
-//! The guarded controller: as a regulator in a world, and around the continuous plant with a
-//! few faults that cost no more than a campaign can pay.
+//! The guarded controller around the continuous plant, with a few faults that cost no more than a
+//! campaign can pay.
 
-use crate::measured::MeasuredState;
 use crate::plant::{self, PlantError, Tolerances};
-use crate::regulator::{Decision, Regulator};
-use crate::sensor::Measurement;
-use lpvmpc::{
-    BoundId, GuardedController, GuardedSettings, GuardedStep, GuardedWorkspace, LpvModel,
-    Observation, SetPoints,
-};
+use lpvmpc::{GuardedController, GuardedStep, GuardedWorkspace, LpvModel};
 use nalgebra::SVector;
-use std::time::Duration;
 
 /// What becomes of a commanded input on its way to the plant, for one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,113 +94,5 @@ where
         self.x = x;
         self.acting = u;
         Ok(())
-    }
-}
-
-/// What a guarded controller says of a sample besides its plan.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Guard {
-    /// What the input is backed by.
-    pub decision: lpvmpc::Decision,
-    /// The artificial set point z: the plan ends at z times the direction of the set points.
-    pub set_point: f64,
-}
-
-/// A guarded controller on the measured state itself. The wanted set points are the reference's coordinates along the
-/// direction of the set points.
-#[derive(Debug)]
-pub struct GuardedFeedback<C, const NX: usize, const NU: usize, const NS: usize, const NA: usize> {
-    /// What decides.
-    pub controller: GuardedController<C, f64, NX, NU, NS>,
-    /// Its memory.
-    pub workspace: GuardedWorkspace<f64, NU, NA>,
-    /// The measured state.
-    pub measured: MeasuredState<NX>,
-    /// The input that was decided last.
-    pub input: SVector<f64, NU>,
-    /// Whether the controller sees the reference before its time, over the whole horizon.
-    pub preview: bool,
-}
-
-impl<C, const NX: usize, const NU: usize, const NS: usize, const NA: usize>
-    GuardedFeedback<C, NX, NU, NS, NA>
-where
-    C: LpvModel<f64, NX, NU, NS>,
-{
-    /// The regulator with this controller and a workspace of its own, with `preview` of the reference or
-    /// without.
-    pub fn new(controller: GuardedController<C, f64, NX, NU, NS>, preview: bool) -> Self {
-        Self {
-            workspace: controller.workspace(),
-            controller,
-            measured: MeasuredState::new(),
-            input: SVector::zeros(),
-            preview,
-        }
-    }
-}
-
-impl<C, const NX: usize, const NU: usize, const NS: usize, const NA: usize> Regulator<NX, NU, NX>
-    for GuardedFeedback<C, NX, NU, NS, NA>
-where
-    C: LpvModel<f64, NX, NU, NS>,
-{
-    fn t_s(&self) -> f64 {
-        self.controller.settings().t_s
-    }
-
-    fn observe(&mut self, measurement: &Measurement<NX>) -> Observation<NX> {
-        self.measured.observe(measurement).1
-    }
-
-    fn decide(
-        &mut self,
-        reference: &dyn Fn(f64) -> SVector<f64, NX>,
-        clock: &dyn Fn() -> Duration,
-    ) -> Decision<NX, NU> {
-        let GuardedSettings {
-            t_s,
-            direction,
-            horizon,
-            ..
-        } = *self.controller.settings();
-        let now = self.measured.time().unwrap_or(0.0);
-        let x = *self.measured.state();
-        let x_ref = reference(now);
-        let coordinate = |x: &SVector<f64, NX>| x.dot(&direction) / direction.norm_squared();
-        let seen = if self.preview { horizon } else { 0 };
-        let at = |i: usize| coordinate(&reference(now + i as f64 * t_s));
-        let stages: Vec<f64> = (0..seen).map(at).collect();
-        let wanted = SetPoints {
-            stages: &stages,
-            end: at(seen),
-        };
-        let before = clock();
-        let workspace = &mut self.workspace;
-        let step = self.controller.step_with_preview(&x, &wanted, workspace);
-        let step_time = clock().saturating_sub(before);
-        self.input = step.u;
-        Decision {
-            u: step.u,
-            estimate: x,
-            x_ref,
-            cost: step.cost,
-            status: step.status,
-            active_bounds: self.workspace.active_bounds(),
-            step_time,
-            gap: step.gap,
-            guard: Some(Guard {
-                decision: step.decision,
-                set_point: step.set_point,
-            }),
-        }
-    }
-
-    fn prediction(&self) -> Vec<SVector<f64, NX>> {
-        self.controller.rollout().copied().collect()
-    }
-
-    fn active_bounds(&self) -> Vec<BoundId> {
-        self.controller.active_bounds().collect()
     }
 }

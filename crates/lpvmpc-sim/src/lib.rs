@@ -2,7 +2,7 @@
 //! robot. No files, no clock of its own, no randomness but from a seed.
 //!
 //! [`advance`] moves a plant under a held input. A [`World`] puts sensors, actuators, a delay
-//! and pushes around it. A [`ClosedLoop`] is a world with a [`Regulator`] in it, and [`run`]
+//! and pushes around it. A [`ClosedLoop`] is a world with a [`Regulator`](lpvmpc::Regulator) in it, and [`run`]
 //! records one from beginning to end.
 #![allow(
     clippy::neg_cmp_op_on_partial_ord,
@@ -13,10 +13,8 @@ mod actuator;
 pub mod closed_loop;
 mod disturbance;
 mod guarded_loop;
-mod measured;
 pub mod plant;
 mod random;
-mod regulator;
 mod sensor;
 mod world;
 
@@ -26,10 +24,8 @@ pub use closed_loop::{
     record, run,
 };
 pub use disturbance::Disturbance;
-pub use guarded_loop::{Actuation, Guard, GuardedFeedback, GuardedLoop};
-pub use measured::MeasuredState;
+pub use guarded_loop::{Actuation, GuardedLoop};
 pub use plant::{Plant, PlantError, Tolerances, Unloaded, advance};
 pub use random::Random;
-pub use regulator::{Decision, Regulator, StateFeedback};
-pub use sensor::{Measurement, Sensor};
+pub use sensor::Sensor;
 pub use world::{World, WorldError, WorldSettings};

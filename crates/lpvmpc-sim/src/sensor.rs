@@ -26,17 +26,6 @@ pub struct Sensor<const NX: usize> {
     pub stale: f64,
 }
 
-/// What the sensors deliver at one instant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Measurement<const NY: usize> {
-    /// Time of the measurement, s.
-    pub t: f64,
-    /// The readings, in the units of the measured quantities; `None` where one is missing.
-    pub values: [Option<f64>; NY],
-    /// The time since each reading was taken, by its own time stamp, s.
-    pub ages: [f64; NY],
-}
-
 impl<const NX: usize> Sensor<NX> {
     /// A perfect sensor of `row`' x.
     pub fn ideal(row: SVector<f64, NX>) -> Self {

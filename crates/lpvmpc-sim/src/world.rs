@@ -3,7 +3,8 @@
 use crate::actuator::Actuator;
 use crate::disturbance::Disturbance;
 use crate::plant::{Plant, PlantError, Tolerances, integrate};
-use crate::sensor::{Channel, Measurement, Sensor};
+use crate::sensor::{Channel, Sensor};
+use lpvmpc::{Measurement, Reading};
 use nalgebra::SVector;
 use std::collections::VecDeque;
 use thiserror::Error;
@@ -160,7 +161,7 @@ pub struct World<P, const NX: usize, const NU: usize, const NY: usize, const NL:
     arrived: SVector<f64, NU>,
     output: SVector<f64, NU>,
     mean_output: SVector<f64, NU>,
-    measurement: Measurement<NY>,
+    measurement: Measurement<f64, NY>,
 }
 
 /// Events closer together than this are one, s.
@@ -252,8 +253,7 @@ where
             mean_output: SVector::zeros(),
             measurement: Measurement {
                 t: 0.0,
-                values: [None; NY],
-                ages: [0.0; NY],
+                readings: [None; NY],
             },
         };
         world.measure();
@@ -281,7 +281,7 @@ where
     }
 
     /// What the sensors deliver now.
-    pub fn measurement(&self) -> &Measurement<NY> {
+    pub fn measurement(&self) -> &Measurement<f64, NY> {
         &self.measurement
     }
 
@@ -353,8 +353,10 @@ where
         self.measurement.t = self.time();
         for (i, channel) in self.channels.iter_mut().enumerate() {
             let reading = channel.read(&self.x, self.steps);
-            self.measurement.values[i] = reading.map(|(value, _)| value);
-            self.measurement.ages[i] = reading.map_or(0.0, |(_, age)| age as f64 * self.period);
+            self.measurement.readings[i] = reading.map(|(value, age)| Reading {
+                value,
+                age: age as f64 * self.period,
+            });
         }
     }
 

@@ -20,6 +20,7 @@ const TOLERANCES: Tolerances = Tolerances {
 };
 
 /// A mass on a rail: x = (position, speed), u = acceleration.
+#[derive(Clone)]
 struct Mass;
 
 impl LpvModel<f64, 2, 1, 1> for Mass {
@@ -87,7 +88,7 @@ fn run_mass<P: LpvModel<f64, 2, 1, 1>>(
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),
     };
-    let mut controller = Controller::allocate(Mass, settings).unwrap();
+    let controller = Controller::allocate(Mass, settings).unwrap();
     let experiment = Experiment {
         initial_state: Vector2::zeros(),
         samples: SAMPLES,
@@ -96,7 +97,7 @@ fn run_mass<P: LpvModel<f64, 2, 1, 1>>(
         clock,
         progress,
     };
-    run(&mut controller, plant, &experiment)
+    run(controller, plant, &experiment)
 }
 
 fn stopped() -> Duration {
@@ -152,7 +153,7 @@ fn a_complete_run_is_recorded_whole() {
 #[test]
 fn no_samples_no_motion() {
     let run_of = |samples| {
-        let mut controller = ballbot_controller();
+        let controller = ballbot_controller();
         let experiment = Experiment {
             initial_state: Vector4::new(0.0, 0.1, 0.0, 0.0),
             samples,
@@ -161,7 +162,7 @@ fn no_samples_no_motion() {
             clock: &stopped,
             progress: &|_| (),
         };
-        run(&mut controller, &Ballbot::paper(), &experiment)
+        run(controller, &Ballbot::paper(), &experiment)
     };
     let nothing = run_of(0);
     assert_eq!(nothing.states().count(), 1);
@@ -244,7 +245,7 @@ fn an_infeasible_problem_ends_the_run_and_keeps_its_record() {
 
 #[test]
 fn a_start_that_is_no_number_ends_the_run_at_once() {
-    let mut controller = ballbot_controller();
+    let controller = ballbot_controller();
     let experiment = Experiment {
         initial_state: Vector4::new(0.0, f64::NAN, 0.0, 0.0),
         samples: 5,
@@ -254,7 +255,7 @@ fn a_start_that_is_no_number_ends_the_run_at_once() {
         progress: &|_| (),
     };
     let plant = Ballbot::paper();
-    let trajectory = run(&mut controller, &plant, &experiment);
+    let trajectory = run(controller, &plant, &experiment);
     assert!(trajectory.samples.is_empty());
     assert_eq!(trajectory.states().count(), 1);
     assert!(
@@ -266,7 +267,7 @@ fn a_start_that_is_no_number_ends_the_run_at_once() {
 
 #[test]
 fn bad_tolerances_end_the_run_at_once() {
-    let mut controller = ballbot_controller();
+    let controller = ballbot_controller();
     let experiment = Experiment {
         initial_state: Vector4::zeros(),
         samples: 5,
@@ -279,7 +280,7 @@ fn bad_tolerances_end_the_run_at_once() {
         progress: &|_| (),
     };
     let plant = Ballbot::paper();
-    let trajectory = run(&mut controller, &plant, &experiment);
+    let trajectory = run(controller, &plant, &experiment);
     assert!(trajectory.samples.is_empty());
     assert!(matches!(
         trajectory.ending,
@@ -336,7 +337,7 @@ fn run_ballbot(clock: &dyn Fn() -> Duration) -> Trajectory<4, 1> {
         progress: &|_| (),
     };
     let plant = Ballbot::paper();
-    run(&mut ballbot_controller(), &plant, &experiment)
+    run(ballbot_controller(), &plant, &experiment)
 }
 
 /// Every number of the record but the times per step.

@@ -5,13 +5,13 @@
 )]
 
 use lpvmpc::{
-    BoundId, Bounds, GuardedController, GuardedIterations, GuardedSettings, LpvModel, Quantity,
-    Rk4, Rollout, Side, SolverSettings, TerminalSet, Weights,
+    BoundId, Bounds, GuardedController, GuardedFeedback, GuardedIterations, GuardedSettings,
+    LpvModel, Measurement, Quantity, Reading, Regulator, Rk4, Rollout, Side, SolverSettings,
+    TerminalSet, Weights,
 };
 use lpvmpc_design::lqr_discrete;
 use lpvmpc_sim::{
-    Actuation, ClosedLoop, Course, Ending, GuardedFeedback, GuardedLoop, MeasuredState, Regulator,
-    Tolerances, Unloaded, World, record,
+    Actuation, ClosedLoop, Course, Ending, GuardedLoop, Tolerances, Unloaded, World, record,
 };
 use nalgebra::{DMatrix, Matrix1, Matrix2, Matrix2x1, RowVector2, Vector1, Vector2};
 use std::time::Duration;
@@ -23,7 +23,7 @@ const TOLERANCES: Tolerances = Tolerances {
 const T_S: f64 = 0.1;
 
 /// x = (position [m], speed [m/s]), u = acceleration [m/s^2].
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 struct Mass;
 
 impl LpvModel<f64, 2, 1, 1> for Mass {
@@ -37,7 +37,7 @@ impl LpvModel<f64, 2, 1, 1> for Mass {
 }
 
 type Guarded = GuardedController<Mass, f64, 2, 1, 1>;
-type Feedback = GuardedFeedback<Mass, 2, 1, 1, 3>;
+type Feedback = GuardedFeedback<Mass, f64, 2, 1, 1, 3>;
 
 /// At most 0.5 m/s and 1 m/s^2. The mass is linear, so the LQR's cost decreases by the stage cost
 /// in every level set, and in this one the law keeps the bounds.
@@ -96,7 +96,7 @@ fn controller() -> Guarded {
 fn a_run_is_the_sequence_of_its_samples() {
     let wanted = |t: f64| if t < 2.0 { 20.0 } else { -1.0 };
     let world = World::ideal(Unloaded::<_, 1>(&Mass), Vector2::zeros(), T_S, TOLERANCES);
-    let regulator = Feedback::new(controller(), false);
+    let regulator = Feedback::guarded_feedback(controller(), false);
     let course = Course {
         samples: 120,
         reference: &|t| Vector2::new(wanted(t), 0.0),
@@ -128,12 +128,12 @@ fn a_run_is_the_sequence_of_its_samples() {
 /// applied, and no others.
 #[test]
 fn active_bounds_are_where_the_plan_meets_them() {
-    let mut regulator = Feedback::new(controller(), false);
+    let mut regulator = Feedback::guarded_feedback(controller(), false);
     let (mut speeds, mut forces) = (0, 0);
     for k in 0..60 {
-        let decision = regulator.decide(&|_| Vector2::new(20.0, 0.0), &|| Duration::ZERO);
-        let plan = regulator.prediction();
-        let active = regulator.active_bounds();
+        let command = regulator.decide(&|_| Vector2::new(20.0, 0.0));
+        let plan: Vec<_> = regulator.prediction().collect();
+        let active: Vec<_> = regulator.active_bounds().collect();
         let upper_speed = |stage| {
             active.contains(&BoundId {
                 stage,
@@ -151,14 +151,12 @@ fn active_bounds_are_where_the_plan_meets_them() {
             quantity: Quantity::Input(0),
             side: Side::Upper,
         });
-        assert_eq!(
-            upper_force,
-            decision.u[0] > 1.0 - 1e-9,
-            "{k}: {}",
-            decision.u
-        );
+        assert_eq!(upper_force, command.u[0] > 1.0 - 1e-9, "{k}: {}", command.u);
         forces += usize::from(upper_force);
-        regulator.measured = MeasuredState::known(plan[0], None);
+        regulator.observe(&Measurement {
+            t: (k + 1) as f64 * T_S,
+            readings: [0, 1].map(|i| Some(Reading::fresh(plan[0][i]))),
+        });
     }
     assert!(speeds > 100 && forces > 0, "{speeds} {forces}");
 }

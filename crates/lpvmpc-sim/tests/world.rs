@@ -59,7 +59,7 @@ fn an_ideal_world_measures_the_state_and_obeys_at_once() {
     let measurement = world.measurement();
     assert_eq!(measurement.t, world.time());
     assert_eq!(
-        measurement.values,
+        measurement.readings.map(|reading| Some(reading?.value)),
         [world.state()[0], world.state()[1]].map(Some)
     );
 }
@@ -175,7 +175,10 @@ fn readings(settings: &Settings, samples: usize) -> Vec<[Option<f64>; 2]> {
     (0..samples)
         .map(|_| {
             forward(&mut world, 1);
-            world.measurement().values
+            world
+                .measurement()
+                .readings
+                .map(|reading| Some(reading?.value))
         })
         .collect()
 }
@@ -261,12 +264,20 @@ fn a_late_sensor_delivers_what_it_measured_before() {
         // readings() begins with sample 1, after one step.
         let before = k.checked_sub(3).and_then(|k| in_time[k][0]);
         if k > 2 {
-            assert_eq!(world.measurement().values[0], before, "sample {}", k + 1);
+            assert_eq!(
+                world.measurement().readings[0].map(|reading| reading.value),
+                before,
+                "sample {}",
+                k + 1
+            );
         }
         if before.is_some() {
-            assert_near(world.measurement().ages[0], 3.0 * settings.period);
+            assert_near(
+                world.measurement().readings[0].unwrap().age,
+                3.0 * settings.period,
+            );
         }
-        assert_eq!(world.measurement().ages[1], 0.0);
+        assert_eq!(world.measurement().readings[1].unwrap().age, 0.0);
     }
 }
 
@@ -280,13 +291,16 @@ fn a_stale_reading_is_the_last_one_with_its_own_time() {
     let (mut again, mut oldest) = (0, 0.0_f64);
     for k in 0..fresh.len() {
         forward(&mut world, 1);
-        let age = world.measurement().ages[0];
+        let age = world.measurement().readings[0].unwrap().age;
         let samples = (age / settings.period).round() as usize;
         assert_near(age, samples as f64 * settings.period);
         again += usize::from(samples > 0);
         oldest = oldest.max(age);
         if samples <= k {
-            assert_eq!(world.measurement().values[0], fresh[k - samples][0]);
+            assert_eq!(
+                world.measurement().readings[0].map(|reading| reading.value),
+                fresh[k - samples][0]
+            );
         }
     }
     let part = again as f64 / fresh.len() as f64;
@@ -363,6 +377,6 @@ fn a_sensor_can_measure_a_combination() {
     let mut settings = ideal();
     settings.sensors[0] = Sensor::ideal(Vector2::new(1.0, -0.5));
     let mut world = World::new(Sledge, Vector2::new(0.3, 0.4), settings).unwrap();
-    assert_near(world.measurement().values[0].unwrap(), 0.1);
+    assert_near(world.measurement().readings[0].unwrap().value, 0.1);
     forward(&mut world, 1);
 }

@@ -316,6 +316,11 @@ where
         self.gap
     }
 
+    /// The model.
+    pub fn model(&self) -> &P {
+        &self.model
+    }
+
     /// The settings.
     pub fn settings(&self) -> &ControllerSettings<T, NX, NU, NS> {
         &self.settings

@@ -1,33 +1,49 @@
 //! Inputs on their way to the plant: what acts now, and what will.
 
+use crate::list::List;
 use crate::model::Scalar;
 use nalgebra::SVector;
 
-/// The inputs that have been commanded and what is left of their delay, at most `K` of them.
+/// The inputs that have been commanded and what is left of their delay.
 ///
-/// With a delay of d and a command every t_s, `K` must be at least d / t_s + 2. When there is no
-/// room, the oldest input is forgotten.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DelayLine<T, const NU: usize, const K: usize> {
+/// With a delay of d and a command every t_s, it needs places for d / t_s + 2 of them. When there is
+/// no room, the oldest input is forgotten.
+#[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
+pub struct DelayLine<T: 'static, const NU: usize> {
     /// Time until it acts, s (negative: acts already), and the input; in this order.
-    inputs: [(T, SVector<T, NU>); K],
+    inputs: List<(T, SVector<T, NU>)>,
     length: usize,
 }
 
-impl<T: Scalar, const NU: usize, const K: usize> Default for DelayLine<T, NU, K> {
-    /// Nothing was commanded: the input is zero.
-    fn default() -> Self {
+impl<T: Scalar, const NU: usize> DelayLine<T, NU> {
+    /// Nothing was commanded, so the input is zero. What `memory` contains does not matter.
+    pub fn new(memory: List<(T, SVector<T, NU>)>) -> Self {
         Self {
-            inputs: [(T::zero(), SVector::zeros()); K],
+            inputs: memory,
             length: 0,
         }
     }
-}
 
-impl<T: Scalar, const NU: usize, const K: usize> DelayLine<T, NU, K> {
+    /// The same with memory of its own, for so many `commands`.
+    #[cfg(feature = "alloc")]
+    pub fn allocate(commands: usize) -> Self {
+        Self::new(List::repeat((T::zero(), SVector::zeros()), commands))
+    }
+
+    /// Takes over the inputs of another line, the last ones if there are not places for all.
+    pub fn copy_from(&mut self, other: &Self) {
+        let forgotten = other.length.saturating_sub(self.inputs.len());
+        self.length = other.length - forgotten;
+        let inputs = other.inputs.iter().skip(forgotten).take(self.length);
+        for (place, input) in self.inputs.iter_mut().zip(inputs) {
+            *place = *input;
+        }
+    }
+
     /// The input `u` will act from `delay` s on.
     pub fn command(&mut self, u: SVector<T, NU>, delay: T) {
-        if self.length == K {
+        if self.length == self.inputs.len() {
             self.forget_oldest();
         }
         if let Some(place) = self.inputs.get_mut(self.length) {
@@ -38,7 +54,7 @@ impl<T: Scalar, const NU: usize, const K: usize> DelayLine<T, NU, K> {
 
     /// Time goes on by `duration` s.
     pub fn elapse(&mut self, duration: T) {
-        for (time, _) in &mut self.inputs {
+        for (time, _) in self.inputs.iter_mut().take(self.length) {
             *time -= duration;
         }
         // The second one acts already, so the first one does no more.
@@ -74,7 +90,8 @@ impl<T: Scalar, const NU: usize, const K: usize> DelayLine<T, NU, K> {
     }
 
     fn forget_oldest(&mut self) {
-        self.inputs.copy_within(K.min(1).., 0);
+        let places = self.inputs.len();
+        self.inputs.copy_within(places.min(1).., 0);
         self.length = self.length.saturating_sub(1);
     }
 }

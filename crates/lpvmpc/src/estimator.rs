@@ -2,6 +2,7 @@
 
 mod covariance;
 mod history;
+mod memory;
 mod observation;
 mod settings;
 
@@ -9,7 +10,8 @@ use crate::clock::{Clock, Tick};
 use crate::delay::DelayLine;
 use crate::model::{LpvModel, Scalar};
 pub use covariance::Covariance;
-use history::{Estimate, History, Taken, Trust};
+use history::{Estimate, History, Instant, Taken, Trust};
+pub use memory::{EstimatorArrays, EstimatorMemory};
 use nalgebra::{SMatrix, SVector};
 pub use observation::{Observation, Restart, Verdict};
 pub use settings::{EstimatorError, EstimatorSettings, Gate, Reading};
@@ -22,23 +24,23 @@ pub use settings::{EstimatorError, EstimatorSettings, Gate, Reading};
 /// at the instant when it was taken, and the filter goes through the time since again; so the
 /// estimate is that of a filter that had every reading in time (Bar-Shalom, Li and Kirubarajan,
 /// Estimation with Applications to Tracking and Navigation, 2001, ch. 6.9). For this it remembers
-/// `K` instants, one per [`advance`](Self::advance) and one per reading that was taken between
+/// its last instants, one per [`advance`](Self::advance) and one per reading that was taken between
 /// two: what is older is stale. 1 does where no reading is ever late.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
 pub struct Estimator<
     P,
-    T,
+    T: 'static,
     const NX: usize,
     const NU: usize,
     const NS: usize,
     const NY: usize,
     const ND: usize,
-    const K: usize,
 > {
     model: P,
     settings: EstimatorSettings<T, NX, NU, NY, ND>,
     now: Estimate<T, NX, ND>,
-    history: History<T, NX, NU, NY, ND, K>,
+    history: History<T, NX, NU, NY, ND>,
     rejected: [usize; NY],
     /// Which sensors have been believed since the beginning.
     heard: [bool; NY],
@@ -49,21 +51,14 @@ pub struct Estimator<
     lost: Option<Restart>,
 }
 
-impl<
-    P,
-    T,
-    const NX: usize,
-    const NU: usize,
-    const NS: usize,
-    const NY: usize,
-    const ND: usize,
-    const K: usize,
-> Estimator<P, T, NX, NU, NS, NY, ND, K>
+impl<P, T, const NX: usize, const NU: usize, const NS: usize, const NY: usize, const ND: usize>
+    Estimator<P, T, NX, NU, NS, NY, ND>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
-    /// An estimator that starts from the state `x` without disturbance.
+    /// An estimator that starts from the state `x` without disturbance, and remembers as many
+    /// instants as there is memory for, at least 1.
     ///
     /// # Errors
     /// An [`EstimatorError`] names the first setting that makes no sense.
@@ -71,20 +66,38 @@ where
         model: P,
         settings: EstimatorSettings<T, NX, NU, NY, ND>,
         x: SVector<T, NX>,
+        memory: EstimatorMemory<T, NX, NU, NY, ND>,
     ) -> Result<Self, EstimatorError> {
         settings.check()?;
+        if memory.0.is_empty() {
+            return Err(EstimatorError::Memory);
+        }
         let now = settings.initial(x);
         Ok(Self {
             model,
             settings,
             now,
-            history: History::new(now),
+            history: History::new(memory.0, now),
             rejected: [0; NY],
             heard: [false; NY],
             clock: Clock::default(),
             silence: T::zero(),
             lost: None,
         })
+    }
+
+    /// The same with memory of its own, for so many `instants`.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    #[cfg(feature = "alloc")]
+    pub fn allocate(
+        model: P,
+        settings: EstimatorSettings<T, NX, NU, NY, ND>,
+        x: SVector<T, NX>,
+        instants: usize,
+    ) -> Result<Self, EstimatorError> {
+        Self::new(model, settings, x, EstimatorMemory::allocate(instants))
     }
 
     /// Starts again from the state `x`. The clock goes on.
@@ -109,7 +122,7 @@ where
         let offsets = |of: &Self| (of.settings.state_offset, of.settings.input_offset);
         if offsets(self) == offsets(previous) {
             self.now = previous.now;
-            self.history = previous.history.clone();
+            self.history.copy_from(&previous.history);
         } else {
             let disturbance = &self.settings.initial_disturbance;
             let mut covariance = self.settings.spread(&SVector::zeros(), disturbance);
@@ -129,7 +142,7 @@ where
 
     fn begin(&mut self, now: Estimate<T, NX, ND>) {
         self.now = now;
-        self.history = History::new(now);
+        self.history.begin(now);
         self.rejected = [0; NY];
         self.silence = T::zero();
         self.lost = None;
@@ -212,10 +225,22 @@ where
     /// longer than [`Gate::longest_gap`], or that is not finite any more, is given up, and begins
     /// anew with the first measurement that has a reading; so it does when the stamps go back by
     /// more than that. A measurement out of order changes nothing.
-    pub fn observe<const C: usize>(
+    pub fn observe(
         &mut self,
         stamp: f64,
-        line: &mut DelayLine<T, NU, C>,
+        line: &mut DelayLine<T, NU>,
+        readings: &[Option<Reading<T>>; NY],
+    ) -> Observation<NY> {
+        let needed = self.settings.needed(readings);
+        let mut observation = self.observe_needed(stamp, line, &needed);
+        self.settings.mark_unneeded(&mut observation.verdicts);
+        observation
+    }
+
+    fn observe_needed(
+        &mut self,
+        stamp: f64,
+        line: &mut DelayLine<T, NU>,
         readings: &[Option<Reading<T>>; NY],
     ) -> Observation<NY> {
         let longest_gap = self.settings.gate.longest_gap;
@@ -250,7 +275,7 @@ where
     }
 
     /// Moves the estimate on by `duration` s under the inputs of `line`.
-    fn elapse<const C: usize>(&mut self, duration: T, line: &mut DelayLine<T, NU, C>) {
+    fn elapse(&mut self, duration: T, line: &mut DelayLine<T, NU>) {
         self.silence += duration;
         // Negated, so that a time that is not a number is too long.
         if self.lost.is_none() && !(self.silence <= self.settings.gate.longest_gap) {
@@ -305,15 +330,17 @@ where
     }
 
     /// Corrects the estimate with what the sensors delivered, and says what became of each
-    /// reading. The work is at most `K` predictions.
+    /// reading. The work is at most one prediction for each instant that is remembered.
     pub fn update(&mut self, readings: &[Option<Reading<T>>; NY]) -> [Verdict; NY] {
         let mut verdicts = [Verdict::Missing; NY];
-        for (i, (verdict, reading)) in verdicts.iter_mut().zip(readings).enumerate() {
+        let needed = self.settings.needed(readings);
+        for (i, (verdict, reading)) in verdicts.iter_mut().zip(&needed).enumerate() {
             if let Some(reading) = reading {
                 *verdict = self.file(i, reading);
             }
         }
         self.go_through_again(&mut verdicts);
+        self.settings.mark_unneeded(&mut verdicts);
         if verdicts.iter().any(|verdict| verdict.is_used()) {
             self.silence = T::zero();
         }
@@ -441,7 +468,9 @@ where
         value: T,
         estimate: &Estimate<T, NX, ND>,
     ) -> (T, SVector<T, NX>, SVector<T, ND>) {
-        let c_z = self.settings.c.row(i).transpose();
+        // Not `row(i)`, which could panic.
+        let rows = self.settings.c.row_iter().nth(i);
+        let c_z = rows.map_or_else(SVector::zeros, |row| row.transpose());
         let c_d = -(self.settings.state_offset.transpose() * c_z);
         let expected = c_z.dot(&estimate.z) + c_d.dot(&estimate.d);
         (value - expected, c_z, c_d)

@@ -16,6 +16,7 @@ mod plan;
 mod program;
 mod search;
 mod settings;
+mod take_over;
 mod tube;
 
 use crate::list::List;

@@ -30,6 +30,7 @@ mod plan;
 mod policy;
 mod predictor;
 mod ramp;
+mod regulator;
 pub mod riccati;
 mod rows;
 mod settings;
@@ -45,8 +46,8 @@ pub use clock::{Clock, Tick};
 pub use controller::{Controller, Reference};
 pub use delay::DelayLine;
 pub use estimator::{
-    Covariance, Estimator, EstimatorError, EstimatorSettings, Gate, Observation, Reading, Restart,
-    Verdict,
+    Covariance, Estimator, EstimatorArrays, EstimatorError, EstimatorMemory, EstimatorSettings,
+    Gate, Observation, Reading, Restart, Verdict,
 };
 pub use farkas::infeasibility_margin;
 pub use guarded::{
@@ -55,7 +56,6 @@ pub use guarded::{
     Rollout, SetPoints, TerminalSet, share_of_bounds,
 };
 pub use kkt::{KktResidual, kkt_residual};
-pub use last_plan::LastPlan;
 pub use list::List;
 pub use memory::{
     Capacity, ControllerArrays, ControllerMemory, SolverArrays, SolverMemory, WorkspaceArrays,
@@ -65,12 +65,21 @@ pub use model::{LpvModel, Scalar};
 pub use ocp::{Bounds, Common, GeneralRow, Ocp, Penalty, Softness, Stage, Terminal};
 pub use predictor::{Predictor, Rk4};
 pub use ramp::RampedInput;
+pub use regulator::{
+    AnyPlanner, Belief, Command, FeedbackArrays, FeedbackMemory, FeedbackSettings, Guard, Guarded,
+    GuardedPlannerMemory, Held, MeasuredState, Measurement, OutputFeedback, Planned, Planner,
+    Ramped, Regulator, Standalone,
+};
+#[cfg(feature = "alloc")]
+pub use regulator::{GuardedFeedback, StateFeedback};
 pub use settings::{
     ControllerError, ControllerSettings, InputReference, Iterations, Scheduling,
     TerminalIngredient, Weights, exact_prices,
 };
 pub use shaping::{Motion, MoveLimits, SmoothMove};
-pub use solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
+pub use solution::{
+    ActiveRow, ActiveSet, BoundId, PackedRow, Part, Quantity, Side, Solution, Status,
+};
 pub use solver::{Solver, SolverSettings, WarmStart, cost};
 pub use steady_state::{SteadyState, SteadyStateProblem};
 pub use workspace::Workspace;

@@ -104,7 +104,20 @@ pub struct Rk4 {
     pub substeps: usize,
 }
 
+/// A prediction over more steps than this is not worth its time.
+const MOST_STEPS: usize = 1_000;
+
 impl Rk4 {
+    /// As few steps over `duration` s as none is longer than `longest_step` s, at most 1000.
+    pub fn with_steps_up_to<T: Scalar>(longest_step: T, duration: T) -> Self {
+        let mut substeps = 1;
+        while convert::<f64, T>(substeps as f64) * longest_step < duration && substeps < MOST_STEPS
+        {
+            substeps += 1;
+        }
+        Self { substeps }
+    }
+
     /// x_{k+1} = A_d x_k + B_d u_k over one sample of `t_s` seconds, for the constant
     /// continuous-time pair (`a`, `b`).
     ///

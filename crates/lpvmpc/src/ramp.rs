@@ -38,10 +38,13 @@ impl<P, const NX: usize> RampedInput<P, NX> {
         joint: &SVector<T, NXU>,
     ) -> (SVector<T, NX>, SVector<T, NU>) {
         const { assert!(NXU == NX + NU, "NXU must be NX + NU") };
-        (
-            SVector::from_iterator(joint.iter().copied().take(NX)),
-            SVector::from_iterator(joint.iter().copied().skip(NX)),
-        )
+        let mut x = SVector::<T, NX>::zeros();
+        let mut u = SVector::<T, NU>::zeros();
+        let places = x.iter_mut().chain(u.iter_mut());
+        for (place, value) in places.zip(joint.iter()) {
+            *place = *value;
+        }
+        (x, u)
     }
 
     /// The plant's pair (A, B) as that of the plant with its inputs as states.

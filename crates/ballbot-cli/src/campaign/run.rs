@@ -261,7 +261,7 @@ pub(super) fn has_fallen(x: &Vector4<f64>) -> bool {
 }
 
 pub(super) fn settings(prepared: &Prepared) -> Result<&GuardedSettings<f64>, ScenarioError> {
-    prepared.guarded.as_ref().ok_or_else(no_certificate)
+    prepared.guarded().ok_or_else(no_certificate)
 }
 
 fn no_certificate() -> ScenarioError {

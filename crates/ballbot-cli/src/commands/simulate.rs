@@ -101,7 +101,7 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
     };
     logs.iter()
         .try_for_each(|path| output::check_writable(path))?;
-    let Record { planes, motors } = record(&prepared)?;
+    let Record { planes, motors, .. } = record(&prepared)?;
     let (trajectories, rows): (Vec<_>, Vec<_>) = planes
         .into_iter()
         .map(|recording| (recording.trajectory, recording.log))

@@ -1,6 +1,7 @@
 //! The recent past of an estimate: enough to go through it again with a reading that comes late.
 
 use super::Covariance;
+use crate::list::List;
 use crate::model::Scalar;
 use nalgebra::SVector;
 
@@ -54,7 +55,7 @@ pub(super) struct Instant<T, const NX: usize, const NU: usize, const NY: usize, 
 impl<T: Scalar, const NX: usize, const NU: usize, const NY: usize, const ND: usize>
     Instant<T, NX, NU, NY, ND>
 {
-    fn new(prior: Option<Estimate<T, NX, ND>>) -> Self {
+    pub(super) fn new(prior: Option<Estimate<T, NX, ND>>) -> Self {
         Self {
             prior,
             readings: [None; NY],
@@ -69,35 +70,62 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NY: usize, const ND: usi
     }
 }
 
-/// The last instants, at most `K`, in a ring.
-#[derive(Clone, Debug)]
+/// The last instants in a ring.
+#[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
 pub(super) struct History<
-    T,
+    T: 'static,
     const NX: usize,
     const NU: usize,
     const NY: usize,
     const ND: usize,
-    const K: usize,
 > {
-    ring: [Instant<T, NX, NU, NY, ND>; K],
+    ring: List<Instant<T, NX, NU, NY, ND>>,
     /// The place of the oldest.
     start: usize,
     length: usize,
 }
 
-impl<T, const NX: usize, const NU: usize, const NY: usize, const ND: usize, const K: usize>
-    History<T, NX, NU, NY, ND, K>
+impl<T, const NX: usize, const NU: usize, const NY: usize, const ND: usize>
+    History<T, NX, NU, NY, ND>
 where
     T: Scalar,
 {
-    /// A past of one instant, which is now.
-    pub(super) fn new(now: Estimate<T, NX, ND>) -> Self {
-        const { assert!(K > 0, "the present is an instant, too") };
-        Self {
-            ring: [Instant::new(Some(now)); K],
+    /// A past of one instant, which is now, in a `ring` with places for one at least.
+    pub(super) fn new(ring: List<Instant<T, NX, NU, NY, ND>>, now: Estimate<T, NX, ND>) -> Self {
+        let mut history = Self {
+            ring,
             start: 0,
             length: 1,
+        };
+        history.begin(now);
+        history
+    }
+
+    /// Forgets the past: there is one instant, which is now.
+    pub(super) fn begin(&mut self, now: Estimate<T, NX, ND>) {
+        (self.start, self.length) = (0, 1);
+        if let Some(first) = self.ring.first_mut() {
+            *first = Instant::new(Some(now));
         }
+    }
+
+    /// The past of another history, as far back as there are places for.
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        let forgotten = other.length.saturating_sub(self.ring.len());
+        (self.start, self.length) = (0, other.length - forgotten);
+        for (i, place) in self.ring.iter_mut().take(self.length).enumerate() {
+            if let Some(instant) = other.get(forgotten + i) {
+                *place = *instant;
+            }
+        }
+    }
+
+    /// Where the instant `i`, from the oldest, is in the ring.
+    fn place(&self, i: usize) -> Option<usize> {
+        let place = self.start + i;
+        let beyond = place.checked_sub(self.ring.len());
+        (i < self.length).then(|| beyond.unwrap_or(place))
     }
 
     pub(super) fn len(&self) -> usize {
@@ -106,11 +134,12 @@ where
 
     /// The instant `i`, from the oldest.
     pub(super) fn get(&self, i: usize) -> Option<&Instant<T, NX, NU, NY, ND>> {
-        (i < self.length).then(|| self.ring.get((self.start + i) % K))?
+        self.ring.get(self.place(i)?)
     }
 
     pub(super) fn get_mut(&mut self, i: usize) -> Option<&mut Instant<T, NX, NU, NY, ND>> {
-        (i < self.length).then(|| self.ring.get_mut((self.start + i) % K))?
+        let place = self.place(i)?;
+        self.ring.get_mut(place)
     }
 
     /// The input `u` acted for `duration` s, and the estimate is `prior` now.
@@ -118,7 +147,7 @@ where
         if let Some(last) = self.get_mut(self.length - 1) {
             (last.u, last.duration) = (*u, duration);
         }
-        if self.length == K {
+        if self.length == self.ring.len() {
             self.forget_oldest();
         }
         self.length += 1;
@@ -144,7 +173,7 @@ where
 
     /// Makes an instant `after` s after the instant `place`, before the next one.
     fn split(&mut self, mut place: usize, after: T) -> Option<usize> {
-        if self.length == K {
+        if self.length == self.ring.len() {
             // Without the instant before it, the new one could not be reached.
             place = place.checked_sub(1)?;
             self.forget_oldest();
@@ -177,7 +206,7 @@ where
     }
 
     fn forget_oldest(&mut self) {
-        self.start = (self.start + 1) % K;
+        self.start = self.place(1).unwrap_or(0);
         self.length -= 1;
     }
 }

@@ -56,7 +56,7 @@ pub struct Observation<const NY: usize> {
 
 impl<const NY: usize> Observation<NY> {
     /// Every reading was refused for the same reason.
-    pub(super) fn refused<T>(readings: &[Option<Reading<T>>; NY], verdict: Verdict) -> Self {
+    pub(crate) fn refused<T>(readings: &[Option<Reading<T>>; NY], verdict: Verdict) -> Self {
         let of = |reading: &Option<Reading<T>>| match reading {
             Some(_) => verdict,
             None => Verdict::Missing,

@@ -40,7 +40,8 @@ pub struct EstimatorSettings<T, const NX: usize, const NU: usize, const NY: usiz
     pub state_noise: SVector<T, NX>,
     /// Variance that the disturbance gains per second, >= 0: how fast it may wander.
     pub disturbance_noise: SVector<T, ND>,
-    /// Variances of the measurements, in squared units, > 0.
+    /// Variances of the measurements, in squared units, > 0; infinite for a sensor that the filter
+    /// does without.
     pub measurement_noise: SVector<T, NY>,
     /// Variances of the state at the start, >= 0.
     pub initial_state: SVector<T, NX>,
@@ -117,6 +118,8 @@ pub enum EstimatorError {
     },
     /// The gate lets nothing through.
     Gate,
+    /// There is no memory for the present instant.
+    Memory,
 }
 
 impl fmt::Display for EstimatorError {
@@ -131,6 +134,10 @@ impl fmt::Display for EstimatorError {
                 f,
                 "the variance of {quantity} {component} must be finite and not negative, that of \
                  a measurement positive"
+            ),
+            Self::Memory => write!(
+                f,
+                "the estimator needs memory for one instant at least, the present"
             ),
             Self::Gate => write!(
                 f,
@@ -148,13 +155,25 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NY: usize, const ND: usi
 {
     /// Enough steps for `duration` s.
     pub(super) fn predictor(&self, duration: T) -> Rk4 {
-        let mut substeps = 1;
-        while convert::<f64, T>(substeps as f64) * self.longest_step < duration
-            && substeps < MOST_STEPS
-        {
-            substeps += 1;
+        Rk4::with_steps_up_to(self.longest_step, duration)
+    }
+
+    /// The readings of the sensors that the filter does not do without.
+    pub(super) fn needed(&self, readings: &[Option<Reading<T>>; NY]) -> [Option<Reading<T>>; NY] {
+        let mut needed = *readings;
+        for (reading, noise) in needed.iter_mut().zip(&self.measurement_noise) {
+            *reading = reading.filter(|_| noise.is_finite());
         }
-        Rk4 { substeps }
+        needed
+    }
+
+    /// Says of the other sensors that they are not needed.
+    pub(super) fn mark_unneeded(&self, verdicts: &mut [Verdict; NY]) {
+        for (verdict, noise) in verdicts.iter_mut().zip(&self.measurement_noise) {
+            if !noise.is_finite() {
+                *verdict = Verdict::NotNeeded;
+            }
+        }
     }
 
     /// What is known at the start from the state `x`.
@@ -226,7 +245,12 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NY: usize, const ND: usi
                 "the measurement" => *variance > T::zero(),
                 _ => *variance >= T::zero(),
             };
-            let wrong = |variance: &T| !(least_allowed(variance) && variance.is_finite());
+            // A sensor of infinite variance is one that is not needed.
+            let unneeded =
+                |variance: &T| quantity == "the measurement" && *variance == convert(f64::INFINITY);
+            let wrong = |variance: &T| {
+                !(least_allowed(variance) && (variance.is_finite() || unneeded(variance)))
+            };
             if let Some(component) = variances.iter().position(wrong) {
                 return Err(EstimatorError::Variance {
                     quantity,
@@ -247,6 +271,3 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NY: usize, const ND: usi
         }
     }
 }
-
-/// A prediction over more steps than this is not worth its time.
-const MOST_STEPS: usize = 1_000;

@@ -1,6 +1,6 @@
 //! Time by stamps: its beginning, gaps, other clocks, in both precisions.
 
-use crate::pendulum::{Observer, Pendulum, settings};
+use crate::pendulum::{INSTANTS, Observer, Pendulum, settings};
 use lpvmpc::{
     Clock, DelayLine, Estimator, EstimatorSettings, Gate, LpvModel, Observation, Reading, Restart,
     Rk4, Tick, Verdict,
@@ -12,12 +12,10 @@ const UNIX: f64 = 1.8e9;
 
 /// The held-up pendulum under an unknown torque, observed at stamps from `start` on: the estimator
 /// after `samples` measurements, and the line of its inputs.
-fn observed(
-    start: f64,
-    samples: usize,
-) -> (Observer<Pendulum>, DelayLine<f64, 1, 4>, Vector2<f64>) {
-    let mut estimator = Observer::new(Pendulum, settings(), Vector2::zeros()).unwrap();
-    let mut line = DelayLine::default();
+fn observed(start: f64, samples: usize) -> (Observer<Pendulum>, DelayLine<f64, 1>, Vector2<f64>) {
+    let mut estimator =
+        Observer::allocate(Pendulum, settings(), Vector2::zeros(), INSTANTS).unwrap();
+    let mut line = DelayLine::allocate(4);
     let mut x = Vector2::new(0.05, 0.0);
     for k in 0..samples {
         let stamp = start + k as f64 * T_S;
@@ -184,8 +182,9 @@ fn unix_time_works_in_single_precision() {
     };
     let run = |start: f64| {
         let mut estimator =
-            Estimator::<_, f32, 2, 1, 1, 1, 1, 8>::new(Single, settings, SVector::zeros()).unwrap();
-        let mut line = DelayLine::<f32, 1, 4>::default();
+            Estimator::<_, f32, 2, 1, 1, 1, 1>::allocate(Single, settings, SVector::zeros(), 8)
+                .unwrap();
+        let mut line = DelayLine::<f32, 1>::allocate(4);
         let mut x = Vector2::new(0.05_f32, 0.0);
         for k in 0..300 {
             let value = x[0] + 1e-3 * (k as f32).sin();

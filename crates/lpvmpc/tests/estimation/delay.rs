@@ -9,7 +9,7 @@ fn stretches_are_those_of_the_definition() {
     let mut rng = Rng::new(3);
     for _ in 0..200 {
         let (delay, period) = (rng.uniform(0.0, 0.2), 0.05);
-        let mut line = DelayLine::<f64, 1, 8>::default();
+        let mut line = DelayLine::<f64, 1>::allocate(8);
         let mut commands: Vec<(f64, f64)> = Vec::new();
         for k in 0..30 {
             let now = f64::from(k) * period;
@@ -38,7 +38,7 @@ fn stretches_are_those_of_the_definition() {
 
 #[test]
 fn without_room_the_oldest_input_is_forgotten() {
-    let mut line = DelayLine::<f64, 1, 2>::default();
+    let mut line = DelayLine::<f64, 1>::allocate(2);
     for (u, delay) in [(1.0, 0.0), (2.0, 0.1), (3.0, 0.2)] {
         line.command(Vector1::new(u), delay);
     }
@@ -46,7 +46,7 @@ fn without_room_the_oldest_input_is_forgotten() {
     line.for_each(0.3, |_, u| seen.push(u[0]));
     assert_eq!(seen, [0.0, 2.0, 3.0]);
     // A line without room holds nothing, and does not fail.
-    let mut none = DelayLine::<f64, 1, 0>::default();
+    let mut none = DelayLine::<f64, 1>::allocate(0);
     none.command(Vector1::new(1.0), 0.0);
     none.elapse(1.0);
     none.for_each(0.1, |_, u| assert_eq!(u[0], 0.0));

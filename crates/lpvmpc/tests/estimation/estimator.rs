@@ -1,6 +1,6 @@
 //! The estimator against a dense textbook filter, statistics, and what it has to find.
 
-use crate::pendulum::{Observer, Pendulum, settings};
+use crate::pendulum::{INSTANTS, Observer, Pendulum, settings};
 use crate::rng::Rng;
 use lpvmpc::{Estimator, EstimatorError, EstimatorSettings, Gate, LpvModel, Reading, Rk4, Verdict};
 use nalgebra::{Matrix1x2, Matrix2, Matrix3, SMatrix, SVector, Vector1, Vector2, Vector3};
@@ -39,7 +39,8 @@ fn mixed() -> EstimatorSettings<f64, 2, 1, 1, 1> {
 fn it_is_the_textbook_filter_of_the_joint_system() {
     let settings = mixed();
     let mut rng = Rng::new(1);
-    let mut estimator = Observer::new(Linear, settings, Vector2::new(0.05, 0.0)).unwrap();
+    let mut estimator =
+        Observer::allocate(Linear, settings, Vector2::new(0.05, 0.0), INSTANTS).unwrap();
     // The joint system in (x, d), written out: x_dot = A (x + E_x d) + B (u + E_u d), sampled by
     // its own Taylor series, y = x_1.
     let (a, b) = Linear.matrices(&Vector1::zeros());
@@ -101,7 +102,8 @@ fn its_errors_have_the_covariance_that_it_states() {
         let settings = settings();
         let mut truth = Vector2::new(0.1 * rng.normal(), 0.1_f64.sqrt() * rng.normal());
         let mut d = 0.5 * rng.normal();
-        let mut estimator = Observer::new(Linear, settings, Vector2::zeros()).unwrap();
+        let mut estimator =
+            Observer::allocate(Linear, settings, Vector2::zeros(), INSTANTS).unwrap();
         for _ in 0..100 {
             // Anything that keeps the motion small.
             let u = Vector1::new(-20.0 * estimator.state()[0] - 8.0 * estimator.state()[1]);
@@ -141,7 +143,7 @@ fn held_upright(
     torque: f64,
     offset: f64,
 ) -> (Observer<Pendulum>, Vector2<f64>) {
-    let mut estimator = Observer::new(Pendulum, settings, Vector2::zeros()).unwrap();
+    let mut estimator = Observer::allocate(Pendulum, settings, Vector2::zeros(), INSTANTS).unwrap();
     let mut z = Vector2::new(0.1, 0.0);
     for _ in 0..2000 {
         let model = estimator.model_state();
@@ -216,8 +218,7 @@ fn the_covariance_stays_positive_in_single_precision() {
             longest_gap: f32::INFINITY,
         },
     };
-    let mut estimator =
-        Estimator::<_, _, _, _, _, _, _, 1>::new(Single, settings, Vector2::zeros()).unwrap();
+    let mut estimator = Estimator::allocate(Single, settings, Vector2::zeros(), 1).unwrap();
     for k in 0..200_000 {
         estimator.advance(&Vector1::zeros(), 0.001);
         estimator.update(&[Some(Reading::fresh(0.0))]);
@@ -233,7 +234,8 @@ fn the_covariance_stays_positive_in_single_precision() {
 
 #[test]
 fn without_readings_it_predicts_and_grows_less_certain() {
-    let mut estimator = Observer::new(Pendulum, settings(), Vector2::new(0.1, 0.0)).unwrap();
+    let mut estimator =
+        Observer::allocate(Pendulum, settings(), Vector2::new(0.1, 0.0), INSTANTS).unwrap();
     let mut alone = Vector2::new(0.1, 0.0);
     let mut last = 0.0;
     for _ in 0..20 {
@@ -246,7 +248,7 @@ fn without_readings_it_predicts_and_grows_less_certain() {
         last = trace;
     }
     estimator.reset(Vector2::new(0.1, 0.0));
-    let fresh = Observer::new(Pendulum, settings(), Vector2::new(0.1, 0.0)).unwrap();
+    let fresh = Observer::allocate(Pendulum, settings(), Vector2::new(0.1, 0.0), INSTANTS).unwrap();
     assert_eq!(estimator.covariance(), fresh.covariance());
     assert_eq!(estimator.state(), fresh.state());
 }
@@ -256,7 +258,7 @@ fn settings_that_make_no_sense_are_named() {
     let refused = |change: &dyn Fn(&mut EstimatorSettings<f64, 2, 1, 1, 1>)| {
         let mut settings = settings();
         change(&mut settings);
-        Observer::new(Pendulum, settings, Vector2::zeros())
+        Observer::allocate(Pendulum, settings, Vector2::zeros(), INSTANTS)
             .err()
             .unwrap()
     };
@@ -292,8 +294,8 @@ fn a_late_reading_corrects_the_state_as_it_was() {
         ..mixed()
     };
     let start = Vector2::new(0.1, -0.2);
-    let mut in_time = Observer::new(Linear, settings, start).unwrap();
-    let mut late = Observer::new(Linear, settings, start).unwrap();
+    let mut in_time = Observer::allocate(Linear, settings, start, INSTANTS).unwrap();
+    let mut late = Observer::allocate(Linear, settings, start, INSTANTS).unwrap();
     let u = Vector1::new(0.6);
     for (i, age) in [0.01, 0.03, 0.05, 0.02].into_iter().enumerate() {
         let value = 0.05 + 0.01 * i as f64;

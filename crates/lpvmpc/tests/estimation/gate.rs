@@ -1,6 +1,6 @@
 //! Readings that must not be believed.
 
-use crate::pendulum::{Observer, Pendulum, settings};
+use crate::pendulum::{INSTANTS, Observer, Pendulum, settings};
 use lpvmpc::{Reading, Rk4, Verdict};
 use nalgebra::{Vector1, Vector2};
 
@@ -8,7 +8,8 @@ const T_S: f64 = 0.01;
 
 /// An estimator that has settled at the upright pendulum, and the held-up pendulum itself.
 fn settled() -> Observer<Pendulum> {
-    let mut estimator = Observer::new(Pendulum, settings(), Vector2::zeros()).unwrap();
+    let mut estimator =
+        Observer::allocate(Pendulum, settings(), Vector2::zeros(), INSTANTS).unwrap();
     for _ in 0..500 {
         estimator.advance(&Vector1::zeros(), T_S);
         estimator.update(&[Some(Reading::fresh(0.0))]);

@@ -103,7 +103,7 @@ fn whatever_the_ages_the_estimate_is_that_from_all_readings_at_once() {
     for run in 0..20 {
         let mut x = Vector3::new(0.1 * rng.normal(), 0.3 * rng.normal(), 0.5 * rng.normal());
         let mut estimator =
-            Estimator::<_, f64, 2, 1, 1, 2, 1, 16>::new(Linear, settings, Vector2::zeros())
+            Estimator::<_, f64, 2, 1, 1, 2, 1>::allocate(Linear, settings, Vector2::zeros(), 16)
                 .unwrap();
         let (mut taken, mut inputs) = (Vec::<Taken>::new(), Vec::new());
         for now in 0..SAMPLES {
@@ -167,8 +167,10 @@ fn whatever_the_ages_the_estimate_is_that_from_all_readings_at_once() {
 #[test]
 fn readings_from_between_two_samples_find_their_place() {
     let settings = two_sensors();
-    let new =
-        || Estimator::<_, f64, 2, 1, 1, 2, 1, 32>::new(Linear, settings, Vector2::zeros()).unwrap();
+    let new = || {
+        Estimator::<_, f64, 2, 1, 1, 2, 1>::allocate(Linear, settings, Vector2::zeros(), 32)
+            .unwrap()
+    };
     let (mut in_time, mut late) = (new(), new());
     let u = Vector1::new(0.7);
     let times = [0.002, 0.005, 0.009, 0.0125, 0.02];
@@ -203,7 +205,7 @@ fn readings_from_between_two_samples_find_their_place() {
 #[test]
 fn what_is_older_than_the_memory_is_stale_and_what_comes_twice_is_said() {
     let mut estimator =
-        Estimator::<_, f64, 2, 1, 1, 2, 1, 4>::new(Linear, two_sensors(), Vector2::zeros())
+        Estimator::<_, f64, 2, 1, 1, 2, 1>::allocate(Linear, two_sensors(), Vector2::zeros(), 4)
             .unwrap();
     for _ in 0..10 {
         estimator.advance(&Vector1::zeros(), T_S);

@@ -48,4 +48,7 @@ pub fn settings() -> EstimatorSettings<f64, 2, 1, 1, 1> {
 }
 
 /// An estimator of the pendulum's state and the torque that remembers eight instants.
-pub type Observer<P> = Estimator<P, f64, 2, 1, 1, 1, 1, 8>;
+pub type Observer<P> = Estimator<P, f64, 2, 1, 1, 1, 1>;
+
+/// Instants that it remembers.
+pub const INSTANTS: usize = 8;

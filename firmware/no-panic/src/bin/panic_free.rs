@@ -1,12 +1,15 @@
-//! Steps controllers of the ballbot on inputs that the compiler knows nothing about, in `f32` and
-//! in `f64`, and maps the torques to the motors: this image must link.
+//! Steps controllers and regulators of the ballbot on inputs that the compiler
+//! knows nothing about, in `f32` and in `f64`, and maps the torques to the motors: this image must
+//! link.
 #![no_std]
 #![no_main]
 
-use ballbot::{Ballbot, PlaneTorques, Wheels};
+use ballbot::{
+    Ballbot, Held, OutputFeedback, PlaneTorques, Ramped, RobotRegulator, RobotState, Wheels,
+};
 use core::hint::black_box;
-use lpvmpc::{Bounds, Controller, Reference, Scalar, Workspace};
-use nalgebra::{Vector1, Vector3, Vector4};
+use lpvmpc::{Bounds, Controller, Measurement, Reference, Regulator, Scalar, Workspace};
+use nalgebra::{Vector1, Vector3, Vector4, convert};
 use no_panic as _;
 
 #[cortex_m_rt::entry]
@@ -14,6 +17,8 @@ fn main() -> ! {
     loop {
         step::<f32>();
         step::<f64>();
+        regulate::<f32>();
+        regulate::<f64>();
     }
 }
 
@@ -45,5 +50,37 @@ fn step<T: Scalar>() {
         black_box(plan);
         black_box(left.first([needed, taken]));
         black_box(wheels.motors(&Vector3::new(torque, torque, T::zero())));
+    }
+}
+
+/// A sample of a whole robot's regulator, and of a plane whose torque moves in ramps.
+#[inline(never)]
+fn regulate<T: Scalar>() {
+    let reference: &dyn Fn(f64) -> RobotState<T> = &|t| black_box(RobotState::repeat(convert(t)));
+    let measurement: Option<&Measurement<T, 10>> = black_box(None);
+    let robot: Option<&mut RobotRegulator<T, Held<T>>> = black_box(None);
+    let before: Option<&RobotRegulator<T, Held<T>>> = black_box(None);
+    if let (Some(robot), Some(measurement)) = (robot, measurement) {
+        if let Some(before) = before {
+            robot.take_over(before);
+        }
+        black_box(robot.observe(measurement));
+        black_box(robot.decide(reference));
+        black_box(robot.between());
+        black_box(robot.cost());
+    }
+    let reference: &dyn Fn(f64) -> Vector4<T> = &|t| black_box(Vector4::repeat(convert(t)));
+    let measurement: Option<&Measurement<T, 4>> = black_box(None);
+    let plane: Option<&mut OutputFeedback<T, Ramped<T>>> = black_box(None);
+    let before: Option<&OutputFeedback<T, Ramped<T>>> = black_box(None);
+    let workspace: Option<&mut Workspace<T, 5, 1>> = black_box(None);
+    if let (Some(plane), Some(measurement), Some(workspace)) = (plane, measurement, workspace) {
+        if let Some(before) = before {
+            plane.take_over(before);
+        }
+        black_box(plane.observe(measurement));
+        black_box(plane.decide(reference, workspace));
+        black_box(plane.between());
+        black_box((plane.cost(), plane.predicted(0), plane.active_bound(0)));
     }
 }

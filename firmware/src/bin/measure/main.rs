@@ -1,5 +1,5 @@
-//! Steps the controllers on recorded states and prints torques and what they cost: instructions,
-//! stack, RAM. `firmware_check`, an example of `ballbot-scenario`, reads the output.
+//! Steps bare controllers on recorded states, and a whole robot's regulator on recorded readings, and
+//! prints torques and what they cost: instructions, stack, RAM. `firmware_check`, an example of `ballbot-scenario`, reads the output.
 #![no_std]
 #![no_main]
 
@@ -11,17 +11,21 @@ use ballbot::Wheels;
 use cortex_m::singleton;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::{debug, hprintln};
-use firmware::{Controller, ControllerMemory, Recording, Workspace, WorkspaceMemory, recorded};
+use firmware::{
+    Controller, ControllerMemory, Descent, Recording, RobotMemory, RobotRecording, RobotRegulator,
+    Workspace, WorkspaceMemory, recorded,
+};
 use instructions::InstructionCounter;
-use lpvmpc::ControllerSettings;
+use lpvmpc::{ControllerSettings, Regulator};
 use nalgebra::{Vector3, Vector4};
 
 type Memory = &'static mut ControllerMemory;
 
 #[entry]
 fn main() -> ! {
-    let (Some(peripherals), Some(memory), Some([x, y, tight, descent])) = (
+    let (Some(peripherals), Some(robot), Some(memory), Some([x, y, tight, descent])) = (
         cortex_m::Peripherals::take(),
+        singleton!(ROBOT: RobotMemory = RobotMemory::default()),
         singleton!(WORKSPACE: WorkspaceMemory = WorkspaceMemory::default()),
         singleton!(PLANES: [ControllerMemory; 4] = [ControllerMemory::default(); 4]),
     ) else {
@@ -44,9 +48,19 @@ fn main() -> ! {
     let mut plane = [set_up(recording, &recording.settings(), tight)];
     deepest = deepest.max(replay(recording, &mut plane, workspace, &mut counter));
     let recording = &recorded::LISSAJOUS;
-    let mut plane = set_up(recording, &recording.descent(8), descent);
+    let iterations = Descent {
+        tolerance: 1e-3,
+        most: 8,
+        prices: [None, Some(1e5), Some(1e5), Some(1e5)],
+    };
+    let settings = recording.with_descent(&iterations, 4);
+    let mut plane = set_up(recording, &settings, descent);
     deepest = deepest.max(descend(recording, &mut plane, workspace, &mut counter));
     hprintln!("bytes stack {deepest}");
+    let bytes = size_of::<RobotRegulator>() + size_of::<RobotMemory>();
+    hprintln!("bytes robot {bytes}");
+    let deepest = regulate(&recorded::WHOLE_ROBOT, robot, &mut counter);
+    hprintln!("bytes robot_stack {deepest}");
     debug::exit(debug::EXIT_SUCCESS);
     failure::stop()
 }
@@ -79,6 +93,51 @@ fn descend(
         let (problems, plan) = (controller.problems(), controller.solution());
         let solved = u8::from(plan.status.is_solved());
         hprintln!("descent {k} {problems} {instructions} {solved}");
+    }
+    deepest
+}
+
+/// The whole robot's regulator on what its sensors deliver. Returns the deepest stack, bytes.
+#[inline(never)]
+fn regulate(
+    recording: &RobotRecording,
+    memory: &'static mut RobotMemory,
+    counter: &mut InstructionCounter,
+) -> u32 {
+    let mut regulator = match recording.robot.regulator(memory) {
+        Ok(regulator) => regulator,
+        Err(error) => {
+            hprintln!("{}: {error}", recording.robot.plane.name);
+            failure::stop()
+        }
+    };
+    let mut deepest = 0;
+    for k in 0..recording.rows.len() {
+        let Some(measurement) = recording.measurement(k) else {
+            failure::stop()
+        };
+        let decides = k % recording.robot.per_sample() == 0;
+        let (mut instructions, mut command, mut solved) = (None, None, true);
+        let stack = stack::depth(&mut || {
+            (instructions, command) = counter.count(|| {
+                regulator.observe(&measurement);
+                if decides {
+                    let command = regulator.decide(&|t| recording.reference(t));
+                    solved = command.status.is_solved();
+                    Some(command.u)
+                } else {
+                    regulator.between()
+                }
+            });
+        });
+        deepest = deepest.max(stack);
+        let (Some(instructions), Some(motors)) = (instructions, command) else {
+            hprintln!("the instruction counter wrapped, or there is no command");
+            failure::stop()
+        };
+        let (kind, solved) = (u8::from(decides), u8::from(solved));
+        let [first, second, third] = motors.into();
+        hprintln!("robot {k} {kind} {first} {second} {third} {instructions} {solved}");
     }
     deepest
 }

@@ -1,0 +1,45 @@
+//! What can be wrong with a regulator.
+
+use core::fmt;
+use lpvmpc::{ControllerError, EstimatorError, GuardedError};
+
+/// A regulator refuses its settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RegulatorError {
+    /// The estimator does.
+    Estimator(EstimatorError),
+    /// The controller does.
+    Controller(ControllerError),
+    /// The guarded controller does.
+    Guarded(GuardedError),
+}
+
+impl fmt::Display for RegulatorError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Estimator(error) => write!(f, "estimator: {error}"),
+            Self::Controller(error) => write!(f, "controller: {error}"),
+            Self::Guarded(error) => write!(f, "guarded controller: {error}"),
+        }
+    }
+}
+
+impl core::error::Error for RegulatorError {}
+
+impl From<EstimatorError> for RegulatorError {
+    fn from(error: EstimatorError) -> Self {
+        Self::Estimator(error)
+    }
+}
+
+impl From<ControllerError> for RegulatorError {
+    fn from(error: ControllerError) -> Self {
+        Self::Controller(error)
+    }
+}
+
+impl From<GuardedError> for RegulatorError {
+    fn from(error: GuardedError) -> Self {
+        Self::Guarded(error)
+    }
+}
