@@ -90,8 +90,12 @@ impl<T: Scalar, const NU: usize> DelayLine<T, NU> {
     }
 
     fn forget_oldest(&mut self) {
-        let places = self.inputs.len();
-        self.inputs.copy_within(places.min(1).., 0);
+        for i in 1..self.length {
+            let next = self.inputs.get(i).copied();
+            if let (Some(place), Some(next)) = (self.inputs.get_mut(i - 1), next) {
+                *place = next;
+            }
+        }
         self.length = self.length.saturating_sub(1);
     }
 }

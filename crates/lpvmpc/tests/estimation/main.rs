@@ -12,6 +12,7 @@ mod gate;
 mod late;
 mod pendulum;
 mod ramp;
+mod regulator;
 mod set_points;
 mod shaping;
 
