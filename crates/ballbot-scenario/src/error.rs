@@ -1,7 +1,7 @@
 //! What can be wrong with a scenario, said to a person.
 
 use crate::builtin;
-use crate::number::Given;
+use crate::given::Given;
 use ballbot::RegulatorError;
 use std::fmt::Display;
 use std::io;

@@ -24,64 +24,48 @@
 )]
 
 pub mod builtin;
-mod certificate;
 mod error;
-mod excitation;
-mod feedback;
-mod feedback_table;
-mod files;
-mod guarantee;
-mod heading;
-mod heading_table;
-mod load;
+mod file;
+mod given;
 pub mod number;
-mod parameters;
-pub mod plausible;
 mod prepare;
-mod problem;
-mod reference;
-mod rollout;
 mod run;
-mod schema;
-mod session;
-mod three_motors;
-mod time_series;
-mod uncertainty;
-mod weights;
-mod whole_robot;
-mod whole_run;
 pub mod words;
-mod world;
-mod world_table;
 
-pub use certificate::{RobotTable, TerminalCertificate, ViscousBallbot, read_certificate};
 pub use error::ScenarioError;
-pub use excitation::Excitation;
-pub use feedback_table::{
+pub use file::certificate::{RobotTable, TerminalCertificate, ViscousBallbot, read_certificate};
+pub use file::feedback_table::{
     DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
 };
-pub use files::Files;
-pub use guarantee::Standing;
-pub use heading::Turning;
-pub use heading_table::HeadingTable;
-pub use parameters::{KnownRobot, Parameters, read_robot};
-pub use prepare::{Plane, Prepared, Problem};
-pub use reference::PhiReference;
-pub use run::{PlaneLoop, Record, Surroundings};
-pub use schema::{
+pub use file::heading_table::HeadingTable;
+pub use file::parameters::{ParameterTable, Parameters};
+pub use file::schema::{
     BoundsTable, CertifiedTable, ControllerTable, CsvTable, IntegrationTable, IterationsTable,
-    LinearModelTable, LissajousTable, ModelKind, ParameterTable, PointTable, PredictorTable,
-    ReferenceTable, Scenario, SineTable, StateBounds, StateTable, TerminalTable,
+    LinearModelTable, LissajousTable, ModelKind, PointTable, PredictorTable, ReferenceTable,
+    Scenario, SineTable, StateBounds, StateTable, TerminalTable,
 };
-pub use session::{Phase, Session, Trouble};
-pub use three_motors::{MotorSample, ThreeMotors};
-pub use uncertainty::{RobotDistribution, Uncertainty};
-pub use weights::bryson;
-pub use world::{PlaneWorld, Robot};
-pub use world_table::{
+pub use file::world_table::{
     ActuatorTable, AngleSensorTable, DelayTable, DeviationsTable, FloorTable, PlaneName, PushTable,
     RateSensorTable, SensorsTable, WorldTable,
 };
+pub use prepare::excitation::Excitation;
+pub use prepare::files::Files;
+pub use prepare::heading::Turning;
+pub use prepare::known_robot::KnownRobot;
+pub use prepare::parameters::read_robot;
+pub use prepare::plausible;
+pub use prepare::prepared::{Plane, Prepared, Problem};
+pub use prepare::reference::PhiReference;
+pub use prepare::standing::Standing;
+pub use prepare::three_motors::ThreeMotors;
+pub use prepare::uncertainty::{RobotDistribution, Uncertainty};
+pub use prepare::weights::bryson;
+pub use prepare::world::{PlaneWorld, Robot};
+pub use run::excited::Excited;
+pub use run::motor_sample::MotorSample;
+pub use run::planes::PlaneLoop;
+pub use run::record::{Record, Surroundings};
+pub use run::session::{Phase, Session, Trouble};
 
 /// The code of the README, compiled and run with the tests.
 #[cfg(doctest)]

@@ -1,37 +1,7 @@
 //! Numbers of a file that must lie in some range.
 
 use crate::error::ScenarioError;
-pub use lpvmpc_design::number_text as text;
-
-/// What a message says of a value.
-pub(crate) trait Given {
-    /// In words, or as a number for a person.
-    fn given(&self) -> String;
-}
-
-impl Given for f64 {
-    fn given(&self) -> String {
-        text(*self)
-    }
-}
-
-impl<T: Given + ?Sized> Given for &T {
-    fn given(&self) -> String {
-        (**self).given()
-    }
-}
-
-macro_rules! given_as_it_is {
-    ($($kind:ty),*) => { $(
-        impl Given for $kind {
-            fn given(&self) -> String {
-                self.to_string()
-            }
-        }
-    )* };
-}
-
-given_as_it_is!(str, String, i32, u64, usize);
+pub use crate::given::text;
 
 /// `value`, if it is `right`.
 ///

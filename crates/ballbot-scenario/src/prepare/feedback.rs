@@ -1,14 +1,14 @@
 //! What stands around the controller on a real robot, checked: estimator, delay, ramps.
 
 use crate::error::ScenarioError;
-use crate::feedback_table::{
+use crate::file::feedback_table::{
     DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
 };
-use crate::heading::Turning;
+use crate::file::schema::{ControllerTable, TerminalTable};
 use crate::number::{not_negative, positive, text};
-use crate::problem::{MOST_SUBSTEPS, dynamic};
-use crate::schema::{ControllerTable, TerminalTable};
-use crate::three_motors::ThreeMotors;
+use crate::prepare::heading::Turning;
+use crate::prepare::problem::{MOST_SUBSTEPS, dynamic};
+use crate::prepare::three_motors::ThreeMotors;
 use ballbot::{Ballbot, EstimatorSettings, MotorLimits, PlaneFeedback, RampedSettings, Wheels};
 use lpvmpc::{
     Bounds, ControllerSettings, Gate, InputReference, LpvModel, MoveLimits, RampedInput,

@@ -1,9 +1,9 @@
 //! The weights Q and R, given or by Bryson's rule.
 
 use crate::error::ScenarioError;
+use crate::file::schema::ControllerTable;
 use crate::number::positive;
-use crate::problem::dynamic;
-use crate::schema::ControllerTable;
+use crate::prepare::problem::dynamic;
 use ballbot::Ballbot;
 use lpvmpc::{LpvModel, Weights};
 use nalgebra::{Matrix1, Matrix4, Vector3, Vector4};

@@ -1,11 +1,11 @@
 //! `[controller]` and `[bounds]`: the problem that the controller solves at every sample.
 
 use crate::error::ScenarioError;
-use crate::number::{positive, text};
-use crate::schema::{
+use crate::file::schema::{
     BoundsTable, ControllerTable, IterationsTable, LinearModelTable, ModelKind, PredictorTable,
     StateBounds, TerminalTable,
 };
+use crate::number::{positive, text};
 use ballbot::{Ballbot, ControllerSettings, LinearParameters};
 use lpvmpc::{
     Bounds, InputReference, Iterations, LpvModel, Predictor, Rk4, Scheduling, Softness,

@@ -1,9 +1,9 @@
 //! Both planes and the heading as one plant on three motors, and its world.
 
-use crate::heading::Turning;
-use crate::prepare::Prepared;
-use crate::three_motors::ThreeMotors;
-use crate::world::{PlaneWorld, Robot};
+use crate::prepare::heading::Turning;
+use crate::prepare::prepared::Prepared;
+use crate::prepare::three_motors::ThreeMotors;
+use crate::prepare::world::{PlaneWorld, Robot};
 use ballbot::{HEADING, Heading, RobotState, Wheels, plane_of};
 use lpvmpc_sim::{Actuator, Disturbance, Plant, Sensor, WorldSettings};
 use nalgebra::{SVector, Vector1, Vector3, Vector4};

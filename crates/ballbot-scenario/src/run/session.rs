@@ -2,11 +2,11 @@
 //! change while it runs. Sample for sample it is [`Prepared::run`].
 
 use crate::error::ScenarioError;
+use crate::file::schema::PointTable;
 use crate::number::finite;
-use crate::prepare::{Plane, Prepared};
-use crate::reference::PhiReference;
-use crate::run::PlaneLoop;
-use crate::schema::PointTable;
+use crate::prepare::prepared::{Plane, Prepared};
+use crate::prepare::reference::PhiReference;
+use crate::run::planes::PlaneLoop;
 use crate::words;
 use lpvmpc::{Observation, Regulator, Status};
 use lpvmpc_sim::{Disturbance, Ending, LogRow, Sample, WorldError};

@@ -1,14 +1,14 @@
 //! The world that the robot is simulated in. Without `[world]` in the scenario it is ideal.
 
 use crate::error::ScenarioError;
-use crate::excitation::Excitation;
-use crate::files::Files;
-use crate::number::{finite, not_negative, positive};
-use crate::parameters::KnownRobot;
-use crate::world_table::{
+use crate::file::world_table::{
     ActuatorTable, AngleSensorTable, PlaneName, PushTable, RateSensorTable, SensorsTable,
     WorldTable,
 };
+use crate::number::{finite, not_negative, positive};
+use crate::prepare::excitation::Excitation;
+use crate::prepare::files::Files;
+use crate::prepare::known_robot::KnownRobot;
 use ballbot::{Ballbot, Disturbed};
 use lpvmpc::Bounds;
 use lpvmpc_sim::{Actuator, Disturbance, Plant, Sensor, Tolerances, WithoutPlan, WorldSettings};

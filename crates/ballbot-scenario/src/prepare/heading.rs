@@ -1,7 +1,7 @@
 //! The robot turning about the vertical: mechanics, law and target, checked.
 
 use crate::error::ScenarioError;
-use crate::heading_table::HeadingTable;
+use crate::file::heading_table::HeadingTable;
 use crate::number::{finite, not_negative, positive};
 use ballbot::YawLaw;
 use lpvmpc_sim::Sensor;

@@ -1,7 +1,7 @@
 //! How far identified parameters may be off, and robots drawn from that.
 
 use crate::error::ScenarioError;
-use crate::problem::dynamic;
+use crate::prepare::problem::dynamic;
 use ballbot::{Ballbot, limits};
 use lpvmpc_sim::Random;
 use nalgebra::{SMatrix, SVector};

@@ -1,6 +1,6 @@
 //! `[world]` of a scenario file, key by key. What it means is in `world`.
 
-use crate::parameters::Parameters;
+use crate::file::parameters::Parameters;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 

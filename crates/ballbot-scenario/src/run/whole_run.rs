@@ -1,12 +1,11 @@
 //! The run of a robot whose planes share three motors.
 
 use crate::error::ScenarioError;
-use crate::prepare::{Plane, Prepared};
-use crate::run::{Record, Surroundings};
-use crate::three_motors::{
-    MotorSample, ThreeMotors, WholeRegulator, log_of_plane, sample_of_plane,
-};
-use crate::whole_robot::{State, WholeRobot, whole_world};
+use crate::prepare::prepared::{Plane, Prepared};
+use crate::prepare::three_motors::ThreeMotors;
+use crate::run::motor_sample::{MotorSample, WholeRegulator, log_of_plane, sample_of_plane};
+use crate::run::record::{Record, Surroundings};
+use crate::run::whole_robot::{State, WholeRobot, whole_world};
 use ballbot::{HEADING, RobotRegulator, plane_feedback, plane_of};
 use lpvmpc_sim::{ClosedLoop, Ending, Recording, Trajectory, World};
 

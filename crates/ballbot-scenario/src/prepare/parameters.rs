@@ -1,74 +1,17 @@
-//! The robot: a table of parameters, or a file that has one.
+//! From a robot's parameters in a file to the robot.
 
 use crate::error::ScenarioError;
-use crate::files::Files;
+use crate::file::parameters::{ParameterTable, Parameters};
+use crate::file::schema::BoundsTable;
 use crate::number::{finite, positive};
-use crate::plausible;
-use crate::schema::{BoundsTable, ParameterTable};
-use crate::uncertainty::{RobotDistribution, Uncertainty};
+use crate::prepare::files::Files;
+use crate::prepare::known_robot::KnownRobot;
+use crate::prepare::plausible;
+use crate::prepare::uncertainty::{RobotDistribution, Uncertainty};
 use crate::words;
-use ballbot::{BadWheels, Ballbot, DriveFriction, Geometry, Wheels};
-use serde::de::value::MapAccessDeserializer;
-use serde::de::{Error, MapAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize};
-use std::fmt;
-use std::path::{Path, PathBuf};
-
-/// Where the parameters of a robot stand.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(untagged)]
-pub enum Parameters {
-    /// Here.
-    Table(ParameterTable),
-    /// In the table `[parameters]` of this TOML file, relative to the scenario file: the
-    /// `parameters.toml` of `ballbot identify`, a result of `ballbot refine`, or another scenario.
-    File(PathBuf),
-}
-
-impl<'de> Deserialize<'de> for Parameters {
-    // By hand, since a derived choice would not say which key of a table is wrong.
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct TableOrFile;
-
-        impl<'de> Visitor<'de> for TableOrFile {
-            type Value = Parameters;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a table of parameters, or the path of a file with such a table")
-            }
-
-            fn visit_str<E: Error>(self, path: &str) -> Result<Parameters, E> {
-                Ok(Parameters::File(path.into()))
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Parameters, A::Error> {
-                let table = MapAccessDeserializer::new(map);
-                Ok(Parameters::Table(ParameterTable::deserialize(table)?))
-            }
-
-            // From a format that reads a table field by field, and so must be told the fields.
-            fn visit_newtype_struct<D: Deserializer<'de>>(
-                self,
-                table: D,
-            ) -> Result<Parameters, D::Error> {
-                Ok(Parameters::Table(ParameterTable::deserialize(table)?))
-            }
-        }
-
-        deserializer.deserialize_any(TableOrFile)
-    }
-}
-
-/// A robot whose parameters have been read and checked.
-#[derive(Debug)]
-pub struct KnownRobot {
-    /// The plant.
-    pub ballbot: Ballbot<f64>,
-    /// The torque map to the motors.
-    pub wheels: Wheels<f64>,
-    /// How far the parameters may be off, where the file says so.
-    pub uncertainty: Option<Box<dyn RobotDistribution>>,
-}
+use ballbot::{BadWheels, Ballbot, DriveFriction, Geometry};
+use serde::Deserialize;
+use std::path::Path;
 
 /// Other tables may stand beside these.
 #[derive(Deserialize)]

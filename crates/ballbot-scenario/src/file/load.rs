@@ -2,7 +2,7 @@
 
 use crate::builtin;
 use crate::error::ScenarioError;
-use crate::schema::Scenario;
+use crate::file::schema::Scenario;
 use crate::words;
 use std::path::Path;
 use toml::{Table, Value};

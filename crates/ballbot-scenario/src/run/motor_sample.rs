@@ -1,22 +1,12 @@
-//! Two planes and the heading on three motors, each with its limit.
+//! What a whole robot's samples are to its planes and motors.
 
-use crate::heading::Turning;
-use ballbot::{AnyPlanner, Heading, MotorLimits, RobotRegulator, plane_of};
+use ballbot::{AnyPlanner, Heading, RobotRegulator, plane_of};
 use lpvmpc::Observation;
 use lpvmpc_sim::{LogRow, Sample};
 use nalgebra::{Vector1, Vector3};
 
 /// The regulator of both planes and the heading.
 pub(crate) type WholeRegulator = RobotRegulator<f64, AnyPlanner<f64>>;
-
-/// What the three motors have, and what they turn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ThreeMotors {
-    /// What they have.
-    pub limits: MotorLimits<f64>,
-    /// How the robot turns.
-    pub turning: Turning,
-}
 
 /// The heading and the motors at a control sample.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! The ballbot in a certificate of a terminal set.
 
 use crate::error::ScenarioError;
-use crate::schema::is_zero;
+use crate::file::parameters::is_zero;
 use ballbot::{Accelerations, Ballbot, DriveFriction, Geometry, Tilt};
 use lpvmpc::LpvModel;
 use lpvmpc_design::{AnalyticModel, Arithmetic, Certificate, MOST_BYTES};

@@ -1,12 +1,15 @@
 //! `[controller.terminal.certified]`: from the certificate of a terminal set to the guarded
 //! controller.
 
-use crate::certificate::{TerminalCertificate, read_certificate};
+use crate::builtin;
 use crate::error::ScenarioError;
-use crate::files::Files;
-use crate::problem::dynamic;
-use crate::schema::{CertifiedTable, ControllerTable, ModelKind, TerminalTable};
-use crate::{RobotTable, builtin, rollout};
+use crate::file::certificate::RobotTable;
+use crate::file::certificate::{TerminalCertificate, read_certificate};
+use crate::file::schema::{CertifiedTable, ControllerTable, ModelKind, TerminalTable};
+use crate::prepare::files::Files;
+use crate::prepare::problem::dynamic;
+use crate::prepare::rollout;
+use crate::prepare::standing::Standing;
 use ballbot::{Ballbot, ControllerSettings, GuardedSettings};
 use lpvmpc::{GuardedIterations, Predictor, TerminalSet, Weights};
 use lpvmpc_design::is_at_most;
@@ -23,27 +26,6 @@ const MARGIN: f64 = 4e-3;
 const SEARCH: usize = 30;
 /// Price of a state bound exceeded by its width, in largest terminal costs of the set.
 const SOFT_PRICE: f64 = 1e3;
-
-/// What is known of a certificate that a scenario relies on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Standing {
-    /// The program's own ([`crate::builtin::TERMINAL_CERTIFICATE`]), which its tests prove.
-    BuiltIn,
-    /// Proved by this version of the program, now or before.
-    Proved,
-    /// Taken at its word.
-    NotProved,
-}
-
-impl fmt::Display for Standing {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::BuiltIn => "built in; the tests of this version prove it",
-            Self::Proved => "proved by this version of the program",
-            Self::NotProved => "not proved here, taken at its word",
-        })
-    }
-}
 
 /// What a certified terminal set makes of a controller.
 pub(crate) struct Guarantee {

@@ -1,7 +1,6 @@
 //! Numbers over time, from a CSV file.
 
 use crate::error::ScenarioError;
-use crate::reference::SAME_TIME;
 use std::path::PathBuf;
 
 /// One quantity over time, in order, without gaps.
@@ -13,6 +12,9 @@ pub(crate) struct TimeSeries {
     /// The line of each row in the file.
     lines: Vec<Option<u64>>,
 }
+
+/// A set point takes effect at the sample that lies within this much of its time, s.
+pub(crate) const SAME_TIME: f64 = 1e-9;
 
 /// An interval this many times the median one is a gap.
 const GAP: f64 = 3.0;

@@ -3,14 +3,14 @@
 //! means them sets `accept_unusual_values = true`.
 
 use crate::error::ScenarioError;
-use crate::feedback_table::{EstimatorTable, MotorsTable, ShapingTable};
-use crate::number::text;
-use crate::parameters::KnownRobot;
-use crate::reference::PhiReference;
-use crate::schema::{
+use crate::file::feedback_table::{EstimatorTable, MotorsTable, ShapingTable};
+use crate::file::schema::{
     BoundsTable, ControllerTable, LissajousTable, ReferenceTable, Scenario, StateTable,
 };
-use crate::world_table::{PushTable, WorldTable};
+use crate::file::world_table::{PushTable, WorldTable};
+use crate::number::text;
+use crate::prepare::known_robot::KnownRobot;
+use crate::prepare::reference::PhiReference;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// A range of absolute values. Zero and infinity, which stand for none, lie in every range.

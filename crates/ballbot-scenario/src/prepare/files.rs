@@ -1,12 +1,11 @@
 //! What a scenario names besides itself, and where it is found.
 
-use crate::certificate::TerminalCertificate;
 use crate::error::ScenarioError;
-use crate::excitation::Excitation;
-use crate::guarantee::{self, Standing};
-use crate::parameters::{self, KnownRobot};
-use crate::schema::{CsvTable, PointTable};
-use crate::time_series::TimeSeries;
+use crate::file::certificate::TerminalCertificate;
+use crate::file::schema::{CsvTable, PointTable};
+use crate::prepare::excitation::Excitation;
+use crate::prepare::known_robot::KnownRobot;
+use crate::prepare::standing::Standing;
 use std::path::Path;
 
 /// Where reference files and certificates come from: a folder, or, in a browser, the page.
@@ -50,29 +49,4 @@ pub trait Files {
     /// # Errors
     /// The file cannot be read, or a row makes no sense.
     fn excitation(&self, file: &Path) -> Result<Excitation, ScenarioError>;
-}
-
-/// The folder that paths are relative to.
-impl Files for &Path {
-    fn reference(&self, file: &CsvTable, duration: f64) -> Result<Vec<PointTable>, ScenarioError> {
-        let columns = [file.time_column.as_str(), file.phi_column.as_str()];
-        let series = TimeSeries::read(self.join(&file.path), columns)?;
-        series.check_covers(duration)?;
-        let points = series
-            .rows()
-            .map(|(time_s, phi_rad)| PointTable { time_s, phi_rad });
-        Ok(points.collect())
-    }
-
-    fn certificate(&self, file: Option<&str>) -> Result<TerminalCertificate, ScenarioError> {
-        guarantee::read(file, self)
-    }
-
-    fn robot(&self, file: &Path) -> Result<KnownRobot, ScenarioError> {
-        parameters::read(file, self)
-    }
-
-    fn excitation(&self, file: &Path) -> Result<Excitation, ScenarioError> {
-        Excitation::read(self.join(file))
-    }
 }

@@ -1,9 +1,10 @@
 //! What phi has to follow, ready to be asked at any time.
 
 use crate::error::ScenarioError;
-use crate::files::Files;
+use crate::file::schema::{LissajousTable, PointTable, ReferenceTable, SineTable};
 use crate::number::finite;
-use crate::schema::{LissajousTable, PointTable, ReferenceTable, SineTable};
+use crate::prepare::files::Files;
+use crate::prepare::time_series::SAME_TIME;
 use ballbot::Geometry;
 use lpvmpc::{MoveLimits, SmoothMove};
 
@@ -21,9 +22,6 @@ pub enum PhiReference {
     /// Set points as smooth moves one after the other, each with the time of its beginning, s.
     Moves(Vec<(f64, SmoothMove<f64>)>),
 }
-
-/// A set point takes effect at the sample that lies within this much of its time, s.
-pub(crate) const SAME_TIME: f64 = 1e-9;
 
 impl PhiReference {
     /// phi_ref at the time `t` (s), rad.
