@@ -4,7 +4,7 @@ use crate::commands::certify::semi_axes;
 use crate::figures::{Band, Dash, Figure, FigureError, Panel, Role, Series, Style};
 use crate::html;
 use ballbot_scenario::TerminalCertificate;
-use lpvmpc_design::Proof;
+use lpvmpc_certificate::Proof;
 use nalgebra::Matrix2;
 use std::f64::consts::TAU;
 

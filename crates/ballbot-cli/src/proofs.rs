@@ -11,7 +11,7 @@ use ballbot_scenario::{
     CsvTable, Excitation, Files, KnownRobot, PointTable, ScenarioError, Standing,
     TerminalCertificate,
 };
-use lpvmpc_design::{ClaimError, MOST_BOXES, PROOF_REVISION, Proof};
+use lpvmpc_certificate::{ClaimError, MOST_BOXES, PROOF_REVISION, Proof};
 use sha2::{Digest, Sha256};
 use std::env;
 use std::fmt::Write;

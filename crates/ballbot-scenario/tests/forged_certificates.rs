@@ -7,7 +7,7 @@
 )]
 
 use ballbot_scenario::{Scenario, Standing, TerminalCertificate, TerminalTable, builtin};
-use lpvmpc_design::{ClaimError, MOST_BYTES};
+use lpvmpc_certificate::{ClaimError, MOST_BYTES};
 use nalgebra::Vector4;
 use std::path::{Path, PathBuf};
 

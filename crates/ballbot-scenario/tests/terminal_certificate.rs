@@ -6,10 +6,11 @@
 
 use ballbot_scenario::{RobotTable, Scenario, TerminalCertificate, builtin};
 use lpvmpc::LpvModel;
-use lpvmpc_design::{
-    AnalyticModel, CertificateProblem, Interval, MOST_BOXES, SchedulingGrid, TaylorModel,
-    TerminalProblem, certify_terminal, synthesize_terminal, zero_order_hold,
+use lpvmpc_certificate::{
+    AnalyticModel, CertificateProblem, Interval, MOST_BOXES, TaylorModel, TerminalProblem,
+    certify_terminal, synthesize_terminal,
 };
+use lpvmpc_design::{SchedulingGrid, zero_order_hold};
 use lpvmpc_sim::{Tolerances, advance};
 use nalgebra::{DMatrix, Vector1, Vector2, Vector4};
 use std::f64::consts::{FRAC_PI_3, PI};

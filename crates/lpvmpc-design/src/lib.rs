@@ -9,8 +9,9 @@
 //! | a gain and a terminal cost | [`lqr_continuous`], [`lqr_discrete`], [`solve_care`], [`solve_dare`] |
 //! | exact sampling of a frozen model | [`zero_order_hold`] |
 //! | is the gain stable at each scheduling? | [`frozen_stability`] |
-//! | a terminal set, and the proof that it is one | [`certify_terminal`], [`Certificate::prove`] |
 //! | is the integration step short enough? | [`check_rk4_step`] |
+//!
+//! Terminal sets and their proofs are in `lpvmpc-certificate`.
 //!
 //! Gains are for u = **-K** x throughout. All quantities are in SI units, poles in 1/s.
 //!
@@ -47,7 +48,6 @@
 //! ```
 
 mod discretize;
-mod enclosure;
 mod least_squares;
 mod linearize;
 mod lqr;
@@ -55,27 +55,26 @@ mod matrix_check;
 mod modes;
 mod number;
 mod offset_free;
+mod parallel;
 mod residual_tests;
 mod riccati;
 mod shooting;
 mod stability;
-mod terminal;
 
 pub use discretize::{DiscretizeError, zero_order_hold};
-pub use enclosure::{
-    AnalyticModel, Arithmetic, Elementary, FlowError, Frame, Interval, SampleEnclosure, SampledLaw,
-    TaylorMap, TaylorModel,
-};
 pub use least_squares::{
     Evaluated, Fit, Iteration, LeastSquaresError, LeastSquaresSettings, RankDeficiency,
     ResidualModel, Termination, gauss_newton, levenberg_marquardt,
 };
 pub use linearize::{Linearization, LinearizeError, Variable, linearize};
 pub use lqr::{Lqr, lqr_continuous, lqr_discrete};
-pub use matrix_check::MatrixError;
+pub use matrix_check::{
+    MatrixError, check_positive_definite, check_positive_semidefinite, checked_symmetric,
+};
 pub use modes::{controllability_rank, poles};
 pub use number::number_text;
 pub use offset_free::{OffsetFreeError, check_offset_free};
+pub use parallel::{each, each_with};
 pub use residual_tests::{Correlation, NORMAL_95, autocorrelation, cross_correlation};
 pub use riccati::{LqProblem, RiccatiError, RiccatiSolution, solve_care, solve_dare};
 pub use shooting::{
@@ -85,10 +84,4 @@ pub use shooting::{
 pub use stability::{
     FrozenError, FrozenStability, MOST_RK4_SUBSTEPS, Rk4Step, Rk4StepError, SchedulingGrid,
     accurate_rk4_substeps, check_rk4_step, frozen_stability,
-};
-pub use terminal::{
-    Certificate, CertificateProblem, CertifyError, ClaimError, DocumentError, Effort, MOST_BOXES,
-    MOST_BYTES, PROOF_REVISION, Proof, QuadraticClaim, Record, SynthesisError, TerminalClaim,
-    TerminalIngredients, TerminalProblem, certify_terminal, is_at_most, raise_level,
-    synthesize_terminal,
 };

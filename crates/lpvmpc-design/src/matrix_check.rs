@@ -171,7 +171,7 @@ pub(crate) fn check_shape(
 }
 
 /// The symmetric part of `m`, once its mirrored entries agree up to rounding.
-pub(crate) fn checked_symmetric(
+pub fn checked_symmetric(
     name: &'static str,
     m: &DMatrix<f64>,
 ) -> Result<DMatrix<f64>, MatrixError> {
@@ -211,10 +211,7 @@ pub(crate) fn unit(m: &DMatrix<f64>) -> f64 {
 }
 
 /// M > 0 for a symmetric, finite M.
-pub(crate) fn check_positive_definite(
-    name: &'static str,
-    m: &DMatrix<f64>,
-) -> Result<(), MatrixError> {
+pub fn check_positive_definite(name: &'static str, m: &DMatrix<f64>) -> Result<(), MatrixError> {
     let unit = unit(m);
     let scaled = m / unit;
     let smallest = smallest_eigenvalue(name, &scaled)?;
@@ -228,7 +225,7 @@ pub(crate) fn check_positive_definite(
 }
 
 /// M >= 0 for a symmetric, finite M, up to the rounding of its eigenvalues.
-pub(crate) fn check_positive_semidefinite(
+pub fn check_positive_semidefinite(
     name: &'static str,
     m: &DMatrix<f64>,
 ) -> Result<(), MatrixError> {

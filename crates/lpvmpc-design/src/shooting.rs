@@ -16,8 +16,8 @@ mod fit;
 mod unknown;
 
 use crate::number_text;
+use crate::parallel::{each, each_with};
 use nalgebra::{DMatrix, DVector, SVector};
-use rayon::prelude::*;
 use thiserror::Error;
 
 use block::Block;
@@ -146,15 +146,10 @@ where
     /// chi^2: the sum of squares of all residuals over their standard deviations, priors included.
     /// Not finite when a simulation is not.
     pub fn chi_square(&self, parameters: &[f64], initial: &[SVector<f64, NX>]) -> f64 {
-        let segments =
-            initial
-                .par_iter()
-                .enumerate()
-                .map_init(Vec::new, |outputs, (segment, initial)| {
-                    self.segment_chi_square(segment, parameters, initial, outputs)
-                });
         // Collected first, so that the sum does not depend on the number of threads.
-        let segments: Vec<f64> = segments.collect();
+        let segments: Vec<f64> = each_with(initial, Vec::new, |outputs, segment, initial| {
+            self.segment_chi_square(segment, parameters, initial, outputs)
+        });
         segments.iter().sum::<f64>() + self.prior_chi_square(parameters)
     }
 
@@ -230,7 +225,7 @@ where
         parameters: &[f64],
         initial: &[SVector<f64, NX>],
     ) -> Vec<Vec<SVector<f64, NY>>> {
-        let segment = |(segment, initial): (usize, &SVector<f64, NX>)| {
+        let segment = |segment: usize, initial: &SVector<f64, NX>| {
             let mut outputs = Vec::new();
             self.model
                 .simulate(segment, parameters, initial, &mut outputs);
@@ -238,7 +233,7 @@ where
             rows.map(|(measured, simulated)| measured - simulated)
                 .collect()
         };
-        initial.par_iter().enumerate().map(segment).collect()
+        each(initial, segment)
     }
 
     fn blocks(
@@ -247,10 +242,10 @@ where
         initial: &[SVector<f64, NX>],
         indices: &[usize],
     ) -> Vec<Block<NX>> {
-        let block = |(segment, initial): (usize, &SVector<f64, NX>)| {
+        let block = |segment: usize, initial: &SVector<f64, NX>| {
             Block::new(self, segment, parameters, initial, indices)
         };
-        initial.par_iter().enumerate().map(block).collect()
+        each(initial, block)
     }
 
     /// The priors' part of information and gradient in the parameters `indices`.

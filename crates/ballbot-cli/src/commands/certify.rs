@@ -15,7 +15,7 @@ use ballbot_scenario::{
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use lpvmpc::Bounds;
-use lpvmpc_design::{
+use lpvmpc_certificate::{
     CertificateProblem, CertifyError, Effort, MOST_BOXES, Proof, TerminalProblem, certify_terminal,
     raise_level,
 };

@@ -27,7 +27,8 @@ use crate::refinement::RefinementError;
 use crate::regulator::RegulatorError;
 use ballbot_identification::{EstimateError, ExcitationError, log::LogError};
 use ballbot_scenario::ScenarioError;
-use lpvmpc_design::{CertifyError, ClaimError, DocumentError, MatrixError};
+use lpvmpc_certificate::{CertifyError, ClaimError, DocumentError};
+use lpvmpc_design::MatrixError;
 use lpvmpc_sim::PlantError;
 use std::path::PathBuf;
 

@@ -4,7 +4,7 @@ use crate::error::ScenarioError;
 use crate::file::parameters::is_zero;
 use ballbot::{Accelerations, Ballbot, DriveFriction, Geometry, Tilt};
 use lpvmpc::LpvModel;
-use lpvmpc_design::{AnalyticModel, Arithmetic, Certificate, MOST_BYTES};
+use lpvmpc_certificate::{AnalyticModel, Arithmetic, Certificate, MOST_BYTES};
 use nalgebra::{Matrix4, Vector2, Vector3, Vector4};
 use serde::{Deserialize, Serialize};
 use std::fs::File;

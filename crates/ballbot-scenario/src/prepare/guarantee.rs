@@ -12,7 +12,7 @@ use crate::prepare::rollout;
 use crate::prepare::standing::Standing;
 use ballbot::{Ballbot, ControllerSettings, GuardedSettings};
 use lpvmpc::{GuardedIterations, Predictor, TerminalSet, Weights};
-use lpvmpc_design::is_at_most;
+use lpvmpc_certificate::is_at_most;
 use nalgebra::{SMatrix, Vector4};
 use std::fmt;
 use std::path::Path;

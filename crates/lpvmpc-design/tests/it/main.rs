@@ -1,11 +1,8 @@
 //! The design tools against the paper's numbers, certified data and second routes.
 
 mod paper;
-mod pendulum;
 
 mod ballbot_parameters;
-mod enclosure;
-mod forgeries;
 mod frozen_stability;
 mod least_squares_failures;
 mod linearize;
@@ -14,4 +11,3 @@ mod nist;
 mod riccati;
 mod rk4_step;
 mod shooting;
-mod terminal;

@@ -5,11 +5,12 @@
 )]
 
 use lpvmpc::{LpvModel, Rk4};
-use lpvmpc_design::{
+use lpvmpc_certificate::{
     AnalyticModel, Arithmetic, Certificate, CertificateProblem, CertifyError, ClaimError,
-    MOST_BOXES, SchedulingGrid, SynthesisError, TerminalIngredients, TerminalProblem,
-    certify_terminal, lqr_discrete, synthesize_terminal, zero_order_hold,
+    MOST_BOXES, SynthesisError, TerminalIngredients, TerminalProblem, certify_terminal,
+    synthesize_terminal,
 };
+use lpvmpc_design::{SchedulingGrid, lqr_discrete, zero_order_hold};
 use nalgebra::{DMatrix, Matrix1, Matrix1x2, Matrix2, Vector1, Vector2};
 use proptest::prelude::*;
 

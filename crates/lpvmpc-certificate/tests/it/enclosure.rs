@@ -1,7 +1,7 @@
 //! Enclosures must contain what they enclose.
 
 use lpvmpc::{LpvModel, Rk4};
-use lpvmpc_design::{
+use lpvmpc_certificate::{
     AnalyticModel, Arithmetic, Frame, Interval, SampledLaw, TaylorMap, TaylorModel,
 };
 use nalgebra::{Matrix1x2, Matrix2, Vector1, Vector2};

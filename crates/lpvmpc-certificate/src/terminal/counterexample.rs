@@ -3,8 +3,8 @@
 use super::decrease::Decrease;
 use super::normalised::Square;
 use crate::enclosure::AnalyticModel;
+use lpvmpc_design::each;
 use nalgebra::{DMatrix, SVector, SymmetricEigen};
-use rayon::prelude::*;
 
 /// Directions that are looked at, on the edge of the set and close to the origin.
 const DIRECTIONS: usize = 48;
@@ -39,8 +39,8 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
         let mut found = self.looks(near);
         found.sort_by(|a, b| b.excess.total_cmp(&a.excess));
         found.truncate(FOLLOWED);
-        let followed = found.par_iter().flat_map_iter(|look| self.follow(look));
-        let mut candidates: Vec<Look<NX>> = followed.collect();
+        let followed = each(&found, |_, look| self.follow(look));
+        let mut candidates: Vec<Look<NX>> = followed.into_iter().flatten().collect();
         candidates.extend(found);
         candidates.retain(|look| look.excess > 0.0);
         candidates.sort_by(|a, b| b.excess.total_cmp(&a.excess));
@@ -78,7 +78,8 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
         if let Some(origin) = &origin {
             places.extend([1e-3, 0.5, 1.0].map(|share| origin.tightest * (share * radius)));
         }
-        places.par_iter().filter_map(|y| self.look(y)).collect()
+        let looks = each(&places, |_, y| self.look(y));
+        looks.into_iter().flatten().collect()
     }
 
     /// To where this scheduling is worst, again and again.

@@ -1,15 +1,15 @@
 //! A terminal gain and cost for a whole set of schedulings, by linear matrix inequalities.
 
 use super::lmi::{AffineMatrix, LmiFailure, maximise_log_det};
-use crate::discretize::{DiscretizeError, zero_order_hold};
-use crate::lqr::lqr_discrete;
-use crate::matrix_check::{
+use lpvmpc::LpvModel;
+use lpvmpc_design::RiccatiError;
+use lpvmpc_design::SchedulingGrid;
+use lpvmpc_design::lqr_discrete;
+use lpvmpc_design::number_text;
+use lpvmpc_design::{DiscretizeError, zero_order_hold};
+use lpvmpc_design::{
     MatrixError, check_positive_definite, check_positive_semidefinite, checked_symmetric,
 };
-use crate::number_text;
-use crate::riccati::RiccatiError;
-use crate::stability::SchedulingGrid;
-use lpvmpc::LpvModel;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use thiserror::Error;
 

@@ -7,8 +7,8 @@ use crate::enclosure::{
     AnalyticModel, Arithmetic, Interval, TaylorMap, TaylorModel, is_positive_definite, product,
     smallest_eigenvalue,
 };
-use crate::stability::SchedulingGrid;
 use lpvmpc::LpvModel;
+use lpvmpc_design::SchedulingGrid;
 use nalgebra::{DMatrix, SMatrix, SVector, SymmetricEigen};
 
 /// Rates of decay that are tried, 1/s.

@@ -6,8 +6,8 @@ use super::proof::Proof;
 use super::quadratic;
 use super::synthesis::{SynthesisError, TerminalIngredients, TerminalProblem, synthesize_terminal};
 use crate::enclosure::AnalyticModel;
-use crate::stability::{FrozenError, SchedulingGrid};
 use lpvmpc::LpvModel;
+use lpvmpc_design::{FrozenError, SchedulingGrid};
 use nalgebra::{SMatrix, SVector};
 use thiserror::Error;
 

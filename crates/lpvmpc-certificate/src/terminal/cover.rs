@@ -1,7 +1,7 @@
 //! A statement proved on a box by proving it on the parts that bisection leaves.
 
+use lpvmpc_design::each;
 use nalgebra::SVector;
-use rayon::prelude::*;
 
 /// The points with |x_i - centre_i| <= half_widths_i.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,7 +95,7 @@ pub(super) fn cover<const N: usize>(
     let (mut examined, mut share) = (0, 0.0);
     while !open.is_empty() {
         let batch = open.split_off(open.len().saturating_sub(TOGETHER));
-        let findings: Vec<Finding> = batch.par_iter().map(|(cell, _)| examine(cell)).collect();
+        let findings = each(&batch, |_, (cell, _)| examine(cell));
         for ((cell, cuts), finding) in batch.into_iter().zip(findings) {
             examined += 1;
             let at = cell.centre;

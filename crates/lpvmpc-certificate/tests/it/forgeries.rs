@@ -8,7 +8,9 @@
 )]
 
 use lpvmpc::{LpvModel, Rk4};
-use lpvmpc_design::{Certificate, ClaimError, DocumentError, MOST_BOXES, MOST_BYTES, is_at_most};
+use lpvmpc_certificate::{
+    Certificate, ClaimError, DocumentError, MOST_BOXES, MOST_BYTES, is_at_most,
+};
 use nalgebra::{Matrix1, Matrix1x2, Matrix2, SMatrix, Vector1, Vector2};
 use std::sync::LazyLock;
 
@@ -86,13 +88,13 @@ fn unstable_law_with_an_asymmetric_q() -> PendulumCertificate {
         state_limits: Vector2::repeat(f64::INFINITY),
         input_limits: Vector1::new(f64::INFINITY),
         scheduling_limits: Vector1::new(0.1),
-        terminal: lpvmpc_design::TerminalClaim {
+        terminal: lpvmpc_certificate::TerminalClaim {
             k,
             p,
             level: 1e-6,
             contraction: 0.0,
         },
-        continuous: lpvmpc_design::QuadraticClaim {
+        continuous: lpvmpc_certificate::QuadraticClaim {
             p: lyapunov(stiffness, damping),
             rate_1_s: 1e-3,
         },
@@ -376,7 +378,7 @@ fn text_that_is_no_certificate_is_refused() {
 /// A plant whose matrices are 0/0: with zero times unbounded as zero it would have been at rest.
 #[test]
 fn zero_times_a_quotient_by_zero_is_unknown() {
-    use lpvmpc_design::{Arithmetic, Interval, TaylorModel};
+    use lpvmpc_certificate::{Arithmetic, Interval, TaylorModel};
     let over_zero = Interval::new(-1.0, 1.0).reciprocal();
     assert_eq!(Interval::point(0.0) * over_zero, Interval::EVERYTHING);
     assert_eq!(over_zero * Interval::point(0.0), Interval::EVERYTHING);

@@ -1,6 +1,6 @@
 //! What can be wrong with the claims of a certificate.
 
-use crate::number_text;
+use lpvmpc_design::number_text;
 use thiserror::Error;
 
 /// A claim that is false, or that could not be shown. The two are told apart: see

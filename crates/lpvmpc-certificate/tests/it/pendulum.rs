@@ -1,7 +1,7 @@
 //! A second plant: a pendulum, upright, with a torque at its joint.
 
 use lpvmpc::LpvModel;
-use lpvmpc_design::{AnalyticModel, Arithmetic};
+use lpvmpc_certificate::{AnalyticModel, Arithmetic};
 use nalgebra::{Matrix2, Vector1, Vector2};
 use serde::{Deserialize, Serialize};
 
