@@ -1,10 +1,10 @@
 //! The readable page of a certificate.
 
 use crate::commands::certify::semi_axes;
-use crate::figures::{Band, Dash, Figure, FigureError, Panel, Role, Series, Style};
 use crate::html;
 use ballbot_scenario::TerminalCertificate;
 use lpvmpc_certificate::Proof;
+use lpvmpc_figures::{Band, Dash, Figure, FigureError, Panel, Role, Series, Style};
 use nalgebra::Matrix2;
 use std::f64::consts::TAU;
 

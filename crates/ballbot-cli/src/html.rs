@@ -1,6 +1,6 @@
 //! Reports: self-contained HTML pages of text, tables and figures.
 
-use crate::figures::{Figure, FigureError};
+use lpvmpc_figures::{Figure, FigureError};
 
 /// A figure with its file name and caption.
 #[derive(Debug)]

@@ -10,7 +10,6 @@ pub mod benchmark;
 pub mod campaign;
 pub mod certificate_page;
 pub mod commands;
-pub mod figures;
 pub mod html;
 pub mod identification;
 pub mod input;

@@ -1,11 +1,11 @@
 //! The figures of recorded runs.
 
-use crate::figures::{
-    self, Band, Figure, GuardRun, Limits, PathRun, PlaneRun, PlansRun, Reference, Role,
-    closed_loop, motor_torques, path_in_plane, two_planes,
-};
 use crate::recording::Columns;
 use ballbot_scenario::{PhiReference, Prepared};
+use lpvmpc_figures::{
+    Band, Figure, GuardRun, Limits, PathRun, PlaneRun, PlansRun, Reference, Role, closed_loop,
+    motor_torques, path_in_plane, two_planes,
+};
 use nalgebra::Vector3;
 
 /// A recorded run with its name and colour in a figure.
@@ -115,7 +115,7 @@ pub fn plans(title: &str, columns: &Columns) -> Option<Figure> {
         decisions: &decisions,
     });
     let gap = &columns.gap;
-    figures::plans(
+    lpvmpc_figures::plans(
         title,
         &PlansRun {
             time: &time,

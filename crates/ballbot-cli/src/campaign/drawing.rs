@@ -1,7 +1,7 @@
 //! The figure of a campaign.
 
 use super::Outcome;
-use crate::figures::{Band, Dash, Figure, Panel, Role, Series, Style};
+use lpvmpc_figures::{Band, Dash, Figure, Panel, Role, Series, Style};
 
 /// Per variant: the largest tilts, and the share of the runs that did not keep all bounds.
 pub fn drawing(outcomes: &[Outcome], theta: Band) -> Figure {

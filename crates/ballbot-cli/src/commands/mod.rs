@@ -20,7 +20,6 @@ pub mod verify;
 pub mod view;
 pub mod wheels;
 
-use crate::figures::FigureError;
 use crate::input::InputError;
 use crate::output::FileError;
 use crate::refinement::RefinementError;
@@ -29,6 +28,7 @@ use ballbot_identification::{EstimateError, ExcitationError, log::LogError};
 use ballbot_scenario::ScenarioError;
 use lpvmpc_certificate::{CertifyError, ClaimError, DocumentError};
 use lpvmpc_design::MatrixError;
+use lpvmpc_figures::FigureError;
 use lpvmpc_sim::PlantError;
 use std::path::PathBuf;
 

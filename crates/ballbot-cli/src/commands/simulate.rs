@@ -2,7 +2,6 @@
 
 use super::CommandError;
 use super::robot::ScenarioOptions;
-use crate::figures::{Figure, Role};
 use crate::json;
 use crate::output::{self, FileError};
 use crate::pictures::{self, Shown};
@@ -12,6 +11,7 @@ use crate::results::ResultFolder;
 use crate::table::Table;
 use ballbot_scenario::{MotorSample, Prepared, Record, Surroundings, words};
 use clap::Args;
+use lpvmpc_figures::{Figure, Role};
 use lpvmpc_sim::{Ending, LogRow, Trajectory};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

@@ -1,9 +1,9 @@
 //! The figures of an identification.
 
-use crate::figures::{Dash, Figure, Panel, Role, Scale, Series, Style};
 use crate::html::Drawing;
 use ballbot_identification::{HORIZONS, Identification, OUTPUTS, SegmentResidual};
 use lpvmpc_design::{Correlation, NORMAL_95};
+use lpvmpc_figures::{Dash, Figure, Panel, Role, Scale, Series, Style};
 
 /// A figure shows so much of the log, s.
 const SHOWN: f64 = 10.0;

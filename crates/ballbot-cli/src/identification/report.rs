@@ -3,9 +3,9 @@
 use super::published;
 use super::summary::mark;
 use super::tables::{self, Sheet};
-use crate::figures::FigureError;
 use crate::html::{self, Drawing, escape};
 use ballbot_identification::{Identification, Weight};
+use lpvmpc_figures::FigureError;
 
 /// The report's text.
 ///

@@ -1,7 +1,7 @@
 //! Figures of costs over distance, and of a run with a long horizon.
 
 use super::{Case, Outcome};
-use crate::figures::{Dash, Figure, Panel, PlaneRun, Reference, Role, Series, Style, closed_loop};
+use lpvmpc_figures::{Dash, Figure, Panel, PlaneRun, Reference, Role, Series, Style, closed_loop};
 
 /// Closed-loop costs over those of nonlinear MPC, by distance.
 pub struct CostOverDistance {

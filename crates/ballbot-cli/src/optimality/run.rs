@@ -2,7 +2,6 @@
 
 use super::Case;
 use crate::commands::CommandError;
-use crate::figures::Limits;
 use crate::pictures;
 use crate::progress::Progress;
 use ballbot_scenario::{
@@ -10,6 +9,7 @@ use ballbot_scenario::{
     TerminalTable,
 };
 use lpvmpc::{Controller, Iterations, Reference};
+use lpvmpc_figures::Limits;
 use nalgebra::Vector4;
 use rayon::prelude::*;
 use std::path::Path;

@@ -1,9 +1,9 @@
 //! The figures of the paper.
 
 use super::Reproduction;
-use crate::figures::{ModelRuns, Role, convergence, models};
 use crate::html::Drawing;
 use crate::pictures::{self, Shown};
+use lpvmpc_figures::{ModelRuns, Role, convergence, models};
 
 impl Reproduction {
     /// All figures, in the order of the paper.

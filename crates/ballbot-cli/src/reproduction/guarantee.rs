@@ -4,13 +4,13 @@ use super::nonlinear::{self, NonlinearRun};
 use super::runs::Run;
 use super::tables::Sheet;
 use crate::commands::CommandError;
-use crate::figures::Role;
 use crate::html::Drawing;
 use crate::pictures::{self, Shown};
 use ballbot_scenario::{
     CertifiedTable, IterationsTable, PredictorTable, Prepared, Scenario, ScenarioError,
     TerminalTable,
 };
+use lpvmpc_figures::Role;
 
 /// The runs beyond the paper.
 #[derive(Debug)]

@@ -6,10 +6,10 @@
 
 use super::tables::Sheet;
 use crate::commands::CommandError;
-use crate::figures::{Dash, Figure, Panel, Role, Scale, Series, Style};
 use crate::html::Drawing;
 use crate::optimality::{Case, Outcome, distances, run_all};
 use lpvmpc::Iterations;
+use lpvmpc_figures::{Dash, Figure, Panel, Role, Scale, Series, Style};
 
 /// Sampling time of the loops that are shown, s.
 pub const SAMPLING_TIME: f64 = 0.05;

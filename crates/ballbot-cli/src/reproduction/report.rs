@@ -5,9 +5,9 @@ use super::claims::{self, Claim};
 use super::optimum::{self, Optimum};
 use super::runs::Run;
 use super::tables::Sheet;
-use crate::figures::FigureError;
 use crate::html::{self, Drawing, escape};
 use ballbot::{Ballbot, LinearParameters};
+use lpvmpc_figures::FigureError;
 use std::f64::consts::{PI, TAU};
 
 /// The report's text.

@@ -68,8 +68,8 @@ fn from(panel: &Panel, begun: f64) -> Panel {
 
 #[cfg(test)]
 mod tests {
-    use super::super::figure::{Dash, Role, Style};
     use super::*;
+    use crate::figure::{Dash, Role, Style};
 
     fn panel(first: f64) -> Panel {
         let x: Vec<f64> = (0..=700).map(|k| f64::from(k) * 0.1).collect();

@@ -1,8 +1,6 @@
 //! What a figure shows: panels, series and allowed ranges.
 
 use super::{layout, png, svg};
-use crate::output::{FileError, write_files};
-use std::path::{Path, PathBuf};
 
 /// One figure: a title above a grid of panels, filled row by row.
 #[derive(Clone, Debug, PartialEq)]
@@ -209,9 +207,6 @@ pub enum FigureError {
     /// The PNG could not be encoded.
     #[error("the PNG could not be encoded: {0}")]
     Encode(String),
-    /// A file could not be written.
-    #[error(transparent)]
-    File(#[from] FileError),
 }
 
 impl Figure {
@@ -230,24 +225,6 @@ impl Figure {
     /// As [`Figure::svg`], and a size beyond 20000 pixels.
     pub fn png(&self, scale: f64) -> Result<Vec<u8>, FigureError> {
         png::encode(&layout::scene(self)?, scale)
-    }
-
-    /// Writes `stem`.svg and `stem`.png and returns the two paths. Both are drawn before either
-    /// file is touched, and a reader sees the old file or the new one, never half of it.
-    ///
-    /// # Errors
-    /// As [`Figure::png`], and what the file system refuses, with the path.
-    pub fn write(&self, stem: &Path, scale: f64) -> Result<[PathBuf; 2], FigureError> {
-        let with = |extension: &str| {
-            // Not `with_extension`: a stem such as `run_0.05` would lose its end.
-            let mut name = stem.as_os_str().to_owned();
-            name.push(extension);
-            PathBuf::from(name)
-        };
-        let paths = [with(".svg"), with(".png")];
-        let (svg, png) = (self.svg()?, self.png(scale)?);
-        write_files(&[(&paths[0], svg.as_bytes()), (&paths[1], &png)])?;
-        Ok(paths)
     }
 }
 

@@ -186,8 +186,8 @@ fn with_room((lower, upper): (f64, f64)) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::figure::{Dash, Role, Series};
     use super::*;
+    use crate::figure::{Dash, Role, Series};
 
     fn panel(y: &[f64]) -> Panel {
         let x: Vec<f64> = (0..y.len()).map(|k| k as f64).collect();

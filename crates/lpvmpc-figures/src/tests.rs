@@ -318,22 +318,6 @@ fn what_cannot_be_drawn_is_an_error_that_names_the_panel() {
     assert!(matches!(small.svg(), Err(FigureError::Size { .. })));
 }
 
-#[test]
-fn both_files_are_written_and_a_failure_names_the_file() {
-    let folder = tempfile::tempdir().unwrap();
-    let figure = figure(vec![panel(&[0.0, 1.0], &[0.0, 1.0], LINE)]);
-    let [svg, png] = figure.write(&folder.path().join("run_0.05"), 1.0).unwrap();
-    assert_eq!(svg, folder.path().join("run_0.05.svg"));
-    assert_eq!(std::fs::read_to_string(svg).unwrap(), figure.svg().unwrap());
-    assert_eq!(std::fs::read(png).unwrap(), figure.png(1.0).unwrap());
-    // A file stands where the directory should be.
-    std::fs::write(folder.path().join("none"), "").unwrap();
-    let error = figure
-        .write(&folder.path().join("none").join("run"), 1.0)
-        .unwrap_err();
-    assert!(error.to_string().contains("run.svg"), "{error}");
-}
-
 fn any_value() -> impl Strategy<Value = f64> {
     prop_oneof![4 => -1e3..1e3, 1 => any::<f64>(), 1 => Just(f64::NAN), 1 => Just(0.0)]
 }
