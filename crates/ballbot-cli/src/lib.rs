@@ -7,7 +7,7 @@
 
 pub mod arguments;
 pub mod benchmark;
-pub mod campaign;
+pub mod campaign_drawing;
 pub mod certificate_page;
 pub mod commands;
 pub mod html;
@@ -15,16 +15,13 @@ pub mod identification;
 pub mod input;
 pub mod interrupt;
 pub mod json;
-pub mod linear_model;
 pub mod optimality;
 pub mod output;
 pub mod pictures;
 pub mod progress;
 pub mod proofs;
 pub mod recording;
-pub mod refinement;
 pub mod refinement_file;
-pub mod regulator;
 pub mod reproduction;
 pub mod results;
 pub mod table;

@@ -1,9 +1,9 @@
 //! The input file of `ballbot refine`: schema, checks, example.
 
 use crate::input::{self, InputError};
-use crate::refinement::{RefinementProblem, start_from};
 use ballbot::Geometry;
 use ballbot_scenario::{LinearModelTable, ScenarioError, number};
+use ballbot_studies::{RefinementProblem, start_from};
 use lpvmpc_design::LeastSquaresSettings;
 use nalgebra::DVector;
 use serde::Deserialize;

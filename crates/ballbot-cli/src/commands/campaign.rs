@@ -2,12 +2,14 @@
 
 use super::CommandError;
 use super::robot::ScenarioOptions;
-use crate::campaign::{Campaign, Outcome, Record, Scenarios, drawing};
+use crate::campaign_drawing::drawing;
 use crate::commands::simulate::PNG_SCALE;
 use crate::json;
 use crate::pictures::limits;
+use crate::progress::Progress;
 use crate::results::ResultFolder;
 use crate::table::Table;
+use ballbot_studies::{Campaign, Outcome, Record, Scenarios};
 use clap::Args;
 use lpvmpc::Decision;
 use serde_json::json;
@@ -73,7 +75,9 @@ pub fn run(arguments: &CampaignArguments) -> Result<String, CommandError> {
     };
     let scenarios = Scenarios::of(arguments.options.prepare(&arguments.scenario)?)?;
     let results = ResultFolder::open(&arguments.out, &RESULTS)?;
-    let outcomes = campaign.run(&scenarios)?;
+    let progress = Progress::new("running", campaign.total_runs());
+    let outcomes = campaign.run(&scenarios, &|done| progress.set(done))?;
+    drop(progress);
     let figure = drawing(&outcomes, limits(&scenarios.guaranteed).states[1]);
     let contents = [
         csv(&outcomes).into_bytes(),

@@ -9,19 +9,14 @@ use crate::progress::Progress;
 use crate::proofs::{self, STEPS};
 use crate::results::ResultFolder;
 use crate::table::{Table, number};
-use ballbot_scenario::{
-    Prepared, RobotTable, TerminalCertificate, TerminalTable, number as numbers,
-};
+use ballbot_scenario::{TerminalCertificate, TerminalTable, number as numbers};
+use ballbot_studies::{CertificateSearch, Searching};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
-use lpvmpc::Bounds;
-use lpvmpc_certificate::{
-    CertificateProblem, CertifyError, Effort, MOST_BOXES, Proof, TerminalProblem, certify_terminal,
-    raise_level,
-};
-use nalgebra::{SVector, Vector2, Vector4};
+use lpvmpc_certificate::{MOST_BOXES, Proof};
 use serde_json::{Value, json};
 use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 
 /// Arguments of `ballbot certify`.
 #[derive(Debug, Args)]
@@ -79,11 +74,6 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Sizes that the search looks at: multiples of a thirty-second of the bounds.
-const SIZES: usize = 32;
-
-type Certified = (TerminalCertificate, Proof<4>);
-
 /// Designs, proves and writes.
 ///
 /// # Errors
@@ -95,14 +85,20 @@ pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
         scenario.controller.terminal = TerminalTable::DiscreteRiccati;
     }
     let prepared = scenario.prepare(folder.as_path())?;
-    let robot = RobotTable::try_from(&prepared.ballbot)?;
     let names = ["certificate.json", "certificate.html"];
     let results = ResultFolder::open(&arguments.out, &names)?;
-    let (size, certified) = match arguments.size {
-        Some(size) => (size, certify(arguments, &prepared, robot, size)?),
-        None => search(arguments, &prepared, robot)?,
+    let search = CertificateSearch {
+        prepared: &prepared,
+        size: arguments.size,
+        contraction: arguments.contraction,
+        level: arguments.level,
+        boxes: arguments.boxes,
+        trials: usize::from(arguments.raise),
+        written_by: format!("ballbot {}", env!("CARGO_PKG_VERSION")),
     };
-    let (certificate, proof) = raise(arguments, &prepared, robot, size, certified);
+    let bars = Bars(Mutex::default());
+    let (certificate, proof) = search.run(&|searching| bars.show(searching))?;
+    drop(bars);
     proofs::remember(&certificate);
     let json = certificate.to_json()?;
     let page = certificate_page::html(&prepared.title, &certificate, &proof)?;
@@ -123,126 +119,28 @@ pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
     ))
 }
 
-/// The largest set that can be certified. A larger box of tilts allows a larger set, up to where
-/// the law has to cope with so many plants that the set shrinks again; the larger the set, the
-/// harder the proof. So the sizes up to the largest designed set are bisected.
-fn search(
-    arguments: &CertifyArguments,
-    prepared: &Prepared,
-    robot: RobotTable,
-) -> Result<(f64, Certified), CommandError> {
-    let progress = Progress::new("designing sets", SIZES);
-    let sizes = (1..=SIZES).map(|i| i as f64 / SIZES as f64);
-    let designed: Vec<(f64, f64)> = sizes
-        .enumerate()
-        .map(|(done, size)| {
-            progress.set(done);
-            let design = problem(arguments, prepared, size).design(&robot.ballbot());
-            (size, design.map_or(f64::NEG_INFINITY, |set| set.log_det()))
-        })
-        .collect();
-    drop(progress);
-    let mut largest = 0;
-    for (i, (_, volume)) in designed.iter().enumerate() {
-        if *volume > designed[largest].1 {
-            largest = i;
-        }
-    }
-    let (mut low, mut high) = (0, largest + 1);
-    let mut best = None;
-    let mut last = None;
-    // Below `low` there is a proof, from `high` on there is none.
-    while low < high {
-        let middle = (low + high) / 2;
-        match certify(arguments, prepared, robot, designed[middle].0) {
-            Ok(found) => {
-                low = middle + 1;
-                best = Some((designed[middle].0, found));
-            }
-            Err(error) => {
-                high = middle;
-                last = Some(error);
-            }
-        }
-    }
-    match (best, last) {
-        (Some(found), _) => Ok(found),
-        (None, Some(error)) => Err(error.into()),
-        (None, None) => Err(CommandError::Usage("no size was tried".to_owned())),
-    }
-}
+/// Bars for what the search is at, one after the other.
+struct Bars(Mutex<(String, Option<Progress>)>);
 
-/// What is asked of the set that keeps tilt and tilt rate within `size` of their bounds.
-fn problem(
-    arguments: &CertifyArguments,
-    prepared: &Prepared,
-    size: f64,
-) -> CertificateProblem<4, 1, 2> {
-    let settings = &prepared.settings;
-    let state_limits = symmetric(&settings.x);
-    let [theta, theta_dot] = [1, 3].map(|i| size * state_limits[i]);
-    CertificateProblem {
-        terminal: TerminalProblem {
-            t_s: settings.t_s,
-            q: settings.weights.q,
-            r: settings.weights.r,
-            state_limits: Vector4::new(state_limits[0], theta, state_limits[2], theta_dot),
-            input_limits: symmetric(&settings.u),
-            contraction: arguments.contraction,
-            level: arguments.level,
-        },
-        state_limits,
-        scheduling_limits: Vector2::new(theta, theta_dot),
-        written_by: format!("ballbot {}", env!("CARGO_PKG_VERSION")),
-    }
-}
-
-fn certify(
-    arguments: &CertifyArguments,
-    prepared: &Prepared,
-    robot: RobotTable,
-    size: f64,
-) -> Result<Certified, CertifyError> {
-    let problem = problem(arguments, prepared, size);
-    let what = format!("proving a set of {size:.3} of the bounds");
-    let progress = Progress::new(what, STEPS);
-    certify_terminal(
-        (&robot.ballbot(), robot),
-        &problem,
-        arguments.boxes,
-        &|done| {
+impl Bars {
+    fn show(&self, searching: Searching) {
+        let (what, done) = match searching {
+            Searching::Designing(done) => ("designing sets".to_owned(), done),
+            Searching::Proving { size, done } => {
+                (format!("proving a set of {size:.3} of the bounds"), done)
+            }
+            Searching::Raising(done) => ("raising the level".to_owned(), done),
+        };
+        let mut bar = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if bar.0 != what || bar.1.is_none() {
+            // The old one ends before the new one begins.
+            bar.1 = None;
+            *bar = (what.clone(), Some(Progress::new(what, STEPS)));
+        }
+        if let Some(progress) = &bar.1 {
             progress.set((done * STEPS as f64) as usize);
-        },
-    )
-}
-
-/// The certificate with the highest level that was tried and proved.
-fn raise(
-    arguments: &CertifyArguments,
-    prepared: &Prepared,
-    robot: RobotTable,
-    size: f64,
-    certified: Certified,
-) -> Certified {
-    let trials = usize::from(arguments.raise);
-    let effort = Effort {
-        trials,
-        most_boxes: arguments.boxes,
-    };
-    let progress = Progress::new("raising the level", trials * STEPS);
-    let problem = problem(arguments, prepared, size);
-    raise_level(
-        &robot.ballbot(),
-        &problem,
-        certified,
-        effort,
-        &|trial, done| progress.set(trial * STEPS + (done * STEPS as f64) as usize),
-    )
-}
-
-/// The limit of |value| that the bounds leave on both sides.
-fn symmetric<const N: usize>(bounds: &Bounds<f64, N>) -> SVector<f64, N> {
-    SVector::from_fn(|i, _| bounds.upper[i].min(-bounds.lower[i]))
+        }
+    }
 }
 
 /// What is proved, in words and numbers.

@@ -3,8 +3,8 @@
 use super::CommandError;
 use super::model::{ModelArguments, ModelChoice};
 use crate::json;
-use crate::linear_model::LinearModel;
 use crate::table::{self, Table, short};
+use ballbot_studies::LinearModel;
 use clap::Args;
 use lpvmpc::LpvModel;
 use nalgebra::{Complex, Vector3};

@@ -22,11 +22,10 @@ pub mod wheels;
 
 use crate::input::InputError;
 use crate::output::FileError;
-use crate::refinement::RefinementError;
-use crate::regulator::RegulatorError;
 use ballbot_identification::{EstimateError, ExcitationError, log::LogError};
 use ballbot_scenario::ScenarioError;
-use lpvmpc_certificate::{CertifyError, ClaimError, DocumentError};
+use ballbot_studies::{CampaignError, ModelError, RefinementError, RegulatorError, SearchError};
+use lpvmpc_certificate::{ClaimError, DocumentError};
 use lpvmpc_design::MatrixError;
 use lpvmpc_figures::FigureError;
 use lpvmpc_sim::PlantError;
@@ -65,12 +64,15 @@ pub enum CommandError {
     /// A figure that cannot be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),
-    /// The threads of a campaign.
-    #[error("cannot start the threads: {0}")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
+    /// A campaign that cannot be run.
+    #[error(transparent)]
+    Campaign(#[from] CampaignError),
+    /// Models that cannot be compared.
+    #[error(transparent)]
+    Models(#[from] ModelError),
     /// No set could be certified.
-    #[error("no certificate: {0}")]
-    Certify(#[from] CertifyError),
+    #[error(transparent)]
+    Certify(#[from] SearchError),
     /// A claim of a certificate is false, or could not be shown.
     #[error("the certificate {verdict}: {0}", verdict = .0.verdict())]
     Claim(#[from] ClaimError),

@@ -1,8 +1,8 @@
 //! Which robot, and which of its linear models.
 
 use super::robot::RobotArguments;
-use crate::linear_model::LinearModel;
 use ballbot::{Ballbot, LinearParameters};
+use ballbot_studies::LinearModel;
 use clap::{Args, ValueEnum};
 use lpvmpc::LpvModel;
 use nalgebra::Vector3;

@@ -1,10 +1,10 @@
 //! `ballbot refine`.
 
 use super::CommandError;
-use crate::refinement::{Refinement, RefinementProblem};
 use crate::refinement_file::{self, EQUATIONS};
 use crate::table::{self, Table, number};
 use crate::{input, json, output};
+use ballbot_studies::{Refinement, RefinementProblem};
 use clap::Args;
 use lpvmpc_design::Fit;
 use serde_json::{Value, json};
@@ -163,7 +163,7 @@ fn indented(text: &str) -> String {
 }
 
 fn document(refinement: &Refinement) -> Value {
-    let equation = |(i, equation): (usize, &crate::refinement::Equation)| {
+    let equation = |(i, equation): (usize, &ballbot_studies::Equation)| {
         json!({
             "name": EQUATIONS[i],
             "p": equation.identified,

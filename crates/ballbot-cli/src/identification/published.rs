@@ -1,8 +1,8 @@
 //! The published chain beside the trajectory fit: p by linear regression, b by refinement.
 
 use super::tables::{Sheet, decimal};
-use crate::refinement::{RefinementProblem, start_from};
 use ballbot_identification::Identification;
+use ballbot_studies::{RefinementProblem, start_from};
 use std::fmt::Write as _;
 
 /// p of the regression with the standard deviations it claims, and p of the fitted robot. Empty if

@@ -3,7 +3,6 @@
 pub mod claims;
 pub mod drawings;
 pub mod guarantee;
-pub mod models;
 pub mod nonlinear;
 pub mod optimum;
 pub mod report;
@@ -11,13 +10,13 @@ pub mod runs;
 pub mod tables;
 
 use crate::commands::CommandError;
-use crate::linear_model::LinearModel;
 use crate::progress::Progress;
-use crate::refinement::{Refinement, RefinementProblem};
-use crate::regulator::{Regulator, RegulatorProblem, Time};
 use ballbot::{Ballbot, LinearParameters};
+use ballbot_studies::LinearModel;
+use ballbot_studies::ModelComparison;
+use ballbot_studies::{Refinement, RefinementProblem};
+use ballbot_studies::{Regulator, RegulatorProblem, Time};
 use guarantee::Guarantee;
-use models::ModelComparison;
 use optimum::Optimum;
 use runs::{Run, Runs};
 

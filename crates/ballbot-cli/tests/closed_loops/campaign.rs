@@ -1,6 +1,6 @@
 //! A small campaign: what is guaranteed holds, and the negative control fails.
 
-use ballbot_cli::campaign::{Campaign, Outcome, Scenarios, Variant};
+use ballbot_studies::{Campaign, Outcome, Scenarios, Variant};
 
 const SMALL: Campaign = Campaign {
     runs: 200,
@@ -19,7 +19,7 @@ fn of(outcomes: &[Outcome], wanted: impl Fn(&Variant) -> bool) -> &Outcome {
 
 #[test]
 fn the_nominal_loop_keeps_its_promise_and_the_paper_s_scheme_does_not() {
-    let outcomes = SMALL.run(&Scenarios::built_in().unwrap()).unwrap();
+    let outcomes = SMALL.run(&Scenarios::built_in().unwrap(), &|_| ()).unwrap();
     let nominal = of(&outcomes, |variant| *variant == Variant::Nominal).tally;
     assert_eq!(nominal.runs, 200);
     assert_eq!(nominal.total.samples, 200 * 60);
@@ -57,9 +57,15 @@ fn the_number_of_threads_changes_nothing() {
         threads: 1,
     };
     let scenarios = Scenarios::built_in().unwrap();
-    let on = |threads| Campaign { threads, ..few }.run(&scenarios).unwrap();
+    let on = |threads| {
+        Campaign { threads, ..few }
+            .run(&scenarios, &|_| ())
+            .unwrap()
+    };
     let one = on(1);
     assert_eq!(one, on(4));
-    let other = Campaign { seed: 4, ..few }.run(&scenarios).unwrap();
+    let other = Campaign { seed: 4, ..few }
+        .run(&scenarios, &|_| ())
+        .unwrap();
     assert_ne!(one[0].records, other[0].records);
 }

@@ -2,7 +2,6 @@
 
 use super::run::{Course, Loop, Record, Wanted};
 use super::{Campaign, Scenarios, paper};
-use crate::commands::CommandError;
 use ballbot::Ballbot;
 use ballbot_scenario::{Prepared, ScenarioError};
 use lpvmpc_sim::{Actuation, Random};
@@ -67,7 +66,7 @@ impl Variant {
         scenarios: &Scenarios,
         campaign: &Campaign,
         number: usize,
-    ) -> Result<Record, CommandError> {
+    ) -> Result<Record, ScenarioError> {
         let mut random = Random::new(campaign.seed, number);
         let prepared = &scenarios.guaranteed;
         match self {

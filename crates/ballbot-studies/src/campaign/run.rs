@@ -1,7 +1,6 @@
 //! One closed loop of a campaign.
 
 use super::variant::Variant;
-use crate::commands::CommandError;
 use ballbot::{Ballbot, GuardedSettings, GuardedWorkspace};
 use ballbot_scenario::{Prepared, ScenarioError};
 use lpvmpc::{Decision, GuardedController};
@@ -9,8 +8,6 @@ use lpvmpc_sim::{GuardedLoop, Random, Tolerances};
 use nalgebra::{Vector1, Vector4};
 use serde::Serialize;
 
-/// The longest horizon of the campaign's controllers.
-pub(super) const N: usize = 60;
 /// How the plant is integrated: as exactly as it makes sense.
 const TOLERANCES: Tolerances = Tolerances {
     relative: 1e-12,
@@ -112,7 +109,7 @@ impl<'a> Loop<'a> {
         prepared: &Prepared,
         edge: bool,
         random: &mut Random,
-    ) -> Result<Vector4<f64>, CommandError> {
+    ) -> Result<Vector4<f64>, ScenarioError> {
         let GuardedSettings { terminal, .. } = settings(prepared)?;
         let direction = Vector4::from_fn(|_, _| random.normal()).normalize();
         let part = random.uniform().powf(0.25);
@@ -120,7 +117,7 @@ impl<'a> Loop<'a> {
         // With P = L L', x = L^-T y has x'Px = |y|^2.
         let factor = terminal.p.cholesky().map(|factor| factor.l().transpose());
         let state = factor.and_then(|root| root.solve_upper_triangular(&(direction * radius)));
-        state.ok_or_else(|| no_certificate().into())
+        state.ok_or_else(no_certificate)
     }
 
     /// The loop of `prepared` with the changes of `variant`.
@@ -128,7 +125,7 @@ impl<'a> Loop<'a> {
         prepared: &'a Prepared,
         variant: &Variant,
         random: &mut Random,
-    ) -> Result<Self, CommandError> {
+    ) -> Result<Self, ScenarioError> {
         let mut settings = *settings(prepared)?;
         match *variant {
             Variant::Candidates => settings.iterations.known = 0,

@@ -1,12 +1,11 @@
 //! Four models under one multi-harmonic torque on the stabilised plant: linearised, nonlinear,
 //! LPV, and Runge-Kutta with one step per sample.
 
-use crate::commands::CommandError;
 use crate::linear_model::LinearModel;
-use crate::regulator::{RegulatorProblem, Time};
+use crate::regulator::{RegulatorError, RegulatorProblem, Time};
 use ballbot::Ballbot;
 use lpvmpc::{LpvModel, Rk4};
-use lpvmpc_sim::{Tolerances, advance};
+use lpvmpc_sim::{PlantError, Tolerances, advance};
 use nalgebra::{Matrix4, RowVector4, Vector1, Vector3, Vector4};
 
 /// The sampling time of the experiment, s; the torque is held for as long.
@@ -50,6 +49,17 @@ pub struct ModelComparison {
     pub four_step_difference: [f64; 4],
 }
 
+/// Why the models cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum ModelError {
+    /// The regulator.
+    #[error(transparent)]
+    Regulator(#[from] RegulatorError),
+    /// The plant cannot be integrated.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+}
+
 /// The plant through A(sigma(x)) x + B(sigma(x)) u, without the direct form of f.
 struct Embedded(Ballbot<f64>);
 
@@ -81,7 +91,7 @@ impl ModelComparison {
     ///
     /// # Errors
     /// The regulator or the integration fails.
-    pub fn compute() -> Result<Self, CommandError> {
+    pub fn compute() -> Result<Self, ModelError> {
         let plant = Ballbot::paper();
         let gain = stabilising_gain(&plant)?;
         let (time, nonlinear, torque) = continuous(&plant, &gain)?;
@@ -115,7 +125,7 @@ fn excitation(t: f64) -> f64 {
 }
 
 /// The sampled regulator that keeps all four models upright.
-fn stabilising_gain(plant: &Ballbot<f64>) -> Result<RowVector4<f64>, CommandError> {
+fn stabilising_gain(plant: &Ballbot<f64>) -> Result<RowVector4<f64>, ModelError> {
     let problem = RegulatorProblem {
         linear: LinearModel::from(plant.linear_parameters().matrices()),
         ballbot: *plant,
@@ -141,7 +151,7 @@ type Course = (Vec<f64>, Vec<[f64; 4]>, Vec<f64>);
 fn continuous<P: LpvModel<f64, 4, 1, 3>>(
     model: &P,
     gain: &RowVector4<f64>,
-) -> Result<Course, CommandError> {
+) -> Result<Course, ModelError> {
     let mut x = Vector4::zeros();
     let (mut time, mut states, mut torques) = (vec![0.0], vec![x.into()], Vec::new());
     for k in 0..samples() {

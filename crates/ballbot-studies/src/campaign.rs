@@ -3,20 +3,16 @@
 //! A run is settled by variant, seed and its number alone, and runs are counted in their order,
 //! so results are the same bit for bit on any number of threads.
 
-mod drawing;
 mod paper;
 mod run;
 mod tally;
 mod variant;
 
-pub use drawing::drawing;
 pub use run::{Course, Record, Wanted};
 pub use tally::Tally;
 pub use variant::Variant;
 
-use crate::commands::CommandError;
-use crate::progress::Progress;
-use ballbot_scenario::{Prepared, Scenario, ScenarioError, number};
+use ballbot_scenario::{Prepared, Scenario, ScenarioError};
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 use std::path::Path;
@@ -37,8 +33,16 @@ pub struct Campaign {
     pub threads: usize,
 }
 
-/// Stack of a thread, bytes: a controller and its workspace are made on it.
-const STACK: usize = 32 << 20;
+/// Why there is no campaign.
+#[derive(Debug, thiserror::Error)]
+pub enum CampaignError {
+    /// A scenario, or a controller that refuses its settings.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The threads.
+    #[error("cannot start the threads: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+}
 
 /// The runs of a variant.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,20 +73,16 @@ impl Scenarios {
     ///
     /// # Errors
     /// None should occur, as there is no input.
-    pub fn built_in() -> Result<Self, CommandError> {
+    pub fn built_in() -> Result<Self, ScenarioError> {
         Self::of(built_in("far-setpoints")?)
     }
 
     /// Those of this guaranteed loop.
     ///
     /// # Errors
-    /// It has no certified terminal set, or a longer horizon than campaigns have.
-    pub fn of(guaranteed: Prepared) -> Result<Self, CommandError> {
+    /// It has no certified terminal set.
+    pub fn of(guaranteed: Prepared) -> Result<Self, ScenarioError> {
         run::settings(&guaranteed)?;
-        let horizon = guaranteed.settings.horizon;
-        let right = horizon <= run::N;
-        let expected = format!("campaigns are compiled for up to {} samples", run::N);
-        number::check("controller.horizon", horizon as f64, right, &expected)?;
         Ok(Self {
             guaranteed,
             paper: built_in("single-setpoint-terminal")?,
@@ -91,21 +91,29 @@ impl Scenarios {
 }
 
 impl Campaign {
-    /// Runs every variant.
+    /// Closed loops of all variants together.
+    pub fn total_runs(&self) -> usize {
+        self.runs + (Variant::ALL.len() - 1) * self.other_runs
+    }
+
+    /// Runs every variant. `progress` is called with the number of closed loops that are done.
     ///
     /// # Errors
     /// A controller refuses its settings, or the threads cannot be started.
-    pub fn run(&self, scenarios: &Scenarios) -> Result<Vec<Outcome>, CommandError> {
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(self.threads)
-            .stack_size(STACK)
-            .build()?;
-        pool.install(|| self.run_here(scenarios))
+    pub fn run(
+        &self,
+        scenarios: &Scenarios,
+        progress: &(dyn Fn(usize) + Sync),
+    ) -> Result<Vec<Outcome>, CampaignError> {
+        let pool = ThreadPoolBuilder::new().num_threads(self.threads).build()?;
+        Ok(pool.install(|| self.run_here(scenarios, progress))?)
     }
 
-    fn run_here(&self, scenarios: &Scenarios) -> Result<Vec<Outcome>, CommandError> {
-        let total = self.runs + (Variant::ALL.len() - 1) * self.other_runs;
-        let progress = Progress::new("running", total);
+    fn run_here(
+        &self,
+        scenarios: &Scenarios,
+        progress: &(dyn Fn(usize) + Sync),
+    ) -> Result<Vec<Outcome>, ScenarioError> {
         let done = AtomicUsize::new(0);
         let outcome = |variant: &Variant| {
             let runs = match variant {
@@ -114,7 +122,7 @@ impl Campaign {
             };
             let records = (0..runs).into_par_iter().map(|number| {
                 let record = variant.run(scenarios, self, number);
-                progress.set(done.fetch_add(1, Ordering::Relaxed) + 1);
+                progress(done.fetch_add(1, Ordering::Relaxed) + 1);
                 record
             });
             let records = records.collect::<Result<Vec<_>, _>>()?;

@@ -1,6 +1,6 @@
 //! The figure of a campaign.
 
-use super::Outcome;
+use ballbot_studies::Outcome;
 use lpvmpc_figures::{Band, Dash, Figure, Panel, Role, Series, Style};
 
 /// Per variant: the largest tilts, and the share of the runs that did not keep all bounds.

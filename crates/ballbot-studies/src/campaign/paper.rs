@@ -1,7 +1,6 @@
 //! The negative control: the paper's scheme to the letter.
 
 use super::run::{Record, Wanted, has_fallen};
-use crate::commands::CommandError;
 use ballbot_scenario::{Prepared, ScenarioError};
 use lpvmpc::{Controller, Reference};
 use nalgebra::Vector4;
@@ -12,7 +11,7 @@ pub(super) fn run(
     start: Vector4<f64>,
     wanted: &Wanted,
     samples: usize,
-) -> Result<Record, CommandError> {
+) -> Result<Record, ScenarioError> {
     let controller = Controller::allocate(prepared.ballbot, prepared.settings);
     let mut controller = controller.map_err(ScenarioError::from)?;
     let mut workspace = controller.workspace();

@@ -1,0 +1,189 @@
+//! The largest terminal set of a robot that can be certified.
+
+use ballbot_scenario::{Prepared, RobotTable, ScenarioError, TerminalCertificate};
+use lpvmpc::Bounds;
+use lpvmpc_certificate::{
+    CertificateProblem, CertifyError, Effort, Proof, TerminalProblem, certify_terminal, raise_level,
+};
+use nalgebra::{SVector, Vector2, Vector4};
+
+/// Sizes that the search looks at: multiples of a thirty-second of the bounds.
+const SIZES: usize = 32;
+
+/// A certificate and its proof.
+pub type Certified = (TerminalCertificate, Proof<4>);
+
+/// What is asked of a set.
+#[derive(Clone, Debug)]
+pub struct CertificateSearch<'a> {
+    /// Robot, sampling time, weights and bounds.
+    pub prepared: &'a Prepared,
+    /// Share of the bounds of tilt and tilt rate that the set may use; `None` for the one with the
+    /// largest set.
+    pub size: Option<f64>,
+    /// eta: what the cost decreases by beyond the stage cost, as a part of itself.
+    pub contraction: f64,
+    /// Level of the designed set x'Px <= level, in units of the cost.
+    pub level: f64,
+    /// Boxes that a proof may take.
+    pub boxes: usize,
+    /// Larger levels that are tried once a set is proved.
+    pub trials: usize,
+    /// Who writes the certificate.
+    pub written_by: String,
+}
+
+/// Why there is no certificate.
+#[derive(Debug, thiserror::Error)]
+pub enum SearchError {
+    /// The robot has what certificates do not know.
+    #[error(transparent)]
+    Robot(#[from] ScenarioError),
+    /// No set could be proved.
+    #[error("no certificate: {0}")]
+    Certify(#[from] CertifyError),
+}
+
+/// What a search is at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Searching {
+    /// Sets of several sizes are designed; this part of them is done.
+    Designing(f64),
+    /// A set of this share of the bounds is being proved; this part is done.
+    Proving {
+        /// Share of the bounds.
+        size: f64,
+        /// Part that is done.
+        done: f64,
+    },
+    /// The level of a proved set is being raised; this part of the trials is done.
+    Raising(f64),
+}
+
+impl CertificateSearch<'_> {
+    /// Designs and proves. `progress` is told what it is at.
+    ///
+    /// # Errors
+    /// The robot has what certificates do not know; or no set could be proved.
+    pub fn run(&self, progress: &(dyn Fn(Searching) + Sync)) -> Result<Certified, SearchError> {
+        let robot = RobotTable::try_from(&self.prepared.ballbot)?;
+        let (size, certified) = match self.size {
+            Some(size) => (size, self.certify(robot, size, progress)?),
+            None => self.search(robot, progress)?,
+        };
+        Ok(self.raise(robot, size, certified, progress))
+    }
+
+    /// A larger box of tilts allows a larger set, up to where the law has to cope with so many plants
+    /// that the set shrinks again; the larger the set, the harder the proof. So the sizes up to the
+    /// largest designed set are bisected.
+    fn search(
+        &self,
+        robot: RobotTable,
+        progress: &(dyn Fn(Searching) + Sync),
+    ) -> Result<(f64, Certified), CertifyError> {
+        let sizes = (1..=SIZES).map(|i| i as f64 / SIZES as f64);
+        let designed: Vec<(f64, f64)> = sizes
+            .enumerate()
+            .map(|(done, size)| {
+                progress(Searching::Designing(done as f64 / SIZES as f64));
+                let design = self.problem(size).design(&robot.ballbot());
+                (size, design.map_or(f64::NEG_INFINITY, |set| set.log_det()))
+            })
+            .collect();
+        let mut largest = 0;
+        for (i, (_, volume)) in designed.iter().enumerate() {
+            if *volume > designed[largest].1 {
+                largest = i;
+            }
+        }
+        // Below `low` there is a proof, from `high` on there is none.
+        let (mut low, mut high) = (0, largest + 1);
+        let mut best = None;
+        loop {
+            let middle = (low + high) / 2;
+            let size = designed[middle].0;
+            match self.certify(robot, size, progress) {
+                Ok(certified) => {
+                    low = middle + 1;
+                    best = Some((size, certified));
+                }
+                Err(error) => {
+                    high = middle;
+                    if low == high && best.is_none() {
+                        return Err(error);
+                    }
+                }
+            }
+            if low == high
+                && let Some(found) = best
+            {
+                return Ok(found);
+            }
+        }
+    }
+
+    /// What is asked of the set that keeps tilt and tilt rate within `size` of their bounds.
+    fn problem(&self, size: f64) -> CertificateProblem<4, 1, 2> {
+        let settings = &self.prepared.settings;
+        let state_limits = symmetric(&settings.x);
+        let [theta, theta_dot] = [1, 3].map(|i| size * state_limits[i]);
+        CertificateProblem {
+            terminal: TerminalProblem {
+                t_s: settings.t_s,
+                q: settings.weights.q,
+                r: settings.weights.r,
+                state_limits: Vector4::new(state_limits[0], theta, state_limits[2], theta_dot),
+                input_limits: symmetric(&settings.u),
+                contraction: self.contraction,
+                level: self.level,
+            },
+            state_limits,
+            scheduling_limits: Vector2::new(theta, theta_dot),
+            written_by: self.written_by.clone(),
+        }
+    }
+
+    fn certify(
+        &self,
+        robot: RobotTable,
+        size: f64,
+        progress: &(dyn Fn(Searching) + Sync),
+    ) -> Result<Certified, CertifyError> {
+        let problem = self.problem(size);
+        certify_terminal((&robot.ballbot(), robot), &problem, self.boxes, &|done| {
+            progress(Searching::Proving { size, done });
+        })
+    }
+
+    /// The certificate with the highest level that was tried and proved.
+    fn raise(
+        &self,
+        robot: RobotTable,
+        size: f64,
+        certified: Certified,
+        progress: &(dyn Fn(Searching) + Sync),
+    ) -> Certified {
+        let effort = Effort {
+            trials: self.trials,
+            most_boxes: self.boxes,
+        };
+        let problem = self.problem(size);
+        raise_level(
+            &robot.ballbot(),
+            &problem,
+            certified,
+            effort,
+            &|trial, done| {
+                progress(Searching::Raising(
+                    (trial as f64 + done) / self.trials.max(1) as f64,
+                ));
+            },
+        )
+    }
+}
+
+/// The limit of |value| that the bounds leave on both sides.
+fn symmetric<const N: usize>(bounds: &Bounds<f64, N>) -> SVector<f64, N> {
+    SVector::from_fn(|i, _| bounds.upper[i].min(-bounds.lower[i]))
+}
