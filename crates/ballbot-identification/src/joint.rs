@@ -192,6 +192,7 @@ impl<'a> Joint<'a> {
             }
             initial = fit.initial;
         };
+        let weights: Vec<Vector3<f64>> = model.planes.iter().map(|plane| plane.noise).collect();
         for (plane, (_, coloured)) in model.planes.iter_mut().zip(&spreads) {
             plane.noise = *coloured;
         }
@@ -207,14 +208,13 @@ impl<'a> Joint<'a> {
                 coordinates,
                 ..
             } = &model.planes[plane];
-            let (spread, noise) = spreads[plane];
             Estimate {
                 values: coordinates.values(&own),
                 covariance: self.variables.part(&covariance, plane),
                 scatter_covariance: self.variables.part(&scatter_covariance, plane),
                 status: self.status(plane, &fit),
-                spread,
-                noise,
+                spread: spreads[plane].0,
+                noise: weights[plane],
                 coordinates: own.to_vec(),
                 segments: segments.clone(),
                 initial: fit.initial[model.range(plane)].to_vec(),

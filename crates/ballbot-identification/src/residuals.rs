@@ -212,9 +212,14 @@ pub struct Difference {
 }
 
 impl Difference {
+    /// The change over its standard deviation.
+    pub fn significance(&self) -> f64 {
+        self.change.abs() / self.standard_deviation
+    }
+
     /// Whether it is no chance.
     pub fn is_alarm(&self) -> bool {
-        self.change.abs() > ALARM * self.standard_deviation
+        self.significance() > ALARM
     }
 }
 

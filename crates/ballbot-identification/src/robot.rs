@@ -310,9 +310,8 @@ impl IdentifiedRobot {
             let accepted = self.first().columns_accepted;
             (None, Verdict::WrongColumns { suspects, accepted })
         }));
-        for difference in self.differences.iter().filter(|one| one.is_alarm()) {
-            all.push((None, self.first().planes_differ(difference)));
-        }
+        let difference = self.difference();
+        all.extend(difference.map(|one| (None, self.first().planes_differ(one))));
         for verdict in first {
             let plane = (!second.contains(verdict)).then_some(0);
             all.push((plane, verdict.clone()));
@@ -324,6 +323,18 @@ impl IdentifiedRobot {
         }
         all.sort_by_key(|(plane, verdict)| (std::cmp::Reverse(verdict.rank()), plane.is_some()));
         all
+    }
+
+    /// The difference between the planes to look at first: each is tested alone, and one makes others
+    /// alarm. Bodies are not symmetric by design, so that comes before a fault.
+    fn difference(&self) -> Option<&Difference> {
+        let alarms = self.differences.iter().filter(|one| one.is_alarm());
+        alarms.max_by(|a, b| {
+            let rank = |one: &Difference| (one.parameter == Parameter::B3, one.significance());
+            rank(a)
+                .partial_cmp(&rank(b))
+                .unwrap_or(std::cmp::Ordering::Equal)
+        })
     }
 
     /// Why this is no result; empty if it is one.

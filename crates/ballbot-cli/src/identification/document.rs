@@ -13,14 +13,6 @@ pub fn document(robot: &IdentifiedRobot) -> Value {
         let findings: Vec<String> = findings.iter().map(ToString::to_string).collect();
         json!({ "log": log, "findings": findings })
     });
-    let verdicts = robot.verdicts();
-    let verdicts = verdicts.iter().map(|(plane, verdict)| {
-        let mut told = json!({ "weight": weight(verdict.weight()), "text": verdict.to_string() });
-        if let Some(name) = plane.and_then(|plane| robot.plane_name(plane)) {
-            told["plane"] = json!(name);
-        }
-        told
-    });
     let shared = Parameter::ALL.into_iter();
     let shared = shared.filter(|parameter| !robot.variables.is_own(*parameter));
     let mut document = json!({
@@ -35,7 +27,6 @@ pub fn document(robot: &IdentifiedRobot) -> Value {
         "wheel_radius_m": first.geometry.wheel_radius,
         "gravity_m_s2": first.geometry.gravity,
         "parameters": parameters(first, shared),
-        "verdicts": verdicts.collect::<Value>(),
     });
     let mut planes = Map::new();
     for (place, plane) in robot.planes.iter().enumerate() {
@@ -61,6 +52,15 @@ pub fn document(robot: &IdentifiedRobot) -> Value {
     if !planes.is_empty() {
         document["planes"] = Value::Object(planes);
     }
+    let verdicts = robot.verdicts();
+    let verdicts = verdicts.iter().map(|(plane, verdict)| {
+        let mut told = json!({ "weight": weight(verdict.weight()), "text": verdict.to_string() });
+        if let Some(name) = plane.and_then(|plane| robot.plane_name(plane)) {
+            told["plane"] = json!(name);
+        }
+        told
+    });
+    document["verdicts"] = verdicts.collect();
     document
 }
 

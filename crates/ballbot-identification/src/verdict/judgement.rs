@@ -199,14 +199,14 @@ impl Identification {
             parameter,
             value,
             change,
-            standard_deviation,
+            ..
         } = *difference;
         let relative = (change / value).abs();
         Verdict::PlanesDiffer {
             parameter,
             value,
             change,
-            significance: change.abs() / standard_deviation,
+            significance: difference.significance(),
             matters: self.matters(parameter, change) && exceeds(relative, WANTED),
         }
     }
