@@ -49,8 +49,8 @@ impl WheelColumns {
     }
 }
 
-/// So many of the arrangements are fitted: those that a regression finds best.
-const FITTED: usize = 6;
+/// So many of the mistakes are fitted: those under which a regression explains most.
+const FITTED: usize = 4;
 
 /// The wheels as they are said to be, and how they turn about the vertical in each run.
 pub(crate) struct WheelsRead<'a> {
@@ -76,17 +76,20 @@ impl Joint<'_> {
         let pair: Pair = [x.runs.to_vec(), y.runs.to_vec()];
         let own = self.chi_square_of(&pair, stretches);
         let signs = [[false, false], [false, true], [true, false], [true, true]];
-        let tilts = signs.map(|negated| Miswiring::Tilts { negated });
-        let mut wheels = Vec::new();
-        if let Some(read) = read {
-            for mistake in wheel_mistakes(read.torques) {
-                let left = self.unexplained(&mistake.corrected(&pair, Some(read)), stretches);
-                wheels.push((mistake, left));
-            }
-        }
-        wheels.sort_by(|(_, a), (_, b)| a.total_cmp(b));
-        let wheels = wheels.into_iter().map(|(mistake, _)| mistake).take(FITTED);
-        let tried = tilts.into_iter().chain(wheels).map(|mistake| {
+        let mut mistakes = signs.map(|negated| Miswiring::Tilts { negated }).to_vec();
+        mistakes.extend(
+            read.into_iter()
+                .flat_map(|read| wheel_mistakes(read.torques)),
+        );
+        let mut screened: Vec<(Miswiring, f64)> = mistakes
+            .into_iter()
+            .map(|mistake| {
+                let left = self.unexplained(&mistake.corrected(&pair, read), stretches);
+                (mistake, left)
+            })
+            .collect();
+        screened.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+        let tried = screened.into_iter().take(FITTED).map(|(mistake, _)| {
             let pair = mistake.corrected(&pair, read);
             (mistake, self.chi_square_of(&pair, stretches))
         });
@@ -115,7 +118,7 @@ impl Joint<'_> {
     }
 }
 
-/// The delay that arrangements of wheels are compared with, s: of no matter beside what they change.
+/// The delay that mistakes are compared with, s: of no matter beside what they change.
 const TYPICAL_DELAY: f64 = 0.01;
 
 /// All other orders and senses of the wheels.
