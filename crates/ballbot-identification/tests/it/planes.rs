@@ -225,15 +225,13 @@ fn what_is_wrong_between_the_planes_is_refused_and_named() {
     let short = planes().map(|plane| Laboratory {
         rate: 100.0,
         duration: 12.0,
+        // Where the delay is a whole number of rows, chi^2 has a kink, on which a fit may stagnate.
+        delay: 0.012,
         ..plane
     });
     let good = rows(&records(&short, 3));
-    assert!(
-        outcome(&csv(&good), CONFIG)
-            .unwrap()
-            .parameter_files()
-            .is_ok()
-    );
+    let robot = outcome(&csv(&good), CONFIG).unwrap();
+    assert!(robot.parameter_files().is_ok(), "{:?}", warnings(&robot));
     // What is changed, and what must be said then.
     type Change = fn(&mut Row);
     let cases: [(&str, Change, &[&str]); 7] = [
