@@ -17,6 +17,7 @@ BALL_INERTIA = 0.6 * BALL_MASS * BALL**2
 WHEEL_INERTIA = 0.006  # one wheel with its rotor, about its axle
 WHEEL_FRICTION = 0.01  # N m s, of each axle
 DELAY, TILT_OFFSET, GYRO_BIAS = 0.010, 0.010, 0.020
+SENSES = np.array([1.0, -1.0])  # of offset and bias in the planes x and y
 NOISE = 1e-3, 1e-3, 5e-3  # ball angle, tilt, rate
 ROW, STEP = 5e-3, 2.5e-4
 
@@ -25,15 +26,15 @@ NORMALS = np.array([[np.sin(ZENITH) * np.cos(a), np.sin(ZENITH) * np.sin(a), np.
 DRIVES = np.array([[-np.sin(a), np.cos(a), 0.0] for a in AZIMUTHS])
 
 
-def truth():
-    """The parameters of the plane x."""
+def truth(plane=0):
+    """The parameters of the plane x or y."""
     b2 = 1.5 * np.cos(ZENITH) ** 2 * (BALL / WHEEL) ** 2 * WHEEL_INERTIA / BODY_MASS
     return {
         "b1_m2": b2 + (BALL_INERTIA + (BALL_MASS + BODY_MASS) * BALL**2) / BODY_MASS,
         "b2_m2": b2,
-        "b3_m2": b2 + LEVER**2 + BODY_INERTIA[1] / BODY_MASS,
+        "b3_m2": b2 + LEVER**2 + BODY_INERTIA[1 - plane] / BODY_MASS,
         "delay_s": DELAY,
-        "tilt_offset_rad": TILT_OFFSET,
+        "tilt_offset_rad": TILT_OFFSET * SENSES[plane],
     }
 
 
@@ -70,7 +71,7 @@ def motors(torques):
 
 
 def record(path, excitation, gain, compliance, floor, seed):
-    """Runs the robot under `excitation` (plane x, N m, a row each) in the loop u = -gain x, and logs."""
+    """Runs the robot under `excitation` (planes x and y, N m, a row each) in the loop u = -gain x, and logs."""
     robot = model(floor)
     data = mujoco.MjData(robot)
     ball = robot.body("ball").id
@@ -92,8 +93,9 @@ def record(path, excitation, gain, compliance, floor, seed):
         encoders = data.qpos[angles] + NOISE[0] * BALL / WHEEL * rng.standard_normal(3)
         phi, phi_dot = virtual(data.qpos[angles]) + tilt, virtual(data.qvel[rates]) + rate
         planes = [-gain @ np.array([phi[i], seen[0][i], phi_dot[i], seen[1][i]]) for i in range(2)]
-        torque = motors([planes[0] + added, planes[1], 0.5 * omega[2]])
-        rows.append([time, *encoders, seen[0][0] + TILT_OFFSET, seen[1][0] + GYRO_BIAS, *torque])
+        torque = motors([planes[0] + added[0], planes[1] + added[1], 0.5 * omega[2]])
+        shown = *(seen[0] + TILT_OFFSET * SENSES), *(seen[1] + GYRO_BIAS * SENSES)
+        rows.append([time, *encoders, *shown, *torque])
         for _ in range(round(ROW / STEP)):
             waiting.append(torque)
             mujoco.mj_step1(robot, data)
@@ -112,4 +114,4 @@ def record(path, excitation, gain, compliance, floor, seed):
             stiffness = compliance * np.eye(3) + STEP * slip @ response.T
             data.qfrc_applied += slip.T @ -np.linalg.solve(stiffness, slip @ data.qvel + STEP * free)
             mujoco.mj_step2(robot, data)
-    np.savetxt(path, rows, delimiter=",", header="t_s,w1,w2,w3,theta,theta_dot,m1,m2,m3", comments="")
+    np.savetxt(path, rows, delimiter=",", header="t_s,w1,w2,w3,theta_x,theta_y,theta_dot_x,theta_dot_y,m1,m2,m3", comments="")

@@ -5,10 +5,10 @@
 //! energy away, inertias of a rigid body) and how the coupling changes with the tilt.
 
 use crate::estimate::{Effort, Estimate, EstimateError, Task};
+use crate::joint::Joint;
 use crate::log::BallAngle;
 use crate::parameter::{Choice, Parameter, Values};
-use crate::segments::spread;
-use std::ops::Range;
+use crate::segments::{Stretch, spread};
 
 /// The best robot with the other reading of the ball angle, beside the one that was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +51,7 @@ impl Task<'_> {
     pub(crate) fn other_reading(
         &self,
         estimate: &Estimate,
-        stretches: &[(usize, Range<usize>)],
+        stretches: &[Stretch],
     ) -> Option<OtherReading> {
         if !matches!(self.choices[Parameter::TorqueGain], Choice::Free { .. }) {
             return None;
@@ -68,7 +68,9 @@ impl Task<'_> {
                 None => task.coarse(stretches, noise, START, &|_| {})?.values,
             };
             let segments = spread(&estimate.segments, SEGMENTS);
-            task.estimate_from(start, segments, noise, &|_| {})
+            let joint = Joint::alone(task);
+            let fit = joint.estimate_from(&[start], vec![segments], &[noise], &|_| {})?;
+            Ok(fit.first())
         };
         let ball_angle = self.ball_angle.other();
         let own = fit(self.ball_angle, Some(estimate.values)).ok()?.fit;

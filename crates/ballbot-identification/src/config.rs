@@ -4,7 +4,7 @@ mod body;
 
 pub use body::BodyTable;
 
-use crate::log::Columns;
+use crate::log::{Columns, WheelPlane};
 use crate::parameter::{Choice, Parameter, Values};
 use ballbot::Geometry;
 use lpvmpc_design::number_text;
@@ -96,6 +96,8 @@ pub struct FitTable {
     pub segment_s: f64,
     /// The part of each run, at its end, that is held back to judge the fit.
     pub held_back: f64,
+    /// Of both planes: the body has the same inertia about both axes, one b3.
+    pub symmetric_body: bool,
 }
 
 impl Default for FitTable {
@@ -104,6 +106,7 @@ impl Default for FitTable {
             physical: true,
             segment_s: 1.0,
             held_back: 0.25,
+            symmetric_body: true,
         }
     }
 }
@@ -126,6 +129,14 @@ pub enum ConfigError {
          per unit: give that as factor, or leave [body] out"
     )]
     NoTorque,
+    /// Tables about the planes of a log that contradict each other.
+    #[error("{key}: {expected}")]
+    Planes {
+        /// The key with its table.
+        key: &'static str,
+        /// What would be right.
+        expected: &'static str,
+    },
     /// A part of a drawing.
     #[error(
         "{key} is missing: [body] has either body_mass_kg alone, or all of a drawing (`ballbot \
@@ -238,6 +249,70 @@ impl Config {
         }
         if self.body.is_some() && !self.log.torque_known() {
             return Err(ConfigError::NoTorque);
+        }
+        self.check_planes()
+    }
+
+    /// That both planes, or one, are said throughout.
+    fn check_planes(&self) -> Result<(), ConfigError> {
+        let log = &self.log;
+        let wheels = log.wheels.as_ref();
+        let both = wheels.is_some_and(|wheels| wheels.plane == WheelPlane::Both);
+        let refused = |key, expected| Err(ConfigError::Planes { key, expected });
+        let Some(y) = &log.y else {
+            return match both {
+                true => refused(
+                    "log.wheels.plane = \"both\"",
+                    "the tilt of the plane y is missing; name its columns in [log.y]",
+                ),
+                false => Ok(()),
+            };
+        };
+        if wheels.is_some() && !both {
+            return refused(
+                "[log.y]",
+                "it is of a second plane, and log.wheels.plane names one; set plane = \"both\", or \
+                 leave [log.y] out",
+            );
+        }
+        let torques = log.has_motors();
+        for (key, given, by_wheels) in [
+            ("log.y.phi", y.phi.is_some(), wheels.is_some()),
+            ("log.y.torque", y.torque.is_some(), torques),
+        ] {
+            match (given, by_wheels) {
+                (true, true) => {
+                    return refused(
+                        key,
+                        "it is put together from the three wheels; leave it out",
+                    );
+                }
+                (false, false) => return refused(key, "it is missing; name its column and unit"),
+                _ => {}
+            }
+        }
+        let planes = log.planes();
+        let [x, y] = planes.as_slice() else {
+            return Ok(());
+        };
+        if x.torque_known() != y.torque_known() {
+            return refused(
+                "log.y.torque",
+                "the torque gain is that of both planes; give both torques in N m, or both in the \
+                 same other unit",
+            );
+        }
+        for (key, of_x, of_y) in [
+            ("log.y.phi", &x.phi, &y.phi),
+            ("log.y.theta", &x.theta, &y.theta),
+            ("log.y.theta_dot", &x.theta_dot, &y.theta_dot),
+            ("log.y.torque", &x.torque, &y.torque),
+        ] {
+            let of_wheels =
+                (key == "log.y.phi" && wheels.is_some()) || (key == "log.y.torque" && torques);
+            if of_x.column == of_y.column && !of_y.column.is_empty() && !of_wheels {
+                return refused(key, "it is the same column as that of the plane x");
+            }
         }
         Ok(())
     }
@@ -398,6 +473,27 @@ mod tests {
                 "without the torque per unit",
             ),
             ("[logs]", "logs"),
+            (
+                "[log.y.theta]\ncolumn = \"theta_y\"\nunit = \"rad\"",
+                "log.y.phi: it is missing",
+            ),
+            (
+                "[log.y]\nphi = { column = \"phi_y\", unit = \"rad\" }\n\
+                 theta = { column = \"theta_y\", unit = \"rad\" }",
+                "log.y.torque: it is missing",
+            ),
+            (
+                "[log.y]\nphi = { column = \"phi_y\", unit = \"rad\" }\n\
+                 theta = { column = \"theta_rad\", unit = \"rad\" }\n\
+                 torque = { column = \"torque_y\", unit = \"Nm\" }",
+                "log.y.theta: it is the same column as that of the plane x",
+            ),
+            (
+                "[log.y]\nphi = { column = \"phi_y\", unit = \"rad\" }\n\
+                 theta = { column = \"theta_y\", unit = \"rad\" }\n\
+                 torque = { column = \"torque_y\", unit = \"%\" }",
+                "log.y.torque: the torque gain is that of both planes",
+            ),
         ] {
             let message = Config::parse(text).unwrap_err().to_string();
             assert!(message.contains(part), "{message}");

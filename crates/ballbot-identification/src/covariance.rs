@@ -1,19 +1,18 @@
 //! From the information of a fit to the covariance of the parameters.
 
-use crate::coordinates::Coordinates;
-use crate::model::SegmentedRuns;
-use crate::parameter::Parameter;
-use lpvmpc_design::{ShootingFit, ShootingProblem};
+use lpvmpc_design::{ShootingFit, ShootingModel, ShootingProblem};
 use nalgebra::DMatrix;
 
 /// The covariance of the parameters from the information, and for coloured residuals: from the
 /// scatter of the segments, but no variance below that of the information, in which coloured rows
 /// count as the fewer white ones that they are worth. An error that repeats itself in every segment
 /// does not scatter.
-pub fn covariances(
-    problem: &ShootingProblem<'_, SegmentedRuns<'_>, 4, 3>,
+///
+/// `jacobian` is the derivative of the parameters by the coordinates of the fit.
+pub fn covariances<M: ShootingModel<4, 3>>(
+    problem: &ShootingProblem<'_, M, 4, 3>,
     fit: &ShootingFit<4>,
-    coordinates: &Coordinates,
+    jacobian: &DMatrix<f64>,
 ) -> (DMatrix<f64>, DMatrix<f64>) {
     let reduced = problem.reduced(&fit.parameters, &fit.initial, &fit.reduced.indices);
     let n = reduced.indices.len();
@@ -28,7 +27,7 @@ pub fn covariances(
     // What was known beforehand scatters, too.
     let prior = problem.prior_information(&fit.parameters, &reduced.indices);
     let scatter = &inverse * (meat * lost + prior) * &inverse;
-    let of = |covariance: &DMatrix<f64>| of_parameters(covariance, &reduced.indices, coordinates);
+    let of = |covariance: &DMatrix<f64>| of_parameters(covariance, &reduced.indices, jacobian);
     let (white, scatter) = (of(&inverse), of(&scatter));
     let growth = white
         .diagonal()
@@ -47,17 +46,26 @@ pub fn covariances(
 pub fn of_parameters(
     covariance: &DMatrix<f64>,
     indices: &[usize],
-    coordinates: &Coordinates,
+    jacobian: &DMatrix<f64>,
 ) -> DMatrix<f64> {
-    let all = Parameter::ALL.len();
+    let all = jacobian.ncols();
     let mut whole = DMatrix::zeros(all, all);
     for (i, row) in indices.iter().enumerate() {
         for (j, column) in indices.iter().enumerate() {
             whole[(*row, *column)] = covariance[(i, j)];
         }
     }
-    let jacobian = coordinates.jacobian();
-    &jacobian * whole * jacobian.transpose()
+    jacobian * whole * jacobian.transpose()
+}
+
+/// Correlation of two; zero where one does not vary.
+pub fn correlation(covariance: &DMatrix<f64>, i: usize, j: usize) -> f64 {
+    let scale = (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+    if scale > 0.0 {
+        covariance[(i, j)] / scale
+    } else {
+        0.0
+    }
 }
 
 /// Inverse of an information matrix; infinite where it tells nothing.

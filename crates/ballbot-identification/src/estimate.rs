@@ -1,21 +1,19 @@
 //! The fit itself: from runs and choices to parameters with their covariance.
 
 use crate::coordinates::{Coordinates, LONGEST_DELAY};
-use crate::covariance::covariances;
+use crate::joint::Joint;
 use crate::log::{BallAngle, Run};
 use crate::model::{Segment, SegmentedRuns};
 use crate::parameter::{Choice, Parameter, Values};
-use crate::residuals::repetition;
-use crate::segments::{segments, spread};
+use crate::segments::{Stretch, segments, spread};
 use crate::start::{linear_fits, typical};
-use crate::suspects::Suspects;
+use crate::suspects::{Suspects, Tables};
 use ballbot::Geometry;
 use lpvmpc_design::number_text;
 use lpvmpc_design::{
-    Prior, ShootingError, ShootingFit, ShootingProblem, ShootingSettings, Unknown,
+    Prior, ShootingError, ShootingFit, ShootingModel, ShootingProblem, ShootingSettings, Unknown,
 };
 use nalgebra::{DMatrix, Vector3, Vector4};
-use std::ops::Range;
 
 /// What is to be fitted, and to what.
 #[derive(Clone, Debug)]
@@ -36,9 +34,11 @@ pub struct Task<'a> {
     pub torque_known: bool,
     /// Known noise of ball angle, tilt and tilt rate; what is `None` is found.
     pub noise: [Option<f64>; 3],
+    /// Where the columns are configured, for messages.
+    pub tables: Tables,
 }
 
-/// A fitted robot.
+/// A fitted robot, as one plane shows it.
 #[derive(Clone, Debug)]
 pub struct Estimate {
     /// All parameters, held ones included.
@@ -56,10 +56,14 @@ pub struct Estimate {
     /// What the outputs are weighted by: the spread, that of the ball angle times the root of how many
     /// rows of coloured residuals count as one.
     pub noise: Vector3<f64>,
-    /// The fit.
+    /// Where the fit ended, in its coordinates.
+    pub coordinates: Vec<f64>,
+    /// The fit, of all planes that were fitted together.
     pub fit: ShootingFit<4>,
-    /// Its segments.
+    /// This plane's segments.
     pub segments: Vec<Segment>,
+    /// Their initial states.
+    pub initial: Vec<Vector4<f64>>,
     /// Length of a segment, s; less than was asked for if the robot could not be simulated so long.
     pub segment: f64,
 }
@@ -108,6 +112,14 @@ pub enum EstimateError {
     /// The fit.
     #[error(transparent)]
     Shooting(#[from] ShootingError),
+    /// Of one plane of two.
+    #[error("plane {plane}: {error}")]
+    Plane {
+        /// The plane, x or y.
+        plane: &'static str,
+        /// What is wrong with it.
+        error: Box<EstimateError>,
+    },
     /// No robot explains the log as it is, but one would if its columns were others.
     #[error("{error} A robot explains the log if {suspects}")]
     Suspect {
@@ -118,13 +130,24 @@ pub enum EstimateError {
     },
 }
 
+impl EstimateError {
+    /// Whether there is nothing to fit, whatever the columns are.
+    pub(crate) fn is_too_short(&self) -> bool {
+        match self {
+            Self::NoSegments { .. } => true,
+            Self::Plane { error, .. } => error.is_too_short(),
+            _ => false,
+        }
+    }
+}
+
 /// Told the number of steps of the fit so far.
 pub type Progress<'a> = &'a dyn Fn(usize);
 
 /// Segments of the first, coarse fit: so short that the unstable mode hardly grows, so few that
 /// trying several starts costs nothing, s.
-const COARSE: f64 = 0.25;
-const START: Effort = Effort {
+pub(crate) const COARSE: f64 = 0.25;
+pub(crate) const START: Effort = Effort {
     segments: 80,
     max_iterations: 40,
 };
@@ -137,16 +160,6 @@ pub struct Effort {
     /// Steps from each start, at most.
     pub max_iterations: usize,
 }
-
-/// Times that the noise is found anew from the residuals, at most.
-const REWEIGHTINGS: usize = 6;
-
-/// Steps of each fit after the first, which begins where that ended.
-const STEPS_AGAIN: usize = 30;
-
-/// Rows that are fitted, at most, to within a segment: of a longer log segments that are spread evenly over it. Errors
-/// fall with the root of the rows, and at a hundred thousand they are those of the model.
-const MOST_ROWS: usize = 200_000;
 
 impl Task<'_> {
     /// Time at the begin of a stretch whose torque a delay may need, s.
@@ -163,132 +176,23 @@ impl Task<'_> {
     /// [`EstimateError`].
     pub fn estimate(
         &self,
-        stretches: &[(usize, Range<usize>)],
+        stretches: &[Stretch],
         floor: Vector3<f64>,
         progress: Progress<'_>,
     ) -> Result<Estimate, EstimateError> {
-        let start = self.coarse(stretches, floor, START, progress)?;
-        let start = start.values;
-        self.refine(start, stretches, floor, progress)
-    }
-
-    /// Fits the robot to these stretches from a start.
-    ///
-    /// # Errors
-    /// [`EstimateError`].
-    pub fn refine(
-        &self,
-        start: Values,
-        stretches: &[(usize, Range<usize>)],
-        floor: Vector3<f64>,
-        progress: Progress<'_>,
-    ) -> Result<Estimate, EstimateError> {
-        let mut length = self.segment;
-        loop {
-            let segments = segments(self.runs, stretches, length, self.lead());
-            let rows: usize = segments.iter().map(|one| one.end - one.first).sum();
-            let segments = spread(&segments, segments.len() * MOST_ROWS / rows.max(MOST_ROWS));
-            let task = Task {
-                segment: length,
-                ..self.clone()
-            };
-            match task.estimate_from(start, segments, floor, progress) {
-                // A wrong model can be so unstable that a segment is too long for it.
-                Err(EstimateError::Shooting(ShootingError::NonFiniteStart { .. }))
-                    if length > COARSE =>
-                {
-                    length = (0.5 * length).max(COARSE);
-                }
-                result => return result,
-            }
-        }
-    }
-
-    /// Fits the robot to these segments from a start.
-    ///
-    /// # Errors
-    /// [`EstimateError`].
-    pub fn estimate_from(
-        &self,
-        start: Values,
-        segments: Vec<Segment>,
-        floor: Vector3<f64>,
-        progress: Progress<'_>,
-    ) -> Result<Estimate, EstimateError> {
-        if segments.is_empty() {
-            return Err(EstimateError::NoSegments {
-                segment: self.segment,
-                lead: self.lead(),
-            });
-        }
-        let model = self.model(segments);
-        let mut noise = self.known(floor);
-        let mut initial = model.initial_states(&start);
-        let mut unknowns = self.unknowns(&start, &model.coordinates);
-        let priors = self.priors(&model.coordinates);
-        let mut rounds = 0;
-        let mut settings = ShootingSettings::default();
-        let (fit, spread, coloured) = loop {
-            let problem = self.problem(&model, &unknowns, &priors, noise);
-            let fit = problem.fit(initial, &settings, progress)?;
-            let residuals = problem.residuals(&fit.parameters, &fit.initial);
-            let spread = residual_noise(&residuals, &fit, noise);
-            let coloured = spread.component_mul(&repetition(&residuals).map(f64::sqrt));
-            // Contacts give way and gears have play: of the three it is the ball angle whose errors
-            // repeat themselves while the robot is as it should be.
-            let next = self.known(Vector3::new(coloured[0], spread[1], spread[2]));
-            let change = next.component_div(&noise).map(|ratio| (ratio - 1.0).abs());
-            rounds += 1;
-            if change.max() < 0.01 || rounds > REWEIGHTINGS {
-                break (fit, self.known(spread), self.known(coloured));
-            }
-            noise = next;
-            settings.max_iterations = STEPS_AGAIN;
-            for (unknown, value) in unknowns.iter_mut().zip(&fit.parameters) {
-                unknown.start = *value;
-            }
-            initial = fit.initial;
-        };
-        let problem = self.problem(&model, &unknowns, &priors, coloured);
-        let (covariance, scatter_covariance) = covariances(&problem, &fit, &model.coordinates);
-        let status = self.status(&fit);
-        Ok(Estimate {
-            values: model.coordinates.values(&fit.parameters),
-            covariance,
-            scatter_covariance,
-            status,
-            spread,
-            noise,
-            fit,
-            segments: model.segments,
-            segment: self.segment,
-        })
+        let alone = Joint::alone(self.clone());
+        let estimate = alone.estimate(&[stretches], &[floor], progress)?;
+        Ok(estimate.first())
     }
 
     /// The runs cut into segments, as data of a fit.
-    pub fn model(&self, segments: Vec<Segment>) -> SegmentedRuns<'_> {
+    pub fn model(&self, segments: Vec<Segment>, noise: Vector3<f64>) -> SegmentedRuns<'_> {
         SegmentedRuns {
             runs: self.runs,
             segments,
             coordinates: Coordinates::new(&self.choices, self.geometry, self.torque_known),
             ball_angle: self.ball_angle,
-        }
-    }
-
-    /// The fit's problem.
-    pub fn problem<'p, 'm>(
-        &self,
-        model: &'p SegmentedRuns<'m>,
-        unknowns: &'p [Unknown],
-        priors: &'p [Prior],
-        noise: Vector3<f64>,
-    ) -> ShootingProblem<'p, SegmentedRuns<'m>, 4, 3> {
-        ShootingProblem {
-            model,
-            unknowns,
-            priors,
             noise,
-            state_scale: Vector4::repeat(1.0),
         }
     }
 
@@ -298,7 +202,7 @@ impl Task<'_> {
     /// [`EstimateError::NoSegments`] or [`EstimateError::NoStart`].
     pub fn coarse(
         &self,
-        stretches: &[(usize, Range<usize>)],
+        stretches: &[Stretch],
         floor: Vector3<f64>,
         effort: Effort,
         progress: Progress<'_>,
@@ -311,7 +215,7 @@ impl Task<'_> {
                 lead,
             });
         }
-        let model = self.model(spread(&coarse, effort.segments));
+        let model = self.model(spread(&coarse, effort.segments), self.known(floor));
         let priors = self.priors(&model.coordinates);
         let mut best: Option<Coarse> = None;
         let mut refused = None;
@@ -322,7 +226,7 @@ impl Task<'_> {
         for start in self.candidates(stretches) {
             let unknowns = self.unknowns(&start, &model.coordinates);
             let start = model.coordinates.values(&starts(&unknowns));
-            let problem = self.problem(&model, &unknowns, &priors, self.known(floor));
+            let problem = problem(&model, &unknowns, &priors);
             match problem.fit(model.initial_states(&start), &settings, progress) {
                 Ok(fit) => {
                     let chi_square = fit.chi_square / fit.degrees_of_freedom();
@@ -347,7 +251,7 @@ impl Task<'_> {
     }
 
     /// Where the coarse fits start.
-    fn candidates(&self, stretches: &[(usize, Range<usize>)]) -> Vec<Values> {
+    fn candidates(&self, stretches: &[Stretch]) -> Vec<Values> {
         let delay = match self.choices[Parameter::Delay] {
             Choice::Fixed(delay) => Some(delay),
             Choice::Free { start } => start,
@@ -362,7 +266,7 @@ impl Task<'_> {
     }
 
     /// Known noise before found noise.
-    fn known(&self, found: Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn known(&self, found: Vector3<f64>) -> Vector3<f64> {
         Vector3::from_fn(|output, _| self.noise[output].unwrap_or(found[output]))
     }
 
@@ -401,61 +305,46 @@ impl Task<'_> {
         Parameter::ALL.map(unknown).to_vec()
     }
 
-    /// What is known beforehand, in the fit's coordinates.
-    pub fn priors(&self, coordinates: &Coordinates) -> Vec<Prior> {
+    /// What is known of a parameter beforehand, in the fit's coordinates.
+    pub(crate) fn prior(&self, parameter: Parameter, coordinates: &Coordinates) -> Option<Prior> {
+        let Choice::Prior {
+            mean,
+            standard_deviation,
+        } = self.choices[parameter]
+        else {
+            return None;
+        };
         let jacobian = coordinates.jacobian();
         let origin = coordinates.values(&[0.0; Parameter::ALL.len()]);
-        let priors = Parameter::ALL.into_iter().filter_map(|parameter| {
-            let Choice::Prior {
-                mean,
-                standard_deviation,
-            } = self.choices[parameter]
-            else {
-                return None;
-            };
-            Some(Prior {
-                coefficients: jacobian.row(parameter.index()).iter().copied().collect(),
-                mean: mean - origin[parameter],
-                standard_deviation,
-            })
-        });
-        priors.collect()
+        Some(Prior {
+            coefficients: jacobian.row(parameter.index()).iter().copied().collect(),
+            mean: mean - origin[parameter],
+            standard_deviation,
+        })
     }
 
-    fn status(&self, fit: &ShootingFit<4>) -> Values<Status> {
-        Values(Parameter::ALL.map(|parameter| {
-            if fit.reduced.indices.contains(&parameter.index()) {
-                Status::Found
-            } else if self.choices[parameter].is_free() {
-                Status::AtBound
-            } else {
-                Status::Held
-            }
-        }))
+    /// What is known of all parameters beforehand.
+    pub fn priors(&self, coordinates: &Coordinates) -> Vec<Prior> {
+        let all = Parameter::ALL.into_iter();
+        all.filter_map(|parameter| self.prior(parameter, coordinates))
+            .collect()
+    }
+}
+
+/// The fit's problem.
+pub fn problem<'a, M: ShootingModel<4, 3>>(
+    model: &'a M,
+    unknowns: &'a [Unknown],
+    priors: &'a [Prior],
+) -> ShootingProblem<'a, M, 4, 3> {
+    ShootingProblem {
+        model,
+        unknowns,
+        priors,
+        state_scale: Vector4::repeat(1.0),
     }
 }
 
 fn starts(unknowns: &[Unknown]) -> Vec<f64> {
     unknowns.iter().map(|unknown| unknown.start).collect()
-}
-
-/// Standard deviation of the residuals of each output; what it was for one that is not measured.
-fn residual_noise(
-    residuals: &[Vec<Vector3<f64>>],
-    fit: &ShootingFit<4>,
-    noise: Vector3<f64>,
-) -> Vector3<f64> {
-    let lost = fit.values as f64 / fit.degrees_of_freedom().max(1.0);
-    Vector3::from_fn(|output, _| {
-        let values = residuals.iter().flatten().map(|row| row[output]);
-        let (sum, count) = values
-            .filter(|value| !value.is_nan())
-            .fold((0.0, 0), |(sum, count), value| {
-                (sum + value * value, count + 1)
-            });
-        if count == 0 || sum == 0.0 {
-            return noise[output];
-        }
-        (sum / f64::from(count) * lost).sqrt()
-    })
 }

@@ -1,12 +1,13 @@
 //! A torque that tells the parameters of a stabilised robot, and how well it will tell them.
 
 use crate::covariance::{inverse, of_parameters};
-use crate::estimate::Task;
+use crate::estimate::{Task, problem};
 use crate::log::{BallAngle, Run, Torque};
 use crate::model::{LONGEST_STEP, Robot};
 use crate::parameter::{Choice, Parameter, Values};
 use crate::poles::linear_model;
 use crate::segments::segments;
+use crate::suspects::Tables;
 use crate::words::{number, percent};
 use ballbot::Geometry;
 use lpvmpc_design::number_text;
@@ -407,12 +408,14 @@ impl ExcitationTask {
             segment: self.segment,
             torque_known: true,
             noise: [0, 1, 2].map(|output| Some(self.noise[output])),
+            tables: Tables::default(),
         };
         let stretch = [(0, 0..motion.run.time.len())];
-        let model = task.model(segments(runs, &stretch, self.segment, task.lead()));
+        let segments = segments(runs, &stretch, self.segment, task.lead());
+        let model = task.model(segments, self.noise);
         let unknowns = task.unknowns(&self.robot, &model.coordinates);
         let priors = task.priors(&model.coordinates);
-        let problem = task.problem(&model, &unknowns, &priors, self.noise);
+        let problem = problem(&model, &unknowns, &priors);
         let starts = model.segments.iter();
         let initial: Vec<Vector4<f64>> = starts.map(|s| motion.states[s.first]).collect();
         let indices: Vec<usize> = Parameter::ALL
@@ -423,7 +426,7 @@ impl ExcitationTask {
         let coordinates = model.coordinates.of(&self.robot);
         let reduced = problem.reduced(&coordinates, &initial, &indices);
         let covariance = inverse(&reduced.information);
-        let covariance = of_parameters(&covariance, &indices, &model.coordinates);
+        let covariance = of_parameters(&covariance, &indices, &model.coordinates.jacobian());
         Values(Parameter::ALL.map(|parameter| {
             let index = parameter.index();
             covariance[(index, index)].sqrt()

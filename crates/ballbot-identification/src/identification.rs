@@ -1,29 +1,28 @@
-//! From logs to a judged robot: the whole way.
+//! A fitted robot as one plane shows it, with all that judges it.
 
 use crate::ball_angle::OtherReading;
-use crate::config::Config;
 use crate::coordinates::Coordinates;
-use crate::estimate::{Estimate, EstimateError, Progress, Status, Task};
-use crate::log::{Finding, Log, Run};
+use crate::covariance::correlation;
+use crate::estimate::{Estimate, EstimateError, Status, Task};
+use crate::log::{Finding, Run};
 use crate::model::Robot;
-use crate::noise;
 use crate::parameter::{Choice, Parameter, Values};
 use crate::poles::{Pole, linear_model, uncertain_poles};
 use crate::published::{LinearRegression, regression};
-use crate::residuals::{OutputResidual, ScoreTest, SegmentResidual, score_tests, simulated, tests};
-use crate::segments::Split;
-use crate::structures::{Compared, compare};
+use crate::residuals::{OutputResidual, ScoreTest, SegmentResidual, simulated, tests};
+use crate::segments::{Split, Stretch};
+use crate::structures::Compared;
 use crate::suspects::Suspects;
 use crate::validation::{Validation, validate};
-use crate::verdict::Weight;
 use ballbot::{Ballbot, Consistency, Geometry, LinearParameters, limits};
 use lpvmpc_design::{NORMAL_95, poles};
 use nalgebra::{DMatrix, Vector3};
-use std::ops::Range;
 
-/// A robot found from logs, and what speaks for and against it.
+/// A robot as one plane of its logs shows it, and what speaks for and against it.
 #[derive(Clone, Debug)]
 pub struct Identification {
+    /// Which plane it is of those that were fitted together, counted from 0.
+    pub plane: usize,
     /// Lengths and gravity, as they were given.
     pub geometry: Geometry<f64>,
     /// Whether mechanics was imposed.
@@ -69,125 +68,62 @@ pub struct Identification {
     pub times: (f64, f64),
 }
 
-/// Identifies one robot from all of the logs.
-///
-/// # Errors
-/// There is too little to fit, or the robot cannot be simulated.
-pub fn identify(
-    logs: Vec<Log>,
-    config: &Config,
-    choices: Values<Choice>,
-    progress: Progress<'_>,
-) -> Result<Identification, EstimateError> {
-    let (runs, findings): (Vec<Run>, Vec<_>) = logs
-        .into_iter()
-        .map(|log| {
-            let name = log.run.name.clone();
-            (log.run, (name, log.findings))
-        })
-        .unzip();
-    let mut task = Task {
-        runs: &runs,
-        ball_angle: config.log.ball_angle_read(),
-        geometry: config.geometry(),
-        choices,
-        physical: config.fit.physical,
-        segment: config.fit.segment_s,
-        torque_known: config.log.torque_known(),
-        noise: config.noise(),
-    };
-    task.choices = choices.with_sensors(task.measures_rate());
-    let split = Split::new(&runs, config.fit.held_back);
-    let floor = noise::floor(&runs);
-    let estimate = task.estimate(&split.fitted, floor, progress);
-    let estimate = estimate.map_err(|error| task.explained(error, &split))?;
-    let task = Task {
-        segment: estimate.segment,
-        ..task
-    };
-    let simulated = simulated(&task, &estimate);
-    // Wheels stand on the body: what their angle is relative to is known.
-    let other_reading = match config.log.wheels {
-        Some(_) => None,
-        None => task.other_reading(&estimate, &split.fitted),
-    };
-    let (validation, structures) = held_back(&task, &estimate, &split, progress);
-    let mut identification = Identification {
-        geometry: task.geometry,
-        physical: task.physical,
-        segment: config.fit.segment_s,
-        coordinates: Coordinates::new(&task.choices, task.geometry, task.torque_known),
-        suspects: None,
-        other_reading,
-        torque_known: task.torque_known,
-        columns_accepted: config.log.accept_suspicious_units,
-        choices: task.choices,
-        findings,
-        floor,
-        residuals: tests(&simulated, estimate.spread, floor),
-        simulated,
-        scores: score_tests(&task, &estimate),
-        covariance: DMatrix::zeros(0, 0),
-        poles: Vec::new(),
-        validation,
-        structures,
-        published: regression(&runs, task.ball_angle),
-        times: (time(&runs, &split.fitted), time(&runs, &split.held_back)),
-        estimate,
-    };
-    identification.covariance = identification.widened();
-    // Their intervals are from the covariance that the residuals decide on.
-    identification.poles = uncertain_poles(
-        &identification.estimate,
-        identification.covariance(),
-        identification.geometry,
-    );
-    let verdicts = identification.verdicts();
-    if verdicts.iter().any(|one| one.weight() >= Weight::Warning) {
-        identification.suspects = task.suspects(&split.fitted);
-    }
-    Ok(identification)
-}
-
-impl Task<'_> {
-    /// Why there is no estimate, with what is wrong with the columns if that is why.
-    fn explained(&self, error: EstimateError, split: &Split) -> EstimateError {
-        let suspects = match error {
-            EstimateError::NoSegments { .. } => None,
-            _ => self.suspects(&split.fitted),
-        };
-        match suspects {
-            Some(suspects) => EstimateError::Suspect {
-                suspects,
-                error: Box::new(error),
-            },
-            None => error,
-        }
-    }
-}
-
-/// The fit on the data that were held back, and other structures of friction beside it.
-fn held_back(
-    task: &Task<'_>,
-    estimate: &Estimate,
-    split: &Split,
-    progress: Progress<'_>,
-) -> (Option<Result<Validation, EstimateError>>, Vec<Compared>) {
-    if split.held_back.is_empty() {
-        return (None, Vec::new());
-    }
-    let validation = validate(task, &estimate.values, estimate.spread, &split.held_back);
-    let structures = compare(task, estimate, &split.held_back, progress);
-    (Some(validation), structures)
-}
-
 /// The time of stretches, s.
-fn time(runs: &[Run], stretches: &[(usize, Range<usize>)]) -> f64 {
+fn time(runs: &[Run], stretches: &[Stretch]) -> f64 {
     let lengths = stretches.iter().map(|(run, rows)| runs[*run].length(rows));
     lengths.sum()
 }
 
 impl Identification {
+    /// The fit of a plane, judged on the stretches that were held back.
+    pub(crate) fn new(
+        plane: usize,
+        task: &Task<'_>,
+        estimate: Estimate,
+        split: &Split,
+        floor: Vector3<f64>,
+    ) -> Self {
+        let simulated = simulated(task, &estimate);
+        // Wheels stand on the body: what their angle is relative to is known.
+        let other_reading = match task.tables.wheels {
+            true => None,
+            false => task.other_reading(&estimate, &split.fitted),
+        };
+        let validation = (!split.held_back.is_empty())
+            .then(|| validate(task, &estimate.values, estimate.spread, &split.held_back));
+        let (runs, spread) = (task.runs, estimate.spread);
+        Self {
+            plane,
+            geometry: task.geometry,
+            physical: task.physical,
+            segment: task.segment,
+            coordinates: Coordinates::new(&task.choices, task.geometry, task.torque_known),
+            suspects: None,
+            other_reading,
+            torque_known: task.torque_known,
+            columns_accepted: false,
+            choices: task.choices,
+            findings: Vec::new(),
+            floor,
+            residuals: tests(&simulated, spread, floor),
+            simulated,
+            scores: Vec::new(),
+            covariance: estimate.covariance.clone(),
+            poles: Vec::new(),
+            validation,
+            structures: Vec::new(),
+            published: regression(runs, task.ball_angle),
+            times: (time(runs, &split.fitted), time(runs, &split.held_back)),
+            estimate,
+        }
+    }
+
+    /// Sets the covariance that the intervals are from, and those of the poles with it.
+    pub(crate) fn set_covariance(&mut self, covariance: DMatrix<f64>) {
+        self.poles = uncertain_poles(&self.estimate, &covariance, self.geometry);
+        self.covariance = covariance;
+    }
+
     /// Whether all residuals are white noise.
     pub fn is_white(&self) -> bool {
         self.residuals.iter().all(OutputResidual::is_white)
@@ -200,28 +136,22 @@ impl Identification {
         &self.covariance
     }
 
-    fn widened(&self) -> DMatrix<f64> {
-        let mut covariance = if self.is_white() || self.has_few_segments() {
-            self.estimate.covariance.clone()
-        } else {
-            self.estimate.scatter_covariance.clone()
-        };
-        let error = self.creep_error();
-        for parameter in Parameter::ROBOT {
-            let (index, value) = (parameter.index(), self.estimate.values[parameter]);
-            if self.estimate.status[parameter] == Status::Found {
-                covariance[(index, index)] += (error * value).powi(2);
-            }
+    /// What the model's own error, with creep, adds to the variance of a parameter.
+    pub(crate) fn model_variance(&self, parameter: Parameter) -> f64 {
+        let values = &self.estimate.values;
+        if self.estimate.status[parameter] != Status::Found {
+            return 0.0;
         }
-        if self.estimate.status[Parameter::Delay] == Status::Found {
+        let error = if Parameter::ROBOT.contains(&parameter) {
+            self.creep_error() * values[parameter]
+        } else if parameter == Parameter::Delay {
             // The torque drives the ball when the contacts have built up their force: after the part
             // of the creep's time that the wheels have of the inertia.
-            let values = &self.estimate.values;
-            let late = self.creep_time() * values[Parameter::B2] / values[Parameter::B1];
-            let index = Parameter::Delay.index();
-            covariance[(index, index)] += late.powi(2);
-        }
-        covariance
+            self.creep_time() * values[Parameter::B2] / values[Parameter::B1]
+        } else {
+            0.0
+        };
+        error.powi(2)
     }
 
     /// How far the ball angle runs ahead per rate of the ball, s: as it was found, or, where creep was
@@ -253,7 +183,8 @@ impl Identification {
 
     /// Whether there are fewer than two segments per parameter: their scatter then tells nothing.
     pub fn has_few_segments(&self) -> bool {
-        self.estimate.segments.len() < 2 * self.estimate.fit.reduced.indices.len()
+        let fit = &self.estimate.fit;
+        fit.initial.len() < 2 * fit.reduced.indices.len()
     }
 
     /// Standard deviation of a parameter; zero if it was held.
@@ -271,14 +202,7 @@ impl Identification {
 
     /// Correlation of two parameters; zero if one was held.
     pub fn correlation(&self, one: Parameter, other: Parameter) -> f64 {
-        let covariance = self.covariance();
-        let (i, j) = (one.index(), other.index());
-        let scale = (covariance[(i, i)] * covariance[(j, j)]).sqrt();
-        if scale > 0.0 {
-            covariance[(i, j)] / scale
-        } else {
-            0.0
-        }
+        correlation(self.covariance(), one.index(), other.index())
     }
 
     /// The plant in the project's own form, whose torque is in N m: the torque gain is part of the

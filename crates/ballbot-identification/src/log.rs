@@ -9,7 +9,7 @@ mod lines;
 mod run;
 mod table;
 
-pub use columns::{BallAngle, Channel, Columns, Unit, WheelEncoders, WheelPlane};
+pub use columns::{BallAngle, Channel, Columns, SecondPlane, Unit, WheelEncoders, WheelPlane};
 pub use error::{LogError, Problem, Suspicion};
 pub use finding::Finding;
 pub(crate) use run::quantile;
@@ -24,6 +24,16 @@ pub struct Log {
     pub run: Run,
     /// What is odd about it, in words by `Display`.
     pub findings: Vec<Finding>,
+}
+
+/// A file with every plane that is identified from it.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// The log of each plane.
+    pub planes: Vec<Log>,
+    /// The turn of the wheels about the vertical and its torque, in place of a plane's ball angle and
+    /// torque, where both planes are read from three wheels.
+    pub turn: Option<Run>,
 }
 
 /// How far the three encoders of `[log.wheels]` have turned from the beginning of a log to its end,
@@ -62,7 +72,32 @@ const LEAST_PUSH_DEG: f64 = 10.0;
 /// Called now and then with the part of the file that was read, 0 to 1.
 pub type Progress<'a> = &'a dyn Fn(f64);
 
-/// Reads a CSV file with a header.
+/// Reads all planes of a CSV file with a header.
+///
+/// # Errors
+/// As [`read`], of any plane.
+pub fn recording(
+    path: &Path,
+    columns: &Columns,
+    progress: Progress<'_>,
+) -> Result<Recording, LogError> {
+    let (planes, turn) = (columns.planes(), columns.turn());
+    let passes = (planes.len() + usize::from(turn.is_some())) as f64;
+    let pass = |place: usize, columns: &Columns| {
+        let done = |part: f64| progress((place as f64 + part) / passes);
+        read(path, columns, &done)
+    };
+    let logs = planes.iter().enumerate();
+    Ok(Recording {
+        planes: logs
+            .map(|(place, columns)| pass(place, columns))
+            .collect::<Result<_, _>>()?,
+        // A robot that never turns has a turn that no diagnosis takes, and it is not needed.
+        turn: turn.and_then(|columns| Some(pass(planes.len(), &columns).ok()?.run)),
+    })
+}
+
+/// Reads one plane of a CSV file with a header.
 ///
 /// # Errors
 /// [`LogError`]: the file cannot be read or understood, or what is in it cannot be the log of a

@@ -152,6 +152,8 @@ pub struct SegmentedRuns<'a> {
     pub coordinates: Coordinates,
     /// What phi is relative to.
     pub ball_angle: BallAngle,
+    /// Standard deviations of the noise of the outputs.
+    pub noise: Vector3<f64>,
 }
 
 impl SegmentedRuns<'_> {
@@ -199,6 +201,10 @@ impl ShootingModel<4, 3> for SegmentedRuns<'_> {
     fn measured(&self, segment: usize) -> &[Vector3<f64>] {
         let Segment { run, first, end } = self.segments[segment];
         &self.runs[run].outputs[first..end]
+    }
+
+    fn noise(&self, _: usize) -> Vector3<f64> {
+        self.noise
     }
 
     fn simulate(

@@ -1,24 +1,48 @@
 //! The result as a TOML file.
 
 use crate::estimate::Status;
-use crate::identification::Identification;
+use crate::joint::PLANES;
 use crate::parameter::Parameter;
-use crate::verdict::Verdict;
+use crate::robot::{IdentifiedRobot, OfPlane};
+use nalgebra::DMatrix;
 use std::fmt::Write as _;
 
-impl Identification {
-    /// `parameters.toml`: the robot as a `[parameters]` table of a scenario, what does not fit into
-    /// that, and the covariance.
+/// What stands in a file of parameters: a table's key, the plane it is read from, the parameter.
+type Entry = (String, usize, Parameter);
+
+impl IdentifiedRobot {
+    /// The files of parameters with their names: `parameters.toml`, or, of a body that is not
+    /// symmetric, whose planes are two robots, `parameters_x.toml` and `parameters_y.toml`. Each has
+    /// the robot as a `[parameters]` table of a scenario, what does not fit into that, and the
+    /// covariance.
     ///
     /// # Errors
     /// The verdicts that forbid it: what was found is no robot.
-    pub fn parameter_file(&self) -> Result<String, Vec<Verdict>> {
+    pub fn parameter_files(&self) -> Result<Vec<(String, String)>, Vec<OfPlane>> {
         let refusals = self.refusals();
         if !refusals.is_empty() {
             return Err(refusals);
         }
+        if !self.variables.is_own(Parameter::B3) {
+            let variables = self.variables.all();
+            let entries = variables.map(|(plane, one)| (self.key(plane, one), plane, one));
+            let text = self.text(0, &entries.collect::<Vec<_>>(), self.covariance());
+            return Ok(vec![("parameters.toml".to_owned(), text)]);
+        }
+        let planes = self.planes.iter().enumerate();
+        let files = planes.map(|(plane, identification)| {
+            let entries = Parameter::ALL.map(|one| (one.key().to_owned(), plane, one));
+            let text = self.text(plane, &entries, identification.covariance());
+            (format!("parameters_{}.toml", PLANES[plane]), text)
+        });
+        Ok(files.collect())
+    }
+
+    /// The file of the robot that a plane shows.
+    fn text(&self, plane: usize, entries: &[Entry], covariance: &DMatrix<f64>) -> String {
+        let identification = &self.planes[plane];
         let mut text = String::new();
-        let robot = self.ballbot();
+        let robot = identification.ballbot();
         let geometry = &robot.geometry;
         // Writing to a string cannot fail; {:?} gives the shortest digits that read back the same.
         let _ = write!(
@@ -40,42 +64,52 @@ impl Identification {
             robot.drive.coulomb,
             geometry.centre_of_mass,
             geometry.ball_radius,
-            self.geometry.wheel_radius,
-            self.estimate.values[Parameter::TorqueGain],
+            identification.geometry.wheel_radius,
+            identification.estimate.values[Parameter::TorqueGain],
             geometry.wheel_radius,
             geometry.gravity,
         );
+        if let Some(wheels) = &self.wheels {
+            let _ = write!(
+                text,
+                "zenith_angle_deg = {:?}\nwheel_azimuths_deg = {:?}\nwheels_reversed = {:?}\n",
+                wheels.zenith_angle_deg, wheels.azimuths_deg, wheels.reversed,
+            );
+        }
         let _ = write!(
             text,
             "\n# All that was found or held, with standard deviations.\n"
         );
-        for parameter in Parameter::ALL {
-            let status = match self.estimate.status[parameter] {
+        for (key, plane, parameter) in entries {
+            let (identification, parameter) = (&self.planes[*plane], *parameter);
+            let status = match identification.estimate.status[parameter] {
                 Status::Held => "held",
                 Status::Found => "found",
                 Status::AtBound => "at its bound",
             };
             let _ = write!(
                 text,
-                "\n[identification.{}] # {}\nvalue = {:?} # {}\nstandard_deviation = {:?}\n\
+                "\n[identification.{key}] # {}\nvalue = {:?} # {}\nstandard_deviation = {:?}\n\
                  status = \"{status}\"\n",
-                parameter.key(),
                 parameter.words(),
-                self.estimate.values[parameter],
+                identification.estimate.values[parameter],
                 parameter.unit(),
-                self.standard_deviation(parameter),
+                identification.standard_deviation(parameter),
             );
         }
-        let keys = Parameter::ALL.map(|parameter| format!("\"{parameter}\""));
+        let keys: Vec<String> = entries
+            .iter()
+            .map(|(key, ..)| format!("\"{key}\""))
+            .collect();
         let _ = write!(
             text,
             "\n[identification.covariance]\nparameters = [{}]\nmatrix = [\n",
             keys.join(", ")
         );
-        for row in self.covariance().row_iter() {
+        for row in covariance.row_iter() {
             let entries: Vec<String> = row.iter().map(|entry| format!("{entry:?}")).collect();
             let _ = writeln!(text, "    [{}],", entries.join(", "));
         }
-        Ok(text + "]\n")
+        text + "]\n"
     }
 }

@@ -1,12 +1,12 @@
 //! What the residuals say about the model.
 
-use crate::estimate::{Estimate, Task};
+use crate::estimate::{Estimate, Status, Task, problem};
+use crate::joint::{Joint, SegmentedPlanes};
 use crate::line::Line;
 use crate::log::Run;
-use crate::model::SegmentedRuns;
-use crate::parameter::Parameter;
+use crate::parameter::{Parameter, Values};
 use lpvmpc_design::{Correlation, ShootingModel, autocorrelation, cross_correlation};
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, DVector, Vector3, Vector4};
 
 /// The outputs in words, in the order of all vectors of three.
 pub const OUTPUTS: [&str; 3] = ["ball angle", "tilt", "tilt rate"];
@@ -100,13 +100,13 @@ pub struct SegmentResidual {
 
 /// What the fitted robot does, beside what was measured.
 pub fn simulated(task: &Task<'_>, estimate: &Estimate) -> Vec<SegmentResidual> {
-    let model = task.model(estimate.segments.clone());
-    let pairs = estimate.segments.iter().zip(&estimate.fit.initial);
+    let model = task.model(estimate.segments.clone(), estimate.noise);
+    let pairs = estimate.segments.iter().zip(&estimate.initial);
     pairs
         .enumerate()
         .map(|(index, (segment, initial))| {
             let mut simulated = Vec::new();
-            model.simulate(index, &estimate.fit.parameters, initial, &mut simulated);
+            model.simulate(index, &estimate.coordinates, initial, &mut simulated);
             let rows = segment.first..segment.end;
             let run: &Run = &task.runs[segment.run];
             SegmentResidual {
@@ -188,43 +188,144 @@ impl ScoreTest {
     }
 }
 
-/// A score test (Rao 1948) of every parameter that was held. The noise is that of the residuals,
-/// their colour included, so a model that misses much asks for little by itself.
-pub fn score_tests(task: &Task<'_>, estimate: &Estimate) -> Vec<ScoreTest> {
-    let model: SegmentedRuns<'_> = task.model(estimate.segments.clone());
-    let unknowns = task.unknowns(&estimate.values, &model.coordinates);
-    let priors = task.priors(&model.coordinates);
-    let problem = task.problem(&model, &unknowns, &priors, estimate.noise);
-    let all: Vec<usize> = (0..Parameter::ALL.len()).collect();
-    let (parameters, initial) = (&estimate.fit.parameters, &estimate.fit.initial);
-    let reduced = problem.reduced(parameters, initial, &all);
-    let found = &estimate.fit.reduced.indices;
-    let bounds = model.coordinates.bounds(&estimate.values, task.physical);
-    let held = Parameter::ALL
-        .into_iter()
-        .filter(|parameter| !task.choices[*parameter].is_free());
-    held.filter_map(|parameter| {
-        let mut indices = found.clone();
-        indices.push(parameter.index());
-        let information = reduced
-            .information
-            .select_rows(&indices)
-            .select_columns(&indices);
-        let gradient = reduced.gradient.select_rows(&indices);
+/// What the residuals say against the fit.
+#[derive(Clone, Debug)]
+pub struct Scores {
+    /// Of the parameters that were held, plane by plane.
+    pub held: Vec<Vec<ScoreTest>>,
+    /// Of the parameters that the planes share.
+    pub differences: Vec<Difference>,
+}
+
+/// By how much a parameter of the second plane, which the planes share, would differ from that of the
+/// first if each had its own, to first order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Difference {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// Its value, which is the one of both planes.
+    pub value: f64,
+    /// The second plane's minus the first's.
+    pub change: f64,
+    /// Standard deviation of the change.
+    pub standard_deviation: f64,
+}
+
+impl Difference {
+    /// The change over its standard deviation.
+    pub fn significance(&self) -> f64 {
+        self.change.abs() / self.standard_deviation
+    }
+
+    /// Whether it is no chance.
+    pub fn is_alarm(&self) -> bool {
+        self.significance() > ALARM
+    }
+}
+
+/// Score tests (Rao 1948) of every parameter that was held, and of every one that planes share. The
+/// noise is that of the residuals, their colour included, so a model that misses much asks for little
+/// by itself.
+pub fn score_tests(joint: &Joint<'_>, estimates: &[Estimate]) -> Scores {
+    let segments = estimates.iter().map(|plane| plane.segments.clone());
+    let noises: Vec<Vector3<f64>> = estimates.iter().map(|plane| plane.noise).collect();
+    let values: Vec<Values> = estimates.iter().map(|plane| plane.values).collect();
+    // Of planes that share nothing: what they share are directions in which both move alike.
+    let (variables, apart) = (joint.variables, joint.variables.apart());
+    let model = SegmentedPlanes {
+        variables: apart,
+        ..joint.model(segments.collect(), &noises)
+    };
+    let unknowns = joint.unknowns(&values, &model);
+    let priors = joint.priors(&model, apart);
+    let problem = problem(&model, &unknowns, &priors);
+    let coordinates = estimates.iter().flat_map(|plane| plane.coordinates.clone());
+    let coordinates: Vec<f64> = coordinates.collect();
+    let initial = estimates.iter().flat_map(|plane| plane.initial.clone());
+    let initial: Vec<Vector4<f64>> = initial.collect();
+    let all: Vec<usize> = (0..apart.count()).collect();
+    let reduced = problem.reduced(&coordinates, &initial, &all);
+
+    let direction = |plane: usize, parameter: Parameter| {
+        let mut direction = DVector::zeros(apart.count());
+        for other in 0..variables.planes() {
+            if other == plane || !variables.is_own(parameter) {
+                direction[apart.place(other, parameter)] = 1.0;
+            }
+        }
+        direction
+    };
+    let found = variables.all().filter(|(plane, parameter)| {
+        let places = estimates.first().map(|plane| &plane.fit.reduced.indices);
+        places.is_some_and(|places| places.contains(&variables.place(*plane, *parameter)))
+    });
+    let found: Vec<DVector<f64>> = found.map(|(plane, one)| direction(plane, one)).collect();
+    // The step of a direction that a fit of it beside all that was found would make.
+    let step = |direction: DVector<f64>| {
+        let mut columns = found.clone();
+        columns.push(direction);
+        let columns = DMatrix::from_columns(&columns);
+        let information = columns.tr_mul(&reduced.information) * &columns;
+        let gradient = columns.tr_mul(&reduced.gradient);
         let covariance = crate::covariance::inverse(&information);
-        let last = indices.len() - 1;
+        let last = columns.ncols() - 1;
         let change = -(covariance.row(last) * gradient)[0];
         let standard_deviation = covariance[(last, last)].sqrt();
-        let (lower, upper) = bounds[parameter];
-        let value = parameters[parameter.index()];
-        let possible = (change > 0.0 && value < upper) || (change < 0.0 && value > lower);
         let finite = change.is_finite() && standard_deviation.is_finite();
-        (possible && finite).then_some(ScoreTest {
-            parameter,
-            held: value,
-            change,
-            standard_deviation,
+        finite.then_some((change, standard_deviation))
+    };
+    let held = |plane: usize| {
+        let (task, estimate) = (&joint.tasks[plane], &estimates[plane]);
+        let bounds = model.planes[plane]
+            .coordinates
+            .bounds(&estimate.values, task.physical);
+        let held = Parameter::ALL
+            .into_iter()
+            .filter(|parameter| !task.choices[*parameter].is_free());
+        held.filter_map(|parameter| {
+            let (change, standard_deviation) = step(direction(plane, parameter))?;
+            let (lower, upper) = bounds[parameter];
+            let value = estimate.coordinates[parameter.index()];
+            let possible = (change > 0.0 && value < upper) || (change < 0.0 && value > lower);
+            possible.then_some(ScoreTest {
+                parameter,
+                held: value,
+                change,
+                standard_deviation,
+            })
         })
-    })
-    .collect()
+        .collect()
+    };
+    let differences = || {
+        let [first, second] = estimates else {
+            return Vec::new();
+        };
+        let shared = Parameter::ALL.into_iter().filter(|parameter| {
+            !variables.is_own(*parameter) && first.status[*parameter] == Status::Found
+        });
+        shared
+            .filter_map(|parameter| {
+                // What changes the second plane's parameter and no other.
+                let mut moved = second.values;
+                moved[parameter] += 1.0;
+                let moved = model.planes[1].coordinates.of(&moved);
+                let mut direction = DVector::zeros(apart.count());
+                for (i, to) in moved.into_iter().enumerate() {
+                    let place = apart.place(1, Parameter::ALL[i]);
+                    direction[place] = to - second.coordinates[i];
+                }
+                let (change, standard_deviation) = step(direction)?;
+                Some(Difference {
+                    parameter,
+                    value: first.values[parameter],
+                    change,
+                    standard_deviation,
+                })
+            })
+            .collect()
+    };
+    Scores {
+        held: (0..estimates.len()).map(held).collect(),
+        differences: differences(),
+    }
 }

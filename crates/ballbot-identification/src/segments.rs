@@ -4,13 +4,16 @@ use crate::log::Run;
 use crate::model::Segment;
 use std::ops::Range;
 
+/// Rows without a gap between them, and which run they are of.
+pub type Stretch = (usize, Range<usize>);
+
 /// Rows for the fit and rows held back to judge it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Split {
     /// Stretches for the fit, with their run.
-    pub fitted: Vec<(usize, Range<usize>)>,
+    pub fitted: Vec<Stretch>,
     /// Stretches held back: the ends of the runs.
-    pub held_back: Vec<(usize, Range<usize>)>,
+    pub held_back: Vec<Stretch>,
 }
 
 impl Split {
@@ -46,12 +49,7 @@ impl Split {
 /// Cuts stretches into segments of `length` seconds. The first `lead` seconds of each stretch are
 /// left out, because the torque before them, which a delay brings in, is not known. A rest of at
 /// least half a length is a segment, too.
-pub fn segments(
-    runs: &[Run],
-    stretches: &[(usize, Range<usize>)],
-    length: f64,
-    lead: f64,
-) -> Vec<Segment> {
+pub fn segments(runs: &[Run], stretches: &[Stretch], length: f64, lead: f64) -> Vec<Segment> {
     let mut segments = Vec::new();
     for (run, stretch) in stretches {
         let time = &runs[*run].time;

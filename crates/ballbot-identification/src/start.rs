@@ -7,6 +7,7 @@
 
 use crate::log::{BallAngle, Run};
 use crate::parameter::{Parameter, Values};
+use crate::segments::Stretch;
 use ballbot::Geometry;
 use nalgebra::{DMatrix, DVector, Matrix4x2, Vector2, Vector4};
 use std::ops::Range;
@@ -36,7 +37,7 @@ pub struct LinearFit {
 /// The best linear fits at a few delays, the best first; none if the log does not tell them.
 pub fn linear_fits(
     runs: &[Run],
-    stretches: &[(usize, Range<usize>)],
+    stretches: &[Stretch],
     ball_angle: BallAngle,
     delays: Option<f64>,
 ) -> Vec<LinearFit> {
@@ -51,7 +52,7 @@ pub fn linear_fits(
 
 fn linear_fit(
     runs: &[Run],
-    stretches: &[(usize, Range<usize>)],
+    stretches: &[Stretch],
     ball_angle: BallAngle,
     delay: f64,
 ) -> Option<LinearFit> {

@@ -1,11 +1,11 @@
 //! Which friction does this robot have? Model structures compared on held-back data.
 
 use crate::estimate::{Estimate, Progress, Task};
+use crate::joint::Joint;
 use crate::parameter::{Choice, Parameter, Values};
-use crate::segments::spread;
+use crate::segments::{Stretch, spread};
 use crate::validation::{Validation, validate};
 use nalgebra::Vector3;
-use std::ops::Range;
 
 /// Where friction acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,35 +86,64 @@ pub struct Compared {
 /// Segments of each fit; enough to tell structures apart.
 const SEGMENTS: usize = 60;
 
-/// Fits every structure, from the estimate on, and judges it on the stretches held back. One that
-/// cannot be fitted or simulated there is left out: it is no rival.
+/// Fits every structure, from the estimates on, and judges it on the stretches of each plane that were
+/// held back: plane by plane, those that can be fitted and simulated there. The others are no rivals.
 pub fn compare(
-    task: &Task<'_>,
-    estimate: &Estimate,
-    held_back: &[(usize, Range<usize>)],
+    joint: &Joint<'_>,
+    estimates: &[Estimate],
+    held_back: &[&[Stretch]],
     progress: Progress<'_>,
-) -> Vec<Compared> {
-    // One noise for all, so that their chi^2 can be compared.
-    let noise: Vector3<f64> = estimate.noise;
-    Structure::ALL
-        .into_iter()
-        .filter_map(|structure| {
-            let task = Task {
-                choices: structure.choices(task.choices),
-                noise: [0, 1, 2].map(|output| Some(noise[output])),
-                ..task.clone()
-            };
-            let segments = spread(&estimate.segments, SEGMENTS);
-            let fitted = task.estimate_from(estimate.values, segments, noise, progress);
-            let fitted = fitted.ok()?;
-            Some(Compared {
-                structure,
-                fitted_chi_square: fitted.fit.chi_square / fitted.fit.degrees_of_freedom(),
-                validation: validate(&task, &fitted.values, estimate.spread, held_back).ok()?,
-                estimate: fitted,
+) -> Vec<Vec<Compared>> {
+    let mut planes = vec![Vec::new(); estimates.len()];
+    for structure in Structure::ALL {
+        let compared = structure.judged(joint, estimates, held_back, progress);
+        for (plane, compared) in planes.iter_mut().zip(compared.into_iter().flatten()) {
+            plane.push(compared);
+        }
+    }
+    planes
+}
+
+impl Structure {
+    /// The structure in each plane; `None` if it cannot be fitted or simulated in one of them.
+    fn judged(
+        self,
+        joint: &Joint<'_>,
+        estimates: &[Estimate],
+        held_back: &[&[Stretch]],
+        progress: Progress<'_>,
+    ) -> Option<Vec<Compared>> {
+        // One noise for all, so that their chi^2 can be compared.
+        let noises: Vec<Vector3<f64>> = estimates.iter().map(|plane| plane.noise).collect();
+        let tasks = joint.tasks.iter().zip(&noises).map(|(task, noise)| Task {
+            choices: self.choices(task.choices),
+            noise: [0, 1, 2].map(|output| Some(noise[output])),
+            ..task.clone()
+        });
+        let joint = Joint {
+            tasks: tasks.collect(),
+            ..joint.clone()
+        };
+        let starts: Vec<Values> = estimates.iter().map(|plane| plane.values).collect();
+        let segments = estimates.iter();
+        let segments = segments
+            .map(|plane| spread(&plane.segments, SEGMENTS))
+            .collect();
+        let fitted = joint.estimate_from(&starts, segments, &noises, progress);
+        let planes = fitted.ok()?.planes.into_iter().enumerate();
+        planes
+            .map(|(plane, fitted)| {
+                let (task, spread) = (&joint.tasks[plane], estimates[plane].spread);
+                let validation = validate(task, &fitted.values, spread, held_back[plane]).ok()?;
+                Some(Compared {
+                    structure: self,
+                    fitted_chi_square: fitted.fit.chi_square / fitted.fit.degrees_of_freedom(),
+                    validation,
+                    estimate: fitted,
+                })
             })
-        })
-        .collect()
+            .collect()
+    }
 }
 
 /// The structure to take: the smallest whose held-back chi^2 is within what chance explains of the

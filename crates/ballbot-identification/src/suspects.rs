@@ -6,16 +6,16 @@
 //! it would be if one column were another, and what then explains it is named.
 
 use crate::coordinates::Coordinates;
-use crate::estimate::{Effort, EstimateError, Task};
+use crate::estimate::{Effort, EstimateError, Task, problem};
 use crate::log::{BallAngle, Run};
+use crate::miswiring::Miswiring;
 use crate::parameter::Parameter;
-use crate::segments::{segments, spread};
+use crate::segments::{Stretch, segments, spread};
 use crate::words::number;
 use lpvmpc_design::{ShootingFit, ShootingSettings};
 use nalgebra::Vector3;
 use std::f64::consts::{PI, TAU};
 use std::fmt;
-use std::ops::Range;
 
 /// A mistake about the columns of a log that would explain it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,16 +42,65 @@ pub enum Suspect {
     BallAndTorque,
     /// Ball angle and tilt stand in each other's place.
     BallAndTilt,
+    /// Something between two planes.
+    Planes(Miswiring),
 }
 
 /// Mistakes, each of which would explain a log; at least one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Suspects(pub Vec<Suspect>);
+pub struct Suspects {
+    /// The mistakes.
+    pub mistakes: Vec<Suspect>,
+    /// Where the configuration says what they are about.
+    pub tables: Tables,
+}
 
 impl fmt::Display for Suspects {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let words: Vec<String> = self.0.iter().map(ToString::to_string).collect();
+        let words = self.mistakes.iter().map(|one| one.words(self.tables));
+        let words: Vec<String> = words.collect();
         f.write_str(&words.join("; or if "))
+    }
+}
+
+/// Where a configuration says what the columns of a plane are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tables {
+    /// In `[log.y]`.
+    pub second: bool,
+    /// The ball angle is in `[log.wheels]`.
+    pub wheels: bool,
+    /// The torque is in `[log.wheels]`.
+    pub motors: bool,
+}
+
+impl Tables {
+    /// The table of a quantity of the plane.
+    fn of(self, quantity: &str) -> String {
+        match self.second {
+            true => format!("[log.y.{quantity}]"),
+            false => format!("[log.{quantity}]"),
+        }
+    }
+
+    /// What gives the ball angle the other sign.
+    fn ball_sign(self) -> String {
+        match self.wheels {
+            true => {
+                "set the other sign for the factors of all encoders in [log.wheels], or, of one \
+                     plane of two, see `ballbot wheels check`"
+                    .to_owned()
+            }
+            false => format!("set factor = -1.0 in {}", self.of("phi")),
+        }
+    }
+
+    /// What gives the torque the other sign.
+    fn torque_sign(self) -> String {
+        match self.motors {
+            true => "set the other sign for the factors of all torques in [log.wheels]".to_owned(),
+            false => format!("set factor = -1.0 in {}", self.of("torque")),
+        }
     }
 }
 
@@ -129,7 +178,7 @@ impl Suspect {
                 row[1] /= by;
                 row[2] /= by;
             }),
-            Self::BallAngle(_) => {}
+            Self::BallAngle(_) | Self::Planes(_) => {}
             Self::BallAndTorque => {
                 let pairs = outputs.zip(&mut run.torque);
                 pairs.for_each(|(row, torque)| std::mem::swap(&mut row[0], torque));
@@ -140,11 +189,24 @@ impl Suspect {
     }
 }
 
+/// What explains a log best of what was tried, each with its chi^2 per degree of freedom, if that is
+/// much better than `own`, that of the log as it is.
+pub(crate) fn explaining<T>(own: f64, tried: Vec<(T, f64)>) -> Vec<T> {
+    let least = tried.iter().map(|(_, one)| *one).fold(own, f64::min);
+    let explained = least < EXPLAINED && own > least + CHANCE;
+    if !(explained || least < CREEPING.min(MUCH_BETTER * own)) {
+        return Vec::new();
+    }
+    let alike = |one: f64| one <= least + CHANCE * least;
+    let best = tried.into_iter().filter(|(_, one)| alike(*one));
+    best.map(|(mistake, _)| mistake).collect()
+}
+
 impl Task<'_> {
     /// The mistakes under which a robot explains these stretches best, if that is much better than
     /// what a robot explains of the log as it is. More than one where the motion is the same: small
     /// angles of the ball and large ones of the body, say.
-    pub fn suspects(&self, stretches: &[(usize, Range<usize>)]) -> Option<Suspects> {
+    pub fn suspects(&self, stretches: &[Stretch]) -> Option<Suspects> {
         let own = self.chi_square_of(self.runs, self.ball_angle, stretches);
         let (gear, rate) = (
             self.geometry.ball_radius / self.geometry.wheel_radius,
@@ -155,14 +217,11 @@ impl Task<'_> {
                 .into_iter()
                 .map(|suspect| (suspect, self.chi_square_if(suspect, stretches)))
                 .collect();
-        let least = chi_squares.iter().map(|(_, one)| *one).fold(own, f64::min);
-        let explained = least < EXPLAINED && own > least + CHANCE;
-        if !(explained || least < CREEPING.min(MUCH_BETTER * own)) {
-            return None;
-        }
-        let alike = |one: f64| one <= least + CHANCE * least;
-        let best = chi_squares.into_iter().filter(|(_, one)| alike(*one));
-        Some(Suspects(best.map(|(suspect, _)| suspect).collect()))
+        let mistakes = explaining(own, chi_squares);
+        (!mistakes.is_empty()).then_some(Suspects {
+            mistakes,
+            tables: self.tables,
+        })
     }
 
     /// Whether any run has a tilt rate.
@@ -171,7 +230,7 @@ impl Task<'_> {
         rows.any(|row| !row[2].is_nan())
     }
 
-    fn chi_square_if(&self, suspect: Suspect, stretches: &[(usize, Range<usize>)]) -> f64 {
+    fn chi_square_if(&self, suspect: Suspect, stretches: &[Stretch]) -> f64 {
         let runs: Vec<Run> = self.runs.iter().map(|run| suspect.corrected(run)).collect();
         let ball_angle = match suspect {
             Suspect::BallAngle(other) => other,
@@ -182,11 +241,11 @@ impl Task<'_> {
 
     /// chi^2 per degree of freedom of a fit to other runs; infinite if there is none, or one that ends
     /// where no robot is.
-    fn chi_square_of(
+    pub(crate) fn chi_square_of(
         &self,
         runs: &[Run],
         ball_angle: BallAngle,
-        stretches: &[(usize, Range<usize>)],
+        stretches: &[Stretch],
     ) -> f64 {
         let task = Task {
             runs,
@@ -206,7 +265,7 @@ impl Task<'_> {
     /// A fit to a few segments; none from a start that is hopeless.
     fn quick(
         &self,
-        stretches: &[(usize, Range<usize>)],
+        stretches: &[Stretch],
         floor: Vector3<f64>,
     ) -> Result<Option<ShootingFit<4>>, EstimateError> {
         let start = self.coarse(stretches, floor, START, &|_| {})?;
@@ -215,10 +274,10 @@ impl Task<'_> {
         }
         let start = start.values;
         let segments = segments(self.runs, stretches, self.segment, self.lead());
-        let model = self.model(spread(&segments, SEGMENTS));
+        let model = self.model(spread(&segments, SEGMENTS), floor);
         let unknowns = self.unknowns(&start, &model.coordinates);
         let priors = self.priors(&model.coordinates);
-        let problem = self.problem(&model, &unknowns, &priors, floor);
+        let problem = problem(&model, &unknowns, &priors);
         let fit = problem.fit(model.initial_states(&start), &SETTINGS, &|_| {})?;
         Ok(Some(fit))
     }
@@ -233,8 +292,9 @@ impl Task<'_> {
     }
 }
 
-impl fmt::Display for Suspect {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Suspect {
+    /// The mistake and what to do about it, in words, of a log that `tables` describe.
+    pub(crate) fn words(&self, tables: Tables) -> String {
         let unit = |by: f64| -> &'static str {
             match by {
                 _ if (by - 180.0 / PI).abs() < 1.0 => "it is in degrees and taken for radians",
@@ -248,44 +308,43 @@ impl fmt::Display for Suspect {
             }
         };
         match self {
-            Self::TorqueSign => write!(
-                f,
-                "the torque has the other sign: set factor = -1.0 in [log.torque]. A positive torque \
-                 turns the ball to positive phi and the body to negative theta"
+            Self::TorqueSign => format!(
+                "the torque has the other sign: {}. A positive torque turns the ball to positive phi and the body to negative theta",
+                tables.torque_sign()
             ),
-            Self::BallSign => write!(
-                f,
-                "the ball angle has the other sign: set factor = -1.0 in [log.phi]. The ball rolls by \
-                 r_b phi to the side to which the body falls at a positive theta"
+            Self::BallSign => format!(
+                "the ball angle has the other sign: {}. The ball rolls by \
+                 r_b phi to the side to which the body falls at a positive theta",
+                tables.ball_sign()
             ),
-            Self::TiltSign => write!(
-                f,
-                "tilt and tilt rate have the other sign: set factor = -1.0 in [log.theta] and \
-                 [log.theta_dot]. A body that leans to the side of positive phi has a positive theta"
+            Self::TiltSign => format!(
+                "tilt and tilt rate have the other sign: set factor = -1.0 in {} and {}. A body that leans to the side of positive phi has a positive theta",
+                tables.of("theta"),
+                tables.of("theta_dot")
             ),
-            Self::TorqueScale(by) => write!(f, "the torque has another unit: {}", unit(*by)),
-            Self::BallScale(by) => write!(f, "the ball angle has another unit: {}", unit(*by)),
-            Self::WheelAngle(by) => write!(
-                f,
+            Self::TorqueScale(by) => format!("the torque has another unit: {}", unit(*by)),
+            Self::BallScale(by) => format!("the ball angle has another unit: {}", unit(*by)),
+            Self::WheelAngle(by) => format!(
                 "the ball angle is the angle of a wheel: set factor = {} (r_w / r_b, over the gear's \
                  ratio for an encoder on the motor's shaft) for it",
                 number(1.0 / by)
             ),
-            Self::TiltScale(by) => write!(f, "tilt and rate have another unit: {}", unit(*by)),
-            Self::TimeScale(by) => write!(f, "the time has another unit: {}", unit(*by)),
-            Self::BallAngle(BallAngle::Inertial) => write!(
-                f,
+            Self::TiltScale(by) => format!("tilt and rate have another unit: {}", unit(*by)),
+            Self::TimeScale(by) => format!("the time has another unit: {}", unit(*by)),
+            Self::BallAngle(BallAngle::Inertial) => {
                 "the ball angle is relative to the floor: set ball_angle = \"inertial\" in [log]"
-            ),
-            Self::BallAngle(BallAngle::RelativeToBody) => write!(
-                f,
+                    .to_owned()
+            }
+            Self::BallAngle(BallAngle::RelativeToBody) => {
                 "the ball angle is relative to the body: set ball_angle = \"relative_to_body\" in \
                  [log]"
-            ),
-            Self::BallAndTorque => {
-                write!(f, "the columns of ball angle and torque are interchanged")
+                    .to_owned()
             }
-            Self::BallAndTilt => write!(f, "the columns of ball angle and tilt are interchanged"),
+            Self::BallAndTorque => {
+                "the columns of ball angle and torque are interchanged".to_owned()
+            }
+            Self::Planes(miswiring) => miswiring.to_string(),
+            Self::BallAndTilt => "the columns of ball angle and tilt are interchanged".to_owned(),
         }
     }
 }

@@ -1,12 +1,11 @@
 //! A fitted robot on data that it has not seen.
 
-use crate::estimate::{EstimateError, Task};
+use crate::estimate::{EstimateError, Task, problem};
 use crate::model::Segment;
 use crate::parameter::{Choice, Parameter, Values};
-use crate::segments::{segments, spread};
+use crate::segments::{Stretch, segments, spread};
 use lpvmpc_design::{ShootingFit, ShootingModel, ShootingSettings};
 use nalgebra::Vector3;
-use std::ops::Range;
 
 /// How far ahead a prediction is judged, s.
 pub const HORIZONS: [f64; 4] = [0.1, 0.25, 0.5, 1.0];
@@ -38,7 +37,7 @@ pub fn validate(
     task: &Task<'_>,
     values: &Values,
     noise: Vector3<f64>,
-    stretches: &[(usize, Range<usize>)],
+    stretches: &[Stretch],
 ) -> Result<Validation, EstimateError> {
     // Everything is held, so only the initial states are fitted.
     let held = Task {
@@ -75,9 +74,9 @@ fn states_of(
             lead: held.lead(),
         });
     }
-    let model = held.model(segments);
+    let model = held.model(segments, noise);
     let unknowns = held.unknowns(values, &model.coordinates);
-    let problem = held.problem(&model, &unknowns, &[], noise);
+    let problem = problem(&model, &unknowns, &[]);
     let initial = model.initial_states(values);
     Ok(problem.fit(initial, &ShootingSettings::default(), &|_| {})?)
 }
@@ -99,7 +98,7 @@ fn prediction_errors(
     });
     let observed: Vec<Segment> = observed.collect();
     let states = states_of(held, observed.clone(), values, noise)?;
-    let model = held.model(windows.clone());
+    let model = held.model(windows.clone(), noise);
     let mut sums = [(Vector3::zeros(), Vector3::<f64>::zeros()); HORIZONS.len()];
     for (index, window) in windows.iter().enumerate() {
         let mut outputs = Vec::new();

@@ -6,7 +6,7 @@ use crate::ball_angle::DECIDES;
 use crate::coordinates::LONGEST_DELAY;
 use crate::parameter::Parameter;
 use crate::structures::Structure;
-use crate::suspects::{Suspect, Suspects};
+use crate::suspects::{Suspect, Suspects, Tables};
 use crate::words::{number, percent, times};
 use lpvmpc_design::ShootingTermination;
 use lpvmpc_design::number_text;
@@ -42,7 +42,7 @@ pub enum Verdict {
         accepted: bool,
     },
     /// The log speaks for the other reading of the ball angle.
-    #[error("the log is explained better (chi^2 lower by {better_by:.0}, where {DECIDES:.0} is no chance) by another robot if {reading}{}", if *accepted { "" } else { ACCEPT })]
+    #[error("the log is explained better (chi^2 lower by {better_by:.0}, where {DECIDES:.0} is no chance) by another robot if {}{}", reading.words(Tables::default()), if *accepted { "" } else { ACCEPT })]
     OtherBallAngle {
         /// The other reading.
         reading: Suspect,
@@ -52,7 +52,7 @@ pub enum Verdict {
         accepted: bool,
     },
     /// The log does not tell what the ball angle is relative to.
-    #[error("the log is explained as well by another robot (b1 = {} m^2) if {reading}. Weigh the body, and set body_mass_kg in [body]; or log with a larger torque", number(*b1))]
+    #[error("the log is explained as well by another robot (b1 = {} m^2) if {}. Weigh the body, and set body_mass_kg in [body]; or log with a larger torque", number(*b1), reading.words(Tables::default()))]
     BallAngleUntold {
         /// The other reading.
         reading: Suspect,
@@ -182,6 +182,20 @@ pub enum Verdict {
         /// The difference is one that a controller would notice.
         matters: bool,
     },
+    /// A parameter that the planes share, and that they want to be two.
+    #[error("{} is one for both planes, {}, and the plane y asks for {} {} more ({} standard deviations): {}", parameter.words(), number(*value), number(*change), parameter.unit(), times(*significance), if *parameter == Parameter::B3 { "the body is not symmetric; set symmetric_body = false in [fit]" } else { "the wheels are not alike, or stand otherwise than is said, or something in one of the planes is not as it should be" })]
+    PlanesDiffer {
+        /// The parameter.
+        parameter: Parameter,
+        /// Its value, of both planes.
+        value: f64,
+        /// By how much that of the plane y would be larger.
+        change: f64,
+        /// Over its standard deviation.
+        significance: f64,
+        /// The difference is one that a controller would notice.
+        matters: bool,
+    },
     /// Nothing is said of the body's mass.
     #[error(
         "the body's mass is not given: weigh the body, and set body_mass_kg in [body]. Without it the \
@@ -275,6 +289,15 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// What comes before what: by weight, and a wrong column, which is the cause of all else, first.
+    pub(crate) fn rank(&self) -> (Weight, bool) {
+        let cause = matches!(
+            self,
+            Self::WrongColumns { .. } | Self::OtherBallAngle { .. }
+        );
+        (self.weight(), cause)
+    }
+
     /// How much it matters.
     pub fn weight(&self) -> Weight {
         match self {
@@ -300,6 +323,7 @@ impl Verdict {
             | Self::Disturbed { .. }
             | Self::DelayAlarm { .. }
             | Self::HeldParameter { matters: true, .. }
+            | Self::PlanesDiffer { matters: true, .. }
             | Self::Unphysical(_)
             | Self::HeldBackBad { .. } => Weight::Warning,
             Self::ResidualTooLarge { part, .. } => {
@@ -311,6 +335,7 @@ impl Verdict {
             }
             Self::Coloured { .. }
             | Self::HeldParameter { .. }
+            | Self::PlanesDiffer { .. }
             | Self::BodyNotWeighed
             | Self::NoTorque
             | Self::AtBound { .. }

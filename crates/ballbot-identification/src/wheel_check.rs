@@ -44,9 +44,27 @@ impl Arrangement {
         turned_deg: 0.0,
     };
 
+    /// Whether the order of the encoders is another.
+    pub(crate) fn is_reordered(&self) -> bool {
+        self.encoders != Self::AS_SAID.encoders
+    }
+
+    /// What the wheels show of what the encoders, in the order of the configuration, do.
+    pub(crate) fn of_wheels(&self, encoders: &[f64; 3]) -> Vector3<f64> {
+        Vector3::from_fn(|wheel, _| {
+            let sense = if self.flipped[wheel] { -1.0 } else { 1.0 };
+            sense * encoders[self.encoders[wheel]]
+        })
+    }
+
+    /// All that are wired otherwise than said, on wheels that stand where they are said to.
+    pub(crate) fn of_same_azimuths() -> impl Iterator<Item = Self> {
+        Self::all().filter(|one| one.turned_deg == 0.0 && *one != Self::AS_SAID)
+    }
+
     /// How many things are otherwise than said.
-    fn changes(&self) -> usize {
-        usize::from(self.encoders != Self::AS_SAID.encoders)
+    pub(crate) fn changes(&self) -> usize {
+        usize::from(self.is_reordered())
             + self.flipped.iter().filter(|flipped| **flipped).count()
             + usize::from(self.turned_deg != 0.0)
     }
@@ -81,11 +99,7 @@ impl Arrangement {
         }
         let expected = encoders.wheels()?.motor_angles(1.0);
         let fits = seen.iter().map(|(push, angles)| {
-            let of_wheels = Vector3::from_fn(|wheel, _| {
-                let sense = if self.flipped[wheel] { -1.0 } else { 1.0 };
-                sense * angles[self.encoders[wheel]]
-            });
-            of_wheels
+            self.of_wheels(angles)
                 .normalize()
                 .dot(&expected.column(*push as usize).normalize())
         });
@@ -96,7 +110,7 @@ impl Arrangement {
 impl fmt::Display for Arrangement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut changes = Vec::new();
-        if self.encoders != Self::AS_SAID.encoders {
+        if self.is_reordered() {
             let [a, b, c] = self.encoders.map(|place| place + 1);
             changes.push(format!(
                 "the wheels 1, 2, 3 have the encoders {a}, {b}, {c}"

@@ -33,6 +33,9 @@ pub trait ShootingModel<const NX: usize, const NY: usize>: Sync {
     /// The measured outputs of a segment, one per row; NaN where a value is missing.
     fn measured(&self, segment: usize) -> &[SVector<f64, NY>];
 
+    /// Standard deviation of the noise of a segment's outputs, in the unit of each, positive.
+    fn noise(&self, segment: usize) -> SVector<f64, NY>;
+
     /// Pushes the simulated outputs of the segment's rows to `outputs`, which is empty. The first
     /// row is that of `initial`. A simulation that leaves the numbers may stop early.
     fn simulate(
@@ -62,7 +65,7 @@ pub trait ShootingModel<const NX: usize, const NY: usize>: Sync {
     }
 }
 
-/// A fit to be made: the model with its data, the unknown parameters, the noise.
+/// A fit to be made: the model with its data, and the unknown parameters.
 #[derive(Debug)]
 pub struct ShootingProblem<'a, M, const NX: usize, const NY: usize> {
     /// The model with its data.
@@ -71,8 +74,6 @@ pub struct ShootingProblem<'a, M, const NX: usize, const NY: usize> {
     pub unknowns: &'a [Unknown],
     /// What is known of them beforehand.
     pub priors: &'a [Prior],
-    /// Standard deviation of the noise of each output, in the unit of the output, positive.
-    pub noise: SVector<f64, NY>,
     /// What a state is measured in: differences are taken over a millionth of it, positive.
     pub state_scale: SVector<f64, NX>,
 }
@@ -162,14 +163,14 @@ where
     ) -> f64 {
         outputs.clear();
         self.model.simulate(segment, parameters, initial, outputs);
-        let measured = self.model.measured(segment);
+        let (measured, noise) = (self.model.measured(segment), self.model.noise(segment));
         if outputs.len() != measured.len() {
             return f64::INFINITY;
         }
         let rows = measured.iter().zip(outputs.iter());
         rows.map(|(measured, simulated)| {
             let squares = (0..NY).map(|output| {
-                let residual = (measured[output] - simulated[output]) / self.noise[output];
+                let residual = (measured[output] - simulated[output]) / noise[output];
                 if measured[output].is_nan() {
                     0.0
                 } else {

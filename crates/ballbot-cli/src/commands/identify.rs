@@ -9,8 +9,8 @@ use crate::json;
 use crate::output::FileError;
 use crate::progress::Progress;
 use crate::results::ResultFolder;
-use ballbot_identification::log::{self, Log, LogError};
-use ballbot_identification::{Config, ConfigError, Identification, identify};
+use ballbot_identification::log::{self, LogError, Recording};
+use ballbot_identification::{Config, ConfigError, IdentifiedRobot, identify};
 use ballbot_scenario::words;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ Examples:
   ballbot identify a.csv b.csv --config my-robot.toml --out results
   ballbot identify a.csv b.csv --leave-out 2:7.5,9            a push in the second log
 
-Several logs are runs of one plane of one robot. Writes parameters.toml (for `ballbot lqr
+Several logs are runs of one robot: of one plane, or of both where [log.y] names the second. Writes parameters.toml (for `ballbot lqr
 --parameters` and for scenario files), report.html and the figures as SVG and PNG, and prints their
 names. Where no robot explains the logs, it says why, writes the report without parameters.toml, and
 exits with 1.")]
@@ -66,7 +66,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, CommandError> {
     let mut config = configuration(arguments.config.as_deref())?;
     config.fit.physical &= !arguments.unphysical;
     let folder = open(&arguments.out)?;
-    let logs = read(arguments, &config)?;
+    let recordings = read(arguments, &config)?;
     let choices = config
         .choices()
         .map_err(|error| InputError::Identification {
@@ -75,38 +75,35 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, CommandError> {
         })?;
     let progress = Progress::new("fitting", EXPECTED_STEPS);
     let step = std::cell::Cell::new(0);
-    let identification = identify(logs, &config, choices, &|_| {
+    let robot = identify(recordings, &config, choices, &|_| {
         step.set(step.get() + 1);
         progress.set(step.get().min(EXPECTED_STEPS - 1));
     })?;
     drop(progress);
-    let parameters = identification.parameter_file();
-    let files = write(&folder, &identification, parameters.as_deref().ok())?;
+    let parameters = robot.parameter_files();
+    let files = write(&folder, &robot, parameters.as_deref().ok())?;
     if let Err(reasons) = parameters {
-        let reasons = reasons.iter().map(|reason| format!("\n- {reason}"));
-        let old = arguments.out.join(PARAMETERS);
+        let reasons = reasons.iter();
+        let reasons = reasons.map(|reason| format!("\n- {}", summary::told(&robot, reason)));
+        let mut old = PARAMETERS.into_iter().map(|name| arguments.out.join(name));
         return Err(CommandError::NoRobot {
             reasons: reasons.collect(),
             report: arguments.out.join(REPORT),
-            old: old.exists().then_some(old),
+            old: old.find(|path| path.exists()),
         });
     }
     Ok(if arguments.json {
-        let mut document = document::document(&identification);
+        let mut document = document::document(&robot);
         document["folder"] = serde_json::json!(folder.path());
         document["files"] = serde_json::json!(files);
         json::text(&document)
     } else {
-        said(arguments, &identification, &files)
+        said(arguments, &robot, &files)
     })
 }
 
 /// The result in words, with the names of the files.
-fn said(
-    arguments: &IdentifyArguments,
-    identification: &Identification,
-    files: &[String],
-) -> String {
+fn said(arguments: &IdentifyArguments, robot: &IdentifiedRobot, files: &[String]) -> String {
     let lengths = match arguments.config {
         Some(_) => "",
         None => {
@@ -115,20 +112,33 @@ fn said(
         }
     };
     let chain = if arguments.published {
-        format!(
-            "\nThe published chain, to compare with\n{}{}\n",
-            published::linear_parameters(identification).on_screen(),
-            published::refined(identification)
-        )
+        chains(robot)
     } else {
         String::new()
     };
     format!(
         "{lengths}{}{chain}\nwritten to {}: {}\n",
-        summary::text(identification),
+        summary::text(robot),
         arguments.out.display(),
         files.join(", ")
     )
+}
+
+/// The published chain, plane by plane.
+fn chains(robot: &IdentifiedRobot) -> String {
+    let planes = robot.planes.iter().enumerate();
+    planes
+        .map(|(place, plane)| {
+            let name = robot.plane_name(place);
+            let name = name.map(|name| format!(" (plane {name})"));
+            format!(
+                "\nThe published chain, to compare with{}\n{}{}\n",
+                name.unwrap_or_default(),
+                published::linear_parameters(plane).on_screen(),
+                published::refined(plane)
+            )
+        })
+        .collect()
 }
 
 /// A part of a log.
@@ -158,7 +168,7 @@ fn part(text: &str) -> Result<Part, String> {
     }
 }
 
-fn read(arguments: &IdentifyArguments, config: &Config) -> Result<Vec<Log>, CommandError> {
+fn read(arguments: &IdentifyArguments, config: &Config) -> Result<Vec<Recording>, CommandError> {
     let paths = &arguments.logs;
     let most = arguments.leave_out.iter().filter_map(|part| part.log).max();
     if let Some(log) = most.filter(|log| *log > paths.len()) {
@@ -173,7 +183,7 @@ fn read(arguments: &IdentifyArguments, config: &Config) -> Result<Vec<Log>, Comm
         let parts = arguments.leave_out.iter();
         let of_this = parts.filter(|part| part.log.is_none_or(|log| log == done + 1));
         columns.leave_out.extend(of_this.map(|part| part.time));
-        log::read(path, &columns, &report)
+        log::recording(path, &columns, &report)
     });
     Ok(logs.collect::<Result<_, LogError>>()?)
 }
@@ -204,7 +214,8 @@ pub fn configuration(path: Option<&Path>) -> Result<Config, InputError> {
     })
 }
 
-const PARAMETERS: &str = "parameters.toml";
+/// Of one plane or a symmetric body, and of the planes of another.
+const PARAMETERS: [&str; 3] = ["parameters.toml", "parameters_x.toml", "parameters_y.toml"];
 const REPORT: &str = "report.html";
 
 /// The files of the drawing `name`, in the folder of the results.
@@ -212,33 +223,47 @@ fn figure(name: &str) -> [String; 2] {
     ["svg", "png"].map(|kind| format!("figures/{name}.{kind}"))
 }
 
+/// The files of all drawings that there can be.
+fn figures() -> Vec<String> {
+    drawings::NAMES
+        .into_iter()
+        .flatten()
+        .flat_map(figure)
+        .collect()
+}
+
 /// The folder for the results, if all of them can be written there.
 fn open(path: &Path) -> Result<ResultFolder, FileError> {
-    let figures: Vec<String> = drawings::NAMES.into_iter().flat_map(figure).collect();
+    let figures = figures();
     let figures = figures.iter().map(String::as_str);
-    let names: Vec<&str> = [PARAMETERS, REPORT].into_iter().chain(figures).collect();
-    ResultFolder::open(path, &names)
+    let names = PARAMETERS.into_iter().chain([REPORT]).chain(figures);
+    ResultFolder::open(path, &names.collect::<Vec<_>>())
 }
 
 /// Writes what there is, parameters only of a robot, and returns the names of the files.
 fn write(
     folder: &ResultFolder,
-    identification: &Identification,
-    parameters: Option<&str>,
+    robot: &IdentifiedRobot,
+    parameters: Option<&[(String, String)]>,
 ) -> Result<Vec<String>, CommandError> {
-    let drawings = drawings::drawings(identification);
-    let report = report::html(identification, &drawings)?;
-    let parameters = parameters.map(|text| (PARAMETERS.to_owned(), text.into()));
-    let mut files: Vec<(String, Vec<u8>)> = parameters.into_iter().collect();
+    let drawings = drawings::drawings(robot);
+    let report = report::html(robot, &drawings)?;
+    let texts = parameters.unwrap_or_default().iter().cloned();
+    let texts = texts.map(|(name, text)| (name, text.into_bytes()));
+    let mut files: Vec<(String, Vec<u8>)> = texts.collect();
     files.push((REPORT.to_owned(), report.into_bytes()));
     for drawing in &drawings {
         let [svg, png] = figure(drawing.name);
         files.push((svg, drawing.figure.svg()?.into_bytes()));
         files.push((png, drawing.figure.png(PNG_SCALE)?));
     }
-    // A figure of an earlier run that this one has not; parameters are kept, and told of.
-    let figures: Vec<String> = drawings::NAMES.into_iter().flat_map(figure).collect();
-    let stale: Vec<&str> = figures.iter().map(String::as_str).collect();
+    // Figures of an earlier run that this one has not, and parameters in place of which there are
+    // others now. Where there are none, they are kept, and told of.
+    let figures = figures();
+    let mut stale: Vec<&str> = figures.iter().map(String::as_str).collect();
+    if parameters.is_some() {
+        stale.extend(PARAMETERS);
+    }
     folder.write(&files, &stale)?;
     Ok(files.into_iter().map(|(name, _)| name).collect())
 }

@@ -1,7 +1,7 @@
 //! The figures of an identification.
 
 use crate::html::Drawing;
-use ballbot_identification::{HORIZONS, Identification, OUTPUTS, SegmentResidual};
+use ballbot_identification::{HORIZONS, Identification, IdentifiedRobot, OUTPUTS, SegmentResidual};
 use lpvmpc_design::{Correlation, NORMAL_95};
 use lpvmpc_figures::{Dash, Figure, Panel, Role, Scale, Series, Style};
 
@@ -11,18 +11,42 @@ const SHOWN: f64 = 10.0;
 const LABELS: [&str; 3] = ["φ [rad]", "θ [rad]", "θ\u{307} [rad/s]"];
 const UNITS: [&str; 3] = ["rad", "rad", "rad/s"];
 
-/// The names of all figures; the last is only of data that were held back.
-pub const NAMES: [&str; 4] = ["fit", "residuals", "correlations", "predictions"];
+/// The names of all figures: of the only plane, of the plane x, of the plane y. The last of each is
+/// only of data that were held back.
+pub const NAMES: [[&str; 4]; 3] = [
+    ["fit", "residuals", "correlations", "predictions"],
+    ["fit_x", "residuals_x", "correlations_x", "predictions_x"],
+    ["fit_y", "residuals_y", "correlations_y", "predictions_y"],
+];
 
-/// All figures.
-pub fn drawings(identification: &Identification) -> Vec<Drawing> {
-    let mut drawings = vec![
-        fit(identification),
-        residuals(identification),
-        correlations(identification),
+/// All figures of all planes.
+pub fn drawings(robot: &IdentifiedRobot) -> Vec<Drawing> {
+    let planes = robot.planes.iter().enumerate();
+    planes
+        .flat_map(|(place, plane)| match robot.plane_name(place) {
+            None => of_plane(plane, NAMES[0], ""),
+            Some(name) => of_plane(plane, NAMES[1 + place], &format!(", plane {name}")),
+        })
+        .collect()
+}
+
+/// The figures of a plane, `title` being what follows the title of each.
+fn of_plane(plane: &Identification, names: [&'static str; 4], title: &str) -> Vec<Drawing> {
+    let drawings = [
+        Some(fit(plane)),
+        Some(residuals(plane)),
+        Some(correlations(plane)),
+        predictions(plane),
     ];
-    drawings.extend(predictions(identification));
-    drawings
+    let named = drawings
+        .into_iter()
+        .zip(names)
+        .filter_map(|(drawing, name)| {
+            let mut drawing = Drawing { name, ..drawing? };
+            drawing.figure.title += title;
+            Some(drawing)
+        });
+    named.collect()
 }
 
 /// The first segments of the log, up to [`SHOWN`] seconds.
@@ -96,7 +120,7 @@ fn fit(identification: &Identification) -> Drawing {
     );
     panels.push(Panel::new("t [s]", "τ [N m]", vec![torque]));
     Drawing {
-        name: "fit",
+        name: NAMES[0][0],
         caption: format!(
             "Measured outputs and those of the fitted robot, simulated segment by segment, over the \
              first {SHOWN} s of the log. Below, the logged torque."
@@ -133,7 +157,7 @@ fn residuals(identification: &Identification) -> Drawing {
         Panel::new("t [s]", &label, all)
     });
     Drawing {
-        name: "residuals",
+        name: NAMES[0][1],
         caption: "Residuals, measured minus simulated, beside what the noise of the sensors alone \
                   would leave. They should look like noise."
             .to_owned(),
@@ -151,7 +175,7 @@ fn correlations(identification: &Identification) -> Drawing {
         ));
     }
     Drawing {
-        name: "correlations",
+        name: NAMES[0][2],
         caption: "Left: correlation of each residual with itself some rows before; right: with the \
                   torque. Between the lines lie 95 % of the values if there is none (for the torque, \
                   which is not white, somewhat less). At lag 0 and to its left the torque answers to the \
@@ -207,7 +231,7 @@ fn predictions(identification: &Identification) -> Option<Drawing> {
     let mut panel = Panel::new("horizon [s]", "tilt, error (rms) [rad]", series);
     panel.y_scale = Scale::Log;
     finite.then(|| Drawing {
-        name: "predictions",
+        name: NAMES[0][3],
         caption: "Errors of predictions on data that were held back, for each structure of friction. \
                   Over a long horizon an error of the state grows with the unstable mode, whatever the \
                   structure: the shorter horizons and \u{3c7}\u{b2} tell structures apart."

@@ -1,20 +1,20 @@
 //! The report of an identification: one self-contained HTML file.
 
 use super::published;
-use super::summary::mark;
+use super::summary::{mark, told};
 use super::tables::{self, Sheet};
 use crate::html::{self, Drawing, escape};
-use ballbot_identification::{Identification, Weight};
+use ballbot_identification::{IdentifiedRobot, Weight};
 use lpvmpc_figures::FigureError;
 
 /// The report's text.
 ///
 /// # Errors
 /// A figure cannot be drawn.
-pub fn html(identification: &Identification, drawings: &[Drawing]) -> Result<String, FigureError> {
-    let (fitted, held_back) = identification.times;
-    let logs: String = identification
-        .findings
+pub fn html(robot: &IdentifiedRobot, drawings: &[Drawing]) -> Result<String, FigureError> {
+    let (fitted, held_back) = robot.first().times;
+    let logs: String = robot
+        .findings()
         .iter()
         .map(|(name, findings)| {
             let findings = findings.iter().map(|finding| escape(&finding.to_string()));
@@ -33,35 +33,52 @@ pub fn html(identification: &Identification, drawings: &[Drawing]) -> Result<Str
          <h2>Poles at the upright position</h2>\n<p>With the half-widths of their 95 % \
          intervals.</p>\n{}\n<h2>Residuals</h2>\n{}\n\
          <h2>Structures of friction</h2>\n{}\n<h2>Correlations of the parameters</h2>\n{}\n\
-         <h2>The published chain, to compare with</h2>\n{}\n<pre>{}</pre>\n",
-        mechanics(identification),
-        identification.estimate.fit.values,
-        verdicts(identification),
-        table(&tables::parameters(identification)),
-        intervals(identification),
+         <h2>The published chain, to compare with</h2>\n{}",
+        mechanics(robot),
+        robot.estimate().fit.values,
+        verdicts(robot),
+        table(&tables::parameters(robot)),
+        intervals(robot),
         html::figures(drawings)?,
-        table(&tables::poles(identification)),
-        table(&tables::residuals(identification)),
-        table(&tables::structures(identification)),
-        table(&tables::correlations(identification)),
-        table(&published::linear_parameters(identification)),
-        escape(&published::refined(identification)),
+        table(&tables::poles(robot)),
+        table(&tables::residuals(robot)),
+        table(&tables::structures(robot)),
+        table(&tables::correlations(robot)),
+        chains(robot),
     );
     Ok(html::page("A ballbot, identified", &body))
 }
 
-fn mechanics(identification: &Identification) -> &'static str {
-    if identification.physical {
+/// The published chain, plane by plane.
+fn chains(robot: &IdentifiedRobot) -> String {
+    let planes = robot.planes.iter().enumerate();
+    planes
+        .map(|(place, plane)| {
+            let title = robot
+                .plane_name(place)
+                .map(|name| format!("<h3>Plane {name}</h3>\n"));
+            format!(
+                "{}{}\n<pre>{}</pre>\n",
+                title.unwrap_or_default(),
+                table(&published::linear_parameters(plane)),
+                escape(&published::refined(plane))
+            )
+        })
+        .collect()
+}
+
+fn mechanics(robot: &IdentifiedRobot) -> &'static str {
+    if robot.first().physical {
         "A positive mass matrix and dissipating friction were imposed."
     } else {
         "Mechanics was not imposed."
     }
 }
 
-fn intervals(identification: &Identification) -> &'static str {
-    if identification.is_white() {
+fn intervals(robot: &IdentifiedRobot) -> &'static str {
+    if robot.is_white() {
         "The intervals are those of white residuals."
-    } else if identification.has_few_segments() {
+    } else if robot.first().has_few_segments() {
         "The residuals are not white: in the intervals they count as the fewer white ones that they \
          are worth."
     } else {
@@ -70,18 +87,19 @@ fn intervals(identification: &Identification) -> &'static str {
     }
 }
 
-fn verdicts(identification: &Identification) -> String {
-    let items = identification.verdicts();
+fn verdicts(robot: &IdentifiedRobot) -> String {
+    let items = robot.verdicts();
     let items = items.iter().map(|verdict| {
-        let class = match verdict.weight() {
+        let weight = verdict.1.weight();
+        let class = match weight {
             Weight::Good => "agrees",
             Weight::Note => "",
             Weight::Warning | Weight::Refusal => "differs",
         };
         format!(
             "<li><span class=\"{class}\">{}</span> {}</li>\n",
-            mark(verdict.weight()),
-            typeset(&verdict.to_string()).replace('\n', "<br>")
+            mark(weight),
+            typeset(&told(robot, verdict)).replace('\n', "<br>")
         )
     });
     format!("<ul>\n{}</ul>", items.collect::<String>())

@@ -1,38 +1,36 @@
 //! An identification in words, for the screen.
 
 use super::tables;
-use ballbot_identification::{Identification, Weight};
+use ballbot_identification::{IdentifiedRobot, OfPlane, Weight};
 use std::fmt::Write as _;
 
 /// Findings, parameters, poles, verdicts.
-pub fn text(identification: &Identification) -> String {
+pub fn text(robot: &IdentifiedRobot) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
-    for (name, findings) in &identification.findings {
+    for (name, findings) in robot.findings() {
         for finding in findings {
             let _ = writeln!(text, "{name}: {finding}");
         }
     }
-    let (fitted, held_back) = identification.times;
+    let (fitted, held_back) = robot.first().times;
+    let fit = &robot.estimate().fit;
     let _ = writeln!(
         text,
         "{} segments, {} values, {fitted:.1} s fitted, {held_back:.1} s held back, {} steps{}\n",
-        identification.simulated.len(),
-        identification.estimate.fit.values,
-        identification.estimate.fit.history.len() - 1,
-        if identification.physical {
+        fit.initial.len(),
+        fit.values,
+        fit.history.len() - 1,
+        if robot.first().physical {
             ""
         } else {
             "; mechanics was not imposed"
         }
     );
     for (title, sheet) in [
-        ("", tables::parameters(identification)),
-        ("Poles, upright", tables::poles(identification)),
-        (
-            "Friction, on the data held back",
-            tables::structures(identification),
-        ),
+        ("", tables::parameters(robot)),
+        ("Poles, upright", tables::poles(robot)),
+        ("Friction, on the data held back", tables::structures(robot)),
     ] {
         if !sheet.rows.is_empty() {
             if !title.is_empty() {
@@ -41,10 +39,23 @@ pub fn text(identification: &Identification) -> String {
             let _ = writeln!(text, "{}", sheet.on_screen());
         }
     }
-    for verdict in identification.verdicts() {
-        let _ = writeln!(text, "{} {verdict}", mark(verdict.weight()));
+    for verdict in robot.verdicts() {
+        let _ = writeln!(
+            text,
+            "{} {}",
+            mark(verdict.1.weight()),
+            told(robot, &verdict)
+        );
     }
     text
+}
+
+/// A verdict, with the plane that it is of.
+pub fn told(robot: &IdentifiedRobot, (plane, verdict): &OfPlane) -> String {
+    match plane.and_then(|plane| robot.plane_name(plane)) {
+        Some(name) => format!("plane {name}: {verdict}"),
+        None => verdict.to_string(),
+    }
 }
 
 /// How a verdict is introduced.

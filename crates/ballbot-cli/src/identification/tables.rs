@@ -1,7 +1,7 @@
 //! The tables of an identification, for the screen and for the report.
 
 use crate::table::Table;
-use ballbot_identification::{HORIZONS, Identification, OUTPUTS, Parameter, Status};
+use ballbot_identification::{HORIZONS, IdentifiedRobot, OUTPUTS, Parameter, Status};
 use lpvmpc_design::NORMAL_95;
 
 /// A table of texts.
@@ -62,8 +62,16 @@ pub(super) fn decimal(value: f64, decimals: usize) -> String {
     }
 }
 
-/// The parameters with standard deviations and 95 % intervals.
-pub fn parameters(identification: &Identification) -> Sheet {
+/// Text with the plane that it is about, where there are two.
+fn in_plane(robot: &IdentifiedRobot, text: &str, plane: usize) -> String {
+    match robot.plane_name(plane) {
+        Some(name) => format!("{text}, plane {name}"),
+        None => text.to_owned(),
+    }
+}
+
+/// The parameters with standard deviations and 95 % intervals: what the planes share once.
+pub fn parameters(robot: &IdentifiedRobot) -> Sheet {
     let mut sheet = Sheet::new(&[
         "parameter",
         "value",
@@ -72,7 +80,8 @@ pub fn parameters(identification: &Identification) -> Sheet {
         "unit",
         "",
     ]);
-    for parameter in Parameter::ALL {
+    for (plane, parameter) in robot.variables.all() {
+        let identification = &robot.planes[plane];
         let value = identification.estimate.values[parameter];
         let deviation = identification.standard_deviation(parameter);
         let status = identification.estimate.status[parameter];
@@ -90,7 +99,10 @@ pub fn parameters(identification: &Identification) -> Sheet {
             Status::Held | Status::AtBound => (String::new(), String::new()),
         };
         sheet.rows.push(vec![
-            parameter.key().to_owned(),
+            match robot.variables.is_own(parameter) {
+                true => in_plane(robot, parameter.key(), plane),
+                false => parameter.key().to_owned(),
+            },
             rounded(value, deviation),
             deviation_text,
             interval,
@@ -106,9 +118,18 @@ pub fn parameters(identification: &Identification) -> Sheet {
     sheet
 }
 
-/// The poles with the half-widths of their 95 % intervals.
-pub fn poles(identification: &Identification) -> Sheet {
+/// The poles with the half-widths of their 95 % intervals: those of planes that move alike once.
+pub fn poles(robot: &IdentifiedRobot) -> Sheet {
     let mut sheet = Sheet::new(&["real part [1/s]", "imaginary part [1/s]"]);
+    let apart = robot.variables.is_own(Parameter::B3);
+    let planes = if apart {
+        &robot.planes[..]
+    } else {
+        &robot.planes[..1]
+    };
+    if apart {
+        sheet.headers.push("plane".to_owned());
+    }
     // The integrator of the ball's angle is at zero whatever the parameters are.
     let part = |value: f64, deviation: f64| match rounded(value, deviation) {
         text if deviation > 0.0 => {
@@ -116,36 +137,46 @@ pub fn poles(identification: &Identification) -> Sheet {
         }
         text => text,
     };
-    for pole in &identification.poles {
-        let (re, im) = pole.standard_deviation;
-        sheet
-            .rows
-            .push(vec![part(pole.value.re, re), part(pole.value.im, im)]);
+    for (place, plane) in planes.iter().enumerate() {
+        for pole in &plane.poles {
+            let (re, im) = pole.standard_deviation;
+            let mut row = vec![part(pole.value.re, re), part(pole.value.im, im)];
+            if let (true, Some(name)) = (apart, robot.plane_name(place)) {
+                row.push(name.to_owned());
+            }
+            sheet.rows.push(row);
+        }
     }
     sheet
 }
 
 /// Correlations of the parameters that were found.
-pub fn correlations(identification: &Identification) -> Sheet {
-    let found: Vec<Parameter> = Parameter::ALL
-        .into_iter()
-        .filter(|parameter| identification.estimate.status[*parameter] == Status::Found)
+pub fn correlations(robot: &IdentifiedRobot) -> Sheet {
+    let found: Vec<(usize, Parameter)> = robot
+        .variables
+        .all()
+        .filter(|(plane, parameter)| {
+            robot.planes[*plane].estimate.status[*parameter] == Status::Found
+        })
         .collect();
-    let keys = found.iter().map(|parameter| parameter.key());
-    let headers: Vec<&str> = std::iter::once("").chain(keys).collect();
-    let mut sheet = Sheet::new(&headers);
-    for row in &found {
+    let keys: Vec<String> = found
+        .iter()
+        .map(|(plane, one)| robot.key(*plane, *one))
+        .collect();
+    let mut sheet = Sheet::new(&[""]);
+    sheet.headers.extend(keys.iter().cloned());
+    for (row, key) in found.iter().zip(&keys) {
         let entries = found
             .iter()
-            .map(|column| decimal(identification.correlation(*row, *column), 2));
-        let row = std::iter::once(row.key().to_owned()).chain(entries);
+            .map(|column| decimal(robot.correlation(*row, *column), 2));
+        let row = std::iter::once(key.clone()).chain(entries);
         sheet.rows.push(row.collect());
     }
     sheet
 }
 
 /// The residuals against the noise of the sensors.
-pub fn residuals(identification: &Identification) -> Sheet {
+pub fn residuals(robot: &IdentifiedRobot) -> Sheet {
     let mut sheet = Sheet::new(&[
         "output",
         "residual (rms)",
@@ -155,10 +186,15 @@ pub fn residuals(identification: &Identification) -> Sheet {
         "largest, at lag",
         "white",
     ]);
-    for (output, residual) in OUTPUTS.iter().zip(&identification.residuals) {
+    let planes = robot.planes.iter().enumerate();
+    let all = planes.flat_map(|(plane, identification)| {
+        let outputs = OUTPUTS.iter().zip(&identification.residuals);
+        outputs.map(move |(output, residual)| (in_plane(robot, output, plane), residual))
+    });
+    for (output, residual) in all {
         let (lag, largest) = residual.autocorrelation.largest();
         sheet.rows.push(vec![
-            (*output).to_owned(),
+            output,
             format!("{:.3e}", residual.spread),
             format!("{:.3e}", residual.floor),
             decimal(residual.normalised(), 2),
@@ -171,16 +207,18 @@ pub fn residuals(identification: &Identification) -> Sheet {
 }
 
 /// Structures of friction on held-back data.
-pub fn structures(identification: &Identification) -> Sheet {
+pub fn structures(robot: &IdentifiedRobot) -> Sheet {
     let mut headers = vec![
         "friction".to_owned(),
         "chi^2, fitted".to_owned(),
         "chi^2, held back".to_owned(),
     ];
     headers.extend(HORIZONS.map(|horizon| format!("tilt error over {horizon} s [mrad]")));
-    let rows = identification.structures.iter().map(|compared| {
+    let planes = robot.planes.iter().enumerate();
+    let all = planes.flat_map(|(plane, one)| one.structures.iter().map(move |one| (plane, one)));
+    let rows = all.map(|(plane, compared)| {
         let mut row = vec![
-            compared.structure.words().to_owned(),
+            in_plane(robot, compared.structure.words(), plane),
             decimal(compared.fitted_chi_square, 3),
             decimal(compared.validation.chi_square, 3),
         ];

@@ -6,6 +6,7 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
+mod both_planes;
 mod campaign;
 mod failures;
 mod interrupt;

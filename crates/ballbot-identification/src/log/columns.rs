@@ -34,6 +34,8 @@ pub struct Columns {
     /// Torque of the virtual wheel. Without a column name it is `torque_applied_nm` if the file has
     /// that, otherwise `torque_commanded_nm`.
     pub torque: Channel,
+    /// The second plane, where both are identified together: then all of the above is of the first, x.
+    pub y: Option<SecondPlane>,
     /// What the ball angle in `phi` is relative to; that of `wheels` is relative to the body.
     pub ball_angle: BallAngle,
     /// Go on although the units look wrong.
@@ -53,6 +55,24 @@ pub struct Channel {
     /// ampere, or -1 for the other sign.
     #[serde(default = "one")]
     pub factor: f64,
+}
+
+/// The columns of the plane y in a file that holds both planes; time and wheels are those of the plane
+/// x.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SecondPlane {
+    /// Ball angle, where it is not that of `wheels`.
+    #[serde(default)]
+    pub phi: Option<Channel>,
+    /// Tilt.
+    pub theta: Channel,
+    /// Tilt rate; without it there is no gyroscope about this axis.
+    #[serde(default)]
+    pub theta_dot: Option<Channel>,
+    /// Torque of the virtual wheel, where it is not that of the motors in `wheels`.
+    #[serde(default)]
+    pub torque: Option<Channel>,
 }
 
 fn azimuths_of_paper() -> [f64; 3] {
@@ -97,15 +117,72 @@ pub enum WheelPlane {
     X,
     /// The one that moves it along y.
     Y,
+    /// Both, identified together; the tilt of the plane y is in [`SecondPlane`].
+    Both,
+    /// The turn about the vertical, which is no plane and has no robot to be found in it.
+    #[serde(skip)]
+    Turn,
+}
+
+impl WheelPlane {
+    /// The column of the wheels' matrix that is read. Of both planes a [`super::read`] is of the
+    /// first.
+    fn column(self) -> usize {
+        match self {
+            Self::X | Self::Both => 0,
+            Self::Y => 1,
+            Self::Turn => 2,
+        }
+    }
 }
 
 impl Columns {
+    /// The columns of each plane that is identified.
+    pub fn planes(&self) -> Vec<Self> {
+        let Some(second) = &self.y else {
+            return vec![self.clone()];
+        };
+        let mut planes = [self.of_wheels(WheelPlane::X), self.of_wheels(WheelPlane::Y)];
+        let [_, y] = &mut planes;
+        y.theta = second.theta.clone();
+        y.theta_dot = match &second.theta_dot {
+            Some(rate) => rate.clone(),
+            None => Channel::new("", Unit::RadianPerSecond),
+        };
+        y.phi = second.phi.clone().unwrap_or(self.phi.clone());
+        y.torque = second.torque.clone().unwrap_or(self.torque.clone());
+        planes.into()
+    }
+
+    /// The columns of the turn about the vertical, as if it were a plane: where all wheels are read,
+    /// what they do is known with it.
+    pub(super) fn turn(&self) -> Option<Self> {
+        let all = self.y.is_some() && self.wheels.is_some();
+        all.then(|| self.of_wheels(WheelPlane::Turn))
+    }
+
+    /// The first plane's columns, but for the wheels, which are read for another.
+    fn of_wheels(&self, plane: WheelPlane) -> Self {
+        let wheels = self.wheels.clone();
+        Self {
+            wheels: wheels.map(|wheels| WheelEncoders { plane, ..wheels }),
+            y: None,
+            ..self.clone()
+        }
+    }
+
     /// What the ball angle that is read is relative to.
     pub fn ball_angle_read(&self) -> BallAngle {
         match self.wheels {
             Some(_) => BallAngle::RelativeToBody,
             None => self.ball_angle,
         }
+    }
+
+    /// Whether the torque is put together from those of three motors.
+    pub fn has_motors(&self) -> bool {
+        let wheels = self.wheels.as_ref();
+        wheels.is_some_and(|wheels| wheels.torques.is_some())
     }
 
     /// Whether the torque is in N m. Where it is a voltage or a duty cycle of unknown torque, the torque
@@ -162,25 +239,16 @@ impl WheelEncoders {
 
     /// What each encoder contributes to the ball angle.
     pub(super) fn weights(&self) -> Result<[f64; 3], Problem> {
-        let wheels = self.wheels()?;
-        let plane = match self.plane {
-            WheelPlane::X => 0,
-            WheelPlane::Y => 1,
-        };
-        let matrix = wheels.matrix();
-        Ok([0, 1, 2].map(|wheel| matrix[(wheel, plane)]))
+        let matrix = self.wheels()?.matrix();
+        Ok([0, 1, 2].map(|wheel| matrix[(wheel, self.plane.column())]))
     }
 
     /// What each wheel's torque contributes to that of the virtual wheel.
     pub(super) fn torque_weights(&self) -> Result<[f64; 3], Problem> {
         let wheels = self.wheels()?;
-        let plane = match self.plane {
-            WheelPlane::X => 0,
-            WheelPlane::Y => 1,
-        };
         Ok([0, 1, 2].map(|wheel| {
             let alone = Vector3::ith(wheel, 1.0);
-            wheels.virtual_torques(&alone)[plane]
+            wheels.virtual_torques(&alone)[self.plane.column()]
         }))
     }
 }
@@ -399,6 +467,7 @@ impl Default for Columns {
             theta_dot: Channel::new("theta_dot_rad_s", Unit::RadianPerSecond),
             torque: Channel::new("", Unit::NewtonMetre),
             wheels: None,
+            y: None,
             ball_angle: BallAngle::Inertial,
             accept_suspicious_units: false,
         }

@@ -107,6 +107,8 @@ pub(super) fn run(
         return Err(Problem::NoStretch {
             needed: SHORTEST_STRETCH,
             longest,
+            rows,
+            left_out: out.len(),
             jumps: jumps.max_by_key(|(_, count)| *count),
         });
     }

@@ -263,7 +263,12 @@ pub enum Problem {
     /// Nothing is left between gaps and jumps.
     #[error(
         "there is no stretch of {needed} s without gap, jump or missing torque; the longest is \
-         {longest:.3} s{}",
+         {longest:.3} s{}{}",
+        match left_out {
+            0 => String::new(),
+            count => format!(". {count} of the {rows} rows are left out because the configuration or \
+                              --leave-out says so"),
+        },
         jumps.as_ref().map_or(String::new(), |(column, count)| format!(
             ". `{column}` jumps {count} times: is its unit wrong (degrees taken for radians), or does \
              its sensor fail?"
@@ -273,6 +278,10 @@ pub enum Problem {
         needed: f64,
         /// Longest, s.
         longest: f64,
+        /// Rows.
+        rows: usize,
+        /// Those of them that were not to be read.
+        left_out: usize,
         /// The column that jumps most, and how often.
         jumps: Option<(String, usize)>,
     },

@@ -5,7 +5,7 @@ use crate::estimate::Status;
 use crate::identification::Identification;
 use crate::log::quantile;
 use crate::parameter::{Choice, Parameter};
-use crate::residuals::{OUTPUTS, SegmentResidual};
+use crate::residuals::{Difference, OUTPUTS, SegmentResidual};
 use crate::structures::{Structure, best};
 use crate::suspects::Suspect;
 use lpvmpc_design::ShootingTermination;
@@ -74,14 +74,7 @@ impl Identification {
         if verdicts.iter().any(|one| one.weight() == Weight::Refusal) {
             verdicts.retain(|one| one.weight() != Weight::Good);
         }
-        // A wrong column is the cause of all else.
-        verdicts.sort_by_key(|verdict| {
-            let cause = matches!(
-                verdict,
-                Verdict::WrongColumns { .. } | Verdict::OtherBallAngle { .. }
-            );
-            std::cmp::Reverse((verdict.weight(), cause))
-        });
+        verdicts.sort_by_key(|verdict| std::cmp::Reverse(verdict.rank()));
         verdicts
     }
 
@@ -103,13 +96,6 @@ impl Identification {
                 b1: other.values[Parameter::B1],
             })
         }
-    }
-
-    /// Why this is no result; empty if it is one.
-    pub fn refusals(&self) -> Vec<Verdict> {
-        let mut verdicts = self.verdicts();
-        verdicts.retain(|one| one.weight() == Weight::Refusal);
-        verdicts
     }
 
     /// Whether it is only the bounds of mechanics that make the inertias those of a rigid body.
@@ -207,6 +193,24 @@ impl Identification {
         }
     }
 
+    /// What is said of a parameter that the planes share and would rather not.
+    pub(crate) fn planes_differ(&self, difference: &Difference) -> Verdict {
+        let Difference {
+            parameter,
+            value,
+            change,
+            ..
+        } = *difference;
+        let relative = (change / value).abs();
+        Verdict::PlanesDiffer {
+            parameter,
+            value,
+            change,
+            significance: difference.significance(),
+            matters: self.matters(parameter, change) && exceeds(relative, WANTED),
+        }
+    }
+
     /// Whether a controller would notice that change of a parameter that was held.
     fn matters(&self, parameter: Parameter, change: f64) -> bool {
         let weight = self.geometry.gravity * self.geometry.centre_of_mass;
@@ -298,7 +302,7 @@ impl Identification {
 
     /// Whether the fit ended where no robot of these lengths is.
     fn is_at_limit(&self, parameter: Parameter) -> bool {
-        let coordinate = self.estimate.fit.parameters[parameter.index()];
+        let coordinate = self.estimate.coordinates[parameter.index()];
         self.coordinates.is_at_limit(parameter, coordinate)
     }
 

@@ -2,7 +2,7 @@
 
 use crate::laboratory::{Laboratory, healthy};
 use ballbot_identification::log::BallAngle;
-use ballbot_identification::{Choice, Estimate, Parameter, Split, Task, Values, noise};
+use ballbot_identification::{Choice, Estimate, Parameter, Split, Tables, Task, Values, noise};
 use rayon::prelude::*;
 
 /// What the robot of a laboratory is.
@@ -36,6 +36,7 @@ fn estimate_with(laboratory: &Laboratory, seed: u64, choices: Values<Choice>) ->
         segment: 1.0,
         torque_known: true,
         noise: [None; 3],
+        tables: Tables::default(),
     };
     let split = Split::new(&runs, 0.0);
     let floor = noise::floor(&runs);
@@ -134,6 +135,7 @@ fn an_encoder_on_the_body_is_understood() {
         segment: 1.0,
         torque_known: true,
         noise: [None; 3],
+        tables: Tables::default(),
     };
     let floor = noise::floor(&runs);
     let split = Split::new(&runs, 0.0);

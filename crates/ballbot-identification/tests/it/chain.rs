@@ -13,9 +13,10 @@ fn identified_from(text: &str, config: &str) -> Identification {
     let path = folder.path().join("log.csv");
     std::fs::write(&path, text).unwrap();
     let config = Config::parse(config).unwrap();
-    let log = log::read(&path, &config.log, &|_| ()).unwrap();
+    let recording = log::recording(&path, &config.log, &|_| ()).unwrap();
     let choices = config.choices().unwrap();
-    identify(vec![log], &config, choices, &|_| {}).unwrap()
+    let robot = identify(vec![recording], &config, choices, &|_| {}).unwrap();
+    robot.first().clone()
 }
 
 /// A delay, an offset, a bias: a real robot.
@@ -280,15 +281,16 @@ fn several_runs_are_one_fit_and_a_drawing_is_a_prior() {
             ..real()
         };
         std::fs::write(&path, csv(&laboratory.record(seed))).unwrap();
-        log::read(&path, &config.log, &|_| ()).unwrap()
+        log::recording(&path, &config.log, &|_| ()).unwrap()
     });
     let choices = config.choices().unwrap();
-    let found = identify(logs.to_vec(), &config, choices, &|_| {}).unwrap();
+    let robot = identify(logs.to_vec(), &config, choices, &|_| {}).unwrap();
+    let found = robot.first();
     let runs = found.simulated.iter().map(|segment| segment.run);
     assert_eq!(runs.collect::<std::collections::BTreeSet<_>>().len(), 2);
     let error = percent(found.estimate.values[Parameter::B1], real().plant.b1);
     assert!(error < 5.0, "{error} %");
-    assert!(warnings(&found).is_empty(), "{:?}", warnings(&found));
+    assert!(warnings(found).is_empty(), "{:?}", warnings(found));
 }
 
 /// The log with three encoders of the wheels, in a unit each, in place of the ball angle.

@@ -4,8 +4,8 @@
 use crate::laboratory::{Laboratory, Record, csv, healthy};
 use ballbot_identification::log::BallAngle;
 use ballbot_identification::{
-    Choice, Config, EstimateError, Identification, Parameter, Suspect, Suspects, Verdict, Weight,
-    identify, log,
+    Choice, Config, EstimateError, IdentifiedRobot, Parameter, Suspect, Suspects, Tables, Verdict,
+    Weight, identify, log,
 };
 use std::f64::consts::{PI, TAU};
 
@@ -27,15 +27,15 @@ fn laboratory() -> Laboratory {
 }
 
 /// What becomes of the log after a change.
-fn outcome(config: &str, change: impl Fn(&mut Record)) -> Result<Identification, String> {
+fn outcome(config: &str, change: impl Fn(&mut Record)) -> Result<IdentifiedRobot, String> {
     let mut record = record();
     change(&mut record);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");
     std::fs::write(&path, csv(&record)).unwrap();
     let config = Config::parse(config).unwrap();
-    let log = log::read(&path, &config.log, &|_| ()).map_err(|error| error.to_string())?;
-    let found = identify(vec![log], &config, config.choices().unwrap(), &|_| {});
+    let read = log::recording(&path, &config.log, &|_| ()).map_err(|error| error.to_string())?;
+    let found = identify(vec![read], &config, config.choices().unwrap(), &|_| {});
     found.map_err(|error| error.to_string())
 }
 
@@ -44,16 +44,20 @@ fn refused(config: &str, words: &str, change: impl Fn(&mut Record)) {
     let said = match outcome(config, change) {
         Err(message) => message,
         Ok(found) => {
-            let reasons = found.parameter_file().unwrap_err();
+            let reasons = found.parameter_files().unwrap_err();
             let good = found
+                .first()
                 .verdicts()
                 .iter()
                 .any(|verdict| verdict.weight() == Weight::Good);
-            assert!(!good, "{:?}", found.verdicts());
-            let all = found.verdicts();
+            assert!(!good, "{:?}", found.first().verdicts());
+            let all = found.first().verdicts();
             let all: String = all.iter().map(|one| format!("{one}\n")).collect();
             assert_short(&all);
-            reasons.iter().map(|reason| format!("{reason}\n")).collect()
+            reasons
+                .iter()
+                .map(|(_, reason)| format!("{reason}\n"))
+                .collect()
         }
     };
     assert!(said.contains(words), "`{words}` is not in: {said}");
@@ -90,9 +94,9 @@ const MASS: &str = "[parameters]\ntorque_gain_1_kg = { fixed = 0.1 }";
 fn the_log_as_it_is_has_parameters() {
     for config in ["", MASS] {
         let found = outcome(config, |_| ()).unwrap();
-        found.parameter_file().unwrap();
+        found.parameter_files().unwrap();
         assert_eq!(found.suspects, None);
-        let b1 = found.estimate.values[Parameter::B1] / laboratory().plant.b1;
+        let b1 = found.estimate().values[Parameter::B1] / laboratory().plant.b1;
         assert!((b1 - 1.0).abs() < 0.05, "{b1}");
     }
 }
@@ -124,7 +128,7 @@ fn everything_with_the_other_sign_is_the_same_robot_seen_from_behind() {
         torque_scaled(-1.0)(record);
         (0..3).for_each(|output| scaled(output, -1.0)(record));
     });
-    found.unwrap().parameter_file().unwrap();
+    found.unwrap().parameter_files().unwrap();
 }
 
 #[test]
@@ -194,13 +198,13 @@ fn a_ball_angle_relative_to_something_else() {
     refused("", "the ball angle is relative to the body", relative);
     let right = "[log]\nball_angle = \"relative_to_body\"";
     let found = outcome(right, relative).unwrap();
-    found.parameter_file().unwrap();
-    let other = found.other_reading.unwrap();
+    found.parameter_files().unwrap();
+    let other = found.first().other_reading.unwrap();
     assert!(other.is_worse(), "{other:?}");
     // The other way round.
     refused(right, "the ball angle is relative to the floor", |_| ());
     // A body that was weighed is not asked about.
-    assert_eq!(outcome(MASS, |_| ()).unwrap().other_reading, None);
+    assert_eq!(outcome(MASS, |_| ()).unwrap().first().other_reading, None);
 }
 
 #[test]
@@ -260,10 +264,15 @@ const NO_GYROSCOPE: &str = "[log.theta_dot]\ncolumn = \"\"\nunit = \"rad/s\"";
 #[test]
 fn without_a_gyroscope_its_bias_is_held() {
     let found = outcome(NO_GYROSCOPE, |_| ()).unwrap();
-    assert_eq!(found.choices[Parameter::GyroBias], Choice::Fixed(0.0));
-    let file = found.parameter_file().unwrap();
+    assert_eq!(
+        found.first().choices[Parameter::GyroBias],
+        Choice::Fixed(0.0)
+    );
+    let [(_, file)] = &found.parameter_files().unwrap()[..] else {
+        panic!("one plane, one file")
+    };
     assert!(!file.contains("NaN") && !file.contains("inf"), "{file}");
-    let b3 = found.estimate.values[Parameter::B3] / laboratory().plant.b3;
+    let b3 = found.estimate().values[Parameter::B3] / laboratory().plant.b3;
     assert!((b3 - 1.0).abs() < 0.05, "{b3}");
 }
 
@@ -294,13 +303,16 @@ fn a_builder_may_insist() {
         Err(message) => return assert!(message.contains("the other sign"), "{message}"),
     };
     let accepted = Verdict::WrongColumns {
-        suspects: Suspects(vec![Suspect::TorqueSign]),
+        suspects: Suspects {
+            mistakes: vec![Suspect::TorqueSign],
+            tables: Tables::default(),
+        },
         accepted: true,
     };
     assert_eq!(accepted.weight(), Weight::Warning);
-    assert!(found.verdicts().contains(&accepted));
+    assert!(found.first().verdicts().contains(&accepted));
     // What the fit says for itself stands.
-    assert!(found.parameter_file().is_err());
+    assert!(found.parameter_files().is_err());
 }
 
 #[test]
@@ -315,7 +327,10 @@ fn a_body_that_was_never_upright_is_refused() {
 #[test]
 fn an_error_of_the_fit_names_the_columns() {
     let error = EstimateError::Suspect {
-        suspects: Suspects(vec![Suspect::BallSign]),
+        suspects: Suspects {
+            mistakes: vec![Suspect::BallSign],
+            tables: Tables::default(),
+        },
         error: Box::new(EstimateError::NoSegments {
             segment: 1.0,
             lead: 0.1,
@@ -349,24 +364,24 @@ fn a_duty_cycle_with_back_emf_is_a_torque_and_a_friction() {
         let config =
             format!("[log.torque]\ncolumn = \"torque_applied_nm\"\nunit = \"1\"\n{factor}");
         let config = Config::parse(&config).unwrap();
-        let log = log::read(&path, &config.log, &|_| ()).unwrap();
-        let found = identify(vec![log], &config, config.choices().unwrap(), &|_| {}).unwrap();
-        found.parameter_file().unwrap();
+        let read = log::recording(&path, &config.log, &|_| ()).unwrap();
+        let found = identify(vec![read], &config, config.choices().unwrap(), &|_| {}).unwrap();
+        found.parameter_files().unwrap();
         found
     };
     let found = identified("");
-    let said = found.verdicts().contains(&Verdict::NoTorque);
-    assert!(said, "{:?}", found.verdicts());
-    let gain = found.estimate.values[Parameter::TorqueGain];
+    let said = found.first().verdicts().contains(&Verdict::NoTorque);
+    assert!(said, "{:?}", found.first().verdicts());
+    let gain = found.estimate().values[Parameter::TorqueGain];
     assert!((gain / (0.1 * 24.0 * 0.05) - 1.0).abs() < 0.05, "{gain}");
-    let friction = found.estimate.values[Parameter::DriveFriction];
+    let friction = found.estimate().values[Parameter::DriveFriction];
     assert!(
         (friction / driven.drive_friction - 1.0).abs() < 0.1,
         "{friction}"
     );
     // With the torque per unit it is one.
     let found = identified("factor = 1.2");
-    assert!(!found.verdicts().contains(&Verdict::NoTorque));
-    let gain = found.estimate.values[Parameter::TorqueGain];
+    assert!(!found.first().verdicts().contains(&Verdict::NoTorque));
+    let gain = found.estimate().values[Parameter::TorqueGain];
     assert!((gain / 0.1 - 1.0).abs() < 0.05, "{gain}");
 }

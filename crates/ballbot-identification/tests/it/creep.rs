@@ -125,8 +125,10 @@ fn identified(compliance: f64, config: &str) -> Identification {
     let path = folder.path().join("log.csv");
     std::fs::write(&path, Creeping { compliance }.log(4)).unwrap();
     let config = Config::parse(config).unwrap();
-    let log = log::read(&path, &config.log, &|_| ()).unwrap();
-    identify(vec![log], &config, config.choices().unwrap(), &|_| {}).unwrap()
+    let recording = log::recording(&path, &config.log, &|_| ()).unwrap();
+    let choices = config.choices().unwrap();
+    let robot = identify(vec![recording], &config, choices, &|_| {}).unwrap();
+    robot.first().clone()
 }
 
 /// Relative errors of b1, b2, b3, and the errors over their standard deviations.

@@ -3,7 +3,7 @@
 use crate::laboratory::healthy;
 use ballbot_identification::log::BallAngle;
 use ballbot_identification::{
-    ExcitationError, ExcitationTask, Parameter, Split, Task, Values, noise,
+    ExcitationError, ExcitationTask, Parameter, Split, Tables, Task, Values, noise,
 };
 use fastrand::Rng;
 use nalgebra::Vector4;
@@ -76,6 +76,7 @@ fn the_expected_precision_is_that_of_the_fit() {
         segment: task.segment,
         torque_known: true,
         noise: [None; 3],
+        tables: Tables::default(),
     };
     let split = Split::new(&runs, 0.0);
     let floor = noise::floor(&runs);

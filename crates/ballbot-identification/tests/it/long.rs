@@ -2,7 +2,7 @@
 
 use crate::laboratory::{Laboratory, healthy};
 use ballbot_identification::log::BallAngle;
-use ballbot_identification::{Parameter, Split, Task, Values, noise};
+use ballbot_identification::{Parameter, Split, Tables, Task, Values, noise};
 
 /// A log of a million rows that jumped every 21 s did not end in four minutes: all of its rows were
 /// simulated in each of up to 420 steps.
@@ -33,6 +33,7 @@ fn of_a_long_log_segments_are_fitted_that_are_spread_over_it() {
         segment: 1.0,
         torque_known: true,
         noise: [None; 3],
+        tables: Tables::default(),
     };
     let split = Split::new(&runs, 0.0);
     let estimate = task.estimate(&split.fitted, noise::floor(&runs), &|_| {});

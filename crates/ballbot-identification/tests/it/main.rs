@@ -12,3 +12,4 @@ mod excite;
 mod laboratory;
 mod long;
 mod malformed;
+mod planes;

@@ -32,6 +32,7 @@ impl<const NX: usize> Block<NX> {
         M: ShootingModel<NX, NY>,
     {
         let measured = problem.model.measured(segment);
+        let noise = problem.model.noise(segment);
         let rows = measured.len();
         // The iterate, then with each of the unknowns moved by a step.
         let mut starts = vec![(parameters.to_vec(), *initial)];
@@ -66,7 +67,7 @@ impl<const NX: usize> Block<NX> {
                 for output in 0..NY {
                     if !measured[row][output].is_nan() {
                         target[row * NY + output] =
-                            (moved[output] - base[output]) / (step * problem.noise[output]);
+                            (moved[output] - base[output]) / (step * noise[output]);
                     }
                 }
             }

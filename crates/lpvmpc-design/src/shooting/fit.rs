@@ -160,8 +160,10 @@ where
             };
             if right { Ok(()) } else { Err(error) }
         };
-        for (output, noise) in self.noise.iter().enumerate() {
-            positive(format!("the noise of output {output}"), *noise)?;
+        for segment in 0..segments {
+            for (output, noise) in self.model.noise(segment).iter().enumerate() {
+                positive(format!("the noise of output {output}"), *noise)?;
+            }
         }
         for (state, scale) in self.state_scale.iter().enumerate() {
             positive(format!("the scale of state {state}"), *scale)?;

@@ -13,7 +13,11 @@ struct Recursion {
 }
 
 const TRUTH: [f64; 2] = [1.1, 0.3];
-const NOISE: [f64; 2] = [0.05, 0.2];
+
+/// Every other segment is measured twice as badly.
+fn noise(segment: usize) -> Vector2<f64> {
+    Vector2::new(0.05, 0.2) * if segment % 2 == 1 { 2.0 } else { 1.0 }
+}
 
 impl ShootingModel<1, 2> for Recursion {
     fn segments(&self) -> usize {
@@ -22,6 +26,10 @@ impl ShootingModel<1, 2> for Recursion {
 
     fn measured(&self, segment: usize) -> &[Vector2<f64>] {
         &self.measured[segment]
+    }
+
+    fn noise(&self, segment: usize) -> Vector2<f64> {
+        noise(segment)
     }
 
     fn simulate(
@@ -54,7 +62,8 @@ fn recursion(segments: usize, seed: u64) -> Recursion {
         let mut outputs = Vec::new();
         model.simulate(segment, &TRUTH, &initial, &mut outputs);
         for output in &mut outputs {
-            *output += Vector2::new(NOISE[0] * normal(&mut rng), NOISE[1] * normal(&mut rng));
+            let deviation = noise(segment);
+            *output += deviation.map(|deviation| deviation * normal(&mut rng));
         }
         model.measured[segment] = outputs;
     }
@@ -82,7 +91,6 @@ fn problem<'a>(
         model,
         unknowns,
         priors,
-        noise: Vector2::from(NOISE),
         state_scale: Vector1::new(1.0),
     }
 }
@@ -100,7 +108,7 @@ impl ResidualModel for Dense<'_> {
                 .simulate(segment, &b.as_slice()[..2], &initial, &mut outputs);
             for (measured, simulated) in self.0.measured[segment].iter().zip(&outputs) {
                 for output in 0..2 {
-                    let residual = (measured[output] - simulated[output]) / NOISE[output];
+                    let residual = (measured[output] - simulated[output]) / noise(segment)[output];
                     residuals.push(if residual.is_nan() { 0.0 } else { residual });
                 }
             }
