@@ -294,7 +294,8 @@ where
         } = self;
         for step in STEPS {
             let step: T = convert(step);
-            let cost = self.roll_out_plan(x, merit, trial, &|i, x_i| {
+            let sufficient = policy.cost - expected * step * convert(SUFFICIENT);
+            let cost = self.roll_out_plan(x, merit, sufficient, trial, &|i, x_i| {
                 let x_plan = i.checked_sub(1).map_or(*x, |j| at(rollout, j));
                 let (x_answer, u_answer) = answer(i);
                 let planned = x_plan + (x_answer - x_plan) * step;
@@ -302,10 +303,8 @@ where
                 let u = u_plan + (u_answer - u_plan) * step;
                 input_at(x_i, (&planned, &u), &at(&policy.gain, i), &self.settings.u)
             });
-            let sufficient = policy.cost - expected * step * convert(SUFFICIENT);
             if let Some(cost) = cost
                 && cost < policy.cost
-                && cost <= sufficient
             {
                 return Some((step, cost));
             }
@@ -392,13 +391,15 @@ where
     }
 
     /// Rolls the nonlinear model out from `x` into `trial`, with the inputs that `input` gives for a
-    /// stage and its state. Returns the merit; `None` if it is not finite.
+    /// stage and its state. Returns the merit; `None` if it is not finite or above `most`, where the
+    /// rollout ends: no stage costs less than nothing.
     // Once in the machine code: a call per stage is nothing beside a Runge-Kutta step.
     #[inline(never)]
     pub(crate) fn roll_out_plan(
         &self,
         x: &SVector<T, NX>,
         merit: &Merit<'_, T, NX, NU>,
+        most: T,
         trial: &mut Trial<T, NX, NU>,
         input: &dyn Fn(usize, &SVector<T, NX>) -> SVector<T, NU>,
     ) -> Option<T> {
@@ -408,11 +409,15 @@ where
         for (i, (u, next)) in places.enumerate().take(self.settings.horizon) {
             *u = input(i, &state);
             total += merit.stage(i, &state, u);
+            // Negated, so that a NaN ends it.
+            if !(total <= most) {
+                return None;
+            }
             state = next_state(&self.model, &self.settings, &state, u);
             *next = state;
         }
         total += merit.end(&state);
-        total.is_finite().then_some(total)
+        (total <= most && total.is_finite()).then_some(total)
     }
 
     /// The trial becomes the plan, if it has a cost.
