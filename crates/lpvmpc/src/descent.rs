@@ -199,9 +199,10 @@ where
     }
 
     fn solve_program(&mut self, workspace: &mut Workspace<T, NX, NU>) {
+        // Along another plan other bounds are active, and to drop one takes longer than to find it.
         let warm_start = match self.problems {
             0 => self.settings.solver.warm_start,
-            _ => WarmStart::Same,
+            _ => WarmStart::Cold,
         };
         let settings = SolverSettings {
             warm_start,
