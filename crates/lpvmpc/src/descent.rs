@@ -100,8 +100,6 @@ where
         let mut status = Status::NoImprovement;
         // Programs in a row that have brought nothing.
         let mut failures = 0;
-        // Whether the embedding still has turns: once it has brought nothing, the plan is too near for it.
-        let mut far = true;
         while self.problems < self.settings.iterations.most() {
             self.linearize_plan(x, aim, along, workspace);
             self.solve_program(workspace);
@@ -135,7 +133,7 @@ where
                     if settled {
                         along = Along::Jacobian;
                     } else if step < convert(SHORT_STEP) || gain <= tolerance {
-                        along = along.other(far);
+                        along = along.other(self.policy.far);
                     }
                 }
                 Outcome::NothingToGain | Outcome::NoStep | Outcome::Unsolved(_) => {
@@ -146,8 +144,8 @@ where
                     if failures >= MOST_FAILURES {
                         break;
                     }
-                    far &= along == Along::Jacobian;
-                    along = along.other(far);
+                    self.policy.far &= along == Along::Jacobian;
+                    along = along.other(self.policy.far);
                 }
             }
         }

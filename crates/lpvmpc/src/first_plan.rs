@@ -75,6 +75,7 @@ where
                 self.take_if_some(cost, &workspace.trial);
                 self.policy.gain.fill(gain);
                 self.policy.damping = T::zero();
+                self.policy.far = true;
             }
             if away.amax() == T::zero() {
                 break;
