@@ -19,7 +19,6 @@ use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
 use crate::plan::{Aim, Merit, Prices, Trial, at};
 use crate::policy::input_at;
-use crate::predictor::Rk4;
 use crate::settings::{ControllerSettings, TerminalIngredient};
 use crate::solution::Status;
 use crate::solver::{SolverSettings, WarmStart};
@@ -192,12 +191,8 @@ where
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
         let ControllerSettings { t_s, predictor, .. } = &self.settings;
         let rk4 = predictor.rk4();
-        // The embedding only shows the way, for which half as many steps are as good.
-        let half = Rk4 {
-            substeps: rk4.substeps.div_ceil(2),
-        };
         match along {
-            Along::Scheduling => half.linearize(&self.model, x, u, *t_s),
+            Along::Scheduling => rk4.linearize(&self.model, x, u, *t_s),
             Along::Jacobian => rk4.differentiate(&self.model, x, u, *t_s),
         }
     }
