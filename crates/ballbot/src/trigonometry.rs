@@ -46,7 +46,11 @@ fn reduced<T: Scalar>(x: T) -> (T, T) {
     };
     let r = PARTS.iter().fold(x, |r, part| r - k * convert(*part));
     let (sin, cos) = polynomials(r);
-    let quarter = if near { k } else { k - four * (k / four).floor() };
+    let quarter = if near {
+        k
+    } else {
+        k - four * (k / four).floor()
+    };
     if quarter == one {
         (cos, -sin)
     } else if quarter == zero {

@@ -58,6 +58,8 @@ enum Outcome<T> {
 const ROUNDINGS: f64 = 30.0;
 /// Parts of the way to a program's answer that are tried.
 const STEPS: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
+/// From each of them to the next longer one, at least.
+const LONGER: f64 = 4.0;
 /// Part of the expected gain that a step has to bring (Armijo's condition).
 const SUFFICIENT: f64 = 1e-4;
 /// The search ends after so many programs in a row that bring nothing; each is damped more.
@@ -99,10 +101,24 @@ where
         let mut status = Status::NoImprovement;
         // Programs in a row that have brought nothing.
         let mut failures = 0;
+        // The longest step that is tried along the embedding. It has no damping to shorten its answers.
+        let mut reach = T::one();
         while self.problems < self.settings.iterations.most() {
             self.linearize_plan(x, aim, along, workspace);
             self.solve_program(workspace);
-            let outcome = self.improve(x, aim, tolerance, &mut prices, workspace);
+            let longest = match along {
+                Along::Scheduling => reach,
+                Along::Jacobian => T::one(),
+            };
+            let outcome = self.improve(x, aim, (tolerance, longest), &mut prices, workspace);
+            if let (Along::Scheduling, Outcome::Moved { step, .. }) = (along, &outcome) {
+                // A longer one only after one that was not shortened.
+                reach = if *step < longest {
+                    *step
+                } else {
+                    *step * convert(LONGER)
+                };
+            }
             let damped = self.policy.damping > T::zero();
             if along == Along::Jacobian {
                 self.adapt_damping(&outcome);
@@ -224,12 +240,13 @@ where
         }
     }
 
-    /// Moves the plan towards the answer of the last program, if that lowers its merit.
+    /// Moves the plan towards the answer of the last program, by no more than the `longest` step, if that
+    /// lowers its merit.
     fn improve(
         &mut self,
         x: &SVector<T, NX>,
         aim: &Aim<'_, T, NX, NU>,
-        tolerance: T,
+        (tolerance, longest): (T, T),
         prices: &mut Prices<T, NX>,
         workspace: &mut Workspace<T, NX, NU>,
     ) -> Outcome<T> {
@@ -253,7 +270,8 @@ where
         if !(expected > least) {
             return Outcome::NothingToGain;
         }
-        let taken = self.search_line(x, &merit, expected, &mut workspace.trial, &|i| {
+        let wanted = (expected, longest);
+        let taken = self.search_line(x, &merit, wanted, &mut workspace.trial, &|i| {
             let x_i = i.checked_sub(1).map_or(*x, |j| at(&self.solution.x, j));
             (x_i, at(&self.solution.u, i))
         });
@@ -279,21 +297,21 @@ where
     }
 
     /// The longest step from the plan towards `answer` (state and input of a stage) that lowers the
-    /// merit enough, and the merit of the rollout that it leaves in `trial`.
+    /// merit enough, of those up to the `longest`, and the merit of the rollout that it leaves in `trial`.
     #[inline(never)]
     fn search_line(
         &self,
         x: &SVector<T, NX>,
         merit: &Merit<'_, T, NX, NU>,
-        expected: T,
+        (expected, longest): (T, T),
         trial: &mut Trial<T, NX, NU>,
         answer: &dyn Fn(usize) -> (SVector<T, NX>, SVector<T, NU>),
     ) -> Option<(T, T)> {
         let Self {
             policy, rollout, ..
         } = self;
-        for step in STEPS {
-            let step: T = convert(step);
+        let steps = STEPS.into_iter().map(convert::<f64, T>);
+        for step in steps.filter(|step| *step <= longest) {
             let sufficient = policy.cost - expected * step * convert(SUFFICIENT);
             let cost = self.roll_out_plan(x, merit, sufficient, trial, &|i, x_i| {
                 let x_plan = i.checked_sub(1).map_or(*x, |j| at(rollout, j));
@@ -340,7 +358,7 @@ where
             let merit = self.merit(aim, prices);
             self.policy.cost = merit.of(&x, &self.policy.u, &self.rollout);
             let trial = &mut workspace.trial;
-            let taken = self.search_line(&x, &merit, T::zero(), trial, &|i| {
+            let taken = self.search_line(&x, &merit, (T::zero(), T::one()), trial, &|i| {
                 let u = if i < last {
                     at(&self.solution.u, i + 1)
                 } else {
