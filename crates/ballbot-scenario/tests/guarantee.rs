@@ -146,8 +146,9 @@ fn errors_as_large_as_assumed_break_nothing() {
             let error = x - Vector4::x() * step.set_point;
             let stage = (settings.weights.q * error).dot(&error)
                 + (settings.weights.r * step.u).dot(&step.u);
-            before = Some((step.cost - stage + step.epsilon, step.cost));
-            assert!(step.epsilon <= 2e-3 * step.cost, "{horizon}, {k}: {step:?}");
+            let epsilon = controller.epsilon();
+            before = Some((step.cost - stage + epsilon, step.cost));
+            assert!(epsilon <= 2e-3 * step.cost, "{horizon}, {k}: {step:?}");
             let moving = x.component_mul(&Vector4::new(0.0, 1.0, 1.0, 1.0));
             let share = share_of_bounds(&moving, &settings.x, &step.u, &settings.u);
             let off = settings.rollout.error * share;

@@ -12,6 +12,9 @@ use nalgebra::convert;
 /// first terms left out are below 5e-17 and 3e-18.
 const LARGEST: f64 = 1.1;
 
+/// Up to this angle (151 degrees) one quarter turn leaves an angle for the polynomials.
+const NEIGHBOURS: f64 = 2.64;
+
 /// (sin x, cos x) for `x` in rad, to rounding up to some thousand turns; the error grows with the
 /// argument from there on. NaN for what is not finite.
 #[inline(always)]
@@ -33,15 +36,25 @@ fn reduced<T: Scalar>(x: T) -> (T, T) {
         4.837_512_969_970_703e-4,
         7.549_789_954_891_882e-8,
     ];
-    let k = (x * T::frac_2_pi()).round();
+    let [zero, one, two, four]: [T; 4] = [0.0, 1.0, 2.0, 4.0].map(convert);
+    // A robot that falls is in the quarters next to the upright one, which need no rounding.
+    let near = x.abs() <= convert(NEIGHBOURS);
+    let k = if near {
+        one.copysign(x)
+    } else {
+        (x * T::frac_2_pi()).round()
+    };
     let r = PARTS.iter().fold(x, |r, part| r - k * convert(*part));
     let (sin, cos) = polynomials(r);
-    let [one, two, four]: [T; 3] = [1.0, 2.0, 4.0].map(convert);
-    let quarter = k - four * (k / four).floor();
-    if quarter < one {
-        (sin, cos)
-    } else if quarter < two {
+    let quarter = if near {
+        k
+    } else {
+        k - four * (k / four).floor()
+    };
+    if quarter == one {
         (cos, -sin)
+    } else if quarter == zero {
+        (sin, cos)
     } else if quarter == two {
         (-sin, -cos)
     } else {

@@ -67,6 +67,11 @@ where
         self.x += jump;
     }
 
+    /// How much the integration error of the coming sample may add to the cost of the next plan.
+    pub fn epsilon(&self) -> f64 {
+        self.controller.epsilon()
+    }
+
     /// The controller's answer to the measured state and the wanted set point.
     pub fn decide<const NA: usize>(
         &mut self,

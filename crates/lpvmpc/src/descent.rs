@@ -58,6 +58,8 @@ enum Outcome<T> {
 const ROUNDINGS: f64 = 30.0;
 /// Parts of the way to a program's answer that are tried.
 const STEPS: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
+/// From each of them to the next longer one, at least.
+const LONGER: f64 = 4.0;
 /// Part of the expected gain that a step has to bring (Armijo's condition).
 const SUFFICIENT: f64 = 1e-4;
 /// The search ends after so many programs in a row that bring nothing; each is damped more.
@@ -99,12 +101,24 @@ where
         let mut status = Status::NoImprovement;
         // Programs in a row that have brought nothing.
         let mut failures = 0;
-        // Whether the embedding still has turns: once it has brought nothing, the plan is too near for it.
-        let mut far = true;
+        // The longest step that is tried along the embedding. It has no damping to shorten its answers.
+        let mut reach = T::one();
         while self.problems < self.settings.iterations.most() {
             self.linearize_plan(x, aim, along, workspace);
             self.solve_program(workspace);
-            let outcome = self.improve(x, aim, tolerance, &mut prices, workspace);
+            let longest = match along {
+                Along::Scheduling => reach,
+                Along::Jacobian => T::one(),
+            };
+            let outcome = self.improve(x, aim, (tolerance, longest), &mut prices, workspace);
+            if let (Along::Scheduling, Outcome::Moved { step, .. }) = (along, &outcome) {
+                // A longer one only after one that was not shortened.
+                reach = if *step < longest {
+                    *step
+                } else {
+                    *step * convert(LONGER)
+                };
+            }
             let damped = self.policy.damping > T::zero();
             if along == Along::Jacobian {
                 self.adapt_damping(&outcome);
@@ -134,7 +148,7 @@ where
                     if settled {
                         along = Along::Jacobian;
                     } else if step < convert(SHORT_STEP) || gain <= tolerance {
-                        along = along.other(far);
+                        along = along.other(self.policy.far);
                     }
                 }
                 Outcome::NothingToGain | Outcome::NoStep | Outcome::Unsolved(_) => {
@@ -145,8 +159,8 @@ where
                     if failures >= MOST_FAILURES {
                         break;
                     }
-                    far &= along == Along::Jacobian;
-                    along = along.other(far);
+                    self.policy.far &= along == Along::Jacobian;
+                    along = along.other(self.policy.far);
                 }
             }
         }
@@ -192,16 +206,18 @@ where
         along: Along,
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
         let ControllerSettings { t_s, predictor, .. } = &self.settings;
+        let rk4 = predictor.rk4();
         match along {
-            Along::Scheduling => predictor.rk4().linearize(&self.model, x, u, *t_s),
-            Along::Jacobian => predictor.rk4().differentiate(&self.model, x, u, *t_s),
+            Along::Scheduling => rk4.linearize(&self.model, x, u, *t_s),
+            Along::Jacobian => rk4.differentiate(&self.model, x, u, *t_s),
         }
     }
 
     fn solve_program(&mut self, workspace: &mut Workspace<T, NX, NU>) {
+        // Along another plan other bounds are active, and to drop one takes longer than to find it.
         let warm_start = match self.problems {
             0 => self.settings.solver.warm_start,
-            _ => WarmStart::Same,
+            _ => WarmStart::Cold,
         };
         let settings = SolverSettings {
             warm_start,
@@ -224,12 +240,13 @@ where
         }
     }
 
-    /// Moves the plan towards the answer of the last program, if that lowers its merit.
+    /// Moves the plan towards the answer of the last program, by no more than the `longest` step, if that
+    /// lowers its merit.
     fn improve(
         &mut self,
         x: &SVector<T, NX>,
         aim: &Aim<'_, T, NX, NU>,
-        tolerance: T,
+        (tolerance, longest): (T, T),
         prices: &mut Prices<T, NX>,
         workspace: &mut Workspace<T, NX, NU>,
     ) -> Outcome<T> {
@@ -253,7 +270,8 @@ where
         if !(expected > least) {
             return Outcome::NothingToGain;
         }
-        let taken = self.search_line(x, &merit, expected, &mut workspace.trial, &|i| {
+        let wanted = (expected, longest);
+        let taken = self.search_line(x, &merit, wanted, &mut workspace.trial, &|i| {
             let x_i = i.checked_sub(1).map_or(*x, |j| at(&self.solution.x, j));
             (x_i, at(&self.solution.u, i))
         });
@@ -279,22 +297,23 @@ where
     }
 
     /// The longest step from the plan towards `answer` (state and input of a stage) that lowers the
-    /// merit enough, and the merit of the rollout that it leaves in `trial`.
+    /// merit enough, of those up to the `longest`, and the merit of the rollout that it leaves in `trial`.
     #[inline(never)]
     fn search_line(
         &self,
         x: &SVector<T, NX>,
         merit: &Merit<'_, T, NX, NU>,
-        expected: T,
+        (expected, longest): (T, T),
         trial: &mut Trial<T, NX, NU>,
         answer: &dyn Fn(usize) -> (SVector<T, NX>, SVector<T, NU>),
     ) -> Option<(T, T)> {
         let Self {
             policy, rollout, ..
         } = self;
-        for step in STEPS {
-            let step: T = convert(step);
-            let cost = self.roll_out_plan(x, merit, trial, &|i, x_i| {
+        let steps = STEPS.into_iter().map(convert::<f64, T>);
+        for step in steps.filter(|step| *step <= longest) {
+            let sufficient = policy.cost - expected * step * convert(SUFFICIENT);
+            let cost = self.roll_out_plan(x, merit, sufficient, trial, &|i, x_i| {
                 let x_plan = i.checked_sub(1).map_or(*x, |j| at(rollout, j));
                 let (x_answer, u_answer) = answer(i);
                 let planned = x_plan + (x_answer - x_plan) * step;
@@ -302,10 +321,8 @@ where
                 let u = u_plan + (u_answer - u_plan) * step;
                 input_at(x_i, (&planned, &u), &at(&policy.gain, i), &self.settings.u)
             });
-            let sufficient = policy.cost - expected * step * convert(SUFFICIENT);
             if let Some(cost) = cost
                 && cost < policy.cost
-                && cost <= sufficient
             {
                 return Some((step, cost));
             }
@@ -341,7 +358,7 @@ where
             let merit = self.merit(aim, prices);
             self.policy.cost = merit.of(&x, &self.policy.u, &self.rollout);
             let trial = &mut workspace.trial;
-            let taken = self.search_line(&x, &merit, T::zero(), trial, &|i| {
+            let taken = self.search_line(&x, &merit, (T::zero(), T::one()), trial, &|i| {
                 let u = if i < last {
                     at(&self.solution.u, i + 1)
                 } else {
@@ -392,13 +409,15 @@ where
     }
 
     /// Rolls the nonlinear model out from `x` into `trial`, with the inputs that `input` gives for a
-    /// stage and its state. Returns the merit; `None` if it is not finite.
+    /// stage and its state. Returns the merit; `None` if it is not finite or above `most`, where the
+    /// rollout ends: no stage costs less than nothing.
     // Once in the machine code: a call per stage is nothing beside a Runge-Kutta step.
     #[inline(never)]
     pub(crate) fn roll_out_plan(
         &self,
         x: &SVector<T, NX>,
         merit: &Merit<'_, T, NX, NU>,
+        most: T,
         trial: &mut Trial<T, NX, NU>,
         input: &dyn Fn(usize, &SVector<T, NX>) -> SVector<T, NU>,
     ) -> Option<T> {
@@ -408,11 +427,15 @@ where
         for (i, (u, next)) in places.enumerate().take(self.settings.horizon) {
             *u = input(i, &state);
             total += merit.stage(i, &state, u);
+            // Negated, so that a NaN ends it.
+            if !(total <= most) {
+                return None;
+            }
             state = next_state(&self.model, &self.settings, &state, u);
             *next = state;
         }
         total += merit.end(&state);
-        total.is_finite().then_some(total)
+        (total <= most && total.is_finite()).then_some(total)
     }
 
     /// The trial becomes the plan, if it has a cost.

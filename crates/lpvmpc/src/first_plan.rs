@@ -35,7 +35,8 @@ where
         let mut best = None;
         if self.initialised {
             self.shift(aim);
-            best = self.roll_out_plan(x, &merit, &mut workspace.trial, &|i, x| {
+            let unlimited = convert(f64::INFINITY);
+            best = self.roll_out_plan(x, &merit, unlimited, &mut workspace.trial, &|i, x| {
                 let policy = &self.policy;
                 let planned = (&at(&self.rollout, i), &at(&policy.u, i));
                 input_at(x, planned, &at(&policy.gain, i), &self.settings.u)
@@ -63,7 +64,8 @@ where
         let merit = self.merit(aim, Prices::none());
         for part in PARTS {
             let x_aim = aim.end() + away * (T::one() - convert::<f64, T>(part));
-            let cost = self.roll_out_plan(x, &merit, &mut workspace.trial, &|_, x| {
+            let most = best.unwrap_or(convert(f64::INFINITY));
+            let cost = self.roll_out_plan(x, &merit, most, &mut workspace.trial, &|_, x| {
                 input_at(x, (&x_aim, &aim.u_ref), &gain, &self.settings.u)
             });
             if let Some(found) = cost
@@ -73,6 +75,7 @@ where
                 self.take_if_some(cost, &workspace.trial);
                 self.policy.gain.fill(gain);
                 self.policy.damping = T::zero();
+                self.policy.far = true;
             }
             if away.amax() == T::zero() {
                 break;

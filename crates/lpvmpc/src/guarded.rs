@@ -87,11 +87,6 @@ pub struct GuardedStep<T, const NX: usize, const NU: usize> {
     /// Cost of the plan on the nonlinear model: sum ||x - z d||_Q^2 + ||u||_R^2, terminal cost
     /// ||x_N - z d||_P^2 and offset cost.
     pub cost: T,
-    /// How much the integration error of the coming sample may add to the next plan's cost: while what
-    /// is wanted stays and the step is guaranteed, that is at most this one's less the first stage
-    /// cost, plus this. In the unit of the cost; of first order in the deviations from the plan, with
-    /// their squares.
-    pub epsilon: T,
     /// Rolled-out minus predicted state at the end of the horizon, in state units; zero where
     /// the plan is not the quadratic program's.
     pub gap: SVector<T, NX>,
@@ -336,7 +331,6 @@ where
             decision,
             set_point: along.set_point,
             cost: along.cost,
-            epsilon: planner.epsilon(along),
             gap,
             status,
         }
@@ -408,6 +402,15 @@ where
     /// The settings.
     pub fn settings(&self) -> &GuardedSettings<T, NX, NU> {
         &self.planner.settings
+    }
+
+    /// How much the integration error of the coming sample may add to the next plan's cost: while what
+    /// is wanted stays and the last step is guaranteed, that is at most the last one's less the first
+    /// stage cost, plus this. In the unit of the cost; of first order in the deviations from the plan,
+    /// with their squares. No input depends on it, and it takes a linearisation along the horizon: it is
+    /// worked out for who asks.
+    pub fn epsilon(&self) -> T {
+        self.planner.epsilon(&self.last)
     }
 
     /// The plan's states x_1 to x_N on the nonlinear model, as many as the horizon; none if there

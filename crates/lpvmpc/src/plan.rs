@@ -47,6 +47,9 @@ pub(crate) struct Policy<T: 'static, const NX: usize, const NU: usize> {
     pub cost: T,
     /// Extra cost of (u - u_i)^2 in the next program along the plan.
     pub damping: T,
+    /// Whether the embedding has turns: since the plan was begun, none of its programs has brought
+    /// nothing. Once one has, the plan is too near for it.
+    pub far: bool,
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> Policy<T, NX, NU> {
@@ -56,6 +59,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Policy<T, NX, NU> {
             gain,
             cost: T::zero(),
             damping: T::zero(),
+            far: true,
         }
     }
 }

@@ -61,6 +61,7 @@ fn size_of_bound<T: Scalar>(lower: T, upper: T) -> T {
 }
 
 /// Offers every violated side of `bounds` at `value` to `visit`. NaN counts as violated.
+#[inline(always)]
 fn violated_sides<T: Scalar, const K: usize>(
     bounds: &Bounds<T, K>,
     soft: &Softness<T, K>,
@@ -69,13 +70,27 @@ fn violated_sides<T: Scalar, const K: usize>(
     quantity: fn(usize) -> Quantity,
     visit: &mut impl FnMut(Candidate<T>),
 ) {
-    if bounds.hold_at(value) {
-        return;
+    // Most hold, which is not worth a call.
+    if !bounds.hold_at(value) {
+        visit_violated(bounds, soft, value, stage, quantity, visit);
     }
-    let sides = bounds.lower.iter().zip(bounds.upper.iter());
-    for (index, ((v, soft), (lower, upper))) in value.iter().zip(soft.iter()).zip(sides).enumerate()
-    {
-        violated_side(*v, (*lower, *upper), *soft, stage, quantity(index), visit);
+}
+
+#[inline(never)]
+fn visit_violated<T: Scalar, const K: usize>(
+    bounds: &Bounds<T, K>,
+    soft: &Softness<T, K>,
+    value: &SVector<T, K>,
+    stage: usize,
+    quantity: fn(usize) -> Quantity,
+    visit: &mut impl FnMut(Candidate<T>),
+) {
+    // As arrays, whose loop is a fraction of one over the vectors' own iterators.
+    let [lower, upper, value] =
+        [&bounds.lower, &bounds.upper, value].map(|vector| &vector.data.0[0]);
+    let sides = lower.iter().zip(upper);
+    for (index, ((v, (lower, upper)), soft)) in value.iter().zip(sides).zip(soft).enumerate() {
+        violated_side(*v, (*lower, *upper), soft, stage, quantity, index, visit);
     }
 }
 
@@ -84,9 +99,10 @@ fn violated_sides<T: Scalar, const K: usize>(
 fn violated_side<T: Scalar>(
     value: T,
     (lower, upper): (T, T),
-    soft: Option<Penalty<T>>,
+    soft: &Option<Penalty<T>>,
     stage: usize,
-    quantity: Quantity,
+    quantity: fn(usize) -> Quantity,
+    index: usize,
     visit: &mut impl FnMut(Candidate<T>),
 ) {
     if value >= lower && value <= upper {
@@ -99,11 +115,11 @@ fn violated_side<T: Scalar>(
         visit(Candidate {
             bound: BoundId {
                 stage,
-                quantity,
+                quantity: quantity(index),
                 side,
             },
             part: Part::Hard,
-            soft,
+            soft: *soft,
             slack,
             violation: -slack / size_of_bound(lower, upper),
             rank: -slack / room_of_bound(lower, upper),
@@ -153,9 +169,10 @@ fn violated_rows<T: Scalar, const NX: usize, const NU: usize>(
         violated_side(
             row.value(x, u),
             sides,
-            row.soft,
+            &row.soft,
             stage,
-            Quantity::Row(j),
+            Quantity::Row,
+            j,
             visit,
         );
     }

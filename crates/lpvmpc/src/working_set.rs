@@ -13,6 +13,9 @@ use crate::model::Scalar;
 use crate::solution::ActiveRow;
 use nalgebra::{SVector, convert};
 
+/// Stages of a product that are summed up side by side: two vector registers of `f64`.
+const LANES: usize = 4;
+
 /// A row of the problem in terms of the normalised deviations v.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
@@ -240,7 +243,9 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
         for ((s, d), row) in spanned.iter_mut().zip(dual.iter()).zip(self.rows()) {
             *s = -row.compliance * *d;
         }
-        self.solve_lower(spanned);
+        if self.rows().iter().any(|row| row.compliance > T::zero()) {
+            self.solve_lower(spanned);
+        }
         self.project(primal, spanned);
         for ((s, q), c) in spanned
             .iter()
@@ -419,10 +424,30 @@ pub(crate) fn copy<V: Copy>(to: &mut [V], from: &[V]) {
     first_mut(to, length).copy_from_slice(first(from, length));
 }
 
-/// a'b over the stages that both have.
+/// a'b over the stages that both have, in sums that do not wait for each other.
 fn dot<T: Scalar, const NU: usize>(a: &[SVector<T, NU>], b: &[SVector<T, NU>]) -> T {
-    let stages = a.iter().zip(b);
-    stages.fold(T::zero(), |sum, (a, b)| sum + a.dot(b))
+    let length = a.len().min(b.len());
+    let (a, a_rest) = first(a, length).as_chunks::<LANES>();
+    let (b, b_rest) = first(b, length).as_chunks::<LANES>();
+    let mut sums = [T::zero(); LANES];
+    for (a, b) in a.iter().zip(b) {
+        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
+            add_products(sum, a, b);
+        }
+    }
+    for ((sum, a), b) in sums.iter_mut().zip(a_rest).zip(b_rest) {
+        add_products(sum, a, b);
+    }
+    let [first, second, third, fourth] = sums;
+    (first + third) + (second + fourth)
+}
+
+/// sum += a'b; without the zero that a product begins with.
+#[inline(always)]
+fn add_products<T: Scalar, const NU: usize>(sum: &mut T, a: &SVector<T, NU>, b: &SVector<T, NU>) {
+    for (a, b) in a.data.0.as_flattened().iter().zip(b.data.0.as_flattened()) {
+        *sum += *a * *b;
+    }
 }
 
 /// v += factor * a over the stages that both have.

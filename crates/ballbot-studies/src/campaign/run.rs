@@ -173,10 +173,11 @@ impl<'a> Loop<'a> {
                 record.compare(cost, fall, step.cost);
             }
             let stage = stage_cost(self.guarded.state(), step.set_point, &step.u, self.prepared);
-            before =
-                step.decision
-                    .is_guaranteed()
-                    .then_some((*wanted, step.cost, stage - step.epsilon));
+            let fall = stage - self.guarded.epsilon();
+            before = step
+                .decision
+                .is_guaranteed()
+                .then_some((*wanted, step.cost, fall));
             record.pay(self.guarded.state(), *wanted, &step.u, self.prepared);
             let actuation = variant.actuation(random);
             let before = *self.guarded.state();

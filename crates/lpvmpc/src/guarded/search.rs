@@ -157,12 +157,14 @@ where
         for fraction in FRACTIONS {
             let towards = program::answer(workspace, &origin);
             self.go_between(along, towards, convert(fraction), trial);
+            // What is too dear need not be judged, which takes longer than its rollout.
+            let cheaper = least.is_none_or(|least| trial.cost < least);
             let found = Found {
                 fraction,
-                feasible: self.judge(trial),
+                feasible: cheaper && self.judge(trial),
                 gap: trial.end - predicted,
             };
-            if found.feasible && least.is_none_or(|least| trial.cost < least) {
+            if found.feasible {
                 return Outcome::Found(found);
             }
             if fraction == 1.0
