@@ -5,8 +5,8 @@
 )]
 
 use ballbot_scenario::{
-    DisturbancesTable, EstimatorTable, Prepared, Scenario, Session, TerminalTable, TorqueRateTable,
-    WorldTable,
+    DisturbancesTable, EstimatorTable, PointTable, Prepared, ReferenceTable, Scenario, Session,
+    TerminalTable, TorqueRateTable, WorldTable,
 };
 use std::path::Path;
 use std::time::Duration;
@@ -69,6 +69,15 @@ fn variants() -> Vec<(String, Scenario)> {
     ] {
         variants.push((name.to_owned(), Scenario::load(name).unwrap()));
     }
+    // 2.5 m at once, where a plan is a long way from its end for many samples.
+    let mut far = Scenario::load("one-metre").unwrap();
+    far.reference = ReferenceTable::SetPoints {
+        points: vec![PointTable {
+            time_s: 0.0,
+            phi_rad: 2.5 / 0.12,
+        }],
+    };
+    variants.push(("2.5 m at once".to_owned(), far));
     for name in ["two-setpoints", "far-setpoints"] {
         let mut scenario = Scenario::load(name).unwrap();
         scenario.controller.terminal = TerminalTable::DiscreteRiccati;

@@ -47,6 +47,7 @@ where
         copy(&mut self.policy.u, &self.solution.u);
         let (cost, damping) = (previous.policy.cost, previous.policy.damping);
         (self.policy.cost, self.policy.damping) = (cost, damping);
+        self.policy.far = previous.policy.far;
         self.initialised = at(&self.rollout, self.last_stage())
             .iter()
             .all(|entry| entry.is_finite());

@@ -257,20 +257,22 @@ fn lent_memory_regulates_as_the_heap_does() {
 /// longer or shorter horizon without a jolt.
 #[test]
 fn a_regulator_takes_over_where_another_stands() {
-    fn handed_over<R: Regulator<f64, 2, 1, 1>>(first: R, second: R) -> Vec<(f64, f64)> {
+    fn handed_over<R: Regulator<f64, 2, 1, 1>>(at: usize, first: R, second: R) -> Vec<(f64, f64)> {
         let (mut first, mut second) = (first, second);
         let mut world = World::new(0.3, 1e-3);
-        let mut path = run(&mut first, &mut world, 60);
+        let mut path = run(&mut first, &mut world, at);
         second.take_over(&first);
-        path.extend(run(&mut second, &mut world, 140));
+        path.extend(run(&mut second, &mut world, 200 - at));
         path
     }
     let alone = run(&mut held(N), &mut World::new(0.3, 1e-3), 200);
-    assert_eq!(handed_over(held(N), held(N)), alone);
     let in_ramps = run(&mut ramped(N), &mut World::new(0.3, 1e-3), 200);
-    assert_eq!(handed_over(ramped(N), ramped(N)), in_ramps);
+    for at in [1, 2, 3, 5, 8, 20, 60, 76, 78, 80, 85, 101] {
+        assert_eq!(handed_over(at, held(N), held(N)), alone, "{at}");
+        assert_eq!(handed_over(at, ramped(N), ramped(N)), in_ramps, "{at}");
+    }
     for horizon in [N + 10, N - 5] {
-        let path = handed_over(held(N), held(horizon));
+        let path = handed_over(60, held(N), held(horizon));
         let jolt = (path[60].0 - alone[60].0).abs();
         assert!(jolt < 0.01, "{horizon}: {jolt}");
     }
