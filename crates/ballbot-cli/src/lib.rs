@@ -1,4 +1,16 @@
-//! The parts of the program `ballbot`.
+//! The program `ballbot`: its commands, and how their results become text, files and figures. What
+//! they compute is in the libraries.
+//!
+//! ```
+//! use ballbot_cli::arguments::Arguments;
+//! use clap::Parser;
+//!
+//! # fn main() -> Result<(), ballbot_cli::commands::CommandError> {
+//! let arguments = Arguments::parse_from(["ballbot", "lqr", "--continuous", "--r", "1000"]);
+//! println!("{}", ballbot_cli::run(arguments)?);
+//! # Ok(())
+//! # }
+//! ```
 
 #![allow(
     clippy::neg_cmp_op_on_partial_ord,

@@ -6,6 +6,38 @@
 //!
 //! State x = (phi, theta, phi_dot, theta_dot), both angles against the vertical; signs and
 //! parameters are those of [`ballbot::Ballbot`].
+//!
+//! What to log, and what it will tell, is worked out first:
+//!
+//! ```
+//! use ballbot_identification::{Config, ExcitationTask, Parameter, Values};
+//! use nalgebra::Vector3;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let config = Config::parse(Config::EXAMPLE)?;
+//! let (geometry, choices) = (config.geometry(), config.choices()?);
+//! let task = ExcitationTask {
+//!     robot: Values::expected(&choices, &geometry),
+//!     geometry,
+//!     choices,
+//!     band: (0.2, 5.0),
+//!     harmonics: 10,
+//!     amplitude: 1.0,
+//!     duration: 20.0,
+//!     tilt_limit: 0.2,
+//!     rate: 200.0,
+//!     noise: Vector3::new(1e-3, 1e-3, 5e-3),
+//!     gain: None,
+//!     segment: config.fit.segment_s,
+//!     gyroscope: true,
+//! };
+//! let excitation = task.design()?;
+//! let b1 = excitation.standard_deviations[Parameter::B1];
+//! println!("{} s of up to {:.2} N m tell b1 to {b1:.1e} m^2", 20.0, excitation.amplitude);
+//! assert!(excitation.amplitude <= 1.0 && excitation.tilt <= 0.2 * 1.01);
+//! # Ok(())
+//! # }
+//! ```
 
 pub mod log;
 pub mod noise;

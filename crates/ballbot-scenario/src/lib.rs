@@ -14,6 +14,7 @@
 //!     progress: &|_| (),
 //! })?;
 //! let end = trajectories[0].final_state;
+//! println!("phi = {:.3} rad after {} s", end[0], trajectories[0].final_time);
 //! assert!((end[0] - std::f64::consts::PI).abs() < 0.05, "phi has reached pi: {end}");
 //! # Ok(())
 //! # }

@@ -1,6 +1,13 @@
 //! The ballbot's closed loop for a browser: what JavaScript can call, and nothing that is not
 //! in [`ballbot_scenario`]. Angles in rad, rates in rad/s, torque in N m, times in s. Errors
 //! are messages for people.
+//!
+//! ```js
+//! const robot = new Simulation(setup, certificate); // a scenario file as an object
+//! for (let k = 0; k < 100; k += 1) robot.step();
+//! const [time, phi] = robot.row();
+//! console.log(`after ${time} s the ball has turned by ${phi} rad: ${robot.status()}`);
+//! ```
 
 mod from_js;
 mod page_files;

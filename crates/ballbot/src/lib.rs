@@ -7,6 +7,34 @@
 //! moves by x = r_b phi. Upright, a positive torque accelerates the body towards negative theta. It
 //! accelerates the ball of a rigid robot towards positive phi, but towards negative phi with the
 //! paper's parameters b*, which belong to no rigid body.
+//!
+//! ```
+//! use ballbot::{Ballbot, DriveFriction, Geometry, Wheels};
+//! use lpvmpc::LpvModel;
+//! use nalgebra::{Vector1, Vector3, Vector4};
+//!
+//! // A rigid robot: inertias per body mass in m^2, b4 in m^2/s, lengths in m.
+//! let robot = Ballbot {
+//!     b1: 0.0294,
+//!     b2: 0.01,
+//!     b3: 0.1487,
+//!     b4: 0.01,
+//!     drive: DriveFriction { viscous: 0.0, coulomb: 0.0 },
+//!     geometry: Geometry {
+//!         centre_of_mass: 0.2978,
+//!         ball_radius: 0.12,
+//!         wheel_radius: 0.05,
+//!         gravity: 9.81,
+//!     },
+//! };
+//! let tilted = Vector4::new(0.0, 0.1, 0.0, 0.0);
+//! let motion = robot.derivative(&tilted, &Vector1::new(0.0));
+//! println!("tilted by 0.1 rad it falls with {:.2} rad/s^2", motion[3]);
+//! assert!(motion[3] > 0.0);
+//!
+//! let motors = Wheels::<f64>::paper().motors(&Vector3::new(0.5, 0.0, 0.0));
+//! println!("0.5 N m along x are {:.3}, {:.3} and {:.3} N m", motors[0], motors[1], motors[2]);
+//! ```
 #![no_std]
 #![allow(
     clippy::neg_cmp_op_on_partial_ord,

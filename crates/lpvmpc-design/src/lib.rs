@@ -42,6 +42,7 @@
 //!
 //! let x = DVector::from_vec(vec![0.1, 0.0]); // 0.1 rad off
 //! let u = -&lqr.k * &x;
+//! println!("a torque of {:.2} N m", u[0]);
 //! assert!(u[0] < 0.0, "the torque brings the pendulum back");
 //! # Ok(())
 //! # }

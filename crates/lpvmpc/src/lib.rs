@@ -1,4 +1,52 @@
-//! Model predictive control for linear parameter-varying (LPV) models.
+//! Model predictive control for plants whose linear model changes as they move: linear
+//! parameter-varying (LPV) models x_dot = A(s) x + B(s) u with s = sigma(x). No std, no heap but with
+//! the feature `alloc`, bounded work, in `f32` or `f64`.
+//!
+//! A pendulum with a torque at its joint stands up from 0.8 rad:
+//!
+//! ```
+//! use lpvmpc::*;
+//! use nalgebra::{Matrix1, Matrix2, Vector1, Vector2};
+//!
+//! struct Pendulum; // x = (angle from upright [rad], rate [rad/s]), u = torque [N m]
+//! impl LpvModel<f64, 2, 1, 1> for Pendulum {
+//!     fn scheduling(&self, x: &Vector2<f64>) -> Vector1<f64> {
+//!         Vector1::new(if x[0] == 0.0 { 1.0 } else { x[0].sin() / x[0] })
+//!     }
+//!     fn matrices(&self, sinc: &Vector1<f64>) -> (Matrix2<f64>, Vector2<f64>) {
+//!         (Matrix2::new(0.0, 1.0, 9.81 * sinc[0], 0.0), Vector2::new(0.0, 1.0))
+//!     }
+//! }
+//! # fn main() -> Result<(), ControllerError> {
+//! let weights = Weights { q: Matrix2::identity(), r: Matrix1::new(0.1) };
+//! // Beyond the horizon of 30 samples of 0.05 s it costs what the regulator of the upright costs.
+//! let terminal = TerminalIngredient::Cost(Matrix2::new(147.006, 40.381, 40.381, 14.758));
+//! let torque = Bounds { lower: Vector1::new(-8.0), upper: Vector1::new(8.0) };
+//! let settings = ControllerSettings::new(0.05, 30, weights, terminal, torque);
+//! let mut controller = Controller::allocate(Pendulum, settings)?;
+//! let mut workspace = controller.workspace();
+//! let mut x = Vector2::new(0.8, 0.0);
+//! for _ in 0..100 {
+//!     let plan = controller.step(&x, &Reference::constant(Vector2::zeros()), &mut workspace);
+//!     x = Rk4 { substeps: 1 }.advance(&Pendulum, &x, &plan.first_input(), 0.05);
+//! }
+//! println!("after 5 s: {:.4} rad, {:.4} rad/s", x[0], x[1]);
+//! assert!(x.amax() < 0.01);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! | for | use |
+//! |---|---|
+//! | a plant | [`LpvModel`] |
+//! | a controller, on the heap or in lent memory | [`Controller`], [`ControllerSettings`], [`ControllerArrays`] |
+//! | one with a guarantee | [`GuardedController`] |
+//! | all that stands between sensors and actuators | [`OutputFeedback`], [`Regulator`], [`Estimator`] |
+//! | a linear-quadratic program with stages by itself | [`Ocp`], [`Solver`], [`kkt_residual`] |
+//!
+//! A larger plant is in the example `cart_pole` (`cargo run --release -p lpvmpc --example cart_pole`):
+//! a cart with a pole on a track with ends. Gains and terminal costs are designed with
+//! `lpvmpc-design`, worlds to try a controller in are in `lpvmpc-sim`.
 #![no_std]
 #![allow(
     clippy::neg_cmp_op_on_partial_ord,
