@@ -5,7 +5,7 @@
 #![no_std]
 #![no_main]
 
-use ballbot::RobotState;
+use ballbot::{RobotState, Wheels};
 use core::hint::black_box;
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -84,7 +84,10 @@ fn main() -> ! {
     ) else {
         board.stop()
     };
-    let Ok(mut regulator) = ROBOT.regulator(memory) else {
+    let Ok(wheels) = Wheels::of_paper(ROBOT.plane.zenith_angle) else {
+        board.stop() // the wheels make no sense
+    };
+    let Ok(mut regulator) = ROBOT.regulator(wheels, memory) else {
         board.stop() // the settings make no sense
     };
     peripherals.SYST.set_clock_source(SystClkSource::Core);

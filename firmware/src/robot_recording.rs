@@ -1,7 +1,7 @@
 //! A whole robot's settings and what its sensors deliver, as they stand in the flash.
 
 use crate::recording::{Descent, Recording};
-use crate::robot::{RobotMemory, RobotRegulator};
+use crate::robot::{PlaneMemory, RobotMemory, RobotRegulator};
 use ballbot::{
     Belief, Controller, Estimator, EstimatorSettings, Held, MotorLimits, OutputFeedback,
     RegulatorError, RobotState, Wheels, YawLaw,
@@ -57,53 +57,52 @@ pub struct RobotSettings {
 }
 
 impl RobotSettings {
-    /// The robot's regulator, in this memory.
+    /// The robot's regulator on these wheels, in this memory.
     ///
     /// # Errors
     /// Its settings make no sense.
     pub fn regulator(
         &self,
+        wheels: Wheels<f32>,
         memory: &'static mut RobotMemory,
     ) -> Result<RobotRegulator, RegulatorError> {
         let RobotMemory {
             planes: [x, y],
             workspace,
         } = memory;
-        let mut planes = [None, None];
-        for (place, memory) in planes.iter_mut().zip([x, y]) {
-            let settings = self.plane.with_descent(&self.descent, self.plane.substeps);
-            let controller =
-                Controller::new(self.plane.ballbot, settings, memory.controller.lend())?;
-            let estimator = Estimator::new(
-                self.plane.ballbot,
-                self.estimator(),
-                Vector4::zeros(),
-                memory.estimator.lend(),
-            )?;
-            let feedback = FeedbackSettings {
-                delay: self.delay,
-                period: self.period,
-                preview: true,
-                u: settings.u,
-            };
-            *place = Some(OutputFeedback::new(
-                Belief::Estimated(estimator),
-                Held::new(controller),
-                feedback,
-                memory.feedback.lend(),
-            ));
-        }
-        let [Some(x), Some(y)] = planes else {
-            unreachable!("both places were filled")
-        };
-        let wheels = Wheels::of_paper(self.plane.zenith_angle).unwrap_or(Wheels::paper());
         Ok(RobotRegulator::new(
-            [x, y],
+            [self.feedback(x)?, self.feedback(y)?],
             Workspace::new(workspace.lend()),
             wheels,
             self.limits,
             self.yaw,
             self.heading,
+        ))
+    }
+
+    /// One plane.
+    fn feedback(
+        &self,
+        memory: &'static mut PlaneMemory,
+    ) -> Result<OutputFeedback<f32, Held<f32>>, RegulatorError> {
+        let Recording {
+            ballbot, substeps, ..
+        } = self.plane;
+        let settings = self.plane.with_descent(&self.descent, substeps);
+        let controller = Controller::new(ballbot, settings, memory.controller.lend())?;
+        let start = Vector4::zeros();
+        let estimator = Estimator::new(ballbot, self.estimator(), start, memory.estimator.lend())?;
+        let feedback = FeedbackSettings {
+            delay: self.delay,
+            period: self.period,
+            preview: true,
+            u: settings.u,
+        };
+        Ok(OutputFeedback::new(
+            Belief::Estimated(estimator),
+            Held::new(controller),
+            feedback,
+            memory.feedback.lend(),
         ))
     }
 

@@ -4,9 +4,11 @@
     reason = "a test fails by panicking, in its helper functions too"
 )]
 
+use ballbot::{AnyPlanner, HEADING, PlanePlanner, RobotRegulator, RobotState, plane_feedback};
 use ballbot_scenario::{
     MotorsTable, Prepared, Record, Scenario, StateTable, Surroundings, WorldTable,
 };
+use lpvmpc::{Measurement, Reading, Regulator};
 use lpvmpc_sim::Ending;
 use std::path::Path;
 use std::time::Duration;
@@ -43,6 +45,56 @@ fn largest_motor(record: &Record) -> f64 {
     let samples = record.motors.as_ref().expect("they are shared");
     let torques = samples.iter().map(|sample| sample.torques.amax());
     torques.fold(0.0, f64::max)
+}
+
+/// A robot's regulator says what it decided for, and one that takes its place in mid-run goes on to
+/// the last bit.
+#[test]
+fn a_robot_s_regulator_tells_its_state_and_takes_over() {
+    let prepared = example().prepare(Path::new(".")).expect("valid");
+    let motors = prepared.motors.expect("given");
+    let plane = || {
+        let planner = PlanePlanner::Held(prepared.settings);
+        let (u, t_s) = (prepared.settings.u, prepared.settings.t_s);
+        plane_feedback(&prepared.ballbot, &planner, &prepared.feedback, &u, t_s).expect("valid")
+    };
+    let new = || {
+        let (law, heading) = (motors.turning.law, motors.turning.initial);
+        let planes = [plane(), plane()];
+        RobotRegulator::new(planes, (), prepared.wheels, motors.limits, law, heading)
+    };
+    let state =
+        |k: usize| RobotState::from_fn(|i, _| 0.02 * ((1 + i) as f64 * 0.3 * k as f64).sin());
+    let reference = |t: f64| {
+        let mut state = RobotState::zeros();
+        (state[0], state[4], state[HEADING]) = (1.0 + 0.1 * t, -0.5, 0.3 * t);
+        state
+    };
+    let decide = |regulator: &mut RobotRegulator<f64, AnyPlanner<f64>>, k: usize| {
+        let x = state(k);
+        let observation = regulator.observe(&Measurement {
+            t: k as f64 * prepared.settings.t_s,
+            readings: std::array::from_fn(|i| Some(Reading::fresh(x[i]))),
+        });
+        assert!(observation.verdicts.iter().all(|verdict| verdict.is_used()));
+        let command = regulator.decide(&reference);
+        assert_eq!(command.estimate, x, "{k}");
+        assert!(
+            command.u.amax() <= motors.limits.motor,
+            "{k}: {}",
+            command.u
+        );
+        command
+    };
+    let mut alone = new();
+    let mut handed = new();
+    for k in 0..12 {
+        let expected = decide(&mut alone, k);
+        assert_eq!(decide(&mut handed, k), expected, "{k}");
+        let mut next = new();
+        next.take_over(&handed);
+        handed = next;
+    }
 }
 
 #[test]

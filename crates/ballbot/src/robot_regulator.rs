@@ -200,16 +200,24 @@ impl<T: Scalar, K: Planner<T, 4, 1>> Regulator<T, 10, 3, 10> for RobotRegulator<
         self.decide_plane(1 - first, left.rest(taken), reference);
 
         let commands = || self.commands.iter().flatten();
+        let (mut estimate, mut gap) = (RobotState::zeros(), RobotState::zeros());
+        let places = estimate.as_mut_slice().chunks_exact_mut(4);
+        let places = places.zip(gap.as_mut_slice().chunks_exact_mut(4));
+        for ((estimate, gap), command) in places.zip(commands()) {
+            estimate.copy_from_slice(command.estimate.as_slice());
+            gap.copy_from_slice(command.gap.as_slice());
+        }
+        (estimate[HEADING], estimate[HEADING + 1]) = (self.heading[0], self.heading[1]);
         let worse = |a: Status<T>, b: Status<T>| if a.is_solved() { b } else { a };
         Command {
             u: self.motor_torques(),
-            estimate: RobotState::zeros(),
+            estimate,
             x_ref,
             status: commands()
                 .map(|command| command.status)
                 .fold(Status::Solved, worse),
             active_bounds: commands().map(|command| command.active_bounds).sum(),
-            gap: RobotState::zeros(),
+            gap,
             guard: commands().find_map(|command| command.guard),
         }
     }

@@ -18,16 +18,13 @@ mod search;
 mod settings;
 mod take_over;
 mod tube;
+mod workspace;
 
 use crate::list::List;
-#[cfg(feature = "alloc")]
-use crate::memory::Capacity;
 use crate::model::{LpvModel, Scalar};
-use crate::ocp::Ocp;
 #[cfg(feature = "alloc")]
 use crate::settings::LONGEST_HORIZON;
-use crate::solution::{ActiveSet, BoundId, Quantity, Side, Solution, Status};
-use crate::solver::Solver;
+use crate::solution::{BoundId, Quantity, Side, Status};
 use aim::Aims;
 pub use aim::SetPoints;
 use core::fmt;
@@ -39,6 +36,7 @@ use program::Slope;
 pub use settings::{
     GuardedError, GuardedIterations, GuardedSettings, Rollout, TerminalSet, share_of_bounds,
 };
+pub use workspace::GuardedWorkspace;
 
 /// What the applied input is backed by, from the strongest to the weakest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -92,62 +90,6 @@ pub struct GuardedStep<T, const NX: usize, const NU: usize> {
     pub gap: SVector<T, NX>,
     /// What the last quadratic program said.
     pub status: Status<T>,
-}
-
-/// Scratch memory of a guarded step; may be shared between controllers that run one after the
-/// other. The quadratic program of a controller with `NX` states has `NA` = `NX` + 1: the set point is
-/// the last one.
-#[derive(Debug)]
-#[cfg_attr(feature = "alloc", derive(Clone))]
-pub struct GuardedWorkspace<T: 'static, const NU: usize, const NA: usize> {
-    ocp: Ocp<T, NA, NU>,
-    solver: Solver<T, NA, NU>,
-    solution: Solution<T, NA, NU>,
-}
-
-impl<T: Scalar, const NU: usize, const NA: usize> GuardedWorkspace<T, NU, NA> {
-    /// A workspace in this memory.
-    pub fn new(memory: GuardedWorkspaceMemory<T, NU, NA>) -> Self {
-        let GuardedWorkspaceMemory {
-            stages,
-            own,
-            solver,
-            u,
-            x,
-            active,
-        } = memory;
-        Self {
-            ocp: Ocp {
-                own,
-                ..Ocp::new(stages)
-            },
-            solver: Solver::new(solver),
-            solution: Solution::new(u, x, active),
-        }
-    }
-
-    /// A workspace with memory of its own, for controllers with these or smaller
-    /// [capacities](GuardedSettings::capacity).
-    #[cfg(feature = "alloc")]
-    pub fn allocate(capacity: Capacity) -> Self {
-        Self::new(GuardedWorkspaceMemory::allocate(capacity))
-    }
-
-    /// The rows that are active in the last quadratic program: the warm start of the next one.
-    pub fn warm_start(&self) -> &ActiveSet<T> {
-        &self.solution.active
-    }
-
-    /// Takes another warm start for the next quadratic program.
-    pub fn set_warm_start(&mut self, active: &ActiveSet<T>) {
-        self.solution.active.copy_from(active);
-    }
-
-    /// Bounds that are active in the last quadratic program, edges of terminal set and trust
-    /// region included.
-    pub fn active_bounds(&self) -> usize {
-        self.solution.active.len()
-    }
 }
 
 /// LPV MPC to set points with guaranteed bounds and convergence, for `NX` states, `NU` inputs and `NS`

@@ -1,6 +1,8 @@
 //! A small campaign: what is guaranteed holds, and the negative control fails.
 
+use ballbot_scenario::Scenario;
 use ballbot_studies::{Campaign, Outcome, Scenarios, Variant};
+use std::path::Path;
 
 const SMALL: Campaign = Campaign {
     runs: 200,
@@ -15,6 +17,23 @@ fn of(outcomes: &[Outcome], wanted: impl Fn(&Variant) -> bool) -> &Outcome {
         .iter()
         .find(|outcome| wanted(&outcome.variant))
         .unwrap()
+}
+
+/// Of any horizon that a scenario may have.
+#[test]
+fn a_campaign_runs_at_the_scenario_s_own_horizon() {
+    let mut scenario = Scenario::load("far-setpoints").unwrap();
+    scenario.controller.horizon = 80;
+    let prepared = scenario.prepare(Path::new(".")).unwrap();
+    let few = Campaign {
+        runs: 2,
+        other_runs: 1,
+        samples: 10,
+        ..SMALL
+    };
+    let outcomes = few.run(&Scenarios::of(prepared).unwrap(), &|_| ()).unwrap();
+    let nominal = of(&outcomes, |variant| *variant == Variant::Nominal).tally;
+    assert_eq!((nominal.total.samples, nominal.broken_promises()), (20, 0));
 }
 
 #[test]

@@ -71,8 +71,7 @@ pub trait Planner<T: Scalar, const NX: usize, const NU: usize> {
     /// Forgets the last plan: the next one is made without it.
     fn forget_plan(&mut self);
 
-    /// Goes on from the plan of another planner, whose plant was last commanded the input
-    /// `commanded`.
+    /// Goes on from the plan of another planner, whose input is `commanded` at the next sample.
     fn take_over(&mut self, previous: &Self, commanded: &SVector<T, NU>);
 
     /// The largest magnitude of each input that the last plan commands beside the `disturbance`;

@@ -104,7 +104,10 @@ fn regulate(
     memory: &'static mut RobotMemory,
     counter: &mut InstructionCounter,
 ) -> u32 {
-    let mut regulator = match recording.robot.regulator(memory) {
+    let Ok(wheels) = Wheels::of_paper(recording.robot.plane.zenith_angle) else {
+        failure::stop()
+    };
+    let mut regulator = match recording.robot.regulator(wheels, memory) {
         Ok(regulator) => regulator,
         Err(error) => {
             hprintln!("{}: {error}", recording.robot.plane.name);
