@@ -41,7 +41,7 @@ impl<T: Scalar, const NU: usize, const NA: usize> GuardedWorkspace<T, NU, NA> {
     }
 
     /// A workspace with memory of its own, for controllers with these or smaller
-    /// [capacities](GuardedSettings::capacity).
+    /// [capacities](super::GuardedSettings::capacity).
     #[cfg(feature = "alloc")]
     pub fn allocate(capacity: Capacity) -> Self {
         Self::new(GuardedWorkspaceMemory::allocate(capacity))
