@@ -220,14 +220,7 @@ impl Identification {
     /// p of the fitted robot, its drive friction included.
     pub fn linear_parameters(&self) -> Option<LinearParameters<f64>> {
         let (a, b) = linear_model(&self.estimate.values, self.geometry)?;
-        Some(LinearParameters {
-            p1: a[(2, 1)],
-            p2: a[(2, 2)],
-            p3: b[2],
-            p4: a[(3, 1)],
-            p5: a[(3, 2)],
-            p6: b[3],
-        })
+        Some(LinearParameters::of_matrices(&a, &b))
     }
 
     /// The residuals' spread over the noise that the sensors have by themselves.

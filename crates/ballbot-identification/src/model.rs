@@ -5,8 +5,9 @@ use crate::line::Line;
 use crate::log::{BallAngle, Run};
 use crate::parameter::{Parameter, Values};
 use ballbot::{Ballbot, DriveFriction, Geometry};
+use lpvmpc::Rk4;
 use lpvmpc_design::ShootingModel;
-use nalgebra::{Vector3, Vector4};
+use nalgebra::{Vector1, Vector3, Vector4};
 
 /// The longest step of the integration, s. The fastest mode of a robot whose body weighs more than
 /// its ball is slower than 1 kHz: one step is well within the stability limit, and for the 50 1/s
@@ -41,12 +42,12 @@ impl Robot {
         }
     }
 
-    /// x_dot at the state (phi, theta, phi_dot, theta_dot) under a torque that acts, N m.
+    /// The torque that acts on the plant where `torque` (N m) is logged, N m.
     #[inline(always)]
-    pub fn f(&self, x: &Vector4<f64>, torque: f64) -> Vector4<f64> {
-        let driving =
-            self.values[Parameter::TorqueGain] * (torque + self.values[Parameter::TorqueBias]);
-        self.plant.f(x, driving)
+    pub(crate) fn driving(&self, torque: f64) -> Vector1<f64> {
+        Vector1::new(
+            self.values[Parameter::TorqueGain] * (torque + self.values[Parameter::TorqueBias]),
+        )
     }
 
     /// The state `duration` seconds later under a constant torque: one Runge-Kutta step of order 4.
@@ -56,8 +57,7 @@ impl Robot {
         next
     }
 
-    /// [`Robot::step`] of several robots. Each waits for its own results most of the time; stage by
-    /// stage the processor works on the others meanwhile.
+    /// [`Robot::step`] of several robots.
     #[inline(always)]
     fn step_each<const LANES: usize>(
         robots: [&Self; LANES],
@@ -65,23 +65,14 @@ impl Robot {
         torque: [f64; LANES],
         duration: f64,
     ) -> [Vector4<f64>; LANES] {
-        // Loops: the closures of array::from_fn are not inlined.
-        let (mut slope, mut sum) = ([Vector4::zeros(); LANES], [Vector4::zeros(); LANES]);
-        for (time, weight) in [
-            (0.0, 1.0),
-            (0.5 * duration, 2.0),
-            (0.5 * duration, 2.0),
-            (duration, 1.0),
-        ] {
-            for (i, robot) in robots.iter().enumerate() {
-                slope[i] = robot.f(&(x[i] + slope[i] * time), torque[i]);
-                sum[i] += slope[i] * weight;
-            }
-        }
         let mut next = *x;
-        for (next, sum) in next.iter_mut().zip(&sum) {
-            *next += sum * (duration / 6.0);
+        let mut driving = [Vector1::zeros(); LANES];
+        // A loop: the closures of array::from_fn are not inlined.
+        for i in 0..LANES {
+            driving[i] = robots[i].driving(torque[i]);
         }
+        let plants = robots.map(|robot| &robot.plant);
+        Rk4::step_each(plants, &mut next, driving.each_ref(), duration);
         next
     }
 

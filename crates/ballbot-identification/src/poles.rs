@@ -26,7 +26,7 @@ pub fn linear_model(
     values[Parameter::DriveCoulomb] = 0.0;
     values[Parameter::TorqueBias] = 0.0;
     let robot = Robot::new(values, geometry);
-    let f = |x: &Vector4<f64>, u: &SVector<f64, 1>| robot.f(x, u[0]);
+    let f = |x: &Vector4<f64>, u: &SVector<f64, 1>| robot.plant.f(x, robot.driving(u[0])[0]);
     let linear = linearize(f, &Vector4::zeros(), &SVector::zeros()).ok()?;
     Some((linear.a, linear.b))
 }

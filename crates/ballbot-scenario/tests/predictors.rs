@@ -83,7 +83,7 @@ fn a_plan_of_many_programs_ends_in_the_set_point() {
         assert!(solution.status.is_solved());
         let mut x = Vector4::zeros();
         for (u, planned) in solution.u.iter().zip(controller.rollout()) {
-            x = FINE.advance(&Ballbot::paper(), &x, u, 0.05);
+            x = FINE.advance(&Ballbot::<f64>::paper(), &x, u, 0.05);
             assert!((x - planned).amax() < 1e-8);
         }
         assert!((x - Vector4::new(phi, 0.0, 0.0, 0.0)).amax() < 1e-5, "{x}");

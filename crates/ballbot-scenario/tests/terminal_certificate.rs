@@ -5,10 +5,10 @@
 )]
 
 use ballbot_scenario::{RobotTable, Scenario, TerminalCertificate, builtin};
-use lpvmpc::LpvModel;
+use lpvmpc::{Embedding, Number};
 use lpvmpc_certificate::{
-    AnalyticModel, CertificateProblem, Interval, MOST_BOXES, TaylorModel, TerminalProblem,
-    certify_terminal, synthesize_terminal,
+    CertificateProblem, Interval, MOST_BOXES, TaylorModel, TerminalProblem, certify_terminal,
+    synthesize_terminal,
 };
 use lpvmpc_design::{SchedulingGrid, zero_order_hold};
 use lpvmpc_sim::{Tolerances, advance};
@@ -92,16 +92,21 @@ fn the_robot_does_not_notice_where_it_stands() {
     let mut table = certificate().plant;
     for friction in [0.0, 1e-3] {
         table.drive_friction_m2_s = friction;
-        let x: [TaylorModel<4>; 4] = std::array::from_fn(|i| TaylorModel::symbol(0.0, 1e3, i));
-        for entry in AnalyticModel::scheduling(&table, &x) {
+        let x: Vector4<TaylorModel<4>> = Vector4::from_fn(|i, _| TaylorModel::symbol(0.0, 1e3, i));
+        let torque = Vector1::new(TaylorModel::constant(0.0));
+        for entry in Embedding::scheduling(&table, &x, &torque).iter() {
             assert_eq!(
                 (entry.slopes[0], entry.squares[0], entry.error),
                 (0.0, [0.0; 4], 0.0)
             );
         }
         let schedulings = [FRAC_PI_3, 2.0 * PI].map(|limit| Interval::new(-limit, limit));
-        let (a, _) = AnalyticModel::matrices(&table, &schedulings);
-        assert!(a.iter().all(|row| row[0] == Interval::point(0.0)));
+        let (a, _) = Embedding::matrices(&table, &Vector2::from(schedulings));
+        assert!(
+            a.column(0)
+                .iter()
+                .all(|entry| *entry == Interval::point(0.0))
+        );
     }
 }
 
@@ -126,14 +131,14 @@ fn the_intervals_hold_the_robots_matrices() {
     let table = certificate().plant;
     for (theta, rate) in [(0.0, 0.0), (0.1, -2.0), (-0.9, 6.0), (1.0, 1.0)] {
         let (a, b) = table.ballbot().matrices(&Vector2::new(theta, rate));
-        let (rows, input) = table.matrices(&[Interval::point(theta), Interval::point(rate)]);
+        let (rows, input) = table.matrices(&Vector2::new(theta, rate).map(Interval::point));
         for i in 0..4 {
             // The plain numbers have roundings of their own.
             let near = |range: Interval, value: f64| {
                 (range.middle() - value).abs() <= 1e-12 * (1.0 + value.abs())
             };
-            assert!((0..4).all(|j| near(rows[i][j], a[(i, j)])));
-            assert!(near(input[i][0], b[i]));
+            assert!((0..4).all(|j| near(rows[(i, j)], a[(i, j)])));
+            assert!(near(input[i], b[i]));
         }
     }
 }
@@ -197,6 +202,6 @@ fn true_on_the_grid_and_false_between_is_rejected() {
         worst(grid(43))
     );
     // There is no proof of what is false, with any number of boxes.
-    let refused = certify_terminal((&robot, table), &problem, 3000, &|_| ());
+    let refused = certify_terminal(table, &problem, 3000, &|_| ());
     assert!(refused.is_err());
 }

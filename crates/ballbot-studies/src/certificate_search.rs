@@ -71,7 +71,7 @@ impl CertificateSearch<'_> {
             Some(size) => (size, self.certify(robot, size, progress)?),
             None => self.search(robot, progress)?,
         };
-        Ok(self.raise(robot, size, certified, progress))
+        Ok(self.raise(size, certified, progress))
     }
 
     /// A larger box of tilts allows a larger set, up to where the law has to cope with so many plants
@@ -87,7 +87,7 @@ impl CertificateSearch<'_> {
             .enumerate()
             .map(|(done, size)| {
                 progress(Searching::Designing(done as f64 / SIZES as f64));
-                let design = self.problem(size).design(&robot.ballbot());
+                let design = self.problem(size).design(&robot);
                 (size, design.map_or(f64::NEG_INFINITY, |set| set.log_det()))
             })
             .collect();
@@ -151,7 +151,7 @@ impl CertificateSearch<'_> {
         progress: &(dyn Fn(Searching) + Sync),
     ) -> Result<Certified, CertifyError> {
         let problem = self.problem(size);
-        certify_terminal((&robot.ballbot(), robot), &problem, self.boxes, &|done| {
+        certify_terminal(robot, &problem, self.boxes, &|done| {
             progress(Searching::Proving { size, done });
         })
     }
@@ -159,7 +159,6 @@ impl CertificateSearch<'_> {
     /// The certificate with the highest level that was tried and proved.
     fn raise(
         &self,
-        robot: RobotTable,
         size: f64,
         certified: Certified,
         progress: &(dyn Fn(Searching) + Sync),
@@ -169,17 +168,11 @@ impl CertificateSearch<'_> {
             most_boxes: self.boxes,
         };
         let problem = self.problem(size);
-        raise_level(
-            &robot.ballbot(),
-            &problem,
-            certified,
-            effort,
-            &|trial, done| {
-                progress(Searching::Raising(
-                    (trial as f64 + done) / self.trials.max(1) as f64,
-                ));
-            },
-        )
+        raise_level(&problem, certified, effort, &|trial, done| {
+            progress(Searching::Raising(
+                (trial as f64 + done) / self.trials.max(1) as f64,
+            ));
+        })
     }
 }
 

@@ -64,8 +64,8 @@ pub enum ModelError {
 struct Embedded(Ballbot<f64>);
 
 impl LpvModel<f64, 4, 1, 3> for Embedded {
-    fn scheduling(&self, x: &Vector4<f64>) -> Vector3<f64> {
-        self.0.scheduling(x)
+    fn scheduling(&self, x: &Vector4<f64>, u: &Vector1<f64>) -> Vector3<f64> {
+        self.0.scheduling(x, u)
     }
 
     fn matrices(&self, scheduling: &Vector3<f64>) -> (Matrix4<f64>, Vector4<f64>) {
@@ -77,7 +77,7 @@ impl LpvModel<f64, 4, 1, 3> for Embedded {
 struct Linearised(Ballbot<f64>);
 
 impl LpvModel<f64, 4, 1, 3> for Linearised {
-    fn scheduling(&self, _x: &Vector4<f64>) -> Vector3<f64> {
+    fn scheduling(&self, _x: &Vector4<f64>, _: &Vector1<f64>) -> Vector3<f64> {
         Vector3::zeros()
     }
 

@@ -7,7 +7,7 @@
 
 use crate::parameters::Ballbot;
 use core::fmt;
-use lpvmpc::Scalar;
+use lpvmpc::{Number, Scalar};
 
 /// The verdict on a set of parameters b over a range of tilts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,14 +30,14 @@ pub struct Consistency<T> {
     pub body_inertia: (T, T),
 }
 
-impl<T: Scalar> Ballbot<T> {
+impl<T: Scalar + Number> Ballbot<T> {
     /// Checks the parameters against mechanics for |theta| <= `tilt` (rad). From pi on, and for
     /// what is no number, that is the whole circle.
     pub fn consistency(&self, tilt: T) -> Consistency<T> {
         let tilt = if tilt.abs() < T::pi() { tilt } else { T::pi() };
         // k grows with |theta|, so |k| is extreme at the ends of the range or at a zero of k.
         let upright = self.coupling(T::one());
-        let tilted = self.coupling(tilt.cos());
+        let tilted = self.coupling(Number::cos(tilt));
         let ends = (self.determinant(upright), self.determinant(tilted));
         let smallest = ends.0.min(ends.1);
         let crosses_zero = upright * tilted <= T::zero();

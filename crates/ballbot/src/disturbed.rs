@@ -1,8 +1,8 @@
 //! The ballbot where it really stands: on a slope, with its mass off centre, pushed.
 
+use crate::dynamics::Attitude;
 use crate::parameters::Ballbot;
-use crate::trigonometry::sin_cos;
-use lpvmpc::Scalar;
+use lpvmpc::{Number, Scalar};
 use nalgebra::{Vector2, Vector4};
 
 /// A ballbot on a floor that may be inclined, whose centre of mass may lie off its axis.
@@ -23,7 +23,7 @@ pub struct Disturbed<T> {
     pub tilt_offset: T,
 }
 
-impl<T: Scalar> Disturbed<T> {
+impl<T: Scalar + Number> Disturbed<T> {
     /// `ballbot` on a level floor, well balanced.
     pub fn level(ballbot: Ballbot<T>) -> Self {
         Self {
@@ -40,31 +40,33 @@ impl<T: Scalar> Disturbed<T> {
     /// positive towards positive theta). A horizontal push f at the height h above the ball's
     /// centre is (f, f h cos(theta)).
     pub fn f(&self, x: &Vector4<T>, torque: T, load: &Vector2<T>) -> Vector4<T> {
-        let (phi_dot, theta_dot) = (x[2], x[3]);
         let Self { ballbot, .. } = self;
         let geometry = &ballbot.geometry;
         let lean = x[1] + self.tilt_offset;
-        let (sin_lean, _) = sin_cos(lean);
         // Between the body's axis and the normal of the floor.
-        let (sin_normal, cos_normal) = sin_cos(lean + self.slope);
-        let (sin_slope, _) = sin_cos(self.slope);
-        let arm = geometry.centre_of_mass * geometry.ball_radius;
-        let drive = ballbot.driving_force(torque, phi_dot - theta_dot);
-        let downhill = self.total_mass * geometry.gravity * geometry.ball_radius * sin_slope;
-        let force_phi =
-            drive + arm * sin_normal * theta_dot * theta_dot - ballbot.b4 * phi_dot - downhill
-                + geometry.ball_radius * load[0];
-        let force_theta = geometry.centre_of_mass * geometry.gravity * sin_lean - drive + load[1];
-        let coupling = ballbot.coupling(cos_normal);
-        let [phi_ddot, theta_ddot] = ballbot.accelerate(coupling, force_phi, force_theta);
-        Vector4::new(phi_dot, theta_dot, phi_ddot, theta_ddot)
+        let (sin_normal, cos_normal) = Number::sin_cos(lean + self.slope);
+        let attitude = Attitude {
+            sin_lean: Number::sin(lean),
+            sin_normal,
+            cos_normal,
+        };
+        let drive = ballbot.driving_force(torque, x[2] - x[3]);
+        let [force_phi, force_theta] = ballbot.forces(&attitude, x, drive);
+        let downhill =
+            self.total_mass * geometry.gravity * geometry.ball_radius * Number::sin(self.slope);
+        let [phi_ddot, theta_ddot] = ballbot.accelerate(
+            ballbot.coupling(cos_normal),
+            force_phi - downhill + geometry.ball_radius * load[0],
+            force_theta + load[1],
+        );
+        Vector4::new(x[2], x[3], phi_ddot, theta_ddot)
     }
 
     /// The state and torque at which the robot rests at `phi` (rad) on its slope without load:
     /// ((phi, theta, 0, 0), torque in N m); `None` if the slope is too steep for that.
     pub fn rest(&self, phi: T) -> Option<(Vector4<T>, T)> {
         let geometry = &self.ballbot.geometry;
-        let downhill = self.total_mass * geometry.ball_radius * self.slope.sin();
+        let downhill = self.total_mass * geometry.ball_radius * Number::sin(self.slope);
         // drive = downhill g on the ball, and l g sin(lean) on the body.
         let sin_lean = downhill / geometry.centre_of_mass;
         let (zero, one) = (T::zero(), T::one());

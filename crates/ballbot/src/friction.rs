@@ -1,7 +1,6 @@
 //! Friction in the drive, between body and ball.
 
-use lpvmpc::Scalar;
-use nalgebra::convert;
+use lpvmpc::Number;
 
 /// The drive's friction against phi_dot - theta_dot, per unit of body mass. Like the torque it
 /// acts on ball and body through [1, -1], in the generalised forces of eq. (1). The paper's robot
@@ -27,19 +26,19 @@ pub struct DriveFriction<T> {
 /// 0.25 rad/s it has 98 %.
 pub const CREEP_SPEED: f64 = 0.05;
 
-impl<T: Scalar> DriveFriction<T> {
+impl<T: Number> DriveFriction<T> {
     /// A drive without friction.
     pub fn none() -> Self {
         Self {
-            viscous: T::zero(),
-            coulomb: T::zero(),
+            viscous: T::constant(0.0),
+            coulomb: T::constant(0.0),
         }
     }
 
     /// Whether there is none: such robots pay for this question alone.
     #[inline(always)]
     pub(crate) fn is_none(&self) -> bool {
-        self.viscous == T::zero() && self.coulomb == T::zero()
+        self.viscous == T::constant(0.0) && self.coulomb == T::constant(0.0)
     }
 
     /// F(v)/v at the speed `speed` = phi_dot - theta_dot in rad/s: m^2/s.
@@ -48,10 +47,10 @@ impl<T: Scalar> DriveFriction<T> {
     #[cold]
     #[inline(never)]
     pub fn coefficient(self, speed: T) -> T {
-        if self.coulomb == T::zero() {
+        if self.coulomb == T::constant(0.0) {
             return self.viscous;
         }
-        let creep: T = convert(CREEP_SPEED);
+        let creep = T::constant(CREEP_SPEED);
         self.viscous + self.coulomb / (speed * speed + creep * creep).sqrt()
     }
 }

@@ -55,15 +55,13 @@ mod regulator;
 mod regulator_error;
 mod robot_regulator;
 mod shares;
-mod trigonometry;
 mod wheels;
 
 pub use consistency::Consistency;
 pub use disturbed::Disturbed;
-pub use embedding::{Accelerations, Tilt};
 pub use friction::{CREEP_SPEED, DriveFriction};
 pub use heading::Heading;
-pub use parameters::{Ballbot, Field, Geometry, LinearParameters, limits};
+pub use parameters::{Ballbot, Geometry, LinearParameters, limits};
 #[cfg(feature = "alloc")]
 pub use plane_regulator::{PlaneFeedback, PlanePlanner, PlaneRegulator, plane_feedback};
 pub use regulator::{

@@ -4,8 +4,7 @@
 //! Predictive Control for Reference Tracking with Linear Parameter-Varying Embedding".
 
 use crate::friction::DriveFriction;
-use core::ops::{Add, Div, Mul, Neg, Sub};
-use lpvmpc::Scalar;
+use lpvmpc::{Number, Scalar};
 use nalgebra::convert;
 
 /// Lengths and gravity (the paper's Table of p).
@@ -64,7 +63,7 @@ pub struct Ballbot<T> {
     pub geometry: Geometry<T>,
 }
 
-impl<T: Scalar> Ballbot<T> {
+impl<T: Scalar + Number> Ballbot<T> {
     /// The paper's refined parameters b*, as printed.
     pub fn paper() -> Self {
         Self {
@@ -74,6 +73,36 @@ impl<T: Scalar> Ballbot<T> {
             b4: convert(-0.07436),
             drive: DriveFriction::none(),
             geometry: Geometry::paper(),
+        }
+    }
+
+    /// The same robot with parameters of another kind of number.
+    #[inline(always)]
+    pub fn over<N: Number>(&self) -> Ballbot<N> {
+        let over = |value: T| N::constant(value.to_subset_unchecked());
+        let Self {
+            b1,
+            b2,
+            b3,
+            b4,
+            drive,
+            geometry,
+        } = *self;
+        Ballbot {
+            b1: over(b1),
+            b2: over(b2),
+            b3: over(b3),
+            b4: over(b4),
+            drive: DriveFriction {
+                viscous: over(drive.viscous),
+                coulomb: over(drive.coulomb),
+            },
+            geometry: Geometry {
+                centre_of_mass: over(geometry.centre_of_mass),
+                ball_radius: over(geometry.ball_radius),
+                wheel_radius: over(geometry.wheel_radius),
+                gravity: over(geometry.gravity),
+            },
         }
     }
 
@@ -90,30 +119,22 @@ impl<T: Scalar> Ballbot<T> {
     }
 }
 
-/// What the equations of motion ask of their numbers.
-pub trait Field:
-    Copy
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
-{
-}
-impl<T> Field for T where
-    T: Copy
-        + Add<Output = T>
-        + Sub<Output = T>
-        + Mul<Output = T>
-        + Div<Output = T>
-        + Neg<Output = T>
-{
-}
-
-impl<T: Field> Ballbot<T> {
+impl<T: Number> Ballbot<T> {
     /// k(theta) = b2 - l r_b cos(theta), m^2: minus the off-diagonal entry of M.
     pub(crate) fn coupling(&self, cos_theta: T) -> T {
-        self.b2 - self.geometry.centre_of_mass * self.geometry.ball_radius * cos_theta
+        self.b2 - self.arm() * cos_theta
+    }
+
+    /// l r_b, m^2.
+    #[inline(always)]
+    pub(crate) fn arm(&self) -> T {
+        self.geometry.centre_of_mass * self.geometry.ball_radius
+    }
+
+    /// l g, m^2/s^2: what gravity pulls the body with, per sin(theta).
+    #[inline(always)]
+    pub(crate) fn pull(&self) -> T {
+        self.geometry.centre_of_mass * self.geometry.gravity
     }
 
     /// d = det M = b1 b3 - k^2, m^4.

@@ -4,7 +4,9 @@ use crate::heading::Heading;
 use crate::regulator::OutputFeedback;
 use crate::shares::PlaneTorques;
 use crate::wheels::Wheels;
-use lpvmpc::{Command, Measurement, Observation, Planner, Regulator, Scalar, Status, Verdict};
+use lpvmpc::{
+    Command, Measurement, Number, Observation, Planner, Regulator, Scalar, Status, Verdict,
+};
 use nalgebra::{SVector, Vector1, Vector2, Vector3, Vector4, convert};
 
 /// The x plane's state, the y plane's, the heading (rad) and its rate (rad/s).
@@ -27,7 +29,7 @@ pub struct MotorLimits<T> {
     pub yaw: T,
 }
 
-impl<T: Scalar> MotorLimits<T> {
+impl<T: Scalar + Number> MotorLimits<T> {
     /// What is left for the planes under the largest yaw torque.
     pub fn left(&self, wheels: &Wheels<T>) -> PlaneTorques<T> {
         wheels.plane_torques(self.motor, self.yaw)
@@ -59,7 +61,7 @@ impl<T: Scalar> YawLaw<T> {
 /// the other one, within what the motors have left. Both planners work in one workspace.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
-pub struct RobotRegulator<T: Scalar, K: Planner<T, 4, 1>> {
+pub struct RobotRegulator<T: Scalar + Number, K: Planner<T, 4, 1>> {
     planes: [OutputFeedback<T, K>; 2],
     workspace: K::Workspace,
     wheels: Wheels<T>,
@@ -77,7 +79,7 @@ pub struct RobotRegulator<T: Scalar, K: Planner<T, 4, 1>> {
     commands: [Option<Command<T, 4, 1>>; 2],
 }
 
-impl<T: Scalar, K: Planner<T, 4, 1>> RobotRegulator<T, K> {
+impl<T: Scalar + Number, K: Planner<T, 4, 1>> RobotRegulator<T, K> {
     /// The regulator of a robot that is expected to look along `heading`, rad.
     pub fn new(
         planes: [OutputFeedback<T, K>; 2],
@@ -147,7 +149,7 @@ impl<T: Scalar, K: Planner<T, 4, 1>> RobotRegulator<T, K> {
     }
 }
 
-impl<T: Scalar, K: Planner<T, 4, 1>> Regulator<T, 10, 3, 10> for RobotRegulator<T, K> {
+impl<T: Scalar + Number, K: Planner<T, 4, 1>> Regulator<T, 10, 3, 10> for RobotRegulator<T, K> {
     fn t_s(&self) -> T {
         let [x, _] = &self.planes;
         x.t_s()

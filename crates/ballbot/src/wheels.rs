@@ -2,8 +2,7 @@
 //! Eq. (6) of the paper is a special case.
 
 use crate::shares::PlaneTorques;
-use crate::trigonometry::sin_cos;
-use lpvmpc::Scalar;
+use lpvmpc::{Number, Scalar};
 use nalgebra::{Matrix3, SVector, Vector2, Vector3, convert};
 
 /// Where a wheel stands, and which way it turns.
@@ -84,7 +83,7 @@ const LEAST_VOLUME: f64 = 0.05;
 /// Azimuths of the wheels of eq. (6), degrees: where the robot's x axis is that of its x plane.
 pub const AZIMUTHS_OF_PAPER_DEG: [f64; 3] = [-90.0, 30.0, 150.0];
 
-impl<T: Scalar> Wheels<T> {
+impl<T: Scalar + Number> Wheels<T> {
     /// Wheels whose contact points lie `zenith_angle` rad away from the top of the ball.
     ///
     /// # Errors
@@ -95,7 +94,7 @@ impl<T: Scalar> Wheels<T> {
             return Err(BadWheels::Azimuths(azimuths));
         }
         let directions = wheels.map(|wheel| {
-            let (sin, cos) = sin_cos(wheel.azimuth);
+            let (sin, cos) = Number::sin_cos(wheel.azimuth);
             let sense = if wheel.reversed { -T::one() } else { T::one() };
             Vector3::new(cos, sin, T::one()) * sense
         });
@@ -122,7 +121,7 @@ impl<T: Scalar> Wheels<T> {
     fn along(zenith_angle: T, directions: [Vector3<T>; 3]) -> Self {
         let [a, b, c] = directions;
         let volume = volume(&directions);
-        let (sin, cos) = sin_cos(zenith_angle);
+        let (sin, cos) = Number::sin_cos(zenith_angle);
         // Rows of the inverse of a matrix with the columns a, b, c: their cross products.
         let row = |cross: Vector3<T>| {
             let [x, y, z] = (cross / volume).into();

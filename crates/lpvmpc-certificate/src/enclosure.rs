@@ -1,6 +1,6 @@
 //! Validated numerics: enclosures that hold in spite of rounding.
 //!
-//! A model's formulas, written once over [`Arithmetic`], are evaluated on [`Interval`]s (all
+//! A model's formulas, written once over [`lpvmpc::Number`], are evaluated on [`Interval`]s (all
 //! values in a range), on [`TaylorModel`]s (all values over a box, with their dependence on the
 //! box) and on power series of either (the motion over time).
 
@@ -13,9 +13,9 @@ mod series;
 mod taylor_map;
 mod taylor_model;
 
-pub use elementary::{Arithmetic, Elementary};
+pub use elementary::Arithmetic;
 pub(crate) use flow::product;
-pub use flow::{AnalyticModel, FlowError, Frame, SampleEnclosure, SampledLaw};
+pub use flow::{FlowError, Frame, SampleEnclosure, SampledLaw};
 pub use interval::Interval;
 pub(crate) use positive::{is_positive_definite, smallest_eigenvalue};
 pub use taylor_map::TaylorMap;

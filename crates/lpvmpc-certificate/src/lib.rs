@@ -8,13 +8,14 @@
 //! | numbers that contain what they stand for | [`Interval`], [`TaylorModel`], [`TaylorMap`] |
 //! | where a sampled loop may be after a sample | [`SampleEnclosure`] |
 //!
-//! A plant is an [`AnalyticModel`]: its equations over any [`Arithmetic`], so that the same code that a
+//! A plant is an [`lpvmpc::Embedding`]: its equations over any number, so that the same code that a
 //! controller runs on numbers is proved on intervals and Taylor models.
 //!
 //! # Example
 //!
 //! ```
-//! use lpvmpc_certificate::{Arithmetic, Interval};
+//! use lpvmpc::Number;
+//! use lpvmpc_certificate::Interval;
 //!
 //! // sin over the angles from 0 to 0.1 rad lies between 0 and 0.1.
 //! let angles = Interval::new(0.0, 0.1);
@@ -27,8 +28,7 @@ mod enclosure;
 mod terminal;
 
 pub use enclosure::{
-    AnalyticModel, Arithmetic, Elementary, FlowError, Frame, Interval, SampleEnclosure, SampledLaw,
-    TaylorMap, TaylorModel,
+    Arithmetic, FlowError, Frame, Interval, SampleEnclosure, SampledLaw, TaylorMap, TaylorModel,
 };
 pub use terminal::{
     Certificate, CertificateProblem, CertifyError, ClaimError, DocumentError, Effort, MOST_BOXES,

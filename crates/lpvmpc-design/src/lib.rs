@@ -7,6 +7,7 @@
 //! | parameters from measured runs | [`ShootingProblem`], [`autocorrelation`] |
 //! | a linear model of a nonlinear plant | [`linearize`], [`poles`], [`controllability_rank`] |
 //! | a gain and a terminal cost | [`lqr_continuous`], [`lqr_discrete`], [`solve_care`], [`solve_dare`] |
+//! | is an embedding the plant that it stands for? | [`embedding_defect`] |
 //! | exact sampling of a frozen model | [`zero_order_hold`] |
 //! | is the gain stable at each scheduling? | [`frozen_stability`] |
 //! | is the integration step short enough? | [`check_rk4_step`] |
@@ -49,6 +50,7 @@
 //! ```
 
 mod discretize;
+mod embedding_check;
 mod least_squares;
 mod linearize;
 mod lqr;
@@ -63,6 +65,7 @@ mod shooting;
 mod stability;
 
 pub use discretize::{DiscretizeError, zero_order_hold};
+pub use embedding_check::{EmbeddingCheckError, EmbeddingDefect, embedding_defect};
 pub use least_squares::{
     Evaluated, Fit, Iteration, LeastSquaresError, LeastSquaresSettings, RankDeficiency,
     ResidualModel, Termination, gauss_newton, levenberg_marquardt,

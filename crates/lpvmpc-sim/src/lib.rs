@@ -13,7 +13,7 @@
 //! /// x = (position [m], speed [m/s]), u = force per mass [m/s^2].
 //! struct Cart;
 //! impl LpvModel<f64, 2, 1, 1> for Cart {
-//!     fn scheduling(&self, _: &Vector2<f64>) -> Vector1<f64> {
+//!     fn scheduling(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Vector1<f64> {
 //!         Vector1::zeros()
 //!     }
 //!     fn matrices(&self, _: &Vector1<f64>) -> (Matrix2<f64>, Vector2<f64>) {

@@ -198,7 +198,7 @@ mod tests {
     struct Growth;
 
     impl LpvModel<f64, 1, 1, 1> for Growth {
-        fn scheduling(&self, x: &Vector1<f64>) -> Vector1<f64> {
+        fn scheduling(&self, x: &Vector1<f64>, _: &Vector1<f64>) -> Vector1<f64> {
             *x
         }
 

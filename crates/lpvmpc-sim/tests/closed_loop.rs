@@ -24,7 +24,7 @@ const TOLERANCES: Tolerances = Tolerances {
 struct Mass;
 
 impl LpvModel<f64, 2, 1, 1> for Mass {
-    fn scheduling(&self, _: &Vector2<f64>) -> Vector1<f64> {
+    fn scheduling(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Vector1<f64> {
         Vector1::zeros()
     }
 
@@ -37,8 +37,8 @@ impl LpvModel<f64, 2, 1, 1> for Mass {
 struct ShortRail;
 
 impl LpvModel<f64, 2, 1, 1> for ShortRail {
-    fn scheduling(&self, x: &Vector2<f64>) -> Vector1<f64> {
-        Mass.scheduling(x)
+    fn scheduling(&self, x: &Vector2<f64>, u: &Vector1<f64>) -> Vector1<f64> {
+        Mass.scheduling(x, u)
     }
 
     fn matrices(&self, scheduling: &Vector1<f64>) -> (Matrix2<f64>, Vector2<f64>) {
@@ -162,7 +162,7 @@ fn no_samples_no_motion() {
             clock: &stopped,
             progress: &|_| (),
         };
-        run(controller, &Ballbot::paper(), &experiment)
+        run(controller, &Ballbot::<f64>::paper(), &experiment)
     };
     let nothing = run_of(0);
     assert_eq!(nothing.states().count(), 1);
@@ -201,8 +201,8 @@ fn an_infeasible_problem_ends_the_run_and_keeps_its_record() {
     struct Slope;
 
     impl LpvModel<f64, 2, 1, 1> for Slope {
-        fn scheduling(&self, x: &Vector2<f64>) -> Vector1<f64> {
-            Mass.scheduling(x)
+        fn scheduling(&self, x: &Vector2<f64>, u: &Vector1<f64>) -> Vector1<f64> {
+            Mass.scheduling(x, u)
         }
 
         fn matrices(&self, scheduling: &Vector1<f64>) -> (Matrix2<f64>, Vector2<f64>) {
@@ -254,7 +254,7 @@ fn a_start_that_is_no_number_ends_the_run_at_once() {
         clock: &stopped,
         progress: &|_| (),
     };
-    let plant = Ballbot::paper();
+    let plant = Ballbot::<f64>::paper();
     let trajectory = run(controller, &plant, &experiment);
     assert!(trajectory.samples.is_empty());
     assert_eq!(trajectory.states().count(), 1);
@@ -279,7 +279,7 @@ fn bad_tolerances_end_the_run_at_once() {
         clock: &stopped,
         progress: &|_| (),
     };
-    let plant = Ballbot::paper();
+    let plant = Ballbot::<f64>::paper();
     let trajectory = run(controller, &plant, &experiment);
     assert!(trajectory.samples.is_empty());
     assert!(matches!(
@@ -324,7 +324,7 @@ fn ballbot_controller() -> ballbot::Controller<f64> {
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),
     };
-    Controller::allocate(Ballbot::paper(), settings).unwrap()
+    Controller::allocate(Ballbot::<f64>::paper(), settings).unwrap()
 }
 
 fn run_ballbot(clock: &dyn Fn() -> Duration) -> Trajectory<4, 1> {
@@ -336,7 +336,7 @@ fn run_ballbot(clock: &dyn Fn() -> Duration) -> Trajectory<4, 1> {
         clock,
         progress: &|_| (),
     };
-    let plant = Ballbot::paper();
+    let plant = Ballbot::<f64>::paper();
     run(ballbot_controller(), &plant, &experiment)
 }
 

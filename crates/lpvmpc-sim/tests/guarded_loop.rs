@@ -27,7 +27,7 @@ const T_S: f64 = 0.1;
 struct Mass;
 
 impl LpvModel<f64, 2, 1, 1> for Mass {
-    fn scheduling(&self, _: &Vector2<f64>) -> Vector1<f64> {
+    fn scheduling(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Vector1<f64> {
         Vector1::zeros()
     }
 

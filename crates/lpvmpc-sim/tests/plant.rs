@@ -53,12 +53,12 @@ fn energy_is_conserved_without_friction_and_torque() {
 struct Frozen(Vector3<f64>);
 
 impl LpvModel<f64, 4, 1, 3> for Frozen {
-    fn scheduling(&self, _: &Vector4<f64>) -> Vector3<f64> {
+    fn scheduling(&self, _: &Vector4<f64>, _: &Vector1<f64>) -> Vector3<f64> {
         self.0
     }
 
     fn matrices(&self, scheduling: &Vector3<f64>) -> (Matrix4<f64>, Vector4<f64>) {
-        Ballbot::paper().matrices(scheduling)
+        Ballbot::<f64>::paper().matrices(scheduling)
     }
 }
 
@@ -103,8 +103,8 @@ fn the_form_of_the_plant_does_not_matter() {
     struct Embedded(Ballbot<f64>);
 
     impl LpvModel<f64, 4, 1, 3> for Embedded {
-        fn scheduling(&self, x: &Vector4<f64>) -> Vector3<f64> {
-            self.0.scheduling(x)
+        fn scheduling(&self, x: &Vector4<f64>, u: &Vector1<f64>) -> Vector3<f64> {
+            self.0.scheduling(x, u)
         }
 
         fn matrices(&self, scheduling: &Vector3<f64>) -> (Matrix4<f64>, Vector4<f64>) {
@@ -112,7 +112,7 @@ fn the_form_of_the_plant_does_not_matter() {
         }
     }
 
-    let robot = Ballbot::paper();
+    let robot = Ballbot::<f64>::paper();
     let (x, u) = (Vector4::new(0.0, 0.5, 10.0, -3.0), Vector1::new(-0.9));
     let direct = advance(&robot, &x, &u, 0.05, tolerances(1e-12)).unwrap();
     let embedded = advance(&Embedded(robot), &x, &u, 0.05, tolerances(1e-12)).unwrap();
@@ -123,11 +123,11 @@ fn the_form_of_the_plant_does_not_matter() {
 fn no_time_no_motion() {
     let x = Vector4::new(0.1, 0.2, 0.3, 0.4);
     let u = Vector1::new(1.0);
-    let after = advance(&Ballbot::paper(), &x, &u, 0.0, tolerances(1e-9));
+    let after = advance(&Ballbot::<f64>::paper(), &x, &u, 0.0, tolerances(1e-9));
     assert_eq!(after, Ok(x));
     // Times at which a step is below the resolution of the state.
     for duration in [1e-300, 1e-30, 1e-15] {
-        let after = advance(&Ballbot::paper(), &x, &u, duration, tolerances(1e-9)).unwrap();
+        let after = advance(&Ballbot::<f64>::paper(), &x, &u, duration, tolerances(1e-9)).unwrap();
         assert!((after - x).norm() < 1e-11, "{duration:e}: {after}");
     }
 }
@@ -147,7 +147,8 @@ fn bad_tolerances_are_refused() {
         (1e-9, f64::INFINITY),
     ] {
         let bad = Tolerances { relative, absolute };
-        let error = advance(&Ballbot::paper(), &x, &Vector1::zeros(), 0.05, bad).unwrap_err();
+        let error =
+            advance(&Ballbot::<f64>::paper(), &x, &Vector1::zeros(), 0.05, bad).unwrap_err();
         assert!(matches!(error, PlantError::Tolerances { .. }), "{error}");
         let words = error.to_string();
         for part in [
@@ -181,7 +182,8 @@ fn bad_durations_are_refused() {
     // A negative one was once said to be not finite.
     let (x, u) = (Vector4::zeros(), Vector1::zeros());
     for duration in [-0.05, -1e-300, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        let error = advance(&Ballbot::paper(), &x, &u, duration, tolerances(1e-9)).unwrap_err();
+        let error =
+            advance(&Ballbot::<f64>::paper(), &x, &u, duration, tolerances(1e-9)).unwrap_err();
         assert!(matches!(error, PlantError::Duration { .. }), "{error}");
         let words = error.to_string();
         for part in [&format!("{duration} s"), "not negative"] {
@@ -194,7 +196,7 @@ fn bad_durations_are_refused() {
 struct Explosion;
 
 impl LpvModel<f64, 1, 1, 1> for Explosion {
-    fn scheduling(&self, x: &Vector1<f64>) -> Vector1<f64> {
+    fn scheduling(&self, x: &Vector1<f64>, _: &Vector1<f64>) -> Vector1<f64> {
         *x
     }
 
@@ -231,7 +233,7 @@ fn an_exploding_plant_is_an_error_with_its_time() {
 struct Cliff;
 
 impl LpvModel<f64, 1, 1, 1> for Cliff {
-    fn scheduling(&self, x: &Vector1<f64>) -> Vector1<f64> {
+    fn scheduling(&self, x: &Vector1<f64>, _: &Vector1<f64>) -> Vector1<f64> {
         *x
     }
 
@@ -269,7 +271,7 @@ fn a_stiff_plant_ends_in_time() {
     struct Stiff;
 
     impl LpvModel<f64, 1, 1, 1> for Stiff {
-        fn scheduling(&self, x: &Vector1<f64>) -> Vector1<f64> {
+        fn scheduling(&self, x: &Vector1<f64>, _: &Vector1<f64>) -> Vector1<f64> {
             *x
         }
 

@@ -391,7 +391,11 @@ where
             Scheduling::Held(held) => Some(held),
         };
         for (stage, (x, u)) in ocp.stages.iter_mut().zip(window).take(horizon) {
-            (stage.a, stage.b) = predictor.linearize_along(&self.model, held, x, u, *t_s);
+            let model = &self.model;
+            let pair = predictor.linearize_along(model, held, x, u, *t_s);
+            let offset = predictor.offset_along(model, held, (x, u), *t_s, &pair);
+            stage.c = offset.unwrap_or_else(SVector::zeros);
+            (stage.a, stage.b) = pair;
         }
     }
 

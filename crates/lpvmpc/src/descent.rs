@@ -177,7 +177,6 @@ where
         along: Along,
         workspace: &mut Workspace<T, NX, NU>,
     ) {
-        workspace.along_plan = true;
         let ocp = &mut workspace.ocp;
         let settings = &self.settings;
         let linear_u = -product(&settings.weights.r, &aim.u_ref);

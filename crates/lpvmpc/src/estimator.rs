@@ -305,7 +305,7 @@ where
     ) -> Estimate<T, NX, ND> {
         let settings = &self.settings;
         let predictor = settings.predictor(duration);
-        let (a, b) = self.model.matrices(&self.model.scheduling(&from.z));
+        let (a, b) = self.model.matrices(&self.model.scheduling(&from.z, u));
         let (a, b) = predictor.discretize(&a, &b, duration);
         let g = b * settings.input_offset;
         let Covariance { zz, zd, dd } = from.covariance;

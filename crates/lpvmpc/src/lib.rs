@@ -1,5 +1,5 @@
 //! Model predictive control for plants whose linear model changes as they move: linear
-//! parameter-varying (LPV) models x_dot = A(s) x + B(s) u with s = sigma(x). No std, no heap but with
+//! parameter-varying (LPV) models x_dot = A(s) x + B(s) u + c(s) with s = sigma(x, u). No std, no heap but with
 //! the feature `alloc`, bounded work, in `f32` or `f64`.
 //!
 //! A pendulum with a torque at its joint stands up from 0.8 rad:
@@ -9,12 +9,9 @@
 //! use nalgebra::{Matrix1, Matrix2, Vector1, Vector2};
 //!
 //! struct Pendulum; // x = (angle from upright [rad], rate [rad/s]), u = torque [N m]
-//! impl LpvModel<f64, 2, 1, 1> for Pendulum {
-//!     fn scheduling(&self, x: &Vector2<f64>) -> Vector1<f64> {
-//!         Vector1::new(if x[0] == 0.0 { 1.0 } else { x[0].sin() / x[0] })
-//!     }
-//!     fn matrices(&self, sinc: &Vector1<f64>) -> (Matrix2<f64>, Vector2<f64>) {
-//!         (Matrix2::new(0.0, 1.0, 9.81 * sinc[0], 0.0), Vector2::new(0.0, 1.0))
+//! impl Dynamics<2, 1> for Pendulum {
+//!     fn f<N: Number>(&self, x: &Vector2<N>, u: &Vector1<N>) -> Vector2<N> {
+//!         Vector2::new(x[1], N::constant(9.81) * x[0].sin() + u[0])
 //!     }
 //! }
 //! # fn main() -> Result<(), ControllerError> {
@@ -23,12 +20,13 @@
 //! let terminal = TerminalIngredient::Cost(Matrix2::new(147.006, 40.381, 40.381, 14.758));
 //! let torque = Bounds { lower: Vector1::new(-8.0), upper: Vector1::new(8.0) };
 //! let settings = ControllerSettings::new(0.05, 30, weights, terminal, torque);
-//! let mut controller = Controller::allocate(Pendulum, settings)?;
+//! let mut controller = Controller::allocate(AlongMotion(Pendulum), settings)?;
 //! let mut workspace = controller.workspace();
 //! let mut x = Vector2::new(0.8, 0.0);
 //! for _ in 0..100 {
-//!     let plan = controller.step(&x, &Reference::constant(Vector2::zeros()), &mut workspace);
-//!     x = Rk4 { substeps: 1 }.advance(&Pendulum, &x, &plan.first_input(), 0.05);
+//!     let upright = Reference::constant(Vector2::zeros());
+//!     let u = controller.step(&x, &upright, &mut workspace).first_input();
+//!     x = Rk4 { substeps: 1 }.advance(controller.model(), &x, &u, 0.05);
 //! }
 //! println!("after 5 s: {:.4} rad, {:.4} rad/s", x[0], x[1]);
 //! assert!(x.amax() < 0.01);
@@ -38,7 +36,7 @@
 //!
 //! | for | use |
 //! |---|---|
-//! | a plant | [`LpvModel`] |
+//! | a plant | [`Dynamics`] (f alone), [`Embedding`] (A(s), B(s)), [`LpvModel`] (what is not formulas) |
 //! | a controller, on the heap or in lent memory | [`Controller`], [`ControllerSettings`], [`ControllerArrays`] |
 //! | one with a guarantee | [`GuardedController`] |
 //! | all that stands between sensors and actuators | [`OutputFeedback`], [`Regulator`], [`Estimator`] |
@@ -62,6 +60,7 @@ mod clock;
 mod controller;
 mod delay;
 mod descent;
+mod embedding;
 mod estimator;
 mod farkas;
 mod first_plan;
@@ -73,6 +72,7 @@ mod last_plan;
 mod list;
 mod memory;
 mod model;
+mod number;
 mod ocp;
 mod plan;
 mod policy;
@@ -93,6 +93,7 @@ mod workspace;
 pub use clock::{Clock, Tick};
 pub use controller::{Controller, Reference};
 pub use delay::DelayLine;
+pub use embedding::{AlongMotion, Dynamics, Embedding, Tangent};
 pub use estimator::{
     Covariance, Estimator, EstimatorArrays, EstimatorError, EstimatorMemory, EstimatorSettings,
     Gate, Observation, Reading, Restart, Verdict,
@@ -110,6 +111,7 @@ pub use memory::{
     WorkspaceMemory,
 };
 pub use model::{LpvModel, Scalar};
+pub use number::{Dual, Elementary, Number};
 pub use ocp::{Bounds, Common, GeneralRow, Ocp, Penalty, Softness, Stage, Terminal};
 pub use predictor::{Predictor, Rk4};
 pub use ramp::RampedInput;

@@ -11,18 +11,30 @@ impl<T: RealField + Copy> Scalar for T {}
 /// A continuous-time linear parameter-varying (LPV) model
 ///
 /// ```text
-/// x_dot = A(scheduling) x + B(scheduling) u,     scheduling = sigma(x)
+/// x_dot = A(s) x + B(s) u + c(s),     s = sigma(x, u)
 /// ```
 ///
-/// with `NX` states, `NU` inputs and `NS` scheduling parameters (eq. (3) of Karachalios and
-/// Abbas). The embedding is exact: with `scheduling = sigma(x)` the right-hand side *is* the
-/// nonlinear plant's f(x, u). All quantities are in SI units.
+/// with `NX` states, `NU` inputs and `NS` scheduling parameters; sigma depends on x alone and c is zero
+/// in eq. (3) of Karachalios and Abbas. The embedding is exact: with `s = sigma(x, u)` the right-hand
+/// side *is* the nonlinear plant's f(x, u). All quantities are in SI units.
+///
+/// This is what a controller asks of its plant, in its own number type. Plants whose formulas can be
+/// written down are best an [`Embedding`](crate::Embedding) or [`Dynamics`](crate::Dynamics): once for
+/// every kind of number, and with this for nothing. Implement it by itself for what is not
+/// formulas: tables, other programs.
 pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize> {
-    /// sigma(x): the scheduling vector at the state `x`.
-    fn scheduling(&self, x: &SVector<T, NX>) -> SVector<T, NS>;
+    /// sigma(x, u): the scheduling vector at the state `x` and the input `u`.
+    fn scheduling(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NS>;
 
-    /// The continuous-time pair A (`NX` x `NX`, per second) and B (`NX` x `NU`) at `scheduling`.
+    /// The continuous-time matrices A (`NX` x `NX`, per second) and B (`NX` x `NU`) at `scheduling`.
     fn matrices(&self, scheduling: &SVector<T, NS>) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>);
+
+    /// The affine term c at `scheduling`, in state units per second; `None` where it is always zero.
+    #[inline(always)]
+    fn offset(&self, scheduling: &SVector<T, NS>) -> Option<SVector<T, NX>> {
+        let _ = scheduling;
+        None
+    }
 
     /// A V, for an A that [`matrices`](Self::matrices) or [`jacobian`](Self::jacobian) returned and
     /// a V of `C` columns.
@@ -38,37 +50,37 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
         product(a, v)
     }
 
-    /// x_dot = f(x, u) = A(sigma(x)) x + B(sigma(x)) u, in state units per second.
+    /// x_dot = f(x, u) = A(s) x + B(s) u + c(s) with s = sigma(x, u), in state units per second.
     ///
     /// A plant with a cheaper direct form may override this; it must return the same vector.
     fn derivative(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NX> {
-        let (a, b) = self.matrices(&self.scheduling(x));
-        a * x + b * u
+        let scheduling = self.scheduling(x, u);
+        let (a, b) = self.matrices(&scheduling);
+        let rate = a * x + b * u;
+        match self.offset(&scheduling) {
+            Some(c) => rate + c,
+            None => rate,
+        }
     }
 
     /// (df/dx, df/du) at `x` and `u`: `NX` x `NX` per second, and `NX` x `NU`.
     ///
-    /// By central differences of [`derivative`](Self::derivative) with respect to x; f is affine in
-    /// u, so that df/du is B. A plant with a closed form should override this: it is faster, and in
-    /// `f32` more accurate.
+    /// By central differences of [`derivative`](Self::derivative); where the scheduling does not depend
+    /// on u, df/du is B. A plant with a closed form should override this: it is faster, and in `f32`
+    /// more accurate.
     fn jacobian(
         &self,
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-        // The cube root of epsilon balances rounding and the differences' own error.
-        let relative = T::default_epsilon().powf(convert(1.0 / 3.0));
-        let mut a = SMatrix::<T, NX, NX>::zeros();
-        for j in 0..NX {
-            let (mut above, mut below) = (*x, *x);
-            let step = relative * (T::one() + x[j].abs());
-            above[j] += step;
-            below[j] -= step;
-            let change = self.derivative(&above, u) - self.derivative(&below, u);
-            // What was really added: x + step is rounded.
-            a.set_column(j, &(change / (above[j] - below[j])));
-        }
-        let (_, b) = self.matrices(&self.scheduling(x));
+        let a = differences(x, |x| self.derivative(x, u));
+        let scheduling = self.scheduling(x, u);
+        let by_input = differences(u, |u| self.scheduling(x, u));
+        let b = if by_input.iter().all(|slope| *slope == T::zero()) {
+            self.matrices(&scheduling).1
+        } else {
+            differences(u, |u| self.derivative(x, u))
+        };
         (a, b)
     }
 
@@ -98,4 +110,23 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
     ) -> Option<SteadyState<T, NX, NU>> {
         steady_state::nearest(self, problem)
     }
+}
+
+/// The derivatives of `g` at `at`, by central differences.
+fn differences<T: Scalar, const R: usize, const C: usize>(
+    at: &SVector<T, C>,
+    g: impl Fn(&SVector<T, C>) -> SVector<T, R>,
+) -> SMatrix<T, R, C> {
+    // The cube root of epsilon balances rounding and the differences' own error.
+    let relative = T::default_epsilon().powf(convert(1.0 / 3.0));
+    let mut slopes = SMatrix::<T, R, C>::zeros();
+    for j in 0..C {
+        let (mut above, mut below) = (*at, *at);
+        let step = relative * (T::one() + at[j].abs());
+        above[j] += step;
+        below[j] -= step;
+        // What was really added: x + step is rounded.
+        slopes.set_column(j, &((g(&above) - g(&below)) / (above[j] - below[j])));
+    }
+    slopes
 }

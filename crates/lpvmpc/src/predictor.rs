@@ -34,7 +34,7 @@ impl Predictor {
     }
 
     /// (A_d, B_d) over a sample of `t_s` seconds that is expected to begin at `x` with the input
-    /// `u`.
+    /// `u`. Of a model with an affine term, [`offset`](Self::offset) is the rest.
     #[inline(always)]
     pub fn linearize<T, P, const NX: usize, const NU: usize, const NS: usize>(
         self,
@@ -67,7 +67,7 @@ impl Predictor {
         if let (Self::StageConsistent(rk4), None) = (self, held) {
             return rk4.linearize(model, x, u, t_s);
         }
-        let scheduling = held.copied().unwrap_or_else(|| model.scheduling(x));
+        let scheduling = held.copied().unwrap_or_else(|| model.scheduling(x, u));
         let (a, b) = model.matrices(&scheduling);
         match self {
             Self::FrozenRk4(rk4) | Self::StageConsistent(rk4) => {
@@ -75,6 +75,48 @@ impl Predictor {
             }
             Self::FrozenExact(_) => exact_hold(&a, &b, t_s),
         }
+    }
+
+    /// c_d of x_{k+1} = A_d x_k + B_d u_k + c_d over the sample that [`linearize`](Self::linearize) takes
+    /// to the `pair` (A_d, B_d), in state units; `None` where the model has no affine term.
+    pub fn offset<T, P, const NX: usize, const NU: usize, const NS: usize>(
+        self,
+        model: &P,
+        (x, u): (&SVector<T, NX>, &SVector<T, NU>),
+        t_s: T,
+        pair: &(SMatrix<T, NX, NX>, SMatrix<T, NX, NU>),
+    ) -> Option<SVector<T, NX>>
+    where
+        T: Scalar,
+        P: LpvModel<T, NX, NU, NS>,
+    {
+        self.offset_along(model, None, (x, u), t_s, pair)
+    }
+
+    /// The same where the scheduling may be `held`, whatever the state.
+    #[inline(always)]
+    pub(crate) fn offset_along<T, P, const NX: usize, const NU: usize, const NS: usize>(
+        self,
+        model: &P,
+        held: Option<&SVector<T, NS>>,
+        (x, u): (&SVector<T, NX>, &SVector<T, NU>),
+        t_s: T,
+        (a_d, b_d): &(SMatrix<T, NX, NX>, SMatrix<T, NX, NU>),
+    ) -> Option<SVector<T, NX>>
+    where
+        T: Scalar,
+        P: LpvModel<T, NX, NU, NS>,
+    {
+        let scheduling = held.copied().unwrap_or_else(|| model.scheduling(x, u));
+        let c = model.offset(&scheduling)?;
+        if let (Self::StageConsistent(rk4), None) = (self, held) {
+            // The pair is exact at the sample's own beginning.
+            return Some(rk4.advance(model, x, u, t_s) - product(a_d, x) - product(b_d, u));
+        }
+        // It acts as an input of 1 does.
+        let (a, _) = model.matrices(&scheduling);
+        let (_, c_d) = self.discretize(&a, &c, t_s);
+        Some(c_d)
     }
 
     /// (A_d, B_d) over a sample of `t_s` seconds, for the constant continuous-time pair.
@@ -156,8 +198,8 @@ impl Rk4 {
         (a_d, b_d)
     }
 
-    /// A_d x + B_d u = [`Rk4::advance`] at the given `x` and `u`: the steps' matrices with the
-    /// scheduling that the nonlinear steps have at each of their stages.
+    /// A_d x + B_d u = [`Rk4::advance`] at the given `x` and `u`, of a model without affine term: the
+    /// steps' matrices with the scheduling that the nonlinear steps have at each of their stages.
     // Not inlined, so that the frozen kinds keep the registers.
     #[inline(never)]
     pub fn linearize<T, P, const NX: usize, const NU: usize, const NS: usize>(
@@ -173,9 +215,13 @@ impl Rk4 {
     {
         // The embedding is exact, so its product is f.
         let embedding = |x: &SVector<T, NX>| {
-            let (a, b) = model.matrices(&model.scheduling(x));
+            let scheduling = model.scheduling(x, u);
+            let (a, b) = model.matrices(&scheduling);
             let mut rate = model.a_times(&a, x);
             add_product(&mut rate, &b, u);
+            if let Some(c) = model.offset(&scheduling) {
+                rate += c;
+            }
             (rate, a, b)
         };
         #[cfg(target_os = "none")]
@@ -272,18 +318,46 @@ impl Rk4 {
         M: LpvModel<T, NX, NU, NS>,
     {
         let h = self.step_length(t_s);
+        let mut x = [*x];
+        for _ in 0..self.substeps {
+            Self::step_each([model], &mut x, [u], h);
+        }
+        let [x] = x;
+        x
+    }
+
+    /// One step of `h` seconds of several plants at once, from the states `x` under the inputs `u`.
+    ///
+    /// A plant by itself waits for its own results most of the time; stage by stage the processor
+    /// works on the others meanwhile.
+    #[inline(always)]
+    pub fn step_each<T, M, const NX: usize, const NU: usize, const NS: usize, const LANES: usize>(
+        models: [&M; LANES],
+        x: &mut [SVector<T, NX>; LANES],
+        u: [&SVector<T, NU>; LANES],
+        h: T,
+    ) where
+        T: Scalar,
+        M: LpvModel<T, NX, NU, NS>,
+    {
         let half: T = h * convert::<f64, T>(0.5);
         let sixth: T = h * convert::<f64, T>(1.0 / 6.0);
         let two: T = convert(2.0);
-        let mut x = *x;
-        for _ in 0..self.substeps {
-            let k1 = model.derivative(&x, u);
-            let k2 = model.derivative(&(x + k1 * half), u);
-            let k3 = model.derivative(&(x + k2 * half), u);
-            let k4 = model.derivative(&(x + k3 * h), u);
-            x += (k1 + (k2 + k3) * two + k4) * sixth;
+        let [mut k1, mut k2, mut k3] = [[SVector::zeros(); LANES]; 3];
+        // Loops: the closures of array::from_fn are not inlined.
+        for i in 0..LANES {
+            k1[i] = models[i].derivative(&x[i], u[i]);
         }
-        x
+        for i in 0..LANES {
+            k2[i] = models[i].derivative(&(x[i] + k1[i] * half), u[i]);
+        }
+        for i in 0..LANES {
+            k3[i] = models[i].derivative(&(x[i] + k2[i] * half), u[i]);
+        }
+        for i in 0..LANES {
+            let k4 = models[i].derivative(&(x[i] + k3[i] * h), u[i]);
+            x[i] += (k1[i] + (k2[i] + k3[i]) * two + k4) * sixth;
+        }
     }
 
     fn step_length<T: Scalar>(self, t_s: T) -> T {

@@ -67,9 +67,16 @@ where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
-    fn scheduling(&self, joint: &SVector<T, NXU>) -> SVector<T, NS> {
-        let (x, _) = Self::split::<T, NU, NXU>(joint);
-        self.0.scheduling(&x)
+    fn scheduling(&self, joint: &SVector<T, NXU>, _rate: &SVector<T, NU>) -> SVector<T, NS> {
+        let (x, u) = Self::split::<T, NU, NXU>(joint);
+        self.0.scheduling(&x, &u)
+    }
+
+    #[inline(always)]
+    fn offset(&self, scheduling: &SVector<T, NS>) -> Option<SVector<T, NXU>> {
+        let still = SVector::<T, NU>::zeros();
+        let c = self.0.offset(scheduling)?;
+        Some(Self::join(&c, &still))
     }
 
     fn matrices(&self, scheduling: &SVector<T, NS>) -> (SMatrix<T, NXU, NXU>, SMatrix<T, NXU, NU>) {

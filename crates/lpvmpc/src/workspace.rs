@@ -8,7 +8,7 @@ use crate::ocp::{Common, Ocp, Penalty, Softness};
 use crate::plan::Trial;
 use crate::settings::ControllerSettings;
 use crate::solver::Solver;
-use nalgebra::{SMatrix, SVector, convert};
+use nalgebra::{SMatrix, convert};
 
 /// Scratch memory of a step: the quadratic program of the sample and the solver.
 ///
@@ -21,8 +21,6 @@ pub struct Workspace<T: 'static, const NX: usize, const NU: usize> {
     pub(crate) solver: Solver<T, NX, NU>,
     /// A rollout that may become the plan.
     pub(crate) trial: Trial<T, NX, NU>,
-    /// Whether the stages have the affine terms and the damping of a descent.
-    pub(crate) along_plan: bool,
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
@@ -41,7 +39,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
             ocp: Ocp::new(stages.shortened(longest)),
             solver: Solver::new(solver),
             trial: Trial { u, x },
-            along_plan: false,
         }
     }
 
@@ -67,11 +64,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
         let soft_x = halved(&settings.soft_x);
         self.ocp.soft_x = soft_x;
         self.ocp.terminal.soft_x = soft_x;
-        if core::mem::take(&mut self.along_plan) {
-            for stage in self.ocp.stages.iter_mut() {
-                stage.c = SVector::zeros();
-            }
-        }
         self.ocp.common = Common {
             q: weights.q,
             r: weights.r,

@@ -88,10 +88,17 @@ impl Laboratory {
         let drive = gear * self.torque_gain * torque
             - self.drive_friction * slip
             - self.coulomb * slip / slip.hypot(CREEP_SPEED);
-        let force = Vector2::new(drive, -drive)
-            - self.plant.coriolis(x[1], x[3])
-            - self.plant.gravity(x[1])
-            - self.plant.friction(x[2], x[3]);
+        // B~ tau - C - D - G of eq. (1).
+        let Geometry {
+            centre_of_mass: l,
+            ball_radius: r_b,
+            gravity: g,
+            ..
+        } = self.plant.geometry;
+        let force = Vector2::new(
+            drive + l * r_b * x[1].sin() * x[3] * x[3] - self.plant.b4 * x[2],
+            l * g * x[1].sin() - drive,
+        );
         let acceleration = self.plant.mass(x[1]).try_inverse().unwrap() * force;
         Vector4::new(x[2], x[3], acceleration[0], acceleration[1])
     }
@@ -133,14 +140,10 @@ impl Laboratory {
 
     pub fn linear_parameters(&self) -> LinearParameters<f64> {
         let (a, b) = self.linear();
-        LinearParameters {
-            p1: a[(2, 1)],
-            p2: a[(2, 2)],
-            p3: b[2],
-            p4: a[(3, 1)],
-            p5: a[(3, 2)],
-            p6: b[3],
-        }
+        LinearParameters::of_matrices(
+            &a.fixed_view::<4, 4>(0, 0).into(),
+            &b.fixed_view::<4, 1>(0, 0).into(),
+        )
     }
 
     /// u = -K x that holds the robot.

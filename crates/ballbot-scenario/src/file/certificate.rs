@@ -2,10 +2,10 @@
 
 use crate::error::ScenarioError;
 use crate::file::parameters::is_zero;
-use ballbot::{Accelerations, Ballbot, DriveFriction, Geometry, Tilt};
-use lpvmpc::LpvModel;
-use lpvmpc_certificate::{AnalyticModel, Arithmetic, Certificate, MOST_BYTES};
-use nalgebra::{Matrix4, Vector2, Vector3, Vector4};
+use ballbot::{Ballbot, DriveFriction, Geometry};
+use lpvmpc::{Embedding, Number};
+use lpvmpc_certificate::{Certificate, MOST_BYTES};
+use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{self, Read};
@@ -98,60 +98,34 @@ impl RobotTable {
         ]
     }
 
-    fn lift<T>(&self, constant: fn(f64) -> T) -> Ballbot<T> {
-        Ballbot {
-            b1: constant(self.b1_m2),
-            b2: constant(self.b2_m2),
-            b3: constant(self.b3_m2),
-            b4: constant(self.b4_m2_s),
-            drive: DriveFriction {
-                viscous: constant(self.drive_friction_m2_s),
-                coulomb: constant(0.0),
-            },
-            geometry: Geometry {
-                centre_of_mass: constant(self.centre_of_mass_m),
-                ball_radius: constant(self.ball_radius_m),
-                wheel_radius: constant(self.wheel_radius_m),
-                gravity: constant(self.gravity_m_s2),
-            },
-        }
-    }
-
     /// The robot.
     pub fn ballbot(&self) -> ViscousBallbot {
-        ViscousBallbot(self.lift(|value| value))
+        ViscousBallbot(Ballbot {
+            b1: self.b1_m2,
+            b2: self.b2_m2,
+            b3: self.b3_m2,
+            b4: self.b4_m2_s,
+            drive: DriveFriction {
+                viscous: self.drive_friction_m2_s,
+                coulomb: 0.0,
+            },
+            geometry: Geometry {
+                centre_of_mass: self.centre_of_mass_m,
+                ball_radius: self.ball_radius_m,
+                wheel_radius: self.wheel_radius_m,
+                gravity: self.gravity_m_s2,
+            },
+        })
     }
 }
 
-impl AnalyticModel<4, 1, 2> for RobotTable {
-    fn scheduling<T: Arithmetic>(&self, x: &[T; 4]) -> [T; 2] {
-        [x[1], x[3]]
+impl Embedding<4, 1, 2> for RobotTable {
+    fn scheduling<N: Number>(&self, x: &Vector4<N>, torque: &Vector1<N>) -> Vector2<N> {
+        self.ballbot().scheduling(x, torque)
     }
 
-    fn matrices<T: Arithmetic>(&self, &[theta, rate]: &[T; 2]) -> ([[T; 4]; 4], [[T; 1]; 4]) {
-        let (zero, one) = (T::constant(0.0), T::constant(1.0));
-        let robot = self.lift(T::constant);
-        let tilt = Tilt {
-            sin: theta.sin(),
-            cos: theta.cos(),
-            sinc: theta.sinc(),
-            rate,
-            one,
-        };
-        let bare = robot.accelerations(tilt);
-        let Accelerations { a: [phi, body], b } = if self.drive_friction_m2_s == 0.0 {
-            bare
-        } else {
-            let gear = robot.geometry.ball_radius / robot.geometry.wheel_radius;
-            bare.with_drive_friction(robot.drive.viscous / gear)
-        };
-        let a = [
-            [zero, zero, one, zero],
-            [zero, zero, zero, one],
-            [zero, phi[0], phi[1], phi[2]],
-            [zero, body[0], body[1], body[2]],
-        ];
-        (a, [[zero], [zero], [b[0]], [b[1]]])
+    fn matrices<N: Number>(&self, scheduling: &Vector2<N>) -> (Matrix4<N>, Vector4<N>) {
+        self.ballbot().matrices(scheduling)
     }
 }
 
@@ -159,15 +133,17 @@ impl AnalyticModel<4, 1, 2> for RobotTable {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViscousBallbot(Ballbot<f64>);
 
-impl LpvModel<f64, 4, 1, 2> for ViscousBallbot {
+impl Embedding<4, 1, 2> for ViscousBallbot {
     /// sigma(x) = (theta, theta_dot), rad and rad/s.
-    fn scheduling(&self, x: &Vector4<f64>) -> Vector2<f64> {
+    fn scheduling<N: Number>(&self, x: &Vector4<N>, _torque: &Vector1<N>) -> Vector2<N> {
         Vector2::new(x[1], x[3])
     }
 
-    fn matrices(&self, scheduling: &Vector2<f64>) -> (Matrix4<f64>, Vector4<f64>) {
+    fn matrices<N: Number>(&self, scheduling: &Vector2<N>) -> (Matrix4<N>, Vector4<N>) {
         // The drive's speed is for Coulomb friction alone.
-        let scheduling = Vector3::new(scheduling[0], scheduling[1], 0.0);
-        self.0.matrices(&scheduling)
+        let speed = N::constant(0.0);
+        self.0
+            .over()
+            .matrices_at(scheduling[0], scheduling[1], speed)
     }
 }

@@ -178,7 +178,7 @@ fn drift(
     terminal: &TerminalSet<f64, 4, 1>,
     rollout: &Rollout<f64, 4>,
 ) -> (Vector4<f64>, f64) {
-    let (a, b) = ballbot.matrices(&ballbot.scheduling(&Vector4::zeros()));
+    let (a, b) = ballbot.matrices(&ballbot.scheduling(&Vector4::zeros(), &Vector1::zeros()));
     let (a, b) = rollout.rk4.discretize(&a, &b, plain.t_s);
     let closed = a - b * terminal.gain;
     let mut power = Matrix4::identity();

@@ -1,17 +1,17 @@
 //! f against the equations of motion, and the equations of motion against mechanics.
 
-use crate::robots;
+use crate::{equations, robots};
 use ballbot::{Ballbot, Geometry};
 use fastrand::Rng;
 use nalgebra::{Vector2, Vector4};
 
 /// q_ddot = M^-1 (B~ tau - C - D - G) by elimination with pivoting.
 fn accelerations(robot: &Ballbot<f64>, x: &Vector4<f64>, torque: f64) -> Vector2<f64> {
-    let force = robot.input() * torque
-        - robot.coriolis(x[1], x[3])
-        - robot.friction(x[2], x[3])
-        - robot.gravity(x[1]);
-    let solution = robot.mass(x[1]).lu().solve(&force);
+    let force = equations::input(robot) * torque
+        - equations::coriolis(robot, x[1], x[3])
+        - equations::friction(robot, x[2], x[3])
+        - equations::gravity(robot, x[1]);
+    let solution = equations::mass(robot, x[1]).lu().solve(&force);
     solution.expect("M is invertible")
 }
 
@@ -23,11 +23,13 @@ fn assert_f_solves_the_equations_of_motion(robot: &Ballbot<f64>, rng: &mut Rng) 
     let expected = accelerations(robot, &x, torque);
     let found = Vector2::new(found[2], found[3]);
     // Forces may cancel: the accuracy is relative to each of them alone.
-    let inverse = robot.mass(x[1]).try_inverse().expect("M is invertible");
-    let forces = (robot.input() * torque).abs()
-        + robot.coriolis(x[1], x[3]).abs()
-        + robot.friction(x[2], x[3]).abs()
-        + robot.gravity(x[1]).abs();
+    let inverse = equations::mass(robot, x[1])
+        .try_inverse()
+        .expect("M is invertible");
+    let forces = (equations::input(robot) * torque).abs()
+        + equations::coriolis(robot, x[1], x[3]).abs()
+        + equations::friction(robot, x[2], x[3]).abs()
+        + equations::gravity(robot, x[1]).abs();
     let scale = inverse.abs() * forces;
     for i in 0..2 {
         assert!(
@@ -63,7 +65,8 @@ fn energy_changes_by_the_power_of_torque_and_friction_alone() {
         let (far, near) = (at(2.0 * h) - at(-2.0 * h), at(h) - at(-h));
         let found = (8.0 * near - far) / (12.0 * h);
         let q_dot = Vector2::new(x[2], x[3]);
-        let expected = q_dot.dot(&(robot.input() * torque - robot.friction(x[2], x[3])));
+        let expected = q_dot
+            .dot(&(equations::input(&robot) * torque - equations::friction(&robot, x[2], x[3])));
         // Rounding of the energies, and the stencil's own error.
         let accuracy = 1e-15 * at(0.0).abs() / h + 1e-9 * rate.norm();
         assert!(

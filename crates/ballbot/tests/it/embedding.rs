@@ -3,12 +3,12 @@
 use crate::robots;
 use ballbot::Ballbot;
 use fastrand::Rng;
-use lpvmpc::{LpvModel, RampedInput};
+use lpvmpc::{AlongMotion, Dynamics, LpvModel, Number, RampedInput};
 use nalgebra::{Matrix4, SMatrix, SVector, Vector1, Vector3, Vector4};
 use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
 fn assert_embeds(robot: &Ballbot<f64>, x: &Vector4<f64>, torque: f64) {
-    let (a, b) = robot.matrices(&robot.scheduling(x));
+    let (a, b) = robot.matrices(&robot.scheduling(x, &Vector1::zeros()));
     let found = a * x + b * torque;
     let expected = robot.f(x, torque);
     let scale = a.abs() * x.abs() + b.abs() * torque.abs();
@@ -34,7 +34,7 @@ fn the_embedding_is_exact() {
 /// The model's own way to multiply with its A gives what A gives.
 fn assert_multiplies<const NX: usize>(model: &impl LpvModel<f64, NX, 1, 3>, rng: &mut Rng) {
     let x = SVector::from_fn(|_, _| 10.0 * rng.f64() - 5.0);
-    let (a, _) = model.matrices(&model.scheduling(&x));
+    let (a, _) = model.matrices(&model.scheduling(&x, &Vector1::zeros()));
     let v = SMatrix::<f64, NX, 3>::from_fn(|_, _| 2.0 * rng.f64() - 1.0);
     let (found, expected) = (model.a_times(&a, &v), a * v);
     let scale = a.abs() * v.abs();
@@ -94,7 +94,7 @@ fn the_jacobian_is_that_of_the_equations_of_motion() {
         assert_differentiates(&robot, &mut rng);
         assert_differentiates::<5>(&RampedInput::<_, 4>(robot), &mut rng);
     }
-    assert_differentiates(&Ballbot::paper(), &mut rng);
+    assert_differentiates(&Ballbot::<f64>::paper(), &mut rng);
 }
 
 #[test]
@@ -182,5 +182,39 @@ fn a_positive_torque_lowers_the_tilt_over_the_whole_range() {
         let theta = FRAC_PI_3 * f64::from(step) / 100.0;
         let (_, b) = Ballbot::<f64>::paper().matrices(&Vector3::new(theta, 0.0, 0.0));
         assert!(b[3] < 0.0, "B41 = {} at {theta}", b[3]);
+    }
+}
+
+/// The closed form of the derivatives, and A(s) x + B(s) u, are those of f itself.
+#[test]
+fn the_tangent_is_what_dual_numbers_give() {
+    struct ByDual(Ballbot<f64>);
+    impl Dynamics<4, 1> for ByDual {
+        fn f<N: Number>(&self, x: &Vector4<N>, u: &Vector1<N>) -> Vector4<N> {
+            lpvmpc::Embedding::f(&self.0, x, u)
+        }
+    }
+    let mut rng = Rng::with_seed(9);
+    for _ in 0..1000 {
+        let mut robot = robots::rigid(&mut rng);
+        // Of Coulomb friction the tangent has the secant.
+        robot.drive.viscous = rng.f64();
+        robot.drive.coulomb = 0.0;
+        let (x, u) = (
+            robots::state(&mut rng),
+            Vector1::new(robots::torque(&mut rng)),
+        );
+        let (_, a, b) = LpvModel::<f64, 4, 1, 3>::tangent(&robot, &x, &u);
+        let (f, by_dual_a, by_dual_b) =
+            LpvModel::<f64, 4, 1, 5>::tangent(&AlongMotion(ByDual(robot)), &x, &u);
+        assert_eq!(f, robot.f(&x, u[0]));
+        assert!(
+            (a - by_dual_a).amax() <= 1e-12 * (1.0 + a.amax()),
+            "{a}{by_dual_a}"
+        );
+        assert!(
+            (b - by_dual_b).amax() <= 1e-12 * (1.0 + b.amax()),
+            "{b}{by_dual_b}"
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! The drive's friction: what it is called after, and what it must do.
 
-use crate::robots;
+use crate::{equations, robots};
 use ballbot::{CREEP_SPEED, DriveFriction};
 use fastrand::Rng;
 use nalgebra::{Vector2, Vector4};
@@ -55,6 +55,6 @@ fn it_always_takes_energy_away() {
         let robot = robots::rigid(&mut rng);
         let x = robots::state(&mut rng);
         let rates = Vector2::new(x[2], x[3]);
-        assert!(rates.dot(&robot.friction(x[2], x[3])) >= 0.0);
+        assert!(rates.dot(&equations::friction(&robot, x[2], x[3])) >= 0.0);
     }
 }

@@ -9,6 +9,7 @@ mod consistency;
 mod disturbed;
 mod dynamics;
 mod embedding;
+mod equations;
 mod friction;
 mod linear;
 mod robots;

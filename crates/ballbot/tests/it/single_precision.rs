@@ -4,7 +4,7 @@ use crate::robots;
 use ballbot::{Ballbot, DriveFriction, LinearParameters, Wheels};
 use fastrand::Rng;
 use lpvmpc::{LpvModel, Scalar};
-use nalgebra::{SMatrix, Vector3, convert};
+use nalgebra::{SMatrix, Vector1, Vector3, convert};
 
 /// Every entry of `single` is `double` to the accuracy of `f32`, relative to `scale`.
 fn assert_agrees<const R: usize, const C: usize>(
@@ -43,10 +43,11 @@ fn the_model_agrees() {
         }
         let torque = robots::torque(&mut rng) as f32;
         let wide = x.cast::<f64>();
-        let (a, b) = double.matrices(&double.scheduling(&wide));
-        let (a_single, b_single) = single.matrices(&single.scheduling(&x));
+        let (a, b) = double.matrices(&double.scheduling(&wide, &Vector1::zeros()));
+        let (a_single, b_single) = single.matrices(&single.scheduling(&x, &Vector1::zeros()));
         // The drive's friction is added to entries of either sign.
-        let (bare, _) = Ballbot::paper().matrices(&double.scheduling(&wide));
+        let (bare, _) =
+            Ballbot::<f64>::paper().matrices(&double.scheduling(&wide, &Vector1::zeros()));
         let sizes = bare.abs() + (a - bare).abs();
         assert_agrees(a_single, a, sizes);
         assert_agrees(b_single, b, b.abs());

@@ -1,7 +1,7 @@
-//! The functions that a model's formulas may use.
+//! Enclosures of the functions that a plant's formulas may use.
 
 use super::interval::Interval;
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use lpvmpc::{Elementary, Number};
 use std::sync::LazyLock;
 
 /// Taylor coefficients that are looked at, at most.
@@ -10,74 +10,128 @@ pub const MOST_COEFFICIENTS: usize = 12;
 /// The coefficients of a power series, the lowest first.
 pub type Coefficients<T> = [T; MOST_COEFFICIENTS];
 
-/// Numbers, or sets of numbers, that a model's formulas can be evaluated on.
-pub trait Arithmetic:
-    Copy
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
-{
-    /// The number `value`, exactly.
-    fn constant(value: f64) -> Self;
-
+/// Numbers, or sets of numbers, whose functions have Taylor coefficients that can be enclosed.
+pub trait Arithmetic: Number {
     /// 1/x; without bound where x may be zero.
     fn reciprocal(self) -> Self;
 
     /// f^(n)(x) / n! for n = 0 to `count` - 1; what follows is zero.
     fn taylor_coefficients(self, function: Elementary, count: usize) -> Coefficients<Self>;
-
-    /// sin x, `x` in rad.
-    fn sin(self) -> Self {
-        self.taylor_coefficients(Elementary::Sin, 1)[0]
-    }
-
-    /// cos x, `x` in rad.
-    fn cos(self) -> Self {
-        self.taylor_coefficients(Elementary::Cos, 1)[0]
-    }
-
-    /// sin(x)/x, 1 at 0; `x` in rad.
-    fn sinc(self) -> Self {
-        self.taylor_coefficients(Elementary::Sinc, 1)[0]
-    }
 }
 
-/// Functions whose Taylor coefficients are known everywhere.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Elementary {
-    /// sin x.
-    Sin,
-    /// cos x.
-    Cos,
-    /// sin(x)/x, 1 at 0.
-    Sinc,
-}
-
-impl Elementary {
-    /// Enclosures of f^(n)(x) / n! over `x`, n = 0 to `count` - 1.
-    pub(super) fn taylor_coefficients(self, count: usize, x: Interval) -> Coefficients<Interval> {
-        let mut coefficients = [Interval::point(0.0); MOST_COEFFICIENTS];
-        if self == Self::Sinc {
-            for (n, place) in coefficients.iter_mut().enumerate().take(count) {
-                *place = sinc_coefficient(n, x);
+/// Enclosures of f^(n)(x) / n! over `x`, n = 0 to `count` - 1; without bound where `x` leaves the
+/// domain of f.
+pub(super) fn taylor_coefficients(
+    function: Elementary,
+    count: usize,
+    x: Interval,
+) -> Coefficients<Interval> {
+    let mut coefficients = [Interval::point(0.0); MOST_COEFFICIENTS];
+    let places = coefficients.iter_mut().take(count).enumerate();
+    match function {
+        Elementary::Sin | Elementary::Cos => {
+            let (sin, cos) = (wave(x, 0.5, f64::sin), wave(x, 0.0, f64::cos));
+            // The derivatives of sin; those of cos begin one later.
+            let derivatives = [sin, cos, -sin, -cos];
+            let first = if function == Elementary::Sin { 0 } else { 1 };
+            for (n, place) in places {
+                *place = derivatives[(first + n) % 4] * TABLES.reciprocal_factorials[n];
             }
-            return coefficients;
         }
-        let (sin, cos) = (wave(x, 0.5, f64::sin), wave(x, 0.0, f64::cos));
-        // The derivatives of sin; those of cos begin one later.
-        let derivatives = [sin, cos, -sin, -cos];
-        let first = if self == Self::Sin { 0 } else { 1 };
-        for (n, place) in coefficients.iter_mut().enumerate().take(count) {
-            *place = derivatives[(first + n) % 4] * TABLES.reciprocal_factorials[n];
+        Elementary::Sinc => places.for_each(|(n, place)| *place = sinc_coefficient(n, x)),
+        Elementary::Exp => {
+            let value = rising(x, f64::exp).common(Interval::new(0.0, f64::INFINITY));
+            places.for_each(|(n, place)| *place = value * TABLES.reciprocal_factorials[n]);
         }
-        coefficients
+        Elementary::Atan => recursion(places, atan_value(x), |n, known| atan_next(x, n, known)),
+        Elementary::Tanh => {
+            let value = rising(x, f64::tanh).common(Interval::new(-1.0, 1.0));
+            recursion(places, value, tanh_next);
+        }
+        Elementary::Ln | Elementary::Sqrt if x.lower <= 0.0 => {
+            coefficients[..count].fill(Interval::EVERYTHING);
+        }
+        Elementary::Ln => recursion(places, rising(x, f64::ln), |n, known| ln_next(x, n, known)),
+        Elementary::Sqrt => {
+            let value = rising(x, f64::sqrt);
+            recursion(places, value, |n, known| sqrt_next(x, n, known));
+        }
+    }
+    coefficients
+}
+
+/// The first coefficient is `value`; `next` makes coefficient n from those before.
+fn recursion<'a>(
+    places: impl Iterator<Item = (usize, &'a mut Interval)>,
+    value: Interval,
+    next: impl Fn(usize, &[Interval]) -> Interval,
+) {
+    let mut known = Vec::with_capacity(MOST_COEFFICIENTS);
+    for (n, place) in places {
+        let coefficient = if n == 0 { value } else { next(n, &known) };
+        known.push(coefficient);
+        *place = coefficient;
     }
 }
 
-/// The library's sine and cosine are taken to be within this many units in the last place. Those
-/// in use are below one.
+/// ln: (-1)^(n+1) / (n x^n).
+fn ln_next(x: Interval, n: usize, known: &[Interval]) -> Interval {
+    if n == 1 {
+        return x.reciprocal();
+    }
+    let ratio = whole(n - 1) * whole(n).reciprocal();
+    -(known[n - 1] * ratio * x.reciprocal())
+}
+
+/// sqrt: binomial(1/2, n) x^(1/2 - n).
+fn sqrt_next(x: Interval, n: usize, known: &[Interval]) -> Interval {
+    let factor = Interval::point(1.5 - n as f64) * whole(n).reciprocal();
+    known[n - 1] * factor * x.reciprocal()
+}
+
+/// tanh: h' = 1 - h^2.
+fn tanh_next(n: usize, known: &[Interval]) -> Interval {
+    let squared = (0..n).fold(Interval::point(0.0), |sum, j| {
+        sum + known[j] * known[n - 1 - j]
+    });
+    let constant = Interval::point(if n == 1 { 1.0 } else { 0.0 });
+    (constant - squared) * whole(n).reciprocal()
+}
+
+fn atan_value(x: Interval) -> Interval {
+    let right_angle = widened(std::f64::consts::FRAC_PI_2).upper;
+    rising(x, f64::atan).common(Interval::new(-right_angle, right_angle))
+}
+
+/// arctan: (1 + x^2) h' + 2 x t h' + t^2 h' = 1 along x + t; no coefficient is larger than 1/n.
+fn atan_next(x: Interval, n: usize, known: &[Interval]) -> Interval {
+    let scale = (Interval::point(1.0) + x.square()).reciprocal();
+    let bound = whole(n).reciprocal();
+    // The coefficient of t^(k) in h'.
+    let slope = |k: usize| whole(k + 1) * known[k + 1];
+    let rest = match n {
+        1 => Interval::point(1.0),
+        2 => -(Interval::point(2.0) * x * slope(0)),
+        _ => -(Interval::point(2.0) * x * slope(n - 2) + slope(n - 3)),
+    };
+    (rest * scale * bound).common(Interval::new(-bound.upper, bound.upper))
+}
+
+fn whole(n: usize) -> Interval {
+    Interval::point(n as f64)
+}
+
+/// A function that rises over the whole of `x`.
+fn rising(x: Interval, function: fn(f64) -> f64) -> Interval {
+    let (lower, upper) = (widened(function(x.lower)), widened(function(x.upper)));
+    if lower.lower.is_nan() || upper.upper.is_nan() {
+        return Interval::EVERYTHING;
+    }
+    lower.hull(upper)
+}
+
+/// The library's functions are taken to be within this many units in the last place. Those in use
+/// are within two.
 const LIBRARY_ULPS: usize = 4;
 
 /// sin or cos over `x`, with its extrema (-1)^i at (i + `phase`) pi.

@@ -7,26 +7,22 @@ use super::interval::Interval;
 use super::series::{CAPACITY, Series};
 use super::taylor_map::{ROUNDING, TaylorMap};
 use super::taylor_model::TaylorModel;
+use lpvmpc::{Embedding, Number};
 use nalgebra::{SMatrix, SVector};
 use thiserror::Error;
 
-/// A plant x_dot = A(s) x + B(s) u, s = sigma(x), whose formulas can be evaluated on any
-/// [`Arithmetic`]: the same plant as its `lpvmpc::LpvModel`, for proofs. All quantities are in SI
-/// units.
-pub trait AnalyticModel<const NX: usize, const NU: usize, const NS: usize> {
-    /// sigma(x).
-    fn scheduling<T: Arithmetic>(&self, x: &[T; NX]) -> [T; NS];
-
-    /// The rows of A(s), per second, and of B(s).
-    fn matrices<T: Arithmetic>(&self, scheduling: &[T; NS]) -> ([[T; NX]; NX], [[T; NU]; NX]);
-}
-
-/// A motion that could not be enclosed; a smaller box may help.
+/// A motion that could not be enclosed.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
-#[error("the motion from this box of initial states has no enclosure over a step of {step} s")]
-pub struct FlowError {
-    /// The time step, s.
-    pub step: f64,
+pub enum FlowError {
+    /// The numbers grew too large; a smaller box may help.
+    #[error("the motion from this box of initial states has no enclosure over a step of {step} s")]
+    NoEnclosure {
+        /// The time step, s.
+        step: f64,
+    },
+    /// A motion with an affine term is not linear in initial state and input.
+    #[error("the plant has an affine term: its motion is not linear in initial state and input")]
+    AffineTerm,
 }
 
 /// The law u = **-K** x(0), held over a sample of `t_s` seconds.
@@ -76,7 +72,7 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
     /// u = -K T y(0).
     ///
     /// # Errors
-    /// No enclosure was found: the box is too large.
+    /// No enclosure was found: the box is too large; or the plant has an affine term.
     pub fn enclose<M, const NS: usize>(
         &self,
         model: &M,
@@ -85,7 +81,7 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
         half_widths: &SVector<f64, NX>,
     ) -> Result<SampleEnclosure<NX>, FlowError>
     where
-        M: AnalyticModel<NX, NU, NS>,
+        M: Embedding<NX, NU, NS>,
     {
         let t = constants(&frame.t);
         let inverse = constants(&frame.inverse);
@@ -102,6 +98,10 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
         };
         let gain = TaylorMap::of(&gain);
         let mut x = product(&t, &y).map(|[x]| x);
+        let scheduling = model.scheduling(&SVector::from(x), &SVector::from(step.input));
+        if model.offset(&scheduling).is_some() {
+            return Err(FlowError::AffineTerm);
+        }
         let mut transition = Composition::identity();
         let mut states: Option<[Interval; NX]> = None;
         for _ in 0..steps {
@@ -119,7 +119,7 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
         let dependence = transition.dependence();
         let (transition, error_square) = transition.affine();
         if error_square.iter().any(|entry| !entry.is_finite()) {
-            return Err(FlowError { step: step.length });
+            return Err(FlowError::NoEnclosure { step: step.length });
         }
         Ok(SampleEnclosure {
             transition,
@@ -152,7 +152,7 @@ impl<M, const NX: usize, const NU: usize> Step<'_, M, NX, NU> {
         x: &[TaylorModel<NX>; NX],
     ) -> Result<StepEnclosure<NX, NU>, FlowError>
     where
-        M: AnalyticModel<NX, NU, NS>,
+        M: Embedding<NX, NU, NS>,
     {
         let unit = |is_one: bool| TaylorModel::constant(if is_one { 1.0 } else { 0.0 });
         let mut columns = vec![*x];
@@ -174,7 +174,7 @@ impl<M, const NX: usize, const NU: usize> Step<'_, M, NX, NU> {
         model_inputs: &Columns<TaylorModel<NX>, NU>,
     ) -> Result<(Columns<TaylorModel<NX>, NX>, [Interval; NX]), FlowError>
     where
-        M: AnalyticModel<NX, NU, NS>,
+        M: Embedding<NX, NU, NS>,
     {
         let inputs = ranges(model_inputs);
         let during = self.a_priori(&ranges(columns), &inputs)?;
@@ -210,7 +210,7 @@ impl<M, const NX: usize, const NU: usize> Step<'_, M, NX, NU> {
         inputs: &Columns<Interval, NU>,
     ) -> Result<Columns<Interval, NX>, FlowError>
     where
-        M: AnalyticModel<NX, NU, NS>,
+        M: Embedding<NX, NU, NS>,
     {
         let time = Interval::new(0.0, self.length);
         let rates = &coefficients(self.model, start, inputs, 1)[1];
@@ -239,7 +239,7 @@ impl<M, const NX: usize, const NU: usize> Step<'_, M, NX, NU> {
                 break;
             }
         }
-        Err(FlowError { step: self.length })
+        Err(FlowError::NoEnclosure { step: self.length })
     }
 }
 
@@ -337,23 +337,24 @@ fn coefficients<T, M, const NX: usize, const NU: usize, const NS: usize>(
 ) -> Vec<Columns<T, NX>>
 where
     T: Arithmetic,
-    M: AnalyticModel<NX, NU, NS>,
+    M: Embedding<NX, NU, NS>,
 {
     let mut known = vec![start.clone()];
     for k in 0..order {
-        let x = std::array::from_fn(|i| Series::new(known.iter().map(|y| y[0][i])));
-        let (a, b) = model.matrices(&model.scheduling(&x));
+        let x = SVector::from_fn(|i, _| Series::new(known.iter().map(|y| y[0][i])));
+        let u = SVector::from_fn(|i, _| Series::fixed(inputs[0][i]));
+        let (a, b) = model.matrices(&model.scheduling(&x, &u));
         let share = T::constant((k + 1) as f64).reciprocal();
         let next = (0..start.len()).map(|column| {
             std::array::from_fn(|i| {
                 let mut sum = T::constant(0.0);
                 for (j, y) in known.iter().rev().enumerate() {
                     for m in 0..NX {
-                        sum = sum + a[i][m].coefficient(j) * y[column][m];
+                        sum = sum + a[(i, m)].coefficient(j) * y[column][m];
                     }
                 }
                 for m in 0..NU {
-                    sum = sum + b[i][m].coefficient(k) * inputs[column][m];
+                    sum = sum + b[(i, m)].coefficient(k) * inputs[column][m];
                 }
                 sum * share
             })

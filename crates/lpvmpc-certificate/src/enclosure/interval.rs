@@ -1,6 +1,7 @@
 //! Intervals with outward rounding.
 
-use super::elementary::{Arithmetic, Coefficients, Elementary};
+use super::elementary::{self, Arithmetic, Coefficients};
+use lpvmpc::{Elementary, Number};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// All real numbers from `lower` to `upper`. The result of an operation contains the result for
@@ -170,11 +171,17 @@ impl Div for Interval {
     }
 }
 
-impl Arithmetic for Interval {
+impl Number for Interval {
     fn constant(value: f64) -> Self {
         Self::point(value)
     }
 
+    fn elementary(self, function: Elementary) -> Self {
+        self.taylor_coefficients(function, 1)[0]
+    }
+}
+
+impl Arithmetic for Interval {
     fn reciprocal(self) -> Self {
         if self.lower <= 0.0 && 0.0 <= self.upper {
             return Self::EVERYTHING;
@@ -183,6 +190,6 @@ impl Arithmetic for Interval {
     }
 
     fn taylor_coefficients(self, function: Elementary, count: usize) -> Coefficients<Self> {
-        function.taylor_coefficients(count, self)
+        elementary::taylor_coefficients(function, count, self)
     }
 }

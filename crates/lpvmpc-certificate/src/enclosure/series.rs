@@ -1,6 +1,7 @@
 //! Power series in time.
 
-use super::elementary::{Arithmetic, Coefficients, Elementary};
+use super::elementary::{Arithmetic, Coefficients};
+use lpvmpc::{Elementary, Number};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Coefficients that a [`Series`] can hold: more is not needed in one step.
@@ -8,7 +9,7 @@ pub(super) const CAPACITY: usize = 9;
 
 /// The first coefficients of a power series in time, c_0 + c_1 t + c_2 t^2 + ... (Taylor
 /// arithmetic; Moore, Methods and Applications of Interval Analysis, 1979).
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Series<T> {
     coefficients: [T; CAPACITY],
     /// How many coefficients are known.
@@ -27,6 +28,17 @@ impl<T: Arithmetic> Series<T> {
             *place = coefficient;
         }
         series
+    }
+
+    /// What does not change over time.
+    pub fn fixed(value: T) -> Self {
+        let mut coefficients = [T::constant(0.0); CAPACITY];
+        coefficients[0] = value;
+        Self {
+            coefficients,
+            known: CAPACITY,
+            length: 1,
+        }
     }
 
     pub fn coefficient(&self, k: usize) -> T {
@@ -103,17 +115,17 @@ impl<T: Arithmetic> Div for Series<T> {
     }
 }
 
-impl<T: Arithmetic> Arithmetic for Series<T> {
+impl<T: Arithmetic> Number for Series<T> {
     fn constant(value: f64) -> Self {
-        let mut coefficients = [T::constant(0.0); CAPACITY];
-        coefficients[0] = T::constant(value);
-        Self {
-            coefficients,
-            known: CAPACITY,
-            length: 1,
-        }
+        Self::fixed(T::constant(value))
     }
 
+    fn elementary(self, function: Elementary) -> Self {
+        self.taylor_coefficients(function, 1)[0]
+    }
+}
+
+impl<T: Arithmetic> Arithmetic for Series<T> {
     /// r x = 1, coefficient by coefficient.
     fn reciprocal(self) -> Self {
         let inverse = self.coefficients[0].reciprocal();

@@ -1,7 +1,8 @@
 //! Taylor models of order two over a box.
 
-use super::elementary::{Arithmetic, Coefficients, Elementary, MOST_COEFFICIENTS};
+use super::elementary::{self, Arithmetic, Coefficients, MOST_COEFFICIENTS};
 use super::interval::Interval;
+use lpvmpc::{Elementary, Number};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A quantity over the box -1 <= z_i <= 1: at every z its value is within `error` of
@@ -215,7 +216,7 @@ impl<const D: usize> Div for TaylorModel<D> {
     }
 }
 
-impl<const D: usize> Arithmetic for TaylorModel<D> {
+impl<const D: usize> Number for TaylorModel<D> {
     fn constant(value: f64) -> Self {
         Self {
             middle: value,
@@ -225,6 +226,12 @@ impl<const D: usize> Arithmetic for TaylorModel<D> {
         }
     }
 
+    fn elementary(self, function: Elementary) -> Self {
+        self.taylor_coefficients(function, 1)[0]
+    }
+}
+
+impl<const D: usize> Arithmetic for TaylorModel<D> {
     /// 1/x = 1/c - (x - c)/c^2 + (x - c)^2/c^3 - (x - c)^3/(c^3 x).
     fn reciprocal(self) -> Self {
         let inverse = Interval::point(self.middle).reciprocal();
@@ -234,8 +241,9 @@ impl<const D: usize> Arithmetic for TaylorModel<D> {
     }
 
     fn taylor_coefficients(self, function: Elementary, count: usize) -> Coefficients<Self> {
-        let centre = function.taylor_coefficients(count + 2, Interval::point(self.middle));
-        let range = function.taylor_coefficients(count + 3, self.range());
+        let centre =
+            elementary::taylor_coefficients(function, count + 2, Interval::point(self.middle));
+        let range = elementary::taylor_coefficients(function, count + 3, self.range());
         let mut coefficients = [Self::constant(0.0); MOST_COEFFICIENTS];
         for (n, place) in coefficients.iter_mut().enumerate().take(count) {
             // (f^(n)/n!)^(m)/m! = binomial(n+m, m) f^(n+m)/(n+m)!.

@@ -7,6 +7,12 @@ use thiserror::Error;
 /// [`Self::is_false`].
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ClaimError {
+    /// The plant is not A(s) x + B(s) u alone.
+    #[error(
+        "the plant has an affine term c(s): a terminal set can be certified for x_dot = A(s) x + B(s) u \
+         only, with the equilibrium at x = 0, u = 0"
+    )]
+    AffineTerm,
     /// A number that cannot be.
     #[error("{name} = {value}: it must be {expected}", value = number_text(*value))]
     Value {
@@ -133,6 +139,7 @@ impl ClaimError {
             Self::NotPositive { .. }
             | Self::NotSemidefinite { .. }
             | Self::LimitNotShown { .. }
+            | Self::AffineTerm
             | Self::DecreaseNotShown { .. }
             | Self::QuadraticStabilityNotShown { .. } => false,
         }

@@ -2,7 +2,7 @@
 
 use super::decrease::Decrease;
 use super::normalised::Square;
-use crate::enclosure::AnalyticModel;
+use lpvmpc::Embedding;
 use lpvmpc_design::each;
 use nalgebra::{DMatrix, SVector, SymmetricEigen};
 
@@ -34,7 +34,7 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
         near: &[SVector<f64, NX>],
     ) -> Option<(SVector<f64, NX>, f64)>
     where
-        M: AnalyticModel<NX, NU, NS> + Sync,
+        M: Embedding<NX, NU, NS> + Sync,
     {
         let mut found = self.looks(near);
         found.sort_by(|a, b| b.excess.total_cmp(&a.excess));
@@ -54,7 +54,7 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
     /// where there is none. Where it is above, no number of boxes proves the claim.
     pub fn tightest<const NS: usize>(&self) -> f64
     where
-        M: AnalyticModel<NX, NU, NS> + Sync,
+        M: Embedding<NX, NU, NS> + Sync,
     {
         let looks = self.looks(&[]);
         let excess = looks.iter().map(|look| look.matrix_excess);
@@ -63,7 +63,7 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
 
     fn looks<const NS: usize>(&self, near: &[SVector<f64, NX>]) -> Vec<Look<NX>>
     where
-        M: AnalyticModel<NX, NU, NS> + Sync,
+        M: Embedding<NX, NU, NS> + Sync,
     {
         let radius = self.ellipsoid.level().sqrt() * EDGE;
         let mut places: Vec<SVector<f64, NX>> = directions().map(|y| y * radius).collect();
@@ -85,7 +85,7 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
     /// To where this scheduling is worst, again and again.
     fn follow<const NS: usize>(&self, start: &Look<NX>) -> Vec<Look<NX>>
     where
-        M: AnalyticModel<NX, NU, NS> + Sync,
+        M: Embedding<NX, NU, NS> + Sync,
     {
         let radius = self.ellipsoid.level().sqrt() * EDGE;
         let mut path: Vec<Look<NX>> = Vec::new();
@@ -109,7 +109,7 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
 
     fn look<const NS: usize>(&self, y: &SVector<f64, NX>) -> Option<Look<NX>>
     where
-        M: AnalyticModel<NX, NU, NS> + Sync,
+        M: Embedding<NX, NU, NS> + Sync,
     {
         let sample = self.enclose_finely(y, &SVector::zeros())?;
         let g = DMatrix::from_column_slice(NX, NX, sample.transition.middle.as_slice());

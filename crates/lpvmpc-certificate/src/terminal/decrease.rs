@@ -4,9 +4,10 @@ use super::cover::{Cell, Finding};
 use super::ellipsoid::Ellipsoid;
 use super::normalised::{Normaliser, Square, corners, from_fn, transposed};
 use crate::enclosure::{
-    AnalyticModel, Arithmetic, Interval, SampleEnclosure, SampledLaw, is_positive_definite,
-    product, smallest_eigenvalue,
+    Arithmetic, Interval, SampleEnclosure, SampledLaw, is_positive_definite, product,
+    smallest_eigenvalue,
 };
+use lpvmpc::Embedding;
 use nalgebra::{DMatrix, SMatrix, SVector, SymmetricEigen};
 use std::sync::{Mutex, PoisonError};
 
@@ -26,7 +27,7 @@ pub(super) struct Decrease<'a, M, const NX: usize, const NU: usize> {
 impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
     pub fn examine<const NS: usize>(&self, cell: &Cell<NX>) -> Finding
     where
-        M: AnalyticModel<NX, NU, NS> + Sync,
+        M: Embedding<NX, NU, NS> + Sync,
     {
         if self.ellipsoid.misses(cell) {
             return Finding::Outside;
@@ -71,7 +72,7 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
     /// is not certain, or if the state is not in the set.
     pub fn violation<const NS: usize>(&self, x: &SVector<f64, NX>) -> Option<f64>
     where
-        M: AnalyticModel<NX, NU, NS> + Sync,
+        M: Embedding<NX, NU, NS> + Sync,
     {
         if !self.ellipsoid.holds(x) {
             return None;
@@ -105,7 +106,7 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
         half_widths: &SVector<f64, NX>,
     ) -> Option<SampleEnclosure<NX>>
     where
-        M: AnalyticModel<NX, NU, NS> + Sync,
+        M: Embedding<NX, NU, NS> + Sync,
     {
         const MORE_HALVINGS: u8 = 5;
         let frame = &self.normaliser.frame;

@@ -5,8 +5,8 @@ use super::claim::ClaimError;
 use super::proof::Proof;
 use super::quadratic;
 use super::synthesis::{SynthesisError, TerminalIngredients, TerminalProblem, synthesize_terminal};
-use crate::enclosure::AnalyticModel;
-use lpvmpc::LpvModel;
+
+use lpvmpc::{Embedding, LpvModel};
 use lpvmpc_design::{FrozenError, SchedulingGrid};
 use nalgebra::{SMatrix, SVector};
 use thiserror::Error;
@@ -67,26 +67,25 @@ impl<const NX: usize, const NU: usize, const NS: usize> CertificateProblem<NX, N
     }
 }
 
-/// Designs terminal ingredients for `model`, and proves them; at most `most_boxes` boxes are
+/// Designs terminal ingredients for the `plant`, and proves them; at most `most_boxes` boxes are
 /// looked at, and `progress` hears which share of the proof is done.
 ///
 /// # Errors
 /// No ingredients at the points of the grid, or no proof.
-pub fn certify_terminal<M, Plant, const NX: usize, const NU: usize, const NS: usize>(
-    (model, plant): (&M, Plant),
+pub fn certify_terminal<Plant, const NX: usize, const NU: usize, const NS: usize>(
+    plant: Plant,
     problem: &CertificateProblem<NX, NU, NS>,
     most_boxes: usize,
     progress: &dyn Fn(f64),
 ) -> Result<(Certificate<Plant, NX, NU, NS>, Proof<NX>), CertifyError>
 where
-    M: LpvModel<f64, NX, NU, NS>,
-    Plant: AnalyticModel<NX, NU, NS> + Sync,
+    Plant: Embedding<NX, NU, NS> + Sync,
 {
     let terminal = &problem.terminal;
-    let ingredients = problem.design(model)?;
+    let ingredients = problem.design(&plant)?;
     let limits = problem.scheduling_limits;
     let continuous = continuous(
-        model,
+        &plant,
         &limits,
         &ingredients.k,
         &ingredients.p,
@@ -166,16 +165,14 @@ pub struct Effort {
 /// is a proof, by halves (in ratio) between what is proved and what cannot be; `progress` hears the
 /// trial, counted from 0, and which share of it is done. Returns what was handed in where no higher
 /// level could be proved.
-pub fn raise_level<M, Plant, const NX: usize, const NU: usize, const NS: usize>(
-    model: &M,
+pub fn raise_level<Plant, const NX: usize, const NU: usize, const NS: usize>(
     problem: &CertificateProblem<NX, NU, NS>,
     proved: (Certificate<Plant, NX, NU, NS>, Proof<NX>),
     effort: Effort,
     progress: &dyn Fn(usize, f64),
 ) -> (Certificate<Plant, NX, NU, NS>, Proof<NX>)
 where
-    M: LpvModel<f64, NX, NU, NS>,
-    Plant: AnalyticModel<NX, NU, NS> + Clone + Sync,
+    Plant: Embedding<NX, NU, NS> + Clone + Sync,
 {
     let base = Certificate {
         state_limits: problem.state_limits,
@@ -189,7 +186,7 @@ where
         }
         let factor = f64::sqrt(low * high);
         let heard = |share| progress(trial, share);
-        match base.raised(model, factor, effort.most_boxes, &heard) {
+        match base.raised(factor, effort.most_boxes, &heard) {
             Ok(found) => {
                 low = factor;
                 best = found;
@@ -209,7 +206,7 @@ const SAMPLED_LEVELS: usize = 10;
 
 impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant, NX, NU, NS>
 where
-    Plant: AnalyticModel<NX, NU, NS> + Clone + Sync,
+    Plant: Embedding<NX, NU, NS> + Clone + Sync,
 {
     /// The factor of the level from which on there is no proof: a limit is in the way, or the matrix
     /// inequality is violated at a sampled state. Where the states go grows with the root.
@@ -241,21 +238,17 @@ where
 
     /// The same claims with a level that is `factor` times as high, in the limits of the schedulings
     /// that this takes; proved.
-    fn raised<M>(
+    fn raised(
         &self,
-        model: &M,
         factor: f64,
         most_boxes: usize,
         progress: &dyn Fn(f64),
-    ) -> Result<(Self, Proof<NX>), CertifyError>
-    where
-        M: LpvModel<f64, NX, NU, NS>,
-    {
+    ) -> Result<(Self, Proof<NX>), CertifyError> {
         let mut raised = self.clone();
         raised.terminal.level *= factor;
         raised.scheduling_limits = raised.scheduling_reach(&self.plant)?;
         let TerminalClaim { k, p, level, .. } = &raised.terminal;
-        raised.continuous = continuous(model, &raised.scheduling_limits, k, p, *level)?;
+        raised.continuous = continuous(&raised.plant, &raised.scheduling_limits, k, p, *level)?;
         let proof = raised.prove(&raised.plant, most_boxes, progress)?;
         Ok((raised.with(&proof), proof))
     }

@@ -7,7 +7,8 @@ use super::decrease::{Decrease, allowed};
 use super::ellipsoid::Ellipsoid;
 use super::normalised::{Normaliser, from_fn};
 use super::quadratic;
-use crate::enclosure::{AnalyticModel, Interval, SampledLaw};
+use crate::enclosure::{Interval, SampledLaw};
+use lpvmpc::Embedding;
 use nalgebra::SVector;
 use std::sync::{Mutex, PoisonError};
 
@@ -46,7 +47,7 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
         progress: &dyn Fn(f64),
     ) -> Result<Proof<NX>, ClaimError>
     where
-        M: AnalyticModel<NX, NU, NS> + Sync,
+        M: Embedding<NX, NU, NS> + Sync,
     {
         self.check_numbers()?;
         let (ellipsoid, normaliser) = self.set()?;
@@ -109,14 +110,12 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
     /// The smallest box of schedulings that the set was shown to lie in.
     pub(super) fn scheduling_reach<M>(&self, model: &M) -> Result<SVector<f64, NS>, ClaimError>
     where
-        M: AnalyticModel<NX, NU, NS> + Sync,
+        M: Embedding<NX, NU, NS> + Sync,
     {
         let (set, _) = self.set()?;
-        let states = std::array::from_fn(|i| {
-            let reach = set.bound(&axis(i));
-            Interval::new(-reach, reach)
-        });
-        let scheduling = model.scheduling(&states);
+        let states = SVector::from_fn(|i, _| symmetric(set.bound(&axis(i))));
+        let inputs = self.input_reach().map(symmetric);
+        let scheduling = model.scheduling(&states, &inputs);
         Ok(SVector::from_fn(|i, _| scheduling[i].magnitude()))
     }
 
@@ -124,7 +123,7 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
     /// level; below zero where there is none.
     pub(super) fn tightest_at(&self, level: f64) -> Option<f64>
     where
-        Plant: AnalyticModel<NX, NU, NS> + Sync,
+        Plant: Embedding<NX, NU, NS> + Sync,
     {
         let (_, normaliser) = self.set().ok()?;
         let set = Ellipsoid::new(self.terminal.p, level, normaliser);
@@ -133,7 +132,7 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
 
     fn prove_quadratic_stability<M>(&self, model: &M) -> Result<Covered, ClaimError>
     where
-        M: AnalyticModel<NX, NU, NS> + Sync,
+        M: Embedding<NX, NU, NS> + Sync,
     {
         let common = Normaliser::of(&self.continuous.p).ok_or(ClaimError::NotPositive {
             name: "continuous.p",
@@ -155,20 +154,25 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
     /// The limits hold wherever x'Px <= level.
     fn check_limits<M>(&self, model: &M, ellipsoid: &Ellipsoid<NX>) -> Result<(), ClaimError>
     where
-        M: AnalyticModel<NX, NU, NS> + Sync,
+        M: Embedding<NX, NU, NS> + Sync,
     {
-        let mut box_of_states = [Interval::EVERYTHING; NX];
+        let mut box_of_states = SVector::<_, NX>::repeat(Interval::EVERYTHING);
         for (i, range) in box_of_states.iter_mut().enumerate() {
             let name = || format!("state_limits[{i}]");
             let reach = check_row(ellipsoid, &axis(i), self.state_limits[i], &name)?;
-            *range = Interval::new(-reach, reach);
+            *range = symmetric(reach);
         }
-        for i in 0..NU {
+        let mut box_of_inputs = SVector::<_, NU>::repeat(Interval::EVERYTHING);
+        for (i, range) in box_of_inputs.iter_mut().enumerate() {
             let row = self.terminal.k.row(i).transpose();
             let name = || format!("input_limits[{i}]");
-            check_row(ellipsoid, &row, self.input_limits[i], &name)?;
+            let reach = check_row(ellipsoid, &row, self.input_limits[i], &name)?;
+            *range = symmetric(reach);
         }
-        let scheduling = model.scheduling(&box_of_states);
+        let scheduling = model.scheduling(&box_of_states, &box_of_inputs);
+        if model.offset(&scheduling).is_some() {
+            return Err(ClaimError::AffineTerm);
+        }
         for (i, range) in scheduling.iter().enumerate() {
             let (reach, limit) = (range.magnitude(), self.scheduling_limits[i]);
             if reach <= limit {
@@ -178,7 +182,8 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
             let farthest = (0..NX).filter_map(|j| ellipsoid.farthest(&axis(j)));
             let inside = farthest.map(|state| state * (1.0 - 1e-9));
             let mut beyond = inside.filter(|state| {
-                let scheduling = model.scheduling(&point(state))[i];
+                let input = -(self.terminal.k * state);
+                let scheduling = model.scheduling(&point(state), &point(&input))[i];
                 let least = scheduling.lower.max(-scheduling.upper);
                 ellipsoid.holds(state) && least > limit
             });
@@ -223,8 +228,12 @@ fn axis<const N: usize>(i: usize) -> SVector<f64, N> {
     SVector::from_fn(|j, _| if i == j { 1.0 } else { 0.0 })
 }
 
-fn point<const N: usize>(state: &SVector<f64, N>) -> [Interval; N] {
-    std::array::from_fn(|i| Interval::point(state[i]))
+fn point<const N: usize>(values: &SVector<f64, N>) -> SVector<Interval, N> {
+    values.map(Interval::point)
+}
+
+fn symmetric(reach: f64) -> Interval {
+    Interval::new(-reach, reach)
 }
 
 /// Whether |row x| <= limit in the whole set; if so, what |row x| is at most.
@@ -265,7 +274,7 @@ fn refute<M, const NX: usize, const NU: usize, const NS: usize>(
     near: &[SVector<f64, NX>],
 ) -> Result<(), ClaimError>
 where
-    M: AnalyticModel<NX, NU, NS> + Sync,
+    M: Embedding<NX, NU, NS> + Sync,
 {
     match decrease.counterexample(near) {
         Some((state, excess)) => Err(ClaimError::NoDecrease {

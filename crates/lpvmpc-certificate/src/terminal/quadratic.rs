@@ -4,10 +4,9 @@ use super::cover::{Cell, Covered, Finding, Uncovered, cover};
 use super::lmi::{AffineMatrix, maximise_log_det};
 use super::normalised::{Normaliser, corners, from_fn, minus_identity, transposed};
 use crate::enclosure::{
-    AnalyticModel, Arithmetic, Interval, TaylorMap, TaylorModel, is_positive_definite, product,
-    smallest_eigenvalue,
+    Interval, TaylorMap, TaylorModel, is_positive_definite, product, smallest_eigenvalue,
 };
-use lpvmpc::LpvModel;
+use lpvmpc::{Embedding, LpvModel, Number};
 use lpvmpc_design::SchedulingGrid;
 use nalgebra::{DMatrix, SMatrix, SVector, SymmetricEigen};
 
@@ -63,7 +62,7 @@ pub(super) fn prove<M, const NX: usize, const NU: usize, const NS: usize>(
     limits: &SVector<f64, NS>,
 ) -> Result<Covered, Uncovered<NS>>
 where
-    M: AnalyticModel<NX, NU, NS> + Sync,
+    M: Embedding<NX, NU, NS> + Sync,
 {
     const MOST_CELLS: usize = 100_000;
     let whole = Cell {
@@ -102,13 +101,14 @@ fn decay<M, const NX: usize, const NU: usize, const NS: usize>(
     cell: &Cell<NS>,
 ) -> TaylorMap<NX, NX, NS>
 where
-    M: AnalyticModel<NX, NU, NS> + Sync,
+    M: Embedding<NX, NU, NS> + Sync,
 {
     let symbol = |i: usize| TaylorModel::symbol(cell.centre[i], cell.half_widths[i], i);
-    let (a, b) = model.matrices(&std::array::from_fn(symbol));
+    let (a, b) = Embedding::matrices(model, &SVector::from_fn(|i, _| symbol(i)));
+    let b: [[TaylorModel<NS>; NU]; NX] = from_fn(|i, j| b[(i, j)]);
     let minus_k: [[TaylorModel<NS>; NX]; NU] = from_fn(|i, j| TaylorModel::constant(-k[(i, j)]));
     let input = product(&b, &minus_k);
-    let closed: [[TaylorModel<NS>; NX]; NX] = from_fn(|i, j| a[i][j] + input[i][j]);
+    let closed: [[TaylorModel<NS>; NX]; NX] = from_fn(|i, j| a[(i, j)] + input[i][j]);
     let p: [[TaylorModel<NS>; NX]; NX] = from_fn(|i, j| TaylorModel::from(normaliser.p()[i][j]));
     let t: [[TaylorModel<NS>; NX]; NX] =
         from_fn(|i, j| TaylorModel::from(normaliser.frame.t[i][j]));

@@ -1,24 +1,27 @@
 //! Enclosures must contain what they enclose.
 
-use lpvmpc::{LpvModel, Rk4};
-use lpvmpc_certificate::{
-    AnalyticModel, Arithmetic, Frame, Interval, SampledLaw, TaylorMap, TaylorModel,
-};
+use lpvmpc::{Embedding, Number, Rk4};
+use lpvmpc_certificate::{FlowError, Frame, Interval, SampledLaw, TaylorMap, TaylorModel};
 use nalgebra::{Matrix1x2, Matrix2, Vector1, Vector2};
 use proptest::prelude::*;
 
 use crate::pendulum::Pendulum;
 
-/// A formula with every operation, on any arithmetic.
-fn formula<T: Arithmetic>(x: T, y: T) -> T {
-    let two = T::constant(2.0);
-    (x.sin() * y - y.cos() * x.sinc()) / (two + x * x) - (x * y).sinc() / (two + y.cos())
+/// A formula with every operation and function, on any kind of number.
+fn formula<N: Number>(x: N, y: N) -> N {
+    let two = N::constant(2.0);
+    let waves =
+        (x.sin() * y - y.cos() * x.sinc()) / (two + x * x) - (x * y).sinc() / (two + y.cos());
+    let others = (two + x * x).ln() * x.sin().exp() - (two + y * y).sqrt() * (x * y).atan();
+    waves + others + (x - y).tanh()
 }
 
-/// Plain numbers, to compare with.
+/// Plain numbers by the standard library, to compare with.
 fn truth(x: f64, y: f64) -> f64 {
     let sinc = |x: f64| if x == 0.0 { 1.0 } else { x.sin() / x };
-    (x.sin() * y - y.cos() * sinc(x)) / (2.0 + x * x) - sinc(x * y) / (2.0 + y.cos())
+    let waves = (x.sin() * y - y.cos() * sinc(x)) / (2.0 + x * x) - sinc(x * y) / (2.0 + y.cos());
+    let others = (2.0 + x * x).ln() * x.sin().exp() - (2.0 + y * y).sqrt() * (x * y).atan();
+    waves + others + (x - y).tanh()
 }
 
 /// The polynomial of a Taylor model at z.
@@ -123,6 +126,80 @@ proptest! {
     }
 }
 
+/// A pendulum whose motor is stronger the more it gives: B depends on the input; with or without wind.
+struct Strong {
+    wind: bool,
+}
+
+impl Embedding<2, 1, 2> for Strong {
+    fn scheduling<N: Number>(&self, x: &Vector2<N>, u: &Vector1<N>) -> Vector2<N> {
+        Vector2::new(x[0], u[0])
+    }
+
+    fn matrices<N: Number>(&self, s: &Vector2<N>) -> (Matrix2<N>, Vector2<N>) {
+        let (zero, one) = (N::constant(0.0), N::constant(1.0));
+        let gravity = N::constant(9.81) * s[0].sinc();
+        let strength = one + N::constant(0.05) * s[1] * s[0].exp();
+        (
+            Matrix2::new(zero, one, gravity, zero),
+            Vector2::new(zero, strength),
+        )
+    }
+
+    fn offset<N: Number>(&self, _: &Vector2<N>) -> Option<Vector2<N>> {
+        let wind = Vector2::new(N::constant(0.0), N::constant(0.1));
+        self.wind.then_some(wind)
+    }
+}
+
+fn strong_law() -> (SampledLaw<2, 1>, Frame<2>) {
+    let (zero, one) = (Interval::point(0.0), Interval::point(1.0));
+    let identity = [[one, zero], [zero, one]];
+    let law = SampledLaw {
+        k: Matrix1x2::new(15.0, 4.0),
+        t_s: 0.05,
+        halvings: 3,
+    };
+    let frame = Frame {
+        t: identity,
+        inverse: identity,
+    };
+    (law, frame)
+}
+
+#[test]
+fn a_scheduling_that_depends_on_the_input_is_enclosed() {
+    let (law, frame) = strong_law();
+    let plant = Strong { wind: false };
+    let centre = Vector2::new(0.2, -0.3);
+    let half_widths = Vector2::repeat(0.05);
+    let sample = law.enclose(&plant, &frame, &centre, &half_widths).unwrap();
+    for i in -4..=4 {
+        for j in -4..=4 {
+            let z = Vector2::new(f64::from(i), f64::from(j)) / 4.0;
+            let x = centre + z * 0.05;
+            let u = Vector1::from(-law.k * x);
+            let end = Rk4 { substeps: 400 }.advance(&plant, &x, &u, law.t_s);
+            let [by_x, by_rate] = sample.transition.slopes;
+            let g = sample.transition.middle + by_x * z[0] + by_rate * z[1];
+            let error = (g * x - end).norm();
+            let allowed = (sample.error_square * x).dot(&x).sqrt();
+            assert!(error <= allowed + 1e-11, "{error:e} > {allowed:e}");
+            assert!((0..2).all(|k| sample.states[k].contains(Interval::point(end[k]))));
+        }
+    }
+}
+
+/// Motion with an affine term is not linear in x and u: the enclosure would leave the wind out.
+#[test]
+fn a_plant_with_an_affine_term_is_refused() {
+    let (law, frame) = strong_law();
+    let plant = Strong { wind: true };
+    let small = Vector2::repeat(0.01);
+    let error = law.enclose(&plant, &frame, &Vector2::zeros(), &small);
+    assert_eq!(error.unwrap_err(), FlowError::AffineTerm);
+}
+
 #[test]
 fn errors_of_taylor_models_shrink_with_the_third_power_of_the_box() {
     let error = |width: f64| {
@@ -145,14 +222,14 @@ fn what_may_be_divided_by_zero_is_unknown() {
 }
 
 #[test]
-fn both_forms_of_the_pendulum_agree() {
-    let (a, b) = LpvModel::matrices(&Pendulum, &Vector1::new(0.3));
-    let (rows, input) = AnalyticModel::matrices(&Pendulum, &[Interval::point(0.3)]);
+fn sets_of_numbers_have_the_matrices_of_numbers() {
+    let (a, b) = Embedding::matrices(&Pendulum, &Vector1::new(0.3));
+    let (rows, input) = Embedding::matrices(&Pendulum, &Vector1::new(Interval::point(0.3)));
     for i in 0..2 {
         for j in 0..2 {
-            assert!((rows[i][j].middle() - a[(i, j)]).abs() < 1e-14);
+            assert!((rows[(i, j)].middle() - a[(i, j)]).abs() < 1e-14);
         }
-        assert_eq!(input[i][0].middle(), b[i]);
+        assert_eq!(input[i].middle(), b[i]);
     }
 }
 

@@ -378,6 +378,7 @@ fn text_that_is_no_certificate_is_refused() {
 /// A plant whose matrices are 0/0: with zero times unbounded as zero it would have been at rest.
 #[test]
 fn zero_times_a_quotient_by_zero_is_unknown() {
+    use lpvmpc::Number;
     use lpvmpc_certificate::{Arithmetic, Interval, TaylorModel};
     let over_zero = Interval::new(-1.0, 1.0).reciprocal();
     assert_eq!(Interval::point(0.0) * over_zero, Interval::EVERYTHING);

@@ -4,11 +4,10 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
-use lpvmpc::{LpvModel, Rk4};
+use lpvmpc::{Embedding, LpvModel, Number, Rk4};
 use lpvmpc_certificate::{
-    AnalyticModel, Arithmetic, Certificate, CertificateProblem, CertifyError, ClaimError,
-    MOST_BOXES, SynthesisError, TerminalIngredients, TerminalProblem, certify_terminal,
-    synthesize_terminal,
+    Certificate, CertificateProblem, CertifyError, ClaimError, MOST_BOXES, SynthesisError,
+    TerminalIngredients, TerminalProblem, certify_terminal, synthesize_terminal,
 };
 use lpvmpc_design::{SchedulingGrid, lqr_discrete, zero_order_hold};
 use nalgebra::{DMatrix, Matrix1, Matrix1x2, Matrix2, Vector1, Vector2};
@@ -48,7 +47,7 @@ type Change = fn(&mut PendulumCertificate);
 pub type PendulumCertificate = Certificate<Pendulum, 2, 1, 1>;
 
 pub fn certificate() -> PendulumCertificate {
-    certify_terminal((&Pendulum, Pendulum), &problem(), MOST_BOXES, &|_| ())
+    certify_terminal(Pendulum, &problem(), MOST_BOXES, &|_| ())
         .unwrap()
         .0
 }
@@ -133,27 +132,18 @@ proptest! {
 #[derive(Clone, Copy, Debug)]
 struct Swing;
 
-impl LpvModel<f64, 2, 1, 1> for Swing {
-    fn scheduling(&self, x: &Vector2<f64>) -> Vector1<f64> {
+impl Embedding<2, 1, 1> for Swing {
+    fn scheduling<N: Number>(&self, x: &Vector2<N>, _: &Vector1<N>) -> Vector1<N> {
         Vector1::new(x[0])
     }
 
-    fn matrices(&self, s: &Vector1<f64>) -> (Matrix2<f64>, Vector2<f64>) {
-        let (up, down) = (5.5 + 4.5 * s[0], 5.5 - 4.5 * s[0]);
-        (Matrix2::new(-0.1, up, -down, -0.1), Vector2::new(0.0, 1e-6))
-    }
-}
-
-impl AnalyticModel<2, 1, 1> for Swing {
-    fn scheduling<T: Arithmetic>(&self, x: &[T; 2]) -> [T; 1] {
-        [x[0]]
-    }
-
-    fn matrices<T: Arithmetic>(&self, s: &[T; 1]) -> ([[T; 2]; 2], [[T; 1]; 2]) {
-        let damping = T::constant(-0.1);
-        let (half, slope) = (T::constant(5.5), T::constant(4.5) * s[0]);
-        let a = [[damping, half + slope], [slope - half, damping]];
-        (a, [[T::constant(0.0)], [T::constant(1e-6)]])
+    fn matrices<N: Number>(&self, s: &Vector1<N>) -> (Matrix2<N>, Vector2<N>) {
+        let damping = N::constant(-0.1);
+        let (half, slope) = (N::constant(5.5), N::constant(4.5) * s[0]);
+        (
+            Matrix2::new(damping, half + slope, slope - half, damping),
+            Vector2::new(N::constant(0.0), N::constant(1e-6)),
+        )
     }
 }
 
@@ -241,6 +231,30 @@ fn too_large_a_set_is_refused_with_a_message() {
     let mut problem = problem();
     problem.terminal.input_limits = Vector1::new(0.1);
     problem.terminal.contraction = 0.9;
-    let error = certify_terminal((&Pendulum, Pendulum), &problem, MOST_BOXES, &|_| ()).unwrap_err();
+    let error = certify_terminal(Pendulum, &problem, MOST_BOXES, &|_| ()).unwrap_err();
     assert!(matches!(error, CertifyError::Synthesis(_)), "{error}");
+}
+
+#[test]
+fn a_plant_with_an_affine_term_has_no_certificate() {
+    #[derive(Debug)]
+    struct Windy;
+    impl Embedding<2, 1, 1> for Windy {
+        fn scheduling<N: Number>(&self, x: &Vector2<N>, u: &Vector1<N>) -> Vector1<N> {
+            Embedding::scheduling(&Pendulum, x, u)
+        }
+
+        fn matrices<N: Number>(&self, s: &Vector1<N>) -> (Matrix2<N>, Vector2<N>) {
+            Embedding::matrices(&Pendulum, s)
+        }
+
+        fn offset<N: Number>(&self, _: &Vector1<N>) -> Option<Vector2<N>> {
+            Some(Vector2::new(0.0, 0.01).map(N::constant))
+        }
+    }
+    let error = certify_terminal(Windy, &problem(), MOST_BOXES, &|_| ()).unwrap_err();
+    assert!(
+        matches!(error, CertifyError::Claim(ClaimError::AffineTerm)),
+        "{error}"
+    );
 }

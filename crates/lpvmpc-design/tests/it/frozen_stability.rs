@@ -61,7 +61,7 @@ fn without_a_gain_the_ballbot_falls() {
 struct Switching;
 
 impl LpvModel<f64, 2, 1, 1> for Switching {
-    fn scheduling(&self, x: &SVector<f64, 2>) -> SVector<f64, 1> {
+    fn scheduling(&self, x: &SVector<f64, 2>, _: &SVector<f64, 1>) -> SVector<f64, 1> {
         SVector::<f64, 1>::new(if x[0] * x[1] > 0.0 { 0.0 } else { 1.0 })
     }
 
@@ -90,7 +90,7 @@ fn every_frozen_loop_is_stable_and_the_moving_one_is_not() {
     };
     let (first, second) = (flow(0.0), flow(1.0));
     for _ in 0..5000 {
-        let s = Switching.scheduling(&x)[0];
+        let s = Switching.scheduling(&x, &SVector::zeros())[0];
         x = if s == 0.0 { first * x } else { second * x };
     }
     assert!(x.norm() > 1000.0 * start, "{}", x.norm());

@@ -3,6 +3,7 @@
 mod paper;
 
 mod ballbot_parameters;
+mod embedding_check;
 mod frozen_stability;
 mod least_squares_failures;
 mod linearize;

@@ -73,7 +73,7 @@ pub struct Ballbot {
 }
 
 impl LpvModel<f64, 4, 1, 2> for Ballbot {
-    fn scheduling(&self, x: &SVector<f64, 4>) -> SVector<f64, 2> {
+    fn scheduling(&self, x: &SVector<f64, 4>, _: &SVector<f64, 1>) -> SVector<f64, 2> {
         SVector::<f64, 2>::new(x[1], x[3])
     }
 

@@ -61,7 +61,7 @@ impl Comparison {
 /// Runs the closed loop from rest at zero and compares every plan with the dense route. It ends
 /// where both find that there is no plan.
 fn compare(mut controller: Loop, phi_ref: fn(usize) -> f64) -> Comparison {
-    let plant = Ballbot::paper();
+    let plant = Ballbot::<f64>::paper();
     let tolerances = Tolerances {
         relative: 1e-10,
         absolute: 1e-10,
@@ -166,7 +166,7 @@ fn controller(x: [f64; 3], u: f64, terminal: TerminalIngredient<f64, NX>) -> Loo
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),
     };
-    Controller::allocate(Ballbot::paper(), settings).unwrap()
+    Controller::allocate(Ballbot::<f64>::paper(), settings).unwrap()
 }
 
 /// phi_ref at a sample, rad: once around at 1 s and back at 3 s.

@@ -20,7 +20,7 @@ pub struct Sample {
 /// `samples` samples from the state `x`, towards rest in the middle of the track. Between them
 /// the plant moves by 50 small Runge-Kutta steps under the held force.
 pub fn run(
-    plant: &CartPole<f64>,
+    plant: &CartPole,
     controller: &mut Regulator,
     mut x: Vector4<f64>,
     samples: usize,

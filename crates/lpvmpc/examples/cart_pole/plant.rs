@@ -1,8 +1,8 @@
 //! A pole hinged on a cart: the plant of Barto, Sutton and Anderson (1983), with viscous friction
 //! of the cart, as a linear parameter-varying model.
 
-use lpvmpc::{LpvModel, Scalar};
-use nalgebra::{Matrix4, Vector2, Vector4, convert};
+use lpvmpc::{Embedding, Number};
+use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
 
 /// A cart on a straight track that carries a uniform pole on a hinge without friction.
 ///
@@ -16,66 +16,61 @@ use nalgebra::{Matrix4, Vector2, Vector4, convert};
 /// m l cos(theta) s_ddot  + 4/3 m l^2 theta_ddot      = m g l sin(theta)
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CartPole<T> {
+pub struct CartPole {
     /// Mass of the cart in kg.
-    pub cart_mass: T,
+    pub cart_mass: f64,
     /// Mass of the pole in kg.
-    pub pole_mass: T,
+    pub pole_mass: f64,
     /// Half the length of the pole in m.
-    pub half_length: T,
+    pub half_length: f64,
     /// Friction of the cart on the track in N s/m.
-    pub friction: T,
+    pub friction: f64,
     /// Gravity in m/s^2.
-    pub gravity: T,
+    pub gravity: f64,
 }
 
-impl<T: Scalar> CartPole<T> {
+impl CartPole {
     /// A cart of 1 kg with a pole of 0.3 kg and 1 m.
     pub fn laboratory() -> Self {
         Self {
-            cart_mass: convert(1.0),
-            pole_mass: convert(0.3),
-            half_length: convert(0.5),
-            friction: convert(0.1),
-            gravity: convert(9.81),
+            cart_mass: 1.0,
+            pole_mass: 0.3,
+            half_length: 0.5,
+            friction: 0.1,
+            gravity: 9.81,
         }
     }
 }
 
-impl<T: Scalar> LpvModel<T, 4, 1, 2> for CartPole<T> {
-    fn scheduling(&self, x: &Vector4<T>) -> Vector2<T> {
+impl Embedding<4, 1, 2> for CartPole {
+    fn scheduling<N: Number>(&self, x: &Vector4<N>, _force: &Vector1<N>) -> Vector2<N> {
         Vector2::new(x[1], x[3])
     }
 
-    /// The embedding: sin(theta) = sinc(theta) theta, and one theta_dot of its square stays in
-    /// the state.
-    fn matrices(&self, scheduling: &Vector2<T>) -> (Matrix4<T>, Vector4<T>) {
+    /// sin(theta) = sinc(theta) theta, and one theta_dot of its square stays in the state.
+    fn matrices<N: Number>(&self, scheduling: &Vector2<N>) -> (Matrix4<N>, Vector4<N>) {
         let (theta, theta_dot) = (scheduling[0], scheduling[1]);
-        let (sin, cos) = theta.sin_cos();
-        let sinc = if theta == T::zero() {
-            T::one()
-        } else {
-            sin / theta
-        };
-        let total = self.cart_mass + self.pole_mass;
-        let four_thirds: T = convert(4.0 / 3.0);
+        let (sin, cos, sinc) = theta.sin_cos_sinc();
+        let number = N::constant;
+        let (m, l) = (number(self.pole_mass), number(self.half_length));
+        let total = number(self.cart_mass + self.pole_mass);
+        let four_thirds = number(4.0 / 3.0);
         // The determinant of the mass matrix over m l^2.
-        let d = four_thirds * total - self.pole_mass * cos * cos;
-        // What a force on the cart does to s_dot and theta_dot.
-        let b = Vector2::new(four_thirds / d, -cos / (self.half_length * d));
-        let damping = b * -self.friction;
-        let swing = b * (self.pole_mass * self.half_length * theta_dot * sin);
-        let weight = Vector2::new(-self.pole_mass * cos, total / self.half_length)
-            * (self.gravity * sinc / d);
-
-        let mut a = Matrix4::zeros();
-        a[(0, 2)] = T::one();
-        a[(1, 3)] = T::one();
-        for (row, j) in [(2, 0), (3, 1)] {
-            a[(row, 1)] = weight[j];
-            a[(row, 2)] = damping[j];
-            a[(row, 3)] = swing[j];
-        }
-        (a, Vector4::new(T::zero(), T::zero(), b[0], b[1]))
+        let d = four_thirds * total - m * cos * cos;
+        // What a force on the cart does to s_dot and theta_dot, by its rows.
+        let b = [four_thirds / d, -cos / (l * d)];
+        let pull = number(self.gravity) * sinc / d;
+        let weight = [-m * cos * pull, total / l * pull];
+        let swing = m * l * theta_dot * sin;
+        let drag = -number(self.friction);
+        let (zero, one) = (number(0.0), number(1.0));
+        #[rustfmt::skip]
+        let a = Matrix4::new(
+            zero, zero,      one,         zero,
+            zero, zero,      zero,        one,
+            zero, weight[0], drag * b[0], swing * b[0],
+            zero, weight[1], drag * b[1], swing * b[1],
+        );
+        (a, Vector4::new(zero, zero, b[0], b[1]))
     }
 }

@@ -11,7 +11,7 @@ use nalgebra::{Matrix1, Matrix4, Vector1, Vector2, Vector4};
 /// Stages of the horizon.
 pub const STAGES: usize = 30;
 /// The controller: 4 states, 1 input, 2 scheduling parameters.
-pub type Regulator = Controller<CartPole<f64>, f64, 4, 1, 2>;
+pub type Regulator = Controller<CartPole, f64, 4, 1, 2>;
 
 /// Largest force, in N.
 pub const FORCE: f64 = 15.0;
@@ -22,7 +22,7 @@ pub const FORCE: f64 = 15.0;
 /// # Errors
 /// [`BadPivot`] from [`terminal_weight`].
 pub fn settings(
-    plant: &CartPole<f64>,
+    plant: &CartPole,
     track: f64,
     scheduling: Scheduling<f64, 2>,
 ) -> Result<ControllerSettings<f64, 4, 1, 2>, BadPivot<f64>> {

@@ -242,7 +242,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
         self.check_direction(model)
     }
 
-    /// A d = 0 and sigma(x + z d) = sigma(x), at points spread over the state bounds: the plant does
+    /// A d = 0 and sigma(x + z d, u) = sigma(x, u), at points spread over the bounds: the plant does
     /// not notice where along d it stands (assumption 4 of `docs/guarantees.md`). Samples, no proof.
     fn check_direction<P, const NS: usize>(&self, model: &P) -> Result<(), GuardedError>
     where
@@ -257,13 +257,14 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
         let moves = [lower, upper, extent, extent * convert(-1.618)];
         for point in 0..CORNERS + INNER_POINTS {
             let x = sample(&self.x, point);
-            let scheduling = model.scheduling(&x);
+            let u = sample(&self.u, point);
+            let scheduling = model.scheduling(&x, &u);
             let (a, _) = model.matrices(&scheduling);
             let rounding = a.amax() * size * T::default_epsilon();
             // So that a number that is not one fails.
             holds &= (a * d).iter().all(|rate| rate.abs() <= rounding);
             for z in moves.into_iter().filter(|z| z.is_finite()) {
-                let moved = model.scheduling(&(x + d * z)) - scheduling;
+                let moved = model.scheduling(&(x + d * z), &u) - scheduling;
                 let largest = x.amax() + z.abs() * size + scheduling.amax();
                 let rounding = largest * T::default_epsilon() * convert(16.0);
                 holds &= moved.iter().all(|change| change.abs() <= rounding);

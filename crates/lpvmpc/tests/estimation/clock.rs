@@ -155,7 +155,7 @@ fn unix_time_works_in_single_precision() {
     /// The pendulum in `f32`.
     struct Single;
     impl LpvModel<f32, 2, 1, 1> for Single {
-        fn scheduling(&self, x: &SVector<f32, 2>) -> SVector<f32, 1> {
+        fn scheduling(&self, x: &SVector<f32, 2>, _: &Vector1<f32>) -> SVector<f32, 1> {
             Vector1::new(x[0])
         }
         fn matrices(&self, _: &SVector<f32, 1>) -> (SMatrix<f32, 2, 2>, SMatrix<f32, 2, 1>) {

@@ -10,7 +10,7 @@ use nalgebra::{Matrix1x2, Matrix2, Matrix3, SMatrix, SVector, Vector1, Vector2, 
 pub struct Linear;
 
 impl LpvModel<f64, 2, 1, 1> for Linear {
-    fn scheduling(&self, _: &Vector2<f64>) -> Vector1<f64> {
+    fn scheduling(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Vector1<f64> {
         Vector1::zeros()
     }
 
@@ -193,7 +193,7 @@ fn the_covariance_stays_positive_in_single_precision() {
     /// The pendulum in `f32`.
     struct Single;
     impl LpvModel<f32, 2, 1, 1> for Single {
-        fn scheduling(&self, x: &SVector<f32, 2>) -> SVector<f32, 1> {
+        fn scheduling(&self, x: &SVector<f32, 2>, _: &Vector1<f32>) -> SVector<f32, 1> {
             Vector1::new(x[0])
         }
         fn matrices(&self, _: &SVector<f32, 1>) -> (SMatrix<f32, 2, 2>, SMatrix<f32, 2, 1>) {

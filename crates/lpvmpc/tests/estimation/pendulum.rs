@@ -8,7 +8,7 @@ use nalgebra::{Matrix1x2, Matrix2, SMatrix, SVector, Vector1, Vector2};
 pub struct Pendulum;
 
 impl LpvModel<f64, 2, 1, 1> for Pendulum {
-    fn scheduling(&self, x: &Vector2<f64>) -> Vector1<f64> {
+    fn scheduling(&self, x: &Vector2<f64>, _: &Vector1<f64>) -> Vector1<f64> {
         Vector1::new(x[0])
     }
 

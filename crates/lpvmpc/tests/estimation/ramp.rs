@@ -35,7 +35,7 @@ fn its_motion_is_that_of_the_plant_under_a_ramp() {
     );
     assert!((found[2] - (u + rate * t_s)[0]).abs() < 1e-12);
     // f and A, B are the same right-hand side.
-    let (a, b) = ramped.matrices(&ramped.scheduling(&joint));
+    let (a, b) = ramped.matrices(&ramped.scheduling(&joint, &Vector1::zeros()));
     assert!((a * joint + b * rate - ramped.derivative(&joint, &rate)).norm() < 1e-12);
 }
 

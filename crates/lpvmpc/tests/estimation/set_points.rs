@@ -185,7 +185,7 @@ fn a_ramped_torque_holds_the_pendulum_too() {
 struct TwoPumps;
 
 impl LpvModel<f64, 1, 2, 1> for TwoPumps {
-    fn scheduling(&self, x: &Vector1<f64>) -> Vector1<f64> {
+    fn scheduling(&self, x: &Vector1<f64>, _: &Vector2<f64>) -> Vector1<f64> {
         *x
     }
 

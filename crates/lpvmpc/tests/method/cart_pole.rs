@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 
 /// x_dot by the formulas of Barto, Sutton and Anderson, "Neuronlike adaptive elements that can
 /// solve difficult learning control problems" (1983), with viscous friction of the cart.
-pub fn textbook(plant: &CartPole<f64>, x: &Vector4<f64>, u: &Vector1<f64>) -> Vector4<f64> {
+pub fn textbook(plant: &CartPole, x: &Vector4<f64>, u: &Vector1<f64>) -> Vector4<f64> {
     let (theta, s_dot, theta_dot) = (x[1], x[2], x[3]);
     let (sin, cos) = theta.sin_cos();
     let total = plant.cart_mass + plant.pole_mass;

@@ -14,7 +14,7 @@ struct Cart {
 }
 
 impl LpvModel<f64, 2, 1, 1> for Cart {
-    fn scheduling(&self, x: &Vector2<f64>) -> Vector1<f64> {
+    fn scheduling(&self, x: &Vector2<f64>, _: &Vector1<f64>) -> Vector1<f64> {
         Vector1::new((self.scheduling)(x[0], x[1]))
     }
 

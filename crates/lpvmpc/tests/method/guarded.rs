@@ -13,10 +13,10 @@ use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
 
 const N: usize = 20;
 const RK4: Rk4 = Rk4 { substeps: 2 };
-type Guarded = GuardedController<CartPole<f64>, f64, 4, 1, 2>;
+type Guarded = GuardedController<CartPole, f64, 4, 1, 2>;
 type Settings = GuardedSettings<f64, 4, 1>;
 
-fn plant() -> CartPole<f64> {
+fn plant() -> CartPole {
     CartPole::laboratory()
 }
 

@@ -12,6 +12,7 @@ mod controller;
 mod direction;
 mod guarded;
 mod horizon;
+mod plants;
 mod predictor;
 mod predictor_kinds;
 mod riccati;

@@ -189,7 +189,7 @@ fn the_discretisation_has_order_four() {
 struct Rising;
 
 impl LpvModel<f64, 1, 1, 1> for Rising {
-    fn scheduling(&self, x: &Vector1<f64>) -> Vector1<f64> {
+    fn scheduling(&self, x: &Vector1<f64>, _: &Vector1<f64>) -> Vector1<f64> {
         *x
     }
 
@@ -250,7 +250,7 @@ struct Frozen<const NX: usize, const NU: usize> {
 }
 
 impl<const NX: usize, const NU: usize> LpvModel<f64, NX, NU, 0> for Frozen<NX, NU> {
-    fn scheduling(&self, _: &SVector<f64, NX>) -> SVector<f64, 0> {
+    fn scheduling(&self, _: &SVector<f64, NX>, _: &SVector<f64, NU>) -> SVector<f64, 0> {
         SVector::zeros()
     }
 

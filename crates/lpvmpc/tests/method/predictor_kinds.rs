@@ -54,7 +54,7 @@ fn the_exact_pair_is_the_matrix_exponential() {
         let t_s = rng.uniform(1e-4, 1.0);
         let exact = Predictor::FrozenExact(Rk4 { substeps: 1 });
         let (a_d, b_d) = exact.linearize(&plant, &x, &u, t_s);
-        let (a, b) = plant.matrices(&plant.scheduling(&x));
+        let (a, b) = plant.matrices(&plant.scheduling(&x, &u));
         let mut block = Matrix5::zeros();
         block.fixed_view_mut::<4, 4>(0, 0).copy_from(&(a * t_s));
         block.fixed_view_mut::<4, 1>(0, 4).copy_from(&(b * t_s));

@@ -215,7 +215,7 @@ fn single_precision_is_close_to_double() {
     const N: usize = 20;
     let settings = settings(N);
     let mut double = controller(settings);
-    let plant = CartPole::<f32>::laboratory();
+    let plant = CartPole::laboratory();
     let mut narrow = Controller::allocate(plant, single(&settings)).unwrap();
     let (mut workspace, mut narrow_workspace) = (double.workspace(), narrow.workspace());
     let mut x = tilted();

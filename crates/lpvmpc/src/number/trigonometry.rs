@@ -1,11 +1,11 @@
-//! Sine and cosine of a tilt, at the price of a dozen multiplications.
+//! Sine and cosine of an angle, at the price of a dozen multiplications.
 //!
 //! A controller's step asks for about a hundred of them. The library's functions take over a
 //! thousand instructions each on a microcontroller without double precision, and 10 kB of its
-//! flash, because they reduce any argument to full accuracy; a tilt needs next to no reduction.
+//! flash, because they reduce any argument to full accuracy; the angles of a plant need next to no reduction.
 //! The same polynomials on every target also mean the same numbers on every target.
 
-use lpvmpc::Scalar;
+use crate::model::Scalar;
 use nalgebra::convert;
 
 /// Up to this angle (63 degrees) the Taylor polynomials are exact to rounding in `f64`: the
@@ -18,7 +18,7 @@ const NEIGHBOURS: f64 = 2.64;
 /// (sin x, cos x) for `x` in rad, to rounding up to some thousand turns; the error grows with the
 /// argument from there on. NaN for what is not finite.
 #[inline(always)]
-pub(crate) fn sin_cos<T: Scalar>(x: T) -> (T, T) {
+pub(super) fn sin_cos<T: Scalar>(x: T) -> (T, T) {
     if x.abs() <= convert(LARGEST) {
         polynomials(x)
     } else {

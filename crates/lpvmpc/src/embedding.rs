@@ -1,0 +1,276 @@
+//! A plant written once, for every kind of number.
+
+use crate::kernel::product;
+use crate::model::{LpvModel, Scalar};
+use crate::number::{Dual, Number};
+use crate::steady_state::{self, SteadyState, SteadyStateProblem};
+use nalgebra::{SMatrix, SVector};
+
+/// f and its derivatives at a point: (f, df/dx, df/du).
+pub type Tangent<T, const NX: usize, const NU: usize> =
+    (SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>);
+
+/// An LPV plant written once, for every kind of [`Number`]: an [`LpvModel`] of `f32` and `f64` for
+/// controllers, filters, simulations and fits, with its derivatives by [`Dual`] numbers, and the
+/// plant of the proofs of `lpvmpc-certificate`.
+///
+/// ```text
+/// x_dot = A(s) x + B(s) u + c(s),     s = sigma(x, u)
+/// ```
+///
+/// with `NX` states, `NU` inputs and `NS` scheduling parameters, in SI units. A plant that is known
+/// by its f alone is a [`Dynamics`].
+pub trait Embedding<const NX: usize, const NU: usize, const NS: usize> {
+    /// sigma(x, u): the scheduling vector.
+    fn scheduling<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NS>;
+
+    /// A(s), `NX` x `NX`, per second, and B(s), `NX` x `NU`.
+    fn matrices<N: Number>(
+        &self,
+        scheduling: &SVector<N, NS>,
+    ) -> (SMatrix<N, NX, NX>, SMatrix<N, NX, NU>);
+
+    /// The affine term c(s) in state units per second; `None` where it is always zero.
+    #[inline(always)]
+    fn offset<N: Number>(&self, scheduling: &SVector<N, NS>) -> Option<SVector<N, NX>> {
+        let _ = scheduling;
+        None
+    }
+
+    /// x_dot = f(x, u), in state units per second.
+    ///
+    /// A plant with a cheaper direct form may override this; it must be the same function.
+    #[inline(always)]
+    fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
+        let scheduling = self.scheduling(x, u);
+        let (a, b) = self.matrices(&scheduling);
+        let zero = N::constant(0.0);
+        let c = self.offset(&scheduling);
+        let mut rate = c.unwrap_or_else(|| SVector::repeat(zero));
+        for (i, rate) in rate.iter_mut().enumerate() {
+            for (j, x) in x.iter().enumerate() {
+                *rate = *rate + a[(i, j)] * *x;
+            }
+            for (j, u) in u.iter().enumerate() {
+                *rate = *rate + b[(i, j)] * *u;
+            }
+        }
+        rate
+    }
+
+    /// f with its derivatives at `x` and `u`.
+    ///
+    /// By dual numbers. A plant with a closed form may override this where speed counts; it must
+    /// return the same numbers, to rounding.
+    #[inline(always)]
+    fn tangent<T: Scalar + Number>(
+        &self,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> Tangent<T, NX, NU> {
+        tangent(
+            x,
+            u,
+            |x: &SVector<Dual<T, NX>, NX>, u| self.f(x, u),
+            |x, u| self.f(x, u),
+        )
+    }
+
+    /// See [`LpvModel::a_times`].
+    #[inline(always)]
+    fn a_times<T: Scalar, const C: usize>(
+        &self,
+        a: &SMatrix<T, NX, NX>,
+        v: &SMatrix<T, NX, C>,
+    ) -> SMatrix<T, NX, C> {
+        product(a, v)
+    }
+
+    /// See [`LpvModel::steady_state`].
+    fn steady_state<T: Scalar + Number>(
+        &self,
+        problem: &SteadyStateProblem<T, NX, NU>,
+    ) -> Option<SteadyState<T, NX, NU>>
+    where
+        Self: Sized,
+    {
+        steady_state::nearest(self, problem)
+    }
+}
+
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> LpvModel<T, NX, NU, NS> for P
+where
+    T: Scalar + Number,
+    P: Embedding<NX, NU, NS>,
+{
+    #[inline(always)]
+    fn scheduling(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NS> {
+        Embedding::scheduling(self, x, u)
+    }
+
+    #[inline(always)]
+    fn matrices(&self, scheduling: &SVector<T, NS>) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+        Embedding::matrices(self, scheduling)
+    }
+
+    #[inline(always)]
+    fn offset(&self, scheduling: &SVector<T, NS>) -> Option<SVector<T, NX>> {
+        Embedding::offset(self, scheduling)
+    }
+
+    #[inline(always)]
+    fn a_times<const C: usize>(
+        &self,
+        a: &SMatrix<T, NX, NX>,
+        v: &SMatrix<T, NX, C>,
+    ) -> SMatrix<T, NX, C> {
+        Embedding::a_times(self, a, v)
+    }
+
+    #[inline(always)]
+    fn derivative(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NX> {
+        self.f(x, u)
+    }
+
+    #[inline(always)]
+    fn jacobian(
+        &self,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+        let (_, a, b) = Embedding::tangent(self, x, u);
+        (a, b)
+    }
+
+    #[inline(always)]
+    fn tangent(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> Tangent<T, NX, NU> {
+        Embedding::tangent(self, x, u)
+    }
+
+    fn steady_state(
+        &self,
+        problem: &SteadyStateProblem<T, NX, NU>,
+    ) -> Option<SteadyState<T, NX, NU>> {
+        Embedding::steady_state(self, problem)
+    }
+}
+
+/// A plant that is known by its f alone, written once for every kind of [`Number`].
+///
+/// [`AlongMotion`] makes an [`LpvModel`] of it.
+pub trait Dynamics<const NX: usize, const NU: usize> {
+    /// x_dot = f(x, u), in state units per second.
+    fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX>;
+}
+
+/// The linear models of a plant along its motion: A and B are the derivatives of f at the scheduling
+/// (x, u), and c = f - A x - B u makes the model exact there. No factorisation is done by hand.
+///
+/// It has `NS` = `NX` + `NU` scheduling parameters; any other number does not compile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AlongMotion<P>(pub P);
+
+impl<P> AlongMotion<P> {
+    fn tangent_at<T, const NX: usize, const NU: usize, const NS: usize>(
+        &self,
+        scheduling: &SVector<T, NS>,
+    ) -> (SVector<T, NX>, SVector<T, NU>, Tangent<T, NX, NU>)
+    where
+        T: Scalar + Number,
+        P: Dynamics<NX, NU>,
+    {
+        const {
+            assert!(
+                NS == NX + NU,
+                "the scheduling is x and u: NS must be NX + NU"
+            )
+        };
+        let entry = |i: usize| match scheduling.get(i) {
+            Some(entry) => *entry,
+            None => T::zero(),
+        };
+        let x = SVector::from_fn(|i, _| entry(i));
+        let u = SVector::from_fn(|i, _| entry(NX + i));
+        let at = LpvModel::<T, NX, NU, NS>::tangent(self, &x, &u);
+        (x, u, at)
+    }
+}
+
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> LpvModel<T, NX, NU, NS>
+    for AlongMotion<P>
+where
+    T: Scalar + Number,
+    P: Dynamics<NX, NU>,
+{
+    /// (x, u).
+    fn scheduling(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NS> {
+        let mut scheduling = SVector::<T, NS>::zeros();
+        for (place, entry) in scheduling.iter_mut().zip(x.iter().chain(u.iter())) {
+            *place = *entry;
+        }
+        scheduling
+    }
+
+    fn matrices(&self, scheduling: &SVector<T, NS>) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+        let (_, _, (_, a, b)) = self.tangent_at(scheduling);
+        (a, b)
+    }
+
+    fn offset(&self, scheduling: &SVector<T, NS>) -> Option<SVector<T, NX>> {
+        let (x, u, (rate, a, b)) = self.tangent_at(scheduling);
+        Some(rate - product(&a, &x) - product(&b, &u))
+    }
+
+    fn derivative(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NX> {
+        self.0.f(x, u)
+    }
+
+    fn jacobian(
+        &self,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+        let (_, a, b) = LpvModel::<T, NX, NU, NS>::tangent(self, x, u);
+        (a, b)
+    }
+
+    fn tangent(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> Tangent<T, NX, NU> {
+        tangent(
+            x,
+            u,
+            |x: &SVector<Dual<T, NX>, NX>, u| self.0.f(x, u),
+            |x, u| self.0.f(x, u),
+        )
+    }
+}
+
+/// (f, df/dx, df/du) by two passes of dual numbers: one for the states, one for the inputs.
+#[inline(always)]
+fn tangent<T: Scalar + Number, const NX: usize, const NU: usize>(
+    x: &SVector<T, NX>,
+    u: &SVector<T, NU>,
+    by_x: impl Fn(&SVector<Dual<T, NX>, NX>, &SVector<Dual<T, NX>, NU>) -> SVector<Dual<T, NX>, NX>,
+    by_u: impl Fn(&SVector<Dual<T, NU>, NX>, &SVector<Dual<T, NU>, NU>) -> SVector<Dual<T, NU>, NX>,
+) -> Tangent<T, NX, NU> {
+    let along_x = by_x(&Dual::variables(x), &u.map(Dual::fixed));
+    let along_u = by_u(&x.map(Dual::fixed), &Dual::variables(u));
+    (
+        along_x.map(|rate| rate.value),
+        slopes(&along_x),
+        slopes(&along_u),
+    )
+}
+
+/// The derivatives of each of R numbers as the rows of a matrix.
+#[inline(always)]
+fn slopes<T: Scalar, const R: usize, const D: usize>(
+    numbers: &SVector<Dual<T, D>, R>,
+) -> SMatrix<T, R, D> {
+    let mut matrix = SMatrix::zeros();
+    for (i, number) in numbers.iter().enumerate() {
+        for (j, slope) in number.slopes.iter().enumerate() {
+            matrix[(i, j)] = *slope;
+        }
+    }
+    matrix
+}
