@@ -119,7 +119,7 @@ impl<S: Scalar + Number> Embedding<4, 1, 3> for Ballbot<S> {
         self.over().tangent_of_f(x, u[0])
     }
 
-    /// With what [`state_matrix`] leaves out.
+    /// Without the products with what is always zero or one.
     #[inline(always)]
     fn a_times<T: Scalar, const C: usize>(
         &self,

@@ -40,7 +40,10 @@ enum Outcome<T> {
     /// It has no answer.
     Unsolved(Status<T>),
     /// It expects to save next to nothing.
-    NothingToGain,
+    NothingToGain {
+        /// So little that the merit's rounding would hide it.
+        hidden: bool,
+    },
     /// It expects to save something, but no step towards its answer lowers the merit.
     NoStep,
     /// The plan was moved.
@@ -124,7 +127,14 @@ where
                 self.adapt_damping(&outcome);
             }
             match outcome {
-                Outcome::NothingToGain if along == Along::Jacobian => {
+                Outcome::NothingToGain { hidden } if along == Along::Jacobian => {
+                    if hidden && !damped {
+                        // The program knows better than the merit can tell, and its states are
+                        // the rollout's to second order.
+                        copy(&mut self.policy.u, &self.solution.u);
+                        copy(&mut self.rollout, &self.solution.x);
+                        self.gap = SVector::zeros();
+                    }
                     // Damped by more than was measured, a program expects little, whatever there is
                     // to gain.
                     if !damped || failures == 0 {
@@ -151,7 +161,7 @@ where
                         along = along.other(self.policy.far);
                     }
                 }
-                Outcome::NothingToGain | Outcome::NoStep | Outcome::Unsolved(_) => {
+                Outcome::NothingToGain { .. } | Outcome::NoStep | Outcome::Unsolved(_) => {
                     if let (Outcome::Unsolved(reason), Status::NoImprovement) = (outcome, status) {
                         status = reason;
                     }
@@ -264,10 +274,12 @@ where
         // states are rounded, too, which counts where they are far from zero and close to their aim.
         let from_zero = merit.end(&(aim.end() + aim.end()));
         let known_to = (before * (before + from_zero)).sqrt() * convert(ROUNDINGS);
-        let least = (tolerance * tolerance * before).max(T::default_epsilon() * known_to);
+        let rounding = T::default_epsilon() * known_to;
+        let least = (tolerance * tolerance * before).max(rounding);
         // Negated, so that a NaN ends the search.
         if !(expected > least) {
-            return Outcome::NothingToGain;
+            let hidden = least == rounding && expected.abs() <= rounding;
+            return Outcome::NothingToGain { hidden };
         }
         let wanted = (expected, longest);
         let taken = self.search_line(x, &merit, wanted, &mut workspace.trial, &|i| {
@@ -366,7 +378,7 @@ where
                 (at(&self.solution.x, i), u)
             });
             self.take_if_some(taken.map(|(_, cost)| cost), &workspace.trial);
-            self.adapt_damping(&Outcome::NothingToGain);
+            self.adapt_damping(&Outcome::NothingToGain { hidden: false });
         }
         self.linearize_plan(&x, aim, Along::Jacobian, workspace);
         true
@@ -381,7 +393,7 @@ where
         let lower = before / factor;
         let equality = matches!(self.settings.terminal, TerminalIngredient::Equality);
         let damping = match outcome {
-            Outcome::NothingToGain => lower,
+            Outcome::NothingToGain { .. } => lower,
             // A full step that the program was good enough for.
             Outcome::Moved { step, .. }
                 if *step == T::one() && (before == T::zero() || equality) =>

@@ -166,12 +166,13 @@ pub trait Dynamics<const NX: usize, const NU: usize> {
 /// The linear models of a plant along its motion: A and B are the derivatives of f at the scheduling
 /// (x, u), and c = f - A x - B u makes the model exact there. No factorisation is done by hand.
 ///
-/// It has `NS` = `NX` + `NU` scheduling parameters; any other number does not compile.
+/// `NS` is the number of scheduling parameters, that of states and inputs together: for 2 states and 1
+/// input, `AlongMotion::<_, 3>(plant)`. Any other number does not compile.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AlongMotion<P>(pub P);
+pub struct AlongMotion<P, const NS: usize>(pub P);
 
-impl<P> AlongMotion<P> {
-    fn tangent_at<T, const NX: usize, const NU: usize, const NS: usize>(
+impl<P, const NS: usize> AlongMotion<P, NS> {
+    fn tangent_at<T, const NX: usize, const NU: usize>(
         &self,
         scheduling: &SVector<T, NS>,
     ) -> (SVector<T, NX>, SVector<T, NU>, Tangent<T, NX, NU>)
@@ -191,13 +192,13 @@ impl<P> AlongMotion<P> {
         };
         let x = SVector::from_fn(|i, _| entry(i));
         let u = SVector::from_fn(|i, _| entry(NX + i));
-        let at = LpvModel::<T, NX, NU, NS>::tangent(self, &x, &u);
+        let at = self.tangent(&x, &u);
         (x, u, at)
     }
 }
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize> LpvModel<T, NX, NU, NS>
-    for AlongMotion<P>
+    for AlongMotion<P, NS>
 where
     T: Scalar + Number,
     P: Dynamics<NX, NU>,
@@ -230,7 +231,7 @@ where
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-        let (_, a, b) = LpvModel::<T, NX, NU, NS>::tangent(self, x, u);
+        let (_, a, b) = self.tangent(x, u);
         (a, b)
     }
 

@@ -20,7 +20,7 @@
 //! let terminal = TerminalIngredient::Cost(Matrix2::new(147.006, 40.381, 40.381, 14.758));
 //! let torque = Bounds { lower: Vector1::new(-8.0), upper: Vector1::new(8.0) };
 //! let settings = ControllerSettings::new(0.05, 30, weights, terminal, torque);
-//! let mut controller = Controller::allocate(AlongMotion(Pendulum), settings)?;
+//! let mut controller = Controller::allocate(AlongMotion::<_, 3>(Pendulum), settings)?;
 //! let mut workspace = controller.workspace();
 //! let mut x = Vector2::new(0.8, 0.0);
 //! for _ in 0..100 {

@@ -205,8 +205,7 @@ fn the_tangent_is_what_dual_numbers_give() {
             Vector1::new(robots::torque(&mut rng)),
         );
         let (_, a, b) = LpvModel::<f64, 4, 1, 3>::tangent(&robot, &x, &u);
-        let (f, by_dual_a, by_dual_b) =
-            LpvModel::<f64, 4, 1, 5>::tangent(&AlongMotion(ByDual(robot)), &x, &u);
+        let (f, by_dual_a, by_dual_b) = AlongMotion::<_, 5>(ByDual(robot)).tangent(&x, &u);
         assert_eq!(f, robot.f(&x, u[0]));
         assert!(
             (a - by_dual_a).amax() <= 1e-12 * (1.0 + a.amax()),

@@ -73,14 +73,14 @@ fn all_forms_of_a_plant_are_the_same_function() {
         let forms = [
             LpvModel::<f64, 2, 1, 2>::derivative(&Factorised, &x, &u),
             Tabulated.derivative(&x, &u),
-            LpvModel::<f64, 2, 1, 3>::derivative(&AlongMotion(Windy), &x, &u),
+            AlongMotion::<_, 3>(Windy).derivative(&x, &u),
         ];
         for found in forms {
             assert!((found - expected).amax() < 1e-13, "{found} for {expected}");
         }
         // The linear model along the motion is exact at its own point.
-        let motion = AlongMotion(Windy);
-        let s = LpvModel::<f64, 2, 1, 3>::scheduling(&motion, &x, &u);
+        let motion = AlongMotion::<_, 3>(Windy);
+        let s = motion.scheduling(&x, &u);
         let (a, b) = motion.matrices(&s);
         let c = motion.offset(&s).unwrap();
         assert!((a * x + b * u + c - expected).amax() < 1e-13);
@@ -97,7 +97,7 @@ fn derivatives_are_exact_by_dual_numbers_and_close_by_differences() {
             Vector2::new(0.0, x[0].cos() + 0.6 * u[0]),
         );
         let by_dual = LpvModel::<f64, 2, 1, 2>::tangent(&Factorised, &x, &u);
-        let alone = LpvModel::<f64, 2, 1, 3>::tangent(&AlongMotion(Windy), &x, &u);
+        let alone = AlongMotion::<_, 3>(Windy).tangent(&x, &u);
         let by_differences = Tabulated.tangent(&x, &u);
         for ((_, found_a, found_b), tolerance) in
             [(by_dual, 1e-13), (alone, 1e-13), (by_differences, 1e-7)]
@@ -260,7 +260,7 @@ fn plants_with_an_affine_term_stand_at_their_set_point() {
     ] {
         for x in [
             stands_at::<_, 2>(Factorised, iterations),
-            stands_at::<_, 3>(AlongMotion(Windy), iterations),
+            stands_at::<_, 3>(AlongMotion::<_, 3>(Windy), iterations),
         ] {
             assert!(
                 (x - Vector2::new(-0.1, 0.0)).amax() < 1e-6,
@@ -278,7 +278,8 @@ fn a_converged_plan_is_a_stationary_point() {
         tolerance: 1e-9,
         most: 60,
     };
-    let mut controller = Controller::allocate(AlongMotion(Windy), settings::<3>(descent)).unwrap();
+    let mut controller =
+        Controller::allocate(AlongMotion::<_, 3>(Windy), settings::<3>(descent)).unwrap();
     let mut workspace = controller.workspace();
     let x0 = Vector2::new(-0.4, 0.5);
     let reference = Reference::constant(Vector2::new(-0.1, 0.0));
@@ -292,7 +293,7 @@ fn a_converged_plan_is_a_stationary_point() {
         for u in inputs {
             let (e, v) = (x - target.x, u - target.u);
             total += e.dot(&(weights.weights.q * e)) + v.dot(&(weights.weights.r * v));
-            x = Rk4 { substeps: 1 }.advance::<f64, _, 2, 1, 3>(&AlongMotion(Windy), &x, u, T_S);
+            x = Rk4 { substeps: 1 }.advance(&AlongMotion::<_, 3>(Windy), &x, u, T_S);
         }
         let TerminalIngredient::Cost(p) = weights.terminal else {
             unreachable!()
@@ -349,8 +350,7 @@ fn an_affine_term_does_not_outlive_its_controller() {
             settings.u,
         )
     };
-    let mut other =
-        Controller::<_, f64, 4, 1, 5>::allocate(AlongMotion(Pushed(plain)), fixed).unwrap();
+    let mut other = Controller::allocate(AlongMotion::<_, 5>(Pushed(plain)), fixed).unwrap();
     let x = Vector4::new(0.1, 0.05, 0.0, 0.0);
     let origin = Reference::constant(Vector4::zeros());
     for _ in 0..5 {
