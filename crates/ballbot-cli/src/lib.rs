@@ -18,7 +18,6 @@
 )]
 
 pub mod arguments;
-pub mod benchmark;
 pub mod campaign_drawing;
 pub mod certificate_page;
 pub mod commands;
@@ -27,7 +26,7 @@ pub mod identification;
 pub mod input;
 pub mod interrupt;
 pub mod json;
-pub mod optimality;
+pub mod optimality_drawing;
 pub mod output;
 pub mod pictures;
 pub mod progress;

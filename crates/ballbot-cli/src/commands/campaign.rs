@@ -78,7 +78,8 @@ pub fn run(arguments: &CampaignArguments) -> Result<String, CommandError> {
     let progress = Progress::new("running", campaign.total_runs());
     let outcomes = campaign.run(&scenarios, &|done| progress.set(done))?;
     drop(progress);
-    let figure = drawing(&outcomes, limits(&scenarios.guaranteed).states[1]);
+    let settings = &scenarios.guaranteed.settings;
+    let figure = drawing(&outcomes, limits(&settings.x, &settings.u).states[1]);
     let contents = [
         csv(&outcomes).into_bytes(),
         figure.svg()?.into_bytes(),

@@ -5,7 +5,7 @@ use lpvmpc::{
     Bounds, Controller, ControllerSettings, InputReference, Iterations, LpvModel, Predictor,
     Quantity, Rk4, Scheduling, Side, SolverSettings, Status, TerminalIngredient, Weights,
 };
-use lpvmpc_sim::{Ending, Experiment, PlantError, Tolerances, Trajectory, run};
+use lpvmpc_sim::{Experiment, PlantError, Termination, Tolerances, Trajectory, run};
 use nalgebra::{Matrix1, Matrix2, Matrix4, Vector1, Vector2, Vector4};
 use std::cell::{Cell, RefCell};
 use std::time::Duration;
@@ -126,7 +126,7 @@ fn a_complete_run_is_recorded_whole() {
     let trajectory = run_mass(&Mass, 1.0, &target, &stopped, &|done| {
         reports.borrow_mut().push(done);
     });
-    assert_eq!(trajectory.ending, Ending::Complete);
+    assert_eq!(trajectory.termination, Termination::Complete);
     assert_eq!(trajectory.samples.len(), SAMPLES);
     assert_eq!(trajectory.conflict(), None);
     assert_chained(&trajectory);
@@ -163,7 +163,7 @@ fn no_samples_no_motion() {
     let nothing = run_of(0);
     assert_eq!(nothing.states().count(), 1);
     assert_eq!(nothing.final_time, 0.0);
-    assert_eq!(nothing.ending, Ending::Complete);
+    assert_eq!(nothing.termination, Termination::Complete);
     assert_eq!(run_of(1).states().count(), 2);
 }
 
@@ -173,8 +173,8 @@ fn a_failing_plant_ends_the_run_and_keeps_its_record() {
     let trajectory = run_mass(&ShortRail, 1.0, &|_| 1.0, &stopped, &|done| {
         reports.set(done);
     });
-    let Ending::PlantFailed { t, error } = &trajectory.ending else {
-        panic!("{:?}", trajectory.ending);
+    let Termination::PlantFailed { t, error } = &trajectory.termination else {
+        panic!("{:?}", trajectory.termination);
     };
     assert!(matches!(error, PlantError::Diverged { .. }), "{error}");
     let recorded = trajectory.samples.len();
@@ -213,8 +213,8 @@ fn an_infeasible_problem_ends_the_run_and_keeps_its_record() {
 
     let fastest = 1.0;
     let trajectory = run_mass(&Slope, fastest, &|_| 1.0, &stopped, &|_| ());
-    let Ending::NoPlan { t, status } = &trajectory.ending else {
-        panic!("{:?}", trajectory.ending);
+    let Termination::NoPlan { t, status } = &trajectory.termination else {
+        panic!("{:?}", trajectory.termination);
     };
     assert_eq!(*t, trajectory.final_time);
     assert!(matches!(status, Status::Infeasible(_)), "{status}");
@@ -255,9 +255,9 @@ fn a_start_that_is_no_number_ends_the_run_at_once() {
     assert!(trajectory.samples.is_empty());
     assert_eq!(trajectory.states().count(), 1);
     assert!(
-        matches!(trajectory.ending, Ending::NoPlan { t: 0.0, .. }),
+        matches!(trajectory.termination, Termination::NoPlan { t: 0.0, .. }),
         "{:?}",
-        trajectory.ending
+        trajectory.termination
     );
 }
 
@@ -279,8 +279,8 @@ fn bad_tolerances_end_the_run_at_once() {
     let trajectory = run(controller, &plant, &experiment);
     assert!(trajectory.samples.is_empty());
     assert!(matches!(
-        trajectory.ending,
-        Ending::PlantFailed {
+        trajectory.termination,
+        Termination::PlantFailed {
             t: 0.0,
             error: PlantError::Tolerances { .. }
         }
@@ -349,7 +349,7 @@ fn bits(trajectory: &Trajectory<4, 1>) -> Vec<u64> {
 #[test]
 fn a_run_is_the_same_to_the_bit() {
     let (first, second) = (run_ballbot(&stopped), run_ballbot(&stopped));
-    assert_eq!(first.ending, Ending::Complete);
+    assert_eq!(first.termination, Termination::Complete);
     assert!(first.samples.iter().any(|sample| sample.active_bounds > 0));
     assert_eq!(first, second);
     assert_eq!(bits(&first), bits(&second));

@@ -7,7 +7,7 @@ use lpvmpc::{
 };
 use lpvmpc_design::lqr_discrete;
 use lpvmpc_sim::{
-    Actuation, ClosedLoop, Course, Ending, GuardedLoop, Tolerances, Unloaded, World, record,
+    Actuation, ClosedLoop, GuardedLoop, RunConfig, Termination, Tolerances, Unloaded, World, record,
 };
 use nalgebra::{DMatrix, Matrix1, Matrix2, Matrix2x1, RowVector2, Vector1, Vector2};
 use std::time::Duration;
@@ -93,7 +93,7 @@ fn a_run_is_the_sequence_of_its_samples() {
     let wanted = |t: f64| if t < 2.0 { 20.0 } else { -1.0 };
     let world = World::ideal(Unloaded::<_, 1>(&Mass), Vector2::zeros(), T_S, TOLERANCES);
     let regulator = Feedback::guarded_feedback(controller(), false);
-    let course = Course {
+    let course = RunConfig {
         samples: 120,
         reference: &|t| Vector2::new(wanted(t), 0.0),
         clock: &|| Duration::ZERO,
@@ -101,7 +101,7 @@ fn a_run_is_the_sequence_of_its_samples() {
     };
     let mut closed_loop = ClosedLoop::new(regulator, world).unwrap();
     let run = record(&mut closed_loop, &course).trajectory;
-    assert_eq!(run.ending, Ending::Complete);
+    assert_eq!(run.termination, Termination::Complete);
     let mut stepped = GuardedLoop::new(controller(), Mass, Vector2::zeros(), TOLERANCES);
     let mut workspace = controller().workspace::<3>();
     for sample in &run.samples {
