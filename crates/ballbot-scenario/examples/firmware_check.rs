@@ -9,7 +9,7 @@
 //! COMPILER is the line that `rustc --version` prints; OUTPUT is what the image printed.
 #![allow(
     clippy::neg_cmp_op_on_partial_ord,
-    reason = "a comparison with a number that is not one must take the failing branch"
+    reason = "a comparison with NaN must take the failing branch"
 )]
 
 use ballbot::{Controller, Workspace};

@@ -130,7 +130,7 @@ pub fn active_bounds(bounds: &[BoundId], t_s: f64) -> String {
 /// anew; empty where there is nothing to tell. A reading that is missing is not told.
 pub fn readings(observations: impl Iterator<Item = (f64, Observation<4>)>) -> String {
     const REFUSED: [(Verdict, &str); 4] = [
-        (Verdict::NotFinite, "no number"),
+        (Verdict::NotFinite, "NaN or infinite"),
         (Verdict::Outlier, "outlier"),
         (Verdict::Stale, "too old"),
         (Verdict::Repeated, "repeated"),

@@ -101,7 +101,7 @@ impl<const NX: usize, const NU: usize> Trajectory<NX, NU> {
 /// What a regulated world does when the controller has no plan that keeps all bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnInfeasible {
-    /// It ends, so that nothing is recorded that the method does not promise.
+    /// It ends, so that nothing is recorded that the method does not guarantee.
     #[default]
     End,
     /// The input that comes with the answer is applied, finite and within its bounds; only a
@@ -186,7 +186,7 @@ where
     ) -> Result<Sample<NX, NU>, Termination> {
         let (t, x) = (self.world.time(), *self.world.state());
         let sides = self.range.lower.iter().zip(self.range.upper.iter());
-        // A state that is not a number is the regulator's to refuse.
+        // NaN in the state is the regulator's to refuse.
         let outside = |(value, (lower, upper)): (&f64, _)| value < lower || value > upper;
         if let Some(component) = x.iter().zip(sides).position(outside) {
             return Err(Termination::OutOfRange { t, component });

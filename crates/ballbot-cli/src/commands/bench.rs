@@ -30,7 +30,7 @@ pub struct BenchArguments {
     /// What it is changed by.
     #[command(flatten)]
     pub options: ScenarioOptions,
-    /// Write the times to this file as JSON, too; - for standard output, in place of the table
+    /// Also write the times to this file as JSON; - for standard output, in place of the table
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
 }

@@ -124,8 +124,8 @@ pub enum CommandError {
         folder: PathBuf,
     },
     /// A guarantee that did not hold on the plant that it is for.
-    #[error("{broken} times something happened that is guaranteed not to:\n{table}")]
-    BrokenPromise {
+    #[error("the guarantee was violated {broken} times:\n{table}")]
+    GuaranteeViolated {
         /// How often.
         broken: usize,
         /// All counts.

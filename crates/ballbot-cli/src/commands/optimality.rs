@@ -30,7 +30,7 @@ closed-loop costs are divided by those of nonlinear MPC on the same problem, whi
 (testdata/nonlinear-mpc, IPOPT) has solved to convergence at every sample. Writes a row per case and
 figures.")]
 pub struct OptimalityArguments {
-    /// Quadratic programs per sample, at most; the default of scenarios if not given
+    /// Most quadratic programs per sample [default: that of scenarios]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub programs: Option<u32>,
     /// Folder for the results

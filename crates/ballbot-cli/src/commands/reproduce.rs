@@ -23,7 +23,7 @@ Examples:
   ballbot reproduce --out results
 
 Writes report.html (one self-contained file), every figure as SVG and PNG, every table and
-trajectory as CSV, and summary.json. Exits with 0 only if every number that is to be met agrees
+trajectory as CSV, and summary.json. Exits with 0 only if every number to be met agrees
 with the computed one within its stated tolerance; the column `source` says whether the paper prints
 it, says it in words (the number is then ours), or it is a check of our own.")]
 pub struct ReproduceArguments {

@@ -12,7 +12,7 @@ pub fn counts(claims: &[Claim]) -> String {
     });
     format!(
         "{printed} numbers that the paper prints agree, {derived} statements derived from its words \
-         (with a number, a tolerance or a start of ours), and {own} checks of our own"
+         (with a number, a tolerance or a starting point of ours), and {own} checks of our own"
     )
 }
 

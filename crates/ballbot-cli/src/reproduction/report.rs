@@ -38,7 +38,7 @@ pub fn html(
          <h2>Figures</h2>\n{figures}\n\
          <h2>Tables</h2>\n{tables}\n\
          <h2>What is guaranteed</h2>\n{}\n\
-         <h2>How near to the optimum</h2>\n{}\n\
+         <h2>How close to the optimum</h2>\n{}\n\
          <h2>Differences from the paper</h2>\n{}\n\
          <h2>What b* means physically</h2>\n{}\n",
         escape(&claims::counts(claims)),
@@ -130,7 +130,7 @@ fn near_the_optimum(optimum: &Optimum) -> Result<String, FigureError> {
     ))
 }
 
-/// The paper's slips, and what is done instead.
+/// The paper's errors, and what is done instead.
 fn differences(reproduction: &Reproduction) -> String {
     let (negative, positive) = reproduction.residual_at_printed_b;
     let [regulator, _] = &reproduction.regulators;

@@ -44,7 +44,7 @@ fn far_set_points_are_reached_with_every_bound_kept() {
     }
 }
 
-/// One program per sample keeps every promise, too, and drives as fast as three. It once took twice as
+/// One program per sample keeps the guarantee, too, and drives as fast as three. It once took twice as
 /// long: proposals were rolled out without feedback and refused.
 #[test]
 fn one_program_per_sample_arrives_as_early_as_three() {

@@ -1,4 +1,4 @@
-//! Mistakes in `[world]` and in what stands around the controller: each gets its message.
+//! Mistakes in `[world]` and in the feedback pipeline: each gets its message.
 
 use ballbot_scenario::{Scenario, builtin};
 use std::path::Path;

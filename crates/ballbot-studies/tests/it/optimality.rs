@@ -13,7 +13,7 @@ fn ratios(cases: &[Case], outcomes: &[Outcome]) -> Vec<f64> {
 }
 
 /// What holds in every set: a plan at each sample, few programs, bounds kept as nonlinear MPC keeps
-/// them, and never dearer than linear MPC where that keeps the bounds.
+/// them, and never costlier than linear MPC where that keeps the bounds.
 fn assert_sound(cases: &[Case], outcomes: &[Outcome]) {
     for (case, run) in cases.iter().zip(outcomes) {
         assert_eq!(run.without_plan, 0, "{case:?}");
@@ -56,7 +56,7 @@ fn random_starts_cost_what_they_must() {
 /// The starts that once cost most: far set points seen by a short horizon (up to 10 % above), and fast
 /// motions close by, whose first plan takes many programs (1.3 %).
 #[test]
-fn the_dearest_starts_cost_what_they_must() {
+fn the_costliest_starts_cost_what_they_must() {
     let all = random_starts().unwrap();
     let cases = [482, 507, 506, 129, 594].map(|row| all[row]);
     let outcomes = run_all(&cases, Iterations::default(), &|_| ()).unwrap();

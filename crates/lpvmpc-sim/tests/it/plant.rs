@@ -190,7 +190,7 @@ fn bad_durations_are_refused() {
     }
 }
 
-/// x_dot = x^2 (1 + u): from x at the time 1/x it has left the numbers.
+/// x_dot = x^2 (1 + u): from x at the time 1/x it has become infinite.
 struct Explosion;
 
 impl LpvModel<f64, 1, 1, 1> for Explosion {

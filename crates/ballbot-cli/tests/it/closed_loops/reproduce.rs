@@ -193,7 +193,7 @@ fn assert_report(results: &Path, claims: usize) {
         "Published and computed",
         "Differences from the paper",
         "Sign of p6",
-        "How near to the optimum",
+        "How close to the optimum",
         "IPOPT converged at every sample",
         "What b* means physically",
         "no rigid ballbot has these parameters",

@@ -80,7 +80,7 @@ fn after_a_gap_the_estimate_begins_anew_and_says_so() {
     }
 }
 
-/// As long as the readings are no numbers, it is the same as a gap.
+/// As long as the readings are NaN, it is the same as a gap.
 #[test]
 fn readings_that_are_no_numbers_lead_to_a_restart() {
     let (mut estimator, mut line, x) = observed(5.0, 300);

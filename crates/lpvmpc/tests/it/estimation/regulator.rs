@@ -1,4 +1,4 @@
-//! The controller with all that stands around it: memory, hand-over, offsets, bounds.
+//! The controller in its feedback pipeline: memory, hand-over, offsets, bounds.
 
 use super::pendulum::{Pendulum, settings};
 use lpvmpc::{

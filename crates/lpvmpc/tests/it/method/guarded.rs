@@ -1,4 +1,4 @@
-//! The guarded loop: what it promises, and what it does where it can promise nothing.
+//! The guarded loop: what it guarantees, and what it does where it can guarantee nothing.
 
 use super::plant::CartPole;
 use super::regulator;
@@ -112,7 +112,7 @@ fn the_terminal_set_is_one() {
     }
 }
 
-/// Asserts what every step promises, whatever happens.
+/// Asserts what every step guarantees, whatever happens.
 fn assert_safe(step: &GuardedStep<f64, 4, 1>) {
     assert!(step.u[0].is_finite());
     assert!(settings().u.contains(&step.u, 0.0));
@@ -153,7 +153,7 @@ fn far_jumps_are_never_infeasible() {
     assert!(new > 10 * candidate, "{decisions:?}");
 }
 
-/// The promise does not rest on the solver: one that gives up in most samples, one that is sloppy.
+/// The guarantee does not rest on the solver: one that gives up in most samples, one that is sloppy.
 #[test]
 fn a_bad_solver_costs_time_and_nothing_else() {
     let mut decisions = [0; 5];
@@ -330,7 +330,7 @@ fn after_a_push_the_bounds_are_soft_until_they_hold_again() {
     assert!(x.norm() < 1e-2, "{x}");
 }
 
-/// Measurements and wishes that are no numbers: a safe input, and business as usual afterwards.
+/// Measurements and set points that are NaN: a safe input, and business as usual afterwards.
 #[test]
 fn nonsense_is_survived() {
     let mut controller = guarded(settings());

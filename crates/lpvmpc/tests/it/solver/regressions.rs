@@ -122,7 +122,7 @@ fn inputs_are_within_their_bounds_to_the_last_bit() {
     }
 }
 
-/// A pivot that is no number was called an indefinite matrix.
+/// A pivot that is NaN was called an indefinite matrix.
 #[test]
 fn nan_in_a_weight_is_not_finite() {
     let mut ocp = integrator();

@@ -16,7 +16,7 @@ impl Distribution {
         self.0.len()
     }
 
-    /// The largest; a value that is no number counts as larger than any.
+    /// The largest; NaN counts as larger than any number.
     pub fn max(&self) -> f64 {
         self.quantile(1.0)
     }
