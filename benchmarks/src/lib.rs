@@ -5,10 +5,8 @@
 
 pub mod closed_loop;
 pub mod comparison;
-mod condensed;
 pub mod contenders;
 mod error;
-mod sparse;
 pub mod synthetic;
 
 pub use error::BenchmarkError;

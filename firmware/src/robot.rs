@@ -30,6 +30,6 @@ pub struct PlaneMemory {
     pub controller: ControllerMemory,
     /// Of the estimator.
     pub estimator: EstimatorArrays<f32, INSTANTS>,
-    /// Of what stands around them.
+    /// Of the feedback pipeline around them.
     pub feedback: FeedbackArrays<f32, 4, 1, N, COMMANDS>,
 }

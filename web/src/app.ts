@@ -8,6 +8,7 @@ import * as link from "./link";
 import { Live, timedPath } from "./live";
 import { Playback } from "./playback";
 import { PRESETS } from "./presets";
+import { NOW, ROW } from "./layout";
 import type { Answers, Batch, Call, PhiPair, RobotFacts } from "./protocol";
 import { robotsNamed, type RobotKind } from "./robots";
 import { toToml, withValue, type Scenario } from "./scenario";
@@ -429,7 +430,7 @@ export class App {
   /** The times that can be looked at, s. */
   get span(): [number, number] {
     const end = this.sampleTime();
-    const kept = this.histories.filter(({ length }) => length > 0).map((history) => history.at(0, 0, 0));
+    const kept = this.histories.filter(({ length }) => length > 0).map((history) => history.at(0, 0, ROW.time));
     return [Math.min(end, ...kept), end];
   }
 
@@ -442,7 +443,7 @@ export class App {
 
   /** Time up to which the robots were simulated, s. */
   private sampleTime(): number {
-    return Math.max(0, ...this.histories.map((history) => history.nowAt(0, 0)));
+    return Math.max(0, ...this.histories.map((history) => history.nowAt(0, NOW.time)));
   }
 
   /** The robots' planes, also while a recording of others is played. */

@@ -1,7 +1,7 @@
 // Files that come in and go out: TOML set-ups, CSV runs.
 
 import type { History } from "./history";
-import { ROW, ROW_WIDTH, NOW_WIDTH } from "./protocol";
+import { NOW, NOW_WIDTH, ROW, ROW_WIDTH } from "./layout";
 
 /** Columns of trajectory.csv, as `ballbot simulate` writes it. */
 export const COLUMNS = [
@@ -21,7 +21,7 @@ export function trajectoryCsv(history: History, plane: number): string {
     lines.push(`${values.join(",")},${plain(history.statusAt(i))},${cell(step, step.toFixed(3))}`);
   }
   const now = [0, 1, 2, 3, 4].map((column) => history.nowAt(plane, column));
-  lines.push(`${now.join(",")},,${history.nowAt(plane, 5)},,${plain(history.ending ?? "")},`);
+  lines.push(`${now.join(",")},,${history.nowAt(plane, NOW.phiReference)},,${plain(history.ending ?? "")},`);
   return `${lines.join("\n")}\n`;
 }
 
@@ -72,7 +72,7 @@ export function readTrajectory(text: string, name: string): Recorded {
       row.set(values);
       row[ROW.activeBounds] = NaN;
       row[ROW.stepMicroseconds] = place("step_us") < 0 ? NaN : Number(cells[place("step_us")] || NaN);
-      row.set(row.subarray(ROW.phi, ROW.phi + 4), ROW.estimate);
+      row.set(row.subarray(ROW.phi, ROW.phi + 4), ROW.estimatePhi);
       rows.push(row);
       statuses.push(status);
     }

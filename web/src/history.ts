@@ -1,6 +1,7 @@
 // What one robot did, as far back as it is kept.
 
-import { NOW_WIDTH, ROW, ROW_WIDTH, type RobotBatch } from "./protocol";
+import { NOW_WIDTH, ROW, ROW_WIDTH } from "./layout";
+import type { RobotBatch } from "./protocol";
 
 /** Samples that are kept; older ones make room, so that memory does not grow. */
 export const CAPACITY = 60_000;

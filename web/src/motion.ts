@@ -2,7 +2,7 @@
 // of a sample, a cubic joins them. The computed run is not touched.
 
 import type { History } from "./history";
-import { NOW_WIDTH, ROW } from "./protocol";
+import { NOW, NOW_WIDTH, ROW } from "./layout";
 
 /** A robot on the floor: ball in m, lean of the body towards +x and +y in rad. */
 export interface Pose {
@@ -22,10 +22,10 @@ function hermite(s: number, h: number, a: number, da: number, b: number, db: num
 
 /** Angles (phi, theta) of a plane at a time. */
 function anglesAt(history: History, plane: number, time: number): [number, number] {
-  const end = history.nowAt(plane, ROW.time);
+  const end = history.nowAt(plane, NOW.time);
   const after = history.indexAt(time);
   if (history.length === 0 || time >= end) {
-    return [history.nowAt(plane, ROW.phi), history.nowAt(plane, ROW.theta)];
+    return [history.nowAt(plane, NOW.phi), history.nowAt(plane, NOW.theta)];
   }
   const from = Math.max(after - 1, 0);
   const start = (column: number) => history.at(from, plane, column);
@@ -63,7 +63,7 @@ const FARTHEST = 50;
  *  no way out may plan anything. */
 export function predictedPoses(history: History, ballRadius: number): Pose[] {
   const [x, y] = history.predictions;
-  const here = poseOf([[history.nowAt(0, ROW.phi), 0], [history.nowAt(1, ROW.phi), 0]], ballRadius);
+  const here = poseOf([[history.nowAt(0, NOW.phi), 0], [history.nowAt(1, NOW.phi), 0]], ballRadius);
   const poses: Pose[] = [];
   for (let i = 0; 4 * i < (x?.length ?? 0); i++) {
     const angles = (states: Float64Array | undefined): [number, number] => [

@@ -3,7 +3,7 @@
 import type { App } from "./app";
 import type { History } from "./history";
 import { poseAt, predictedPoses, type Pose } from "./motion";
-import { ROW } from "./protocol";
+import { NOW, ROW } from "./layout";
 import { colourOf } from "./robots";
 import type { FloorPoint, RobotPicture } from "./scene/view";
 
@@ -74,7 +74,7 @@ export class Pictures {
   }
 
   private goal(history: History): FloorPoint {
-    return { x: history.nowAt(0, 5) * this.radius, y: history.planes === 2 ? history.nowAt(1, 5) * this.radius : 0 };
+    return { x: history.nowAt(0, NOW.phiReference) * this.radius, y: history.planes === 2 ? history.nowAt(1, NOW.phiReference) * this.radius : 0 };
   }
 
   forget(): void {

@@ -1,7 +1,8 @@
 // A recorded run, played as if it were running.
 
 import type { Recorded } from "./files";
-import { NOW_WIDTH, ROW, ROW_WIDTH, type Batch, type RunOrder } from "./protocol";
+import { NOW, NOW_WIDTH, ROW, ROW_WIDTH } from "./layout";
+import type { Batch, RunOrder } from "./protocol";
 import type { Source } from "./engine";
 import { LINE_POINTS } from "./scene/lines";
 
@@ -136,8 +137,8 @@ export class Playback implements Source {
     for (const [plane, { rows, final }] of this.planes.entries()) {
       const row = rows[this.index];
       if (this.index < this.samples && row) {
-        now.set(row.subarray(0, 5), plane * NOW_WIDTH);
-        now[plane * NOW_WIDTH + 5] = row[ROW.phiReference] ?? 0;
+        now.set(row.subarray(0, NOW.phiReference), plane * NOW_WIDTH);
+        now[plane * NOW_WIDTH + NOW.phiReference] = row[ROW.phiReference] ?? 0;
       } else now.set(final, plane * NOW_WIDTH);
     }
     return now;

@@ -82,31 +82,15 @@ export type ToWorker =
   /** Whether it still answers. */
   | { ping: true };
 
-/** Columns of a row: one sample in one plane. Times in s, angles in rad, torque in N m. */
-export const ROW = {
-  time: 0,
-  phi: 1,
-  theta: 2,
-  phiDot: 3,
-  thetaDot: 4,
-  torque: 5,
-  phiReference: 6,
-  cost: 7,
-  activeBounds: 8,
-  stepMicroseconds: 9,
-  estimate: 10,
-} as const;
-export const ROW_WIDTH = 14;
-
 /** What happened to one robot since the last batch. */
 export interface RobotBatch {
-  /** Samples times planes times ROW_WIDTH. */
+  /** Samples times planes times ROW_WIDTH (layout.ts). */
   rows: Float64Array;
   /** Samples times three, N m. */
   motors: Float64Array;
   /** Status of each sample, in words, run-length coded: the first sample it holds from. */
   statuses: { from: number; text: string }[];
-  /** The state now, per plane: time, phi, theta, phi_dot, theta_dot, phi_ref. */
+  /** Planes times NOW_WIDTH (layout.ts). */
   now: Float64Array;
   /** Per plane: the bounds that are active in the last plan, in words. */
   activeBounds: string[];
@@ -117,8 +101,6 @@ export interface RobotBatch {
   /** It lies on the floor. */
   down: boolean;
 }
-
-export const NOW_WIDTH = 6;
 
 export interface Batch {
   /** Simulated time that the display has reached, s. */

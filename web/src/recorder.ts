@@ -1,7 +1,8 @@
 // Collects what a robot does between two batches.
 
 import type { Simulation } from "./generated/ballbot_web.js";
-import { ROW_WIDTH, type RobotBatch } from "./protocol";
+import { ROW_WIDTH } from "./layout";
+import type { RobotBatch } from "./protocol";
 
 export class Recorder {
   private rows: number[] = [];

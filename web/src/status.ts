@@ -1,7 +1,7 @@
 // What the controllers do, in words and numbers, over the scene.
 
 import type { History } from "./history";
-import { ROW } from "./protocol";
+import { ROW } from "./layout";
 import { usualStepInWords } from "./steptime";
 import { TERMS } from "./terms";
 

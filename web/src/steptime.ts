@@ -1,7 +1,7 @@
 // The time per step, as exactly as the browser's clock tells it.
 
 import type { History } from "./history";
-import { ROW } from "./protocol";
+import { ROW } from "./layout";
 
 /** Steps over which the time is taken. */
 const STEPS = 400;

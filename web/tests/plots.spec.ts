@@ -7,7 +7,7 @@ import { columns } from "../src/plots/columns";
 import { drawPredictions, drawTime } from "../src/plots/marks";
 import { ticks, valueRange } from "../src/plots/range";
 import { STRIPS, type Strip } from "../src/plots/strips";
-import { ROW_WIDTH } from "../src/protocol";
+import { ROW_WIDTH } from "../src/layout";
 import { clock, fill, open, openFlat, pause, saved, scenario, table, test, until } from "./page";
 
 /** The strip of phi, of theta and so on. */

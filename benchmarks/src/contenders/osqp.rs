@@ -2,8 +2,8 @@
 
 use crate::BenchmarkError;
 use crate::comparison::Contender;
-use crate::sparse::{self, Csc, SparseQp};
 use lpvmpc::Ocp;
+use lpvmpc_testkit::sparse::{self, Csc, SparseQp};
 use nalgebra::SVector;
 use osqp::{CscMatrix, Problem, Settings, Status};
 

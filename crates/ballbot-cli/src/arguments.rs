@@ -25,10 +25,10 @@ Examples:
   ballbot help lqr                    options and examples of one command
 
 Exit codes: 0 done, 1 no result (the message says why), 2 the command line is not understood, 130
-interrupted (what was written until then is said, nothing is half-written)."
+interrupted (what was written by then is listed; no file is half-written)."
 )]
 pub struct Arguments {
-    /// No progress, and no report where the results are in files; errors are still told
+    /// No progress bar, and no report where the results are in files; errors are still printed
     #[arg(long, short, global = true)]
     pub quiet: bool,
     /// What to do.
@@ -64,11 +64,11 @@ pub enum Command {
     Bench(BenchArguments),
     /// List or show the built-in scenarios
     Scenario(ScenarioArguments),
-    /// Design a safe torque that tells a robot's parameters
+    /// Design a safe torque that identifies a robot's parameters
     Excite(ExciteArguments),
     /// Find a robot's parameters, with error bars, from its logs
     Identify(IdentifyArguments),
-    /// See by hand, before power-on, whether the wheels are as a configuration says
+    /// Check by hand, before power-on, that the wheels match a configuration
     Wheels(WheelsArguments),
     /// From an excitation to a controller, on a simulated robot
     Rehearse(RehearseArguments),
@@ -78,13 +78,13 @@ pub enum Command {
     Linearize(LinearizeArguments),
     /// Design a linear-quadratic regulator u = -K x and check it at frozen scheduling
     Lqr(LqrArguments),
-    /// Find a terminal set and prove what holds in it
+    /// Find a terminal set and certify it
     Certify(CertifyArguments),
     /// Prove the claims of a certificate again
     Verify(VerifyArguments),
-    /// Serve the ballbot in the browser, to this machine only
+    /// Serve the browser page, to this machine only
     View(ViewArguments),
-    /// Run many closed loops and count what is guaranteed, and where that ends
+    /// Run many closed loops: where the guarantee holds, and where it ends
     Campaign(CampaignArguments),
     /// Compare closed-loop costs with those of nonlinear MPC, converged by IPOPT
     Optimality(OptimalityArguments),

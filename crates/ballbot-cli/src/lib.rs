@@ -14,11 +14,10 @@
 
 #![allow(
     clippy::neg_cmp_op_on_partial_ord,
-    reason = "a comparison with a number that is not one must take the failing branch"
+    reason = "a comparison with NaN must take the failing branch"
 )]
 
 pub mod arguments;
-pub mod benchmark;
 pub mod campaign_drawing;
 pub mod certificate_page;
 pub mod commands;
@@ -27,7 +26,7 @@ pub mod identification;
 pub mod input;
 pub mod interrupt;
 pub mod json;
-pub mod optimality;
+pub mod optimality_drawing;
 pub mod output;
 pub mod pictures;
 pub mod progress;

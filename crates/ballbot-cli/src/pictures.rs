@@ -1,7 +1,8 @@
 //! The figures of recorded runs.
 
-use crate::recording::Columns;
 use ballbot_scenario::{PhiReference, Prepared};
+use ballbot_studies::recorded::Columns;
+use lpvmpc::Bounds;
 use lpvmpc_figures::{
     Band, Figure, GuardRun, Limits, PathRun, PlaneRun, PlansRun, Reference, Role, closed_loop,
     motor_torques, path_in_plane, two_planes,
@@ -33,8 +34,7 @@ impl<'a> Shown<'a> {
 }
 
 /// The bounds of the controller's problem, as the figures shade them.
-pub fn limits(prepared: &Prepared) -> Limits {
-    let (x, u) = (&prepared.settings.x, &prepared.settings.u);
+pub fn limits(x: &Bounds<f64, 4>, u: &Bounds<f64, 1>) -> Limits {
     Limits {
         states: std::array::from_fn(|i| Band {
             lower: x.lower[i],
@@ -60,7 +60,12 @@ pub fn one_plane(title: &str, prepared: &Prepared, shown: &[Shown<'_>]) -> Figur
     let runs: Vec<PlaneRun<'_>> = shown.iter().map(|shown| shown.run()).collect();
     let followed = shown.first().zip(prepared.planes.first());
     let reference = followed.map(|(shown, plane)| reference(shown.columns, &plane.reference));
-    closed_loop(title, &runs, reference, Some(limits(prepared)))
+    closed_loop(
+        title,
+        &runs,
+        reference,
+        Some(limits(&prepared.settings.x, &prepared.settings.u)),
+    )
 }
 
 /// Time series of both planes.
@@ -76,7 +81,7 @@ pub fn both_planes(title: &str, prepared: &Prepared, planes: [Shown<'_>; 2]) -> 
         title,
         planes.map(Shown::run),
         references,
-        Some(limits(prepared)),
+        Some(limits(&prepared.settings.x, &prepared.settings.u)),
     )
 }
 

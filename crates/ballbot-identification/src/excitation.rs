@@ -1,4 +1,4 @@
-//! A torque that tells the parameters of a stabilised robot, and how well it will tell them.
+//! A torque that identifies the parameters of a stabilised robot, and how well it will identify them.
 
 use crate::covariance::{inverse, of_parameters};
 use crate::estimate::{Task, problem};

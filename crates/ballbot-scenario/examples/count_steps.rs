@@ -6,11 +6,11 @@
 //! ```
 
 use ballbot::{Controller, Workspace};
-use ballbot_scenario::{Scenario, Surroundings};
+use ballbot_scenario::{RunHooks, Scenario};
 use lpvmpc::Reference;
 use nalgebra::Vector4;
 use std::hint::black_box;
-use std::{env, error::Error, path::Path, time::Duration};
+use std::{env, error::Error, path::Path};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = env::args().skip(1).collect();
@@ -20,10 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut prepared = Scenario::load(name)?.prepare(Path::new("."))?;
     prepared.samples = samples.parse()?;
     prepared.planes.truncate(1);
-    let trajectories = prepared.run(&Surroundings {
-        clock: &|| Duration::ZERO,
-        progress: &|_| (),
-    })?;
+    let trajectories = prepared.run(&RunHooks::NONE)?;
     let mut controller = Controller::allocate(prepared.ballbot, prepared.settings)?;
     let mut workspace = controller.workspace();
     let horizon = prepared.settings.horizon;

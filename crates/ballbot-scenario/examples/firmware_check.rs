@@ -9,17 +9,17 @@
 //! COMPILER is the line that `rustc --version` prints; OUTPUT is what the image printed.
 #![allow(
     clippy::neg_cmp_op_on_partial_ord,
-    reason = "a comparison with a number that is not one must take the failing branch"
+    reason = "a comparison with NaN must take the failing branch"
 )]
 
 use ballbot::{Controller, Workspace};
-use ballbot_scenario::{Plane, Prepared, Scenario, Surroundings};
+use ballbot_scenario::{Plane, Prepared, RunHooks, Scenario};
 use lpvmpc::{ControllerSettings, Reference};
 use nalgebra::{Vector3, Vector4};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::error::Error;
-use std::{env, fs, path::Path, time::Duration};
+use std::{env, fs, path::Path};
 
 /// Largest difference of a torque, N m. Torques are up to 0.5 N m, f32 rounds to 6e-8 of a number,
 /// and a plan sums a few dozen products of the torque's size or ten times that: some 1e-6 is to be
@@ -279,10 +279,7 @@ fn check_robot(steps: &[RobotStep]) -> Result<(), Failure> {
     let plane = prepared.planes.first().ok_or("no plane")?;
     let per_sample = (prepared.settings.t_s / plane.world.settings.period).round() as usize;
     prepared.samples = steps.len() / per_sample;
-    let record = prepared.record(&Surroundings {
-        clock: &|| Duration::ZERO,
-        progress: &|_| (),
-    })?;
+    let record = prepared.record(&RunHooks::NONE)?;
     if steps.is_empty() || steps.len() != record.robot_log.len() {
         return Err(format!("whole-robot: {} of its measurements", steps.len()).into());
     }
@@ -320,10 +317,7 @@ fn check_recording<'a>(
     prepared: &Prepared,
     steps: impl Iterator<Item = &'a Step>,
 ) -> Result<(), Failure> {
-    let trajectories = prepared.run(&Surroundings {
-        clock: &|| Duration::ZERO,
-        progress: &|_| (),
-    })?;
+    let trajectories = prepared.run(&RunHooks::NONE)?;
     let mut count = 0;
     for step in steps {
         count += 1;

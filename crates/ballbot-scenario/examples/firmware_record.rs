@@ -14,12 +14,12 @@
 //! around the controllers.
 
 use ballbot::{Ballbot, Geometry};
-use ballbot_scenario::{Parameters, Plane, Prepared, Scenario, Surroundings, ThreeMotors};
+use ballbot_scenario::{Parameters, Plane, Prepared, RunHooks, Scenario, ThreeMotors};
 use lpvmpc::{Iterations, Reading, TerminalIngredient};
 use lpvmpc_sim::Trajectory;
 use std::error::Error;
 use std::fmt::Write;
-use std::{env, path::Path, time::Duration};
+use std::{env, path::Path};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = env::args().skip(1).collect();
@@ -37,10 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         print!("{}", whole_robot(name, &prepared, zenith_angle, &motors)?);
         return Ok(());
     }
-    let trajectories = prepared.run(&Surroundings {
-        clock: &|| Duration::ZERO,
-        progress: &|_| (),
-    })?;
+    let trajectories = prepared.run(&RunHooks::NONE)?;
     let mut text = format!(
         "//! The scenario `{name}` and its first {samples} samples in closed loop.\n\
          //! Written by `firmware_record {name} {samples}`, an example of `ballbot-scenario`.\n\n\
@@ -132,7 +129,7 @@ fn write_plane(
     trajectory: &Trajectory<4, 1>,
 ) -> Result<(), Box<dyn Error>> {
     if trajectory.samples.len() < prepared.samples {
-        return Err(format!("the run ended early: {:?}", trajectory.ending).into());
+        return Err(format!("the run ended early: {:?}", trajectory.termination).into());
     }
     writeln!(text, "        Plane {{\n            states: &[")?;
     for sample in &trajectory.samples {
@@ -154,10 +151,7 @@ fn whole_robot(
     zenith_angle: f64,
     ThreeMotors { limits, turning }: &ThreeMotors,
 ) -> Result<String, Box<dyn Error>> {
-    let record = prepared.record(&Surroundings {
-        clock: &|| Duration::ZERO,
-        progress: &|_| (),
-    })?;
+    let record = prepared.record(&RunHooks::NONE)?;
     let samples = prepared.samples;
     let estimator = prepared.feedback.estimator.ok_or("it has no estimator")?;
     let plane = prepared.planes.first().ok_or("it has no plane")?;

@@ -2,17 +2,14 @@
 //! plant, and the run itself.
 //!
 //! ```
-//! use ballbot_scenario::{Scenario, Surroundings};
-//! use std::{path::Path, time::Duration};
+//! use ballbot_scenario::{RunHooks, Scenario};
+//! use std::path::Path;
 //!
 //! # fn main() -> Result<(), ballbot_scenario::ScenarioError> {
 //! let mut scenario = Scenario::load("single-setpoint")?;
 //! scenario.controller.horizon = 30;
 //! let prepared = scenario.prepare(Path::new("."))?;
-//! let trajectories = prepared.run(&Surroundings {
-//!     clock: &|| Duration::ZERO,
-//!     progress: &|_| (),
-//! })?;
+//! let trajectories = prepared.run(&RunHooks::NONE)?;
 //! let end = trajectories[0].final_state;
 //! println!("phi = {:.3} rad after {} s", end[0], trajectories[0].final_time);
 //! assert!((end[0] - std::f64::consts::PI).abs() < 0.05, "phi has reached pi: {end}");
@@ -21,7 +18,7 @@
 //! ```
 #![allow(
     clippy::neg_cmp_op_on_partial_ord,
-    reason = "a comparison with a number that is not one must take the failing branch"
+    reason = "a comparison with NaN must take the failing branch"
 )]
 
 pub mod builtin;
@@ -65,8 +62,8 @@ pub use prepare::world::{PlaneWorld, Robot};
 pub use run::excited::Excited;
 pub use run::motor_sample::MotorSample;
 pub use run::planes::PlaneLoop;
-pub use run::record::{Record, Surroundings};
-pub use run::session::{Phase, Session, Trouble};
+pub use run::record::{Record, RunHooks};
+pub use run::session::{FailureCause, Phase, Session};
 
 /// The code of the README, compiled and run with the tests.
 #[cfg(doctest)]

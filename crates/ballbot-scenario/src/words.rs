@@ -1,7 +1,7 @@
 //! Statuses and endings for people, with the ballbot's names.
 
 use lpvmpc::{BoundId, Observation, Quantity, Restart, Side, Status, Verdict};
-use lpvmpc_sim::Ending;
+use lpvmpc_sim::Termination;
 
 /// Names of the states, in their order.
 pub const STATES: [&str; 4] = ["phi", "theta", "phi_dot", "theta_dot"];
@@ -74,17 +74,17 @@ fn without_types(text: &str) -> String {
 }
 
 /// Why a run ended, with its time.
-pub fn ending(ending: &Ending) -> String {
-    match ending {
-        Ending::Complete => "complete".to_owned(),
-        Ending::OutOfRange { t, component } => {
+pub fn termination(termination: &Termination) -> String {
+    match termination {
+        Termination::Complete => "complete".to_owned(),
+        Termination::OutOfRange { t, component } => {
             let state = STATES.get(*component).copied().unwrap_or("state");
             format!("the robot has fallen: {state} left its range by t = {t:.3} s")
         }
-        Ending::NoPlan { t, status } => {
+        Termination::NoPlan { t, status } => {
             format!("no plan at t = {t:.3} s: {}", self::status(status))
         }
-        Ending::PlantFailed { t, error } => format!("at t = {t:.3} s: {error}"),
+        Termination::PlantFailed { t, error } => format!("at t = {t:.3} s: {error}"),
     }
 }
 
@@ -130,7 +130,7 @@ pub fn active_bounds(bounds: &[BoundId], t_s: f64) -> String {
 /// anew; empty where there is nothing to tell. A reading that is missing is not told.
 pub fn readings(observations: impl Iterator<Item = (f64, Observation<4>)>) -> String {
     const REFUSED: [(Verdict, &str); 4] = [
-        (Verdict::NotFinite, "no number"),
+        (Verdict::NotFinite, "NaN or infinite"),
         (Verdict::Outlier, "outlier"),
         (Verdict::Stale, "too old"),
         (Verdict::Repeated, "repeated"),

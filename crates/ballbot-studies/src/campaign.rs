@@ -8,7 +8,7 @@ mod run;
 mod tally;
 mod variant;
 
-pub use run::{Course, Record, Wanted};
+pub use run::{ImpossibleSetPoints, Record, SetPoints};
 pub use tally::Tally;
 pub use variant::Variant;
 

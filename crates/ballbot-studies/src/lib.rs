@@ -1,5 +1,6 @@
 //! Studies of a ballbot and its controllers: results as data, for a command line, tests and other
-//! languages alike. No files, no figures; progress is told to whoever asks.
+//! languages alike. No files, no figures; the clock is handed in, and
+//! progress is told to whoever asks.
 //!
 //! | for | use |
 //! |---|---|
@@ -8,6 +9,10 @@
 //! | four models of the robot side by side | [`ModelComparison`] |
 //! | a terminal set, as large as can be proved | [`CertificateSearch`] |
 //! | what is guaranteed, counted over many closed loops | [`Campaign`] |
+//! | closed-loop costs beside those of nonlinear MPC | [`optimality`] |
+//! | how long a step takes on this machine | [`timing`] |
+//! | everything that the paper publishes, with its claims | [`reproduction`] |
+//! | what a recorded run amounts to | [`recorded`] |
 //!
 //! # Example
 //!
@@ -32,20 +37,27 @@
 //! ```
 #![allow(
     clippy::neg_cmp_op_on_partial_ord,
-    reason = "a comparison with a number that is not one must take the failing branch"
+    reason = "a comparison with NaN must take the failing branch"
 )]
 
 mod campaign;
 mod certificate_search;
+mod error;
 mod linear_model;
 mod model_comparison;
+pub mod optimality;
+pub mod recorded;
 mod refinement;
 mod regulator;
+pub mod reproduction;
+pub mod timing;
 
 pub use campaign::{
-    Campaign, CampaignError, Course, Outcome, Record, Scenarios, Tally, Variant, Wanted,
+    Campaign, CampaignError, ImpossibleSetPoints, Outcome, Record, Scenarios, SetPoints, Tally,
+    Variant,
 };
 pub use certificate_search::{CertificateSearch, Certified, SearchError, Searching};
+pub use error::StudyError;
 pub use linear_model::LinearModel;
 pub use model_comparison::{ModelComparison, ModelError};
 pub use refinement::{

@@ -145,13 +145,13 @@ fn torque_at(gain: &RowVector4<f64>, x: &Vector4<f64>, t: f64) -> f64 {
     excitation(t) - (gain * x)[0]
 }
 
-type Course = (Vec<f64>, Vec<[f64; 4]>, Vec<f64>);
+type SampledRun = (Vec<f64>, Vec<[f64; 4]>, Vec<f64>);
 
 /// The loop around a continuous model: times, states, and the torque of each sample.
 fn continuous<P: LpvModel<f64, 4, 1, 3>>(
     model: &P,
     gain: &RowVector4<f64>,
-) -> Result<Course, ModelError> {
+) -> Result<SampledRun, ModelError> {
     let mut x = Vector4::zeros();
     let (mut time, mut states, mut torques) = (vec![0.0], vec![x.into()], Vec::new());
     for k in 0..samples() {

@@ -10,9 +10,11 @@
 //! ```
 
 mod from_js;
+mod layout;
 mod page_files;
 
 use ballbot_scenario::{Phase, PhiReference, PointTable, Prepared, Scenario, Session};
+use layout::{NOW, Now, ROW, row};
 use page_files::PageFiles;
 use std::time::Duration;
 use wasm_bindgen::prelude::*;
@@ -113,21 +115,10 @@ impl Simulation {
         self.session.step(&clock)
     }
 
-    /// The last sample, per plane: time, phi, theta, phi_dot, theta_dot, torque, phi_ref, cost,
-    /// active bounds, microseconds of the step, and the four states it was decided for.
+    /// The last sample: a row per plane, its columns as in `web/src/layout.ts`.
     pub fn row(&self) -> Vec<f64> {
         let samples = self.session.samples().iter();
-        samples
-            .flat_map(|s| {
-                let (x, e) = (&s.x, &s.estimate);
-                let step_us = s.step_time.as_secs_f64() * 1e6;
-                let active = s.active_bounds as f64;
-                [
-                    s.t, x[0], x[1], x[2], x[3], s.u[0], s.x_ref[0], s.cost, active, step_us, e[0],
-                    e[1], e[2], e[3],
-                ]
-            })
-            .collect()
+        samples.flat_map(|sample| row(&ROW, sample)).collect()
     }
 
     /// The three motors' torques of the last sample.
@@ -135,12 +126,20 @@ impl Simulation {
         self.session.motor_torques().as_slice().to_vec()
     }
 
-    /// The state now, per plane: time, phi, theta, phi_dot, theta_dot, phi_ref.
+    /// The state now: a row per plane, its columns as in `web/src/layout.ts`.
     pub fn now(&self) -> Vec<f64> {
-        let t = self.session.time();
+        let time = self.session.time();
         let planes = self.session.states().zip(self.session.targets());
         planes
-            .flat_map(|(x, target)| [t, x[0], x[1], x[2], x[3], target])
+            .flat_map(|(x, phi_reference)| {
+                let state = (*x).into();
+                let now = Now {
+                    time,
+                    state,
+                    phi_reference,
+                };
+                row(&NOW, &now).collect::<Vec<_>>()
+            })
             .collect()
     }
 

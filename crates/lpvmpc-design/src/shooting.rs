@@ -4,7 +4,7 @@
 //! of its own, and the parameters and all initial states are chosen so that the simulated outputs
 //! fit the measured ones, weighted by the noise of each output. Nothing is differentiated, so
 //! noise does not become a bias; and a segment is short enough for an unstable plant, whose
-//! simulation over a whole run would leave the numbers (Bock 1981; Ljung, System Identification,
+//! simulation over a whole run would become non-finite (Bock 1981; Ljung, System Identification,
 //! 2nd ed., ch. 7).
 //!
 //! An initial state touches its own segment only, so the normal equations are bordered block
@@ -37,7 +37,7 @@ pub trait ShootingModel<const NX: usize, const NY: usize>: Sync {
     fn noise(&self, segment: usize) -> SVector<f64, NY>;
 
     /// Pushes the simulated outputs of the segment's rows to `outputs`, which is empty. The first
-    /// row is that of `initial`. A simulation that leaves the numbers may stop early.
+    /// row is that of `initial`. A simulation that becomes non-finite may stop early.
     fn simulate(
         &self,
         segment: usize,
@@ -116,7 +116,7 @@ pub enum ShootingError {
         /// What it may be.
         allowed: &'static str,
     },
-    /// The simulation from the start leaves the numbers.
+    /// The simulation from the start becomes non-finite.
     #[error(
         "the simulation of segment {segment} (counted from 0) from the starting values leaves the \
          numbers; better starting values or shorter segments are needed"

@@ -38,7 +38,7 @@ pub struct Sample<const NX: usize, const NU: usize> {
 
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Ending {
+pub enum Termination {
     /// After all samples.
     Complete,
     /// The controller had no plan: time, state, and why. No input was applied any more.
@@ -76,7 +76,7 @@ pub struct Trajectory<const NX: usize, const NU: usize> {
     /// State reference at that time.
     pub final_reference: SVector<f64, NX>,
     /// How the run ended.
-    pub ending: Ending,
+    pub termination: Termination,
 }
 
 impl<const NX: usize, const NU: usize> Trajectory<NX, NU> {
@@ -88,8 +88,8 @@ impl<const NX: usize, const NU: usize> Trajectory<NX, NU> {
 
     /// The bound that made the run end, if one did.
     pub fn conflict(&self) -> Option<BoundId> {
-        match self.ending {
-            Ending::NoPlan {
+        match self.termination {
+            Termination::NoPlan {
                 status: Status::Infeasible(bound),
                 ..
             } => Some(bound),
@@ -100,8 +100,8 @@ impl<const NX: usize, const NU: usize> Trajectory<NX, NU> {
 
 /// What a regulated world does when the controller has no plan that keeps all bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum WithoutPlan {
-    /// It ends, so that nothing is recorded that the method does not promise.
+pub enum OnInfeasible {
+    /// It ends, so that nothing is recorded that the method does not guarantee.
     #[default]
     End,
     /// The input that comes with the answer is applied, finite and within its bounds; only a
@@ -132,7 +132,7 @@ pub struct ClosedLoop<R, P, const NX: usize, const NU: usize, const NY: usize, c
     /// What it decides about.
     pub world: World<P, NX, NU, NY, NL>,
     /// What happens without a plan.
-    pub without_plan: WithoutPlan,
+    pub without_plan: OnInfeasible,
     /// The run ends when the plant's state is found outside.
     pub range: Bounds<f64, NX>,
     /// Samples of the sensors per control sample.
@@ -167,7 +167,7 @@ where
         Self {
             regulator,
             world,
-            without_plan: WithoutPlan::End,
+            without_plan: OnInfeasible::End,
             range: Bounds::none(),
             per_sample: 1,
         }
@@ -177,19 +177,19 @@ where
     /// `log` gets a row for every sample of the sensors.
     ///
     /// # Errors
-    /// The [`Ending`], if the run ends here.
+    /// The [`Termination`], if the run ends here.
     pub fn sample(
         &mut self,
         reference: &dyn Fn(f64) -> SVector<f64, NX>,
         clock: &dyn Fn() -> Duration,
         log: &mut dyn FnMut(LogRow<NY, NU>),
-    ) -> Result<Sample<NX, NU>, Ending> {
+    ) -> Result<Sample<NX, NU>, Termination> {
         let (t, x) = (self.world.time(), *self.world.state());
         let sides = self.range.lower.iter().zip(self.range.upper.iter());
-        // A state that is not a number is the regulator's to refuse.
+        // NaN in the state is the regulator's to refuse.
         let outside = |(value, (lower, upper)): (&f64, _)| value < lower || value > upper;
         if let Some(component) = x.iter().zip(sides).position(outside) {
-            return Err(Ending::OutOfRange { t, component });
+            return Err(Termination::OutOfRange { t, component });
         }
         let mut observation = self.regulator.observe(self.world.measurement());
         let before = clock();
@@ -200,11 +200,11 @@ where
         // A guarded controller has an answer whatever its quadratic program said.
         let guarded = command.guard.is_some();
         let usable = match self.without_plan {
-            WithoutPlan::End => guarded || status.is_solved(),
-            WithoutPlan::Apply => status != Status::NotFinite,
+            OnInfeasible::End => guarded || status.is_solved(),
+            OnInfeasible::Apply => status != Status::NotFinite,
         };
         if !usable {
-            return Err(Ending::NoPlan { t, status });
+            return Err(Termination::NoPlan { t, status });
         }
         self.world.command(command.u);
         for i in 0..self.per_sample {
@@ -236,12 +236,12 @@ where
         &mut self,
         observation: Observation<NY>,
         log: &mut dyn FnMut(LogRow<NY, NU>),
-    ) -> Result<(), Ending> {
+    ) -> Result<(), Termination> {
         let world = &mut self.world;
         let measurement = *world.measurement();
         let t = measurement.t;
         let moved = world.advance();
-        moved.map_err(|error| Ending::PlantFailed { t, error })?;
+        moved.map_err(|error| Termination::PlantFailed { t, error })?;
         log(LogRow {
             t,
             readings: measurement.readings,
@@ -254,7 +254,7 @@ where
 }
 
 /// What a run needs besides regulator and world.
-pub struct Course<'a, const NX: usize> {
+pub struct RunConfig<'a, const NX: usize> {
     /// Number of control samples.
     pub samples: usize,
     /// State reference at a time in s; the controller sees it over its whole horizon.
@@ -277,10 +277,10 @@ pub struct Recording<const NX: usize, const NU: usize, const NY: usize> {
 /// Runs a closed loop from where it stands.
 ///
 /// The run ends early, with what was recorded so far, when the loop ends;
-/// [`Trajectory::ending`] says why.
+/// [`Trajectory::termination`] says why.
 pub fn record<R, P, const NX: usize, const NU: usize, const NY: usize, const NL: usize>(
     closed_loop: &mut ClosedLoop<R, P, NX, NU, NY, NL>,
-    course: &Course<'_, NX>,
+    course: &RunConfig<'_, NX>,
 ) -> Recording<NX, NU, NY>
 where
     R: Regulator<f64, NX, NU, NY>,
@@ -288,12 +288,12 @@ where
 {
     let mut samples = Vec::with_capacity(course.samples);
     let mut log = Vec::new();
-    let mut ending = Ending::Complete;
+    let mut termination = Termination::Complete;
     for k in 0..course.samples {
         match closed_loop.sample(course.reference, course.clock, &mut |row| log.push(row)) {
             Ok(sample) => samples.push(sample),
             Err(early) => {
-                ending = early;
+                termination = early;
                 break;
             }
         }
@@ -305,7 +305,7 @@ where
         final_time,
         final_state: *closed_loop.world.state(),
         final_reference: (course.reference)(final_time),
-        ending,
+        termination,
     };
     Recording { trajectory, log }
 }
@@ -344,7 +344,7 @@ where
         experiment.tolerances,
     );
     let regulator = StateFeedback::state_feedback(controller);
-    let course = Course {
+    let course = RunConfig {
         samples: experiment.samples,
         reference: experiment.reference,
         clock: experiment.clock,

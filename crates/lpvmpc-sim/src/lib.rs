@@ -36,7 +36,7 @@
 //! ```
 #![allow(
     clippy::neg_cmp_op_on_partial_ord,
-    reason = "a comparison with a number that is not one must take the failing branch"
+    reason = "a comparison with NaN must take the failing branch"
 )]
 
 mod actuator;
@@ -50,8 +50,8 @@ mod world;
 
 pub use actuator::Actuator;
 pub use closed_loop::{
-    ClosedLoop, Course, Ending, Experiment, LogRow, Recording, Sample, Trajectory, WithoutPlan,
-    record, run,
+    ClosedLoop, Experiment, LogRow, OnInfeasible, Recording, RunConfig, Sample, Termination,
+    Trajectory, record, run,
 };
 pub use disturbance::Disturbance;
 pub use guarded_loop::{Actuation, GuardedLoop};

@@ -39,7 +39,7 @@ pub enum PlantError {
     /// The state, the input or the rate of change is not finite at the start.
     #[error("the plant starts from a state, input or rate of change that is not finite")]
     NotFinite,
-    /// The integrator gave up, or the state left the numbers.
+    /// The integrator gave up, or the state became non-finite.
     #[error("the plant's motion cannot be integrated {after:.6} s into the sample: {reason}")]
     Diverged {
         /// Time since the beginning of the sample, s.
@@ -113,7 +113,7 @@ where
 /// input between two calls is never stepped across.
 ///
 /// # Errors
-/// [`PlantError`] if the tolerances are out of range, or the motion leaves the numbers.
+/// [`PlantError`] if the tolerances are out of range, or the motion becomes non-finite.
 pub fn advance<P, const NX: usize, const NU: usize, const NS: usize>(
     model: &P,
     x: &SVector<f64, NX>,

@@ -30,7 +30,7 @@ pub struct SolverSettings<T> {
     /// state, input and general row of every stage in use.
     ///
     /// That is measured, not proved: of 2424 searches on random problems with horizons of 1 to 200 one
-    /// was ended by it, and half of those of each size need less than 4 % of it (`tests/it/changes.rs`).
+    /// was ended by it, and half of those of each size need less than 4 % of it (`tests/it/solver/changes.rs`).
     pub max_changes: Option<usize>,
     /// What the active set of the previous solution is used for. Default: shifted.
     pub warm_start: WarmStart,

@@ -1,4 +1,4 @@
-// What decides: the controller's own numbers, and what stands around it on a real robot.
+// What decides: the controller's own numbers, and the feedback pipeline around it on a real robot.
 
 import { kindOf, type Scenario } from "../scenario";
 import { TERMS } from "../terms";

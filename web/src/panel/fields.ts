@@ -43,7 +43,7 @@ function shown(value: number): string {
   return Number.isFinite(value) ? String(Number(value.toPrecision(5))) : "";
 }
 
-/** What was typed; an empty field is `whenEmpty`, and what is no number is NaN, to be refused with a reason. */
+/** What was typed; an empty field is `whenEmpty`, and what cannot be read as a number is NaN, to be refused with a reason. */
 function typed(input: HTMLInputElement, whenEmpty: number): number {
   if (input.validity.badInput) return NaN;
   return input.value.trim() === "" ? whenEmpty : Number(input.value);

@@ -56,7 +56,7 @@ export class Panel {
       section("Target and push", true, this.targetFields[0].element, this.targetFields[1].element, ...this.pushes()),
       section("Controller", true, ...controllerFields(this.form)),
       section("Bounds", false, ...boundFields(this.form)),
-      section("On a real robot", false, ...feedbackFields(this.form), note("What stands around the controller. Empty fields are the controller's defaults.")),
+      section("On a real robot", false, ...feedbackFields(this.form), note("The feedback pipeline around the controller. Empty fields are the controller's defaults.")),
       section("World", false, ...worldFields(this.form), note("The controller knows nothing of these. With any of them set, a controller without a plan goes on with its best guess; in an ideal world it gives up.")),
       licences(),
     );

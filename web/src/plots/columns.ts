@@ -2,7 +2,7 @@
 
 import type uPlot from "uplot";
 import type { History } from "../history";
-import { ROW } from "../protocol";
+import { NOW, ROW } from "../layout";
 import { stepAt } from "../steptime";
 import type { Strip } from "./strips";
 
@@ -36,7 +36,7 @@ export function columns(strip: Strip, shown: Shown[], chosen: number, start: num
   const stride = Math.max(Math.ceil((longest.length - from) / MOST_POINTS), 1);
   const indices: number[] = [];
   for (let i = from; i < longest.length; i += stride) indices.push(i);
-  const end = longest.nowAt(0, ROW.time);
+  const end = longest.nowAt(0, NOW.time);
   const times = [...indices.map((i) => longest.at(i, 0, ROW.time)), end];
   const made: (number | null)[][] = [];
   for (const { history } of shown) {
@@ -57,7 +57,7 @@ export function columns(strip: Strip, shown: Shown[], chosen: number, start: num
   if (strip.reference) {
     const plane = planeOf(longest, chosen);
     const values = indices.map((i) => longest.at(i, plane, ROW.phiReference));
-    values.push(longest.nowAt(plane, 5));
+    values.push(longest.nowAt(plane, NOW.phiReference));
     made.push(withGaps(values));
   }
   return [times, ...made] as uPlot.AlignedData;

@@ -1,7 +1,7 @@
 // What is drawn into a chart besides its curves.
 
 import uPlot from "uplot";
-import { ROW } from "../protocol";
+import { NOW } from "../layout";
 import type { Range } from "../scenario";
 import { planeOf, type Shown } from "./columns";
 
@@ -57,7 +57,7 @@ export function drawPredictions(chart: uPlot, component: number, shown: Shown[],
       ctx.globalAlpha = 0.9;
       ctx.setLineDash([3 * ratio, 3 * ratio]);
       const states = history.predictions[plane];
-      if (states) curve(history.nowAt(plane, ROW.time), states, history.samplingTime);
+      if (states) curve(history.nowAt(plane, NOW.time), states, history.samplingTime);
     }
   });
 }

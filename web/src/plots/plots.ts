@@ -2,7 +2,7 @@
 
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import { ROW } from "../protocol";
+import { ROW } from "../layout";
 import type { Scenario } from "../scenario";
 import { COARSE_CLOCK, usualStep } from "../steptime";
 import { unitOf, type Unit, type UnitSystem } from "../units";

@@ -1,6 +1,6 @@
 // What the strip charts show: one quantity per strip.
 
-import { ROW } from "../protocol";
+import { ROW } from "../layout";
 import type { Range, Scenario } from "../scenario";
 import { TERMS } from "../terms";
 import type { Quantity } from "../units";

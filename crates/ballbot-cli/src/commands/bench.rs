@@ -2,14 +2,15 @@
 
 use super::CommandError;
 use super::robot::ScenarioOptions;
-use crate::benchmark::{self, GuardedTimes, SEQUENCES, SequenceTimes, Times};
 use crate::json;
 use crate::output;
 use crate::progress::Progress;
 use crate::table::Table;
+use ballbot_studies::timing::{self, GuardedTimes, SEQUENCES, SequenceTimes, Times};
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// Arguments of `ballbot bench`.
 #[derive(Debug, Args)]
@@ -29,7 +30,7 @@ pub struct BenchArguments {
     /// What it is changed by.
     #[command(flatten)]
     pub options: ScenarioOptions,
-    /// Write the times to this file as JSON, too; - for standard output, in place of the table
+    /// Also write the times to this file as JSON; - for standard output, in place of the table
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
 }
@@ -46,13 +47,16 @@ pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
     let file = arguments.json.as_deref();
     let file = file.filter(|path| *path != Path::new("-"));
     file.map(output::check_writable).transpose()?;
+    let start = Instant::now();
+    let clock = || start.elapsed();
     let progress = Progress::new("timing", names.len() + 1);
     let mut sequences: Vec<SequenceTimes> = Vec::with_capacity(names.len());
     for name in names {
-        sequences.push(benchmark::time(name, &arguments.options.prepare(name)?)?);
+        let prepared = arguments.options.prepare(name)?;
+        sequences.push(timing::time(name, &prepared, &clock)?);
         progress.set(sequences.len());
     }
-    let guarded = benchmark::time_guarded()?;
+    let guarded = timing::time_guarded(&clock)?;
     progress.set(sequences.len() + 1);
     let document = json::text(&json!({ "sequences": sequences, "guarded": guarded }));
     match file {

@@ -37,7 +37,7 @@ pub struct CampaignArguments {
     /// What it is changed by.
     #[command(flatten)]
     pub options: ScenarioOptions,
-    /// Closed loops of the nominal plant; a twentieth of them of every other variant
+    /// Closed loops of the nominal plant; every other variant has a twentieth of them
     #[arg(long, default_value = "10000", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub runs: u32,
     /// Samples of each closed loop
@@ -46,7 +46,7 @@ pub struct CampaignArguments {
     /// Seed of everything random
     #[arg(long, default_value = "1")]
     pub seed: u64,
-    /// Threads, one per core if not given; the numbers do not depend on them
+    /// Threads [default: one per core]; the numbers do not depend on them
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Folder for the results
@@ -78,7 +78,8 @@ pub fn run(arguments: &CampaignArguments) -> Result<String, CommandError> {
     let progress = Progress::new("running", campaign.total_runs());
     let outcomes = campaign.run(&scenarios, &|done| progress.set(done))?;
     drop(progress);
-    let figure = drawing(&outcomes, limits(&scenarios.guaranteed).states[1]);
+    let settings = &scenarios.guaranteed.settings;
+    let figure = drawing(&outcomes, limits(&settings.x, &settings.u).states[1]);
     let contents = [
         csv(&outcomes).into_bytes(),
         figure.svg()?.into_bytes(),
@@ -92,7 +93,7 @@ pub fn run(arguments: &CampaignArguments) -> Result<String, CommandError> {
         .filter(|outcome| outcome.variant.is_nominal());
     let broken: usize = nominal.map(|outcome| outcome.tally.broken_promises()).sum();
     if broken > 0 {
-        return Err(CommandError::BrokenPromise {
+        return Err(CommandError::GuaranteeViolated {
             broken,
             table: table(&outcomes).to_string(),
         });

@@ -37,7 +37,7 @@ pub struct CertifyArguments {
     /// What it is changed by.
     #[command(flatten)]
     pub options: ScenarioOptions,
-    /// Share of the bounds of tilt and tilt rate that the set may use; searched for if not given
+    /// Share of the bounds of tilt and tilt rate that the set may use [default: searched for]
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub size: Option<f64>,
     /// Level of the designed set x'Px <= LEVEL, in units of the cost
@@ -47,7 +47,7 @@ pub struct CertifyArguments {
     /// proof shorter and P larger
     #[arg(long, default_value = "0.15", value_parser = share)]
     pub contraction: f64,
-    /// Boxes of states that one proof may look at
+    /// Most boxes of states in one proof
     #[arg(long, default_value = "40000", value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_BOXES as u64))]
     pub boxes: usize,
     /// Higher levels that are tried for the same K and P after the design, each a proof; 0 keeps

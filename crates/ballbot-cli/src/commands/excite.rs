@@ -27,7 +27,7 @@ Examples:
 Add the torque to that of the loop that holds the robot, log, and identify. Without --gain the loop
 is an LQR of the expected robot. Gains are for u = -K x, x = (phi, theta, phi_dot, theta_dot).")]
 pub struct ExciteArguments {
-    /// What the robot is expected to be, lengths, noise [default: the paper's lengths]
+    /// The expected robot, lengths, noise [default: the paper's lengths]
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
     /// Parameters from `ballbot identify`, in place of what the configuration expects
@@ -42,10 +42,10 @@ pub struct ExciteArguments {
     /// Largest torque of the excitation, N m
     #[arg(long, value_parser = positive, default_value_t = 1.0)]
     pub amplitude: f64,
-    /// Length, s
+    /// Duration, s
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 20.0)]
     pub length: f64,
-    /// Largest tilt, degrees; the torque is made smaller until it is kept
+    /// Largest tilt, degrees; the torque is reduced until it is kept
     #[arg(long, value_name = "DEGREES", value_parser = positive, default_value_t = 10.0)]
     pub tilt_limit: f64,
     /// Rows per second of loop and log
@@ -54,7 +54,7 @@ pub struct ExciteArguments {
     /// Gains of your loop, N m per rad and per rad/s
     #[arg(long, value_parser = finite_list::<4>, allow_hyphen_values = true, value_name = "K1,K2,K3,K4")]
     pub gain: Option<[f64; 4]>,
-    /// Where the torque is written
+    /// Where to write the torque
     #[arg(long, value_name = "FILE.csv", default_value = "out/excitation.csv")]
     pub out: PathBuf,
     /// Print JSON

@@ -38,10 +38,10 @@ pub struct IdentifyArguments {
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/identification")]
     pub out: PathBuf,
-    /// Leave out a part of a log, in seconds since its first row; of log 2 with 2:FROM,TO
+    /// Leave out a part of a log, in seconds since its first row; 2:FROM,TO for the second log
     #[arg(long, value_name = "[LOG:]FROM,TO", value_parser = part)]
     pub leave_out: Vec<Part>,
-    /// Do not impose mechanics: see what the data say alone
+    /// Do not impose mechanics: see what the data alone say
     #[arg(long)]
     pub unphysical: bool,
     /// Show the published chain, too: p by linear regression, b by refinement

@@ -44,7 +44,7 @@ pub struct LqrArguments {
     /// Runge-Kutta steps per sample [default: as in a scenario, by the fastest pole]
     #[arg(long, value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_RK4_SUBSTEPS as u64))]
     pub substeps: Option<usize>,
-    /// Design in continuous time: P is then about t_s times that of sampled time
+    /// Design in continuous time: P is then about t_s times that of discrete time
     #[arg(long, conflicts_with_all = ["ts", "substeps"])]
     pub continuous: bool,
     /// Print JSON

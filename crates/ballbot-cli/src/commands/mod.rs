@@ -24,7 +24,7 @@ use crate::input::InputError;
 use crate::output::FileError;
 use ballbot_identification::{EstimateError, ExcitationError, log::LogError};
 use ballbot_scenario::ScenarioError;
-use ballbot_studies::{CampaignError, ModelError, RefinementError, RegulatorError, SearchError};
+use ballbot_studies::{CampaignError, RefinementError, RegulatorError, SearchError, StudyError};
 use lpvmpc_certificate::{ClaimError, DocumentError};
 use lpvmpc_design::MatrixError;
 use lpvmpc_figures::FigureError;
@@ -67,9 +67,9 @@ pub enum CommandError {
     /// A campaign that cannot be run.
     #[error(transparent)]
     Campaign(#[from] CampaignError),
-    /// Models that cannot be compared.
+    /// A study that has no result.
     #[error(transparent)]
-    Models(#[from] ModelError),
+    Study(#[from] StudyError),
     /// No set could be certified.
     #[error(transparent)]
     Certify(#[from] SearchError),
@@ -109,7 +109,7 @@ pub enum CommandError {
     Wheels(String),
     /// A run that ended before its time.
     #[error(
-        "the {what} ended early, {ending}\nat phi = {:.4} rad, theta = {:.4} rad, phi_dot = {:.4} \
+        "the {what} ended early, {termination}\nat phi = {:.4} rad, theta = {:.4} rad, phi_dot = {:.4} \
          rad/s, theta_dot = {:.4} rad/s\nwhat was recorded until then is in {}",
         state[0], state[1], state[2], state[3], folder.display()
     )]
@@ -117,15 +117,15 @@ pub enum CommandError {
         /// The run, with its plane where there are two.
         what: &'static str,
         /// When and why.
-        ending: String,
+        termination: String,
         /// The state then.
         state: [f64; 4],
         /// Where the recorded part is.
         folder: PathBuf,
     },
     /// A guarantee that did not hold on the plant that it is for.
-    #[error("{broken} times something happened that is guaranteed not to:\n{table}")]
-    BrokenPromise {
+    #[error("the guarantee was violated {broken} times:\n{table}")]
+    GuaranteeViolated {
         /// How often.
         broken: usize,
         /// All counts.

@@ -3,12 +3,14 @@
 use super::CommandError;
 use crate::commands::simulate::PNG_SCALE;
 use crate::json;
-use crate::optimality::{
-    Case, CostOverDistance, Outcome, cost_over_distance, distances, guaranteed_cost, long_horizon,
-    quantile, random_starts, run_all,
-};
+use crate::optimality_drawing::{CostOverDistance, cost_over_distance, long_horizon};
+use crate::progress::Progress;
 use crate::results::ResultFolder;
 use crate::table::Table;
+use ballbot_studies::StudyError;
+use ballbot_studies::optimality::{
+    Case, Outcome, Summary, distances, guaranteed_cost, quantile, random_starts, run_all,
+};
 use clap::Args;
 use lpvmpc::Iterations;
 use rayon::prelude::*;
@@ -28,7 +30,7 @@ closed-loop costs are divided by those of nonlinear MPC on the same problem, whi
 (testdata/nonlinear-mpc, IPOPT) has solved to convergence at every sample. Writes a row per case and
 figures.")]
 pub struct OptimalityArguments {
-    /// Quadratic programs per sample, at most; the default of scenarios if not given
+    /// Most quadratic programs per sample [default: that of scenarios]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub programs: Option<u32>,
     /// Folder for the results
@@ -81,10 +83,13 @@ pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
     let mut documents = Vec::new();
     let mut contents = Vec::new();
     for (name, cases) in &sets {
-        let outcomes = run_all(cases, iterations)?;
+        let outcomes = {
+            let progress = Progress::new("running", cases.len());
+            run_all(cases, iterations, &|done| progress.set(done))?
+        };
         let summary = Summary::of(cases, &outcomes);
-        table.row(summary.cells(name));
-        documents.push(summary.document(name));
+        table.row(cells(name, &summary));
+        documents.push(document(name, &summary));
         for (case, outcome) in cases.iter().zip(&outcomes) {
             rows += &csv_row(name, case, outcome);
         }
@@ -129,7 +134,7 @@ fn figures(
     let guaranteed = shown
         .par_iter()
         .map(|(case, _)| Ok(guaranteed_cost(case)? / case.nonlinear))
-        .collect::<Result<Vec<_>, CommandError>>()?;
+        .collect::<Result<Vec<_>, StudyError>>()?;
     let costs = cost_over_distance(&CostOverDistance {
         distance: shown.iter().map(|(case, _)| case.distance).collect(),
         linear: over(|case, _| case.linear),
@@ -151,92 +156,36 @@ fn figures(
     Ok(files)
 }
 
-/// A state bound that is exceeded by less than this part of it counts as kept.
-const KEPT: f64 = 1e-3;
-
-/// What the runs of a set amount to.
-struct Summary {
-    /// Cost over that of nonlinear MPC, from the smallest on.
-    ratios: Vec<f64>,
-    /// The same of linear MPC.
-    linear: Vec<f64>,
-    /// Cost over that of linear MPC where that kept the bounds, from the smallest on.
-    against_linear: Vec<f64>,
-    mean_programs: f64,
-    most_programs: usize,
-    without_plan: usize,
+fn cells(name: &str, summary: &Summary) -> Vec<String> {
+    let ratio = |value: f64| format!("{value:.4}");
+    let at = |share| ratio(quantile(&summary.ratios, share));
+    vec![
+        name.to_owned(),
+        summary.ratios.len().to_string(),
+        at(0.5),
+        at(0.95),
+        at(0.99),
+        at(1.0),
+        ratio(quantile(&summary.linear, 0.5)),
+        ratio(quantile(&summary.against_linear, 1.0)),
+        format!("{:.2}", summary.mean_programs),
+        summary.most_programs.to_string(),
+        summary.without_plan.to_string(),
+    ]
 }
 
-impl Summary {
-    fn of(cases: &[Case], outcomes: &[Outcome]) -> Self {
-        let sorted = |mut values: Vec<f64>| {
-            values.sort_by(f64::total_cmp);
-            values
-        };
-        let pairs = || cases.iter().zip(outcomes);
-        let mean = outcomes
-            .iter()
-            .map(|outcome| outcome.mean_programs)
-            .sum::<f64>();
-        Self {
-            ratios: sorted(
-                pairs()
-                    .map(|(case, run)| run.cost / case.nonlinear)
-                    .collect(),
-            ),
-            linear: sorted(
-                cases
-                    .iter()
-                    .map(|case| case.linear / case.nonlinear)
-                    .collect(),
-            ),
-            against_linear: sorted(
-                pairs()
-                    .filter(|(case, _)| case.linear_excess < KEPT)
-                    .map(|(case, run)| run.cost / case.linear)
-                    .collect(),
-            ),
-            mean_programs: mean / outcomes.len() as f64,
-            most_programs: outcomes
-                .iter()
-                .map(|run| run.most_programs)
-                .max()
-                .unwrap_or(0),
-            without_plan: outcomes.iter().map(|run| run.without_plan).sum(),
-        }
-    }
-
-    fn cells(&self, name: &str) -> Vec<String> {
-        let ratio = |value: f64| format!("{value:.4}");
-        let at = |share| ratio(quantile(&self.ratios, share));
-        vec![
-            name.to_owned(),
-            self.ratios.len().to_string(),
-            at(0.5),
-            at(0.95),
-            at(0.99),
-            at(1.0),
-            ratio(quantile(&self.linear, 0.5)),
-            ratio(quantile(&self.against_linear, 1.0)),
-            format!("{:.2}", self.mean_programs),
-            self.most_programs.to_string(),
-            self.without_plan.to_string(),
-        ]
-    }
-
-    fn document(&self, name: &str) -> serde_json::Value {
-        let at = |share| quantile(&self.ratios, share);
-        json!({
-            "set": name,
-            "runs": self.ratios.len(),
-            "cost_over_nonlinear": { "median": at(0.5), "p95": at(0.95), "p99": at(0.99), "worst": at(1.0) },
-            "linear_over_nonlinear_median": quantile(&self.linear, 0.5),
-            "cost_over_linear_worst": quantile(&self.against_linear, 1.0),
-            "programs_per_sample_mean": self.mean_programs,
-            "programs_per_sample_most": self.most_programs,
-            "samples_without_plan": self.without_plan,
-        })
-    }
+fn document(name: &str, summary: &Summary) -> serde_json::Value {
+    let at = |share| quantile(&summary.ratios, share);
+    json!({
+        "set": name,
+        "runs": summary.ratios.len(),
+        "cost_over_nonlinear": { "median": at(0.5), "p95": at(0.95), "p99": at(0.99), "worst": at(1.0) },
+        "linear_over_nonlinear_median": quantile(&summary.linear, 0.5),
+        "cost_over_linear_worst": quantile(&summary.against_linear, 1.0),
+        "programs_per_sample_mean": summary.mean_programs,
+        "programs_per_sample_most": summary.most_programs,
+        "samples_without_plan": summary.without_plan,
+    })
 }
 
 const CSV_HEADER: &str = "set,horizon,t_s_s,distance_m,theta0_rad,phi_dot0_rad_s,theta_dot0_rad_s,\

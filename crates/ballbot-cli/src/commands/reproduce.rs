@@ -3,14 +3,17 @@
 use super::CommandError;
 use super::simulate::PNG_SCALE;
 use crate::html::Drawing;
+use crate::progress::Progress;
 use crate::recording;
-use crate::reproduction::claims::{self, Claim};
-use crate::reproduction::tables::Sheet;
-use crate::reproduction::{Reproduction, report};
+use crate::reproduction::tables::{self, Sheet};
+use crate::reproduction::{claims, drawings, guarantee, optimum, report};
 use crate::results::ResultFolder;
+use ballbot_studies::StudyError;
+use ballbot_studies::reproduction::{Claim, Reproduction};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
+use std::time::Instant;
 
 /// Arguments of `ballbot reproduce`.
 #[derive(Debug, Args)]
@@ -20,7 +23,7 @@ Examples:
   ballbot reproduce --out results
 
 Writes report.html (one self-contained file), every figure as SVG and PNG, every table and
-trajectory as CSV, and summary.json. Exits with 0 only if every number that is to be met agrees
+trajectory as CSV, and summary.json. Exits with 0 only if every number to be met agrees
 with the computed one within its stated tolerance; the column `source` says whether the paper prints
 it, says it in words (the number is then ours), or it is a check of our own.")]
 pub struct ReproduceArguments {
@@ -35,10 +38,10 @@ pub struct ReproduceArguments {
 /// A file cannot be written, or a published number does not agree.
 pub fn run(arguments: &ReproduceArguments) -> Result<String, CommandError> {
     let results = ResultFolder::open(&arguments.out, &["report.html", "summary.json"])?;
-    let reproduction = Reproduction::compute()?;
+    let reproduction = compute()?;
     let claims = reproduction.claims();
-    let sheets = reproduction.sheets(&claims);
-    let drawings = reproduction.drawings();
+    let sheets = tables::sheets(&reproduction, &claims);
+    let drawings = drawings::drawings(&reproduction);
     write(&results, &reproduction, &claims, &sheets, &drawings)?;
 
     let table = claims::table(&claims);
@@ -59,6 +62,12 @@ pub fn run(arguments: &ReproduceArguments) -> Result<String, CommandError> {
     }
 }
 
+fn compute() -> Result<Reproduction, StudyError> {
+    let progress = Progress::new("reproducing", Reproduction::PARTS);
+    let start = Instant::now();
+    Reproduction::compute(&|| start.elapsed(), &|done| progress.set(done))
+}
+
 fn write(
     results: &ResultFolder,
     reproduction: &Reproduction,
@@ -68,14 +77,18 @@ fn write(
 ) -> Result<(), CommandError> {
     let machine = machine();
     let mut files: Vec<(String, Vec<u8>)> = Vec::new();
-    let (guarantee, optimum) = (&reproduction.guarantee, &reproduction.optimum);
-    let beyond = [guarantee.drawing(), optimum.drawing()];
+    let beyond = [
+        guarantee::drawing(&reproduction.guarantee),
+        optimum::drawing(&reproduction.optimum),
+    ];
     for drawing in drawings.iter().chain(&beyond) {
         let stem = format!("figures/{}", drawing.name);
         files.push((format!("{stem}.svg"), drawing.figure.svg()?.into_bytes()));
         files.push((format!("{stem}.png"), drawing.figure.png(PNG_SCALE)?));
     }
-    let beyond = guarantee.sheets().into_iter().chain([optimum.sheet()]);
+    let beyond = guarantee::sheets(&reproduction.guarantee)
+        .into_iter()
+        .chain([optimum::sheet(&reproduction.optimum)]);
     for sheet in sheets.iter().cloned().chain(beyond) {
         let name = format!("tables/{}.csv", sheet.name);
         files.push((name, sheet.csv().into_bytes()));

@@ -35,7 +35,7 @@ pub struct ScenarioOptions {
     /// The robot.
     #[command(flatten)]
     pub robot: RobotArguments,
-    /// Set a key of the scenario, in place of what its file says; may be given more than once
+    /// Set a key of the scenario, in place of what its file says; repeatable
     #[arg(long, value_name = "KEY=VALUE", value_parser = assignment)]
     pub set: Vec<(String, String)>,
 }

@@ -6,13 +6,14 @@ use crate::json;
 use crate::output::{self, FileError};
 use crate::pictures::{self, Shown};
 use crate::progress::Progress;
-use crate::recording::{self, Columns, Metrics};
+use crate::recording;
 use crate::results::ResultFolder;
 use crate::table::Table;
-use ballbot_scenario::{MotorSample, Prepared, Record, Surroundings, words};
+use ballbot_scenario::{MotorSample, Prepared, Record, RunHooks, words};
+use ballbot_studies::recorded::{Columns, Metrics};
 use clap::Args;
 use lpvmpc_figures::{Figure, Role};
-use lpvmpc_sim::{Ending, LogRow, Trajectory};
+use lpvmpc_sim::{LogRow, Termination, Trajectory};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -133,7 +134,7 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
     let early = runs
         .into_iter()
         .zip(&trajectories)
-        .find(|(_, run)| run.ending != Ending::Complete);
+        .find(|(_, run)| run.termination != Termination::Complete);
     match early {
         None => Ok(Simulated {
             prepared,
@@ -147,7 +148,7 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
         }),
         Some((what, run)) => Err(CommandError::EndedEarly {
             what,
-            ending: words::ending(&run.ending),
+            termination: words::termination(&run.termination),
             state: run.final_state.into(),
             folder: folder.path().to_owned(),
         }),
@@ -161,11 +162,11 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
 pub fn record(prepared: &Prepared) -> Result<Record, CommandError> {
     let progress = Progress::new("simulating", prepared.total_samples());
     let start = Instant::now();
-    let surroundings = Surroundings {
+    let hooks = RunHooks {
         clock: &|| start.elapsed(),
         progress: &|done| progress.set(done),
     };
-    Ok(prepared.record(&surroundings)?)
+    Ok(prepared.record(&hooks)?)
 }
 
 /// The motors of two planes that were run one after the other, at a heading of zero; none for

@@ -16,9 +16,9 @@ Example:
   ballbot verify out/certificate/certificate.json
 
 Proves every claim again from the numbers in the file, without an optimiser: for the model with
-these numbers, the exact state and no delay. Exits with 1 and names the claim if one is false, which
-is said with a state that shows it, if one could not be shown, which leaves open whether it is true,
-or if the file is not as it was written.")]
+these numbers, the exact state and no delay. Exits with 1 and names the claim if one is false
+(with a state that shows it), if one could not be shown (it may be true all the same), or if the file
+is not as it was written.")]
 pub struct VerifyArguments {
     /// A file written by `ballbot certify`
     pub certificate: PathBuf,

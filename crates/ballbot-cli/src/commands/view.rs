@@ -18,7 +18,7 @@ Examples:
 
 Only this machine can reach the page; it loads nothing from elsewhere. Ctrl-C ends it.")]
 pub struct ViewArguments {
-    /// Port to listen at; 0 for any that is free
+    /// Port to listen on; 0 for any that is free
     #[arg(long, default_value_t = 8017)]
     pub port: u16,
 }

@@ -20,7 +20,7 @@ pub struct WheelsArguments {
 /// What can be done about wheels.
 #[derive(Debug, Subcommand)]
 pub enum WheelsCommand {
-    /// See by hand whether the wheels' order, sense and azimuths are those of a configuration
+    /// Check by hand that the wheels' order, sense of rotation and azimuths match a configuration
     Check(CheckArguments),
 }
 

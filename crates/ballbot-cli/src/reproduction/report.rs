@@ -1,12 +1,10 @@
 //! The report: one self-contained HTML file.
 
-use super::Reproduction;
-use super::claims::{self, Claim};
-use super::optimum::{self, Optimum};
-use super::runs::Run;
 use super::tables::Sheet;
+use super::{claims, guarantee, optimum};
 use crate::html::{self, Drawing, escape};
 use ballbot::{Ballbot, LinearParameters};
+use ballbot_studies::reproduction::{Claim, Optimum, Reproduction, Run, SAMPLING_TIME};
 use lpvmpc_figures::FigureError;
 use std::f64::consts::{PI, TAU};
 
@@ -40,7 +38,7 @@ pub fn html(
          <h2>Figures</h2>\n{figures}\n\
          <h2>Tables</h2>\n{tables}\n\
          <h2>What is guaranteed</h2>\n{}\n\
-         <h2>How near to the optimum</h2>\n{}\n\
+         <h2>How close to the optimum</h2>\n{}\n\
          <h2>Differences from the paper</h2>\n{}\n\
          <h2>What b* means physically</h2>\n{}\n",
         escape(&claims::counts(claims)),
@@ -64,7 +62,7 @@ fn guaranteed(reproduction: &Reproduction) -> Result<String, FigureError> {
     let cost = |run: &Run| run.metrics[0].closed_loop_cost;
     let one_program = cost(&guarantee.fine);
     let nonlinear = &guarantee.nonlinear;
-    let [gap, price] = guarantee.sheets();
+    let [gap, price] = guarantee::sheets(guarantee);
     Ok(format!(
         "<p>The paper's guarantee needs the terminal equality to hold for the nonlinear robot, and \
          its predictor keeps the scheduling frozen over a sample. The first table shows how far \
@@ -86,7 +84,7 @@ fn guaranteed(reproduction: &Reproduction) -> Result<String, FigureError> {
         guarantee.samples_guaranteed(),
         guarantee.far.metrics[0].samples,
         guarantee.far.metrics[0].violations,
-        html::figures(&[guarantee.drawing()])?,
+        html::figures(&[guarantee::drawing(guarantee)])?,
         table(&price),
         nonlinear.mean_programs,
         nonlinear.largest_last_step,
@@ -120,26 +118,29 @@ fn near_the_optimum(optimum: &Optimum) -> Result<String, FigureError> {
          docs/descent.md the method and what is not claimed.</p>\n",
         optimum.cases.len(),
         optimum.duration(),
-        1e3 * optimum::SAMPLING_TIME,
+        1e3 * SAMPLING_TIME,
         match optimum.not_converged() {
             0 => "IPOPT converged at every sample of these loops".to_owned(),
             samples => format!("IPOPT did not converge at {samples} of the samples"),
         },
-        html::figures(&[optimum.drawing()])?,
-        table(&optimum.sheet()),
+        html::figures(&[optimum::drawing(optimum)])?,
+        table(&optimum::sheet(optimum)),
         100.0 * (optimum.worst() - 1.0),
         100.0 * (optimum.worst_linear() - 1.0),
     ))
 }
 
-/// The paper's slips, and what is done instead.
+/// The paper's errors, and what is done instead.
 fn differences(reproduction: &Reproduction) -> String {
     let (negative, positive) = reproduction.residual_at_printed_b;
     let [regulator, _] = &reproduction.regulators;
     let upright = Ballbot::<f64>::paper().linear_parameters();
     let p = LinearParameters::<f64>::paper();
     let (phi, theta) = reproduction.terminal_gap;
-    let overshoot = claims::smallest_phi(&reproduction.runs.two_setpoints, 3.0, f64::INFINITY);
+    let overshoot = reproduction
+        .runs
+        .two_setpoints
+        .smallest_phi(3.0..f64::INFINITY);
     let (equality, cost) = (
         &reproduction.runs.terminal_equality,
         &reproduction.runs.terminal_cost,
@@ -201,7 +202,7 @@ fn differences(reproduction: &Reproduction) -> String {
             -100.0 * overshoot / TAU,
             equality.reaches(PI, 0.02 * PI),
             cost.reaches(PI, 0.02 * PI),
-            claims::largest_phi(equality) - PI,
+            equality.largest_phi() - PI,
         ),
         "<strong>Times.</strong> The paper times single quadratic programs in MATLAB with YALMIP on \
          an Intel i7-8650U; the times here are of this program's whole step on another machine. \

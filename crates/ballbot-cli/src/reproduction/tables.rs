@@ -1,10 +1,9 @@
 //! The tables of the paper, filled.
 
-use super::Reproduction;
-use super::claims::{Claim, HEADERS};
-use super::runs::Run;
-use crate::recording::{Metrics, mean_and_deviation};
+use super::claims::{HEADERS, cells};
 use ballbot::{Ballbot, LinearParameters, limits};
+use ballbot_studies::recorded::{Metrics, mean_and_deviation};
+use ballbot_studies::reproduction::{Claim, Reproduction, Run};
 use lpvmpc::LpvModel;
 use nalgebra::Vector3;
 
@@ -61,132 +60,135 @@ fn number(value: f64) -> String {
     format!("{:.6}", value + 0.0)
 }
 
-impl Reproduction {
-    /// All tables: the claims first, then those of the paper.
-    pub fn sheets(&self, claims: &[Claim]) -> Vec<Sheet> {
-        vec![
-            claims_sheet(claims),
-            elements_sheet(),
-            self.linear_sheet(),
-            self.refinement_sheet(),
-            self.constraints_sheet(),
-            self.times_sheet(),
-        ]
-    }
+/// All tables: the claims first, then those of the paper.
+pub fn sheets(reproduction: &Reproduction, claims: &[Claim]) -> Vec<Sheet> {
+    vec![
+        claims_sheet(claims),
+        elements_sheet(),
+        linear_sheet(reproduction),
+        refinement_sheet(reproduction),
+        constraints_sheet(reproduction),
+        times_sheet(reproduction),
+    ]
+}
 
-    fn linear_sheet(&self) -> Sheet {
-        let mut sheet = Sheet::new(
-            "linear-parameters",
-            "Parameters p of the linear model, and what the refined b makes of them",
-            &["", "p", "h(b)", "p - h(b)"],
-        );
-        for (i, equation) in self.refinement.equations.iter().enumerate() {
-            let cells = [equation.identified, equation.refined, equation.difference()];
-            sheet.row(&format!("p{}", i + 1), cells.map(number));
-        }
-        sheet
+fn linear_sheet(reproduction: &Reproduction) -> Sheet {
+    let mut sheet = Sheet::new(
+        "linear-parameters",
+        "Parameters p of the linear model, and what the refined b makes of them",
+        &["", "p", "h(b)", "p - h(b)"],
+    );
+    for (i, equation) in reproduction.refinement.equations.iter().enumerate() {
+        let cells = [equation.identified, equation.refined, equation.difference()];
+        sheet.row(&format!("p{}", i + 1), cells.map(number));
     }
+    sheet
+}
 
-    fn refinement_sheet(&self) -> Sheet {
-        let mut sheet = Sheet::new(
-            "refinement",
-            "Refinement of b by Gauss-Newton, step by step",
-            &[
-                "step",
-                "b1 [m^2]",
-                "b2 [m^2]",
-                "b3 [m^2]",
-                "b4 [m^2/s]",
-                "||F(b)||",
-                "||step||",
+fn refinement_sheet(reproduction: &Reproduction) -> Sheet {
+    let mut sheet = Sheet::new(
+        "refinement",
+        "Refinement of b by Gauss-Newton, step by step",
+        &[
+            "step",
+            "b1 [m^2]",
+            "b2 [m^2]",
+            "b3 [m^2]",
+            "b4 [m^2/s]",
+            "||F(b)||",
+            "||step||",
+        ],
+    );
+    for (step, iterate) in reproduction
+        .refinement
+        .gauss_newton
+        .history
+        .iter()
+        .enumerate()
+    {
+        let b = &iterate.parameters;
+        let cells = [b[0], b[1], b[2], b[3]].map(|b| format!("{b:.8}"));
+        let [b1, b2, b3, b4] = cells;
+        let norms = [iterate.residual_norm, iterate.step_norm].map(|n| format!("{n:.6e}"));
+        let [residual, step_norm] = norms;
+        sheet.row(&step.to_string(), [b1, b2, b3, b4, residual, step_norm]);
+    }
+    sheet
+}
+
+fn constraints_sheet(reproduction: &Reproduction) -> Sheet {
+    let runs = reproduction.runs.all();
+    let names = runs.map(|run| format!("{}, largest", run.name));
+    let mut headers = vec!["", "lower", "upper"];
+    headers.extend(names.iter().map(String::as_str));
+    let mut sheet = Sheet::new(
+        "constraints",
+        "Constraints, and the largest magnitude reached in each run",
+        &headers,
+    );
+    let largest =
+        |run: &Run, of: fn(&Metrics) -> f64| number(run.metrics.iter().map(of).fold(0.0, f64::max));
+    let rows: [Line; 4] = [
+        ("theta [rad]", limits::THETA, |m| m.largest_tilt_rad),
+        ("phi_dot [rad/s]", limits::PHI_DOT, |m| {
+            m.largest_phi_dot_rad_s
+        }),
+        ("theta_dot [rad/s]", limits::THETA_DOT, |m| {
+            m.largest_theta_dot_rad_s
+        }),
+        ("torque [N m]", limits::TORQUE, |m| m.largest_torque_nm),
+    ];
+    for (name, limit, of) in rows {
+        let [a, b, c, d, e] = runs.map(|run| largest(run, of));
+        sheet.row(name, [number(-limit), number(limit), a, b, c, d, e]);
+    }
+    sheet
+}
+
+fn times_sheet(reproduction: &Reproduction) -> Sheet {
+    let mut sheet = Sheet::new(
+        "times",
+        "Time per sample: the paper's single QP, and this program's whole step (scheduling, \
+         predictor, QP, rollout)",
+        &[
+            "",
+            "paper, mean [ms]",
+            "paper, std [ms]",
+            "computed, mean [ms]",
+            "computed, std [ms]",
+            "computed, longest [ms]",
+        ],
+    );
+    for (name, run, mean, deviation) in [
+        ("scenario 1", &reproduction.runs.two_setpoints, 8.6, 10.4),
+        ("scenario 2", &reproduction.runs.lissajous, 8.7, 13.2),
+        ("scenario 3", &reproduction.runs.terminal_equality, 5.8, 2.5),
+    ] {
+        let samples = run.trajectories.iter().flat_map(|run| &run.samples);
+        let times: Vec<f64> = samples
+            .map(|sample| sample.step_time.as_secs_f64() * 1e3)
+            .collect();
+        let (computed, spread) = mean_and_deviation(&times);
+        let longest = times.into_iter().fold(0.0, f64::max);
+        let ours = [computed, spread, longest].map(|time| format!("{time:.4}"));
+        let [computed, spread, longest] = ours;
+        sheet.row(
+            name,
+            [
+                mean.to_string(),
+                deviation.to_string(),
+                computed,
+                spread,
+                longest,
             ],
         );
-        for (step, iterate) in self.refinement.gauss_newton.history.iter().enumerate() {
-            let b = &iterate.parameters;
-            let cells = [b[0], b[1], b[2], b[3]].map(|b| format!("{b:.8}"));
-            let [b1, b2, b3, b4] = cells;
-            let norms = [iterate.residual_norm, iterate.step_norm].map(|n| format!("{n:.6e}"));
-            let [residual, step_norm] = norms;
-            sheet.row(&step.to_string(), [b1, b2, b3, b4, residual, step_norm]);
-        }
-        sheet
     }
-
-    fn constraints_sheet(&self) -> Sheet {
-        let runs = self.runs.all();
-        let names = runs.map(|run| format!("{}, largest", run.name));
-        let mut headers = vec!["", "lower", "upper"];
-        headers.extend(names.iter().map(String::as_str));
-        let mut sheet = Sheet::new(
-            "constraints",
-            "Constraints, and the largest magnitude reached in each run",
-            &headers,
-        );
-        let largest = |run: &Run, of: fn(&Metrics) -> f64| {
-            number(run.metrics.iter().map(of).fold(0.0, f64::max))
-        };
-        let rows: [Line; 4] = [
-            ("theta [rad]", limits::THETA, |m| m.largest_tilt_rad),
-            ("phi_dot [rad/s]", limits::PHI_DOT, |m| {
-                m.largest_phi_dot_rad_s
-            }),
-            ("theta_dot [rad/s]", limits::THETA_DOT, |m| {
-                m.largest_theta_dot_rad_s
-            }),
-            ("torque [N m]", limits::TORQUE, |m| m.largest_torque_nm),
-        ];
-        for (name, limit, of) in rows {
-            let [a, b, c, d, e] = runs.map(|run| largest(run, of));
-            sheet.row(name, [number(-limit), number(limit), a, b, c, d, e]);
-        }
-        sheet
-    }
-
-    fn times_sheet(&self) -> Sheet {
-        let mut sheet = Sheet::new(
-            "times",
-            "Time per sample: the paper's single QP, and this program's whole step (scheduling, \
-             predictor, QP, rollout)",
-            &[
-                "",
-                "paper, mean [ms]",
-                "paper, std [ms]",
-                "computed, mean [ms]",
-                "computed, std [ms]",
-                "computed, longest [ms]",
-            ],
-        );
-        for (name, run, mean, deviation) in [
-            ("scenario 1", &self.runs.two_setpoints, 8.6, 10.4),
-            ("scenario 2", &self.runs.lissajous, 8.7, 13.2),
-            ("scenario 3", &self.runs.terminal_equality, 5.8, 2.5),
-        ] {
-            let samples = run.trajectories.iter().flat_map(|run| &run.samples);
-            let times: Vec<f64> = samples
-                .map(|sample| sample.step_time.as_secs_f64() * 1e3)
-                .collect();
-            let (computed, spread) = mean_and_deviation(&times);
-            let longest = times.into_iter().fold(0.0, f64::max);
-            let ours = [computed, spread, longest].map(|time| format!("{time:.4}"));
-            let [computed, spread, longest] = ours;
-            sheet.row(
-                name,
-                [
-                    mean.to_string(),
-                    deviation.to_string(),
-                    computed,
-                    spread,
-                    longest,
-                ],
-            );
-        }
-        sheet
-    }
+    sheet
 }
 
 fn claims_sheet(claims: &[Claim]) -> Sheet {
     let mut sheet = Sheet::new("published-and-computed", "Published and computed", &HEADERS);
-    sheet.rows = claims.iter().map(|claim| claim.cells().to_vec()).collect();
+    sheet.rows = claims.iter().map(|claim| cells(claim).to_vec()).collect();
     sheet
 }
 

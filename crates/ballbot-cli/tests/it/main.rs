@@ -1,10 +1,12 @@
 //! The program `ballbot` as its users run it.
 #![allow(
     clippy::unwrap_used,
+    clippy::panic,
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
 mod certify;
+mod closed_loops;
 mod identify;
 mod linearize;
 mod lqr;
@@ -13,33 +15,31 @@ mod refine;
 mod wheels;
 
 use serde_json::Value;
+use std::path::Path;
 use std::process::{Command, Output};
 
-/// Runs the program to its end.
-fn ballbot(arguments: &[&str]) -> Output {
+/// Runs the program in `folder` to its end.
+fn ballbot_in(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_ballbot"))
+        .current_dir(folder)
         .args(arguments)
         .env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"))
         .output()
         .unwrap()
 }
 
-/// Standard output of a run that succeeds.
-fn text(arguments: &[&str]) -> String {
-    let output = ballbot(arguments);
+/// Standard output of a run in `folder` that succeeds.
+fn succeed(folder: &Path, arguments: &[&str]) -> String {
+    let output = ballbot_in(folder, arguments);
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{arguments:?}: {message}");
     assert!(message.is_empty(), "{arguments:?}: {message}");
     String::from_utf8(output.stdout).unwrap()
 }
 
-fn json(arguments: &[&str]) -> Value {
-    serde_json::from_str(&text(arguments)).unwrap()
-}
-
-/// The message of a run that fails with the exit code `code` and prints no result.
-fn failure(arguments: &[&str], code: i32) -> String {
-    let output = ballbot(arguments);
+/// The message of a run in `folder` that exits with `code` and prints no result.
+fn fail(folder: &Path, arguments: &[&str], code: i32) -> String {
+    let output = ballbot_in(folder, arguments);
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
     assert!(output.stdout.is_empty(), "{arguments:?} printed a result");
@@ -48,10 +48,27 @@ fn failure(arguments: &[&str], code: i32) -> String {
     message
 }
 
-/// The message has all of these parts.
-fn assert_says(message: &str, parts: &[&str]) {
+/// The three of them where the folder does not matter.
+fn ballbot(arguments: &[&str]) -> Output {
+    ballbot_in(Path::new("."), arguments)
+}
+
+fn text(arguments: &[&str]) -> String {
+    succeed(Path::new("."), arguments)
+}
+
+fn failure(arguments: &[&str], code: i32) -> String {
+    fail(Path::new("."), arguments, code)
+}
+
+fn json(arguments: &[&str]) -> Value {
+    serde_json::from_str(&text(arguments)).unwrap()
+}
+
+/// The text has all of these parts.
+fn assert_says(text: &str, parts: &[&str]) {
     for part in parts {
-        assert!(message.contains(part), "`{part}` is not in: {message}");
+        assert!(text.contains(part), "`{part}` is not in: {text}");
     }
 }
 

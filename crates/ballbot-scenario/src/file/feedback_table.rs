@@ -1,4 +1,4 @@
-//! What stands around the controller on a real robot, key by key: estimator, delay, ramps,
+//! The feedback pipeline around the controller of a real robot, key by key: estimator, delay, ramps,
 //! motors. What it means is in `feedback`.
 
 use serde::{Deserialize, Serialize};

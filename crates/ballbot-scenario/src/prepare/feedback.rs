@@ -1,4 +1,4 @@
-//! What stands around the controller on a real robot, checked: estimator, delay, ramps.
+//! The feedback pipeline around the controller of a real robot, checked: estimator, delay, ramps.
 
 use crate::error::ScenarioError;
 use crate::file::feedback_table::{
@@ -24,7 +24,7 @@ use std::f64::consts::FRAC_PI_2;
 const ESTIMATOR_STEP: f64 = 0.5;
 
 impl ControllerTable {
-    /// What stands around the controller.
+    /// The feedback pipeline around the controller.
     pub(crate) fn feedback(&self, ballbot: &Ballbot<f64>) -> Result<PlaneFeedback, ScenarioError> {
         let estimator = self.estimator.as_ref();
         let delay = not_negative("controller.delay_s", self.delay_s)?;

@@ -247,7 +247,7 @@ fn check_bounds(
         ("torque_nm", torque, u.lower[0], u.upper[0]),
     ];
     for (key, reach, lower, upper) in rows {
-        // Negated, so that a number that is not one fails.
+        // Negated, so that NaN fails.
         if !(lower <= -reach && reach <= upper) {
             return Err(ScenarioError::value(
                 format!("bounds.{key}"),

@@ -30,7 +30,7 @@ pub struct Prepared {
     pub settings: ballbot::ControllerSettings<f64>,
     /// Which problem is posed.
     pub problem: Problem,
-    /// What stands around the controller.
+    /// The feedback pipeline around the controller.
     pub feedback: PlaneFeedback,
     /// What is known of the certificate that this rests on.
     pub certificate: Option<Standing>,

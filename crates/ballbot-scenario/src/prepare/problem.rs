@@ -50,7 +50,7 @@ impl BoundsTable {
             ("torque_nm", self.torque_nm),
         ];
         for (key, [lower, upper]) in rows {
-            // Negated, so that a bound that is not a number fails.
+            // Negated, so that NaN fails.
             if !(lower <= upper) || lower == f64::INFINITY || upper == f64::NEG_INFINITY {
                 return Err(ScenarioError::value(
                     format!("bounds.{key}"),
@@ -95,7 +95,7 @@ fn check_horizon(table: &ControllerTable) -> Result<(), ScenarioError> {
 }
 
 impl ControllerTable {
-    /// The settings of the controller without what stands around it.
+    /// The settings of the controller alone, without the feedback pipeline.
     pub(crate) fn settings(
         &self,
         ballbot: &Ballbot<f64>,

@@ -110,7 +110,7 @@ impl Uncertainty {
         }
         let parts = dynamic(&correlations).symmetric_eigen();
         let smallest = parts.eigenvalues.min();
-        // Negated, so that what is not a number fails.
+        // Negated, so that NaN fails.
         if !(smallest >= -TOLERANCE) {
             return Err(refused(
                 format!("(smallest eigenvalue of the correlations {smallest:.3})"),

@@ -11,7 +11,7 @@ use crate::prepare::files::Files;
 use crate::prepare::known_robot::KnownRobot;
 use ballbot::{Ballbot, Disturbed};
 use lpvmpc::Bounds;
-use lpvmpc_sim::{Actuator, Disturbance, Plant, Sensor, Tolerances, WithoutPlan, WorldSettings};
+use lpvmpc_sim::{Actuator, Disturbance, OnInfeasible, Plant, Sensor, Tolerances, WorldSettings};
 use nalgebra::{Vector1, Vector2, Vector4};
 use std::f64::consts::FRAC_PI_2;
 
@@ -42,7 +42,7 @@ pub struct PlaneWorld {
     /// Sensors, of (phi, theta, phi_dot, theta_dot) in this order, drive, delay and pushes.
     pub settings: WorldSettings<4, 1, 4, 2>,
     /// What happens without a plan.
-    pub without_plan: WithoutPlan,
+    pub without_plan: OnInfeasible,
     /// Outside of it the robot has fallen.
     pub range: Bounds<f64, 4>,
     /// What is added to the controller's torque.
@@ -58,7 +58,7 @@ impl PlaneWorld {
                 torque_bias: 0.0,
             },
             settings: WorldSettings::ideal(t_s, tolerances),
-            without_plan: WithoutPlan::End,
+            without_plan: OnInfeasible::End,
             range: Bounds::none(),
             excitation: None,
         }
@@ -135,7 +135,7 @@ impl WorldTable {
                 seed,
                 tolerances,
             },
-            without_plan: WithoutPlan::Apply,
+            without_plan: OnInfeasible::Apply,
             range,
             excitation: self.excitation(plane, files)?,
         })

@@ -4,10 +4,10 @@ use crate::error::ScenarioError;
 use crate::prepare::prepared::{Plane, Prepared};
 use crate::prepare::world::{PlaneWorld, Robot};
 use crate::run::excited::Excited;
-use crate::run::record::{Record, Surroundings};
+use crate::run::record::{Record, RunHooks};
 use ballbot::PlaneRegulator;
 use lpvmpc::Regulator;
-use lpvmpc_sim::{ClosedLoop, Course, Trajectory, World};
+use lpvmpc_sim::{ClosedLoop, RunConfig, Trajectory, World};
 use nalgebra::Vector3;
 
 /// The closed loop of one plane, whatever the horizon. The sensors are those of (phi, theta,
@@ -26,12 +26,9 @@ impl Prepared {
     ///
     /// # Errors
     /// [`ScenarioError::Controller`] if the controller refuses its settings. An infeasible
-    /// problem is not an error: see [`Trajectory::ending`].
-    pub fn run(
-        &self,
-        surroundings: &Surroundings<'_>,
-    ) -> Result<Vec<Trajectory<4, 1>>, ScenarioError> {
-        let planes = self.record(surroundings)?.planes.into_iter();
+    /// problem is not an error: see [`Trajectory::termination`].
+    pub fn run(&self, hooks: &RunHooks<'_>) -> Result<Vec<Trajectory<4, 1>>, ScenarioError> {
+        let planes = self.record(hooks)?.planes.into_iter();
         Ok(planes.map(|recording| recording.trajectory).collect())
     }
 
@@ -39,17 +36,17 @@ impl Prepared {
     ///
     /// # Errors
     /// As [`run`](Self::run).
-    pub fn record(&self, surroundings: &Surroundings<'_>) -> Result<Record, ScenarioError> {
+    pub fn record(&self, hooks: &RunHooks<'_>) -> Result<Record, ScenarioError> {
         if let (Some(motors), [x, y]) = (&self.motors, self.planes.as_slice()) {
-            return self.record_whole(motors, [x, y], surroundings);
+            return self.record_whole(motors, [x, y], hooks);
         }
         let mut planes = Vec::with_capacity(self.planes.len());
         for (done, plane) in self.planes.iter().enumerate() {
-            let course = Course {
+            let course = RunConfig {
                 samples: self.samples,
                 reference: &|t| plane.state_reference(t),
-                clock: surroundings.clock,
-                progress: &|samples| (surroundings.progress)(done * self.samples + samples),
+                clock: hooks.clock,
+                progress: &|samples| (hooks.progress)(done * self.samples + samples),
             };
             let mut closed_loop = self.closed_loop(plane)?;
             planes.push(lpvmpc_sim::record(&mut closed_loop, &course));

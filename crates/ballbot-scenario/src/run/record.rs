@@ -5,11 +5,19 @@ use lpvmpc_sim::{LogRow, Recording};
 use std::time::Duration;
 
 /// What the run reads and reports besides its results.
-pub struct Surroundings<'a> {
+pub struct RunHooks<'a> {
     /// A monotonic clock, for the time per step.
     pub clock: &'a dyn Fn() -> Duration,
     /// Called with the number of samples done, over all planes.
     pub progress: &'a dyn Fn(usize),
+}
+
+impl RunHooks<'_> {
+    /// A run that is not timed, so that every step takes no time, and tells nobody of its progress.
+    pub const NONE: RunHooks<'static> = RunHooks {
+        clock: &|| Duration::ZERO,
+        progress: &|_| (),
+    };
 }
 
 /// A recorded run.

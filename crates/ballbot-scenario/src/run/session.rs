@@ -9,7 +9,7 @@ use crate::prepare::reference::PhiReference;
 use crate::run::planes::PlaneLoop;
 use crate::words;
 use lpvmpc::{Observation, Regulator, Status};
-use lpvmpc_sim::{Disturbance, Ending, LogRow, Sample, WorldError};
+use lpvmpc_sim::{Disturbance, LogRow, Sample, Termination, WorldError};
 use nalgebra::{Vector1, Vector3, Vector4};
 use std::f64::consts::FRAC_PI_2;
 use std::time::Duration;
@@ -25,7 +25,7 @@ pub struct Session {
     /// What became of each plane's last measurement.
     observations: Vec<Observation<4>>,
     phase: Phase,
-    trouble: Trouble,
+    cause: FailureCause,
     /// The planes follow what a person ordered, not the scenario.
     ordered: bool,
     /// Pushes that take effect with the next sample: plane, and change of its state.
@@ -38,14 +38,14 @@ pub enum Phase {
     /// The controller is at work.
     Running,
     /// It gave up, for this reason; the robot falls without torque.
-    Falling(Ending),
+    Falling(Termination),
     /// It lies on the floor, or its motion cannot be followed any further.
-    Down(Ending),
+    Down(Termination),
 }
 
 /// What led to a fall.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Trouble {
+pub struct FailureCause {
     /// The first of the samples without interruption until now that had no plan: time and why.
     pub without_plan: Option<(f64, Status<f64>)>,
     /// For how long the torque of some plane has been at its bound without interruption, s.
@@ -69,7 +69,7 @@ impl Session {
             samples: Vec::new(),
             observations: Vec::new(),
             phase: Phase::Running,
-            trouble: Trouble::default(),
+            cause: FailureCause::default(),
             ordered: false,
             pushes: Vec::new(),
         })
@@ -112,7 +112,7 @@ impl Session {
             samples,
             observations,
             phase: self.phase.clone(),
-            trouble: self.trouble.clone(),
+            cause: self.cause.clone(),
             ordered: self.ordered,
             pushes: Vec::new(),
         };
@@ -208,17 +208,17 @@ impl Session {
 
     /// Why the robot does not stand any more, for people; `None` while it stands.
     pub fn fall_in_words(&self) -> Option<String> {
-        let (Phase::Falling(ending) | Phase::Down(ending)) = &self.phase else {
+        let (Phase::Falling(termination) | Phase::Down(termination)) = &self.phase else {
             return None;
         };
-        let mut text = words::ending(ending);
-        if let Some((t, status)) = &self.trouble.without_plan
-            && !matches!(ending, Ending::NoPlan { .. })
+        let mut text = words::termination(termination);
+        if let Some((t, status)) = &self.cause.without_plan
+            && !matches!(termination, Termination::NoPlan { .. })
         {
             text += &format!("; no plan from t = {t:.3} s on: {}", words::status(status));
         }
-        if self.trouble.saturated > 0.0 {
-            let saturated = self.trouble.saturated;
+        if self.cause.saturated > 0.0 {
+            let saturated = self.cause.saturated;
             text += &format!("; the torque had been at its bound for {saturated:.2} s");
         }
         Some(text)
@@ -247,19 +247,19 @@ impl Session {
             let mut log = |row: LogRow<4, 1>| last = Some(row.observation);
             match closed_loop.sample(&reference, clock, &mut log) {
                 Ok(sample) => samples.push(sample),
-                Err(ending) => return self.give_up(ending, samples),
+                Err(termination) => return self.give_up(termination, samples),
             }
             observations.extend(last);
         }
         self.samples = samples;
         self.observations = observations;
-        self.note_trouble();
+        self.note_cause();
         true
     }
 
-    fn note_trouble(&mut self) {
+    fn note_cause(&mut self) {
         let unsolved = self.samples.iter().find(|s| !s.status.is_solved());
-        self.trouble.without_plan = match (unsolved, &self.trouble.without_plan) {
+        self.cause.without_plan = match (unsolved, &self.cause.without_plan) {
             (None, _) => None,
             (Some(_), Some(first)) => Some(*first),
             (Some(sample), None) => Some((sample.t, sample.status)),
@@ -272,19 +272,19 @@ impl Session {
             u <= lower + NEARLY * lower.abs() || u >= upper - NEARLY * upper.abs()
         };
         if self.samples.iter().any(at_bound) {
-            self.trouble.saturated += self.prepared.settings.t_s;
+            self.cause.saturated += self.prepared.settings.t_s;
         } else {
-            self.trouble.saturated = 0.0;
+            self.cause.saturated = 0.0;
         }
     }
 
     /// The planes up to the one that ended have a sample already; those after it were not asked.
-    fn give_up(&mut self, ending: Ending, samples: Vec<Sample<4, 1>>) -> bool {
-        let falls = matches!(ending, Ending::NoPlan { .. });
+    fn give_up(&mut self, termination: Termination, samples: Vec<Sample<4, 1>>) -> bool {
+        let falls = matches!(termination, Termination::NoPlan { .. });
         self.phase = if falls {
-            Phase::Falling(ending)
+            Phase::Falling(termination)
         } else {
-            Phase::Down(ending)
+            Phase::Down(termination)
         };
         let any = falls || !samples.is_empty();
         if any {
@@ -298,8 +298,8 @@ impl Session {
         let falling = self.loops.get(samples.len());
         let t = falling.map_or(0.0, |closed_loop| closed_loop.world.time());
         let status = match &self.phase {
-            Phase::Falling(Ending::NoPlan { status, .. })
-            | Phase::Down(Ending::NoPlan { status, .. }) => *status,
+            Phase::Falling(Termination::NoPlan { status, .. })
+            | Phase::Down(Termination::NoPlan { status, .. }) => *status,
             _ => Status::NotFinite,
         };
         let planes = self.loops.iter().zip(&self.prepared.planes);
@@ -331,8 +331,8 @@ impl Session {
             while world.time() < until - 0.5 * world.period() {
                 let moved = world.advance();
                 if moved.is_err() || world.state()[1].abs() > FRAC_PI_2 {
-                    if let Phase::Falling(ending) = &self.phase {
-                        self.phase = Phase::Down(ending.clone());
+                    if let Phase::Falling(termination) = &self.phase {
+                        self.phase = Phase::Down(termination.clone());
                     }
                     return;
                 }

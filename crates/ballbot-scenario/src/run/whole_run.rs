@@ -4,10 +4,10 @@ use crate::error::ScenarioError;
 use crate::prepare::prepared::{Plane, Prepared};
 use crate::prepare::three_motors::ThreeMotors;
 use crate::run::motor_sample::{MotorSample, WholeRegulator, log_of_plane, sample_of_plane};
-use crate::run::record::{Record, Surroundings};
+use crate::run::record::{Record, RunHooks};
 use crate::run::whole_robot::{State, WholeRobot, whole_world};
 use ballbot::{HEADING, RobotRegulator, plane_feedback, plane_of};
-use lpvmpc_sim::{ClosedLoop, Ending, Recording, Trajectory, World};
+use lpvmpc_sim::{ClosedLoop, Recording, Termination, Trajectory, World};
 
 type WholeLoop = ClosedLoop<WholeRegulator, WholeRobot, 10, 3, 10, 4>;
 
@@ -17,7 +17,7 @@ impl Prepared {
         &self,
         motors: &ThreeMotors,
         planes: [&Plane; 2],
-        surroundings: &Surroundings<'_>,
+        hooks: &RunHooks<'_>,
     ) -> Result<Record, ScenarioError> {
         let reference = |t: f64| self.whole_reference(motors, planes, t);
         let mut closed_loop = self.whole_loop(motors, planes)?;
@@ -25,16 +25,16 @@ impl Prepared {
         let mut logs = [Vec::new(), Vec::new()];
         let mut robot_log = Vec::new();
         let mut turns = Vec::with_capacity(self.samples);
-        let mut ending = Ending::Complete;
+        let mut termination = Termination::Complete;
         for k in 0..self.samples {
             let mut rows = Vec::new();
-            let sample = closed_loop.sample(&reference, surroundings.clock, &mut |row| {
+            let sample = closed_loop.sample(&reference, hooks.clock, &mut |row| {
                 rows.push(row);
             });
             let sample = match sample {
                 Ok(sample) => sample,
                 Err(early) => {
-                    ending = early;
+                    termination = early;
                     break;
                 }
             };
@@ -53,7 +53,7 @@ impl Prepared {
                 target: sample.x_ref[HEADING],
                 torques: sample.u,
             });
-            (surroundings.progress)(planes.len() * (k + 1));
+            (hooks.progress)(planes.len() * (k + 1));
         }
         let final_time = closed_loop.world.time();
         let (x, x_ref) = (closed_loop.world.state(), reference(final_time));
@@ -63,7 +63,7 @@ impl Prepared {
                 final_time,
                 final_state: plane_of(x, index),
                 final_reference: plane_of(&x_ref, index),
-                ending: of_plane(&ending),
+                termination: of_plane(&termination),
             },
             log,
         };
@@ -135,12 +135,12 @@ impl Prepared {
 }
 
 /// How the run of a plane ended, for both planes: they end together.
-fn of_plane(ending: &Ending) -> Ending {
-    match ending {
-        Ending::OutOfRange { t, component } => Ending::OutOfRange {
+fn of_plane(termination: &Termination) -> Termination {
+    match termination {
+        Termination::OutOfRange { t, component } => Termination::OutOfRange {
             t: *t,
             component: component % 4,
         },
-        ending => ending.clone(),
+        termination => termination.clone(),
     }
 }

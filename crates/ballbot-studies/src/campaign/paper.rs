@@ -1,6 +1,6 @@
 //! The negative control: the paper's scheme to the letter.
 
-use super::run::{Record, Wanted, has_fallen};
+use super::run::{Record, SetPoints, has_fallen};
 use ballbot_scenario::{Prepared, ScenarioError};
 use lpvmpc::{Controller, Reference};
 use nalgebra::Vector4;
@@ -9,7 +9,7 @@ use nalgebra::Vector4;
 pub(super) fn run(
     prepared: &Prepared,
     start: Vector4<f64>,
-    wanted: &Wanted,
+    wanted: &SetPoints,
     samples: usize,
 ) -> Result<Record, ScenarioError> {
     let controller = Controller::allocate(prepared.ballbot, prepared.settings);

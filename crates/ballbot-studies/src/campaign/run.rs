@@ -44,7 +44,7 @@ pub struct Record {
 
 /// Set points that a robot cannot follow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Course {
+pub enum ImpossibleSetPoints {
     /// Another one at every sample.
     EverySample,
     /// From one side to the other at every sample.
@@ -57,9 +57,9 @@ pub enum Course {
 
 /// Set points and when they are given.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Wanted(Vec<f64>);
+pub struct SetPoints(Vec<f64>);
 
-impl Wanted {
+impl SetPoints {
     /// A set point up to `farthest` rad from 0, and others at random times, 40 samples apart on
     /// average.
     pub(super) fn draw(random: &mut Random, samples: usize, farthest: f64) -> Self {
@@ -75,14 +75,19 @@ impl Wanted {
     }
 
     /// What a `course` of set points asks for.
-    pub(super) fn of(course: Course, random: &mut Random, samples: usize, farthest: f64) -> Self {
+    pub(super) fn of(
+        course: ImpossibleSetPoints,
+        random: &mut Random,
+        samples: usize,
+        farthest: f64,
+    ) -> Self {
         let size = farthest * random.symmetric();
         let at = |k: usize, random: &mut Random| match course {
-            Course::EverySample => farthest * random.symmetric(),
-            Course::Alternating if k.is_multiple_of(2) => size,
-            Course::Alternating => -size,
-            Course::RunningAway => size * k as f64,
-            Course::Huge => {
+            ImpossibleSetPoints::EverySample => farthest * random.symmetric(),
+            ImpossibleSetPoints::Alternating if k.is_multiple_of(2) => size,
+            ImpossibleSetPoints::Alternating => -size,
+            ImpossibleSetPoints::RunningAway => size * k as f64,
+            ImpossibleSetPoints::Huge => {
                 let beyond = [1e300, -1e300, f64::INFINITY, f64::NAN, size];
                 beyond[(5.0 * random.uniform()) as usize % beyond.len()]
             }
@@ -147,7 +152,7 @@ impl<'a> Loop<'a> {
     pub fn record(
         &mut self,
         variant: &Variant,
-        wanted: &Wanted,
+        wanted: &SetPoints,
         samples: usize,
         random: &mut Random,
     ) -> Record {

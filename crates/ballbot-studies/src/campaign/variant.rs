@@ -1,6 +1,6 @@
 //! What differs from the nominal closed loop.
 
-use super::run::{Course, Loop, Record, Wanted};
+use super::run::{ImpossibleSetPoints, Loop, Record, SetPoints};
 use super::{Campaign, Scenarios, paper};
 use ballbot::Ballbot;
 use ballbot_scenario::{Prepared, ScenarioError};
@@ -16,7 +16,7 @@ pub enum Variant {
     /// The same from the edge of the certified set.
     Edge,
     /// The same with set points that a robot cannot follow.
-    Unfollowable(Course),
+    Unfollowable(ImpossibleSetPoints),
     /// The same with no programs but for the first plan: the rest of it is all there is.
     Candidates,
     /// The same with this horizon.
@@ -40,10 +40,10 @@ impl Variant {
     pub const ALL: [Self; 20] = [
         Self::Nominal,
         Self::Edge,
-        Self::Unfollowable(Course::EverySample),
-        Self::Unfollowable(Course::Alternating),
-        Self::Unfollowable(Course::RunningAway),
-        Self::Unfollowable(Course::Huge),
+        Self::Unfollowable(ImpossibleSetPoints::EverySample),
+        Self::Unfollowable(ImpossibleSetPoints::Alternating),
+        Self::Unfollowable(ImpossibleSetPoints::RunningAway),
+        Self::Unfollowable(ImpossibleSetPoints::Huge),
         Self::Candidates,
         Self::Horizon(5),
         Self::Horizon(10),
@@ -72,16 +72,16 @@ impl Variant {
         match self {
             Self::Paper(farthest) => {
                 let start = Loop::start(prepared, false, &mut random)?;
-                let wanted = Wanted::draw(&mut random, campaign.samples, *farthest);
+                let wanted = SetPoints::draw(&mut random, campaign.samples, *farthest);
                 paper::run(&scenarios.paper, start, &wanted, campaign.samples)
             }
             _ => {
                 let mut run = Loop::new(prepared, self, &mut random)?;
                 let wanted = match *self {
                     Self::Unfollowable(course) => {
-                        Wanted::of(course, &mut random, campaign.samples, FARTHEST)
+                        SetPoints::of(course, &mut random, campaign.samples, FARTHEST)
                     }
-                    _ => Wanted::draw(&mut random, campaign.samples, FARTHEST),
+                    _ => SetPoints::draw(&mut random, campaign.samples, FARTHEST),
                 };
                 Ok(run.record(self, &wanted, campaign.samples, &mut random))
             }
@@ -171,16 +171,18 @@ impl fmt::Display for Variant {
         match self {
             Self::Nominal => f.write_str("nominal"),
             Self::Edge => f.write_str("nominal, from the set's edge"),
-            Self::Unfollowable(Course::EverySample) => {
+            Self::Unfollowable(ImpossibleSetPoints::EverySample) => {
                 f.write_str("nominal, new set points at every sample")
             }
-            Self::Unfollowable(Course::Alternating) => {
+            Self::Unfollowable(ImpossibleSetPoints::Alternating) => {
                 f.write_str("nominal, alternating set points")
             }
-            Self::Unfollowable(Course::RunningAway) => {
+            Self::Unfollowable(ImpossibleSetPoints::RunningAway) => {
                 f.write_str("nominal, set points that run away")
             }
-            Self::Unfollowable(Course::Huge) => f.write_str("nominal, set points to 1e300, NaN"),
+            Self::Unfollowable(ImpossibleSetPoints::Huge) => {
+                f.write_str("nominal, set points to 1e300, NaN")
+            }
             Self::Candidates => f.write_str("nominal, candidates only"),
             Self::Horizon(horizon) => write!(f, "nominal, {horizon} samples"),
             Self::Pushes(part) => write!(f, "pushes, {:.0} % of the rates' bounds", 100.0 * part),

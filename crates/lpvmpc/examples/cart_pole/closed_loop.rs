@@ -1,7 +1,7 @@
 //! The controller on the nonlinear plant.
 
-use crate::plant::CartPole;
-use crate::regulator::Regulator;
+use super::plant::CartPole;
+use super::regulator::Regulator;
 use lpvmpc::{Reference, Rk4, Status, Weights};
 use nalgebra::{Vector1, Vector4};
 

@@ -1,6 +1,6 @@
 //! The controller that puts the pole upright over the middle of the track.
 
-use crate::plant::CartPole;
+use super::plant::CartPole;
 use lpvmpc::riccati::{BadPivot, CostToGo, StageFactor};
 use lpvmpc::{
     Bounds, Common, Controller, ControllerSettings, Iterations, LpvModel, Predictor, Rk4,

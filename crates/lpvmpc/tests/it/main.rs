@@ -1,4 +1,4 @@
-//! The solver against its optimality conditions, other solvers and exact relations.
+//! What the method promises, from its parts to the regulator made of them.
 #![allow(
     clippy::expect_used,
     clippy::panic,
@@ -6,14 +6,6 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
-mod support;
-
-mod campaign;
-mod changes;
-mod fuzz;
-mod memory;
-mod optimality;
-mod regressions;
-mod relations;
-mod single_precision;
-mod verdicts;
+mod estimation;
+mod method;
+mod solver;

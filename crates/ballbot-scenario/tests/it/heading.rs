@@ -1,0 +1,218 @@
+//! Both planes and yaw as one robot with three motors, each with its limit.
+
+use ballbot::{AnyPlanner, HEADING, PlanePlanner, RobotRegulator, RobotState, plane_feedback};
+use ballbot_scenario::{MotorsTable, Prepared, Record, RunHooks, Scenario, StateTable, WorldTable};
+use lpvmpc::{Measurement, Reading, Regulator};
+use lpvmpc_sim::Termination;
+use std::path::Path;
+
+fn example() -> Scenario {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/turning-robot.toml");
+    Scenario::load(file.to_str().expect("text")).expect("valid")
+}
+
+fn motors(scenario: &mut Scenario) -> &mut MotorsTable {
+    scenario
+        .controller
+        .motors
+        .as_mut()
+        .expect("the example has them")
+}
+
+fn run(scenario: &Scenario) -> (Prepared, Record) {
+    let prepared = scenario.prepare(Path::new(".")).expect("valid");
+    let record = prepared.record(&RunHooks::NONE).expect("runs");
+    (prepared, record)
+}
+
+fn stands(record: &Record) -> bool {
+    let mut runs = record.planes.iter();
+    runs.all(|plane| plane.trajectory.termination == Termination::Complete)
+}
+
+fn largest_motor(record: &Record) -> f64 {
+    let samples = record.motors.as_ref().expect("they are shared");
+    let torques = samples.iter().map(|sample| sample.torques.amax());
+    torques.fold(0.0, f64::max)
+}
+
+/// A robot's regulator says what it decided for, and one that takes its place in mid-run goes on to
+/// the last bit.
+#[test]
+fn a_robot_s_regulator_tells_its_state_and_takes_over() {
+    let prepared = example().prepare(Path::new(".")).expect("valid");
+    let motors = prepared.motors.expect("given");
+    let plane = || {
+        let planner = PlanePlanner::Held(prepared.settings);
+        let (u, t_s) = (prepared.settings.u, prepared.settings.t_s);
+        plane_feedback(&prepared.ballbot, &planner, &prepared.feedback, &u, t_s).expect("valid")
+    };
+    let new = || {
+        let (law, heading) = (motors.turning.law, motors.turning.initial);
+        let planes = [plane(), plane()];
+        RobotRegulator::new(planes, (), prepared.wheels, motors.limits, law, heading)
+    };
+    let state =
+        |k: usize| RobotState::from_fn(|i, _| 0.02 * ((1 + i) as f64 * 0.3 * k as f64).sin());
+    let reference = |t: f64| {
+        let mut state = RobotState::zeros();
+        (state[0], state[4], state[HEADING]) = (1.0 + 0.1 * t, -0.5, 0.3 * t);
+        state
+    };
+    let decide = |regulator: &mut RobotRegulator<f64, AnyPlanner<f64>>, k: usize| {
+        let x = state(k);
+        let observation = regulator.observe(&Measurement {
+            t: k as f64 * prepared.settings.t_s,
+            readings: std::array::from_fn(|i| Some(Reading::fresh(x[i]))),
+        });
+        assert!(observation.verdicts.iter().all(|verdict| verdict.is_used()));
+        let command = regulator.decide(&reference);
+        assert_eq!(command.estimate, x, "{k}");
+        assert!(
+            command.u.amax() <= motors.limits.motor,
+            "{k}: {}",
+            command.u
+        );
+        command
+    };
+    let mut alone = new();
+    let mut handed = new();
+    for k in 0..12 {
+        let expected = decide(&mut alone, k);
+        assert_eq!(decide(&mut handed, k), expected, "{k}");
+        let mut next = new();
+        next.take_over(&handed);
+        handed = next;
+    }
+}
+
+#[test]
+fn a_turning_robot_follows_the_curve_and_no_motor_is_asked_for_more_than_it_has() {
+    let scenario = example();
+    let (prepared, record) = run(&scenario);
+    assert!(stands(&record));
+    let [x, y] = record.planes.as_slice() else {
+        unreachable!("two planes")
+    };
+    let samples = x.trajectory.samples.iter().zip(&y.trajectory.samples);
+    for (x, y) in samples.filter(|(x, _)| x.t > 10.0) {
+        let (along_x, along_y) = (x.x[0] - x.x_ref[0], y.x[0] - y.x_ref[0]);
+        let way = prepared.ballbot.geometry.position(along_x.hypot(along_y));
+        assert!(way < 0.02, "{way} m beside the curve at {} s", x.t);
+    }
+    let turned = record.motors.as_ref().expect("they are shared");
+    for sample in turned.iter().filter(|sample| sample.t > 10.0) {
+        let off = sample.heading - sample.target;
+        assert!(off.abs() < 0.2, "heading off by {off} at {} s", sample.t);
+    }
+    let limit = prepared.motors.expect("given").limits.motor;
+    let most = largest_motor(&record);
+    assert!(most <= limit * (1.0 + 1e-9), "{most} N m");
+    assert!(most > 0.9 * limit, "the limit was needed: {most} N m");
+}
+
+/// The motors' torques are turned by the measured heading: one that is wrong by more than a
+/// right angle pushes the robot the other way.
+#[test]
+fn with_a_wrong_heading_it_falls() {
+    let mut scenario = example();
+    scenario.heading.as_mut().expect("given").bias_rad = 2.0;
+    // A world, in which the robot falls to the floor instead of being without a plan.
+    scenario.world = Some(WorldTable::default());
+    let (_, record) = run(&scenario);
+    let termination = &record.planes[0].trajectory.termination;
+    assert!(
+        matches!(termination, Termination::OutOfRange { .. }),
+        "{termination:?}"
+    );
+}
+
+/// The bound of a plane alone, in both planes at once.
+#[test]
+fn without_sharing_a_motor_is_asked_for_more_than_it_has() {
+    let mut scenario = example();
+    let limit = scenario.prepare(Path::new(".")).expect("valid").motors;
+    let limit = limit.expect("given").limits.motor;
+    let wheels = ballbot::Wheels::<f64>::paper();
+    let alone = wheels.plane_torques(limit, 0.0).alone();
+    scenario.bounds.torque_nm = [-alone, alone];
+    scenario.controller.motors = None;
+    scenario.heading = None;
+    scenario.initial_state_y = Some(StateTable {
+        phi_rad: 8.0,
+        ..StateTable::default()
+    });
+    let (prepared, record) = run(&scenario);
+    let trajectories: Vec<_> = record.planes.into_iter().map(|p| p.trajectory).collect();
+    let torques = prepared.motor_torques(&trajectories);
+    let most = torques.iter().map(|t| t.amax()).fold(0.0, f64::max);
+    assert!(most > 1.2 * limit, "{most} N m of {limit} N m");
+}
+
+/// A push in one plane that half of the disc's square would not stand: the other plane is at
+/// rest and leaves its part.
+#[test]
+fn a_plane_that_needs_more_than_an_equal_share_gets_it() {
+    let mut scenario = example();
+    scenario.world = Some(WorldTable::default());
+    scenario.heading = None;
+    scenario.duration_s = 5.0;
+    scenario.initial_state_y = Some(StateTable::default());
+    scenario.initial_state = StateTable {
+        theta_dot_rad_s: 2.75,
+        ..StateTable::default()
+    };
+    let (prepared, record) = run(&scenario);
+    assert!(stands(&record));
+    let motors = prepared.motors.expect("given");
+    let left = prepared.wheels.plane_torques(motors.limits.motor, 0.0);
+    let samples = record.planes[0].trajectory.samples.iter();
+    let most = samples.map(|sample| sample.u[0].abs()).fold(0.0, f64::max);
+    assert!(
+        most > 1.2 * left.equal() && most <= left.alone() * (1.0 + 1e-9),
+        "{most} N m; an equal share is {} N m",
+        left.equal()
+    );
+
+    // The negative control: an equal share as the plane's own bound.
+    scenario.bounds.torque_nm = [-left.equal(), left.equal()];
+    let (_, record) = run(&scenario);
+    assert!(!stands(&record), "an equal share must not do");
+}
+
+/// Random starts, headings, targets and pushes, with yaw at work.
+#[test]
+fn in_no_run_of_a_campaign_a_motor_gets_more_than_its_limit() {
+    let mut random = fastrand::Rng::with_seed(3);
+    let mut between = |lower: f64, upper: f64| lower + (upper - lower) * random.f64();
+    let mut at_limit = 0;
+    for run_number in 0..40 {
+        let mut scenario = example();
+        scenario.world = Some(WorldTable::default());
+        scenario.duration_s = 2.0;
+        let mut state = || StateTable {
+            phi_rad: between(-5.0, 5.0),
+            theta_rad: between(-0.15, 0.15),
+            phi_dot_rad_s: between(-3.0, 3.0),
+            theta_dot_rad_s: between(-1.0, 1.0),
+        };
+        scenario.initial_state = state();
+        scenario.initial_state_y = Some(state());
+        motors(&mut scenario).limit_nm = between(0.3, 1.0);
+        motors(&mut scenario).yaw_reserve_nm = between(0.0, 0.1);
+        let heading = scenario.heading.as_mut().expect("given");
+        heading.initial_deg = between(-180.0, 180.0);
+        heading.target_deg = between(-180.0, 180.0);
+        heading.target_rate_deg_s = between(-90.0, 90.0);
+        // Fallen or not: the torques count.
+        let (prepared, record) = run(&scenario);
+        let limit = prepared.motors.expect("given").limits.motor;
+        let most = largest_motor(&record);
+        assert!(
+            most <= limit * (1.0 + 1e-9),
+            "run {run_number}: {most} N m of {limit} N m"
+        );
+        at_limit += usize::from(most > 0.95 * limit);
+    }
+    assert!(at_limit > 10, "the limit mattered in {at_limit} runs only");
+}

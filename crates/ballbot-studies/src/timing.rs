@@ -1,0 +1,339 @@
+//! How long the controller takes on this machine.
+//!
+//! Every sample of a closed loop is repeated from the same memory of the past, and the shortest
+//! time counts, so that what else the machine does is left out; the statistics are over the
+//! samples of the sequence. The clock is handed in: a monotonic one, of the machine.
+
+use crate::StudyError;
+use ballbot::{Controller, ControllerSettings};
+use ballbot_scenario::{Prepared, Scenario, ScenarioError};
+use lpvmpc::{
+    GuardedController, GuardedIterations, Iterations, Reference, Solution, Solver,
+    TerminalIngredient,
+};
+use lpvmpc_sim::advance;
+use nalgebra::Vector4;
+use serde::Serialize;
+use std::hint::black_box;
+use std::path::Path;
+use std::time::Duration;
+
+/// The closed loops that are timed.
+pub const SEQUENCES: [&str; 4] = [
+    "two-setpoints",
+    "lissajous",
+    "single-setpoint-terminal",
+    "tight-bounds",
+];
+
+/// Repetitions of each sample.
+const PASSES: usize = 30;
+
+/// Samples of a sequence, spread evenly, that are timed with a cold cache, and their repetitions: each
+/// needs a sweep, which takes a thousand times as long as a step.
+const COLD_SAMPLES: usize = 40;
+const COLD_PASSES: usize = 3;
+/// What is swept before each of these, bytes: more than the caches of a core hold.
+const SWEPT: usize = 48 << 20;
+
+/// Samples of the guaranteed loop, and how long it keeps a set point.
+const GUARDED_SAMPLES: usize = 400;
+const HOLD: usize = 80;
+
+/// The time since some instant.
+pub type Clock<'a> = &'a dyn Fn() -> Duration;
+
+type Control = Controller<f64>;
+
+/// Statistics of a time over a sequence, in microseconds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Times {
+    /// Half of the samples take no longer.
+    pub median: f64,
+    /// 99 % of the samples take no longer.
+    pub p99: f64,
+    /// No sample takes longer.
+    pub max: f64,
+}
+
+/// The times of one sequence.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SequenceTimes {
+    /// The scenario.
+    pub name: String,
+    /// The quadratic program alone.
+    pub qp_us: Times,
+    /// The whole step: scheduling, predictor, quadratic program, rollout.
+    pub step_us: Times,
+    /// The whole step after other work, of 48 MB, has taken the caches.
+    pub step_cold_us: Times,
+    /// Most bounds active in one sample (components of a terminal equality included).
+    pub max_active: usize,
+}
+
+impl Times {
+    fn new(mut times: Vec<f64>) -> Self {
+        times.sort_by(f64::total_cmp);
+        let at = |fraction: f64| {
+            let index = (fraction * times.len() as f64).ceil() as usize;
+            times.get(index.saturating_sub(1)).copied().unwrap_or(0.0)
+        };
+        Self {
+            median: at(0.5),
+            p99: at(0.99),
+            max: at(1.0),
+        }
+    }
+}
+
+/// The times of the guaranteed step and of the plain one from the same states.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GuardedTimes {
+    /// Without guarantee: terminal cost, the same predictor.
+    pub plain_us: Times,
+    /// The same as a descent, the default of scenarios.
+    pub descent_us: Times,
+    /// Of a descent, from the measured state to its answer, with everything else prepared.
+    pub feedback_us: Times,
+    /// A descent towards a set point 2.5 m away, given at once: several programs per sample.
+    pub far_descent_us: Times,
+    /// With artificial set point, certified terminal set and acceptance test; one quadratic
+    /// program.
+    pub guarded_us: Times,
+}
+
+/// Times the guaranteed loop of the scenario `far-setpoints`, with set points within a turn, along
+/// with the plain controller.
+///
+/// # Errors
+/// A controller refuses its settings or the plant cannot be integrated.
+pub fn time_guarded(clock: Clock<'_>) -> Result<GuardedTimes, StudyError> {
+    let prepared = Scenario::load("far-setpoints")?.prepare(Path::new("."))?;
+    let Some(mut settings) = prepared.guarded().copied() else {
+        return Err(StudyError::Unsuitable("no terminal set"));
+    };
+    settings.iterations = GuardedIterations {
+        known: 1,
+        ..settings.iterations
+    };
+    let mut plain_settings = prepared.settings;
+    plain_settings.terminal = TerminalIngredient::Cost(settings.terminal.p);
+    plain_settings.iterations = Iterations::Fixed(1);
+    let refused = ScenarioError::from;
+    let mut plain = Control::allocate(prepared.ballbot, plain_settings).map_err(refused)?;
+    let mut guarded =
+        GuardedController::allocate(prepared.ballbot, settings).map_err(ScenarioError::from)?;
+    let mut workspace = plain.workspace();
+    let mut memory = guarded.workspace::<5>();
+    let (mut plain_us, mut guarded_us) = (Vec::new(), Vec::new());
+    let mut x = Vector4::zeros();
+    for k in 0..GUARDED_SAMPLES {
+        let wanted = [1.0, -0.5, 2.0, -2.0, 0.0][k / HOLD % 5];
+        let reference = Reference::constant(Vector4::new(wanted, 0.0, 0.0, 0.0));
+        let before = plain.clone();
+        plain_us.push(shortest(|| {
+            plain.clone_from(&before);
+            let start = clock();
+            black_box(plain.step(black_box(&x), &reference, &mut workspace));
+            clock() - start
+        }));
+        let (before, remembered) = (guarded.clone(), memory.clone());
+        let mut u = prepared.settings.u.lower;
+        guarded_us.push(shortest(|| {
+            guarded.clone_from(&before);
+            memory.clone_from(&remembered);
+            let start = clock();
+            u = black_box(guarded.step(black_box(&x), wanted, &mut memory)).u;
+            clock() - start
+        }));
+        x = advance(&prepared.ballbot, &x, &u, settings.t_s, prepared.tolerances)?;
+    }
+    let descent_settings = ControllerSettings {
+        iterations: Iterations::default(),
+        ..plain_settings
+    };
+    let near = |k: usize| [1.0, -0.5, 2.0, -2.0, 0.0][k / HOLD % 5];
+    let far = |_: usize| prepared.ballbot.geometry.ball_angle(2.5);
+    let descent = DescentTimes::of(&prepared, descent_settings, GUARDED_SAMPLES, near, clock)?;
+    let far = DescentTimes::of(&prepared, descent_settings, HOLD, far, clock)?;
+    Ok(GuardedTimes {
+        plain_us: Times::new(plain_us),
+        descent_us: descent.step,
+        feedback_us: descent.feedback,
+        far_descent_us: far.step,
+        guarded_us: Times::new(guarded_us),
+    })
+}
+
+/// The times of a descent in a closed loop.
+struct DescentTimes {
+    step: Times,
+    feedback: Times,
+}
+
+impl DescentTimes {
+    /// From rest, towards the ball angle (rad) that is `wanted` at each sample.
+    fn of(
+        prepared: &Prepared,
+        settings: ControllerSettings<f64>,
+        samples: usize,
+        wanted: impl Fn(usize) -> f64,
+        clock: Clock<'_>,
+    ) -> Result<Self, StudyError> {
+        let controller = Control::allocate(prepared.ballbot, settings);
+        let mut controller = controller.map_err(ScenarioError::from)?;
+        let mut workspace = controller.workspace();
+        let (mut step, mut feedback) = (Vec::new(), Vec::new());
+        let mut x = Vector4::zeros();
+        for k in 0..samples {
+            let reference = Reference::constant(Vector4::new(wanted(k), 0.0, 0.0, 0.0));
+            let before = controller.clone();
+            feedback.push(shortest(|| {
+                controller.clone_from(&before);
+                controller.prepare(&reference, &mut workspace);
+                let start = clock();
+                black_box(controller.feedback(black_box(&x), &reference, &mut workspace));
+                clock() - start
+            }));
+            step.push(shortest(|| {
+                controller.clone_from(&before);
+                let start = clock();
+                black_box(controller.step(black_box(&x), &reference, &mut workspace));
+                clock() - start
+            }));
+            x = next(prepared, &x, &controller)?;
+        }
+        Ok(Self {
+            step: Times::new(step),
+            feedback: Times::new(feedback),
+        })
+    }
+}
+
+/// Times the controller of a scenario, without filter, delay line and world, on the scenario's robot
+/// in an ideal world.
+///
+/// # Errors
+/// The controller refuses its settings or the plant cannot be integrated.
+pub fn time(
+    name: &str,
+    prepared: &Prepared,
+    clock: Clock<'_>,
+) -> Result<SequenceTimes, StudyError> {
+    let mut record = Record::default();
+    for plane in 0..prepared.planes.len() {
+        time_plane(prepared, plane, clock, &mut record)?;
+    }
+    Ok(SequenceTimes {
+        name: name.to_owned(),
+        qp_us: Times::new(record.qp),
+        step_us: Times::new(record.step),
+        step_cold_us: Times::new(record.cold),
+        max_active: record.max_active,
+    })
+}
+
+#[derive(Default)]
+struct Record {
+    qp: Vec<f64>,
+    step: Vec<f64>,
+    cold: Vec<f64>,
+    max_active: usize,
+}
+
+fn time_plane(
+    prepared: &Prepared,
+    plane: usize,
+    clock: Clock<'_>,
+    record: &mut Record,
+) -> Result<(), StudyError> {
+    let plane = &prepared.planes[plane];
+    let t_s = prepared.settings.t_s;
+    let mut controller =
+        Control::allocate(prepared.ballbot, prepared.settings).map_err(ScenarioError::from)?;
+    let mut workspace = controller.workspace();
+    let mut solver = Solver::allocate(prepared.settings.capacity());
+    let horizon = prepared.settings.horizon;
+    let mut x = plane.initial_state;
+    let mut other_work = OtherWork::new();
+    let stride = prepared.samples.div_ceil(COLD_SAMPLES);
+    for k in 0..prepared.samples {
+        let at = |i: usize| plane.state_reference((k + i) as f64 * t_s);
+        let stages: Vec<_> = (0..horizon).map(at).collect();
+        let reference = Reference {
+            stages: &stages,
+            terminal: at(horizon),
+        };
+        let before = controller.clone();
+        let step = shortest(|| {
+            controller.clone_from(&before);
+            let start = clock();
+            black_box(controller.step(black_box(&x), &reference, &mut workspace));
+            clock() - start
+        });
+        let qp = shortest(|| {
+            let mut solution: Solution<f64, 4, 1> = before.solution().clone();
+            let settings = &controller.settings().solver;
+            let start = clock();
+            solver.solve(black_box(workspace.ocp()), settings, &mut solution);
+            let elapsed = clock() - start;
+            black_box(&solution);
+            elapsed
+        });
+        if k % stride == 0 {
+            record.cold.push(shortest_of(COLD_PASSES, || {
+                controller.clone_from(&before);
+                other_work.sweep();
+                let start = clock();
+                black_box(controller.step(black_box(&x), &reference, &mut workspace));
+                clock() - start
+            }));
+        }
+        record.step.push(step);
+        record.qp.push(qp);
+        record.max_active = record.max_active.max(controller.solution().active.len());
+        x = next(prepared, &x, &controller)?;
+    }
+    Ok(())
+}
+
+fn next(
+    prepared: &Prepared,
+    x: &Vector4<f64>,
+    controller: &Control,
+) -> Result<Vector4<f64>, StudyError> {
+    let u = controller.solution().u[0];
+    let t_s = prepared.settings.t_s;
+    Ok(advance(&prepared.ballbot, x, &u, t_s, prepared.tolerances)?)
+}
+
+/// Memory that work of another kind goes through between two steps.
+struct OtherWork {
+    memory: Vec<u64>,
+}
+
+impl OtherWork {
+    fn new() -> Self {
+        Self {
+            memory: vec![0; SWEPT / size_of::<u64>()],
+        }
+    }
+
+    /// Reads and writes all of it.
+    fn sweep(&mut self) {
+        for word in &mut self.memory {
+            *word = word.wrapping_add(1);
+        }
+        black_box(&self.memory);
+    }
+}
+
+/// The shortest of [`PASSES`] repetitions, in microseconds.
+fn shortest(repetition: impl FnMut() -> Duration) -> f64 {
+    shortest_of(PASSES, repetition)
+}
+
+fn shortest_of(passes: usize, mut repetition: impl FnMut() -> Duration) -> f64 {
+    let times = (0..passes).map(|_| repetition());
+    times.min().unwrap_or_default().as_secs_f64() * 1e6
+}

@@ -1,0 +1,101 @@
+//! Readings that must not be believed.
+
+use super::pendulum::{INSTANTS, Observer, Pendulum, settings};
+use lpvmpc::{Reading, Rk4, Verdict};
+use nalgebra::{Vector1, Vector2};
+
+const T_S: f64 = 0.01;
+
+/// An estimator that has settled at the upright pendulum, and the held-up pendulum itself.
+fn settled() -> Observer<Pendulum> {
+    let mut estimator =
+        Observer::allocate(Pendulum, settings(), Vector2::zeros(), INSTANTS).unwrap();
+    for _ in 0..500 {
+        estimator.advance(&Vector1::zeros(), T_S);
+        estimator.update(&[Some(Reading::fresh(0.0))]);
+    }
+    // An instant without a reading.
+    estimator.advance(&Vector1::zeros(), T_S);
+    estimator
+}
+
+#[test]
+fn an_outlier_is_seen_and_changes_nothing() {
+    let mut estimator = settled();
+    let before = (
+        estimator.state(),
+        *estimator.disturbance(),
+        *estimator.covariance(),
+    );
+    for value in [0.3, -0.3, 1e300] {
+        let verdict = estimator.update(&[Some(Reading::fresh(value))]);
+        assert_eq!(verdict, [Verdict::Outlier], "{value}");
+    }
+    let after = (
+        estimator.state(),
+        *estimator.disturbance(),
+        *estimator.covariance(),
+    );
+    assert_eq!(before, after);
+}
+
+#[test]
+fn what_is_no_number_and_what_is_old_is_refused_and_said() {
+    let mut estimator = settled();
+    let before = estimator.state();
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let verdict = estimator.update(&[Some(Reading::fresh(value))]);
+        assert_eq!(verdict, [Verdict::NotFinite], "{value}");
+    }
+    for age in [0.0501, f64::NAN, f64::INFINITY] {
+        let reading = Reading { value: 0.001, age };
+        assert_eq!(
+            estimator.update(&[Some(reading)]),
+            [Verdict::Stale],
+            "{age}"
+        );
+    }
+    assert_eq!(estimator.state(), before);
+    let reading = Reading {
+        value: 0.001,
+        age: 0.045,
+    };
+    assert_eq!(estimator.update(&[Some(reading)]), [Verdict::Used]);
+    assert_ne!(estimator.state(), before);
+}
+
+#[test]
+fn after_a_blow_the_state_follows_the_sensor() {
+    let mut estimator = settled();
+    // The angle is elsewhere at once, and the pendulum is caught there.
+    let mut truth = Vector2::new(0.3, 0.5);
+    let mut verdicts = Vec::new();
+    for _ in 0..60 {
+        let u = Vector1::new(-40.0 * truth[0] - 12.0 * truth[1]);
+        truth = Rk4 { substeps: 1 }.advance(&Pendulum, &truth, &u, T_S);
+        estimator.advance(&u, T_S);
+        verdicts.extend(estimator.update(&[Some(Reading::fresh(truth[0]))]));
+    }
+    assert_eq!(
+        verdicts[..3],
+        [Verdict::Outlier; 3],
+        "at first it does not believe"
+    );
+    assert_eq!(verdicts[3], Verdict::UsedAfterBlow);
+    let error = estimator.state() - truth;
+    assert!(error[0].abs() < 0.005 && error[1].abs() < 0.05, "{error}");
+}
+
+#[test]
+fn one_bad_sample_now_and_then_is_not_a_blow() {
+    let mut estimator = settled();
+    for k in 0..300 {
+        estimator.advance(&Vector1::zeros(), T_S);
+        let (value, verdict) = match k % 3 {
+            0 => (0.2, Verdict::Outlier),
+            _ => (0.0, Verdict::Used),
+        };
+        assert_eq!(estimator.update(&[Some(Reading::fresh(value))]), [verdict]);
+    }
+    assert!(estimator.state().norm() < 1e-3);
+}

@@ -1,0 +1,245 @@
+//! Set points at which the plant needs an input to stand.
+
+use super::pendulum::Pendulum;
+use lpvmpc::{
+    Bounds, Controller, ControllerSettings, InputReference, Iterations, LpvModel, Predictor,
+    RampedInput, Reference, Rk4, Scheduling, SolverSettings, SteadyStateProblem,
+    TerminalIngredient, Weights,
+};
+use nalgebra::{Matrix1, Matrix1x2, Matrix2, Matrix3, SMatrix, Vector1, Vector2, Vector3};
+
+const RK4: Rk4 = Rk4 { substeps: 2 };
+const T_S: f64 = 0.05;
+const N: usize = 30;
+const TORQUE: f64 = 8.0;
+
+fn settings(iterations: Iterations<f64>) -> ControllerSettings<f64, 2, 1, 1> {
+    ControllerSettings {
+        t_s: T_S,
+        horizon: N,
+        predictor: Predictor::StageConsistent(RK4),
+        weights: Weights {
+            q: Matrix2::identity(),
+            r: Matrix1::new(0.1),
+        },
+        terminal: TerminalIngredient::Cost(Matrix2::identity() * 20.0),
+        x: Bounds::none(),
+        soft_x: [None; 2],
+        u: Bounds {
+            lower: Vector1::new(-TORQUE),
+            upper: Vector1::new(TORQUE),
+        },
+        input_reference: InputReference::SteadyState,
+        scheduling: Scheduling::Predicted,
+        iterations,
+        solver: SolverSettings::default(),
+    }
+}
+
+/// Where the pendulum is after 10 s under `settings`, from upright.
+fn arrives(settings: ControllerSettings<f64, 2, 1, 1>, angle: f64) -> (Vector2<f64>, f64) {
+    let mut controller = Controller::allocate(Pendulum, settings).unwrap();
+    let mut workspace = controller.workspace();
+    let reference = Reference::constant(Vector2::new(angle, 0.0));
+    let mut x = Vector2::zeros();
+    let mut u = Vector1::zeros();
+    for _ in 0..200 {
+        let plan = controller.step(&x, &reference, &mut workspace);
+        assert!(plan.status.is_solved(), "{angle} rad: {}", plan.status);
+        u = plan.u[0];
+        x = RK4.advance(&Pendulum, &x, &u, T_S);
+    }
+    (x, u[0])
+}
+
+/// What holds a pendulum of 1 kg and 1 m: gravity's torque, with the opposite sign.
+fn holding(angle: f64) -> f64 {
+    -9.81 * angle.sin()
+}
+
+#[test]
+fn a_pendulum_stands_where_it_is_sent_with_the_torque_that_holds_it() {
+    let iterations = [Iterations::Fixed(1), Iterations::default()];
+    for iterations in iterations {
+        for angle in [-0.85, -0.5, -0.1, 0.0, 0.069, 0.3, 0.5, 0.8] {
+            let (x, u) = arrives(settings(iterations), angle);
+            assert!((x[0] - angle).abs() < 1e-4, "{angle} rad: {x}");
+            assert!((u - holding(angle)).abs() < 1e-2, "{angle} rad: {u} N m");
+        }
+    }
+}
+
+#[test]
+fn without_an_input_reference_it_is_drawn_off_its_set_point() {
+    // The check above can fail.
+    let settings = ControllerSettings {
+        input_reference: InputReference::Given(Vector1::zeros()),
+        ..settings(Iterations::default())
+    };
+    let (x, _) = arrives(settings, 0.5);
+    assert!((x[0] - 0.5).abs() > 0.1, "{x}");
+    // A given one does what the calculated one does.
+    let given = ControllerSettings {
+        input_reference: InputReference::Given(Vector1::new(holding(0.5))),
+        ..settings
+    };
+    let (x, _) = arrives(given, 0.5);
+    assert!((x[0] - 0.5).abs() < 1e-4, "{x}");
+}
+
+#[test]
+fn what_cannot_be_held_becomes_the_nearest_that_can_and_is_told() {
+    let mut controller = Controller::allocate(Pendulum, settings(Iterations::default())).unwrap();
+    let mut workspace = controller.workspace();
+    let x = Vector2::zeros();
+    let mut target = |angle: f64| {
+        let reference = Reference::constant(Vector2::new(angle, 0.0));
+        controller.step(&x, &reference, &mut workspace);
+        *controller.target().unwrap()
+    };
+    let farthest = (TORQUE / 9.81).asin();
+    for angle in [1.0_f64, 1.2, -1.4] {
+        let found = target(angle);
+        assert!(!found.reached);
+        let expected = Vector2::new(farthest.copysign(angle), 0.0);
+        assert!(
+            (found.x - expected).norm() < 1e-6,
+            "{angle} rad: {}",
+            found.x
+        );
+        assert!((found.u[0] + TORQUE.copysign(angle)).abs() < 1e-6);
+    }
+    assert!(target(0.9).reached);
+    // A rate that never ends is no steady state: it comes to rest at the angle.
+    let spinning = Reference::constant(Vector2::new(0.4, 1.0));
+    controller.step(&x, &spinning, &mut workspace);
+    let found = controller.target().unwrap();
+    assert!(!found.reached && found.x[1].abs() < 1e-9, "{}", found.x);
+}
+
+#[test]
+fn new_bounds_move_the_target() {
+    let mut controller = Controller::allocate(Pendulum, settings(Iterations::default())).unwrap();
+    let mut workspace = controller.workspace();
+    let reference = Reference::constant(Vector2::new(0.5, 0.0));
+    controller.step(&Vector2::zeros(), &reference, &mut workspace);
+    assert!(controller.target().unwrap().reached);
+    let narrow = Bounds {
+        lower: Vector1::new(-2.0),
+        upper: Vector1::new(2.0),
+    };
+    controller.set_bounds(Bounds::none(), narrow).unwrap();
+    controller.step(&Vector2::zeros(), &reference, &mut workspace);
+    let found = controller.target().unwrap();
+    assert!(
+        (found.x[0] - (2.0_f64 / 9.81).asin()).abs() < 1e-6,
+        "{}",
+        found.x
+    );
+}
+
+#[test]
+fn a_ramped_torque_holds_the_pendulum_too() {
+    let plain = settings(Iterations::default());
+    let mut q = Matrix3::identity();
+    q[(2, 2)] = 0.1;
+    let unlimited = f64::INFINITY;
+    let settings = ControllerSettings {
+        t_s: plain.t_s,
+        horizon: N,
+        predictor: plain.predictor,
+        weights: Weights {
+            q,
+            r: Matrix1::new(1e-3),
+        },
+        terminal: TerminalIngredient::Cost(q * 20.0),
+        x: Bounds {
+            lower: Vector3::new(-unlimited, -unlimited, -TORQUE),
+            upper: Vector3::new(unlimited, unlimited, TORQUE),
+        },
+        soft_x: [None; 3],
+        u: Bounds {
+            lower: Vector1::new(-40.0),
+            upper: Vector1::new(40.0),
+        },
+        input_reference: InputReference::SteadyState,
+        scheduling: plain.scheduling,
+        iterations: plain.iterations,
+        solver: plain.solver,
+    };
+    let ramped = RampedInput::<_, 2>(Pendulum);
+    let mut controller = Controller::allocate(ramped, settings).unwrap();
+    let mut workspace = controller.workspace();
+    let reference = Reference::constant(Vector3::new(0.5, 0.0, 0.0));
+    let mut x = Vector3::zeros();
+    for _ in 0..200 {
+        let plan = controller.step(&x, &reference, &mut workspace);
+        assert!(plan.status.is_solved(), "{}", plan.status);
+        x = RK4.advance(&ramped, &x, &plan.u[0], T_S);
+    }
+    let expected = Vector3::new(0.5, 0.0, holding(0.5));
+    assert!((x - expected).norm() < 1e-3, "{x}");
+}
+
+/// x_dot = -x + u_1 + 2 u_2: two inputs for one state.
+struct TwoPumps;
+
+impl LpvModel<f64, 1, 2, 1> for TwoPumps {
+    fn scheduling(&self, x: &Vector1<f64>, _: &Vector2<f64>) -> Vector1<f64> {
+        *x
+    }
+
+    fn matrices(&self, _: &Vector1<f64>) -> (Matrix1<f64>, SMatrix<f64, 1, 2>) {
+        (Matrix1::new(-1.0), Matrix1x2::new(1.0, 2.0))
+    }
+}
+
+#[test]
+fn of_several_inputs_that_hold_a_state_the_cheapest_is_taken() {
+    let unbounded = SteadyStateProblem {
+        x_ref: Vector1::new(3.0),
+        q: Vector1::new(1.0),
+        r: Vector2::new(1.0, 8.0),
+        x: Bounds::none(),
+        u: Bounds::none(),
+    };
+    let found = TwoPumps.steady_state(&unbounded).unwrap();
+    // min u_1^2 + 8 u_2^2 with u_1 + 2 u_2 = 3: u_2 = u_1 / 4.
+    assert!(
+        (found.u - Vector2::new(2.0, 0.5)).norm() < 1e-6,
+        "{}",
+        found.u
+    );
+    let bounded = SteadyStateProblem {
+        u: Bounds {
+            lower: Vector2::zeros(),
+            upper: Vector2::new(1.0, 5.0),
+        },
+        ..unbounded
+    };
+    let found = TwoPumps.steady_state(&bounded).unwrap();
+    assert!(found.reached);
+    assert!(
+        (found.u - Vector2::new(1.0, 1.0)).norm() < 1e-6,
+        "{}",
+        found.u
+    );
+    let weak = SteadyStateProblem {
+        u: Bounds {
+            lower: Vector2::zeros(),
+            upper: Vector2::new(1.0, 0.5),
+        },
+        ..unbounded
+    };
+    let found = TwoPumps.steady_state(&weak).unwrap();
+    assert!(
+        !found.reached && (found.x[0] - 2.0).abs() < 1e-6,
+        "{}",
+        found.x
+    );
+    let drained = SteadyStateProblem {
+        x_ref: Vector1::new(f64::NAN),
+        ..unbounded
+    };
+    assert!(TwoPumps.steady_state(&drained).is_none());
+}

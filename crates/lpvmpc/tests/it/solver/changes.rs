@@ -1,0 +1,127 @@
+//! How many changes of the active set a search needs, and what the default cap makes of it.
+//!
+//! Run with `--nocapture` for the figures.
+
+use super::support::census::{Counts, Distribution};
+use super::support::{capacity, kind, solve_with};
+use lpvmpc::{Bounds, List, Ocp, Solution, Solver, SolverSettings, Status, kkt_residual};
+use lpvmpc_testkit::problems::{Family, problem};
+use lpvmpc_testkit::rng::Rng;
+use nalgebra::{DMatrix, SVector};
+
+/// What [`SolverSettings::max_changes`] promises where nothing is set, per state, input and general
+/// row of a stage.
+const DEFAULT: usize = 10;
+
+/// The number that was the default for every size.
+const CONSTANT: usize = 500;
+
+/// The searches of one size.
+#[derive(Default)]
+struct Findings {
+    verdicts: Counts,
+    /// Changes over the default cap.
+    used: Distribution,
+    beyond_constant: usize,
+}
+
+/// `count` problems of every family and as many with saturated inputs, each from a cold start and, a
+/// little moved, from the answer.
+fn sweep<const NX: usize, const NU: usize>(longest: usize, rows: usize, count: u64) {
+    let mut findings = Findings::default();
+    for k in 0..count {
+        for family in Family::ALL {
+            let mut rng = Rng::new(k << 8 | family as u64);
+            findings.search(&mut problem::<NX, NU>(&mut rng, family, longest, rows));
+        }
+        findings.search(&mut saturated::<NX, NU>(&mut Rng::new(k), longest, rows));
+    }
+    let Findings {
+        verdicts,
+        used,
+        beyond_constant,
+    } = findings;
+    println!(
+        "{NX} {NU} {longest} {rows}: {} searches: {verdicts}; of the default: {used}; \
+         {beyond_constant} needed more than {CONSTANT}",
+        used.len()
+    );
+    assert!(verdicts.of("working set full") == 0, "{verdicts}");
+    let capped = verdicts.of("change cap");
+    assert!(100 * capped <= used.len(), "{verdicts}");
+}
+
+impl Findings {
+    fn search<const NX: usize, const NU: usize>(&mut self, ocp: &mut Ocp<f64, NX, NU>) {
+        let cap = DEFAULT * ocp.length() * (NX + NU + ocp.rows_per_stage);
+        let mut solver = Solver::allocate(capacity(ocp));
+        let mut solution = Solution::allocate(capacity(ocp));
+        for _ in 0..2 {
+            solver.solve(ocp, &SolverSettings::default(), &mut solution);
+            assert!(solution.changes <= cap, "{} of {cap}", solution.changes);
+            self.verdicts.add(kind(&solution.status));
+            self.used.add(solution.changes as f64 / cap as f64);
+            self.beyond_constant += usize::from(solution.changes > CONSTANT);
+            ocp.x0 *= 1.02;
+        }
+    }
+}
+
+/// An unstable plant whose inputs have little room: most are at a bound, and other ones at last than
+/// those that the regulator saturates first. Its free motion grows at most a millionfold.
+fn saturated<const NX: usize, const NU: usize>(
+    rng: &mut Rng,
+    longest: usize,
+    rows: usize,
+) -> Ocp<f64, NX, NU> {
+    let mut ocp = problem::<NX, NU>(rng, Family::Loose, longest, rows);
+    let a = DMatrix::from_column_slice(NX, NX, ocp.stages[0].a.as_slice());
+    let radius = a.complex_eigenvalues().map(|z| z.norm()).max();
+    let growth = 1e6_f64.powf(1.0 / ocp.length() as f64);
+    let growth = rng.power_of_ten(0.0, 0.5).min(growth);
+    let limit = SVector::repeat(rng.power_of_ten(-3.0, 0.3));
+    for stage in &mut ocp.stages {
+        stage.a *= growth / radius;
+    }
+    ocp.own = List::empty();
+    (ocp.common.u.lower, ocp.common.u.upper) = (-limit, limit);
+    ocp.terminal.x = Bounds::none();
+    for row in &mut ocp.rows {
+        (row.lower, row.upper) = (f64::NEG_INFINITY, f64::INFINITY);
+    }
+    ocp
+}
+
+#[test]
+fn the_default_cap_grows_with_the_problem() {
+    sweep::<4, 1>(5, 1, 20);
+    sweep::<2, 1>(20, 0, 20);
+    sweep::<4, 1>(20, 1, 20);
+    sweep::<8, 2>(20, 1, 10);
+    sweep::<6, 3>(30, 2, 10);
+    sweep::<4, 1>(100, 0, 10);
+    sweep::<12, 4>(50, 0, 4);
+    sweep::<8, 2>(100, 1, 3);
+    sweep::<4, 1>(200, 1, 4);
+}
+
+/// A search on 200 stages that a constant for short horizons has cut off.
+#[test]
+fn a_long_horizon_gets_the_changes_that_it_needs() {
+    let mut ocp = saturated::<4, 1>(&mut Rng::new(2), 200, 0);
+    ocp.horizon = 200;
+    let solution = solve_with(&ocp, &SolverSettings::default());
+    assert_eq!(solution.status, Status::Solved);
+    assert!(solution.changes > CONSTANT, "{}", solution.changes);
+    let residual = kkt_residual(&ocp, &solution).largest();
+    assert!(residual < 1e-8, "{residual:.1e}");
+
+    // A number that is set still holds.
+    let set = SolverSettings {
+        max_changes: Some(CONSTANT),
+        ..SolverSettings::default()
+    };
+    let solution = solve_with(&ocp, &set);
+    assert_eq!(solution.status, Status::ChangeCap);
+    assert_eq!(solution.changes, CONSTANT);
+}

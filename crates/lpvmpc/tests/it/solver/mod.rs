@@ -1,0 +1,13 @@
+//! The solver against its optimality conditions, other solvers and exact relations.
+
+mod support;
+
+mod campaign;
+mod changes;
+mod fuzz;
+mod memory;
+mod optimality;
+mod regressions;
+mod relations;
+mod single_precision;
+mod verdicts;
