@@ -65,7 +65,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
     pub(crate) fn pose<const NS: usize>(&mut self, settings: &ControllerSettings<T, NX, NU, NS>) {
         let ControllerSettings { weights, x, u, .. } = settings;
         let soft_x = halved(&settings.soft_x);
-        self.ocp.soft_x = soft_x;
         self.ocp.terminal.soft_x = soft_x;
         if core::mem::take(&mut self.along_plan) {
             for stage in self.ocp.stages.iter_mut() {
@@ -77,6 +76,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
             r: weights.r,
             s: SMatrix::zeros(),
             x: *x,
+            soft_x,
             u: *u,
         };
         self.ocp.terminal.x = *x;

@@ -49,7 +49,7 @@ impl Dense {
         let mut free = ocp.x0;
         for (i, stage) in ocp.stages.iter().enumerate().take(n) {
             let common = ocp.common_at(i);
-            assert!(common.s.amax() == 0.0 && ocp.soft_x == [None; NX]);
+            assert!(common.s.amax() == 0.0 && common.soft_x == [None; NX]);
             dense.h += map.tr_mul(&(common.q * &map));
             dense.g += map.tr_mul(&(common.q * free + stage.linear_x));
             dense.h[(i, i)] += common.r[0];

@@ -88,7 +88,7 @@ fn spoil_problem(rng: &mut Rng, largest: f64, ocp: &mut Problem) {
         11 => spoil(rng, largest, &mut row.x),
         12 => spoil(rng, largest, &mut row.u),
         13 => {
-            ocp.soft_x[rng.index(NX)] = Some(Penalty {
+            common.soft_x[rng.index(NX)] = Some(Penalty {
                 linear: nonsense(rng, largest).abs(),
                 quadratic: nonsense(rng, largest).abs(),
             });

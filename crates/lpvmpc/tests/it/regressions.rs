@@ -1,6 +1,6 @@
 //! What once went wrong. Each test carries the mistake that it caught.
 
-use crate::support::problems::{Family, problem};
+use crate::support::problems::{Family, each_common, problem};
 use crate::support::rng::Rng;
 use crate::support::{capacity, cold, kind, solve};
 use lpvmpc::{
@@ -46,10 +46,12 @@ fn warm_start_from_a_bound_that_has_become_soft() {
     };
     solver.solve(&ocp, &same, &mut solution);
     assert_eq!(solution.active.len(), 1);
-    ocp.soft_x[0] = Some(Penalty {
-        linear: 0.01,
-        quadratic: 0.0,
-    });
+    for common in each_common(&mut ocp) {
+        common.soft_x[0] = Some(Penalty {
+            linear: 0.01,
+            quadratic: 0.0,
+        });
+    }
     solver.solve(&ocp, &same, &mut solution);
     let reference = solve(&ocp);
     assert!((solution.cost - reference.cost).abs() < 1e-12);

@@ -234,6 +234,7 @@ fn add_stage<const NX: usize, const NU: usize>(
         r,
         s,
         x: bounds_x,
+        soft_x,
         u: bounds_u,
     } = ocp.common_at(i);
     program.quadratic.push_upper(input, r);
@@ -247,7 +248,7 @@ fn add_stage<const NX: usize, const NU: usize>(
         for j in 0..NX {
             program.linear[state + j] += stage.linear_x[j];
         }
-        program.bounds(x, bounds_x, &ocp.soft_x);
+        program.bounds(x, bounds_x, soft_x);
     } else {
         let x0 = &ocp.x0;
         program.constant += (q * x0 * 0.5 + stage.linear_x).dot(x0);

@@ -29,7 +29,7 @@ pub fn condense<const NX: usize, const NU: usize>(ocp: &Ocp<f64, NX, NU>) -> Opt
     for (i, stage) in ocp.stages.iter().enumerate().take(n) {
         let mut select = DMatrix::<f64>::zeros(NU, size);
         select.view_mut((0, i * NU), (NU, NU)).fill_with_identity();
-        let Common { q, r, s, x, u } = ocp.common_at(i);
+        let Common { q, r, s, x, u, .. } = ocp.common_at(i);
         let (q, r, s) = (dynamic(q), dynamic(r), dynamic(s));
         let cross = select.tr_mul(&(&s * &map));
         dense.h += map.tr_mul(&(&q * &map)) + select.tr_mul(&(&r * &select));
@@ -58,7 +58,8 @@ pub fn condense<const NX: usize, const NU: usize>(ocp: &Ocp<f64, NX, NU>) -> Opt
         };
         dense.bound(&map, &free, &pinned);
     }
-    let mut soft_x = ocp.soft_x.iter().chain(&end.soft_x);
+    let stages = (0..n).flat_map(|i| &ocp.common_at(i).soft_x);
+    let mut soft_x = stages.chain(&end.soft_x);
     let soft = soft_x.any(Option::is_some) || ocp.rows.iter().any(|row| row.soft.is_some());
     (!soft).then_some(dense)
 }
