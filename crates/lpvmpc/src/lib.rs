@@ -58,6 +58,7 @@ extern crate alloc;
 
 mod active_set;
 mod adjoint;
+mod by_stage;
 mod clock;
 mod controller;
 mod delay;
@@ -77,6 +78,7 @@ mod ocp;
 mod plan;
 mod policy;
 mod predictor;
+mod preview;
 mod ramp;
 mod regulator;
 pub mod riccati;
@@ -87,6 +89,7 @@ mod shaping;
 mod solution;
 mod solver;
 mod steady_state;
+mod step_with;
 mod working_set;
 mod workspace;
 
@@ -112,6 +115,7 @@ pub use memory::{
 pub use model::{LpvModel, Scalar};
 pub use ocp::{Bounds, Common, GeneralRow, Ocp, Penalty, Softness, Stage, Terminal};
 pub use predictor::{Predictor, Rk4};
+pub use preview::{Preview, PreviewError, PreviewMistake, PreviewPart};
 pub use ramp::RampedInput;
 pub use regulator::{
     AnyPlanner, Belief, Command, FeedbackArrays, FeedbackMemory, FeedbackSettings, Guard, Guarded,

@@ -230,6 +230,13 @@ impl<T: Scalar, const NX: usize, const NU: usize> Default for GeneralRow<T, NX, 
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> GeneralRow<T, NX, NU> {
+    /// Whether the row can be met or missed at the beginning, where the state is given, or at the end,
+    /// where there is no input.
+    pub(crate) fn counts(&self, beginning: bool, end: bool) -> bool {
+        let of_state = self.u.iter().all(|entry| *entry == T::zero());
+        if of_state { !beginning } else { !end }
+    }
+
     /// x'x_i + u'u_i; without an input at the end of the horizon.
     pub(crate) fn value(&self, x: &SVector<T, NX>, u: Option<&SVector<T, NU>>) -> T {
         self.x.dot(x) + u.map_or(T::zero(), |u| self.u.dot(u))

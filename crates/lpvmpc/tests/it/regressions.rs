@@ -14,6 +14,8 @@ const SMALL: Capacity = Capacity {
     stages: 3,
     rows: 6,
     active: 6,
+    own_stages: 0,
+    general_rows: 0,
 };
 
 type Scalar1 = Ocp<f64, 1, 1>;

@@ -87,7 +87,10 @@ fn dearer(ocp: &Problem, factor: f64) -> Problem {
         stage.linear_x *= factor;
         stage.linear_u *= factor;
     }
-    for Common { q, r, s, soft_x, .. } in each_common(&mut scaled) {
+    for Common {
+        q, r, s, soft_x, ..
+    } in each_common(&mut scaled)
+    {
         *q *= factor;
         *r *= factor;
         *s *= factor;

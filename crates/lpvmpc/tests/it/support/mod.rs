@@ -26,6 +26,7 @@ pub fn capacity<T: Scalar, const NX: usize, const NU: usize>(ocp: &Ocp<T, NX, NU
         stages,
         rows,
         active: rows,
+        ..Capacity::default()
     }
 }
 
@@ -69,5 +70,6 @@ pub fn kind<T>(status: &Status<T>) -> &'static str {
         Status::HorizonTooLong => "horizon too long",
         Status::NumericalFailure { .. } => "numerical failure",
         Status::NotFinite => "not finite",
+        Status::Refused(_) => "refused",
     }
 }
