@@ -3,6 +3,7 @@
 //! The loops of the controller are written once, over these traits. For `()`, nothing of its own,
 //! they become the machine code of a controller that knows its settings only.
 
+use crate::at_stage::AtStage;
 use crate::controller::next_state;
 use crate::descent::Along;
 use crate::model::{LpvModel, Scalar};
@@ -10,7 +11,7 @@ use crate::ocp::{Bounds, GeneralRow, Softness};
 use crate::predictor::Predictor;
 use crate::preview::Preview;
 use crate::settings::{ControllerSettings, Scheduling, TerminalIngredient, Weights};
-use crate::steady_state::{self, SteadyState, SteadyStateProblem};
+use crate::steady_state::{SteadyState, SteadyStateProblem};
 use nalgebra::{SMatrix, SVector};
 
 /// Cost and bounds of stage `i`, from 0 to the end of the horizon; `None`: as the settings have them.
@@ -304,95 +305,5 @@ where
                 u: *u.unwrap_or(&settings.u),
             })
         })
-    }
-}
-
-/// A plant with the scheduling and under the disturbance of one sample.
-struct AtStage<'a, P, T, const NX: usize, const NS: usize> {
-    plant: &'a P,
-    /// `None`: that of the state.
-    scheduling: Option<&'a SVector<T, NS>>,
-    /// What comes on top of x_dot.
-    disturbance: Option<&'a SVector<T, NX>>,
-}
-
-impl<P, T: Scalar, const NX: usize, const NS: usize> AtStage<'_, P, T, NX, NS> {
-    fn is_the_plant(&self) -> bool {
-        self.scheduling.is_none() && self.disturbance.is_none()
-    }
-
-    fn disturbed(&self, rate: SVector<T, NX>) -> SVector<T, NX> {
-        self.disturbance.map_or(rate, |d| rate + d)
-    }
-}
-
-impl<P, T, const NX: usize, const NU: usize, const NS: usize> LpvModel<T, NX, NU, NS>
-    for AtStage<'_, P, T, NX, NS>
-where
-    T: Scalar,
-    P: LpvModel<T, NX, NU, NS>,
-{
-    fn scheduling(&self, x: &SVector<T, NX>) -> SVector<T, NS> {
-        let given = self.scheduling.copied();
-        given.unwrap_or_else(|| self.plant.scheduling(x))
-    }
-
-    fn matrices(&self, scheduling: &SVector<T, NS>) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-        self.plant.matrices(scheduling)
-    }
-
-    fn a_times<const C: usize>(
-        &self,
-        a: &SMatrix<T, NX, NX>,
-        v: &SMatrix<T, NX, C>,
-    ) -> SMatrix<T, NX, C> {
-        self.plant.a_times(a, v)
-    }
-
-    fn derivative(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NX> {
-        self.disturbed(match self.scheduling {
-            None => self.plant.derivative(x, u),
-            Some(scheduling) => {
-                let (a, b) = self.plant.matrices(scheduling);
-                a * x + b * u
-            }
-        })
-    }
-
-    fn jacobian(
-        &self,
-        x: &SVector<T, NX>,
-        u: &SVector<T, NU>,
-    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-        match self.scheduling {
-            None => self.plant.jacobian(x, u),
-            Some(scheduling) => self.plant.matrices(scheduling),
-        }
-    }
-
-    fn tangent(
-        &self,
-        x: &SVector<T, NX>,
-        u: &SVector<T, NU>,
-    ) -> (SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-        let (rate, a, b) = match self.scheduling {
-            None => self.plant.tangent(x, u),
-            Some(scheduling) => {
-                let (a, b) = self.plant.matrices(scheduling);
-                (a * x + b * u, a, b)
-            }
-        };
-        (self.disturbed(rate), a, b)
-    }
-
-    fn steady_state(
-        &self,
-        problem: &SteadyStateProblem<T, NX, NU>,
-    ) -> Option<SteadyState<T, NX, NU>> {
-        if self.is_the_plant() {
-            self.plant.steady_state(problem)
-        } else {
-            steady_state::nearest(self, problem)
-        }
     }
 }

@@ -1,23 +1,24 @@
 //! The LPVMPC controller: Algorithm 2 of the paper for any LPV model.
 
 use crate::by_stage::{CostByStage, PlantByStage};
+use crate::changes::FixedRows;
 use crate::kernel::product;
 use crate::list::List;
 use crate::memory::ControllerMemory;
 use crate::model::{LpvModel, Scalar};
-use crate::ocp::{Bounds, Ocp};
+use crate::ocp::Ocp;
 use crate::plan::{Aim, Policy, at};
 #[cfg(feature = "alloc")]
 use crate::settings::LONGEST_HORIZON;
 use crate::settings::{
     ControllerError, ControllerSettings, InputReference, Iterations, TerminalIngredient, Weights,
-    check, check_bounds,
+    check,
 };
 use crate::solution::{Solution, Status};
 use crate::solver::{SolverSettings, WarmStart};
 use crate::steady_state::{SteadyState, SteadyStateProblem};
-use crate::step_with::FixedRows;
-use crate::working_set::copy;
+
+use crate::two_parts::Answered;
 use crate::workspace::Workspace;
 use nalgebra::{SMatrix, SVector};
 
@@ -44,15 +45,6 @@ impl<T: Scalar, const NX: usize> Reference<'_, T, NX> {
     pub fn at(&self, i: usize) -> &SVector<T, NX> {
         self.stages.get(i).unwrap_or(&self.terminal)
     }
-}
-
-/// What a feedback leaves of its step for later.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Answered<T, const NX: usize> {
-    /// All that follows from the state that it was given.
-    At(SVector<T, NX>),
-    /// What follows from the state that comes next.
-    Before(SVector<T, NX>),
 }
 
 /// The LPVMPC controller of one plant.
@@ -191,126 +183,17 @@ where
         self.iterate(x, own, workspace);
     }
 
-    /// What a step can do before the state is measured: the rest of the last step, the program's
-    /// matrices, and the backward sweep. [`feedback`](Self::feedback) then takes little time.
-    ///
-    /// `reference` is that of the coming sample. Until the feedback the workspace is this
-    /// controller's alone. Without a past there is nothing to prepare.
-    pub fn prepare(
-        &mut self,
-        reference: &Reference<'_, T, NX>,
-        workspace: &mut Workspace<T, NX, NU>,
-    ) {
-        match self.fixed.take() {
-            None => self.prepare_sample(reference, (), workspace),
-            Some(fixed) => (fixed.run)(self, None, reference, fixed, workspace),
-        }
-    }
-
-    /// What there is to prepare, with what the stages have of their own.
-    pub(crate) fn prepare_sample<D: PlantByStage<P, T, NX, NU, NS>>(
-        &mut self,
-        reference: &Reference<'_, T, NX>,
+    /// Weights, bounds and rows of the program.
+    #[inline(always)]
+    pub(crate) fn pose<D: CostByStage<T, NX, NU>>(
+        &self,
         own: D,
         workspace: &mut Workspace<T, NX, NU>,
     ) {
-        self.prepared = None;
-        if !workspace.holds(self.settings.horizon) {
-            return;
-        }
-        self.pose(own, workspace);
-        let aim = &self.aim(reference, own);
-        if let Iterations::Descent { .. } = self.settings.iterations {
-            let answered = self.answered.take();
-            if !self.initialised || !self.prepare_descent(answered, aim, workspace) {
-                self.initialised = false;
-                return;
-            }
-        } else {
-            self.make_up(own);
-            if !self.initialised {
-                return;
-            }
-            let x = at(&self.rollout, 0);
-            self.predict(&x, own, &mut workspace.ocp);
-            self.track(aim, &mut workspace.ocp);
-        }
-        self.prepared = Some(workspace.solver.factorize(&workspace.ocp));
-    }
-
-    /// The answer to the measured state `x` by the program that [`prepare`](Self::prepare) made
-    /// ready with this `reference`; a whole step where nothing is prepared.
-    ///
-    /// It is the answer of one program. Of a descent it is not known yet whether it is an
-    /// improvement; the next `prepare` goes on from the better plan. The inputs are finite and
-    /// within the input bounds, whatever the status says.
-    pub fn feedback(
-        &mut self,
-        x: &SVector<T, NX>,
-        reference: &Reference<'_, T, NX>,
-        workspace: &mut Workspace<T, NX, NU>,
-    ) -> &Solution<T, NX, NU> {
-        let Some(factorized) = self.prepared.take() else {
-            return self.step(x, reference, workspace);
-        };
-        self.answer(x, factorized, workspace);
-        self.answered = Some(Answered::At(*x));
-        &self.solution
-    }
-
-    /// The answer of the program that was made ready.
-    pub(crate) fn answer(
-        &mut self,
-        x: &SVector<T, NX>,
-        factorized: Result<(), Status<T>>,
-        workspace: &mut Workspace<T, NX, NU>,
-    ) {
-        let Workspace { ocp, solver, .. } = workspace;
-        ocp.x0 = *x;
-        let settings = &self.settings.solver;
-        solver.solve_factorized(factorized, ocp, settings, &mut self.solution);
-        self.problems = 1;
-        self.take_gains(workspace);
-    }
-
-    /// The rollout that a feedback has left for later.
-    #[inline(always)]
-    fn make_up<D: PlantByStage<P, T, NX, NU, NS>>(&mut self, own: D) {
-        self.prepared = None;
-        match self.answered.take() {
-            None => return,
-            Some(Answered::At(x)) => self.roll_out(&x, ()),
-            Some(Answered::Before(x)) if D::SOME => self.roll_out_rest(&x, own),
-            Some(Answered::Before(_)) => self.initialised = false,
-        }
-        copy(&mut self.policy.u, &self.solution.u);
-    }
-
-    /// Weights, bounds and rows of the program.
-    #[inline(always)]
-    fn pose<D: CostByStage<T, NX, NU>>(&self, own: D, workspace: &mut Workspace<T, NX, NU>) {
         workspace.pose(&self.settings);
         if D::SOME {
             workspace.pose_own(&self.settings, &own);
         }
-    }
-
-    /// Bounds of state and input from the next step on, over its whole horizon: for what is known
-    /// at run time only, such as the part of a motor that somebody else needs, or an estimated
-    /// disturbance of the input.
-    ///
-    /// # Errors
-    /// [`ControllerError::Bounds`]; the bounds are then as they were.
-    pub fn set_bounds(
-        &mut self,
-        x: Bounds<T, NX>,
-        u: Bounds<T, NU>,
-    ) -> Result<(), ControllerError> {
-        check_bounds(&x, "state")?;
-        check_bounds(&u, "input")?;
-        (self.settings.x, self.settings.u) = (x, u);
-        (self.prepared, self.aimed_at) = (None, None);
-        Ok(())
     }
 
     /// The steady state that the last step headed for: the end of its reference, or, where the plant
@@ -321,7 +204,7 @@ where
     }
 
     /// What to follow: the target where the reference is at rest, the reference where it moves.
-    fn aim<'a, D: PlantByStage<P, T, NX, NU, NS>>(
+    pub(crate) fn aim<'a, D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
         reference: &'a Reference<'a, T, NX>,
         own: D,
@@ -445,7 +328,7 @@ where
 
     /// Algorithm 1, lines 1 to 8: the predictor's matrices along the scheduling window, which
     /// is that of the last rollout (Algorithm 2, steps 5 and 9).
-    fn predict<D: PlantByStage<P, T, NX, NU, NS>>(
+    pub(crate) fn predict<D: PlantByStage<P, T, NX, NU, NS>>(
         &self,
         x: &SVector<T, NX>,
         own: D,

@@ -15,7 +15,7 @@
 //! as in the method of Levenberg and Marquardt.
 
 use crate::by_stage::{CostByStage, PlantByStage};
-use crate::controller::{Answered, Controller, next_state};
+use crate::controller::{Controller, next_state};
 use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
 use crate::plan::{Aim, Merit, Prices, Trial, at};
@@ -23,6 +23,7 @@ use crate::policy::input_at;
 use crate::settings::{ControllerSettings, TerminalIngredient};
 use crate::solution::Status;
 use crate::solver::{SolverSettings, WarmStart};
+use crate::two_parts::Answered;
 use crate::working_set::copy;
 use crate::workspace::Workspace;
 use nalgebra::{SMatrix, SVector, convert};

@@ -58,7 +58,9 @@ extern crate alloc;
 
 mod active_set;
 mod adjoint;
+mod at_stage;
 mod by_stage;
+mod changes;
 mod clock;
 mod controller;
 mod delay;
@@ -90,6 +92,7 @@ mod solution;
 mod solver;
 mod steady_state;
 mod step_with;
+mod two_parts;
 mod working_set;
 mod workspace;
 
