@@ -40,6 +40,8 @@
 //! |---|---|
 //! | a plant | [`LpvModel`] |
 //! | a controller, on the heap or in lent memory | [`Controller`], [`ControllerSettings`], [`ControllerArrays`] |
+//! | weights, bounds, rows, disturbances, scheduling or models that are known ahead | [`Preview`], [`Controller::step_with`] |
+//! | what changes while it runs | [`Controller::set_settings`], [`Controller::set_rows`], [`Controller::set_model`] |
 //! | one with a guarantee | [`GuardedController`] |
 //! | all that stands between sensors and actuators | [`OutputFeedback`], [`Regulator`], [`Estimator`] |
 //! | a linear-quadratic program with stages by itself | [`Ocp`], [`Solver`], [`kkt_residual`] |
@@ -138,3 +140,8 @@ pub use solution::{
 pub use solver::{Solver, SolverSettings, WarmStart, cost};
 pub use steady_state::{SteadyState, SteadyStateProblem};
 pub use workspace::Workspace;
+
+/// The code of docs/preview.md.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/preview.md")]
+struct WhatASampleMayBeTold;
