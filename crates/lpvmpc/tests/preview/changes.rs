@@ -3,8 +3,8 @@
 use crate::plants::Pendulum;
 use crate::short_case::{PLANT, settings};
 use lpvmpc::{
-    Bounds, Controller, ControllerError, InputReference, Iterations, Predictor, Reference, Rk4,
-    TerminalIngredient, Weights,
+    Bounds, Controller, ControllerError, InputReference, Iterations, Predictor, Preview, Reference,
+    Rk4, TerminalIngredient, Weights,
 };
 use nalgebra::{Matrix1, Matrix2, Vector1, Vector2};
 
@@ -98,5 +98,46 @@ fn settings_that_make_no_sense_are_refused_and_change_nothing() {
     for error in [refused(&|s| s.horizon += 1), refused(&|s| s.t_s *= 2.0)] {
         assert_eq!(error, ControllerError::Another);
         assert!(error.to_string().contains("takes over"));
+    }
+}
+
+/// A controller that takes over goes on as the one before would have, under what both are told; one
+/// with a longer horizon has a plan, too.
+#[test]
+fn a_plan_with_a_preview_is_taken_over() {
+    let told = Preview {
+        disturbance: &[Vector2::new(0.0, 1.0), Vector2::new(0.0, -1.0)],
+        u_ref: &[Vector1::new(0.3)],
+        ..Preview::new(upright())
+    };
+    for iterations in [Iterations::Fixed(1), Iterations::default()] {
+        let settings = crate::short_case::Settings {
+            iterations,
+            ..settings()
+        };
+        let longer = crate::short_case::Settings {
+            horizon: settings.horizon + 5,
+            ..settings
+        };
+        let mut before = Controller::allocate(PLANT, settings).unwrap();
+        let mut after = Controller::allocate(PLANT, settings).unwrap();
+        let mut long = Controller::allocate(PLANT, longer).unwrap();
+        let mut workspace = long.workspace();
+        let mut x = Vector2::new(0.3, 0.0);
+        for _ in 0..5 {
+            let u = before.step_with(&x, &told, &mut workspace).u[0];
+            x = Rk4 { substeps: 2 }.advance(&PLANT, &x, &u, 0.05);
+        }
+        after.take_over(&before);
+        long.take_over(&before);
+        let expected = before.step_with(&x, &told, &mut workspace).u[0];
+        assert_eq!(after.step_with(&x, &told, &mut workspace).u[0], expected);
+        let plan = long.step_with(&x, &told, &mut workspace);
+        assert!(plan.status.is_solved());
+        assert!(
+            (plan.u[0] - expected).amax() < 0.1,
+            "{} {expected}",
+            plan.u[0]
+        );
     }
 }

@@ -4,7 +4,7 @@ use crate::plants::{Cart, Pendulum};
 use crate::short_case::settings;
 use lpvmpc::{
     Bounds, Controller, ControllerMemory, ControllerSettings, GeneralRow, Iterations, List,
-    LpvModel, Preview, Reference, Rk4, Status, TerminalIngredient, Weights, Workspace,
+    LpvModel, Predictor, Preview, Reference, Rk4, Status, TerminalIngredient, Weights, Workspace,
 };
 use nalgebra::{Matrix1, Matrix2, Matrix3, Vector1, Vector2, Vector3};
 
@@ -337,5 +337,93 @@ impl LpvModel<f64, 2, 1, 1> for Spring {
 
     fn matrices(&self, s: &Vector1<f64>) -> (Matrix2<f64>, Vector2<f64>) {
         Told.matrices(s)
+    }
+}
+
+/// The pendulum with a push as a state of its own that stands still: (angle, rate, push).
+struct Pushed;
+
+impl LpvModel<f64, 3, 1, 1> for Pushed {
+    fn scheduling(&self, x: &Vector3<f64>) -> Vector1<f64> {
+        Pendulum { stiffness: 9.81 }.scheduling(&Vector2::new(x[0], x[1]))
+    }
+
+    fn matrices(&self, sinc: &Vector1<f64>) -> (Matrix3<f64>, Vector3<f64>) {
+        let k = 9.81 * sinc[0];
+        let a = Matrix3::new(0.0, 1.0, 0.0, k, -0.1, 1.0, 0.0, 0.0, 0.0);
+        (a, Vector3::new(0.0, 1.0, 0.0))
+    }
+}
+
+/// A disturbance is a state that stands still, whatever the predictor and in both ways to iterate. The
+/// stage-consistent matrices follow the scheduling of the undisturbed motion within a sample, which
+/// moves them by a ten-thousandth; a descent ends where the matrices do not matter.
+#[test]
+fn a_disturbance_is_a_state_that_stands_still() {
+    let rk4 = Rk4 { substeps: 2 };
+    let given = lpvmpc::InputReference::Given(Vector1::zeros());
+    let precise = Iterations::Descent {
+        tolerance: 1e-8,
+        most: 30,
+    };
+    for (predictor, iterations, tolerance) in [
+        (Predictor::FrozenRk4(rk4), Iterations::Fixed(2), 1e-9),
+        (Predictor::FrozenExact(rk4), Iterations::Fixed(1), 1e-9),
+        (Predictor::StageConsistent(rk4), Iterations::Fixed(1), 1e-3),
+        (Predictor::StageConsistent(rk4), precise, 1e-6),
+    ] {
+        let plain = Settings {
+            predictor,
+            iterations,
+            input_reference: given,
+            ..settings()
+        };
+        let TerminalIngredient::Cost(p) = plain.terminal else {
+            panic!("the example has a terminal cost");
+        };
+        let wide = |m: &Matrix2<f64>| m.insert_row(2, 0.0).insert_column(2, 0.0);
+        let weights = Weights {
+            q: wide(&plain.weights.q),
+            r: plain.weights.r,
+        };
+        let infinity = f64::INFINITY;
+        let state = ControllerSettings {
+            predictor,
+            iterations,
+            input_reference: given,
+            x: Bounds {
+                lower: plain.x.lower.push(-infinity),
+                upper: plain.x.upper.push(infinity),
+            },
+            soft_x: [plain.soft_x[0], plain.soft_x[1], None],
+            ..ControllerSettings::new(
+                plain.t_s,
+                plain.horizon,
+                weights,
+                TerminalIngredient::Cost(wide(&p)),
+                plain.u,
+            )
+        };
+        let mut told = Controller::allocate(Pendulum { stiffness: 9.81 }, plain).unwrap();
+        let mut state = Controller::allocate(Pushed, state).unwrap();
+        let (mut memory, mut other) = (told.workspace(), state.workspace());
+        let push = -1.5;
+        let mut x = Vector2::new(0.5, -1.0);
+        for k in 0..40 {
+            let preview = Preview {
+                disturbance: &[Vector2::new(0.0, push)],
+                ..Preview::new(rest())
+            };
+            let found = told.step_with(&x, &preview, &mut memory).u[0];
+            let reference = Reference::constant(Vector3::zeros());
+            let plan = state.step(&x.push(push), &reference, &mut other);
+            assert!(plan.status.is_solved());
+            let error = (found - plan.u[0]).amax();
+            assert!(
+                error < tolerance,
+                "{predictor:?} {iterations:?} {k}: {error:e}"
+            );
+            x = plant_moves(&x, found[0], push);
+        }
     }
 }

@@ -119,6 +119,11 @@ fn the_plan_is_the_optimum_of_the_problem_written_out() {
         for (iterations, predictor) in ways() {
             let settings = Settings {
                 predictor,
+                scheduling: match predictor {
+                    // The plant's own; what is told from outside takes its place.
+                    Predictor::FrozenRk4(_) => lpvmpc::Scheduling::Held(SVector::zeros()),
+                    _ => lpvmpc::Scheduling::Predicted,
+                },
                 ..case.settings(iterations)
             };
             let Answer::Solved { u, cost } = dense::solve(&case, &settings) else {
@@ -159,6 +164,11 @@ fn hard_rows_hold_or_are_called_infeasible() {
         for (iterations, predictor) in ways() {
             let settings = Settings {
                 predictor,
+                scheduling: match predictor {
+                    // The plant's own; what is told from outside takes its place.
+                    Predictor::FrozenRk4(_) => lpvmpc::Scheduling::Held(SVector::zeros()),
+                    _ => lpvmpc::Scheduling::Predicted,
+                },
                 ..case.settings(iterations)
             };
             let (plan, _) = plan(&case, settings);
