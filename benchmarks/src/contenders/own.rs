@@ -24,6 +24,7 @@ impl<'a, const NX: usize, const NU: usize> Own<'a, NX, NU> {
             stages,
             rows,
             active: rows + stages * NX,
+            ..Capacity::default()
         };
         Self {
             problems,

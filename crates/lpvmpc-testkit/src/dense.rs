@@ -53,7 +53,8 @@ impl<const NX: usize, const NU: usize> DenseQp<NX, NU> {
     /// Memory for problems with the horizon of `ocp` and with the same finite bounds; `None` if
     /// one of them is soft.
     pub fn allocate(ocp: &Ocp<f64, NX, NU>) -> Option<Self> {
-        let mut soft_x = ocp.soft_x.iter().chain(&ocp.terminal.soft_x);
+        let stages = (0..ocp.length()).flat_map(|i| &ocp.common_at(i).soft_x);
+        let mut soft_x = stages.chain(&ocp.terminal.soft_x);
         let soft = soft_x.any(Option::is_some) || ocp.rows.iter().any(|row| row.soft.is_some());
         let horizon = ocp.length();
         let inputs = horizon * NU;

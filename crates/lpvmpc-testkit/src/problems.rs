@@ -304,7 +304,9 @@ fn soften<const NX: usize, const NU: usize>(
     for row in &mut ocp.rows {
         row.soft = price;
     }
-    ocp.soft_x = [price; NX];
+    for Common { soft_x, .. } in each_common(ocp) {
+        *soft_x = [price; NX];
+    }
     ocp.terminal.soft_x = [price; NX];
 }
 

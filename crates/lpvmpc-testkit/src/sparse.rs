@@ -120,7 +120,7 @@ impl Draft {
             let common = ocp.common_at(i);
             draft.add_bounds(input, &common.u, &[None; NU]);
             if let Some(state) = state {
-                draft.add_bounds(state, &common.x, &ocp.soft_x);
+                draft.add_bounds(state, &common.x, &common.soft_x);
             }
             draft.add_rows(ocp, i, state, Some(input));
         }

@@ -1,21 +1,24 @@
 //! The LPVMPC controller: Algorithm 2 of the paper for any LPV model.
 
+use crate::by_stage::{CostByStage, PlantByStage};
+use crate::changes::FixedRows;
 use crate::kernel::product;
 use crate::list::List;
 use crate::memory::ControllerMemory;
 use crate::model::{LpvModel, Scalar};
-use crate::ocp::{Bounds, Ocp};
+use crate::ocp::Ocp;
 use crate::plan::{Aim, Policy, at};
 #[cfg(feature = "alloc")]
 use crate::settings::LONGEST_HORIZON;
 use crate::settings::{
-    ControllerError, ControllerSettings, InputReference, Iterations, Scheduling,
-    TerminalIngredient, Weights, check, check_bounds,
+    ControllerError, ControllerSettings, InputReference, Iterations, TerminalIngredient, Weights,
+    check,
 };
 use crate::solution::{Solution, Status};
 use crate::solver::{SolverSettings, WarmStart};
 use crate::steady_state::{SteadyState, SteadyStateProblem};
-use crate::working_set::copy;
+
+use crate::two_parts::Answered;
 use crate::workspace::Workspace;
 use nalgebra::{SMatrix, SVector};
 
@@ -64,12 +67,14 @@ pub struct Controller<P, T: 'static, const NX: usize, const NU: usize, const NS:
     /// Quadratic programs that the last step solved.
     pub(crate) problems: usize,
     /// The end of the reference for which `target` was worked out.
-    aimed_at: Option<SVector<T, NX>>,
-    target: Option<SteadyState<T, NX, NU>>,
+    pub(crate) aimed_at: Option<SVector<T, NX>>,
+    pub(crate) target: Option<SteadyState<T, NX, NU>>,
     /// What came of factorising the program that is ready for [`Controller::feedback`].
-    prepared: Option<Result<(), Status<T>>>,
-    /// The state that the last feedback was given, while the rest of its step is to be made up for.
-    answered: Option<SVector<T, NX>>,
+    pub(crate) prepared: Option<Result<(), Status<T>>>,
+    /// What the last feedback began with, while the rest of its step is to be made up for.
+    pub(crate) answered: Option<Answered<T, NX>>,
+    /// General rows of every sample.
+    pub(crate) fixed: Option<FixedRows<P, T, NX, NU, NS>>,
     pub(crate) solution: Solution<T, NX, NU>,
 }
 
@@ -107,6 +112,7 @@ where
             target: None,
             prepared: None,
             answered: None,
+            fixed: None,
             solution: Solution::new(u, x, active),
         })
     }
@@ -143,111 +149,51 @@ where
         reference: &Reference<'_, T, NX>,
         workspace: &mut Workspace<T, NX, NU>,
     ) -> &Solution<T, NX, NU> {
-        if !workspace.holds(self.settings.horizon) {
-            self.give_up(Status::HorizonTooLong);
-            return &self.solution;
+        match self.fixed.take() {
+            None => self.sample(x, reference, (), workspace),
+            Some(fixed) => (fixed.run)(self, Some(x), reference, fixed, workspace),
         }
-        self.make_up();
-        workspace.pose(&self.settings);
-        let aim = &self.aim(reference);
-        if let Iterations::Descent { tolerance, .. } = self.settings.iterations {
-            self.descend(x, aim, tolerance, workspace);
-            return &self.solution;
-        }
-        let Workspace { ocp, solver, .. } = workspace;
-        self.initialise_scheduling(x);
-        self.predict(x, ocp);
-        self.track(aim, ocp);
-        solver.solve(ocp, &self.settings.solver, &mut self.solution);
-        self.roll_out(x);
-        self.iterate(x, workspace);
         &self.solution
     }
 
-    /// What a step can do before the state is measured: the rest of the last step, the program's
-    /// matrices, and the backward sweep. [`feedback`](Self::feedback) then takes little time.
-    ///
-    /// `reference` is that of the coming sample. Until the feedback the workspace is this
-    /// controller's alone. Without a past there is nothing to prepare.
-    pub fn prepare(
-        &mut self,
-        reference: &Reference<'_, T, NX>,
-        workspace: &mut Workspace<T, NX, NU>,
-    ) {
-        self.prepared = None;
-        if !workspace.holds(self.settings.horizon) {
-            return;
-        }
-        workspace.pose(&self.settings);
-        let aim = &self.aim(reference);
-        if let Iterations::Descent { .. } = self.settings.iterations {
-            let answered = self.answered.take();
-            if !self.initialised || !self.prepare_descent(answered, aim, workspace) {
-                self.initialised = false;
-                return;
-            }
-        } else {
-            self.make_up();
-            if !self.initialised {
-                return;
-            }
-            let x = at(&self.rollout, 0);
-            self.predict(&x, &mut workspace.ocp);
-            self.track(aim, &mut workspace.ocp);
-        }
-        self.prepared = Some(workspace.solver.factorize(&workspace.ocp));
-    }
-
-    /// The answer to the measured state `x` by the program that [`prepare`](Self::prepare) made
-    /// ready with this `reference`; a whole step where nothing is prepared.
-    ///
-    /// It is the answer of one program. Of a descent it is not known yet whether it is an
-    /// improvement; the next `prepare` goes on from the better plan. The inputs are finite and
-    /// within the input bounds, whatever the status says.
-    pub fn feedback(
+    /// The sample's plan, with what the stages have of their own.
+    #[inline(always)]
+    pub(crate) fn sample<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
         x: &SVector<T, NX>,
         reference: &Reference<'_, T, NX>,
+        own: D,
         workspace: &mut Workspace<T, NX, NU>,
-    ) -> &Solution<T, NX, NU> {
-        let Some(factorized) = self.prepared.take() else {
-            return self.step(x, reference, workspace);
-        };
-        let Workspace { ocp, solver, .. } = workspace;
-        ocp.x0 = *x;
-        let settings = &self.settings.solver;
-        solver.solve_factorized(factorized, ocp, settings, &mut self.solution);
-        self.problems = 1;
-        self.take_gains(workspace);
-        self.answered = Some(*x);
-        &self.solution
-    }
-
-    /// The rollout that a feedback has left for later.
-    fn make_up(&mut self) {
-        self.prepared = None;
-        if let Some(x) = self.answered.take() {
-            self.roll_out(&x);
-            copy(&mut self.policy.u, &self.solution.u);
+    ) {
+        if !workspace.holds(self.settings.horizon) {
+            return self.give_up(Status::HorizonTooLong);
         }
+        self.make_up(own);
+        self.pose(own, workspace);
+        let aim = &self.aim(reference, own);
+        if let Iterations::Descent { tolerance, .. } = self.settings.iterations {
+            return self.descend(x, aim, tolerance, workspace);
+        }
+        let Workspace { ocp, solver, .. } = workspace;
+        self.initialise_scheduling(x);
+        self.predict(x, own, ocp);
+        self.track(aim, ocp);
+        solver.solve(ocp, &self.settings.solver, &mut self.solution);
+        self.roll_out(x, own);
+        self.iterate(x, own, workspace);
     }
 
-    /// Bounds of state and input from the next step on, over its whole horizon: for what is known
-    /// at run time only, such as the part of a motor that somebody else needs, or an estimated
-    /// disturbance of the input.
-    ///
-    /// # Errors
-    /// [`ControllerError::Bounds`]; the bounds are then as they were.
-    pub fn set_bounds(
-        &mut self,
-        x: Bounds<T, NX>,
-        u: Bounds<T, NU>,
-    ) -> Result<(), ControllerError> {
-        check_bounds(&x, "state")?;
-        check_bounds(&u, "input")?;
-        (self.settings.x, self.settings.u) = (x, u);
-        (self.prepared, self.aimed_at) = (None, None);
-        Ok(())
+    /// Weights, bounds and rows of the program.
+    #[inline(always)]
+    pub(crate) fn pose<D: CostByStage<T, NX, NU>>(
+        &self,
+        own: D,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) {
+        workspace.pose(&self.settings);
+        if D::SOME {
+            workspace.pose_own(&self.settings, &own);
+        }
     }
 
     /// The steady state that the last step headed for: the end of its reference, or, where the plant
@@ -258,14 +204,21 @@ where
     }
 
     /// What to follow: the target where the reference is at rest, the reference where it moves.
-    fn aim<'a>(&mut self, reference: &'a Reference<'a, T, NX>) -> Aim<'a, T, NX, NU> {
-        self.find_target(&reference.terminal);
+    pub(crate) fn aim<'a, D: PlantByStage<P, T, NX, NU, NS>>(
+        &mut self,
+        reference: &'a Reference<'a, T, NX>,
+        own: D,
+    ) -> Aim<'a, T, NX, NU, D> {
+        if !(D::SOME && self.find_own_target(&reference.terminal, own)) {
+            self.find_target(&reference.terminal);
+        }
         let mut stages = reference.stages.iter().take(self.settings.horizon);
         let rests = stages.all(|x_ref| *x_ref == reference.terminal);
         Aim {
             reference,
             rest: self.target.filter(|_| rests).map(|target| target.x),
             u_ref: self.u_ref(),
+            own,
         }
     }
 
@@ -334,18 +287,29 @@ where
     /// The paper's cost J of the last plan (Algorithm 1), constant terms included, on the
     /// states predicted from `x`, for the arguments of the last step.
     pub fn tracking_cost(&self, x: &SVector<T, NX>, reference: &Reference<'_, T, NX>) -> T {
-        let Weights { q, r } = &self.settings.weights;
+        self.own_cost(x, reference, &())
+    }
+
+    /// The same with what the stages have of their own.
+    #[inline(always)]
+    pub(crate) fn own_cost<D: CostByStage<T, NX, NU>>(
+        &self,
+        x: &SVector<T, NX>,
+        reference: &Reference<'_, T, NX>,
+        own: &D,
+    ) -> T {
         let u_ref = self.u_ref();
         let mut total = T::zero();
         let mut x = x;
         let steps = self.solution.u.iter().zip(self.solution.x.iter());
         for (i, (u, x_next)) in steps.enumerate().take(self.settings.horizon) {
             let error = x - reference.at(i);
-            let input = u - u_ref;
+            let Weights { q, r } = own.weights(i).unwrap_or(&self.settings.weights);
+            let input = u - own.u_ref(i).unwrap_or(&u_ref);
             total += (q * error).dot(&error) + (r * input).dot(&input);
             x = x_next;
         }
-        match &self.settings.terminal {
+        match own.terminal().unwrap_or(&self.settings.terminal) {
             TerminalIngredient::Cost(p) => {
                 let error = x - reference.terminal;
                 total + (p * error).dot(&error)
@@ -364,44 +328,47 @@ where
 
     /// Algorithm 1, lines 1 to 8: the predictor's matrices along the scheduling window, which
     /// is that of the last rollout (Algorithm 2, steps 5 and 9).
-    fn predict(&self, x: &SVector<T, NX>, ocp: &mut Ocp<T, NX, NU>) {
+    pub(crate) fn predict<D: PlantByStage<P, T, NX, NU, NS>>(
+        &self,
+        x: &SVector<T, NX>,
+        own: D,
+        ocp: &mut Ocp<T, NX, NU>,
+    ) {
         ocp.horizon = self.settings.horizon;
         ocp.x0 = *x;
-        self.linearize(x, &self.solution.u, 1, ocp);
+        self.linearize(x, &self.solution.u, 1, own, ocp);
     }
 
     /// The predictor's matrices along the last rollout, which began at `x` and had these
     /// `inputs`, from its sample `first` (0 or 1) on; the last input is repeated.
     // Not inlined, so that each loop has the registers for itself: a tenth of the step's time.
     #[inline(never)]
-    fn linearize(
+    fn linearize<D: PlantByStage<P, T, NX, NU, NS>>(
         &self,
         x: &SVector<T, NX>,
         inputs: &[SVector<T, NU>],
         first: usize,
+        own: D,
         ocp: &mut Ocp<T, NX, NU>,
     ) {
-        let ControllerSettings { t_s, predictor, .. } = &self.settings;
         let horizon = self.settings.horizon;
         let states = core::iter::once(x).chain(self.rollout.iter()).skip(first);
         let inputs = inputs.iter().take(horizon);
         let window = states.zip(inputs.clone().skip(first).chain(inputs.last()));
-        let held = match &self.settings.scheduling {
-            Scheduling::Predicted => None,
-            Scheduling::Held(held) => Some(held),
-        };
-        for (stage, (x, u)) in ocp.stages.iter_mut().zip(window).take(horizon) {
-            let model = &self.model;
-            let pair = predictor.linearize_along(model, held, x, u, *t_s);
-            let offset = predictor.offset_along(model, held, (x, u), *t_s, &pair);
-            stage.c = offset.unwrap_or_else(SVector::zeros);
-            (stage.a, stage.b) = pair;
+        let samples = ocp.stages.iter_mut().zip(window).take(horizon);
+        for (i, (stage, (x, u))) in samples.enumerate() {
+            (stage.a, stage.b, stage.c) = own.predict(i, &self.model, &self.settings, x, u);
         }
     }
 
     /// The further quadratic programs of the sample, each along the plan of the one before.
     #[inline(never)]
-    fn iterate(&mut self, x: &SVector<T, NX>, workspace: &mut Workspace<T, NX, NU>) {
+    fn iterate<D: PlantByStage<P, T, NX, NU, NS>>(
+        &mut self,
+        x: &SVector<T, NX>,
+        own: D,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) {
         self.problems = 1;
         let Workspace { ocp, solver, .. } = workspace;
         let settings = SolverSettings {
@@ -412,26 +379,35 @@ where
             && self.initialised
             && self.solution.status.is_solved()
         {
-            self.linearize(x, &self.solution.u, 0, ocp);
+            self.linearize(x, &self.solution.u, 0, own, ocp);
             solver.solve(ocp, &settings, &mut self.solution);
-            self.roll_out(x);
+            self.roll_out(x, own);
             self.problems += 1;
         }
     }
 
     /// Algorithm 1, cost: the reference enters the linear terms.
     #[inline(never)]
-    pub(crate) fn track(&self, aim: &Aim<'_, T, NX, NU>, ocp: &mut Ocp<T, NX, NU>) {
+    pub(crate) fn track<D: CostByStage<T, NX, NU>>(
+        &self,
+        aim: &Aim<'_, T, NX, NU, D>,
+        ocp: &mut Ocp<T, NX, NU>,
+    ) {
         let q = -self.settings.weights.q;
         let linear_u = -product(&self.settings.weights.r, &aim.u_ref);
         let stages = ocp.stages.iter_mut().enumerate();
         for (i, stage) in stages.take(self.settings.horizon) {
             stage.linear_x = linear_term(&q, aim.at(i));
             stage.linear_u = linear_u;
+            if D::SOME {
+                let Weights { q, r } = aim.own.weights(i).unwrap_or(&self.settings.weights);
+                stage.linear_x = -product(q, aim.at(i));
+                stage.linear_u = -product(r, aim.u_ref(i));
+            }
         }
         let x_ref = *aim.end();
-        let (p, equality) = match self.settings.terminal {
-            TerminalIngredient::Cost(p) => (p, None),
+        let (p, equality) = match aim.own.terminal().unwrap_or(&self.settings.terminal) {
+            TerminalIngredient::Cost(p) => (*p, None),
             TerminalIngredient::Equality => (SMatrix::zeros(), Some(x_ref)),
         };
         ocp.terminal.p = p;
@@ -447,11 +423,15 @@ where
 
     /// Algorithm 2, step 4: the nonlinear model under the plan.
     #[inline(never)]
-    fn roll_out(&mut self, x: &SVector<T, NX>) {
+    pub(crate) fn roll_out<D: PlantByStage<P, T, NX, NU, NS>>(
+        &mut self,
+        x: &SVector<T, NX>,
+        own: D,
+    ) {
         let mut state = *x;
         let places = self.rollout.iter_mut().zip(self.solution.u.iter());
-        for (place, u) in places.take(self.settings.horizon) {
-            state = next_state(&self.model, &self.settings, &state, u);
+        for (i, (place, u)) in places.enumerate().take(self.settings.horizon) {
+            state = own.next_state(i, &self.model, &self.settings, &state, u);
             *place = state;
         }
         self.gap = state - at(&self.solution.x, self.last_stage());

@@ -14,6 +14,7 @@
 //! the next program of the Jacobian gets so much of it: what it changes of the inputs costs extra,
 //! as in the method of Levenberg and Marquardt.
 
+use crate::by_stage::{CostByStage, PlantByStage};
 use crate::controller::{Controller, next_state};
 use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
@@ -22,6 +23,7 @@ use crate::policy::input_at;
 use crate::settings::{ControllerSettings, TerminalIngredient};
 use crate::solution::Status;
 use crate::solver::{SolverSettings, WarmStart};
+use crate::two_parts::Answered;
 use crate::working_set::copy;
 use crate::workspace::Workspace;
 use nalgebra::{SMatrix, SVector, convert};
@@ -83,10 +85,10 @@ where
 {
     /// The plan from `x`, as the controller's solution.
     #[inline(never)]
-    pub(crate) fn descend(
+    pub(crate) fn descend<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
         x: &SVector<T, NX>,
-        aim: &Aim<'_, T, NX, NU>,
+        aim: &Aim<'_, T, NX, NU, D>,
         tolerance: T,
         workspace: &mut Workspace<T, NX, NU>,
     ) {
@@ -124,7 +126,7 @@ where
             }
             let damped = self.policy.damping > T::zero();
             if along == Along::Jacobian {
-                self.adapt_damping(&outcome);
+                self.adapt_damping(aim, &outcome);
             }
             match outcome {
                 Outcome::NothingToGain { hidden } if along == Along::Jacobian => {
@@ -180,10 +182,10 @@ where
     /// The matrices of the program along the plan from `x`. Their affine terms make the linear model
     /// exact on the plan itself.
     #[inline(never)]
-    fn linearize_plan(
+    fn linearize_plan<D: PlantByStage<P, T, NX, NU, NS>>(
         &self,
         x: &SVector<T, NX>,
-        aim: &Aim<'_, T, NX, NU>,
+        aim: &Aim<'_, T, NX, NU, D>,
         along: Along,
         workspace: &mut Workspace<T, NX, NU>,
     ) {
@@ -199,26 +201,19 @@ where
             Along::Jacobian => self.policy.damping,
         };
         ocp.common.r = settings.weights.r + SMatrix::identity() * damping;
-        for (stage, ((x, u), next)) in ocp.stages.iter_mut().zip(samples).take(settings.horizon) {
-            (stage.a, stage.b) = self.sample_matrices(x, u, along);
+        let stages = ocp.stages.iter_mut().zip(samples).enumerate();
+        for (i, (stage, ((x, u), next))) in stages.take(settings.horizon) {
+            let own = &aim.own;
+            (stage.a, stage.b) = own.sample_matrices(i, &self.model, settings, (x, u), along);
             stage.c = next - stage.a * x - stage.b * u;
             stage.linear_u = linear_u - u * damping;
-        }
-    }
-
-    /// The matrices of one sample from `x` with the input `u`. They follow the scheduling within the
-    /// sample, whatever the predictor.
-    pub(crate) fn sample_matrices(
-        &self,
-        x: &SVector<T, NX>,
-        u: &SVector<T, NU>,
-        along: Along,
-    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-        let ControllerSettings { t_s, predictor, .. } = &self.settings;
-        let rk4 = predictor.rk4();
-        match along {
-            Along::Scheduling => rk4.linearize(&self.model, x, u, *t_s),
-            Along::Jacobian => rk4.differentiate(&self.model, x, u, *t_s),
+            if D::SOME {
+                let r = own.weights(i).unwrap_or(&settings.weights).r;
+                stage.linear_u = -product(&r, aim.u_ref(i)) - u * damping;
+                if let Some(common) = ocp.own.get_mut(i) {
+                    common.r = r + SMatrix::identity() * damping;
+                }
+            }
         }
     }
 
@@ -251,10 +246,10 @@ where
 
     /// Moves the plan towards the answer of the last program, by no more than the `longest` step, if that
     /// lowers its merit.
-    fn improve(
+    fn improve<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
         x: &SVector<T, NX>,
-        aim: &Aim<'_, T, NX, NU>,
+        aim: &Aim<'_, T, NX, NU, D>,
         (tolerance, longest): (T, T),
         prices: &mut Prices<T, NX>,
         workspace: &mut Workspace<T, NX, NU>,
@@ -310,10 +305,10 @@ where
     /// The longest step from the plan towards `answer` (state and input of a stage) that lowers the
     /// merit enough, of those up to the `longest`, and the merit of the rollout that it leaves in `trial`.
     #[inline(never)]
-    fn search_line(
+    fn search_line<D: PlantByStage<P, T, NX, NU, NS>>(
         &self,
         x: &SVector<T, NX>,
-        merit: &Merit<'_, T, NX, NU>,
+        merit: &Merit<'_, T, NX, NU, D>,
         (expected, longest): (T, T),
         trial: &mut Trial<T, NX, NU>,
         answer: &dyn Fn(usize) -> (SVector<T, NX>, SVector<T, NU>),
@@ -330,7 +325,8 @@ where
                 let planned = x_plan + (x_answer - x_plan) * step;
                 let u_plan = at(&policy.u, i);
                 let u = u_plan + (u_answer - u_plan) * step;
-                input_at(x_i, (&planned, &u), &at(&policy.gain, i), &self.settings.u)
+                let bounds = merit.aim.own.u(i).unwrap_or(&self.settings.u);
+                input_at(x_i, (&planned, &u), &at(&policy.gain, i), bounds)
             });
             if let Some(cost) = cost
                 && cost < policy.cost
@@ -344,20 +340,21 @@ where
     /// Makes up for what [`Controller::feedback`] left: the plan, one sample after `x` was measured,
     /// is the best of what was planned before and of what the program answered. Then the program
     /// along it is made ready. `false` if nothing is finite.
-    pub(crate) fn prepare_descent(
+    pub(crate) fn prepare_descent<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
-        answered: Option<SVector<T, NX>>,
-        aim: &Aim<'_, T, NX, NU>,
+        answered: Option<Answered<T, NX>>,
+        aim: &Aim<'_, T, NX, NU, D>,
         workspace: &mut Workspace<T, NX, NU>,
     ) -> bool {
         self.track(aim, &mut workspace.ocp);
         let last = self.last_stage();
         // Where the plant will be, as far as the model knows.
         let x = match answered {
-            Some(x) => {
+            Some(Answered::At(x)) => {
                 let u = at(&self.solution.u, 0);
                 next_state(&self.model, &self.settings, &x, &u)
             }
+            Some(Answered::Before(x)) => x,
             None => at(&self.rollout, 0),
         };
         if !self.first_plan(&x, aim, workspace) {
@@ -378,7 +375,7 @@ where
                 (at(&self.solution.x, i), u)
             });
             self.take_if_some(taken.map(|(_, cost)| cost), &workspace.trial);
-            self.adapt_damping(&Outcome::NothingToGain { hidden: false });
+            self.adapt_damping(aim, &Outcome::NothingToGain { hidden: false });
         }
         self.linearize_plan(&x, aim, Along::Jacobian, workspace);
         true
@@ -386,12 +383,22 @@ where
 
     /// The curvature that the last step showed, for the next program of the Jacobian; more where there
     /// was no step.
-    fn adapt_damping(&mut self, outcome: &Outcome<T>) {
-        let least = self.settings.weights.r.amax();
+    fn adapt_damping<D: PlantByStage<P, T, NX, NU, NS>>(
+        &mut self,
+        aim: &Aim<'_, T, NX, NU, D>,
+        outcome: &Outcome<T>,
+    ) {
+        let mut least = self.settings.weights.r.amax();
+        if D::SOME {
+            let stages = 0..self.settings.horizon;
+            let weights = stages.filter_map(|i| aim.own.weights(i));
+            least = weights.fold(least, |least, weights| least.max(weights.r.amax()));
+        }
         let factor: T = convert(DAMPING_FACTOR);
         let before = self.policy.damping;
         let lower = before / factor;
-        let equality = matches!(self.settings.terminal, TerminalIngredient::Equality);
+        let terminal = aim.own.terminal().unwrap_or(&self.settings.terminal);
+        let equality = matches!(terminal, TerminalIngredient::Equality);
         let damping = match outcome {
             Outcome::NothingToGain { .. } => lower,
             // A full step that the program was good enough for.
@@ -411,11 +418,11 @@ where
         self.policy.damping = if sound { damping } else { T::zero() };
     }
 
-    pub(crate) fn merit<'a>(
+    pub(crate) fn merit<'a, D: CostByStage<T, NX, NU>>(
         &self,
-        aim: &'a Aim<'a, T, NX, NU>,
+        aim: &'a Aim<'a, T, NX, NU, D>,
         prices: Prices<T, NX>,
-    ) -> Merit<'a, T, NX, NU> {
+    ) -> Merit<'a, T, NX, NU, D> {
         Merit::new(&self.settings, aim, prices)
     }
 
@@ -424,10 +431,10 @@ where
     /// rollout ends: no stage costs less than nothing.
     // Once in the machine code: a call per stage is nothing beside a Runge-Kutta step.
     #[inline(never)]
-    pub(crate) fn roll_out_plan(
+    pub(crate) fn roll_out_plan<D: PlantByStage<P, T, NX, NU, NS>>(
         &self,
         x: &SVector<T, NX>,
-        merit: &Merit<'_, T, NX, NU>,
+        merit: &Merit<'_, T, NX, NU, D>,
         most: T,
         trial: &mut Trial<T, NX, NU>,
         input: &dyn Fn(usize, &SVector<T, NX>) -> SVector<T, NU>,
@@ -442,7 +449,8 @@ where
             if !(total <= most) {
                 return None;
             }
-            state = next_state(&self.model, &self.settings, &state, u);
+            let own = &merit.aim.own;
+            state = own.next_state(i, &self.model, &self.settings, &state, u);
             *next = state;
         }
         total += merit.end(&state);
@@ -477,6 +485,25 @@ where
 }
 
 impl Along {
+    /// The matrices of one sample of `model` from `x` with the input `u`. They follow the scheduling
+    /// within the sample, whatever the predictor.
+    pub(crate) fn matrices<P, T, const NX: usize, const NU: usize, const NS: usize>(
+        self,
+        model: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        (x, u): (&SVector<T, NX>, &SVector<T, NU>),
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>)
+    where
+        T: Scalar,
+        P: LpvModel<T, NX, NU, NS>,
+    {
+        let rk4 = settings.predictor.rk4();
+        match self {
+            Self::Scheduling => rk4.linearize(model, x, u, settings.t_s),
+            Self::Jacobian => rk4.differentiate(model, x, u, settings.t_s),
+        }
+    }
+
     /// The one whose turn is next; the embedding's only while the plan is `far` from its goal.
     fn other(self, far: bool) -> Self {
         match self {

@@ -1,5 +1,6 @@
 //! What a descent begins with: the rest of the last plan, or the regulator's own closed loops.
 
+use crate::by_stage::PlantByStage;
 use crate::controller::Controller;
 use crate::descent::Along;
 use crate::model::{LpvModel, Scalar};
@@ -24,10 +25,10 @@ where
 {
     /// The rest of the last plan from `x`; where there is none, or it has become dear, the best of
     /// the regulator's own closed loops if that is cheaper. `false` if nothing is finite.
-    pub(crate) fn first_plan(
+    pub(crate) fn first_plan<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
         x: &SVector<T, NX>,
-        aim: &Aim<'_, T, NX, NU>,
+        aim: &Aim<'_, T, NX, NU, D>,
         workspace: &mut Workspace<T, NX, NU>,
     ) -> bool {
         let last = self.policy.cost;
@@ -39,7 +40,8 @@ where
             best = self.roll_out_plan(x, &merit, unlimited, &mut workspace.trial, &|i, x| {
                 let policy = &self.policy;
                 let planned = (&at(&self.rollout, i), &at(&policy.u, i));
-                input_at(x, planned, &at(&policy.gain, i), &self.settings.u)
+                let bounds = aim.own.u(i).unwrap_or(&self.settings.u);
+                input_at(x, planned, &at(&policy.gain, i), bounds)
             });
             self.take_if_some(best, &workspace.trial);
         }
@@ -52,10 +54,10 @@ where
     /// The regulator's closed loops towards the set point and towards points on the way to it. The
     /// plan becomes the cheapest of them, if it is cheaper than `best`; returns what it costs then.
     #[inline(never)]
-    fn regulate(
+    fn regulate<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
         x: &SVector<T, NX>,
-        aim: &Aim<'_, T, NX, NU>,
+        aim: &Aim<'_, T, NX, NU, D>,
         mut best: Option<T>,
         workspace: &mut Workspace<T, NX, NU>,
     ) -> Option<T> {
@@ -65,8 +67,9 @@ where
         for part in PARTS {
             let x_aim = aim.end() + away * (T::one() - convert::<f64, T>(part));
             let most = best.unwrap_or(convert(f64::INFINITY));
-            let cost = self.roll_out_plan(x, &merit, most, &mut workspace.trial, &|_, x| {
-                input_at(x, (&x_aim, &aim.u_ref), &gain, &self.settings.u)
+            let cost = self.roll_out_plan(x, &merit, most, &mut workspace.trial, &|i, x| {
+                let bounds = aim.own.u(i).unwrap_or(&self.settings.u);
+                input_at(x, (&x_aim, aim.u_ref(i)), &gain, bounds)
             });
             if let Some(found) = cost
                 && best.is_none_or(|best| found < best)
@@ -87,12 +90,20 @@ where
     /// The gain of the regulator at the end of the reference (u = u_ref + K (x - x_ref)), that of the
     /// first of many equal stages with the weights of `ocp`; and 1 for each state whose value is all the
     /// same to the plant (the position, as a rule), 0 for the others.
-    fn regulator(
+    fn regulator<D: PlantByStage<P, T, NX, NU, NS>>(
         &self,
-        aim: &Aim<'_, T, NX, NU>,
+        aim: &Aim<'_, T, NX, NU, D>,
         ocp: &Ocp<T, NX, NU>,
     ) -> (SMatrix<T, NU, NX>, SVector<T, NX>) {
-        let (a, b) = self.sample_matrices(aim.end(), &aim.u_ref, Along::Jacobian);
+        let last = self.last_stage();
+        let end = (aim.end(), aim.u_ref(last));
+        let (model, settings) = (&self.model, &self.settings);
+        let (a, b) = { &aim.own }.sample_matrices(last, model, settings, end, Along::Jacobian);
+        let weights = if D::SOME {
+            ocp.common_at(last)
+        } else {
+            &ocp.common
+        };
         let indifferent = SVector::from_fn(|j, _| {
             let column = (0..NX).all(|i| a[(i, j)] == one_if(i == j));
             one_if(column)
@@ -108,10 +119,7 @@ where
         };
         let mut factor = StageFactor::zeros();
         for _ in 0..self.settings.horizon.max(REGULATOR) {
-            if factor
-                .eliminate(&stage, &ocp.common, &mut cost_to_go)
-                .is_err()
-            {
+            if factor.eliminate(&stage, weights, &mut cost_to_go).is_err() {
                 return (SMatrix::zeros(), indifferent);
             }
         }
@@ -119,12 +127,13 @@ where
     }
 
     /// The plan one sample on; its last stage is the regulator's.
-    fn shift(&mut self, aim: &Aim<'_, T, NX, NU>) {
+    fn shift<D: PlantByStage<P, T, NX, NU, NS>>(&mut self, aim: &Aim<'_, T, NX, NU, D>) {
         let last = self.last_stage();
         let gain = at(&self.policy.gain, last);
-        let planned = (aim.end(), &aim.u_ref);
+        let planned = (aim.end(), aim.u_ref(last));
         let end = at(&self.rollout, last);
-        let u = input_at(&end, planned, &gain, &self.settings.u);
+        let bounds = aim.own.u(last).unwrap_or(&self.settings.u);
+        let u = input_at(&end, planned, &gain, bounds);
         // What comes in from beyond the horizon is overwritten.
         move_on(&mut self.policy.u, last, u);
         move_on(&mut self.policy.gain, last, gain);

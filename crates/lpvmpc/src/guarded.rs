@@ -9,6 +9,9 @@
 //! Alvarado, Alamo and Camacho 2008). So once there is a plan, there is one at every later sample,
 //! and its cost never grows while the set point stays, whatever the solver does. `docs/guarantees.md`
 //! states the theorem and what it rests on.
+//!
+//! It takes no [`Preview`](crate::Preview): the certificate of its terminal set is a proof for one model,
+//! fixed weights and fixed bounds.
 
 mod aim;
 mod memory;

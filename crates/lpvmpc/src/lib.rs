@@ -38,6 +38,8 @@
 //! |---|---|
 //! | a plant | [`Dynamics`] (f alone), [`Embedding`] (A(s), B(s)), [`LpvModel`] (what is not formulas) |
 //! | a controller, on the heap or in lent memory | [`Controller`], [`ControllerSettings`], [`ControllerArrays`] |
+//! | weights, bounds, rows, disturbances, scheduling or models that are known ahead | [`Preview`], [`Controller::step_with`] |
+//! | what changes while it runs | [`Controller::set_settings`], [`Controller::set_rows`], [`Controller::set_model`] |
 //! | one with a guarantee | [`GuardedController`] |
 //! | all that stands between sensors and actuators | [`OutputFeedback`], [`Regulator`], [`Estimator`] |
 //! | a linear-quadratic program with stages by itself | [`Ocp`], [`Solver`], [`kkt_residual`] |
@@ -56,6 +58,9 @@ extern crate alloc;
 
 mod active_set;
 mod adjoint;
+mod at_stage;
+mod by_stage;
+mod changes;
 mod clock;
 mod controller;
 mod delay;
@@ -77,6 +82,7 @@ mod ocp;
 mod plan;
 mod policy;
 mod predictor;
+mod preview;
 mod ramp;
 mod regulator;
 pub mod riccati;
@@ -87,6 +93,8 @@ mod shaping;
 mod solution;
 mod solver;
 mod steady_state;
+mod step_with;
+mod two_parts;
 mod working_set;
 mod workspace;
 
@@ -114,6 +122,7 @@ pub use model::{LpvModel, Scalar};
 pub use number::{Dual, Elementary, Number};
 pub use ocp::{Bounds, Common, GeneralRow, Ocp, Penalty, Softness, Stage, Terminal};
 pub use predictor::{Predictor, Rk4};
+pub use preview::{Preview, PreviewError, PreviewMistake, PreviewPart};
 pub use ramp::RampedInput;
 pub use regulator::{
     AnyPlanner, Belief, Command, FeedbackArrays, FeedbackMemory, FeedbackSettings, Guard, Guarded,
@@ -133,3 +142,8 @@ pub use solution::{
 pub use solver::{Solver, SolverSettings, WarmStart, cost};
 pub use steady_state::{SteadyState, SteadyStateProblem};
 pub use workspace::Workspace;
+
+/// The code of docs/preview.md.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/preview.md")]
+struct WhatASampleMayBeTold;

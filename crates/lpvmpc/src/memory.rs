@@ -2,14 +2,14 @@
 
 use crate::list::List;
 use crate::model::Scalar;
-use crate::ocp::Stage;
+use crate::ocp::{Common, GeneralRow, Stage};
 use crate::riccati::StageFactor;
 use crate::solution::{PackedRow, Side};
 use crate::working_set::Terms;
 use nalgebra::{SMatrix, SVector};
 
 /// For what there is room.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Capacity {
     /// Stages of the horizon, at least 1.
     pub stages: usize,
@@ -19,6 +19,32 @@ pub struct Capacity {
     /// Bounds that may be active at once: those rows, soft bounds that are exceeded at a linear price,
     /// and bounds that hold because others do. With a place for every bound there are always enough.
     pub active: usize,
+    /// Stages with weights and bounds of their own ([`Preview`](crate::Preview)): none, as a rule, or
+    /// all of the horizon. Of a controller's workspace only.
+    pub own_stages: usize,
+    /// General rows of a stage; none, as a rule. Of a controller's workspace only.
+    pub general_rows: usize,
+}
+
+impl Capacity {
+    /// The same with room for weights and bounds of every stage's own.
+    pub fn with_own_stages(self) -> Self {
+        Self {
+            own_stages: self.stages,
+            ..self
+        }
+    }
+
+    /// The same with room for so many general rows of each stage, hard or soft.
+    pub fn with_general_rows(self, count: usize) -> Self {
+        let all = (self.stages + 1) * count;
+        Self {
+            rows: self.rows + all,
+            active: self.active + 2 * all,
+            general_rows: count,
+            ..self
+        }
+    }
 }
 
 /// Memory of a [`Solver`](crate::Solver): on the heap, or [lent](SolverArrays::lend) arrays.
@@ -77,6 +103,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
             stages,
             rows,
             active,
+            ..
         } = capacity;
         let deviations = || List::repeat(SVector::zeros(), stages);
         let numbers = || List::repeat(T::zero(), rows);
@@ -157,33 +184,62 @@ pub struct WorkspaceMemory<T: 'static, const NX: usize, const NU: usize> {
     pub(crate) u: List<SVector<T, NU>>,
     /// Its states, one for each stage.
     pub(crate) x: List<SVector<T, NX>>,
+    /// Weights and bounds of the stages' own.
+    pub(crate) own: List<Common<T, NX, NU>>,
+    /// General rows of all stages.
+    pub(crate) rows: List<GeneralRow<T, NX, NU>>,
 }
 
 #[cfg(feature = "alloc")]
 impl<T: Scalar, const NX: usize, const NU: usize> WorkspaceMemory<T, NX, NU> {
     /// As much as is needed, on the heap.
     pub fn allocate(capacity: Capacity) -> Self {
-        let Capacity { stages, .. } = capacity;
+        let Capacity {
+            stages,
+            own_stages,
+            general_rows,
+            ..
+        } = capacity;
         Self {
             stages: List::repeat(Stage::new(), stages),
             solver: SolverMemory::allocate(capacity),
             u: List::repeat(SVector::zeros(), stages),
             x: List::repeat(SVector::zeros(), stages),
+            own: List::repeat(Common::default(), own_stages),
+            rows: List::repeat(GeneralRow::default(), (stages + 1) * general_rows),
         }
     }
 }
 
-/// The same as arrays: horizons of up to `N` samples, up to `M` active bounds.
+/// The same as arrays: horizons of up to `N` samples, up to `M` active bounds; weights and bounds of
+/// their own for `OWN` stages (0 or `N`), and `ROWS` general rows, those of a stage times (`N` + 1).
 #[derive(Clone, Copy, Debug)]
-pub struct WorkspaceArrays<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
+pub struct WorkspaceArrays<
+    T,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const M: usize,
+    const OWN: usize = 0,
+    const ROWS: usize = 0,
+> {
     stages: [Stage<T, NX, NU>; N],
     solver: SolverArrays<T, NX, NU, N, M>,
     u: [SVector<T, NU>; N],
     x: [SVector<T, NX>; N],
+    own: [Common<T, NX, NU>; OWN],
+    rows: [GeneralRow<T, NX, NU>; ROWS],
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize>
-    WorkspaceArrays<T, NX, NU, N, M>
+impl<
+    T: Scalar,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const M: usize,
+    const OWN: usize,
+    const ROWS: usize,
+> WorkspaceArrays<T, NX, NU, N, M, OWN, ROWS>
 {
     /// The arrays as memory of a workspace.
     pub fn lend(&'static mut self) -> WorkspaceMemory<T, NX, NU> {
@@ -192,12 +248,21 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
             solver: self.solver.lend(),
             u: List::Static(&mut self.u),
             x: List::Static(&mut self.x),
+            own: List::Static(&mut self.own),
+            rows: List::Static(&mut self.rows),
         }
     }
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize> Default
-    for WorkspaceArrays<T, NX, NU, N, M>
+impl<
+    T: Scalar,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const M: usize,
+    const OWN: usize,
+    const ROWS: usize,
+> Default for WorkspaceArrays<T, NX, NU, N, M, OWN, ROWS>
 {
     #[inline(always)]
     fn default() -> Self {
@@ -206,6 +271,8 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
             solver: SolverArrays::default(),
             u: [SVector::zeros(); N],
             x: [SVector::zeros(); N],
+            own: [Common::default(); OWN],
+            rows: [GeneralRow::default(); ROWS],
         }
     }
 }

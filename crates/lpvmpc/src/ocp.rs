@@ -123,6 +123,8 @@ pub struct Common<T, const NX: usize, const NU: usize> {
     pub s: SMatrix<T, NU, NX>,
     /// Bounds on the state.
     pub x: Bounds<T, NX>,
+    /// Which of them are soft.
+    pub soft_x: Softness<T, NX>,
     /// Bounds on the input, always hard.
     pub u: Bounds<T, NU>,
 }
@@ -170,8 +172,6 @@ pub struct Ocp<T: 'static, const NX: usize, const NU: usize> {
     pub common: Common<T, NX, NU>,
     /// Weights and bounds of their own for the stages from 0 on; empty where they are all the same.
     pub own: List<Common<T, NX, NU>>,
-    /// Which state bounds of the stages are soft, at the same price at all of them.
-    pub soft_x: Softness<T, NX>,
     /// General rows, `rows_per_stage` of stage 0, then of stage 1, up to those of the end of the horizon.
     pub rows: List<GeneralRow<T, NX, NU>>,
     /// General rows of each stage and of the end; 0 as a rule.
@@ -209,6 +209,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Default for Common<T, NX, NU> 
             r: SMatrix::identity(),
             s: SMatrix::zeros(),
             x: Bounds::none(),
+            soft_x: [None; NX],
             u: Bounds::none(),
         }
     }
@@ -229,6 +230,13 @@ impl<T: Scalar, const NX: usize, const NU: usize> Default for GeneralRow<T, NX, 
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> GeneralRow<T, NX, NU> {
+    /// Whether the row can be met or missed at the beginning, where the state is given, or at the end,
+    /// where there is no input.
+    pub(crate) fn counts(&self, beginning: bool, end: bool) -> bool {
+        let of_state = self.u.iter().all(|entry| *entry == T::zero());
+        if of_state { !beginning } else { !end }
+    }
+
     /// x'x_i + u'u_i; without an input at the end of the horizon.
     pub(crate) fn value(&self, x: &SVector<T, NX>, u: Option<&SVector<T, NU>>) -> T {
         self.x.dot(x) + u.map_or(T::zero(), |u| self.u.dot(u))
@@ -258,7 +266,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Ocp<T, NX, NU> {
             stages,
             common: Common::default(),
             own: List::empty(),
-            soft_x: [None; NX],
             rows: List::empty(),
             rows_per_stage: 0,
             terminal: Terminal::default(),

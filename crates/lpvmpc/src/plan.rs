@@ -1,5 +1,6 @@
 //! Plans as policies, their rollouts on the nonlinear model, and what a rollout costs.
 
+use crate::by_stage::CostByStage;
 use crate::controller::Reference;
 use crate::kernel::product;
 use crate::list::List;
@@ -11,20 +12,32 @@ use crate::solver::{excess, price};
 use nalgebra::{SMatrix, SVector, convert};
 
 /// What a sample's cost draws state and input to.
-pub(crate) struct Aim<'a, T, const NX: usize, const NU: usize> {
+pub(crate) struct Aim<'a, T, const NX: usize, const NU: usize, D> {
     /// As it was given.
     pub reference: &'a Reference<'a, T, NX>,
     /// The steady state in its place, where it is the same at all stages.
     pub rest: Option<SVector<T, NX>>,
-    /// The input that costs nothing.
+    /// The input that costs nothing, but where a stage has one of its own.
     pub u_ref: SVector<T, NU>,
+    /// What the stages have of their own.
+    pub own: D,
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize> Aim<'_, T, NX, NU> {
+impl<T, const NX: usize, const NU: usize, D> Aim<'_, T, NX, NU, D>
+where
+    T: Scalar,
+    D: CostByStage<T, NX, NU>,
+{
     /// x_ref at stage `i`.
     #[inline(always)]
     pub fn at(&self, i: usize) -> &SVector<T, NX> {
         self.rest.as_ref().unwrap_or_else(|| self.reference.at(i))
+    }
+
+    /// u_ref at stage `i`.
+    #[inline(always)]
+    pub fn u_ref(&self, i: usize) -> &SVector<T, NU> {
+        self.own.u_ref(i).unwrap_or(&self.u_ref)
     }
 
     /// x_ref at the end of the horizon.
@@ -89,6 +102,8 @@ pub(crate) struct Prices<T, const NX: usize> {
     pub bounds: SVector<T, NX>,
     /// Of missing the terminal equality.
     pub end: SVector<T, NX>,
+    /// Of exceeding a hard general row, whichever.
+    pub rows: T,
 }
 
 impl<T: Scalar, const NX: usize> Prices<T, NX> {
@@ -96,6 +111,7 @@ impl<T: Scalar, const NX: usize> Prices<T, NX> {
         Self {
             bounds: SVector::zeros(),
             end: SVector::zeros(),
+            rows: T::zero(),
         }
     }
 
@@ -103,14 +119,13 @@ impl<T: Scalar, const NX: usize> Prices<T, NX> {
     pub fn raise(&mut self, active: &ActiveSet<T>) {
         const FACTOR: f64 = 4.0;
         for row in active.iter() {
-            let Quantity::State(j) = row.bound.quantity else {
-                continue;
+            let price = match (row.bound.quantity, row.bound.side) {
+                (Quantity::State(j), Side::Equality) => self.end.get_mut(j),
+                (Quantity::State(j), _) => self.bounds.get_mut(j),
+                (Quantity::Row(_), _) => Some(&mut self.rows),
+                (Quantity::Input(_), _) => None,
             };
-            let prices = match row.bound.side {
-                Side::Equality => &mut self.end,
-                Side::Lower | Side::Upper => &mut self.bounds,
-            };
-            if let Some(price) = prices.get_mut(j) {
+            if let Some(price) = price {
                 *price = price.max(row.multiplier.abs() * convert(FACTOR));
             }
         }
@@ -118,25 +133,29 @@ impl<T: Scalar, const NX: usize> Prices<T, NX> {
 }
 
 /// The merit of a trajectory: the cost J, with an exact penalty for what must not be.
-pub(crate) struct Merit<'a, T, const NX: usize, const NU: usize> {
+pub(crate) struct Merit<'a, T, const NX: usize, const NU: usize, D> {
     weights: Weights<T, NX, NU>,
     terminal: TerminalIngredient<T, NX>,
     bounds: Bounds<T, NX>,
     soft: Softness<T, NX>,
     horizon: usize,
-    aim: &'a Aim<'a, T, NX, NU>,
+    pub aim: &'a Aim<'a, T, NX, NU, D>,
     prices: Prices<T, NX>,
 }
 
-impl<'a, T: Scalar, const NX: usize, const NU: usize> Merit<'a, T, NX, NU> {
+impl<'a, T, const NX: usize, const NU: usize, D> Merit<'a, T, NX, NU, D>
+where
+    T: Scalar,
+    D: CostByStage<T, NX, NU>,
+{
     pub fn new<const NS: usize>(
         settings: &ControllerSettings<T, NX, NU, NS>,
-        aim: &'a Aim<'a, T, NX, NU>,
+        aim: &'a Aim<'a, T, NX, NU, D>,
         prices: Prices<T, NX>,
     ) -> Self {
         Self {
             weights: settings.weights,
-            terminal: settings.terminal,
+            terminal: *aim.own.terminal().unwrap_or(&settings.terminal),
             bounds: settings.x,
             soft: settings.soft_x,
             horizon: settings.horizon,
@@ -151,9 +170,17 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> Merit<'a, T, NX, NU> {
     #[cfg_attr(target_arch = "arm", inline(never))]
     #[cfg_attr(not(target_arch = "arm"), inline(always))]
     pub fn stage(&self, i: usize, x: &SVector<T, NX>, u: &SVector<T, NU>) -> T {
-        let (error, input) = (x - self.aim.at(i), u - self.aim.u_ref);
-        let cost = squared(&self.weights.q, &error) + squared(&self.weights.r, &input);
-        if i > 0 { cost + self.excess(x) } else { cost }
+        let (error, input) = (x - self.aim.at(i), u - self.aim.u_ref(i));
+        let weights = self.aim.own.weights(i).unwrap_or(&self.weights);
+        let mut cost = squared(&weights.q, &error) + squared(&weights.r, &input);
+        if D::SOME {
+            cost += self.price_of_rows(i, x, Some(u));
+        }
+        if i > 0 {
+            cost + self.excess(i, x)
+        } else {
+            cost
+        }
     }
 
     /// Of the state `x` at the end of the horizon.
@@ -165,7 +192,12 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> Merit<'a, T, NX, NU> {
             TerminalIngredient::Cost(p) => squared(p, &error),
             TerminalIngredient::Equality => error.abs().dot(&self.prices.end),
         };
-        cost + self.excess(x)
+        let cost = cost + self.excess(self.horizon, x);
+        if D::SOME {
+            cost + self.price_of_rows(self.horizon, x, None)
+        } else {
+            cost
+        }
     }
 
     /// Of the inputs `u` and the states `x`_1 to `x`_N that follow `x0`.
@@ -179,28 +211,48 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> Merit<'a, T, NX, NU> {
         total + self.end(before)
     }
 
-    /// The price of the state bounds that `x` exceeds.
+    /// The price of the state bounds of stage `i` that `x` exceeds.
     #[inline(always)]
-    fn excess(&self, x: &SVector<T, NX>) -> T {
-        if self.bounds.hold_at(x) {
+    fn excess(&self, i: usize, x: &SVector<T, NX>) -> T {
+        if self.bounds(i).hold_at(x) {
             T::zero()
         } else {
-            self.price_of_excess(x)
+            self.price_of_excess(i, x)
         }
+    }
+
+    #[inline(always)]
+    fn bounds(&self, i: usize) -> &Bounds<T, NX> {
+        self.aim.own.x(i).unwrap_or(&self.bounds)
     }
 
     #[cold]
     #[inline(never)]
-    fn price_of_excess(&self, x: &SVector<T, NX>) -> T {
-        let mut total = price(&self.soft, x, &self.bounds);
-        let sides = self.bounds.lower.iter().zip(self.bounds.upper.iter());
-        let values = self.soft.iter().zip(x.iter()).zip(sides);
+    fn price_of_excess(&self, i: usize, x: &SVector<T, NX>) -> T {
+        let bounds = self.bounds(i);
+        let soft = self.aim.own.soft_x(i).unwrap_or(&self.soft);
+        let mut total = price(soft, x, bounds);
+        let sides = bounds.lower.iter().zip(bounds.upper.iter());
+        let values = soft.iter().zip(x.iter()).zip(sides);
         for (((soft, v), (lower, upper)), price) in values.zip(self.prices.bounds.iter()) {
             if soft.is_none() {
                 total += excess(*v, *lower, *upper) * *price;
             }
         }
         total
+    }
+
+    /// The price of the general rows of stage `i` that `x` and `u` exceed.
+    fn price_of_rows(&self, i: usize, x: &SVector<T, NX>, u: Option<&SVector<T, NU>>) -> T {
+        let rows = self.aim.own.rows(i).iter();
+        let counting = rows.filter(|row| row.counts(i == 0, u.is_none()));
+        counting.fold(T::zero(), |total, row| {
+            let beyond = excess(row.value(x, u), row.lower, row.upper);
+            let price = row
+                .soft
+                .map_or(self.prices.rows * beyond, |price| price.of(beyond));
+            total + price
+        })
     }
 }
 

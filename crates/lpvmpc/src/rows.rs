@@ -139,7 +139,7 @@ pub(crate) fn violated_bounds<T: Scalar, const NX: usize, const NU: usize>(
     for (i, (x_next, u)) in steps.enumerate() {
         let bounds = ocp.common_at(i);
         if i > 0 {
-            violated_sides(&bounds.x, &ocp.soft_x, x, i, Quantity::State, visit);
+            violated_sides(&bounds.x, &bounds.soft_x, x, i, Quantity::State, visit);
         }
         violated_sides(&bounds.u, &[None; NU], u, i, Quantity::Input, visit);
         violated_rows(ocp, i, x, Some(u), visit);
@@ -391,7 +391,7 @@ pub(crate) fn soft_price<T: Scalar, const NX: usize, const NU: usize>(
     let at_end = bound.stage >= ocp.length();
     match bound.quantity {
         Quantity::State(j) if at_end => ocp.terminal.soft_x.get(j).copied().flatten(),
-        Quantity::State(j) => ocp.soft_x.get(j).copied().flatten(),
+        Quantity::State(j) => ocp.common_at(bound.stage).soft_x.get(j).copied().flatten(),
         Quantity::Row(j) => ocp.row(bound.stage, j)?.soft,
         Quantity::Input(_) => None,
     }

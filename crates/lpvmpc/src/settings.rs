@@ -4,6 +4,7 @@ use crate::memory::Capacity;
 use crate::model::Scalar;
 use crate::ocp::{Bounds, Penalty, Softness};
 use crate::predictor::{Predictor, Rk4};
+use crate::preview::PreviewMistake;
 use crate::solver::SolverSettings;
 use core::fmt;
 use nalgebra::{Cholesky, Const, SMatrix, SVector, convert};
@@ -170,6 +171,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
             stages: self.horizon,
             rows,
             active: rows + (self.horizon + 1) * NX,
+            ..Capacity::default()
         }
     }
 
@@ -264,6 +266,10 @@ pub enum ControllerError {
     Iterations,
     /// The solver's tolerance is not a positive number.
     Tolerance,
+    /// Another horizon or sampling time than the controller was built with.
+    Another,
+    /// General rows for every sample that make no sense.
+    Rows(PreviewMistake),
 }
 
 impl fmt::Display for ControllerError {
@@ -301,6 +307,12 @@ impl fmt::Display for ControllerError {
                  positive number"
             ),
             Self::Tolerance => write!(f, "the solver's tolerance must be a positive number"),
+            Self::Another => write!(
+                f,
+                "horizon and sampling time cannot change while a controller runs: build another \
+                 one, which takes over"
+            ),
+            Self::Rows(mistake) => write!(f, "the general rows: {mistake}"),
         }
     }
 }

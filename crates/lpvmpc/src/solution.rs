@@ -5,6 +5,7 @@ use crate::list::List;
 #[cfg(feature = "alloc")]
 use crate::memory::Capacity;
 use crate::model::Scalar;
+use crate::preview::PreviewError;
 use crate::working_set::{copy, first};
 use core::fmt;
 use nalgebra::SVector;
@@ -292,6 +293,8 @@ pub enum Status<T> {
     },
     /// The problem contains a number that is not finite (or overflowed).
     NotFinite,
+    /// What the sample was told makes no sense, or there is no room for it; nothing was planned.
+    Refused(PreviewError),
 }
 
 impl<T: Scalar> Status<T> {
@@ -324,6 +327,7 @@ impl<T: fmt::Display> fmt::Display for Status<T> {
                 "R + B'PB not positive definite at stage {stage} (pivot {pivot})"
             ),
             Self::NotFinite => write!(f, "a number of the problem is not finite"),
+            Self::Refused(error) => write!(f, "refused: {error}"),
         }
     }
 }

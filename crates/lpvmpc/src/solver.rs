@@ -10,7 +10,7 @@ use crate::list::List;
 use crate::memory::Capacity;
 use crate::memory::SolverMemory;
 use crate::model::Scalar;
-use crate::ocp::{Bounds, Ocp, Softness};
+use crate::ocp::{Bounds, Common, Ocp, Softness};
 use crate::riccati::{CostToGo, StageFactor};
 use crate::rows::Trajectory;
 use crate::solution::{ActiveRow, ActiveSet, Quantity, Solution, Status};
@@ -375,7 +375,8 @@ pub fn cost<T: Scalar, const NX: usize, const NU: usize>(
     solution: &Solution<T, NX, NU>,
 ) -> T {
     let half: T = convert(0.5);
-    let soft = ocp.soft_x.iter().any(Option::is_some);
+    let soft_at = |common: &Common<T, NX, NU>| common.soft_x.iter().any(Option::is_some);
+    let soft = !ocp.own.is_empty() || soft_at(&ocp.common);
     let mut total = T::zero();
     let mut x = &ocp.x0;
     let steps = solution.u.iter().zip(solution.x.iter());
@@ -385,7 +386,7 @@ pub fn cost<T: Scalar, const NX: usize, const NU: usize>(
         total += (product(&common.q, x) * half + stage.linear_x).dot(x);
         total += (product(&common.s, x) + product(&common.r, u) * half + stage.linear_u).dot(u);
         if i > 0 && soft {
-            total += price(&ocp.soft_x, x, &common.x);
+            total += price(&common.soft_x, x, &common.x);
         }
         total += price_of_rows(ocp, i, x, Some(u));
         x = x_next;

@@ -1,12 +1,15 @@
 //! Scratch memory of a controller's step.
 
+use crate::by_stage::CostByStage;
+use crate::list::List;
 #[cfg(feature = "alloc")]
 use crate::memory::Capacity;
 use crate::memory::WorkspaceMemory;
 use crate::model::Scalar;
 use crate::ocp::{Common, Ocp, Penalty, Softness};
 use crate::plan::Trial;
-use crate::settings::ControllerSettings;
+use crate::preview::Room;
+use crate::settings::{ControllerSettings, Weights};
 use crate::solver::Solver;
 use nalgebra::{SMatrix, convert};
 
@@ -21,6 +24,10 @@ pub struct Workspace<T: 'static, const NX: usize, const NU: usize> {
     pub(crate) solver: Solver<T, NX, NU>,
     /// A rollout that may become the plan.
     pub(crate) trial: Trial<T, NX, NU>,
+    /// Whether the program has stages or general rows of its own.
+    by_stage: bool,
+    /// Room for weights and bounds of the stages' own, while the program has none.
+    own: List<Common<T, NX, NU>>,
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
@@ -31,14 +38,21 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
             solver,
             u,
             x,
+            own,
+            rows,
         } = memory;
         // The shortest of the lists is what there is memory for.
         let places = [stages.len(), solver.stages(), u.len(), x.len()];
         let longest = places.into_iter().min().unwrap_or(0);
         Self {
-            ocp: Ocp::new(stages.shortened(longest)),
+            ocp: Ocp {
+                rows,
+                ..Ocp::new(stages.shortened(longest))
+            },
             solver: Solver::new(solver),
             trial: Trial { u, x },
+            by_stage: false,
+            own,
         }
     }
 
@@ -62,26 +76,94 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
     pub(crate) fn pose<const NS: usize>(&mut self, settings: &ControllerSettings<T, NX, NU, NS>) {
         let ControllerSettings { weights, x, u, .. } = settings;
         let soft_x = halved(&settings.soft_x);
-        self.ocp.soft_x = soft_x;
         self.ocp.terminal.soft_x = soft_x;
+        if core::mem::take(&mut self.by_stage) {
+            self.forget_own();
+        }
         self.ocp.common = Common {
             q: weights.q,
             r: weights.r,
             s: SMatrix::zeros(),
             x: *x,
+            soft_x,
             u: *u,
         };
         self.ocp.terminal.x = *x;
+    }
+
+    /// A program whose stages are all the same, without general rows.
+    #[cold]
+    #[inline(never)]
+    fn forget_own(&mut self) {
+        self.ocp.rows_per_stage = 0;
+        if !self.ocp.own.is_empty() {
+            core::mem::swap(&mut self.ocp.own, &mut self.own);
+        }
+    }
+
+    /// What a preview is checked against.
+    pub(crate) fn room(&self, horizon: usize) -> Room {
+        Room {
+            horizon,
+            own_stages: self.own.len().max(self.ocp.own.len()),
+            rows: self.ocp.rows.len(),
+        }
+    }
+
+    /// Writes what the stages have of their own into the program, over what [`pose`](Self::pose) wrote.
+    pub(crate) fn pose_own<D: CostByStage<T, NX, NU>, const NS: usize>(
+        &mut self,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        own: &D,
+    ) {
+        let end = settings.horizon;
+        self.by_stage = true;
+        if own.has_own_stages() {
+            core::mem::swap(&mut self.ocp.own, &mut self.own);
+        }
+        let ocp = &mut self.ocp;
+        let soft_at = |i| halved(own.soft_x(i).unwrap_or(&settings.soft_x));
+        for (i, common) in ocp.own.iter_mut().enumerate().take(end) {
+            let Weights { q, r } = *own.weights(i).unwrap_or(&settings.weights);
+            *common = Common {
+                q,
+                r,
+                s: SMatrix::zeros(),
+                x: *own.x(i).unwrap_or(&settings.x),
+                soft_x: soft_at(i),
+                u: *own.u(i).unwrap_or(&settings.u),
+            };
+        }
+        ocp.terminal.x = *own.x(end).unwrap_or(&settings.x);
+        ocp.terminal.soft_x = soft_at(end);
+        let counts = (0..=end).map(|i| own.rows(i).len());
+        ocp.rows_per_stage = counts.max().unwrap_or(0);
+        for (place, row) in ocp.rows.iter_mut().enumerate() {
+            let (i, j) = match ocp.rows_per_stage {
+                0 => break,
+                count => (place / count, place % count),
+            };
+            if i > end {
+                break;
+            }
+            let given = own.rows(i).get(j);
+            let counting = given.filter(|row| row.counts(i == 0, i == end));
+            *row = counting.copied().unwrap_or_default();
+            row.soft = row.soft.map(half);
+        }
     }
 }
 
 /// Prices of the cost J as those of the quadratic program, whose cost is half of it.
 fn halved<T: Scalar, const NX: usize>(soft: &Softness<T, NX>) -> Softness<T, NX> {
+    soft.map(|price| price.map(half))
+}
+
+#[inline(always)]
+fn half<T: Scalar>(Penalty { linear, quadratic }: Penalty<T>) -> Penalty<T> {
     let half: T = convert(0.5);
-    soft.map(|price| {
-        price.map(|Penalty { linear, quadratic }| Penalty {
-            linear: linear * half,
-            quadratic: quadratic * half,
-        })
-    })
+    Penalty {
+        linear: linear * half,
+        quadratic: quadratic * half,
+    }
 }

@@ -205,7 +205,6 @@ where
         let place = if upper { edge } else { -edge };
         ocp.terminal.linear_x[0] = -pressure * place;
         ocp.terminal.x = Bounds::none();
-        ocp.soft_x = [None; NA];
         ocp.terminal.soft_x = [None; NA];
         for i in 0..NX {
             ocp.terminal.x.lower[i] = -widest;
@@ -223,8 +222,10 @@ where
                 quadratic: self.settings.soft_price / (width * width),
             })
         };
-        for (soft, width) in ocp.soft_x.iter_mut().zip(width.iter()) {
-            *soft = penalty(*width);
+        for common in &mut ocp.own {
+            for (soft, width) in common.soft_x.iter_mut().zip(width.iter()) {
+                *soft = penalty(*width);
+            }
         }
         let edge = self.settings.terminal.level.sqrt();
         for soft in ocp.terminal.soft_x.iter_mut().take(NX) {

@@ -186,6 +186,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
             stages,
             rows,
             active: rows + soft + (stages + 1) * NX,
+            ..Capacity::default()
         }
     }
 

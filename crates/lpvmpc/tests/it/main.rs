@@ -8,4 +8,5 @@
 
 mod estimation;
 mod method;
+mod preview;
 mod solver;

@@ -8,7 +8,10 @@ use ballbot::{
     Ballbot, Held, OutputFeedback, PlaneTorques, Ramped, RobotRegulator, RobotState, Wheels,
 };
 use core::hint::black_box;
-use lpvmpc::{Bounds, Controller, Measurement, Reference, Regulator, Scalar, Workspace};
+use lpvmpc::{
+    Bounds, Controller, GeneralRow, List, Measurement, Preview, Reference, Regulator, Scalar,
+    Workspace,
+};
 use nalgebra::{Vector1, Vector3, Vector4, convert};
 use no_panic as _;
 
@@ -17,6 +20,8 @@ fn main() -> ! {
     loop {
         step::<f32>();
         step::<f64>();
+        step_with::<f32>();
+        step_with::<f64>();
         regulate::<f32>();
         regulate::<f64>();
     }
@@ -50,6 +55,31 @@ fn step<T: Scalar>() {
         black_box(plan);
         black_box(left.first([needed, taken]));
         black_box(wheels.motors(&Vector3::new(torque, torque, T::zero())));
+    }
+}
+
+/// The same with all that may be known ahead, and with what may change while a controller runs.
+#[inline(never)]
+fn step_with<T: Scalar>() {
+    let controller: Option<&mut Controller<Ballbot<T>, T, 4, 1, 3>> = black_box(None);
+    let workspace: Option<&mut Workspace<T, 4, 1>> = black_box(None);
+    let told: Option<(&Vector4<T>, &Preview<'_, Ballbot<T>, T, 4, 1, 3>)> = black_box(None);
+    let rows: Option<List<GeneralRow<T, 4, 1>>> = black_box(None);
+    if let (Some(controller), Some(workspace), Some((x, preview)), Some(rows)) =
+        (controller, workspace, told, rows)
+    {
+        black_box(controller.set_rows(rows).is_ok());
+        black_box(
+            controller
+                .set_settings(*black_box(controller.settings()))
+                .is_ok(),
+        );
+        controller.set_model(*black_box(controller.model()));
+        controller.prepare_with(preview, workspace);
+        black_box(controller.feedback_with(x, preview, workspace));
+        black_box(controller.step_with(x, preview, workspace));
+        black_box(controller.tracking_cost_with(x, preview));
+        black_box(controller.step(x, &preview.reference, workspace));
     }
 }
 

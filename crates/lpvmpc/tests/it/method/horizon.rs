@@ -115,6 +115,7 @@ fn matches_the_dense_solution<const NX: usize, const NU: usize>(
         stages: memory,
         rows: 1,
         active: 1,
+        ..Capacity::default()
     };
     let mut solver = Solver::allocate(capacity);
     let mut solution = Solution::allocate(capacity);

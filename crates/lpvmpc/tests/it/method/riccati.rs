@@ -278,6 +278,7 @@ fn the_solver_names_stage_and_pivot() {
         stages: 5,
         rows: 1,
         active: 1,
+        ..Capacity::default()
     };
     let mut solution = Solution::allocate(capacity);
     Solver::allocate(capacity).solve(&ocp, &SolverSettings::default(), &mut solution);

@@ -18,6 +18,8 @@ const ROOM: Capacity = Capacity {
     stages: N,
     rows: 30,
     active: 30,
+    own_stages: 0,
+    general_rows: 0,
 };
 type Problem = Ocp<f64, NX, NU>;
 
@@ -88,7 +90,7 @@ fn spoil_problem(rng: &mut Rng, largest: f64, ocp: &mut Problem) {
         11 => spoil(rng, largest, &mut row.x),
         12 => spoil(rng, largest, &mut row.u),
         13 => {
-            ocp.soft_x[rng.index(NX)] = Some(Penalty {
+            common.soft_x[rng.index(NX)] = Some(Penalty {
                 linear: nonsense(rng, largest).abs(),
                 quadratic: nonsense(rng, largest).abs(),
             });
@@ -255,6 +257,7 @@ fn sizes_that_do_not_fit() {
             stages: size(&mut rng),
             rows: size(&mut rng) * NU,
             active: size(&mut rng) * NU,
+            ..Capacity::default()
         };
         let (of_solver, of_solution) = (room(), room());
         let mut solution = Solution::allocate(of_solution);

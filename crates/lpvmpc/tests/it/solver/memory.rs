@@ -48,6 +48,7 @@ fn lent_arrays_give_the_answers_of_memory_on_the_heap() {
         stages: N + 5,
         rows: 0,
         active: MANY,
+        ..Capacity::default()
     };
     let mut solution = Solution::allocate(room);
     let mut before = Solution::allocate(room);
@@ -97,6 +98,7 @@ fn a_horizon_without_memory_is_said() {
         stages: N,
         rows: 60,
         active: 60,
+        ..Capacity::default()
     };
     for mut ocp in problems(20) {
         ocp.own = List::empty();
@@ -283,6 +285,7 @@ fn nothing_is_left_from_a_longer_problem() {
         stages: N,
         rows: 60,
         active: 60,
+        ..Capacity::default()
     };
     let mut solver = Solver::allocate(room);
     for ocp in problems(100) {
@@ -304,6 +307,7 @@ fn rows_that_fill_the_space_of_the_inputs_are_enough() {
             stages: 100,
             rows: 103,
             active: 403,
+            ..Capacity::default()
         };
         let mut solution = Solution::allocate(least);
         Solver::allocate(least).solve(&ocp, &cold(), &mut solution);

@@ -2,7 +2,7 @@
 
 use super::support::solve;
 use lpvmpc::{Ocp, Penalty, Solution, kkt_residual};
-use lpvmpc_testkit::problems::{Family, problem};
+use lpvmpc_testkit::problems::{Family, each_common, problem};
 use lpvmpc_testkit::rng::Rng;
 use nalgebra::SVector;
 
@@ -63,7 +63,9 @@ fn multiplier_above_the_price_is_seen() {
         linear: 1e-3,
         quadratic: 0.0,
     });
-    ocp.soft_x = [price; 3];
+    for common in each_common(&mut ocp) {
+        common.soft_x = [price; 3];
+    }
     ocp.terminal.soft_x = [price; 3];
     assert!(kkt_residual(&ocp, &solution).dual > 1e-4);
 }

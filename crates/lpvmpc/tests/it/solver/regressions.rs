@@ -5,7 +5,7 @@ use lpvmpc::{
     Capacity, GeneralRow, List, Ocp, Penalty, Solution, Solver, SolverSettings, Status, WarmStart,
     kkt_residual,
 };
-use lpvmpc_testkit::problems::{Family, problem};
+use lpvmpc_testkit::problems::{Family, each_common, problem};
 use lpvmpc_testkit::rng::Rng;
 use nalgebra::{Matrix1, Vector1};
 
@@ -14,6 +14,8 @@ const SMALL: Capacity = Capacity {
     stages: 3,
     rows: 6,
     active: 6,
+    own_stages: 0,
+    general_rows: 0,
 };
 
 type Scalar1 = Ocp<f64, 1, 1>;
@@ -46,10 +48,12 @@ fn warm_start_from_a_bound_that_has_become_soft() {
     };
     solver.solve(&ocp, &same, &mut solution);
     assert_eq!(solution.active.len(), 1);
-    ocp.soft_x[0] = Some(Penalty {
-        linear: 0.01,
-        quadratic: 0.0,
-    });
+    for common in each_common(&mut ocp) {
+        common.soft_x[0] = Some(Penalty {
+            linear: 0.01,
+            quadratic: 0.0,
+        });
+    }
     solver.solve(&ocp, &same, &mut solution);
     let reference = solve(&ocp);
     assert!((solution.cost - reference.cost).abs() < 1e-12);

@@ -87,15 +87,18 @@ fn dearer(ocp: &Problem, factor: f64) -> Problem {
         stage.linear_x *= factor;
         stage.linear_u *= factor;
     }
-    for Common { q, r, s, .. } in each_common(&mut scaled) {
+    for Common {
+        q, r, s, soft_x, ..
+    } in each_common(&mut scaled)
+    {
         *q *= factor;
         *r *= factor;
         *s *= factor;
+        *soft_x = soft_x.map(price);
     }
     for row in &mut scaled.rows {
         row.soft = price(row.soft);
     }
-    scaled.soft_x = scaled.soft_x.map(price);
     scaled.terminal.p *= factor;
     scaled.terminal.linear_x *= factor;
     scaled.terminal.soft_x = scaled.terminal.soft_x.map(price);

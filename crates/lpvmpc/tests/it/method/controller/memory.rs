@@ -202,6 +202,7 @@ fn controllers_that_share_a_workspace_do_not_see_each_other() {
         stages: largest(|room| room.stages),
         rows: largest(|room| room.rows),
         active: largest(|room| room.active),
+        ..Capacity::default()
     });
     let x = Vector4::new(0.05, 0.02, 0.3, 0.0);
     for k in 0..4 {

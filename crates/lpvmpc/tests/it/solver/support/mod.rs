@@ -23,6 +23,7 @@ pub fn capacity<T: Scalar, const NX: usize, const NU: usize>(ocp: &Ocp<T, NX, NU
         stages,
         rows,
         active: rows,
+        ..Capacity::default()
     }
 }
 
@@ -66,5 +67,6 @@ pub fn kind<T>(status: &Status<T>) -> &'static str {
         Status::HorizonTooLong => "horizon too long",
         Status::NumericalFailure { .. } => "numerical failure",
         Status::NotFinite => "not finite",
+        Status::Refused(_) => "refused",
     }
 }

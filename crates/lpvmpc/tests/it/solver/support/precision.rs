@@ -61,6 +61,7 @@ impl<A: Scalar, B: Scalar> Into<'_, A, B> {
             r: self.matrix(&common.r),
             s: self.matrix(&common.s),
             x: self.bounds(&common.x),
+            soft_x: self.prices(&common.soft_x),
             u: self.bounds(&common.u),
         }
     }
@@ -85,7 +86,6 @@ impl<A: Scalar, B: Scalar> Into<'_, A, B> {
             stages: list(&ocp.stages, |stage| self.stage(stage)),
             common: self.common(&ocp.common),
             own: list(&ocp.own, |common| self.common(common)),
-            soft_x: self.prices(&ocp.soft_x),
             rows: list(&ocp.rows, |row| self.row(row)),
             rows_per_stage: ocp.rows_per_stage,
             terminal: Terminal {

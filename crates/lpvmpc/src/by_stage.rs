@@ -1,0 +1,310 @@
+//! What a sample's problem has of its own at a stage, and the plant as it is there.
+//!
+//! The loops of the controller are written once, over these traits. For `()`, nothing of its own,
+//! they become the machine code of a controller that knows its settings only.
+
+use crate::at_stage::AtStage;
+use crate::controller::next_state;
+use crate::descent::Along;
+use crate::model::{LpvModel, Scalar};
+use crate::ocp::{Bounds, GeneralRow, Softness};
+use crate::preview::Preview;
+use crate::settings::{ControllerSettings, Scheduling, TerminalIngredient, Weights};
+use crate::steady_state::{SteadyState, SteadyStateProblem};
+use nalgebra::{SMatrix, SVector};
+
+/// Cost and bounds of stage `i`, from 0 to the end of the horizon; `None`: as the settings have them.
+pub(crate) trait CostByStage<T: Scalar, const NX: usize, const NU: usize>: Copy {
+    /// Whether there may be anything.
+    const SOME: bool = true;
+
+    /// Whether a stage may have weights or bounds of its own.
+    fn has_own_stages(&self) -> bool {
+        false
+    }
+    fn u_ref(&self, _i: usize) -> Option<&SVector<T, NU>> {
+        None
+    }
+    fn weights(&self, _i: usize) -> Option<&Weights<T, NX, NU>> {
+        None
+    }
+    fn terminal(&self) -> Option<&TerminalIngredient<T, NX>> {
+        None
+    }
+    fn x(&self, _i: usize) -> Option<&Bounds<T, NX>> {
+        None
+    }
+    fn soft_x(&self, _i: usize) -> Option<&Softness<T, NX>> {
+        None
+    }
+    fn u(&self, _i: usize) -> Option<&Bounds<T, NU>> {
+        None
+    }
+    fn rows(&self, _i: usize) -> &[GeneralRow<T, NX, NU>] {
+        &[]
+    }
+}
+
+/// The plant over the sample `i` of the horizon.
+pub(crate) trait PlantByStage<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize>:
+    CostByStage<T, NX, NU>
+{
+    /// One sample after `x` under `u`.
+    fn next_state(
+        &self,
+        i: usize,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> SVector<T, NX>;
+
+    /// The matrices of a descent at a state and an input.
+    fn sample_matrices(
+        &self,
+        i: usize,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        at: (&SVector<T, NX>, &SVector<T, NU>),
+        along: Along,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>);
+
+    /// A, B and c of the predictor, for a sample that is expected to begin at `x` with `u`.
+    fn predict(
+        &self,
+        i: usize,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>, SVector<T, NX>);
+
+    /// The steady state of the plant as it is in the last sample of the horizon; `None` where that is
+    /// the one that the settings have.
+    fn steady_state(
+        &self,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        x_ref: &SVector<T, NX>,
+    ) -> Option<Option<SteadyState<T, NX, NU>>>;
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize> CostByStage<T, NX, NU> for () {
+    const SOME: bool = false;
+}
+
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> PlantByStage<P, T, NX, NU, NS> for ()
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS>,
+{
+    #[inline(always)]
+    fn next_state(
+        &self,
+        _: usize,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> SVector<T, NX> {
+        next_state(plant, settings, x, u)
+    }
+
+    #[inline(always)]
+    fn sample_matrices(
+        &self,
+        _: usize,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        at: (&SVector<T, NX>, &SVector<T, NU>),
+        along: Along,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+        along.matrices(plant, settings, at)
+    }
+
+    #[inline(always)]
+    fn predict(
+        &self,
+        _: usize,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>, SVector<T, NX>) {
+        predicted(plant, settings.scheduling.held(), settings, (x, u))
+    }
+
+    #[inline(always)]
+    fn steady_state(
+        &self,
+        _: &P,
+        _: &ControllerSettings<T, NX, NU, NS>,
+        _: &SVector<T, NX>,
+    ) -> Option<Option<SteadyState<T, NX, NU>>> {
+        None
+    }
+}
+
+/// A, B and c of the settings' predictor for a sample from (x, u), where the scheduling may be `held`.
+#[inline(always)]
+fn predicted<P, T, const NX: usize, const NU: usize, const NS: usize>(
+    plant: &P,
+    held: Option<&SVector<T, NS>>,
+    settings: &ControllerSettings<T, NX, NU, NS>,
+    (x, u): (&SVector<T, NX>, &SVector<T, NU>),
+) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>, SVector<T, NX>)
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS>,
+{
+    let ControllerSettings { predictor, t_s, .. } = settings;
+    let pair = predictor.linearize_along(plant, held, x, u, *t_s);
+    let c = predictor.offset_along(plant, held, (x, u), *t_s, &pair);
+    let (a, b) = pair;
+    (a, b, c.unwrap_or_else(SVector::zeros))
+}
+
+impl<T: Scalar, const NS: usize> Scheduling<T, NS> {
+    /// The constant one, if it is.
+    #[inline(always)]
+    pub(crate) fn held(&self) -> Option<&SVector<T, NS>> {
+        match self {
+            Self::Predicted => None,
+            Self::Held(held) => Some(held),
+        }
+    }
+}
+
+/// A preview, beside the rows that hold where it has none.
+pub(crate) struct Given<'a, P, T, const NX: usize, const NU: usize, const NS: usize> {
+    pub preview: &'a Preview<'a, P, T, NX, NU, NS>,
+    pub rows: &'a [GeneralRow<T, NX, NU>],
+}
+
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> Clone
+    for Given<'_, P, T, NX, NU, NS>
+{
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> Copy for Given<'_, P, T, NX, NU, NS> {}
+
+/// Entry `i`; beyond the last, the last.
+pub(crate) fn entry<V>(list: &[V], i: usize) -> Option<&V> {
+    list.get(i).or(list.last())
+}
+
+impl<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize> CostByStage<T, NX, NU>
+    for Given<'_, P, T, NX, NU, NS>
+{
+    fn has_own_stages(&self) -> bool {
+        self.preview.has_own_stages()
+    }
+    fn u_ref(&self, i: usize) -> Option<&SVector<T, NU>> {
+        entry(self.preview.u_ref, i)
+    }
+    fn weights(&self, i: usize) -> Option<&Weights<T, NX, NU>> {
+        entry(self.preview.weights, i)
+    }
+    fn terminal(&self) -> Option<&TerminalIngredient<T, NX>> {
+        self.preview.terminal.as_ref()
+    }
+    fn x(&self, i: usize) -> Option<&Bounds<T, NX>> {
+        entry(self.preview.x, i)
+    }
+    fn soft_x(&self, i: usize) -> Option<&Softness<T, NX>> {
+        entry(self.preview.soft_x, i)
+    }
+    fn u(&self, i: usize) -> Option<&Bounds<T, NU>> {
+        entry(self.preview.u, i)
+    }
+    fn rows(&self, i: usize) -> &[GeneralRow<T, NX, NU>] {
+        entry(self.preview.rows, i).copied().unwrap_or(self.rows)
+    }
+}
+
+impl<'a, P, T, const NX: usize, const NU: usize, const NS: usize> Given<'a, P, T, NX, NU, NS>
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS>,
+{
+    fn plant(&self, i: usize, plant: &'a P) -> AtStage<'a, P, T, NX, NS> {
+        AtStage {
+            plant: entry(self.preview.models, i).unwrap_or(plant),
+            scheduling: entry(self.preview.scheduling, i),
+            disturbance: entry(self.preview.disturbance, i),
+        }
+    }
+}
+
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> PlantByStage<P, T, NX, NU, NS>
+    for Given<'_, P, T, NX, NU, NS>
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS>,
+{
+    fn next_state(
+        &self,
+        i: usize,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> SVector<T, NX> {
+        next_state(&self.plant(i, plant), settings, x, u)
+    }
+
+    fn sample_matrices(
+        &self,
+        i: usize,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        at: (&SVector<T, NX>, &SVector<T, NU>),
+        along: Along,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+        along.matrices(&self.plant(i, plant), settings, at)
+    }
+
+    fn predict(
+        &self,
+        i: usize,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>, SVector<T, NX>) {
+        let plant = self.plant(i, plant);
+        let held = plant.scheduling.or(settings.scheduling.held());
+        predicted(&plant, held, settings, (x, u))
+    }
+
+    fn steady_state(
+        &self,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        x_ref: &SVector<T, NX>,
+    ) -> Option<Option<SteadyState<T, NX, NU>>> {
+        let end = settings.horizon;
+        let last = end.saturating_sub(1);
+        let here = self.plant(last, plant);
+        let weights = self.weights(last);
+        let (x, u) = (self.x(end), self.u(last));
+        let same = here.is_the_plant()
+            && self.preview.models.is_empty()
+            && weights.is_none()
+            && x.is_none()
+            && u.is_none();
+        let Weights { q, r } = weights.unwrap_or(&settings.weights);
+        (!same).then(|| {
+            here.steady_state(&SteadyStateProblem {
+                x_ref: *x_ref,
+                q: q.diagonal(),
+                r: r.diagonal(),
+                x: *x.unwrap_or(&settings.x),
+                u: *u.unwrap_or(&settings.u),
+            })
+        })
+    }
+}

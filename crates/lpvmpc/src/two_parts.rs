@@ -1,0 +1,175 @@
+//! A step in two parts, the long one before the state is measured, and what the short one leaves for
+//! later.
+
+use crate::by_stage::PlantByStage;
+use crate::controller::{Controller, Reference};
+use crate::model::{LpvModel, Scalar};
+use crate::plan::at;
+use crate::preview::Preview;
+use crate::settings::Iterations;
+use crate::solution::{Solution, Status};
+use crate::working_set::copy;
+use crate::workspace::Workspace;
+use nalgebra::SVector;
+
+/// What a feedback leaves of its step for later.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Answered<T, const NX: usize> {
+    /// All that follows from the state that it was given.
+    At(SVector<T, NX>),
+    /// What follows from the state that comes next.
+    Before(SVector<T, NX>),
+}
+
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> Controller<P, T, NX, NU, NS>
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS>,
+{
+    /// What a step can do before the state is measured: the rest of the last step, the program's
+    /// matrices, and the backward sweep. [`feedback`](Self::feedback) then takes little time.
+    ///
+    /// `reference` is that of the coming sample. Until the feedback the workspace is this
+    /// controller's alone. Without a past there is nothing to prepare.
+    pub fn prepare(
+        &mut self,
+        reference: &Reference<'_, T, NX>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) {
+        match self.fixed.take() {
+            None => self.prepare_sample(reference, (), workspace),
+            Some(fixed) => (fixed.run)(self, None, reference, fixed, workspace),
+        }
+    }
+
+    /// What there is to prepare, with what the stages have of their own.
+    pub(crate) fn prepare_sample<D: PlantByStage<P, T, NX, NU, NS>>(
+        &mut self,
+        reference: &Reference<'_, T, NX>,
+        own: D,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) {
+        self.prepared = None;
+        if !workspace.holds(self.settings.horizon) {
+            return;
+        }
+        self.pose(own, workspace);
+        let aim = &self.aim(reference, own);
+        if let Iterations::Descent { .. } = self.settings.iterations {
+            let answered = self.answered.take();
+            if !self.initialised || !self.prepare_descent(answered, aim, workspace) {
+                self.initialised = false;
+                return;
+            }
+        } else {
+            self.make_up(own);
+            if !self.initialised {
+                return;
+            }
+            let x = at(&self.rollout, 0);
+            self.predict(&x, own, &mut workspace.ocp);
+            self.track(aim, &mut workspace.ocp);
+        }
+        self.prepared = Some(workspace.solver.factorize(&workspace.ocp));
+    }
+
+    /// The answer to the measured state `x` by the program that [`prepare`](Self::prepare) made
+    /// ready with this `reference`; a whole step where nothing is prepared.
+    ///
+    /// It is the answer of one program. Of a descent it is not known yet whether it is an
+    /// improvement; the next `prepare` goes on from the better plan. The inputs are finite and
+    /// within the input bounds, whatever the status says.
+    pub fn feedback(
+        &mut self,
+        x: &SVector<T, NX>,
+        reference: &Reference<'_, T, NX>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) -> &Solution<T, NX, NU> {
+        let Some(factorized) = self.prepared.take() else {
+            return self.step(x, reference, workspace);
+        };
+        self.answer(x, factorized, workspace);
+        self.answered = Some(Answered::At(*x));
+        &self.solution
+    }
+
+    /// The answer of the program that was made ready.
+    pub(crate) fn answer(
+        &mut self,
+        x: &SVector<T, NX>,
+        factorized: Result<(), Status<T>>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) {
+        let Workspace { ocp, solver, .. } = workspace;
+        ocp.x0 = *x;
+        let settings = &self.settings.solver;
+        solver.solve_factorized(factorized, ocp, settings, &mut self.solution);
+        self.problems = 1;
+        self.take_gains(workspace);
+    }
+
+    /// The rollout that a feedback has left for later.
+    #[inline(always)]
+    pub(crate) fn make_up<D: PlantByStage<P, T, NX, NU, NS>>(&mut self, own: D) {
+        self.prepared = None;
+        match self.answered.take() {
+            None => return,
+            Some(Answered::At(x)) => self.roll_out(&x, ()),
+            Some(Answered::Before(x)) if D::SOME => self.roll_out_rest(&x, own),
+            Some(Answered::Before(_)) => self.initialised = false,
+        }
+        copy(&mut self.policy.u, &self.solution.u);
+    }
+
+    /// [`prepare`](Self::prepare) with all that may be known ahead of the coming sample.
+    pub fn prepare_with(
+        &mut self,
+        preview: &Preview<'_, P, T, NX, NU, NS>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) {
+        self.with_rows(preview, workspace, |controller, given, workspace| {
+            controller.prepare_sample(&preview.reference, given, workspace);
+        });
+    }
+
+    /// [`feedback`](Self::feedback) after a [`prepare_with`](Self::prepare_with) of the same preview.
+    /// It takes a Runge-Kutta step more than [`feedback`](Self::feedback).
+    pub fn feedback_with(
+        &mut self,
+        x: &SVector<T, NX>,
+        preview: &Preview<'_, P, T, NX, NU, NS>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) -> &Solution<T, NX, NU> {
+        let Some(factorized) = self.prepared.take() else {
+            return self.step_with(x, preview, workspace);
+        };
+        self.with_rows(preview, workspace, |controller, given, workspace| {
+            controller.answer(x, factorized, workspace);
+            let u = at(&controller.solution.u, 0);
+            let (model, settings) = (&controller.model, &controller.settings);
+            let next = given.next_state(0, model, settings, x, &u);
+            controller.answered = Some(Answered::Before(next));
+        });
+        &self.solution
+    }
+
+    /// The nonlinear model under the last plan's second and further inputs, from the state that its
+    /// first led to; what `own` has at stage 0 is of the plan's stage 1.
+    #[cold]
+    pub(crate) fn roll_out_rest<D: PlantByStage<P, T, NX, NU, NS>>(
+        &mut self,
+        x: &SVector<T, NX>,
+        own: D,
+    ) {
+        let mut state = *x;
+        let places = self.rollout.iter_mut().zip(self.solution.u.iter());
+        for (i, (place, u)) in places.enumerate().take(self.settings.horizon) {
+            if let Some(before) = i.checked_sub(1) {
+                state = own.next_state(before, &self.model, &self.settings, &state, u);
+            }
+            *place = state;
+        }
+        self.gap = state - at(&self.solution.x, self.last_stage());
+        self.initialised = state.iter().all(|entry| entry.is_finite());
+    }
+}

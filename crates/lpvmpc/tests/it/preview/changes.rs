@@ -1,0 +1,143 @@
+//! Settings and models that change while a controller runs.
+
+use super::plants::Pendulum;
+use super::short_case::{PLANT, settings};
+use lpvmpc::{
+    Bounds, Controller, ControllerError, InputReference, Iterations, Predictor, Preview, Reference,
+    Rk4, TerminalIngredient, Weights,
+};
+use nalgebra::{Matrix1, Matrix2, Vector1, Vector2};
+
+fn upright() -> Reference<'static, f64, 2> {
+    Reference::constant(Vector2::zeros())
+}
+
+/// From the first step on they are those of a controller that is built with them.
+#[test]
+fn other_settings_are_those_of_a_controller_built_with_them() {
+    let other = |iterations| {
+        let mut other = settings();
+        other.weights = Weights {
+            q: Matrix2::from_diagonal(&Vector2::new(3.0, 0.1)),
+            r: Matrix1::new(0.5),
+        };
+        other.terminal = TerminalIngredient::Equality;
+        other.u = Bounds {
+            lower: Vector1::new(-6.0),
+            upper: Vector1::new(7.0),
+        };
+        other.x.upper[0] = 0.9;
+        other.soft_x = [None; 2];
+        other.input_reference = InputReference::Given(Vector1::new(0.2));
+        other.predictor = Predictor::FrozenRk4(Rk4 { substeps: 3 });
+        other.iterations = iterations;
+        other
+    };
+    for iterations in [Iterations::Fixed(2), Iterations::default()] {
+        let mut set = Controller::allocate(PLANT, settings()).unwrap();
+        let mut made = Controller::allocate(PLANT, other(iterations)).unwrap();
+        let [mut memory, mut own] = [set.workspace(), made.workspace()];
+        let x = Vector2::new(0.4, 0.2);
+        // With a past and a target that are not those of the new settings.
+        set.step(&x, &upright(), &mut memory);
+        set.prepare(&upright(), &mut memory);
+        set.set_settings(other(iterations)).unwrap();
+        set.reset();
+        let expected = made.step(&x, &upright(), &mut own).clone();
+        assert!(expected.status.is_solved());
+        assert_eq!(set.step(&x, &upright(), &mut memory), &expected);
+        assert_eq!(set.target(), made.target());
+        assert_eq!(*set.settings(), other(iterations));
+    }
+}
+
+/// With a past, too, the next plan is a good one: a descent ends where one without a past ends.
+#[test]
+fn a_plan_goes_on_under_other_weights_and_another_model() {
+    let heavy = Pendulum { stiffness: 15.0 };
+    let precise = |r: f64| {
+        let mut settings = settings();
+        settings.weights.r[0] = r;
+        settings.iterations = Iterations::Descent {
+            tolerance: 1e-9,
+            most: 50,
+        };
+        settings
+    };
+    let mut changed = Controller::allocate(PLANT, precise(0.1)).unwrap();
+    let mut fresh = Controller::allocate(heavy, precise(1.0)).unwrap();
+    let [mut memory, mut own] = [changed.workspace(), fresh.workspace()];
+    let x = Vector2::new(0.3, -0.5);
+    changed.step(&x, &upright(), &mut memory);
+    changed.prepare(&upright(), &mut memory);
+    changed.set_model(heavy);
+    changed.set_settings(precise(1.0)).unwrap();
+    let found = changed.feedback(&x, &upright(), &mut memory).u[0];
+    let expected = fresh.step(&x, &upright(), &mut own).u[0];
+    assert!((found - expected).amax() < 1e-5, "{found} {expected}");
+}
+
+#[test]
+fn settings_that_make_no_sense_are_refused_and_change_nothing() {
+    let mut controller = Controller::allocate(PLANT, settings()).unwrap();
+    let mut refused = |change: &dyn Fn(&mut super::short_case::Settings)| {
+        let mut other = settings();
+        change(&mut other);
+        let error = controller.set_settings(other).unwrap_err();
+        assert_eq!(*controller.settings(), settings());
+        error
+    };
+    let r = refused(&|s| s.weights.r[0] = -1.0);
+    assert_eq!(r, ControllerError::WeightSign("R"));
+    let u = refused(&|s| s.u.lower[0] = f64::NAN);
+    let expected = ControllerError::Bounds {
+        quantity: "input",
+        component: 0,
+    };
+    assert_eq!(u, expected);
+    for error in [refused(&|s| s.horizon += 1), refused(&|s| s.t_s *= 2.0)] {
+        assert_eq!(error, ControllerError::Another);
+        assert!(error.to_string().contains("takes over"));
+    }
+}
+
+/// A controller that takes over goes on as the one before would have, under what both are told; one
+/// with a longer horizon has a plan, too.
+#[test]
+fn a_plan_with_a_preview_is_taken_over() {
+    let told = Preview {
+        disturbance: &[Vector2::new(0.0, 1.0), Vector2::new(0.0, -1.0)],
+        u_ref: &[Vector1::new(0.3)],
+        ..Preview::new(upright())
+    };
+    for iterations in [Iterations::Fixed(1), Iterations::default()] {
+        let settings = super::short_case::Settings {
+            iterations,
+            ..settings()
+        };
+        let longer = super::short_case::Settings {
+            horizon: settings.horizon + 5,
+            ..settings
+        };
+        let mut before = Controller::allocate(PLANT, settings).unwrap();
+        let mut after = Controller::allocate(PLANT, settings).unwrap();
+        let mut long = Controller::allocate(PLANT, longer).unwrap();
+        let mut workspace = long.workspace();
+        let mut x = Vector2::new(0.3, 0.0);
+        for _ in 0..5 {
+            let u = before.step_with(&x, &told, &mut workspace).u[0];
+            x = Rk4 { substeps: 2 }.advance(&PLANT, &x, &u, 0.05);
+        }
+        after.take_over(&before);
+        long.take_over(&before);
+        let expected = before.step_with(&x, &told, &mut workspace).u[0];
+        assert_eq!(after.step_with(&x, &told, &mut workspace).u[0], expected);
+        let plan = long.step_with(&x, &told, &mut workspace);
+        assert!(plan.status.is_solved());
+        assert!(
+            (plan.u[0] - expected).amax() < 0.1,
+            "{} {expected}",
+            plan.u[0]
+        );
+    }
+}

@@ -1,0 +1,237 @@
+//! The problem of a case written out over its inputs alone, and solved by Clarabel.
+
+use super::case::{Case, Settings, T_S};
+use super::plants::{NU, NX};
+use ::clarabel::algebra::CscMatrix;
+use ::clarabel::solver::{
+    DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus,
+};
+use lpvmpc::{InputReference, Penalty};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+
+/// Optimal inputs and cost J, prices included; or why there are none.
+pub enum Answer {
+    Solved { u: Vec<SVector<f64, NU>>, cost: f64 },
+    Infeasible,
+    Undecided,
+}
+
+/// x = map U + free
+#[derive(Clone)]
+struct Affine {
+    map: DMatrix<f64>,
+    free: DVector<f64>,
+}
+
+/// min z'Hz + 2g'z + constant with D z <= e. The inputs are the first variables, then excesses.
+struct Program {
+    h: Vec<(usize, usize, f64)>,
+    g: Vec<f64>,
+    constant: f64,
+    rows: Vec<(Vec<(usize, f64)>, f64)>,
+}
+
+impl Program {
+    fn add_square<const K: usize>(&mut self, weight: &SMatrix<f64, K, K>, of: &Affine) {
+        let w = DMatrix::from_fn(K, K, |i, j| weight[(i, j)]);
+        let h = of.map.transpose() * &w * &of.map;
+        let g = of.map.transpose() * &w * &of.free;
+        for i in 0..h.nrows() {
+            for j in i..h.ncols() {
+                self.h.push((i, j, h[(i, j)]));
+            }
+            self.g[i] += g[i];
+        }
+        self.constant += of.free.dot(&(&w * &of.free));
+    }
+
+    /// lower <= coefficients'z + constant <= upper.
+    fn bound(
+        &mut self,
+        (coefficients, constant): (&[f64], f64),
+        (lower, upper): (f64, f64),
+        soft: Option<Penalty<f64>>,
+    ) {
+        for (sign, limit) in [(1.0, upper), (-1.0, -lower)] {
+            if limit == f64::INFINITY {
+                continue;
+            }
+            let mut row: Vec<_> = coefficients.iter().map(|c| sign * c).enumerate().collect();
+            if let Some(price) = soft {
+                let excess = self.g.len();
+                // J has linear s + quadratic s^2 / 2; the program has g twice.
+                self.g.push(price.linear / 2.0);
+                self.h.push((excess, excess, price.quadratic / 2.0));
+                row.push((excess, -1.0));
+                self.rows.push((vec![(excess, -1.0)], 0.0));
+            }
+            self.rows.push((row, limit - sign * constant));
+        }
+    }
+
+    fn solve(&self, inputs: usize) -> Answer {
+        let n = self.g.len();
+        let triplets = |entries: &[(usize, usize, f64)], rows, factor: f64| {
+            CscMatrix::new_from_triplets(
+                rows,
+                n,
+                entries.iter().map(|e| e.0).collect(),
+                entries.iter().map(|e| e.1).collect(),
+                entries.iter().map(|e| factor * e.2).collect(),
+            )
+        };
+        let rows = self.rows.iter().enumerate();
+        let entries: Vec<_> = rows
+            .flat_map(|(k, (row, _))| row.iter().map(move |(j, v)| (k, *j, *v)))
+            .collect();
+        let right: Vec<f64> = self.rows.iter().map(|row| row.1).collect();
+        let q: Vec<f64> = self.g.iter().map(|g| 2.0 * g).collect();
+        let settings = DefaultSettings {
+            verbose: false,
+            max_threads: 1,
+            tol_gap_abs: 1e-12,
+            tol_gap_rel: 1e-12,
+            tol_feas: 1e-12,
+            reduced_tol_gap_abs: 1e-10,
+            reduced_tol_gap_rel: 1e-10,
+            reduced_tol_feas: 1e-10,
+            ..DefaultSettings::default()
+        };
+        let mut solver = DefaultSolver::new(
+            &triplets(&self.h, n, 2.0),
+            &q,
+            &triplets(&entries, right.len(), 1.0),
+            &right,
+            &[NonnegativeConeT(right.len())],
+            settings,
+        )
+        .unwrap();
+        solver.solve();
+        match solver.solution.status {
+            SolverStatus::Solved | SolverStatus::AlmostSolved => {
+                let z = &solver.solution.x[..inputs];
+                Answer::Solved {
+                    u: z.chunks(NU).map(SVector::from_column_slice).collect(),
+                    cost: solver.solution.obj_val + self.constant,
+                }
+            }
+            SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => {
+                Answer::Infeasible
+            }
+            _ => Answer::Undecided,
+        }
+    }
+}
+
+/// Entry `i` of a list whose last entry holds from where it ends.
+fn of<V: Clone>(list: &[V], i: usize, otherwise: &V) -> V {
+    list.get(i).or(list.last()).unwrap_or(otherwise).clone()
+}
+
+/// One step of the classical Runge-Kutta method for x_dot = A x + w is the Taylor polynomial of order
+/// four: (A_d, what w is multiplied by).
+pub fn sampled(a: &SMatrix<f64, NX, NX>) -> (SMatrix<f64, NX, NX>, SMatrix<f64, NX, NX>) {
+    let m = a * T_S;
+    let mut power = SMatrix::<f64, NX, NX>::identity();
+    let (mut a_d, mut integral) = (SMatrix::zeros(), SMatrix::zeros());
+    let mut factorial = 1.0;
+    for k in 0..=4 {
+        a_d += power / factorial;
+        if k < 4 {
+            integral += power * (T_S / (factorial * f64::from(k + 1)));
+        }
+        power *= m;
+        factorial *= f64::from(k + 1);
+    }
+    (a_d, integral)
+}
+
+fn add(one: &Affine, other: &Affine, factor: f64) -> Affine {
+    Affine {
+        map: &one.map + &other.map * factor,
+        free: &one.free + &other.free * factor,
+    }
+}
+
+fn times<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>, of: &Affine) -> Affine {
+    let m = DMatrix::from_fn(R, C, |i, j| m[(i, j)]);
+    Affine {
+        map: &m * &of.map,
+        free: m * &of.free,
+    }
+}
+
+fn constant<const K: usize>(v: &SVector<f64, K>, size: usize) -> Affine {
+    Affine {
+        map: DMatrix::zeros(K, size),
+        free: DVector::from_fn(K, |i, _| v[i]),
+    }
+}
+
+/// The optimum of `case`, whose empty lists mean what the settings say.
+pub fn solve(case: &Case, settings: &Settings) -> Answer {
+    let n = case.horizon;
+    let size = n * NU;
+    let mut program = Program {
+        h: Vec::new(),
+        g: vec![0.0; size],
+        constant: 0.0,
+        rows: Vec::new(),
+    };
+    let InputReference::Given(u_ref) = settings.input_reference else {
+        panic!("the cases have a given input reference");
+    };
+    let mut x = constant(&case.x0, size);
+    for i in 0..=n {
+        if i > 0 {
+            let bounds = of(&case.x, i, &settings.x);
+            let soft = of(&case.soft_x, i, &settings.soft_x);
+            for (j, soft) in soft.into_iter().enumerate() {
+                let row: Vec<f64> = x.map.row(j).iter().copied().collect();
+                let limits = (bounds.lower[j], bounds.upper[j]);
+                program.bound((&row, x.free[j]), limits, soft);
+            }
+        }
+        let error = add(&x, &constant(&case.x_ref[i], size), -1.0);
+        let rows = of(&case.rows, i, &Vec::new());
+        if i == n {
+            program.add_square(&case.p, &error);
+        }
+        let mut u = constant(&SVector::<f64, NU>::zeros(), size);
+        if i < n {
+            u.map.view_mut((0, i * NU), (NU, NU)).fill_with_identity();
+            let weights = of(&case.weights, i, &settings.weights);
+            program.add_square(&weights.q, &error);
+            let wanted = constant(&of(&case.u_ref, i, &u_ref), size);
+            program.add_square(&weights.r, &add(&u, &wanted, -1.0));
+            let bounds = of(&case.u, i, &settings.u);
+            for j in 0..NU {
+                let row: Vec<f64> = u.map.row(j).iter().copied().collect();
+                program.bound((&row, 0.0), (bounds.lower[j], bounds.upper[j]), None);
+            }
+        }
+        for row in rows {
+            let of_state = row.u.amax() == 0.0;
+            if (of_state && i == 0) || (!of_state && i == n) {
+                continue;
+            }
+            let value = add(
+                &times(&row.x.transpose(), &x),
+                &times(&row.u.transpose(), &u),
+                1.0,
+            );
+            let coefficients: Vec<f64> = value.map.iter().copied().collect();
+            let limits = (row.lower, row.upper);
+            program.bound((&coefficients, value.free[0]), limits, row.soft);
+        }
+        if i < n {
+            let plant = of(&case.models, i, &case.plant);
+            let s = of(&case.scheduling, i, &SVector::zeros());
+            let (a_d, integral) = sampled(&(plant.a + plant.a_s * s[0]));
+            let d = of(&case.disturbance, i, &SVector::zeros());
+            let pushed = add(&times(&plant.b, &u), &constant(&d, size), 1.0);
+            x = add(&times(&a_d, &x), &times(&integral, &pushed), 1.0);
+        }
+    }
+    program.solve(size)
+}
