@@ -49,6 +49,47 @@ impl ConeProgram {
         }
     }
 
+    /// Minimise z'Pz/2 + q'z with Az <= b, from the entries (row, column, value) of P's upper triangle
+    /// and of A; entries in one place add up.
+    pub fn of_entries(
+        p: &[(usize, usize, f64)],
+        q: Vec<f64>,
+        a: &[(usize, usize, f64)],
+        b: Vec<f64>,
+    ) -> Self {
+        let matrix = |rows, entries: &[(usize, usize, f64)]| {
+            let places = entries.iter().map(|entry| entry.0).collect();
+            let columns = entries.iter().map(|entry| entry.1).collect();
+            let values = entries.iter().map(|entry| entry.2).collect();
+            CscMatrix::new_from_triplets(rows, q.len(), places, columns, values)
+        };
+        Self {
+            p: matrix(q.len(), p),
+            a: matrix(b.len(), a),
+            q,
+            b,
+            equalities: 0,
+        }
+    }
+
+    /// Clarabel's verdict and, where it is solved, the minimiser.
+    ///
+    /// # Errors
+    /// Clarabel refuses it.
+    pub fn solve(&self) -> Result<(Verdict, Vec<f64>), SolverError> {
+        let mut solver = self.solver(settings())?;
+        solver.solve();
+        let solution = solver.solution;
+        let verdict = match solution.status {
+            SolverStatus::Solved | SolverStatus::AlmostSolved => Verdict::Solved {
+                primal: solution.obj_val,
+            },
+            SolverStatus::PrimalInfeasible => Verdict::Infeasible,
+            status => Verdict::Undecided(status),
+        };
+        Ok((verdict, solution.x))
+    }
+
     /// A solver with this program.
     ///
     /// # Errors
@@ -131,14 +172,11 @@ pub fn solve<const NX: usize, const NU: usize>(
 ) -> Result<Verdict, SolverError> {
     let qp = SparseQp::new(ocp);
     let constant = qp.constant;
-    let mut solver = ConeProgram::new(qp).solver(settings())?;
-    solver.solve();
-    let solution = &solver.solution;
-    Ok(match solution.status {
-        SolverStatus::Solved | SolverStatus::AlmostSolved => Verdict::Solved {
-            primal: solution.obj_val + constant,
+    let (verdict, _) = ConeProgram::new(qp).solve()?;
+    Ok(match verdict {
+        Verdict::Solved { primal } => Verdict::Solved {
+            primal: primal + constant,
         },
-        SolverStatus::PrimalInfeasible => Verdict::Infeasible,
-        status => Verdict::Undecided(status),
+        other => other,
     })
 }

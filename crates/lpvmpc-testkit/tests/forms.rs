@@ -220,7 +220,7 @@ fn sparse_form_has_the_problems_costs_and_bounds() {
                 (bounded, 0.0, f64::INFINITY)
             );
             *size = beyond(bounded).max(0.0);
-            let price = ocp.soft_x[0].unwrap();
+            let price = ocp.common.soft_x[0].unwrap();
             penalty += (price.linear + 0.5 * price.quadratic * *size) * *size;
         }
         if excesses == 0 {

@@ -344,8 +344,8 @@ impl LpvModel<f64, 2, 1, 1> for Spring {
 struct Pushed;
 
 impl LpvModel<f64, 3, 1, 1> for Pushed {
-    fn scheduling(&self, x: &Vector3<f64>, _: &Vector1<f64>) -> Vector1<f64> {
-        Pendulum { stiffness: 9.81 }.scheduling(&Vector2::new(x[0], x[1]))
+    fn scheduling(&self, x: &Vector3<f64>, u: &Vector1<f64>) -> Vector1<f64> {
+        Pendulum { stiffness: 9.81 }.scheduling(&Vector2::new(x[0], x[1]), u)
     }
 
     fn matrices(&self, sinc: &Vector1<f64>) -> (Matrix3<f64>, Vector3<f64>) {

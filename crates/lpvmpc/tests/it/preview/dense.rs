@@ -2,11 +2,8 @@
 
 use super::case::{Case, Settings, T_S};
 use super::plants::{NU, NX};
-use ::clarabel::algebra::CscMatrix;
-use ::clarabel::solver::{
-    DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus,
-};
 use lpvmpc::{InputReference, Penalty};
+use lpvmpc_testkit::clarabel::{ConeProgram, Verdict};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 /// Optimal inputs and cost J, prices included; or why there are none.
@@ -70,55 +67,24 @@ impl Program {
     }
 
     fn solve(&self, inputs: usize) -> Answer {
-        let n = self.g.len();
-        let triplets = |entries: &[(usize, usize, f64)], rows, factor: f64| {
-            CscMatrix::new_from_triplets(
-                rows,
-                n,
-                entries.iter().map(|e| e.0).collect(),
-                entries.iter().map(|e| e.1).collect(),
-                entries.iter().map(|e| factor * e.2).collect(),
-            )
-        };
+        let twice: Vec<_> = self.h.iter().map(|(i, j, v)| (*i, *j, 2.0 * v)).collect();
+        let q = self.g.iter().map(|g| 2.0 * g).collect();
         let rows = self.rows.iter().enumerate();
         let entries: Vec<_> = rows
             .flat_map(|(k, (row, _))| row.iter().map(move |(j, v)| (k, *j, *v)))
             .collect();
-        let right: Vec<f64> = self.rows.iter().map(|row| row.1).collect();
-        let q: Vec<f64> = self.g.iter().map(|g| 2.0 * g).collect();
-        let settings = DefaultSettings {
-            verbose: false,
-            max_threads: 1,
-            tol_gap_abs: 1e-12,
-            tol_gap_rel: 1e-12,
-            tol_feas: 1e-12,
-            reduced_tol_gap_abs: 1e-10,
-            reduced_tol_gap_rel: 1e-10,
-            reduced_tol_feas: 1e-10,
-            ..DefaultSettings::default()
-        };
-        let mut solver = DefaultSolver::new(
-            &triplets(&self.h, n, 2.0),
-            &q,
-            &triplets(&entries, right.len(), 1.0),
-            &right,
-            &[NonnegativeConeT(right.len())],
-            settings,
-        )
-        .unwrap();
-        solver.solve();
-        match solver.solution.status {
-            SolverStatus::Solved | SolverStatus::AlmostSolved => {
-                let z = &solver.solution.x[..inputs];
-                Answer::Solved {
-                    u: z.chunks(NU).map(SVector::from_column_slice).collect(),
-                    cost: solver.solution.obj_val + self.constant,
-                }
-            }
-            SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => {
-                Answer::Infeasible
-            }
-            _ => Answer::Undecided,
+        let right = self.rows.iter().map(|row| row.1).collect();
+        let program = ConeProgram::of_entries(&twice, q, &entries, right);
+        match program.solve().unwrap() {
+            (Verdict::Solved { primal }, z) => Answer::Solved {
+                u: z[..inputs]
+                    .chunks(NU)
+                    .map(SVector::from_column_slice)
+                    .collect(),
+                cost: primal + self.constant,
+            },
+            (Verdict::Infeasible, _) => Answer::Infeasible,
+            (Verdict::Undecided(_), _) => Answer::Undecided,
         }
     }
 }
