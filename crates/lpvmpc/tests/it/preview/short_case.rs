@@ -265,3 +265,56 @@ fn rows_of_the_controller_hold_in_two_parts() {
         x = Rk4 { substeps: 5 }.advance(&PLANT, &x, &found[0], 0.05);
     }
 }
+
+/// The settings' weights and bounds, told as lists of one entry, change nothing: bit for bit, on far
+/// starts whose programs are damped, too.
+#[test]
+fn the_settings_told_anew_are_the_settings() {
+    let mut rng = Rng::new(77);
+    for settings in ways() {
+        let room = settings.capacity().with_own_stages();
+        for _ in 0..40 {
+            let mut short = Controller::allocate(PLANT, settings).unwrap();
+            let mut long =
+                Controller::new(PLANT, settings, ControllerMemory::allocate(room)).unwrap();
+            let [mut memory, mut other] = [(); 2].map(|()| Workspace::allocate(room));
+            let mut x = Vector2::new(rng.uniform(-3.0, 3.0), rng.uniform(-6.0, 6.0));
+            let reference = Reference::constant(Vector2::new(rng.uniform(-0.5, 0.5), 0.0));
+            let preview = Preview {
+                weights: &[settings.weights],
+                terminal: Some(settings.terminal),
+                x: &[settings.x],
+                soft_x: &[settings.soft_x],
+                u: &[settings.u],
+                models: &[PLANT],
+                ..Preview::new(reference)
+            };
+            for _ in 0..3 {
+                let expected = short.step(&x, &reference, &mut memory).clone();
+                let found = long.step_with(&x, &preview, &mut other);
+                assert_same(found, &expected);
+                assert_eq!(long.problems(), short.problems());
+                x = Rk4 { substeps: 5 }.advance(&PLANT, &x, &expected.u[0], 0.05);
+            }
+        }
+    }
+}
+
+/// The target of a sample under a disturbance is not that of the next one without.
+#[test]
+fn the_target_is_that_of_its_sample() {
+    let mut controller = Controller::allocate(PLANT, settings()).unwrap();
+    let mut workspace = controller.workspace();
+    let x = Vector2::new(0.1, 0.0);
+    let reference = Reference::constant(Vector2::zeros());
+    let pushed = Preview {
+        disturbance: &[Vector2::new(0.0, 2.0)],
+        ..Preview::new(reference)
+    };
+    for _ in 0..2 {
+        controller.step(&x, &reference, &mut workspace);
+        assert!(controller.target().unwrap().u.amax() < 1e-6);
+        controller.step_with(&x, &pushed, &mut workspace);
+        assert!((controller.target().unwrap().u[0] + 2.0).abs() < 1e-6);
+    }
+}
