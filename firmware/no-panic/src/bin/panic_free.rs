@@ -9,8 +9,8 @@ use ballbot::{
 };
 use core::hint::black_box;
 use lpvmpc::{
-    Bounds, Controller, GeneralRow, List, Measurement, Preview, Reference, Regulator, Scalar,
-    Workspace,
+    Bounds, Controller, GeneralRow, List, Measurement, Number, Preview, Reference, Regulator,
+    Scalar, Workspace,
 };
 use nalgebra::{Vector1, Vector3, Vector4, convert};
 use no_panic as _;
@@ -29,7 +29,7 @@ fn main() -> ! {
 
 /// One step of a controller that is never built: what matters is the code, not a run.
 #[inline(never)]
-fn step<T: Scalar>() {
+fn step<T: Scalar + Number>() {
     let controller: Option<&mut Controller<Ballbot<T>, T, 4, 1, 3>> = black_box(None);
     let workspace: Option<&mut Workspace<T, 4, 1>> = black_box(None);
     let inputs: Option<&(Vector4<T>, Reference<'_, T, 4>)> = black_box(None);
@@ -60,7 +60,7 @@ fn step<T: Scalar>() {
 
 /// The same with all that may be known ahead, and with what may change while a controller runs.
 #[inline(never)]
-fn step_with<T: Scalar>() {
+fn step_with<T: Scalar + Number>() {
     let controller: Option<&mut Controller<Ballbot<T>, T, 4, 1, 3>> = black_box(None);
     let workspace: Option<&mut Workspace<T, 4, 1>> = black_box(None);
     let told: Option<(&Vector4<T>, &Preview<'_, Ballbot<T>, T, 4, 1, 3>)> = black_box(None);
@@ -85,7 +85,7 @@ fn step_with<T: Scalar>() {
 
 /// A sample of a whole robot's regulator, and of a plane whose torque moves in ramps.
 #[inline(never)]
-fn regulate<T: Scalar>() {
+fn regulate<T: Scalar + Number>() {
     let reference: &dyn Fn(f64) -> RobotState<T> = &|t| black_box(RobotState::repeat(convert(t)));
     let measurement: Option<&Measurement<T, 10>> = black_box(None);
     let robot: Option<&mut RobotRegulator<T, Held<T>>> = black_box(None);
