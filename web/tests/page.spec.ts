@@ -204,7 +204,12 @@ test("minutes do not let the memory grow", async ({ page }) => {
   await page.waitForTimeout(45_000);
   await until(page, begun + 300);
   await pause(page);
-  const after = await memory();
+  let after = await memory();
+  // What waits to be collected on a busy machine is no growth: a leak stays, however often one looks.
+  for (let looks = 1; looks < 3 && after.some((bytes, i) => bytes - (before[i] ?? 0) >= 50_000); looks += 1) {
+    await page.waitForTimeout(2_000);
+    after = await memory();
+  }
   test.info().annotations.push({ type: "memory", description: `${before} bytes and nodes at first, ${after} after ${await clock(page) - begun} s` });
   expect(after[0] - before[0]).toBeLessThan(50_000);
   expect(after[1] - before[1]).toBeLessThan(50_000);

@@ -4,7 +4,7 @@ use lpvmpc_figures::{Figure, FigureError};
 
 /// A figure with its file name and caption.
 #[derive(Debug)]
-pub struct Drawing {
+pub struct CaptionedFigure {
     /// File name without extension.
     pub name: &'static str,
     /// One or two sentences under it.
@@ -44,17 +44,17 @@ pub fn page(title: &str, body: &str) -> String {
 ///
 /// # Errors
 /// A figure cannot be drawn.
-pub fn figures(drawings: &[Drawing]) -> Result<String, FigureError> {
-    let mut figures = String::new();
-    for drawing in drawings {
-        figures += &format!(
+pub fn figures(figures: &[CaptionedFigure]) -> Result<String, FigureError> {
+    let mut html = String::new();
+    for figure in figures {
+        html += &format!(
             "<figure id=\"{}\">{}<figcaption>{}</figcaption></figure>\n",
-            drawing.name,
-            drawing.figure.svg()?,
-            escape(&drawing.caption)
+            figure.name,
+            figure.figure.svg()?,
+            escape(&figure.caption)
         );
     }
-    Ok(figures)
+    Ok(html)
 }
 
 /// Text as HTML shows it.

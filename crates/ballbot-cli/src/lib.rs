@@ -18,7 +18,7 @@
 )]
 
 pub mod arguments;
-pub mod campaign_drawing;
+pub mod campaign_figure;
 pub mod certificate_page;
 pub mod commands;
 pub mod html;
@@ -26,15 +26,15 @@ pub mod identification;
 pub mod input;
 pub mod interrupt;
 pub mod json;
-pub mod optimality_drawing;
+pub mod optimality_figure;
 pub mod output;
-pub mod pictures;
 pub mod progress;
 pub mod proofs;
 pub mod recording;
 pub mod refinement_file;
 pub mod reproduction;
 pub mod results;
+pub mod run_figures;
 pub mod table;
 
 use arguments::{Arguments, Command};

@@ -38,12 +38,12 @@ pub fn trajectory_csv(trajectory: &Trajectory<4, 1>) -> String {
     for sample in &trajectory.samples {
         let (x, gap) = (&sample.x, &sample.gap);
         let step_us = sample.step_time.as_secs_f64() * 1e6;
-        let guard = sample.guard.map_or_else(
+        let guarantee = sample.guarantee.map_or_else(
             || ",".to_owned(),
-            |guard| format!("{},{:?}", guard.decision, guard.set_point),
+            |guarantee| format!("{},{:?}", guarantee.decision, guarantee.set_point),
         );
         text += &format!(
-            "{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{},{step_us:.3},{:?},{:?},{:?},{:?},{guard}\n",
+            "{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{},{step_us:.3},{:?},{:?},{:?},{:?},{guarantee}\n",
             time(sample.t),
             x[0],
             x[1],

@@ -90,9 +90,9 @@ pub enum ScenarioError {
     /// The controller refuses its settings.
     #[error("controller: {0}")]
     Controller(#[from] lpvmpc::ControllerError),
-    /// The guarded controller refuses its settings.
+    /// The guaranteed controller refuses its settings.
     #[error("controller: {0}")]
-    Guarded(#[from] lpvmpc::GuardedError),
+    Guaranteed(#[from] lpvmpc::GuaranteedError),
 }
 
 impl From<RegulatorError> for ScenarioError {
@@ -100,7 +100,7 @@ impl From<RegulatorError> for ScenarioError {
         match error {
             RegulatorError::Estimator(error) => error.into(),
             RegulatorError::Controller(error) => error.into(),
-            RegulatorError::Guarded(error) => error.into(),
+            RegulatorError::Guaranteed(error) => error.into(),
         }
     }
 }

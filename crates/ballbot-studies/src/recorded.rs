@@ -1,7 +1,7 @@
 //! A recorded run as arrays, and what it amounts to.
 
 use ballbot_scenario::{Plane, Prepared};
-use lpvmpc::Guard;
+use lpvmpc::Guarantee;
 use lpvmpc_sim::Trajectory;
 
 /// A trajectory as the arrays that figures take.
@@ -21,7 +21,7 @@ pub struct Columns {
     pub gap: Vec<[f64; 4]>,
     /// What each torque was backed by, and the artificial set point in rad, where there is a
     /// guarantee.
-    pub guard: Vec<Guard<f64>>,
+    pub guarantee: Vec<Guarantee<f64>>,
 }
 
 impl From<&Trajectory<4, 1>> for Columns {
@@ -36,7 +36,10 @@ impl From<&Trajectory<4, 1>> for Columns {
             cost: samples.iter().map(|sample| sample.cost).collect(),
             phi_reference: references.chain([trajectory.final_reference[0]]).collect(),
             gap: samples.iter().map(|sample| sample.gap.into()).collect(),
-            guard: samples.iter().filter_map(|sample| sample.guard).collect(),
+            guarantee: samples
+                .iter()
+                .filter_map(|sample| sample.guarantee)
+                .collect(),
         }
     }
 }
@@ -116,11 +119,11 @@ impl Metrics {
             rms_error_rad: (squares / errors.len() as f64).sqrt(),
             largest_error_rad: errors.iter().fold(0.0, |most, error| most.max(error.abs())),
             violations: outside.count(),
-            not_guaranteed: prepared.guarded().map(|_| {
-                let guards = samples.iter().filter_map(|sample| sample.guard);
+            not_guaranteed: prepared.guaranteed().map(|_| {
+                let guarantees = samples.iter().filter_map(|sample| sample.guarantee);
                 samples.len()
-                    - guards
-                        .filter(|guard| guard.decision.is_guaranteed())
+                    - guarantees
+                        .filter(|guarantee| guarantee.decision.is_guaranteed())
                         .count()
             }),
             most_active_bounds: active.max().unwrap_or(0),

@@ -8,7 +8,7 @@ use crate::StudyError;
 use ballbot::{Controller, ControllerSettings};
 use ballbot_scenario::{Prepared, Scenario, ScenarioError};
 use lpvmpc::{
-    GuardedController, GuardedIterations, Iterations, Reference, Solution, Solver,
+    GuaranteedController, GuaranteedIterations, Iterations, Reference, Solution, Solver,
     TerminalIngredient,
 };
 use lpvmpc_sim::advance;
@@ -88,7 +88,7 @@ impl Times {
 
 /// The times of the guaranteed step and of the plain one from the same states.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct GuardedTimes {
+pub struct GuaranteedTimes {
     /// Without guarantee: terminal cost, the same predictor.
     pub plain_us: Times,
     /// The same as a descent, the default of scenarios.
@@ -99,7 +99,7 @@ pub struct GuardedTimes {
     pub far_descent_us: Times,
     /// With artificial set point, certified terminal set and acceptance test; one quadratic
     /// program.
-    pub guarded_us: Times,
+    pub guaranteed_us: Times,
 }
 
 /// Times the guaranteed loop of the scenario `far-setpoints`, with set points within a turn, along
@@ -107,12 +107,12 @@ pub struct GuardedTimes {
 ///
 /// # Errors
 /// A controller refuses its settings or the plant cannot be integrated.
-pub fn time_guarded(clock: Clock<'_>) -> Result<GuardedTimes, StudyError> {
+pub fn time_guaranteed(clock: Clock<'_>) -> Result<GuaranteedTimes, StudyError> {
     let prepared = Scenario::load("far-setpoints")?.prepare(Path::new("."))?;
-    let Some(mut settings) = prepared.guarded().copied() else {
+    let Some(mut settings) = prepared.guaranteed().copied() else {
         return Err(StudyError::Unsuitable("no terminal set"));
     };
-    settings.iterations = GuardedIterations {
+    settings.iterations = GuaranteedIterations {
         known: 1,
         ..settings.iterations
     };
@@ -121,11 +121,11 @@ pub fn time_guarded(clock: Clock<'_>) -> Result<GuardedTimes, StudyError> {
     plain_settings.iterations = Iterations::Fixed(1);
     let refused = ScenarioError::from;
     let mut plain = Control::allocate(prepared.ballbot, plain_settings).map_err(refused)?;
-    let mut guarded =
-        GuardedController::allocate(prepared.ballbot, settings).map_err(ScenarioError::from)?;
+    let mut guaranteed =
+        GuaranteedController::allocate(prepared.ballbot, settings).map_err(ScenarioError::from)?;
     let mut workspace = plain.workspace();
-    let mut memory = guarded.workspace::<5>();
-    let (mut plain_us, mut guarded_us) = (Vec::new(), Vec::new());
+    let mut memory = guaranteed.workspace::<5>();
+    let (mut plain_us, mut guaranteed_us) = (Vec::new(), Vec::new());
     let mut x = Vector4::zeros();
     for k in 0..GUARDED_SAMPLES {
         let wanted = [1.0, -0.5, 2.0, -2.0, 0.0][k / HOLD % 5];
@@ -137,13 +137,13 @@ pub fn time_guarded(clock: Clock<'_>) -> Result<GuardedTimes, StudyError> {
             black_box(plain.step(black_box(&x), &reference, &mut workspace));
             clock() - start
         }));
-        let (before, remembered) = (guarded.clone(), memory.clone());
+        let (before, remembered) = (guaranteed.clone(), memory.clone());
         let mut u = prepared.settings.u.lower;
-        guarded_us.push(shortest(|| {
-            guarded.clone_from(&before);
+        guaranteed_us.push(shortest(|| {
+            guaranteed.clone_from(&before);
             memory.clone_from(&remembered);
             let start = clock();
-            u = black_box(guarded.step(black_box(&x), wanted, &mut memory)).u;
+            u = black_box(guaranteed.step(black_box(&x), wanted, &mut memory)).u;
             clock() - start
         }));
         x = advance(&prepared.ballbot, &x, &u, settings.t_s, prepared.tolerances)?;
@@ -156,12 +156,12 @@ pub fn time_guarded(clock: Clock<'_>) -> Result<GuardedTimes, StudyError> {
     let far = |_: usize| prepared.ballbot.geometry.ball_angle(2.5);
     let descent = DescentTimes::of(&prepared, descent_settings, GUARDED_SAMPLES, near, clock)?;
     let far = DescentTimes::of(&prepared, descent_settings, HOLD, far, clock)?;
-    Ok(GuardedTimes {
+    Ok(GuaranteedTimes {
         plain_us: Times::new(plain_us),
         descent_us: descent.step,
         feedback_us: descent.feedback,
         far_descent_us: far.step,
-        guarded_us: Times::new(guarded_us),
+        guaranteed_us: Times::new(guaranteed_us),
     })
 }
 

@@ -32,7 +32,7 @@ pub struct Consistency<T> {
 
 impl<T: Scalar + Number> Ballbot<T> {
     /// Checks the parameters against mechanics for |theta| <= `tilt` (rad). From pi on, and for
-    /// what is no number, that is the whole circle.
+    /// NaN, that is the whole circle.
     pub fn consistency(&self, tilt: T) -> Consistency<T> {
         let tilt = if tilt.abs() < T::pi() { tilt } else { T::pi() };
         // k grows with |theta|, so |k| is extreme at the ends of the range or at a zero of k.

@@ -38,7 +38,7 @@
 #![no_std]
 #![allow(
     clippy::neg_cmp_op_on_partial_ord,
-    reason = "a comparison with a number that is not one must take the failing branch"
+    reason = "a comparison with NaN must take the failing branch"
 )]
 
 mod consistency;
@@ -66,8 +66,8 @@ pub use parameters::{Ballbot, Geometry, LinearParameters, limits};
 pub use plane_regulator::{PlaneFeedback, PlanePlanner, PlaneRegulator, plane_feedback};
 pub use regulator::{
     AnyPlanner, Belief, Controller, ControllerSettings, Estimator, EstimatorArrays,
-    EstimatorSettings, Guarded, GuardedController, GuardedSettings, GuardedWorkspace, Held,
-    OutputFeedback, Ramped, RampedSettings, Workspace,
+    EstimatorSettings, Guaranteed, GuaranteedController, GuaranteedSettings, GuaranteedWorkspace,
+    Held, OutputFeedback, Ramped, RampedSettings, Workspace,
 };
 pub use regulator_error::RegulatorError;
 pub use robot_regulator::{HEADING, MotorLimits, RobotRegulator, RobotState, YawLaw, plane_of};

@@ -2,8 +2,8 @@
 
 use crate::parameters::Ballbot;
 use crate::regulator::{
-    AnyPlanner, Belief, Controller, ControllerSettings, Estimator, EstimatorSettings, Guarded,
-    GuardedController, GuardedSettings, Held, OutputFeedback, Ramped, RampedSettings,
+    AnyPlanner, Belief, Controller, ControllerSettings, Estimator, EstimatorSettings, Guaranteed,
+    GuaranteedController, GuaranteedSettings, Held, OutputFeedback, Ramped, RampedSettings,
 };
 use crate::regulator_error::RegulatorError;
 use lpvmpc::{
@@ -27,7 +27,7 @@ pub enum PlanePlanner {
     /// In ramps: settings of the plant with the torque as fifth state.
     Ramped(RampedSettings<f64>),
     /// Held, with a guarantee for the measured state itself.
-    Guarded(GuardedSettings<f64>),
+    Guaranteed(GuaranteedSettings<f64>),
 }
 
 /// What stands around a plane's planner.
@@ -62,10 +62,10 @@ fn planner(
             let workspace = controller.workspace();
             AnyPlanner::Ramped(Ramped::allocate(controller), workspace)
         }
-        PlanePlanner::Guarded(settings) => {
-            let controller = GuardedController::allocate(*ballbot, *settings)?;
+        PlanePlanner::Guaranteed(settings) => {
+            let controller = GuaranteedController::allocate(*ballbot, *settings)?;
             let workspace = controller.workspace();
-            AnyPlanner::Guarded(Guarded::allocate(controller), workspace)
+            AnyPlanner::Guaranteed(Guaranteed::allocate(controller), workspace)
         }
     })
 }

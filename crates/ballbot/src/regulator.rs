@@ -11,14 +11,14 @@ pub type ControllerSettings<T> = lpvmpc::ControllerSettings<T, 4, 1, 3>;
 /// The program of a sample and the solver, which the controllers of both planes may share.
 pub type Workspace<T> = lpvmpc::Workspace<T, 4, 1>;
 
-/// The guarded controller of one plane.
-pub type GuardedController<T> = lpvmpc::GuardedController<Ballbot<T>, T, 4, 1, 3>;
+/// The guaranteed controller of one plane.
+pub type GuaranteedController<T> = lpvmpc::GuaranteedController<Ballbot<T>, T, 4, 1, 3>;
 
 /// Its settings.
-pub type GuardedSettings<T> = lpvmpc::GuardedSettings<T, 4, 1>;
+pub type GuaranteedSettings<T> = lpvmpc::GuaranteedSettings<T, 4, 1>;
 
 /// Its program and solver: the set point is a fifth state there.
-pub type GuardedWorkspace<T> = lpvmpc::GuardedWorkspace<T, 1, 5>;
+pub type GuaranteedWorkspace<T> = lpvmpc::GuaranteedWorkspace<T, 1, 5>;
 
 /// The controller's settings where the torque moves in ramps: it is a fifth state.
 pub type RampedSettings<T> = lpvmpc::ControllerSettings<T, 5, 1, 3>;
@@ -46,7 +46,7 @@ pub type Held<T> = lpvmpc::Held<Ballbot<T>, T, 4, 1, 3>;
 pub type Ramped<T> = lpvmpc::Ramped<Ballbot<T>, T, 4, 1, 3, 5>;
 
 /// The planner with a guarantee.
-pub type Guarded<T> = lpvmpc::Guarded<Ballbot<T>, T, 4, 1, 3, 5>;
+pub type Guaranteed<T> = lpvmpc::Guaranteed<Ballbot<T>, T, 4, 1, 3, 5>;
 
 /// Any of the three.
 pub type AnyPlanner<T> = lpvmpc::AnyPlanner<Ballbot<T>, T, 4, 1, 3, 5, 5>;

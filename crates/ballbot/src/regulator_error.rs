@@ -1,7 +1,7 @@
 //! What can be wrong with a regulator.
 
 use core::fmt;
-use lpvmpc::{ControllerError, EstimatorError, GuardedError};
+use lpvmpc::{ControllerError, EstimatorError, GuaranteedError};
 
 /// A regulator refuses its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,8 +10,8 @@ pub enum RegulatorError {
     Estimator(EstimatorError),
     /// The controller does.
     Controller(ControllerError),
-    /// The guarded controller does.
-    Guarded(GuardedError),
+    /// The guaranteed controller does.
+    Guaranteed(GuaranteedError),
 }
 
 impl fmt::Display for RegulatorError {
@@ -19,7 +19,7 @@ impl fmt::Display for RegulatorError {
         match self {
             Self::Estimator(error) => write!(f, "estimator: {error}"),
             Self::Controller(error) => write!(f, "controller: {error}"),
-            Self::Guarded(error) => write!(f, "guarded controller: {error}"),
+            Self::Guaranteed(error) => write!(f, "guaranteed controller: {error}"),
         }
     }
 }
@@ -38,8 +38,8 @@ impl From<ControllerError> for RegulatorError {
     }
 }
 
-impl From<GuardedError> for RegulatorError {
-    fn from(error: GuardedError) -> Self {
-        Self::Guarded(error)
+impl From<GuaranteedError> for RegulatorError {
+    fn from(error: GuaranteedError) -> Self {
+        Self::Guaranteed(error)
     }
 }

@@ -220,7 +220,7 @@ impl<T: Scalar + Number, K: Planner<T, 4, 1>> Regulator<T, 10, 3, 10> for RobotR
                 .fold(Status::Solved, worse),
             active_bounds: commands().map(|command| command.active_bounds).sum(),
             gap,
-            guard: commands().find_map(|command| command.guard),
+            guarantee: commands().find_map(|command| command.guarantee),
         }
     }
 

@@ -61,7 +61,7 @@ impl<T: Scalar> PlaneTorques<T> {
     pub fn need(plan: impl IntoIterator<Item = T>, bound: T) -> T {
         let largest = |most: T, torque: T| most.max(torque.abs());
         let most = plan.into_iter().fold(T::zero(), largest);
-        // Negated, so that a plan that is not a number counts as cut off.
+        // Negated, so that a plan that is NaN counts as cut off.
         if !(most < bound * convert(1.0 - 1e-3)) {
             convert(f64::INFINITY)
         } else {

@@ -59,4 +59,4 @@ pub use closed_loop::{Limits, PlaneRun, Reference, closed_loop, motor_torques};
 pub use figure::{Band, Dash, Figure, FigureError, Panel, Role, Scale, Series, Style};
 pub use models::{ModelRuns, convergence, models};
 pub use planes::{PathRun, path_in_plane, two_planes};
-pub use plans::{GuardRun, PlansRun, plans};
+pub use plans::{GuaranteeRun, PlansRun, plans};

@@ -13,12 +13,12 @@ pub struct PlansRun<'a> {
     /// rad and rad/s.
     pub gap: &'a [[f64; 4]],
     /// Of a run with a guarantee.
-    pub guard: Option<GuardRun<'a>>,
+    pub guarantee: Option<GuaranteeRun<'a>>,
 }
 
 /// What a guarantee rests on at each instant.
 #[derive(Clone, Copy, Debug)]
-pub struct GuardRun<'a> {
+pub struct GuaranteeRun<'a> {
     /// Artificial set point, rad.
     pub set_points: &'a [f64],
     /// Wanted set point, rad.
@@ -39,8 +39,8 @@ pub fn plans(title: &str, run: &PlansRun<'_>) -> Option<Figure> {
     // Negated, so that a gap that is NaN is shown, too.
     let differs = gaps.any(|gap| !(gap.abs() <= NO_GAP));
     let mut panels: Vec<Panel> = differs.then(|| gap_panel(run)).into_iter().collect();
-    if let Some(guard) = &run.guard {
-        panels.extend(guard_panels(run.time, guard));
+    if let Some(guarantee) = &run.guarantee {
+        panels.extend(guarantee_panels(run.time, guarantee));
     }
     share_horizontal_view(&mut panels);
     (!panels.is_empty()).then(|| Figure {
@@ -80,16 +80,26 @@ fn gap_panel(run: &PlansRun<'_>) -> Panel {
     panel
 }
 
-fn guard_panels(time: &[f64], guard: &GuardRun<'_>) -> [Panel; 2] {
+fn guarantee_panels(time: &[f64], guarantee: &GuaranteeRun<'_>) -> [Panel; 2] {
     let steps = |label: &str, values: &[f64], dash: Dash, role: Role| {
         Series::new(label, time, values, Style::Steps(dash), role)
     };
     let aims = vec![
-        steps("artificial", guard.set_points, Dash::Solid, Role::Nonlinear),
-        steps(REFERENCE_LABEL, guard.wanted, Dash::Dashed, Role::Reference),
+        steps(
+            "artificial",
+            guarantee.set_points,
+            Dash::Solid,
+            Role::Nonlinear,
+        ),
+        steps(
+            REFERENCE_LABEL,
+            guarantee.wanted,
+            Dash::Dashed,
+            Role::Reference,
+        ),
     ];
     let label = "1 new plan, 2 candidate, 3 terminal law, 4 soft bounds, 5 saturated LQR";
-    let backed = steps(label, guard.decisions, Dash::Solid, Role::Member(1));
+    let backed = steps(label, guarantee.decisions, Dash::Solid, Role::Member(1));
     let mut backed = Panel::new(TIME_LABEL, "backed by", vec![backed]);
     backed.y_range = Some((0.5, 5.5));
     [Panel::new(TIME_LABEL, "set point [rad]", aims), backed]

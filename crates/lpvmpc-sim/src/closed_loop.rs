@@ -3,8 +3,8 @@
 use crate::plant::{Plant, PlantError, Tolerances, Unloaded};
 use crate::world::{World, WorldError};
 use lpvmpc::{
-    BoundId, Bounds, Controller, Guard, LpvModel, Observation, Reading, Regulator, StateFeedback,
-    Status,
+    BoundId, Bounds, Controller, Guarantee, LpvModel, Observation, Reading, Regulator,
+    StateFeedback, Status,
 };
 use nalgebra::SVector;
 use std::time::Duration;
@@ -32,8 +32,8 @@ pub struct Sample<const NX: usize, const NU: usize> {
     pub step_time: Duration,
     /// Nonlinear rollout minus prediction at the end of the horizon, in state units.
     pub gap: SVector<f64, NX>,
-    /// What only a guarded controller knows.
-    pub guard: Option<Guard<f64>>,
+    /// What only a guaranteed controller knows.
+    pub guarantee: Option<Guarantee<f64>>,
 }
 
 /// How a run ended.
@@ -197,10 +197,10 @@ where
         let step_time = clock().saturating_sub(before);
         let cost = self.regulator.cost();
         let status = command.status;
-        // A guarded controller has an answer whatever its quadratic program said.
-        let guarded = command.guard.is_some();
+        // A guaranteed controller has an answer whatever its quadratic program said.
+        let guaranteed = command.guarantee.is_some();
         let usable = match self.without_plan {
-            OnInfeasible::End => guarded || status.is_solved(),
+            OnInfeasible::End => guaranteed || status.is_solved(),
             OnInfeasible::Apply => status != Status::NotFinite,
         };
         if !usable {
@@ -227,7 +227,7 @@ where
             active_bounds: command.active_bounds,
             step_time,
             gap: command.gap,
-            guard: command.guard,
+            guarantee: command.guarantee,
         })
     }
 

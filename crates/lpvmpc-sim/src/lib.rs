@@ -42,7 +42,7 @@
 mod actuator;
 pub mod closed_loop;
 mod disturbance;
-mod guarded_loop;
+mod guaranteed_loop;
 pub mod plant;
 mod random;
 mod sensor;
@@ -54,7 +54,7 @@ pub use closed_loop::{
     Trajectory, record, run,
 };
 pub use disturbance::Disturbance;
-pub use guarded_loop::{Actuation, GuardedLoop};
+pub use guaranteed_loop::{Actuation, GuaranteedLoop};
 pub use plant::{Plant, PlantError, Tolerances, Unloaded, advance};
 pub use random::Random;
 pub use sensor::Sensor;

@@ -1,6 +1,6 @@
 //! The problem as a sparse quadratic program in inputs and states.
 
-use lpvmpc::{Bounds, Ocp, Penalty, Softness};
+use lpvmpc::{Bounds, Ocp, Penalty, SoftBounds};
 use nalgebra::{SMatrix, SVector};
 
 /// A matrix in compressed columns, rows ascending within a column.
@@ -180,7 +180,7 @@ impl Draft {
         &mut self,
         variable: usize,
         bounds: &Bounds<f64, K>,
-        soft: &Softness<f64, K>,
+        soft: &SoftBounds<f64, K>,
     ) {
         let limits = bounds.lower.iter().zip(&bounds.upper);
         for (j, ((lower, upper), price)) in limits.zip(soft).enumerate() {

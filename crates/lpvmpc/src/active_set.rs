@@ -101,7 +101,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         let mut worst: Option<Candidate<T>> = None;
         let mut least = -T::one();
         rows::violated_bounds(ocp, trajectory, &mut |candidate| {
-            // Negated, so that a violation that is not a number counts; it stays the worst.
+            // Negated, so that a violation that is NaN counts; it stays the worst.
             if worst.is_none_or(|worst| worst.slack.is_finite())
                 && !(candidate.violation <= self.tolerance)
                 && !(candidate.rank <= least)

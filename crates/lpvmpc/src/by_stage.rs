@@ -7,7 +7,7 @@ use crate::at_stage::AtStage;
 use crate::controller::next_state;
 use crate::descent::Along;
 use crate::model::{LpvModel, Scalar};
-use crate::ocp::{Bounds, GeneralRow, Softness};
+use crate::ocp::{Bounds, GeneralRow, SoftBounds};
 use crate::preview::Preview;
 use crate::settings::{ControllerSettings, Scheduling, TerminalIngredient, Weights};
 use crate::steady_state::{SteadyState, SteadyStateProblem};
@@ -34,7 +34,7 @@ pub(crate) trait CostByStage<T: Scalar, const NX: usize, const NU: usize>: Copy 
     fn x(&self, _i: usize) -> Option<&Bounds<T, NX>> {
         None
     }
-    fn soft_x(&self, _i: usize) -> Option<&Softness<T, NX>> {
+    fn soft_x(&self, _i: usize) -> Option<&SoftBounds<T, NX>> {
         None
     }
     fn u(&self, _i: usize) -> Option<&Bounds<T, NU>> {
@@ -214,7 +214,7 @@ impl<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize> CostByStag
     fn x(&self, i: usize) -> Option<&Bounds<T, NX>> {
         entry(self.preview.x, i)
     }
-    fn soft_x(&self, i: usize) -> Option<&Softness<T, NX>> {
+    fn soft_x(&self, i: usize) -> Option<&SoftBounds<T, NX>> {
         entry(self.preview.soft_x, i)
     }
     fn u(&self, i: usize) -> Option<&Bounds<T, NU>> {

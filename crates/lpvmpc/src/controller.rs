@@ -2,7 +2,6 @@
 
 use crate::by_stage::{CostByStage, PlantByStage};
 use crate::changes::FixedRows;
-use crate::kernel::product;
 use crate::list::List;
 use crate::memory::ControllerMemory;
 use crate::model::{LpvModel, Scalar};
@@ -14,6 +13,7 @@ use crate::settings::{
     ControllerError, ControllerSettings, InputReference, Iterations, TerminalIngredient, Weights,
     check,
 };
+use crate::small_matrix::product;
 use crate::solution::{Solution, Status};
 use crate::solver::{SolverSettings, WarmStart};
 use crate::steady_state::{SteadyState, SteadyStateProblem};
@@ -92,19 +92,24 @@ where
         settings: ControllerSettings<T, NX, NU, NS>,
         memory: ControllerMemory<T, NX, NU>,
     ) -> Result<Self, ControllerError> {
-        let ControllerMemory { x, u, gain, active } = memory;
+        let ControllerMemory {
+            x,
+            u,
+            feedback,
+            active,
+        } = memory;
         let places = x.iter().map(|list| list.len());
         let places = places.chain(u.iter().map(|list| list.len()));
-        check(&settings, places.fold(gain.len(), usize::min))?;
+        check(&settings, places.fold(feedback.len(), usize::min))?;
         let horizon = settings.horizon;
         let [rollout, x] = x.map(|list| list.shortened(horizon));
         let [planned, u] = u.map(|list| list.shortened(horizon));
-        let gain = gain.shortened(horizon);
+        let feedback = feedback.shortened(horizon);
         Ok(Self {
             model,
             settings,
             rollout,
-            policy: Policy::new(planned, gain),
+            policy: Policy::new(planned, feedback),
             gap: SVector::zeros(),
             initialised: false,
             problems: 0,

@@ -1,6 +1,6 @@
 //! A sample as a descent: each quadratic program is an improvement or is not taken.
 //!
-//! A plan is a policy (inputs, states, gains) that is rolled out on the nonlinear model, so that it
+//! A plan is a policy (inputs, states, feedback matrices) that is rolled out on the nonlinear model, so that it
 //! stays together on an unstable plant. Its merit is the cost J of that rollout, the exact penalty
 //! of the state bounds included. A quadratic program along the plan proposes another one, and the
 //! plan is moved towards it as far as the merit falls: a line search (Nocedal and Wright, Numerical
@@ -16,11 +16,11 @@
 
 use crate::by_stage::{CostByStage, PlantByStage};
 use crate::controller::{Controller, next_state};
-use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
 use crate::plan::{Aim, Merit, Prices, Trial, at};
 use crate::policy::input_at;
 use crate::settings::{ControllerSettings, TerminalIngredient};
+use crate::small_matrix::product;
 use crate::solution::Status;
 use crate::solver::{SolverSettings, WarmStart};
 use crate::two_parts::Answered;
@@ -107,18 +107,18 @@ where
         // Programs in a row that have brought nothing.
         let mut failures = 0;
         // The longest step that is tried along the embedding. It has no damping to shorten its answers.
-        let mut reach = T::one();
+        let mut longest_step = T::one();
         while self.problems < self.settings.iterations.most() {
             self.linearize_plan(x, aim, along, workspace);
             self.solve_program(workspace);
             let longest = match along {
-                Along::Scheduling => reach,
+                Along::Scheduling => longest_step,
                 Along::Jacobian => T::one(),
             };
             let outcome = self.improve(x, aim, (tolerance, longest), &mut prices, workspace);
             if let (Along::Scheduling, Outcome::Moved { step, .. }) = (along, &outcome) {
                 // A longer one only after one that was not shortened.
-                reach = if *step < longest {
+                longest_step = if *step < longest {
                     *step
                 } else {
                     *step * convert(LONGER)
@@ -231,15 +231,15 @@ where
             .solver
             .solve(&workspace.ocp, &settings, &mut self.solution);
         self.problems += 1;
-        self.take_gains(workspace);
+        self.take_feedback(workspace);
     }
 
-    /// The plan is followed with the gains of the last program.
-    pub(crate) fn take_gains(&mut self, workspace: &Workspace<T, NX, NU>) {
+    /// The plan is followed with the feedback of the last program.
+    pub(crate) fn take_feedback(&mut self, workspace: &Workspace<T, NX, NU>) {
         if self.solution.status.is_solved() {
             let factors = workspace.solver.factors();
-            for (gain, factor) in self.policy.gain.iter_mut().zip(factors) {
-                *gain = factor.gain;
+            for (feedback, factor) in self.policy.feedback.iter_mut().zip(factors) {
+                *feedback = factor.feedback;
             }
         }
     }
@@ -326,7 +326,7 @@ where
                 let u_plan = at(&policy.u, i);
                 let u = u_plan + (u_answer - u_plan) * step;
                 let bounds = merit.aim.own.u(i).unwrap_or(&self.settings.u);
-                input_at(x_i, (&planned, &u), &at(&policy.gain, i), bounds)
+                input_at(x_i, (&planned, &u), &at(&policy.feedback, i), bounds)
             });
             if let Some(cost) = cost
                 && cost < policy.cost

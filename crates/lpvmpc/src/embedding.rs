@@ -1,8 +1,8 @@
 //! A plant written once, for every kind of number.
 
-use crate::kernel::product;
 use crate::model::{LpvModel, Scalar};
 use crate::number::{Dual, Number};
+use crate::small_matrix::product;
 use crate::steady_state::{self, SteadyState, SteadyStateProblem};
 use nalgebra::{SMatrix, SVector};
 

@@ -277,7 +277,7 @@ where
     /// Moves the estimate on by `duration` s under the inputs of `line`.
     fn elapse(&mut self, duration: T, line: &mut DelayLine<T, NU>) {
         self.silence += duration;
-        // Negated, so that a time that is not a number is too long.
+        // Negated, so that a time that is NaN is too long.
         if self.lost.is_none() && !(self.silence <= self.settings.gate.longest_gap) {
             self.lost = Some(Restart::Gap);
         }

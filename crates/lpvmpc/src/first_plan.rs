@@ -41,7 +41,7 @@ where
                 let policy = &self.policy;
                 let planned = (&at(&self.rollout, i), &at(&policy.u, i));
                 let bounds = aim.own.u(i).unwrap_or(&self.settings.u);
-                input_at(x, planned, &at(&policy.gain, i), bounds)
+                input_at(x, planned, &at(&policy.feedback, i), bounds)
             });
             self.take_if_some(best, &workspace.trial);
         }
@@ -61,7 +61,7 @@ where
         mut best: Option<T>,
         workspace: &mut Workspace<T, NX, NU>,
     ) -> Option<T> {
-        let (gain, indifferent) = self.regulator(aim, &workspace.ocp);
+        let (feedback, indifferent) = self.regulator(aim, &workspace.ocp);
         let away = (x - aim.end()).component_mul(&indifferent);
         let merit = self.merit(aim, Prices::none());
         for part in PARTS {
@@ -69,14 +69,14 @@ where
             let most = best.unwrap_or(convert(f64::INFINITY));
             let cost = self.roll_out_plan(x, &merit, most, &mut workspace.trial, &|i, x| {
                 let bounds = aim.own.u(i).unwrap_or(&self.settings.u);
-                input_at(x, (&x_aim, aim.u_ref(i)), &gain, bounds)
+                input_at(x, (&x_aim, aim.u_ref(i)), &feedback, bounds)
             });
             if let Some(found) = cost
                 && best.is_none_or(|best| found < best)
             {
                 best = cost;
                 self.take_if_some(cost, &workspace.trial);
-                self.policy.gain.fill(gain);
+                self.policy.feedback.fill(feedback);
                 self.policy.damping = T::zero();
                 self.policy.far = true;
             }
@@ -87,7 +87,7 @@ where
         best
     }
 
-    /// The gain of the regulator at the end of the reference (u = u_ref + K (x - x_ref)), that of the
+    /// The feedback matrix of the regulator at the end of the reference (u = u_ref + K (x - x_ref)), that of the
     /// first of many equal stages with the weights of `ocp`; and 1 for each state whose value is all the
     /// same to the plant (the position, as a rule), 0 for the others.
     fn regulator<D: PlantByStage<P, T, NX, NU, NS>>(
@@ -123,20 +123,20 @@ where
                 return (SMatrix::zeros(), indifferent);
             }
         }
-        (factor.gain, indifferent)
+        (factor.feedback, indifferent)
     }
 
     /// The plan one sample on; its last stage is the regulator's.
     fn shift<D: PlantByStage<P, T, NX, NU, NS>>(&mut self, aim: &Aim<'_, T, NX, NU, D>) {
         let last = self.last_stage();
-        let gain = at(&self.policy.gain, last);
+        let feedback = at(&self.policy.feedback, last);
         let planned = (aim.end(), aim.u_ref(last));
         let end = at(&self.rollout, last);
         let bounds = aim.own.u(last).unwrap_or(&self.settings.u);
-        let u = input_at(&end, planned, &gain, bounds);
+        let u = input_at(&end, planned, &feedback, bounds);
         // What comes in from beyond the horizon is overwritten.
         move_on(&mut self.policy.u, last, u);
-        move_on(&mut self.policy.gain, last, gain);
+        move_on(&mut self.policy.feedback, last, feedback);
     }
 }
 

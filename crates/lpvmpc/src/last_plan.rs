@@ -20,7 +20,7 @@ where
         let horizon = previous.settings.horizon;
         let states = previous.rollout.get(..horizon).unwrap_or_default();
         let inputs = previous.solution.u.get(..horizon).unwrap_or_default();
-        let gains = previous.policy.gain.get(..horizon).unwrap_or_default();
+        let matrices = previous.policy.feedback.get(..horizon).unwrap_or_default();
         let (Some(mut x), Some(mut u)) = (states.first().copied(), inputs.first().copied()) else {
             return;
         };
@@ -33,13 +33,13 @@ where
                 Some(x) => *x,
                 None => next_state(&self.model, &self.settings, &x, &u),
             };
-            let gain = gains.get(i).copied().unwrap_or_else(SMatrix::zeros);
+            let feedback = matrices.get(i).copied().unwrap_or_else(SMatrix::zeros);
             let places = (self.rollout.get_mut(i), self.solution.u.get_mut(i));
             if let (Some(place_x), Some(place_u)) = places {
                 (*place_x, *place_u) = (x, u);
             }
-            if let Some(place) = self.policy.gain.get_mut(i) {
-                *place = gain;
+            if let Some(place) = self.policy.feedback.get_mut(i) {
+                *place = feedback;
             }
         }
         // Rows that do not fit are found again.

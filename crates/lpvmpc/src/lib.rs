@@ -40,7 +40,7 @@
 //! | a controller, on the heap or in lent memory | [`Controller`], [`ControllerSettings`], [`ControllerArrays`] |
 //! | weights, bounds, rows, disturbances, scheduling or models that are known ahead | [`Preview`], [`Controller::step_with`] |
 //! | what changes while it runs | [`Controller::set_settings`], [`Controller::set_rows`], [`Controller::set_model`] |
-//! | one with a guarantee | [`GuardedController`] |
+//! | one with a guarantee | [`GuaranteedController`] |
 //! | all that stands between sensors and actuators | [`OutputFeedback`], [`Regulator`], [`Estimator`] |
 //! | a linear-quadratic program with stages by itself | [`Ocp`], [`Solver`], [`kkt_residual`] |
 //!
@@ -50,7 +50,7 @@
 #![no_std]
 #![allow(
     clippy::neg_cmp_op_on_partial_ord,
-    reason = "a comparison with a number that is not one must take the failing branch"
+    reason = "a comparison with NaN must take the failing branch"
 )]
 
 #[cfg(feature = "alloc")]
@@ -69,9 +69,8 @@ mod embedding;
 mod estimator;
 mod farkas;
 mod first_plan;
-mod guarded;
+mod guaranteed;
 mod held_inputs;
-mod kernel;
 mod kkt;
 mod last_plan;
 mod list;
@@ -88,9 +87,10 @@ mod regulator;
 pub mod riccati;
 mod rows;
 mod settings;
-mod settle;
 mod shaping;
+mod small_matrix;
 mod solution;
+mod solve_working_set;
 mod solver;
 mod steady_state;
 mod step_with;
@@ -107,10 +107,11 @@ pub use estimator::{
     Gate, Observation, Reading, Restart, Verdict,
 };
 pub use farkas::infeasibility_margin;
-pub use guarded::{
-    Decision, GuardedArrays, GuardedController, GuardedError, GuardedIterations, GuardedMemory,
-    GuardedSettings, GuardedStep, GuardedWorkspace, GuardedWorkspaceArrays, GuardedWorkspaceMemory,
-    Rollout, SetPoints, TerminalSet, share_of_bounds,
+pub use guaranteed::{
+    Decision, GuaranteedArrays, GuaranteedController, GuaranteedError, GuaranteedIterations,
+    GuaranteedMemory, GuaranteedSettings, GuaranteedStep, GuaranteedWorkspace,
+    GuaranteedWorkspaceArrays, GuaranteedWorkspaceMemory, Rollout, SetPoints, TerminalSet,
+    share_of_bounds,
 };
 pub use kkt::{KktResidual, kkt_residual};
 pub use list::List;
@@ -120,17 +121,17 @@ pub use memory::{
 };
 pub use model::{LpvModel, Scalar};
 pub use number::{Dual, Elementary, Number};
-pub use ocp::{Bounds, Common, GeneralRow, Ocp, Penalty, Softness, Stage, Terminal};
+pub use ocp::{Bounds, Common, GeneralRow, Ocp, Penalty, SoftBounds, Stage, Terminal};
 pub use predictor::{Predictor, Rk4};
 pub use preview::{Preview, PreviewError, PreviewMistake, PreviewPart};
 pub use ramp::RampedInput;
 pub use regulator::{
-    AnyPlanner, Belief, Command, FeedbackArrays, FeedbackMemory, FeedbackSettings, Guard, Guarded,
-    GuardedPlannerMemory, Held, MeasuredState, Measurement, OutputFeedback, Planned, Planner,
-    Ramped, Regulator, Standalone,
+    AnyPlanner, Belief, Command, FeedbackArrays, FeedbackMemory, FeedbackSettings, Guarantee,
+    Guaranteed, GuaranteedPlannerMemory, Held, MeasuredState, Measurement, OutputFeedback, Planned,
+    Planner, Ramped, Regulator, Standalone,
 };
 #[cfg(feature = "alloc")]
-pub use regulator::{GuardedFeedback, StateFeedback};
+pub use regulator::{GuaranteedFeedback, StateFeedback};
 pub use settings::{
     ControllerError, ControllerSettings, InputReference, Iterations, Scheduling,
     TerminalIngredient, Weights, exact_prices,

@@ -285,7 +285,7 @@ pub struct ControllerMemory<T: 'static, const NX: usize, const NU: usize> {
     /// Inputs of both.
     pub(crate) u: [List<SVector<T, NU>>; 2],
     /// Gains of the plan, one for each stage.
-    pub(crate) gain: List<SMatrix<T, NU, NX>>,
+    pub(crate) feedback: List<SMatrix<T, NU, NX>>,
     /// Active bounds.
     pub(crate) active: List<PackedRow<T>>,
 }
@@ -297,7 +297,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ControllerMemory<T, NX, NU> {
         Self {
             x: core::array::from_fn(|_| List::repeat(SVector::zeros(), stages)),
             u: core::array::from_fn(|_| List::repeat(SVector::zeros(), stages)),
-            gain: List::repeat(SMatrix::zeros(), stages),
+            feedback: List::repeat(SMatrix::zeros(), stages),
             active: List::repeat(PackedRow::empty(), active),
         }
     }
@@ -308,7 +308,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ControllerMemory<T, NX, NU> {
 pub struct ControllerArrays<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
     x: [[SVector<T, NX>; N]; 2],
     u: [[SVector<T, NU>; N]; 2],
-    gain: [SMatrix<T, NU, NX>; N],
+    feedback: [SMatrix<T, NU, NX>; N],
     active: [PackedRow<T>; M],
 }
 
@@ -320,7 +320,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         ControllerMemory {
             x: self.x.each_mut().map(|list| List::Static(list)),
             u: self.u.each_mut().map(|list| List::Static(list)),
-            gain: List::Static(&mut self.gain),
+            feedback: List::Static(&mut self.feedback),
             active: List::Static(&mut self.active),
         }
     }
@@ -334,7 +334,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         Self {
             x: [[SVector::zeros(); N]; 2],
             u: [[SVector::zeros(); N]; 2],
-            gain: [SMatrix::zeros(); N],
+            feedback: [SMatrix::zeros(); N],
             active: [PackedRow::empty(); M],
         }
     }

@@ -1,6 +1,6 @@
 //! What a plant must offer: a linear model whose matrices depend on a scheduling vector.
 
-use crate::kernel::product;
+use crate::small_matrix::product;
 use crate::steady_state::{self, SteadyState, SteadyStateProblem};
 use nalgebra::{RealField, SMatrix, SVector, convert};
 

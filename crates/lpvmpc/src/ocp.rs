@@ -35,7 +35,7 @@ pub struct Bounds<T, const K: usize> {
 
 /// For each of `K` bounded quantities: `None`, the bounds are hard; `Some`, either of them may
 /// be exceeded at this price.
-pub type Softness<T, const K: usize> = [Option<Penalty<T>>; K];
+pub type SoftBounds<T, const K: usize> = [Option<Penalty<T>>; K];
 
 impl<T: Scalar, const K: usize> Bounds<T, K> {
     /// No bounds at all.
@@ -124,7 +124,7 @@ pub struct Common<T, const NX: usize, const NU: usize> {
     /// Bounds on the state.
     pub x: Bounds<T, NX>,
     /// Which of them are soft.
-    pub soft_x: Softness<T, NX>,
+    pub soft_x: SoftBounds<T, NX>,
     /// Bounds on the input, always hard.
     pub u: Bounds<T, NU>,
 }
@@ -155,7 +155,7 @@ pub struct Terminal<T, const NX: usize> {
     /// Bounds on the terminal state.
     pub x: Bounds<T, NX>,
     /// Which of them are soft.
-    pub soft_x: Softness<T, NX>,
+    pub soft_x: SoftBounds<T, NX>,
     /// The terminal state that must be reached exactly, if any (eq. (9) of the paper).
     pub equality: Option<SVector<T, NX>>,
 }

@@ -2,11 +2,11 @@
 
 use crate::by_stage::CostByStage;
 use crate::controller::Reference;
-use crate::kernel::product;
 use crate::list::List;
 use crate::model::Scalar;
-use crate::ocp::{Bounds, Softness};
+use crate::ocp::{Bounds, SoftBounds};
 use crate::settings::{ControllerSettings, TerminalIngredient, Weights};
+use crate::small_matrix::product;
 use crate::solution::{ActiveSet, Quantity, Side};
 use crate::solver::{excess, price};
 use nalgebra::{SMatrix, SVector, convert};
@@ -55,7 +55,7 @@ pub(crate) struct Policy<T: 'static, const NX: usize, const NU: usize> {
     /// u_0 to u_{N-1}.
     pub u: List<SVector<T, NU>>,
     /// K_0 to K_{N-1}.
-    pub gain: List<SMatrix<T, NU, NX>>,
+    pub feedback: List<SMatrix<T, NU, NX>>,
     /// The merit of the plan.
     pub cost: T,
     /// Extra cost of (u - u_i)^2 in the next program along the plan.
@@ -66,10 +66,10 @@ pub(crate) struct Policy<T: 'static, const NX: usize, const NU: usize> {
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> Policy<T, NX, NU> {
-    pub fn new(u: List<SVector<T, NU>>, gain: List<SMatrix<T, NU, NX>>) -> Self {
+    pub fn new(u: List<SVector<T, NU>>, feedback: List<SMatrix<T, NU, NX>>) -> Self {
         Self {
             u,
-            gain,
+            feedback,
             cost: T::zero(),
             damping: T::zero(),
             far: true,
@@ -137,7 +137,7 @@ pub(crate) struct Merit<'a, T, const NX: usize, const NU: usize, D> {
     weights: Weights<T, NX, NU>,
     terminal: TerminalIngredient<T, NX>,
     bounds: Bounds<T, NX>,
-    soft: Softness<T, NX>,
+    soft: SoftBounds<T, NX>,
     horizon: usize,
     pub aim: &'a Aim<'a, T, NX, NU, D>,
     prices: Prices<T, NX>,

@@ -5,8 +5,8 @@
 //! matrices (lines 2 to 8 of Algorithm 1); with the scheduling read off the state it is the
 //! nonlinear map of the rollout (eq. (5), step 4 of Algorithm 2).
 
-use crate::kernel::{add_product, add_scaled, product, scale};
 use crate::model::{LpvModel, Scalar};
+use crate::small_matrix::{add_product, add_scaled, product, scale};
 use nalgebra::{SMatrix, SVector, convert};
 
 /// How a sample of the model becomes a pair of matrices. Each kind carries the Runge-Kutta steps

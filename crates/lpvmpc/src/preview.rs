@@ -4,7 +4,7 @@
 use crate::by_stage::entry;
 use crate::controller::Reference;
 use crate::model::Scalar;
-use crate::ocp::{Bounds, GeneralRow, Penalty, Softness};
+use crate::ocp::{Bounds, GeneralRow, Penalty, SoftBounds};
 use crate::settings::{ControllerError, TerminalIngredient, Weights, check_bounds, check_weight};
 use core::fmt;
 use nalgebra::{SVector, Vector1};
@@ -42,7 +42,7 @@ pub struct Preview<'a, P, T, const NX: usize, const NU: usize, const NS: usize> 
     /// Bounds of x_0 to x_N. The present state x_0 is given: its entry counts nothing.
     pub x: &'a [Bounds<T, NX>],
     /// Which of them may be exceeded, and at what price in the unit of the cost J.
-    pub soft_x: &'a [Softness<T, NX>],
+    pub soft_x: &'a [SoftBounds<T, NX>],
     /// Bounds of u_0 to u_{N-1}, always hard.
     pub u: &'a [Bounds<T, NU>],
     /// General rows lower <= x'x_i + u'u_i <= upper of the stages 0 to N, any number of them at each;

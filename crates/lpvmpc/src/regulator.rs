@@ -16,7 +16,7 @@ mod any_planner;
 mod belief;
 #[cfg(feature = "alloc")]
 mod direct;
-mod guarded;
+mod guaranteed;
 mod held;
 mod measured;
 mod output_feedback;
@@ -26,14 +26,14 @@ mod standalone;
 mod window;
 
 use crate::estimator::{Observation, Reading};
-use crate::guarded::Decision;
+use crate::guaranteed::Decision;
 use crate::model::Scalar;
 use crate::solution::{BoundId, Status};
 pub use any_planner::AnyPlanner;
 pub use belief::Belief;
 #[cfg(feature = "alloc")]
-pub use direct::{GuardedFeedback, StateFeedback};
-pub use guarded::{Guarded, GuardedPlannerMemory};
+pub use direct::{GuaranteedFeedback, StateFeedback};
+pub use guaranteed::{Guaranteed, GuaranteedPlannerMemory};
 pub use held::Held;
 pub use measured::MeasuredState;
 use nalgebra::SVector;
@@ -67,13 +67,13 @@ pub struct Command<T, const NX: usize, const NU: usize> {
     pub active_bounds: usize,
     /// Nonlinear rollout minus prediction at the end of the horizon, in state units.
     pub gap: SVector<T, NX>,
-    /// What only a guarded controller knows.
-    pub guard: Option<Guard<T>>,
+    /// What only a guaranteed controller knows.
+    pub guarantee: Option<Guarantee<T>>,
 }
 
-/// What a guarded controller says of a sample besides its plan.
+/// What a guaranteed controller says of a sample besides its plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Guard<T> {
+pub struct Guarantee<T> {
     /// What the input is backed by.
     pub decision: Decision,
     /// The artificial set point z: the plan ends at z times the direction of the set points.

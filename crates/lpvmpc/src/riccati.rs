@@ -6,9 +6,9 @@
 //! v = L'(u - K x - k), the whole cost becomes `constant + sum |v_i|^2 / 2`: the horizon's
 //! Hessian is the identity, and a bound is a plain linear row in v.
 
-use crate::kernel::{add_product, product, transposed_product};
 use crate::model::Scalar;
 use crate::ocp::{Common, Stage};
+use crate::small_matrix::{add_product, product, transposed_product};
 use nalgebra::{SMatrix, SVector, convert};
 
 /// Cost-to-go x'Px/2 + p'x.
@@ -24,8 +24,8 @@ pub struct CostToGo<T, const NX: usize> {
 /// under it, x+ = (A + BK) x + B L^-T v + (c + B k).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StageFactor<T, const NX: usize, const NU: usize> {
-    /// Feedback K, `NU` x `NX`.
-    pub gain: SMatrix<T, NU, NX>,
+    /// Feedback K, `NU` x `NX`, with the sign of u = K x; gains are for u = -K x throughout.
+    pub feedback: SMatrix<T, NU, NX>,
     /// Feedforward k, `NU`.
     pub feedforward: SVector<T, NU>,
     /// L^-1, `NU` x `NU`, lower triangular.
@@ -46,7 +46,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     /// The factor of a stage that does nothing, to fill a workspace with.
     pub fn zeros() -> Self {
         Self {
-            gain: SMatrix::zeros(),
+            feedback: SMatrix::zeros(),
             feedforward: SVector::zeros(),
             inverse_factor: SMatrix::zeros(),
             closed_loop: SMatrix::zeros(),
@@ -83,7 +83,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         let l_g_x = product(&inverse, &g_x);
         let scaled_g_x = scaled_rows(&l_g_x, &reciprocals);
         let scaled_g = scaled_rows(&product(&inverse, &g), &reciprocals);
-        self.gain = -transposed_product(&inverse, &scaled_g_x);
+        self.feedback = -transposed_product(&inverse, &scaled_g_x);
         self.feedforward = -transposed_product(&inverse, &scaled_g);
 
         // A'P(A + BK) + Q + S'K, and the same for the linear part.
@@ -94,7 +94,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
             stage.linear_x + transposed_product(a, &p_next) - transposed_product(&l_g_x, &scaled_g);
 
         self.inverse_factor = scaled_rows(&inverse, &reciprocals.map(|d| d.sqrt()));
-        self.closed_loop = a + product(b, &self.gain);
+        self.closed_loop = a + product(b, &self.feedback);
         self.input = product(b, &self.inverse_factor.transpose());
         self.drift = c + product(b, &self.feedforward);
         Ok(())
@@ -104,7 +104,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     #[inline(always)]
     pub fn policy(&self, x: &SVector<T, NX>, v: &SVector<T, NU>) -> SVector<T, NU> {
         let mut u = self.feedforward;
-        add_product(&mut u, &self.gain, x);
+        add_product(&mut u, &self.feedback, x);
         u += transposed_product(&self.inverse_factor, v);
         u
     }

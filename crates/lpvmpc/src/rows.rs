@@ -2,7 +2,7 @@
 //! normalised deviations v. Rows are formed only when they are violated.
 
 use crate::model::Scalar;
-use crate::ocp::{Bounds, Ocp, Penalty, Softness, Terminal};
+use crate::ocp::{Bounds, Ocp, Penalty, SoftBounds, Terminal};
 use crate::riccati::StageFactor;
 use crate::solution::{ActiveRow, BoundId, Part, Quantity, Side};
 use crate::working_set::{Row, Terms, first};
@@ -64,7 +64,7 @@ fn size_of_bound<T: Scalar>(lower: T, upper: T) -> T {
 #[inline(always)]
 fn violated_sides<T: Scalar, const K: usize>(
     bounds: &Bounds<T, K>,
-    soft: &Softness<T, K>,
+    soft: &SoftBounds<T, K>,
     value: &SVector<T, K>,
     stage: usize,
     quantity: fn(usize) -> Quantity,
@@ -79,7 +79,7 @@ fn violated_sides<T: Scalar, const K: usize>(
 #[inline(never)]
 fn visit_violated<T: Scalar, const K: usize>(
     bounds: &Bounds<T, K>,
-    soft: &Softness<T, K>,
+    soft: &SoftBounds<T, K>,
     value: &SVector<T, K>,
     stage: usize,
     quantity: fn(usize) -> Quantity,
@@ -297,7 +297,7 @@ pub(crate) fn form_row<T: Scalar, const NX: usize, const NU: usize>(
         && bound.stage < ocp.length()
     {
         *alpha = factor.inverse_factor * normal_u * sign;
-        costate += factor.gain.tr_mul(&normal_u) * sign;
+        costate += factor.feedback.tr_mul(&normal_u) * sign;
         row.support += 1;
     }
     let before = factors.iter().zip(row.alpha.iter_mut()).take(bound.stage);
@@ -378,7 +378,7 @@ pub(crate) fn subtract<
         if places.may_be_at(i) {
             let (rows_x, rows_u) = gradient(ocp, active_at(i));
             *v += factor.inverse_factor * rows_u;
-            costate += factor.gain.tr_mul(&rows_u) + rows_x;
+            costate += factor.feedback.tr_mul(&rows_u) + rows_x;
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::memory::Capacity;
 use crate::model::Scalar;
-use crate::ocp::{Bounds, Penalty, Softness};
+use crate::ocp::{Bounds, Penalty, SoftBounds};
 use crate::predictor::{Predictor, Rk4};
 use crate::preview::PreviewMistake;
 use crate::solver::SolverSettings;
@@ -117,7 +117,7 @@ pub struct ControllerSettings<T, const NX: usize, const NU: usize, const NS: usi
     /// State bounds, at the stages 1 to N.
     pub x: Bounds<T, NX>,
     /// Which state bounds may be exceeded, and at what price in the unit of the cost.
-    pub soft_x: Softness<T, NX>,
+    pub soft_x: SoftBounds<T, NX>,
     /// Input bounds, at the stages 0 to N - 1.
     pub u: Bounds<T, NU>,
     /// Where the scheduling comes from.
@@ -209,7 +209,7 @@ const PRICE_OF_WIDTH: f64 = 20.0;
 pub fn exact_prices<T: Scalar, const NX: usize>(
     cost: &SMatrix<T, NX, NX>,
     x: &Bounds<T, NX>,
-) -> Softness<T, NX> {
+) -> SoftBounds<T, NX> {
     let sides = x.lower.iter().zip(x.upper.iter());
     let mut prices = [None; NX];
     for (j, (place, (lower, upper))) in prices.iter_mut().zip(sides).enumerate() {
@@ -406,7 +406,7 @@ pub(crate) fn check_bounds<T: Scalar, const K: usize>(
     let infinity: T = convert(f64::INFINITY);
     let sides = bounds.lower.iter().zip(bounds.upper.iter());
     for (component, (lower, upper)) in sides.enumerate() {
-        // Negated, so that a bound that is not a number fails.
+        // Negated, so that a bound that is NaN fails.
         if !(*lower <= *upper && *lower < infinity && *upper > -infinity) {
             return Err(ControllerError::Bounds {
                 quantity,

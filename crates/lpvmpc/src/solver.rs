@@ -4,15 +4,15 @@
 use crate::active_set::DualActiveSet;
 use crate::farkas::infeasibility_margin;
 use crate::held_inputs::{HeldInputs, eliminate_held};
-use crate::kernel::{add_product, product};
 use crate::list::List;
 #[cfg(feature = "alloc")]
 use crate::memory::Capacity;
 use crate::memory::SolverMemory;
 use crate::model::Scalar;
-use crate::ocp::{Bounds, Common, Ocp, Softness};
+use crate::ocp::{Bounds, Common, Ocp, SoftBounds};
 use crate::riccati::{CostToGo, StageFactor};
 use crate::rows::Trajectory;
+use crate::small_matrix::{add_product, product};
 use crate::solution::{ActiveRow, ActiveSet, Quantity, Solution, Status};
 use crate::working_set::first;
 use nalgebra::{SVector, convert};
@@ -417,7 +417,7 @@ fn price_of_rows<T: Scalar, const NX: usize, const NU: usize>(
 
 /// The price of the soft bounds that `value` exceeds.
 pub(crate) fn price<T: Scalar, const K: usize>(
-    soft: &Softness<T, K>,
+    soft: &SoftBounds<T, K>,
     value: &SVector<T, K>,
     bounds: &Bounds<T, K>,
 ) -> T {

@@ -105,7 +105,7 @@ where
         let settings = &self.settings.solver;
         solver.solve_factorized(factorized, ocp, settings, &mut self.solution);
         self.problems = 1;
-        self.take_gains(workspace);
+        self.take_feedback(workspace);
     }
 
     /// The rollout that a feedback has left for later.

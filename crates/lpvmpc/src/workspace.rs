@@ -6,7 +6,7 @@ use crate::list::List;
 use crate::memory::Capacity;
 use crate::memory::WorkspaceMemory;
 use crate::model::Scalar;
-use crate::ocp::{Common, Ocp, Penalty, Softness};
+use crate::ocp::{Common, Ocp, Penalty, SoftBounds};
 use crate::plan::Trial;
 use crate::preview::Room;
 use crate::settings::{ControllerSettings, Weights};
@@ -155,7 +155,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
 }
 
 /// Prices of the cost J as those of the quadratic program, whose cost is half of it.
-fn halved<T: Scalar, const NX: usize>(soft: &Softness<T, NX>) -> Softness<T, NX> {
+fn halved<T: Scalar, const NX: usize>(soft: &SoftBounds<T, NX>) -> SoftBounds<T, NX> {
     soft.map(|price| price.map(half))
 }
 

@@ -6,7 +6,7 @@ use crate::json;
 use crate::output;
 use crate::progress::Progress;
 use crate::table::Table;
-use ballbot_studies::timing::{self, GuardedTimes, SEQUENCES, SequenceTimes, Times};
+use ballbot_studies::timing::{self, GuaranteedTimes, SEQUENCES, SequenceTimes, Times};
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -56,9 +56,9 @@ pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
         sequences.push(timing::time(name, &prepared, &clock)?);
         progress.set(sequences.len());
     }
-    let guarded = timing::time_guarded(&clock)?;
+    let guaranteed = timing::time_guaranteed(&clock)?;
     progress.set(sequences.len() + 1);
-    let document = json::text(&json!({ "sequences": sequences, "guarded": guarded }));
+    let document = json::text(&json!({ "sequences": sequences, "guarded": guaranteed }));
     match file {
         Some(path) => output::write_files(&[(path, document.as_bytes())])?,
         None if arguments.json.is_some() => return Ok(document),
@@ -86,17 +86,17 @@ pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
         row.push(sequence.max_active.to_string());
         table.row(row);
     }
-    Ok(format!("{table}\n{}", guarded_table(&guarded)))
+    Ok(format!("{table}\n{}", guaranteed_table(&guaranteed)))
 }
 
-fn guarded_table(times: &GuardedTimes) -> Table {
+fn guaranteed_table(times: &GuaranteedTimes) -> Table {
     let mut table = Table::new(["far-setpoints, step in us", "median", "p99", "max"]);
     let rows = [
         ("plain, the same predictor, one program", times.plain_us),
         ("plain, descent", times.descent_us),
         ("plain, descent: feedback alone", times.feedback_us),
         ("plain, descent, 2.5 m at once", times.far_descent_us),
-        ("guaranteed", times.guarded_us),
+        ("guaranteed", times.guaranteed_us),
     ];
     for (name, times) in rows {
         let cells = [times.median, times.p99, times.max].map(|t| format!("{t:.2}"));

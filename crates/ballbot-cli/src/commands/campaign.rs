@@ -2,12 +2,12 @@
 
 use super::CommandError;
 use super::robot::ScenarioOptions;
-use crate::campaign_drawing::drawing;
+use crate::campaign_figure::figure;
 use crate::commands::simulate::PNG_SCALE;
 use crate::json;
-use crate::pictures::limits;
 use crate::progress::Progress;
 use crate::results::ResultFolder;
+use crate::run_figures::limits;
 use crate::table::Table;
 use ballbot_studies::{Campaign, Outcome, Record, Scenarios};
 use clap::Args;
@@ -79,7 +79,7 @@ pub fn run(arguments: &CampaignArguments) -> Result<String, CommandError> {
     let outcomes = campaign.run(&scenarios, &|done| progress.set(done))?;
     drop(progress);
     let settings = &scenarios.guaranteed.settings;
-    let figure = drawing(&outcomes, limits(&settings.x, &settings.u).states[1]);
+    let figure = figure(&outcomes, limits(&settings.x, &settings.u).states[1]);
     let contents = [
         csv(&outcomes).into_bytes(),
         figure.svg()?.into_bytes(),

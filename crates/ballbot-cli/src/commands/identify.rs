@@ -3,7 +3,7 @@
 use super::CommandError;
 use super::simulate::PNG_SCALE;
 use crate::arguments::finite_list;
-use crate::identification::{document, drawings, published, report, summary};
+use crate::identification::{document, figures, published, report, summary};
 use crate::input::{self, InputError};
 use crate::json;
 use crate::output::FileError;
@@ -218,23 +218,23 @@ pub fn configuration(path: Option<&Path>) -> Result<Config, InputError> {
 const PARAMETERS: [&str; 3] = ["parameters.toml", "parameters_x.toml", "parameters_y.toml"];
 const REPORT: &str = "report.html";
 
-/// The files of the drawing `name`, in the folder of the results.
-fn figure(name: &str) -> [String; 2] {
+/// The files of the figure `name`, in the folder of the results.
+fn figure_files(name: &str) -> [String; 2] {
     ["svg", "png"].map(|kind| format!("figures/{name}.{kind}"))
 }
 
-/// The files of all drawings that there can be.
-fn figures() -> Vec<String> {
-    drawings::NAMES
+/// The files of all figures that there can be.
+fn all_figure_files() -> Vec<String> {
+    figures::NAMES
         .into_iter()
         .flatten()
-        .flat_map(figure)
+        .flat_map(figure_files)
         .collect()
 }
 
 /// The folder for the results, if all of them can be written there.
 fn open(path: &Path) -> Result<ResultFolder, FileError> {
-    let figures = figures();
+    let figures = all_figure_files();
     let figures = figures.iter().map(String::as_str);
     let names = PARAMETERS.into_iter().chain([REPORT]).chain(figures);
     ResultFolder::open(path, &names.collect::<Vec<_>>())
@@ -246,21 +246,21 @@ fn write(
     robot: &IdentifiedRobot,
     parameters: Option<&[(String, String)]>,
 ) -> Result<Vec<String>, CommandError> {
-    let drawings = drawings::drawings(robot);
-    let report = report::html(robot, &drawings)?;
+    let figures = figures::figures(robot);
+    let report = report::html(robot, &figures)?;
     let texts = parameters.unwrap_or_default().iter().cloned();
     let texts = texts.map(|(name, text)| (name, text.into_bytes()));
     let mut files: Vec<(String, Vec<u8>)> = texts.collect();
     files.push((REPORT.to_owned(), report.into_bytes()));
-    for drawing in &drawings {
-        let [svg, png] = figure(drawing.name);
-        files.push((svg, drawing.figure.svg()?.into_bytes()));
-        files.push((png, drawing.figure.png(PNG_SCALE)?));
+    for figure in &figures {
+        let [svg, png] = figure_files(figure.name);
+        files.push((svg, figure.figure.svg()?.into_bytes()));
+        files.push((png, figure.figure.png(PNG_SCALE)?));
     }
     // Figures of an earlier run that this one has not, and parameters in place of which there are
     // others now. Where there are none, they are kept, and told of.
-    let figures = figures();
-    let mut stale: Vec<&str> = figures.iter().map(String::as_str).collect();
+    let all = all_figure_files();
+    let mut stale: Vec<&str> = all.iter().map(String::as_str).collect();
     if parameters.is_some() {
         stale.extend(PARAMETERS);
     }

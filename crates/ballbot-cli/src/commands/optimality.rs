@@ -3,7 +3,7 @@
 use super::CommandError;
 use crate::commands::simulate::PNG_SCALE;
 use crate::json;
-use crate::optimality_drawing::{CostOverDistance, cost_over_distance, long_horizon};
+use crate::optimality_figure::{CostOverDistance, cost_over_distance, long_horizon};
 use crate::progress::Progress;
 use crate::results::ResultFolder;
 use crate::table::Table;

@@ -2,11 +2,11 @@
 
 use super::CommandError;
 use super::simulate::PNG_SCALE;
-use crate::html::Drawing;
+use crate::html::CaptionedFigure;
 use crate::progress::Progress;
 use crate::recording;
 use crate::reproduction::tables::{self, Sheet};
-use crate::reproduction::{claims, drawings, guarantee, optimum, report};
+use crate::reproduction::{claims, figures, guarantee, optimum, report};
 use crate::results::ResultFolder;
 use ballbot_studies::StudyError;
 use ballbot_studies::reproduction::{Claim, Reproduction};
@@ -41,8 +41,8 @@ pub fn run(arguments: &ReproduceArguments) -> Result<String, CommandError> {
     let reproduction = compute()?;
     let claims = reproduction.claims();
     let sheets = tables::sheets(&reproduction, &claims);
-    let drawings = drawings::drawings(&reproduction);
-    write(&results, &reproduction, &claims, &sheets, &drawings)?;
+    let figures = figures::figures(&reproduction);
+    write(&results, &reproduction, &claims, &sheets, &figures)?;
 
     let table = claims::table(&claims);
     let differing = claims.iter().filter(|claim| !claim.agrees()).count();
@@ -73,18 +73,18 @@ fn write(
     reproduction: &Reproduction,
     claims: &[Claim],
     sheets: &[Sheet],
-    drawings: &[Drawing],
+    figures: &[CaptionedFigure],
 ) -> Result<(), CommandError> {
     let machine = machine();
     let mut files: Vec<(String, Vec<u8>)> = Vec::new();
     let beyond = [
-        guarantee::drawing(&reproduction.guarantee),
-        optimum::drawing(&reproduction.optimum),
+        guarantee::figure(&reproduction.guarantee),
+        optimum::figure(&reproduction.optimum),
     ];
-    for drawing in drawings.iter().chain(&beyond) {
-        let stem = format!("figures/{}", drawing.name);
-        files.push((format!("{stem}.svg"), drawing.figure.svg()?.into_bytes()));
-        files.push((format!("{stem}.png"), drawing.figure.png(PNG_SCALE)?));
+    for figure in figures.iter().chain(&beyond) {
+        let stem = format!("figures/{}", figure.name);
+        files.push((format!("{stem}.svg"), figure.figure.svg()?.into_bytes()));
+        files.push((format!("{stem}.png"), figure.figure.png(PNG_SCALE)?));
     }
     let beyond = guarantee::sheets(&reproduction.guarantee)
         .into_iter()
@@ -108,7 +108,7 @@ fn write(
     let summary = summary(reproduction, claims, &machine);
     let summary = format!("{summary:#}\n");
     files.push(("summary.json".to_owned(), summary.into_bytes()));
-    let report = report::html(reproduction, claims, sheets, drawings, &machine)?;
+    let report = report::html(reproduction, claims, sheets, figures, &machine)?;
     files.push(("report.html".to_owned(), report.into_bytes()));
     Ok(results.write(&files, &[])?)
 }

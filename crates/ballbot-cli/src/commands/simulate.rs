@@ -4,10 +4,10 @@ use super::CommandError;
 use super::robot::ScenarioOptions;
 use crate::json;
 use crate::output::{self, FileError};
-use crate::pictures::{self, Shown};
 use crate::progress::Progress;
 use crate::recording;
 use crate::results::ResultFolder;
+use crate::run_figures::{self, Shown};
 use crate::table::Table;
 use ballbot_scenario::{MotorSample, Prepared, Record, RunHooks, words};
 use ballbot_studies::recorded::{Columns, Metrics};
@@ -323,16 +323,16 @@ fn figures(
             let torques: Vec<_> = motors.iter().map(|sample| sample.torques).collect();
             let planes = [shown(x), shown(y)];
             let mut figures = vec![
-                ("figure", pictures::both_planes(title, prepared, planes)),
-                ("path", pictures::path(title, prepared, [x, y])),
+                ("figure", run_figures::both_planes(title, prepared, planes)),
+                ("path", run_figures::path(title, prepared, [x, y])),
                 (
                     "motors",
-                    pictures::motors("Motor torques", prepared, x, &torques),
+                    run_figures::motors("Motor torques", prepared, x, &torques),
                 ),
             ];
             let plans = [
-                ("plans_x", pictures::plans("Plans of the x plane", x)),
-                ("plans_y", pictures::plans("Plans of the y plane", y)),
+                ("plans_x", run_figures::plans("Plans of the x plane", x)),
+                ("plans_y", run_figures::plans("Plans of the y plane", y)),
             ];
             let shown = plans
                 .into_iter()
@@ -342,10 +342,10 @@ fn figures(
         }
         runs => {
             let shown: Vec<Shown<'_>> = runs.iter().map(shown).collect();
-            let mut figures = vec![("figure", pictures::one_plane(title, prepared, &shown))];
+            let mut figures = vec![("figure", run_figures::one_plane(title, prepared, &shown))];
             let plans = columns
                 .first()
-                .and_then(|run| pictures::plans("Plans", run));
+                .and_then(|run| run_figures::plans("Plans", run));
             figures.extend(plans.map(|plans| ("plans", plans)));
             figures
         }

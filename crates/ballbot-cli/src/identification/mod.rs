@@ -1,7 +1,7 @@
 //! What `ballbot identify` shows of an identification: tables, figures, report, words.
 
 pub mod document;
-pub mod drawings;
+pub mod figures;
 pub mod published;
 pub mod report;
 pub mod summary;

@@ -3,7 +3,7 @@
 use super::published;
 use super::summary::{mark, told};
 use super::tables::{self, Sheet};
-use crate::html::{self, Drawing, escape};
+use crate::html::{self, CaptionedFigure, escape};
 use ballbot_identification::{IdentifiedRobot, Weight};
 use lpvmpc_figures::FigureError;
 
@@ -11,7 +11,7 @@ use lpvmpc_figures::FigureError;
 ///
 /// # Errors
 /// A figure cannot be drawn.
-pub fn html(robot: &IdentifiedRobot, drawings: &[Drawing]) -> Result<String, FigureError> {
+pub fn html(robot: &IdentifiedRobot, figures: &[CaptionedFigure]) -> Result<String, FigureError> {
     let (fitted, held_back) = robot.first().times;
     let logs: String = robot
         .findings()
@@ -39,7 +39,7 @@ pub fn html(robot: &IdentifiedRobot, drawings: &[Drawing]) -> Result<String, Fig
         verdicts(robot),
         table(&tables::parameters(robot)),
         intervals(robot),
-        html::figures(drawings)?,
+        html::figures(figures)?,
         table(&tables::poles(robot)),
         table(&tables::residuals(robot)),
         table(&tables::structures(robot)),

@@ -1,8 +1,8 @@
 //! What is guaranteed, and at what price, in tables and a figure.
 
 use super::tables::Sheet;
-use crate::html::Drawing;
-use crate::pictures::{self, Shown};
+use crate::html::CaptionedFigure;
+use crate::run_figures::{self, Shown};
 use ballbot_scenario::Prepared;
 use ballbot_studies::reproduction::Guarantee;
 use lpvmpc_figures::Role;
@@ -73,14 +73,17 @@ fn price_sheet(guarantee: &Guarantee) -> Sheet {
         ),
         (
             "scenario 3, guaranteed, one program",
-            &guarantee.guarded_once,
+            &guarantee.guaranteed_once,
         ),
         (
             "scenario 3, guaranteed, three programs",
-            &guarantee.guarded_single,
+            &guarantee.guaranteed_single,
         ),
         ("scenario 1, terminal cost, no guarantee", &guarantee.fine),
-        ("scenario 1, guaranteed, three programs", &guarantee.guarded),
+        (
+            "scenario 1, guaranteed, three programs",
+            &guarantee.guaranteed,
+        ),
     ] {
         let metrics = &run.metrics[0];
         let cells = [
@@ -100,18 +103,18 @@ pub fn sheets(guarantee: &Guarantee) -> [Sheet; 2] {
 }
 
 /// The far set points.
-pub fn drawing(guarantee: &Guarantee) -> Drawing {
+pub fn figure(guarantee: &Guarantee) -> CaptionedFigure {
     let shown = Shown {
         label: "ballbot",
         role: Role::Lpv,
         columns: &guarantee.far.columns[0],
     };
     let Prepared { title, .. } = &guarantee.far.prepared;
-    Drawing {
+    CaptionedFigure {
         name: "far-setpoints",
         caption: "Set points far apart, each given at the jump and not before: guaranteed at \
                   every sample."
             .to_owned(),
-        figure: pictures::one_plane(title, &guarantee.far.prepared, &[shown]),
+        figure: run_figures::one_plane(title, &guarantee.far.prepared, &[shown]),
     }
 }

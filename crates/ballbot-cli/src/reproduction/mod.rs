@@ -1,7 +1,7 @@
 //! The reproduction of the paper as tables, figures and a report.
 
 pub mod claims;
-pub mod drawings;
+pub mod figures;
 pub mod guarantee;
 pub mod optimum;
 pub mod report;

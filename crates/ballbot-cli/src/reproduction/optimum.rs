@@ -1,7 +1,7 @@
 //! What linear, LPV and nonlinear MPC cost by the distance of the set point, in a table and a figure.
 
 use super::tables::Sheet;
-use crate::html::Drawing;
+use crate::html::CaptionedFigure;
 use ballbot_studies::optimality::Case;
 use ballbot_studies::reproduction::{HORIZONS, Optimum};
 use lpvmpc_figures::{Dash, Figure, Panel, Role, Scale, Series, Style};
@@ -43,8 +43,8 @@ pub fn sheet(optimum: &Optimum) -> Sheet {
 }
 
 /// The cost beyond that of nonlinear MPC by distance, a panel per horizon.
-pub fn drawing(optimum: &Optimum) -> Drawing {
-    Drawing {
+pub fn figure(optimum: &Optimum) -> CaptionedFigure {
+    CaptionedFigure {
         name: "cost-by-distance",
         caption: format!(
             "Closed-loop cost beyond that of nonlinear MPC (IPOPT, converged at every sample), by \

@@ -2,7 +2,7 @@
 
 use super::tables::Sheet;
 use super::{claims, guarantee, optimum};
-use crate::html::{self, Drawing, escape};
+use crate::html::{self, CaptionedFigure, escape};
 use ballbot::{Ballbot, LinearParameters};
 use ballbot_studies::reproduction::{Claim, Optimum, Reproduction, Run, SAMPLING_TIME};
 use lpvmpc_figures::FigureError;
@@ -16,10 +16,10 @@ pub fn html(
     reproduction: &Reproduction,
     claims: &[Claim],
     sheets: &[Sheet],
-    drawings: &[Drawing],
+    figures: &[CaptionedFigure],
     machine: &str,
 ) -> Result<String, FigureError> {
-    let figures = html::figures(drawings)?;
+    let figures = html::figures(figures)?;
     let (claims_sheet, others) = match sheets.split_first() {
         Some((first, others)) => (table(first), others),
         None => (String::new(), sheets),
@@ -84,7 +84,7 @@ fn guaranteed(reproduction: &Reproduction) -> Result<String, FigureError> {
         guarantee.samples_guaranteed(),
         guarantee.far.metrics[0].samples,
         guarantee.far.metrics[0].violations,
-        html::figures(&[guarantee::drawing(guarantee)])?,
+        html::figures(&[guarantee::figure(guarantee)])?,
         table(&price),
         nonlinear.mean_programs,
         nonlinear.largest_last_step,
@@ -123,7 +123,7 @@ fn near_the_optimum(optimum: &Optimum) -> Result<String, FigureError> {
             0 => "IPOPT converged at every sample of these loops".to_owned(),
             samples => format!("IPOPT did not converge at {samples} of the samples"),
         },
-        html::figures(&[optimum::drawing(optimum)])?,
+        html::figures(&[optimum::figure(optimum)])?,
         table(&optimum::sheet(optimum)),
         100.0 * (optimum.worst() - 1.0),
         100.0 * (optimum.worst_linear() - 1.0),

@@ -1,4 +1,4 @@
-//! `[controller.terminal.certified]`: from the certificate of a terminal set to the guarded
+//! `[controller.terminal.certified]`: from the certificate of a terminal set to the guaranteed
 //! controller.
 
 use crate::builtin;
@@ -10,8 +10,8 @@ use crate::prepare::files::Files;
 use crate::prepare::problem::dynamic;
 use crate::prepare::rollout;
 use crate::prepare::standing::Standing;
-use ballbot::{Ballbot, ControllerSettings, GuardedSettings};
-use lpvmpc::{GuardedIterations, Predictor, TerminalSet, Weights};
+use ballbot::{Ballbot, ControllerSettings, GuaranteedSettings};
+use lpvmpc::{GuaranteedIterations, Predictor, TerminalSet, Weights};
 use lpvmpc_certificate::is_at_most;
 use nalgebra::{SMatrix, Vector4};
 use std::fmt;
@@ -29,8 +29,8 @@ const SOFT_PRICE: f64 = 1e3;
 
 /// What a certified terminal set makes of a controller.
 pub(crate) struct Guarantee {
-    /// The guarded controller's settings.
-    pub settings: GuardedSettings<f64>,
+    /// The guaranteed controller's settings.
+    pub settings: GuaranteedSettings<f64>,
     certificate: TerminalCertificate,
     file: Option<String>,
 }
@@ -49,8 +49,8 @@ impl Guarantee {
 }
 
 impl ControllerTable {
-    /// The guarded controller, where the terminal set is certified.
-    pub(crate) fn guarded(
+    /// The guaranteed controller, where the terminal set is certified.
+    pub(crate) fn guaranteed(
         &self,
         ballbot: &Ballbot<f64>,
         settings: &ControllerSettings<f64>,
@@ -103,7 +103,7 @@ pub(crate) fn read(
 }
 
 impl CertifiedTable {
-    /// The guarded controller for the problem of `plain`.
+    /// The guaranteed controller for the problem of `plain`.
     ///
     /// # Errors
     /// The certificate cannot be read, or is none of this robot, cost and bounds.
@@ -131,7 +131,7 @@ impl CertifiedTable {
         let room = check_bounds(&terminal, &certificate.state_limits, plain)?;
         let direction = Vector4::x();
         let stiffness = (terminal.p * direction).dot(&direction);
-        let settings = GuardedSettings {
+        let settings = GuaranteedSettings {
             t_s: plain.t_s,
             horizon: plain.horizon,
             rk4,
@@ -144,7 +144,7 @@ impl CertifiedTable {
             set_points: [plain.x.lower[0] + room, plain.x.upper[0] - room],
             offset_weight: self.offset_weight.unwrap_or(stiffness),
             margin: MARGIN,
-            iterations: GuardedIterations {
+            iterations: GuaranteedIterations {
                 known: plain.iterations.most(),
                 unknown: SEARCH.max(plain.iterations.most()),
             },

@@ -12,7 +12,7 @@ use crate::prepare::reference::{self, PhiReference};
 use crate::prepare::standing::Standing;
 use crate::prepare::three_motors::ThreeMotors;
 use crate::prepare::world::PlaneWorld;
-use ballbot::{Ballbot, GuardedSettings, PlaneFeedback, PlanePlanner, RampedSettings, Wheels};
+use ballbot::{Ballbot, GuaranteedSettings, PlaneFeedback, PlanePlanner, RampedSettings, Wheels};
 use lpvmpc::MoveLimits;
 use lpvmpc_sim::Tolerances;
 use nalgebra::Vector4;
@@ -54,14 +54,14 @@ pub enum Problem {
     /// The torque's rate, which is bounded.
     Ramped(RampedSettings<f64>),
     /// The torque, with a certified terminal set.
-    Guarded(GuardedSettings<f64>),
+    Guaranteed(GuaranteedSettings<f64>),
 }
 
 impl Prepared {
-    /// The settings of the guarded controller, where that runs.
-    pub fn guarded(&self) -> Option<&GuardedSettings<f64>> {
+    /// The settings of the guaranteed controller, where that runs.
+    pub fn guaranteed(&self) -> Option<&GuaranteedSettings<f64>> {
         match &self.problem {
-            Problem::Guarded(settings) => Some(settings),
+            Problem::Guaranteed(settings) => Some(settings),
             Problem::Plain | Problem::Ramped(_) => None,
         }
     }
@@ -71,7 +71,7 @@ impl Prepared {
         match &self.problem {
             Problem::Plain => PlanePlanner::Held(self.settings),
             Problem::Ramped(settings) => PlanePlanner::Ramped(*settings),
-            Problem::Guarded(settings) => PlanePlanner::Guarded(*settings),
+            Problem::Guaranteed(settings) => PlanePlanner::Guaranteed(*settings),
         }
     }
 }
@@ -132,11 +132,11 @@ impl Scenario {
         };
         check_motion(&ballbot, &self.bounds)?;
         let settings = self.controller.settings(&ballbot, bounds)?;
-        let guarded = self.controller.guarded(&ballbot, &settings, files)?;
+        let guaranteed = self.controller.guaranteed(&ballbot, &settings, files)?;
         let feedback = self.controller.feedback(&ballbot)?;
         let ramp = self.controller.ramp(&ballbot, &settings)?;
         let direct = feedback.estimator.is_none() && feedback.delay == 0.0;
-        if guarded.is_some() && !(direct && ramp.is_none()) {
+        if guaranteed.is_some() && !(direct && ramp.is_none()) {
             return Err(ScenarioError::value(
                 "controller.terminal.certified",
                 "(given)",
@@ -174,9 +174,9 @@ impl Scenario {
         })?;
         let planes = self.planes(references, &real, (settings.t_s, tolerances), files)?;
         // After all that is cheap to check.
-        let certificate = guarded.as_ref().map(|found| found.standing(files));
-        let problem = match (guarded, ramp) {
-            (Some(found), _) => Problem::Guarded(found.settings),
+        let certificate = guaranteed.as_ref().map(|found| found.standing(files));
+        let problem = match (guaranteed, ramp) {
+            (Some(found), _) => Problem::Guaranteed(found.settings),
             (None, Some(settings)) => Problem::Ramped(settings),
             (None, None) => Problem::Plain,
         };

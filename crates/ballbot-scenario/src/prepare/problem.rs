@@ -8,7 +8,7 @@ use crate::file::schema::{
 use crate::number::{positive, text};
 use ballbot::{Ballbot, ControllerSettings, LinearParameters};
 use lpvmpc::{
-    Bounds, InputReference, Iterations, LpvModel, Predictor, Rk4, Scheduling, Softness,
+    Bounds, InputReference, Iterations, LpvModel, Predictor, Rk4, Scheduling, SoftBounds,
     SolverSettings, TerminalIngredient, Weights, exact_prices,
 };
 use nalgebra::{DMatrix, Matrix4, Vector1, Vector3, Vector4};
@@ -171,7 +171,7 @@ impl ControllerTable {
         weights: &Weights<f64, 4, 1>,
         predictor: Predictor,
         x: &Bounds<f64, 4>,
-    ) -> Result<Softness<f64, 4>, ScenarioError> {
+    ) -> Result<SoftBounds<f64, 4>, ScenarioError> {
         let lqr = self.lqr((a, b), weights, predictor)?;
         Ok(exact_prices(&lqr, x))
     }
@@ -241,7 +241,7 @@ impl ControllerTable {
         Ok(match &self.terminal {
             TerminalTable::None => TerminalIngredient::Cost(Matrix4::zeros()),
             TerminalTable::Equality => TerminalIngredient::Equality,
-            // The certified cost is the guarded controller's; without guard it is as by default.
+            // The certified cost is the guaranteed controller's; without guarantee it is as by default.
             TerminalTable::DiscreteRiccati | TerminalTable::Certified(_) => {
                 TerminalIngredient::Cost(self.lqr((a, b), weights, predictor)?)
             }

@@ -210,7 +210,7 @@ mod tests {
     fn steps_that_are_too_coarse_are_refused_with_the_number_needed() {
         let prepared = Scenario::load("far-setpoints").unwrap();
         let prepared = prepared.prepare(Path::new(".")).unwrap();
-        let terminal = prepared.guarded().unwrap().terminal;
+        let terminal = prepared.guaranteed().unwrap().terminal;
         let refused = |margin: f64, wanted: Option<usize>| {
             let (ballbot, plain) = (&prepared.ballbot, &prepared.settings);
             let rollout = accurate(ballbot, plain, &terminal, margin, wanted);
@@ -232,7 +232,7 @@ mod tests {
     fn the_error_is_within_its_bound() {
         let prepared = Scenario::load("far-setpoints").unwrap();
         let prepared = prepared.prepare(Path::new(".")).unwrap();
-        let settings = *prepared.guarded().unwrap();
+        let settings = *prepared.guaranteed().unwrap();
         let Rollout {
             rk4,
             error,

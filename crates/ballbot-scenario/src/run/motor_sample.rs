@@ -39,7 +39,7 @@ pub(crate) fn sample_of_plane(
         active_bounds: command.active_bounds,
         step_time: sample.step_time / 2,
         gap: command.gap,
-        guard: command.guard,
+        guarantee: command.guarantee,
     })
 }
 

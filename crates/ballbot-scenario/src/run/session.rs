@@ -316,7 +316,7 @@ impl Session {
                 active_bounds: 0,
                 step_time: Duration::ZERO,
                 gap: Vector4::zeros(),
-                guard: None,
+                guarantee: None,
             });
         }
         self.samples = samples;

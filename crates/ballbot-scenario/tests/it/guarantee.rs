@@ -1,6 +1,6 @@
 //! The guaranteed loop from a scenario: far set points, and certificates that do not fit.
 
-use ballbot::GuardedController;
+use ballbot::GuaranteedController;
 use ballbot_scenario::{
     CertifiedTable, IterationsTable, Parameters, PointTable, ReferenceTable, RunHooks, Scenario,
     ScenarioError, TerminalTable, TorqueRateTable, builtin,
@@ -30,7 +30,7 @@ fn far_set_points_are_reached_with_every_bound_kept() {
     }
     for pair in trajectory.samples.windows(2) {
         let [before, after] = pair else { continue };
-        assert!(after.guard.unwrap().decision.is_guaranteed());
+        assert!(after.guarantee.unwrap().decision.is_guaranteed());
         assert!(prepared.settings.u.contains(&after.u, 0.0));
         // What is wanted at the end of the horizon, and beyond.
         let end = |t: f64| prepared.planes[0].state_reference(t + 1.0);
@@ -57,7 +57,7 @@ fn one_program_per_sample_arrives_as_early_as_three() {
         assert!(
             samples
                 .iter()
-                .all(|s| s.guard.unwrap().decision.is_guaranteed())
+                .all(|s| s.guarantee.unwrap().decision.is_guaranteed())
         );
         let near = samples.iter().find(|s| (s.x[0] - 100.0).abs() < 1.0);
         near.unwrap().t
@@ -74,14 +74,15 @@ fn one_program_per_sample_arrives_as_early_as_three() {
 fn cruising_with_one_program_is_smooth() {
     let scenario = Scenario::load("far-setpoints").unwrap();
     let prepared = scenario.prepare(Path::new(".")).unwrap();
-    let settings = *prepared.guarded().unwrap();
+    let settings = *prepared.guaranteed().unwrap();
     // Variation of the tilt rate per sample, and the part of the samples with a kink.
     let cruise = |programs: usize| {
         let (mut variation, mut kinks, mut count) = (0.0, 0.0, 0.0);
         for set_point in (60..130).step_by(6) {
             let mut settings = settings;
             settings.iterations.known = programs;
-            let mut controller = GuardedController::allocate(prepared.ballbot, settings).unwrap();
+            let mut controller =
+                GuaranteedController::allocate(prepared.ballbot, settings).unwrap();
             let mut workspace = controller.workspace::<5>();
             let mut x = Vector4::zeros();
             let mut states = Vec::new();
@@ -116,9 +117,9 @@ fn errors_as_large_as_assumed_break_nothing() {
     let prepared = scenario.prepare(Path::new(".")).unwrap();
     let mut random = fastrand::Rng::with_seed(3);
     for (horizon, programs) in [(5, 1), (12, 1), (20, 3), (20, 0), (60, 1)] {
-        let mut settings = *prepared.guarded().unwrap();
+        let mut settings = *prepared.guaranteed().unwrap();
         (settings.horizon, settings.iterations.known) = (horizon, programs);
-        let mut controller = GuardedController::allocate(prepared.ballbot, settings).unwrap();
+        let mut controller = GuaranteedController::allocate(prepared.ballbot, settings).unwrap();
         let mut workspace = controller.workspace::<5>();
         let (mut x, mut wanted) = (Vector4::new(0.0, 0.2, 1.0, -0.3), 40.0);
         let mut before: Option<(f64, f64)> = None;
@@ -172,8 +173,8 @@ fn every_horizon_keeps_the_promise() {
         scenario.controller.horizon = horizon;
         let trajectory = run(&scenario);
         assert_eq!(trajectory.termination, Termination::Complete);
-        let mut guards = trajectory.samples.iter().map(|s| s.guard.unwrap());
-        assert!(guards.all(|guard| guard.decision.is_guaranteed()));
+        let mut guarantees = trajectory.samples.iter().map(|s| s.guarantee.unwrap());
+        assert!(guarantees.all(|guarantee| guarantee.decision.is_guaranteed()));
         let off = trajectory.final_state - Vector4::new(3.0, 0.0, 0.0, 0.0);
         assert!(off.amax() < 1e-2, "{horizon}: {off}");
     }
@@ -186,11 +187,11 @@ fn long_horizons_fit_a_thread() {
     const LONG: usize = 300;
     let mut ramped = Scenario::load("far-setpoints").unwrap();
     let prepared = ramped.prepare(Path::new(".")).unwrap();
-    let mut settings = *prepared.guarded().unwrap();
+    let mut settings = *prepared.guaranteed().unwrap();
     settings.horizon = LONG;
-    GuardedController::allocate(prepared.ballbot, settings).unwrap();
+    GuaranteedController::allocate(prepared.ballbot, settings).unwrap();
     settings.horizon = 0;
-    let refused = GuardedController::allocate(prepared.ballbot, settings);
+    let refused = GuaranteedController::allocate(prepared.ballbot, settings);
     let refused = refused.err().unwrap().to_string();
     assert!(refused.contains("from 1 to 65535 samples"), "{refused}");
     ramped.reference = ReferenceTable::SetPoints {
@@ -223,7 +224,7 @@ fn an_unreachable_set_point_is_approached_as_far_as_the_bounds_allow() {
     let [_, upper] = scenario
         .prepare(Path::new("."))
         .unwrap()
-        .guarded()
+        .guaranteed()
         .unwrap()
         .set_points;
     assert!(upper < 10.0 && upper > 7.0, "{upper}");
@@ -325,7 +326,7 @@ fn preview_costs_no_more_than_without_the_guarantee() {
     let weights = prepared.settings.weights;
     let mut cost = 0.0;
     for sample in &trajectory.samples {
-        assert!(sample.guard.unwrap().decision.is_guaranteed());
+        assert!(sample.guarantee.unwrap().decision.is_guaranteed());
         let error = sample.x - sample.x_ref;
         cost += (weights.q * error).dot(&error) + (weights.r * sample.u).dot(&sample.u);
     }

@@ -1,13 +1,13 @@
 //! The guaranteed loop against the optima that IPOPT finds for its problem
 //! (`testdata/guaranteed-optimum`).
 
-use ballbot::GuardedController;
+use ballbot::GuaranteedController;
 use ballbot_scenario::{CertifiedTable, Prepared, Scenario, TerminalTable};
 use lpvmpc::Rk4;
 use nalgebra::Vector4;
 use std::path::Path;
 
-type Guarded = GuardedController<f64>;
+type Guaranteed = GuaranteedController<f64>;
 
 fn rows(name: &str) -> Vec<Vec<f64>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/guaranteed-optimum");
@@ -16,11 +16,11 @@ fn rows(name: &str) -> Vec<Vec<f64>> {
     text.lines().skip(1).map(numbers).collect()
 }
 
-fn controller(prepared: &Prepared, horizon: f64, programs: usize) -> Guarded {
-    let mut settings = *prepared.guarded().unwrap();
+fn controller(prepared: &Prepared, horizon: f64, programs: usize) -> Guaranteed {
+    let mut settings = *prepared.guaranteed().unwrap();
     settings.horizon = horizon as usize;
     settings.iterations.known = programs;
-    Guarded::allocate(prepared.ballbot, settings).unwrap()
+    Guaranteed::allocate(prepared.ballbot, settings).unwrap()
 }
 
 fn prepared() -> Prepared {

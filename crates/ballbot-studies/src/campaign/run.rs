@@ -1,10 +1,10 @@
 //! One closed loop of a campaign.
 
 use super::variant::Variant;
-use ballbot::{Ballbot, GuardedSettings, GuardedWorkspace};
+use ballbot::{Ballbot, GuaranteedSettings, GuaranteedWorkspace};
 use ballbot_scenario::{Prepared, ScenarioError};
-use lpvmpc::{Decision, GuardedController};
-use lpvmpc_sim::{GuardedLoop, Random, Tolerances};
+use lpvmpc::{Decision, GuaranteedController};
+use lpvmpc_sim::{GuaranteedLoop, Random, Tolerances};
 use nalgebra::{Vector1, Vector4};
 use serde::Serialize;
 
@@ -104,8 +104,8 @@ impl SetPoints {
 /// The guaranteed loop, ready to run.
 pub(super) struct Loop<'a> {
     prepared: &'a Prepared,
-    guarded: GuardedLoop<Ballbot<f64>, Ballbot<f64>, 4, 1, 3>,
-    workspace: GuardedWorkspace<f64>,
+    guaranteed: GuaranteedLoop<Ballbot<f64>, Ballbot<f64>, 4, 1, 3>,
+    workspace: GuaranteedWorkspace<f64>,
 }
 
 impl<'a> Loop<'a> {
@@ -115,7 +115,7 @@ impl<'a> Loop<'a> {
         edge: bool,
         random: &mut Random,
     ) -> Result<Vector4<f64>, ScenarioError> {
-        let GuardedSettings { terminal, .. } = settings(prepared)?;
+        let GuaranteedSettings { terminal, .. } = settings(prepared)?;
         let direction = Vector4::from_fn(|_, _| random.normal()).normalize();
         let part = random.uniform().powf(0.25);
         let radius = terminal.level.sqrt() * if edge { 1.0 } else { part };
@@ -137,14 +137,14 @@ impl<'a> Loop<'a> {
             Variant::Horizon(horizon) => settings.horizon = horizon,
             _ => {}
         }
-        let controller = GuardedController::allocate(prepared.ballbot, settings);
+        let controller = GuaranteedController::allocate(prepared.ballbot, settings);
         let controller = controller.map_err(ScenarioError::from)?;
         let start = Self::start(prepared, *variant == Variant::Edge, random)?;
         let plant = variant.plant(prepared, random)?;
         Ok(Self {
             prepared,
             workspace: controller.workspace(),
-            guarded: GuardedLoop::new(controller, plant, start, TOLERANCES),
+            guaranteed: GuaranteedLoop::new(controller, plant, start, TOLERANCES),
         })
     }
 
@@ -161,11 +161,11 @@ impl<'a> Loop<'a> {
         let mut before: Option<(f64, f64, f64)> = None;
         for wanted in wanted.points().iter().take(samples) {
             if let Some(jump) = variant.push(self.prepared, random) {
-                self.guarded.push(&jump);
+                self.guaranteed.push(&jump);
                 before = None;
             }
-            record.look_at(self.guarded.state(), self.prepared);
-            let step = self.guarded.decide(*wanted, &mut self.workspace);
+            record.look_at(self.guaranteed.state(), self.prepared);
+            let step = self.guaranteed.decide(*wanted, &mut self.workspace);
             record.samples += 1;
             record.decisions[step.decision as usize] += 1;
             record.largest_gap = record.largest_gap.max(step.gap.amax());
@@ -177,25 +177,30 @@ impl<'a> Loop<'a> {
             {
                 record.compare(cost, fall, step.cost);
             }
-            let stage = stage_cost(self.guarded.state(), step.set_point, &step.u, self.prepared);
-            let fall = stage - self.guarded.epsilon();
+            let stage = stage_cost(
+                self.guaranteed.state(),
+                step.set_point,
+                &step.u,
+                self.prepared,
+            );
+            let fall = stage - self.guaranteed.epsilon();
             before = step
                 .decision
                 .is_guaranteed()
                 .then_some((*wanted, step.cost, fall));
-            record.pay(self.guarded.state(), *wanted, &step.u, self.prepared);
+            record.pay(self.guaranteed.state(), *wanted, &step.u, self.prepared);
             let actuation = variant.actuation(random);
-            let before = *self.guarded.state();
-            let moved = self.guarded.advance(&step.u, &actuation);
+            let before = *self.guaranteed.state();
+            let moved = self.guaranteed.advance(&step.u, &actuation);
             if variant.is_nominal() {
                 record.look_between(&before, &step.u, self.prepared);
             }
-            if moved.is_err() || has_fallen(self.guarded.state()) {
+            if moved.is_err() || has_fallen(self.guaranteed.state()) {
                 record.fell = true;
                 break;
             }
         }
-        record.look_at(self.guarded.state(), self.prepared);
+        record.look_at(self.guaranteed.state(), self.prepared);
         record
     }
 }
@@ -263,8 +268,8 @@ pub(super) fn has_fallen(x: &Vector4<f64>) -> bool {
     !(x[1].abs() < std::f64::consts::FRAC_PI_2)
 }
 
-pub(super) fn settings(prepared: &Prepared) -> Result<&GuardedSettings<f64>, ScenarioError> {
-    prepared.guarded().ok_or_else(no_certificate)
+pub(super) fn settings(prepared: &Prepared) -> Result<&GuaranteedSettings<f64>, ScenarioError> {
+    prepared.guaranteed().ok_or_else(no_certificate)
 }
 
 fn no_certificate() -> ScenarioError {

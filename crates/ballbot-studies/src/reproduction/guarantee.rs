@@ -20,11 +20,11 @@ pub struct Guarantee {
     /// Scenario 1 with the stage-consistent predictor and one program per sample.
     pub fine: Run,
     /// Scenario 3, guaranteed, one program per sample.
-    pub guarded_once: Run,
+    pub guaranteed_once: Run,
     /// Scenario 3, guaranteed, three programs per sample.
-    pub guarded_single: Run,
+    pub guaranteed_single: Run,
     /// Scenario 1, guaranteed, three programs per sample.
-    pub guarded: Run,
+    pub guaranteed: Run,
     /// Far set points, guaranteed.
     pub far: Run,
     /// Scenario 1 by nonlinear MPC with the predictor of `fine`.
@@ -52,15 +52,15 @@ impl Guarantee {
         };
         let mut fine = Scenario::load("two-setpoints")?;
         fine.controller.predictor = Some(FINE);
-        let guarded = |scenario: &Scenario, programs| {
+        let guaranteed = |scenario: &Scenario, programs| {
             let mut scenario = scenario.clone();
             scenario.controller.terminal = TerminalTable::Certified(CertifiedTable::default());
             scenario.controller.iterations = Some(IterationsTable::Fixed(programs));
             Run::of("guaranteed", &scenario, clock)
         };
-        let guarded_single = guarded(&scenario_3(converged)?, 3)?;
-        let guarded_once = guarded(&scenario_3(converged)?, 1)?;
-        let guarded = guarded(&fine, 3)?;
+        let guaranteed_single = guaranteed(&scenario_3(converged)?, 3)?;
+        let guaranteed_once = guaranteed(&scenario_3(converged)?, 1)?;
+        let guaranteed = guaranteed(&fine, 3)?;
         let fine = Run::of("LPV MPC", &fine, clock)?;
         Ok(Self {
             frozen: Run::compute("single-setpoint-terminal", clock)?,
@@ -72,9 +72,9 @@ impl Guarantee {
             converged: Run::of("until converged", &scenario_3(converged)?, clock)?,
             nonlinear: nonlinear::run(&fine.prepared)?,
             fine,
-            guarded_once,
-            guarded_single,
-            guarded,
+            guaranteed_once,
+            guaranteed_single,
+            guaranteed,
             far: Run::compute("far-setpoints", clock)?,
         })
     }
@@ -85,8 +85,8 @@ impl Guarantee {
         samples
             .filter(|sample| {
                 sample
-                    .guard
-                    .is_some_and(|guard| guard.decision.is_guaranteed())
+                    .guarantee
+                    .is_some_and(|guarantee| guarantee.decision.is_guaranteed())
             })
             .count()
     }

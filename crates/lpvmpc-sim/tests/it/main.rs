@@ -7,7 +7,7 @@
 )]
 
 mod closed_loop;
-mod guarded_loop;
+mod guaranteed_loop;
 mod plant;
 mod tight_bounds;
 mod world;

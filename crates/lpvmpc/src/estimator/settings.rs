@@ -76,7 +76,7 @@ impl<T: Scalar> Gate<T> {
         } else if reading.age <= self.oldest {
             None
         } else {
-            // An age that is not a number is too old, too.
+            // An age that is NaN is too old, too.
             Some(Verdict::Stale)
         }
     }

@@ -1,11 +1,11 @@
 //! A planner whose kind is chosen when the program runs.
 
-use super::guarded::Guarded;
+use super::guaranteed::Guaranteed;
 use super::held::Held;
 use super::planner::{Planned, Planner};
 use super::ramped::Ramped;
 use crate::controller::Reference;
-use crate::guarded::GuardedWorkspace;
+use crate::guaranteed::GuaranteedWorkspace;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Bounds;
 use crate::solution::BoundId;
@@ -36,7 +36,10 @@ pub enum AnyPlanner<
     /// The input moves in ramps.
     Ramped(Ramped<P, T, NX, NU, NS, NXU>, Workspace<T, NXU, NU>),
     /// The input is held, and backed by a certificate.
-    Guarded(Guarded<P, T, NX, NU, NS, NA>, GuardedWorkspace<T, NU, NA>),
+    Guaranteed(
+        Guaranteed<P, T, NX, NU, NS, NA>,
+        GuaranteedWorkspace<T, NU, NA>,
+    ),
 }
 
 /// The same of whichever it is.
@@ -45,7 +48,7 @@ macro_rules! of_any {
         match $any {
             AnyPlanner::Held($planner, _) => $answer,
             AnyPlanner::Ramped($planner, _) => $answer,
-            AnyPlanner::Guarded($planner, _) => $answer,
+            AnyPlanner::Guaranteed($planner, _) => $answer,
         }
     };
 }
@@ -82,7 +85,7 @@ where
             Self::Ramped(planner, workspace) => {
                 planner.plan(z, disturbance, allowed, reference, workspace)
             }
-            Self::Guarded(planner, workspace) => {
+            Self::Guaranteed(planner, workspace) => {
                 planner.plan(z, disturbance, allowed, reference, workspace)
             }
         }
@@ -125,11 +128,11 @@ where
             (Self::Ramped(planner, _), Self::Ramped(before, _)) => {
                 planner.take_over(before, commanded);
             }
-            (Self::Guarded(planner, _), Self::Guarded(before, _)) => {
+            (Self::Guaranteed(planner, _), Self::Guaranteed(before, _)) => {
                 planner.take_over(before, commanded);
             }
             (Self::Ramped(planner, _), _) => planner.begin_at(commanded),
-            (Self::Held(..) | Self::Guarded(..), _) => {}
+            (Self::Held(..) | Self::Guaranteed(..), _) => {}
         }
     }
 

@@ -1,10 +1,10 @@
 //! Controllers on the measured state itself, with memory of their own.
 
 use super::{
-    Belief, FeedbackMemory, FeedbackSettings, Guarded, Held, OutputFeedback, Planner, Standalone,
+    Belief, FeedbackMemory, FeedbackSettings, Guaranteed, Held, OutputFeedback, Planner, Standalone,
 };
 use crate::controller::Controller;
-use crate::guarded::{GuardedController, GuardedWorkspace};
+use crate::guaranteed::{GuaranteedController, GuaranteedWorkspace};
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Bounds;
 use crate::workspace::Workspace;
@@ -13,13 +13,19 @@ use crate::workspace::Workspace;
 pub type StateFeedback<P, T, const NX: usize, const NU: usize, const NS: usize> =
     Standalone<DirectFeedback<P, Held<P, T, NX, NU, NS>, T, NX, NU, NS>, Workspace<T, NX, NU>>;
 
-/// A guarded controller on the measured state itself, for which alone it gives its guarantee; `NA` is
+/// A guaranteed controller on the measured state itself, for which alone it gives its guarantee; `NA` is
 /// `NX` + 1.
-pub type GuardedFeedback<P, T, const NX: usize, const NU: usize, const NS: usize, const NA: usize> =
-    Standalone<
-        DirectFeedback<P, Guarded<P, T, NX, NU, NS, NA>, T, NX, NU, NS>,
-        GuardedWorkspace<T, NU, NA>,
-    >;
+pub type GuaranteedFeedback<
+    P,
+    T,
+    const NX: usize,
+    const NU: usize,
+    const NS: usize,
+    const NA: usize,
+> = Standalone<
+    DirectFeedback<P, Guaranteed<P, T, NX, NU, NS, NA>, T, NX, NU, NS>,
+    GuaranteedWorkspace<T, NU, NA>,
+>;
 
 /// All states are measured, and no disturbance is looked for.
 type DirectFeedback<P, K, T, const NX: usize, const NU: usize, const NS: usize> =
@@ -45,14 +51,14 @@ where
 }
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize, const NA: usize>
-    GuardedFeedback<P, T, NX, NU, NS, NA>
+    GuaranteedFeedback<P, T, NX, NU, NS, NA>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS> + PartialEq + Clone,
 {
     /// The regulator with this controller, with `preview` of the reference or without.
-    pub fn guarded_feedback(
-        controller: GuardedController<P, T, NX, NU, NS>,
+    pub fn guaranteed_feedback(
+        controller: GuaranteedController<P, T, NX, NU, NS>,
         preview: bool,
     ) -> Self {
         Self {
@@ -60,7 +66,7 @@ where
             feedback: direct(
                 controller.model().clone(),
                 controller.settings().u,
-                Guarded::allocate(controller),
+                Guaranteed::allocate(controller),
                 preview,
             ),
         }

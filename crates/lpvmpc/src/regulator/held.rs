@@ -63,7 +63,7 @@ where
         let controller = &mut self.controller;
         let (x, u) = (controller.settings().x, shifted(allowed, disturbance));
         if u != controller.settings().u {
-            // Bounds that are not numbers are refused; the state is none either then, and the
+            // Bounds that are NaN are refused; the state is none either then, and the
             // plan says so.
             controller.set_bounds(x, u).ok();
         }
@@ -74,7 +74,7 @@ where
             status,
             active_bounds,
             gap: controller.gap(),
-            guard: None,
+            guarantee: None,
         }
     }
 

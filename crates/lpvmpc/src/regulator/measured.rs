@@ -43,7 +43,7 @@ impl<T: Scalar, const NX: usize> MeasuredState<T, NX> {
 
     /// Takes in readings of the first states, all of them as a rule. A reading that is missing
     /// keeps its last value. Returns the time since the last measurement (s), zero if that is not
-    /// known, and what became of the readings; one whose stamp is no number changes nothing.
+    /// known, and what became of the readings; one whose stamp is NaN changes nothing.
     pub fn observe<const NY: usize>(
         &mut self,
         measurement: &Measurement<T, NY>,

@@ -263,7 +263,7 @@ where
             status: Status::NotFinite,
             active_bounds: 0,
             gap: SVector::zeros(),
-            guard: None,
+            guarantee: None,
         };
         self.command(SVector::zeros(), x_ref, nothing)
     }
@@ -281,7 +281,7 @@ where
             status: plan.status,
             active_bounds: plan.active_bounds,
             gap: plan.gap,
-            guard: plan.guard,
+            guarantee: plan.guarantee,
         }
     }
 }

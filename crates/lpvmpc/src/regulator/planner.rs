@@ -6,7 +6,7 @@ use crate::ocp::Bounds;
 use crate::solution::{BoundId, Status};
 use nalgebra::SVector;
 
-use super::Guard;
+use super::Guarantee;
 
 /// What is to be said about a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,8 +17,8 @@ pub struct Planned<T, const NX: usize> {
     pub active_bounds: usize,
     /// Nonlinear rollout minus prediction at the end of the horizon, in state units.
     pub gap: SVector<T, NX>,
-    /// What only a guarded controller knows.
-    pub guard: Option<Guard<T>>,
+    /// What only a guaranteed controller knows.
+    pub guarantee: Option<Guarantee<T>>,
 }
 
 /// Plans the input of a plant of `NX` states and `NU` inputs.

@@ -110,7 +110,7 @@ where
             upper: join(&Self::state_of(&x.upper), &allowed.upper),
         };
         if x != controller.settings().x {
-            // Bounds that are not numbers are refused; the state is none either then, and the
+            // Bounds that are NaN are refused; the state is none either then, and the
             // plan says so.
             controller.set_bounds(x, u).ok();
         }
@@ -134,7 +134,7 @@ where
             status,
             active_bounds,
             gap: Self::state_of(&controller.gap()),
-            guard: None,
+            guarantee: None,
         }
     }
 

@@ -1,8 +1,8 @@
 //! The direction of the set points: where the plant must not notice that it was moved.
 
 use lpvmpc::{
-    Bounds, GuardedController, GuardedError, GuardedIterations, GuardedSettings, LpvModel, Rk4,
-    Rollout, SolverSettings, TerminalSet, Weights,
+    Bounds, GuaranteedController, GuaranteedError, GuaranteedIterations, GuaranteedSettings,
+    LpvModel, Rk4, Rollout, SolverSettings, TerminalSet, Weights,
 };
 use nalgebra::{Matrix1, Matrix1x2, Matrix2, Vector1, Vector2};
 
@@ -24,8 +24,8 @@ impl LpvModel<f64, 2, 1, 1> for Cart {
     }
 }
 
-fn check(cart: Cart, x: Bounds<f64, 2>) -> Result<(), GuardedError> {
-    let settings = GuardedSettings {
+fn check(cart: Cart, x: Bounds<f64, 2>) -> Result<(), GuaranteedError> {
+    let settings = GuaranteedSettings {
         t_s: 0.1,
         horizon: 4,
         rk4: Rk4 { substeps: 1 },
@@ -49,14 +49,14 @@ fn check(cart: Cart, x: Bounds<f64, 2>) -> Result<(), GuardedError> {
         set_points: [f64::NEG_INFINITY, f64::INFINITY],
         offset_weight: 1.0,
         margin: 1e-3,
-        iterations: GuardedIterations {
+        iterations: GuaranteedIterations {
             known: 1,
             unknown: 1,
         },
         soft_price: 1.0,
         solver: SolverSettings::default(),
     };
-    GuardedController::allocate(cart, settings).map(|_| ())
+    GuaranteedController::allocate(cart, settings).map(|_| ())
 }
 
 const FREE: Cart = Cart {
@@ -111,6 +111,6 @@ fn a_plant_that_notices_where_it_stands_is_refused() {
         },
     ];
     for (i, cart) in carts.into_iter().enumerate() {
-        assert_eq!(check(cart, bounds), Err(GuardedError::Direction), "{i}");
+        assert_eq!(check(cart, bounds), Err(GuaranteedError::Direction), "{i}");
     }
 }

@@ -4,7 +4,7 @@
 mod cart_pole;
 mod controller;
 mod direction;
-mod guarded;
+mod guaranteed;
 mod horizon;
 mod plants;
 mod predictor;

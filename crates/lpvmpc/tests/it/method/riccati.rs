@@ -134,7 +134,7 @@ fn gain_and_feedforward_minimise() {
         let (b, r) = (&problem.stage.b, &problem.weights.r);
         let hessian = r + b.transpose() * problem.behind.quadratic * b;
         let x = rng.matrix::<4, 1>();
-        let u = factor.gain * x + factor.feedforward;
+        let u = factor.feedback * x + factor.feedforward;
         let optimum = problem.cost(&x, &u);
         let (expected, _, size) = problem.minimum(&x);
         assert!((u - expected).norm() <= rounding(size), "{u}{expected}");
@@ -180,7 +180,7 @@ fn policy_and_next_agree_with_the_stage() {
         let problem = Problem::<5, 2>::random(&mut rng);
         let (factor, _) = problem.eliminate();
         let (x, v) = (rng.matrix(), rng.matrix());
-        let law = factor.gain * x + factor.feedforward;
+        let law = factor.feedback * x + factor.feedforward;
         let policy = factor.policy(&x, &SVector::zeros());
         assert!((policy - law).norm() <= 1e-14 * (1.0 + law.norm()));
 
@@ -188,7 +188,7 @@ fn policy_and_next_agree_with_the_stage() {
         let expected = problem.next(&x, &u);
         let found = factor.next(&x, &v);
         // A few dozen roundings, of terms that may cancel in A + BK.
-        let size = 1.0 + x.norm() * (1.0 + factor.gain.norm()) + v.norm() + u.norm();
+        let size = 1.0 + x.norm() * (1.0 + factor.feedback.norm()) + v.norm() + u.norm();
         let error = (found - expected).norm();
         assert!(error <= 1e-13 * size * (1.0 + problem.stage.b.norm()));
     }

@@ -2,7 +2,7 @@
 
 use super::plants::{NU, NX, Scheduled};
 use lpvmpc::{
-    Bounds, ControllerSettings, GeneralRow, Iterations, Penalty, Preview, Reference, Softness,
+    Bounds, ControllerSettings, GeneralRow, Iterations, Penalty, Preview, Reference, SoftBounds,
     TerminalIngredient, Weights,
 };
 use lpvmpc_testkit::rng::Rng;
@@ -23,7 +23,7 @@ pub struct Case {
     pub weights: Vec<Weights<f64, NX, NU>>,
     pub p: SMatrix<f64, NX, NX>,
     pub x: Vec<Bounds<f64, NX>>,
-    pub soft_x: Vec<Softness<f64, NX>>,
+    pub soft_x: Vec<SoftBounds<f64, NX>>,
     pub u: Vec<Bounds<f64, NU>>,
     pub rows: Vec<Vec<Row>>,
     pub disturbance: Vec<SVector<f64, NX>>,

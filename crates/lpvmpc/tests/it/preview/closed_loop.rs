@@ -225,7 +225,7 @@ fn moving_gaps_are_passed() {
 }
 
 /// Exact prices, so that a gate that cannot be passed any more has a plan.
-fn both_prices(settings: &Settings) -> [lpvmpc::Softness<f64, 2>; 1] {
+fn both_prices(settings: &Settings) -> [lpvmpc::SoftBounds<f64, 2>; 1] {
     let price = lpvmpc::Penalty {
         linear: 1e3 * settings.weights.q[(0, 0)],
         quadratic: 0.0,

@@ -1,6 +1,6 @@
 //! A problem in another number type.
 
-use lpvmpc::{Bounds, Common, GeneralRow, List, Ocp, Penalty, Scalar, Softness, Stage, Terminal};
+use lpvmpc::{Bounds, Common, GeneralRow, List, Ocp, Penalty, Scalar, SoftBounds, Stage, Terminal};
 use nalgebra::SMatrix;
 
 /// Rounded to `f32`.
@@ -35,7 +35,7 @@ impl<A: Scalar, B: Scalar> Into<'_, A, B> {
         })
     }
 
-    fn prices<const K: usize>(&self, soft: &Softness<A, K>) -> Softness<B, K> {
+    fn prices<const K: usize>(&self, soft: &SoftBounds<A, K>) -> SoftBounds<B, K> {
         soft.each_ref().map(|price| self.price(price))
     }
 

@@ -32,14 +32,17 @@ use aim::Aims;
 pub use aim::SetPoints;
 use core::fmt;
 use core::mem::swap;
-pub use memory::{GuardedArrays, GuardedMemory, GuardedWorkspaceArrays, GuardedWorkspaceMemory};
+pub use memory::{
+    GuaranteedArrays, GuaranteedMemory, GuaranteedWorkspaceArrays, GuaranteedWorkspaceMemory,
+};
 use nalgebra::{SVector, convert};
 use plan::{Plan, PlannedStage};
 use program::Slope;
 pub use settings::{
-    GuardedError, GuardedIterations, GuardedSettings, Rollout, TerminalSet, share_of_bounds,
+    GuaranteedError, GuaranteedIterations, GuaranteedSettings, Rollout, TerminalSet,
+    share_of_bounds,
 };
-pub use workspace::GuardedWorkspace;
+pub use workspace::GuaranteedWorkspace;
 
 /// What the applied input is backed by, from the strongest to the weakest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -76,9 +79,9 @@ impl fmt::Display for Decision {
     }
 }
 
-/// What one sample of the guarded loop gives.
+/// What one sample of the guaranteed loop gives.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GuardedStep<T, const NX: usize, const NU: usize> {
+pub struct GuaranteedStep<T, const NX: usize, const NU: usize> {
     /// The input to apply until the next sample, finite and within its bounds.
     pub u: SVector<T, NU>,
     /// What it is backed by.
@@ -99,7 +102,7 @@ pub struct GuardedStep<T, const NX: usize, const NU: usize> {
 /// scheduling parameters.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
-pub struct GuardedController<P, T: 'static, const NX: usize, const NU: usize, const NS: usize> {
+pub struct GuaranteedController<P, T: 'static, const NX: usize, const NU: usize, const NS: usize> {
     planner: Planner<P, T, NX, NU, NS>,
     /// The last plan, feasible or not.
     last: Plan<T, NX, NU>,
@@ -130,7 +133,7 @@ enum Repeated {
 #[cfg_attr(feature = "alloc", derive(Clone))]
 struct Planner<P, T: 'static, const NX: usize, const NU: usize, const NS: usize> {
     model: P,
-    settings: GuardedSettings<T, NX, NU>,
+    settings: GuaranteedSettings<T, NX, NU>,
     /// What plans are aimed at in this sample.
     aims: Aims<T>,
     /// The last wanted set point that was a number.
@@ -150,25 +153,25 @@ struct Planner<P, T: 'static, const NX: usize, const NU: usize, const NS: usize>
     touch: Option<SVector<T, NX>>,
 }
 
-impl<P, T, const NX: usize, const NU: usize, const NS: usize> GuardedController<P, T, NX, NU, NS>
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> GuaranteedController<P, T, NX, NU, NS>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
-    /// A guarded controller for `model`.
+    /// A guaranteed controller for `model`.
     ///
     /// # Errors
-    /// A [`GuardedError`] names the first setting that makes no sense, or that there is too little memory
+    /// A [`GuaranteedError`] names the first setting that makes no sense, or that there is too little memory
     /// for.
     pub fn new(
         model: P,
-        settings: GuardedSettings<T, NX, NU>,
-        memory: GuardedMemory<T, NX, NU>,
-    ) -> Result<Self, GuardedError> {
+        settings: GuaranteedSettings<T, NX, NU>,
+        memory: GuaranteedMemory<T, NX, NU>,
+    ) -> Result<Self, GuaranteedError> {
         const {
             assert!(NU > 0, "the set point enters through the first input");
         }
-        let GuardedMemory { plans, drift, aims } = memory;
+        let GuaranteedMemory { plans, drift, aims } = memory;
         let places = plans.iter().map(|list| list.len());
         let largest = places.fold(drift.len().min(aims.len()), usize::min);
         settings.check(&model, largest)?;
@@ -198,22 +201,25 @@ where
         Ok(controller)
     }
 
-    /// A guarded controller with memory of its own.
+    /// A guaranteed controller with memory of its own.
     ///
     /// # Errors
     /// As [`new`](Self::new).
     #[cfg(feature = "alloc")]
-    pub fn allocate(model: P, settings: GuardedSettings<T, NX, NU>) -> Result<Self, GuardedError> {
+    pub fn allocate(
+        model: P,
+        settings: GuaranteedSettings<T, NX, NU>,
+    ) -> Result<Self, GuaranteedError> {
         // What is refused is not worth its memory.
         settings.check(&model, LONGEST_HORIZON)?;
-        let memory = GuardedMemory::allocate(settings.horizon);
+        let memory = GuaranteedMemory::allocate(settings.horizon);
         Self::new(model, settings, memory)
     }
 
     /// A workspace for this controller, with memory of its own; `NA` is `NX` + 1.
     #[cfg(feature = "alloc")]
-    pub fn workspace<const NA: usize>(&self) -> GuardedWorkspace<T, NU, NA> {
-        GuardedWorkspace::allocate(self.planner.settings.capacity())
+    pub fn workspace<const NA: usize>(&self) -> GuaranteedWorkspace<T, NU, NA> {
+        GuaranteedWorkspace::allocate(self.planner.settings.capacity())
     }
 
     /// One sample: from the measured state `x` and the wanted set point (any number, reachable
@@ -222,8 +228,8 @@ where
         &mut self,
         x: &SVector<T, NX>,
         wanted: T,
-        workspace: &mut GuardedWorkspace<T, NU, NA>,
-    ) -> GuardedStep<T, NX, NU> {
+        workspace: &mut GuaranteedWorkspace<T, NU, NA>,
+    ) -> GuaranteedStep<T, NX, NU> {
         self.step_with_preview(x, &SetPoints::constant(wanted), workspace)
     }
 
@@ -233,8 +239,8 @@ where
         &mut self,
         x: &SVector<T, NX>,
         wanted: &SetPoints<'_, T>,
-        workspace: &mut GuardedWorkspace<T, NU, NA>,
-    ) -> GuardedStep<T, NX, NU> {
+        workspace: &mut GuaranteedWorkspace<T, NU, NA>,
+    ) -> GuaranteedStep<T, NX, NU> {
         const {
             assert!(NA == NX + 1, "NA must be NX + 1");
         }
@@ -271,7 +277,7 @@ where
             .stages
             .first()
             .map_or_else(SVector::zeros, |stage| stage.u);
-        GuardedStep {
+        GuaranteedStep {
             u: planner.settings.u.project(&u),
             decision,
             set_point: along.set_point,
@@ -345,7 +351,7 @@ where
     }
 
     /// The settings.
-    pub fn settings(&self) -> &GuardedSettings<T, NX, NU> {
+    pub fn settings(&self) -> &GuaranteedSettings<T, NX, NU> {
         &self.planner.settings
     }
 
@@ -373,7 +379,7 @@ where
     /// The bounds that the last plan meets: those of an input to rounding, those of a state to the
     /// margin that plans keep away from them.
     pub fn active_bounds(&self) -> impl Iterator<Item = BoundId> {
-        let GuardedSettings { x, u, margin, .. } = &self.planner.settings;
+        let GuaranteedSettings { x, u, margin, .. } = &self.planner.settings;
         // A tenth more than the margin, for what rounding leaves.
         let room_x = plan::width(x) * (*margin * convert(1.1));
         let room_u = plan::width(u) * T::default_epsilon().sqrt();
@@ -398,7 +404,7 @@ where
 {
     /// Takes over what is wanted, as admissible numbers.
     fn take_aim(&mut self, x: &SVector<T, NX>, wanted: &SetPoints<'_, T>) {
-        let GuardedSettings {
+        let GuaranteedSettings {
             direction,
             set_points: [lower, upper],
             terminal,

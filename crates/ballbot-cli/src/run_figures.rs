@@ -4,7 +4,7 @@ use ballbot_scenario::{PhiReference, Prepared};
 use ballbot_studies::recorded::Columns;
 use lpvmpc::Bounds;
 use lpvmpc_figures::{
-    Band, Figure, GuardRun, Limits, PathRun, PlaneRun, PlansRun, Reference, Role, closed_loop,
+    Band, Figure, GuaranteeRun, Limits, PathRun, PlaneRun, PlansRun, Reference, Role, closed_loop,
     motor_torques, path_in_plane, two_planes,
 };
 use nalgebra::Vector3;
@@ -110,11 +110,11 @@ pub fn plans(title: &str, columns: &Columns) -> Option<Figure> {
     let samples = columns.gap.len();
     let first = |values: &[f64]| values.get(..samples).unwrap_or(values).to_vec();
     let (time, wanted) = (first(&columns.time), first(&columns.phi_reference));
-    let guard = columns.guard.iter();
-    let (set_points, decisions): (Vec<f64>, Vec<f64>) = guard
-        .map(|guard| (guard.set_point, f64::from(guard.decision as u8 + 1)))
+    let guarantee = columns.guarantee.iter();
+    let (set_points, decisions): (Vec<f64>, Vec<f64>) = guarantee
+        .map(|guarantee| (guarantee.set_point, f64::from(guarantee.decision as u8 + 1)))
         .unzip();
-    let guard = (columns.guard.len() == samples).then_some(GuardRun {
+    let guarantee = (columns.guarantee.len() == samples).then_some(GuaranteeRun {
         set_points: &set_points,
         wanted: &wanted,
         decisions: &decisions,
@@ -125,7 +125,7 @@ pub fn plans(title: &str, columns: &Columns) -> Option<Figure> {
         &PlansRun {
             time: &time,
             gap,
-            guard,
+            guarantee,
         },
     )
 }

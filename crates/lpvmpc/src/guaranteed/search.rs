@@ -3,7 +3,7 @@
 
 use super::plan::Plan;
 use super::program::{self, Slope};
-use super::{Decision, GuardedController, GuardedWorkspace, Planner};
+use super::{Decision, GuaranteedController, GuaranteedWorkspace, Planner};
 use crate::model::{LpvModel, Scalar};
 use crate::solver::{SolverSettings, WarmStart};
 use core::mem::swap;
@@ -14,7 +14,7 @@ const WORTHWHILE: f64 = 1e-7;
 /// Fractions of the way to the quadratic program's answer that are tried.
 const FRACTIONS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 
-impl<P, T, const NX: usize, const NU: usize, const NS: usize> GuardedController<P, T, NX, NU, NS>
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> GuaranteedController<P, T, NX, NU, NS>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
@@ -26,7 +26,7 @@ where
     pub(super) fn improve<const NA: usize>(
         &mut self,
         known: Option<(Decision, T)>,
-        workspace: &mut GuardedWorkspace<T, NU, NA>,
+        workspace: &mut GuaranteedWorkspace<T, NU, NA>,
     ) -> Option<SVector<T, NX>> {
         let Self {
             planner,
@@ -104,7 +104,7 @@ where
     /// `along`, with its gap.
     pub(super) fn last_resort<const NA: usize>(
         &mut self,
-        workspace: &mut GuardedWorkspace<T, NU, NA>,
+        workspace: &mut GuaranteedWorkspace<T, NU, NA>,
     ) -> (Decision, SVector<T, NX>) {
         let Self {
             planner,
@@ -146,7 +146,7 @@ where
         &self,
         along: &Plan<T, NX, NU>,
         least: Option<T>,
-        workspace: &GuardedWorkspace<T, NU, NA>,
+        workspace: &GuaranteedWorkspace<T, NU, NA>,
         [trial, nearer]: [&mut Plan<T, NX, NU>; 2],
     ) -> Outcome<T, NX> {
         let horizon = self.settings.horizon;
@@ -218,7 +218,7 @@ where
 
     fn solve<const NA: usize>(
         &self,
-        workspace: &mut GuardedWorkspace<T, NU, NA>,
+        workspace: &mut GuaranteedWorkspace<T, NU, NA>,
         warm_start: WarmStart,
     ) {
         let settings = SolverSettings {

@@ -4,7 +4,7 @@ use ballbot_studies::Outcome;
 use lpvmpc_figures::{Band, Dash, Figure, Panel, Role, Series, Style};
 
 /// Per variant: the largest tilts, and the share of the runs that did not keep all bounds.
-pub fn drawing(outcomes: &[Outcome], theta: Band) -> Figure {
+pub fn figure(outcomes: &[Outcome], theta: Band) -> Figure {
     let mut tilts = Panel::new(
         "share of the runs",
         "largest |θ| [rad]",

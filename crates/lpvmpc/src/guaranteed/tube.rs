@@ -9,9 +9,9 @@
 //! itself, so what is of second order in the deviation is left out.
 
 use super::plan::{Plan, PlannedStage};
-use super::{GuardedSettings, GuardedWorkspace, Planner, share_of_bounds};
-use crate::kernel::product;
+use super::{GuaranteedSettings, GuaranteedWorkspace, Planner, share_of_bounds};
 use crate::model::{LpvModel, Scalar};
+use crate::small_matrix::product;
 use nalgebra::{SMatrix, SVector, convert};
 
 /// A and B of a sample.
@@ -28,7 +28,7 @@ where
         let mut x = plan.start;
         for stage in plan.stages.iter_mut() {
             let slopes = self.slopes(&x, &stage.u);
-            shape = self.carried(&shape, (&x, &stage.u), &slopes, &stage.gain);
+            shape = self.carried(&shape, (&x, &stage.u), &slopes, &stage.feedback);
             stage.drift = shape.diagonal().map(root);
             x = stage.x;
         }
@@ -40,7 +40,7 @@ where
     pub(super) fn learn_drift<const NA: usize>(
         &mut self,
         plan: &Plan<T, NX, NU>,
-        workspace: &GuardedWorkspace<T, NU, NA>,
+        workspace: &GuaranteedWorkspace<T, NU, NA>,
     ) {
         let stages = workspace.ocp.stages.iter().skip(1);
         let factors = workspace.solver.factors().iter().skip(1);
@@ -51,8 +51,8 @@ where
         {
             let a = stage.a.fixed_view::<NX, NX>(0, 0).into_owned();
             let b = stage.b.fixed_view::<NX, NU>(0, 0).into_owned();
-            let gain = factor.gain.fixed_columns::<NX>(0).into_owned();
-            shape = self.carried(&shape, (x, u), &(a, b), &gain);
+            let feedback = factor.feedback.fixed_columns::<NX>(0).into_owned();
+            shape = self.carried(&shape, (x, u), &(a, b), &feedback);
             if let Some(drift) = self.drift.get_mut(i) {
                 *drift = shape.diagonal().map(root);
             }
@@ -66,14 +66,14 @@ where
         shape: &SMatrix<T, NX, NX>,
         (x, u): (&SVector<T, NX>, &SVector<T, NU>),
         (a, b): &Slopes<T, NX, NU>,
-        gain: &SMatrix<T, NU, NX>,
+        feedback: &SMatrix<T, NU, NX>,
     ) -> SMatrix<T, NX, NX> {
         // The box lies in the ellipsoid through its corners.
         let parts: T = convert(NX as f64);
         let error = self.error(x, u);
         let noise = SMatrix::from_diagonal(&error.component_mul(&error)) * parts;
-        let mut moved = around(&(a + product(b, gain)), shape);
-        if self.may_saturate(u, &self.reach(gain, shape)) {
+        let mut moved = around(&(a + product(b, feedback)), shape);
+        if self.may_saturate(u, &self.reach(feedback, shape)) {
             moved += around(a, shape);
         }
         sum(&moved, &noise)
@@ -99,7 +99,7 @@ where
         let mut rest = plan.end_drift * plan.end_drift;
         let stages = plan.stages.iter().zip(plan.stages.iter().skip(1));
         let stages = stages.zip(aims.stages.iter().skip(1)).enumerate();
-        for (i, ((PlannedStage { x, drift, .. }, PlannedStage { u, gain, .. }), wanted)) in
+        for (i, ((PlannedStage { x, drift, .. }, PlannedStage { u, feedback, .. }), wanted)) in
             stages.rev()
         {
             let aim = if i + 1 < aims.changes {
@@ -109,12 +109,12 @@ where
             };
             let (a, b) = self.slopes(x, u);
             let by_input = r * u * two + b.transpose() * gradient;
-            let reach = gain.abs() * drift;
+            let reach = feedback.abs() * drift;
             gradient = q * (x - d * aim) * two + a.transpose() * gradient;
             if self.may_saturate(u, &reach) {
                 rest += by_input.abs().dot(&reach);
             } else {
-                gradient += gain.transpose() * by_input;
+                gradient += feedback.transpose() * by_input;
             }
             rest += (q.abs() * drift).dot(drift) + (r.abs() * reach).dot(&reach);
         }
@@ -133,13 +133,15 @@ where
 
     /// The derivatives of the prediction over a sample.
     fn slopes(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> Slopes<T, NX, NU> {
-        let GuardedSettings { rk4, t_s, .. } = &self.settings;
+        let GuaranteedSettings { rk4, t_s, .. } = &self.settings;
         rk4.differentiate(&self.model, x, u, *t_s)
     }
 
     /// How far the feedback within the ellipsoid `shape` moves the input.
-    fn reach(&self, gain: &SMatrix<T, NU, NX>, shape: &SMatrix<T, NX, NX>) -> SVector<T, NU> {
-        (gain * shape * gain.transpose()).diagonal().map(root)
+    fn reach(&self, feedback: &SMatrix<T, NU, NX>, shape: &SMatrix<T, NX, NX>) -> SVector<T, NU> {
+        (feedback * shape * feedback.transpose())
+            .diagonal()
+            .map(root)
     }
 
     /// Whether the feedback that moves the input by as much as `reach` can push it to its bound.

@@ -1,4 +1,4 @@
-//! The memory of a guarded controller and its workspace.
+//! The memory of a guaranteed controller and its workspace.
 
 use super::plan::PlannedStage;
 use crate::list::List;
@@ -11,10 +11,10 @@ use nalgebra::SVector;
 #[cfg(feature = "alloc")]
 use crate::memory::Capacity;
 
-/// Memory of a [`GuardedController`](crate::GuardedController): on the heap, or
-/// [lent](GuardedArrays::lend) arrays.
+/// Memory of a [`GuaranteedController`](crate::GuaranteedController): on the heap, or
+/// [lent](GuaranteedArrays::lend) arrays.
 #[derive(Debug)]
-pub struct GuardedMemory<T: 'static, const NX: usize, const NU: usize> {
+pub struct GuaranteedMemory<T: 'static, const NX: usize, const NU: usize> {
     /// The last plan and those that are compared in a step, one entry for each sample.
     pub(super) plans: [List<PlannedStage<T, NX, NU>>; 4],
     /// One for each sample.
@@ -24,7 +24,7 @@ pub struct GuardedMemory<T: 'static, const NX: usize, const NU: usize> {
 }
 
 #[cfg(feature = "alloc")]
-impl<T: Scalar, const NX: usize, const NU: usize> GuardedMemory<T, NX, NU> {
+impl<T: Scalar, const NX: usize, const NU: usize> GuaranteedMemory<T, NX, NU> {
     /// As much as this horizon needs, on the heap.
     pub fn allocate(horizon: usize) -> Self {
         Self {
@@ -37,16 +37,16 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedMemory<T, NX, NU> {
 
 /// The same as arrays, for horizons of up to `N` samples.
 #[derive(Clone, Copy, Debug)]
-pub struct GuardedArrays<T, const NX: usize, const NU: usize, const N: usize> {
+pub struct GuaranteedArrays<T, const NX: usize, const NU: usize, const N: usize> {
     plans: [[PlannedStage<T, NX, NU>; N]; 4],
     drift: [SVector<T, NX>; N],
     aims: [T; N],
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> GuardedArrays<T, NX, NU, N> {
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> GuaranteedArrays<T, NX, NU, N> {
     /// The arrays as memory of a controller.
-    pub fn lend(&'static mut self) -> GuardedMemory<T, NX, NU> {
-        GuardedMemory {
+    pub fn lend(&'static mut self) -> GuaranteedMemory<T, NX, NU> {
+        GuaranteedMemory {
             plans: self.plans.each_mut().map(|list| List::Static(list)),
             drift: List::Static(&mut self.drift),
             aims: List::Static(&mut self.aims),
@@ -55,7 +55,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> GuardedArrays<
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Default
-    for GuardedArrays<T, NX, NU, N>
+    for GuaranteedArrays<T, NX, NU, N>
 {
     #[inline(always)]
     fn default() -> Self {
@@ -67,10 +67,10 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Default
     }
 }
 
-/// Memory of a [`GuardedWorkspace`](crate::GuardedWorkspace): on the heap, or
-/// [lent](GuardedWorkspaceArrays::lend) arrays.
+/// Memory of a [`GuaranteedWorkspace`](crate::GuaranteedWorkspace): on the heap, or
+/// [lent](GuaranteedWorkspaceArrays::lend) arrays.
 #[derive(Debug)]
-pub struct GuardedWorkspaceMemory<T: 'static, const NU: usize, const NA: usize> {
+pub struct GuaranteedWorkspaceMemory<T: 'static, const NU: usize, const NA: usize> {
     pub(super) stages: List<Stage<T, NA, NU>>,
     pub(super) own: List<Common<T, NA, NU>>,
     pub(super) solver: SolverMemory<T, NA, NU>,
@@ -80,7 +80,7 @@ pub struct GuardedWorkspaceMemory<T: 'static, const NU: usize, const NA: usize> 
 }
 
 #[cfg(feature = "alloc")]
-impl<T: Scalar, const NU: usize, const NA: usize> GuardedWorkspaceMemory<T, NU, NA> {
+impl<T: Scalar, const NU: usize, const NA: usize> GuaranteedWorkspaceMemory<T, NU, NA> {
     /// As much as is needed, on the heap.
     pub fn allocate(capacity: Capacity) -> Self {
         let Capacity { stages, active, .. } = capacity;
@@ -97,7 +97,7 @@ impl<T: Scalar, const NU: usize, const NA: usize> GuardedWorkspaceMemory<T, NU, 
 
 /// The same as arrays: `NP` stages, two more than the horizon has samples, and up to `M` active bounds.
 #[derive(Clone, Copy, Debug)]
-pub struct GuardedWorkspaceArrays<
+pub struct GuaranteedWorkspaceArrays<
     T,
     const NU: usize,
     const NA: usize,
@@ -113,11 +113,11 @@ pub struct GuardedWorkspaceArrays<
 }
 
 impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usize>
-    GuardedWorkspaceArrays<T, NU, NA, NP, M>
+    GuaranteedWorkspaceArrays<T, NU, NA, NP, M>
 {
     /// The arrays as memory of a workspace.
-    pub fn lend(&'static mut self) -> GuardedWorkspaceMemory<T, NU, NA> {
-        GuardedWorkspaceMemory {
+    pub fn lend(&'static mut self) -> GuaranteedWorkspaceMemory<T, NU, NA> {
+        GuaranteedWorkspaceMemory {
             stages: List::Static(&mut self.stages),
             own: List::Static(&mut self.own),
             solver: self.solver.lend(),
@@ -129,7 +129,7 @@ impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usiz
 }
 
 impl<T: Scalar, const NU: usize, const NA: usize, const NP: usize, const M: usize> Default
-    for GuardedWorkspaceArrays<T, NU, NA, NP, M>
+    for GuaranteedWorkspaceArrays<T, NU, NA, NP, M>
 {
     #[inline(always)]
     fn default() -> Self {

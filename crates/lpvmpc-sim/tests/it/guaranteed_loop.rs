@@ -1,13 +1,14 @@
-//! The guarded loop around a mass on a rail: batch and stepping, late inputs, pushes.
+//! The guaranteed loop around a mass on a rail: batch and stepping, late inputs, pushes.
 
 use lpvmpc::{
-    BoundId, Bounds, GuardedController, GuardedFeedback, GuardedIterations, GuardedSettings,
-    LpvModel, Measurement, Quantity, Reading, Regulator, Rk4, Rollout, Side, SolverSettings,
-    TerminalSet, Weights,
+    BoundId, Bounds, GuaranteedController, GuaranteedFeedback, GuaranteedIterations,
+    GuaranteedSettings, LpvModel, Measurement, Quantity, Reading, Regulator, Rk4, Rollout, Side,
+    SolverSettings, TerminalSet, Weights,
 };
 use lpvmpc_design::lqr_discrete;
 use lpvmpc_sim::{
-    Actuation, ClosedLoop, GuardedLoop, RunConfig, Termination, Tolerances, Unloaded, World, record,
+    Actuation, ClosedLoop, GuaranteedLoop, RunConfig, Termination, Tolerances, Unloaded, World,
+    record,
 };
 use nalgebra::{DMatrix, Matrix1, Matrix2, Matrix2x1, RowVector2, Vector1, Vector2};
 use std::time::Duration;
@@ -32,12 +33,12 @@ impl LpvModel<f64, 2, 1, 1> for Mass {
     }
 }
 
-type Guarded = GuardedController<Mass, f64, 2, 1, 1>;
-type Feedback = GuardedFeedback<Mass, f64, 2, 1, 1, 3>;
+type Guaranteed = GuaranteedController<Mass, f64, 2, 1, 1>;
+type Feedback = GuaranteedFeedback<Mass, f64, 2, 1, 1, 3>;
 
 /// At most 0.5 m/s and 1 m/s^2. The mass is linear, so the LQR's cost decreases by the stage cost
 /// in every level set, and in this one the law keeps the bounds.
-fn controller() -> Guarded {
+fn controller() -> Guaranteed {
     let (q, r) = (Matrix2::identity(), Matrix1::new(0.1));
     let (a, b) = (
         Matrix2::new(1.0, T_S, 0.0, 1.0),
@@ -50,7 +51,7 @@ fn controller() -> Guarded {
         DMatrix::from_column_slice(1, 1, r.as_slice()),
     ];
     let lqr = lqr_discrete(&a, &b, &q_d, &r_d).unwrap();
-    let settings = GuardedSettings {
+    let settings = GuaranteedSettings {
         t_s: T_S,
         horizon: 10,
         rk4: Rk4 { substeps: 1 },
@@ -78,21 +79,21 @@ fn controller() -> Guarded {
         set_points: [f64::NEG_INFINITY, f64::INFINITY],
         offset_weight: 100.0,
         margin: 1e-3,
-        iterations: GuardedIterations {
+        iterations: GuaranteedIterations {
             known: 1,
             unknown: 30,
         },
         soft_price: 1e3,
         solver: SolverSettings::default(),
     };
-    Guarded::allocate(Mass, settings).unwrap()
+    Guaranteed::allocate(Mass, settings).unwrap()
 }
 
 #[test]
 fn a_run_is_the_sequence_of_its_samples() {
     let wanted = |t: f64| if t < 2.0 { 20.0 } else { -1.0 };
     let world = World::ideal(Unloaded::<_, 1>(&Mass), Vector2::zeros(), T_S, TOLERANCES);
-    let regulator = Feedback::guarded_feedback(controller(), false);
+    let regulator = Feedback::guaranteed_feedback(controller(), false);
     let course = RunConfig {
         samples: 120,
         reference: &|t| Vector2::new(wanted(t), 0.0),
@@ -102,13 +103,13 @@ fn a_run_is_the_sequence_of_its_samples() {
     let mut closed_loop = ClosedLoop::new(regulator, world).unwrap();
     let run = record(&mut closed_loop, &course).trajectory;
     assert_eq!(run.termination, Termination::Complete);
-    let mut stepped = GuardedLoop::new(controller(), Mass, Vector2::zeros(), TOLERANCES);
+    let mut stepped = GuaranteedLoop::new(controller(), Mass, Vector2::zeros(), TOLERANCES);
     let mut workspace = controller().workspace::<3>();
     for sample in &run.samples {
         assert_eq!(*stepped.state(), sample.x);
         let step = stepped.decide(wanted(sample.t), &mut workspace);
         assert_eq!((step.u, step.cost), (sample.u, sample.cost));
-        assert_eq!(sample.guard.unwrap().decision, step.decision);
+        assert_eq!(sample.guarantee.unwrap().decision, step.decision);
         assert!(step.decision.is_guaranteed());
         assert!(sample.x[1].abs() <= 0.5, "{}", sample.x);
         stepped.advance(&step.u, &Actuation::ideal()).unwrap();
@@ -124,7 +125,7 @@ fn a_run_is_the_sequence_of_its_samples() {
 /// applied, and no others.
 #[test]
 fn active_bounds_are_where_the_plan_meets_them() {
-    let mut regulator = Feedback::guarded_feedback(controller(), false);
+    let mut regulator = Feedback::guaranteed_feedback(controller(), false);
     let (mut speeds, mut forces) = (0, 0);
     for k in 0..60 {
         let command = regulator.decide(&|_| Vector2::new(20.0, 0.0));
@@ -161,7 +162,7 @@ fn active_bounds_are_where_the_plan_meets_them() {
 /// delay, the new one with its error after it, and a push comes on top.
 #[test]
 fn a_late_and_wrong_input_acts_as_said() {
-    let mut run = GuardedLoop::new(controller(), Mass, Vector2::zeros(), TOLERANCES);
+    let mut run = GuaranteedLoop::new(controller(), Mass, Vector2::zeros(), TOLERANCES);
     run.advance(&Vector1::new(1.0), &Actuation::ideal())
         .unwrap();
     let first = Vector2::new(T_S * T_S / 2.0, T_S);

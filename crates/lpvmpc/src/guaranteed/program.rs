@@ -1,4 +1,4 @@
-//! The quadratic program of a guarded sample.
+//! The quadratic program of a guaranteed sample.
 //!
 //! Its state is (x, z) with the set point z, which stays as it is, both seen from the set point of
 //! the plan that it is made along: so it does not matter where the plant stands. Two stages are
@@ -9,7 +9,7 @@
 //! with the multiplier of the program before. The acceptance test asks for the ball itself.
 
 use super::plan::{Plan, shrunk, width};
-use super::{GuardedWorkspace, Planner};
+use super::{GuaranteedWorkspace, Planner};
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Bounds, Common, Ocp, Penalty, Stage};
 use crate::solution::{ActiveRow, Quantity, Solution};
@@ -82,10 +82,10 @@ where
     /// one is posed with.
     pub(super) fn learn<const NA: usize>(
         &mut self,
-        workspace: &GuardedWorkspace<T, NU, NA>,
+        workspace: &GuaranteedWorkspace<T, NU, NA>,
         along: &Plan<T, NX, NU>,
     ) {
-        let GuardedWorkspace { ocp, solution, .. } = workspace;
+        let GuaranteedWorkspace { ocp, solution, .. } = workspace;
         let at_end = |row: &ActiveRow<T>| {
             row.bound.stage == ocp.horizon && row.bound.quantity == Quantity::State(0)
         };
@@ -262,21 +262,21 @@ fn augmented<T: Scalar, const NX: usize, const NA: usize>(
 }
 
 /// The answer of a solved program as a policy, from the plant's own origin: planned states, inputs and
-/// gains from stage 0 on; `from` is the set point of the plan that the program was made along, times the
+/// feedback matrices from stage 0 on; `from` is the set point of the plan that the program was made along, times the
 /// direction.
 pub(super) fn answer<'a, T: Scalar, const NX: usize, const NU: usize, const NA: usize>(
-    workspace: &'a GuardedWorkspace<T, NU, NA>,
+    workspace: &'a GuaranteedWorkspace<T, NU, NA>,
     from: &'a SVector<T, NX>,
 ) -> impl Iterator<Item = (SVector<T, NX>, SVector<T, NU>, SMatrix<T, NU, NX>)> + 'a {
-    let GuardedWorkspace {
+    let GuaranteedWorkspace {
         solution, solver, ..
     } = workspace;
     let inputs = solution.u.iter().skip(1);
     let factors = solver.factors().iter().skip(1);
     let stages = solution.x.iter().zip(inputs.zip(factors));
     stages.map(move |(planned, (u, factor))| {
-        let gain = factor.gain.fixed_columns::<NX>(0).into_owned();
-        (plant_state::<T, NX, NA>(planned) + from, *u, gain)
+        let feedback = factor.feedback.fixed_columns::<NX>(0).into_owned();
+        (plant_state::<T, NX, NA>(planned) + from, *u, feedback)
     })
 }
 

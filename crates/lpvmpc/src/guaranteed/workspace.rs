@@ -1,6 +1,6 @@
-//! The program of a guarded step and its solver.
+//! The program of a guaranteed step and its solver.
 
-use super::memory::GuardedWorkspaceMemory;
+use super::memory::GuaranteedWorkspaceMemory;
 #[cfg(feature = "alloc")]
 use crate::memory::Capacity;
 use crate::model::Scalar;
@@ -8,21 +8,21 @@ use crate::ocp::Ocp;
 use crate::solution::{ActiveSet, Solution};
 use crate::solver::Solver;
 
-/// Scratch memory of a guarded step; may be shared between controllers that run one after the
+/// Scratch memory of a guaranteed step; may be shared between controllers that run one after the
 /// other. The quadratic program of a controller with `NX` states has `NA` = `NX` + 1: the set point is
 /// the last one.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
-pub struct GuardedWorkspace<T: 'static, const NU: usize, const NA: usize> {
+pub struct GuaranteedWorkspace<T: 'static, const NU: usize, const NA: usize> {
     pub(super) ocp: Ocp<T, NA, NU>,
     pub(super) solver: Solver<T, NA, NU>,
     pub(super) solution: Solution<T, NA, NU>,
 }
 
-impl<T: Scalar, const NU: usize, const NA: usize> GuardedWorkspace<T, NU, NA> {
+impl<T: Scalar, const NU: usize, const NA: usize> GuaranteedWorkspace<T, NU, NA> {
     /// A workspace in this memory.
-    pub fn new(memory: GuardedWorkspaceMemory<T, NU, NA>) -> Self {
-        let GuardedWorkspaceMemory {
+    pub fn new(memory: GuaranteedWorkspaceMemory<T, NU, NA>) -> Self {
+        let GuaranteedWorkspaceMemory {
             stages,
             own,
             solver,
@@ -41,10 +41,10 @@ impl<T: Scalar, const NU: usize, const NA: usize> GuardedWorkspace<T, NU, NA> {
     }
 
     /// A workspace with memory of its own, for controllers with these or smaller
-    /// [capacities](super::GuardedSettings::capacity).
+    /// [capacities](super::GuaranteedSettings::capacity).
     #[cfg(feature = "alloc")]
     pub fn allocate(capacity: Capacity) -> Self {
-        Self::new(GuardedWorkspaceMemory::allocate(capacity))
+        Self::new(GuaranteedWorkspaceMemory::allocate(capacity))
     }
 
     /// The rows that are active in the last quadratic program: the warm start of the next one.

@@ -48,7 +48,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
                 self.working.append(&self.candidate, &self.direction);
             }
         }
-        self.settle(ocp, factors, trajectory)
+        self.solve_working_set(ocp, factors, trajectory)
     }
 
     /// After the last violated bound: removes what rounding has left in the optimality
@@ -74,7 +74,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         if self.refinements > 0 {
             self.refinements -= 1;
             self.forget_idle();
-            self.settle(ocp, factors, trajectory)?;
+            self.solve_working_set(ocp, factors, trajectory)?;
             return Ok(true);
         }
         if defect <= self.loosest {
@@ -102,7 +102,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         let mut worst = (T::zero(), ActiveRow::<T>::empty().bound);
         for (defect, bound) in working.chain(resting) {
             let relative = defect / rows::size(ocp, &bound);
-            // Negated, so that a defect that is not a number counts.
+            // Negated, so that a defect that is NaN counts.
             if !(relative <= worst.0) {
                 worst = (relative, bound);
             }
@@ -117,7 +117,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
 
     /// Moves to the minimiser over the working set, without the rows whose multiplier would
     /// leave its interval there. `trajectory` belongs to the current v.
-    fn settle<const NX: usize>(
+    fn solve_working_set<const NX: usize>(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
         factors: &[StageFactor<T, NX, NU>],
@@ -158,7 +158,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         let rows = self.working.rows().iter().zip(self.multipliers.iter());
         for (position, (row, multiplier)) in rows.enumerate() {
             let outside = (-*multiplier).max(*multiplier - row.cap);
-            // Negated, so that a multiplier that is not a number counts.
+            // Negated, so that a multiplier that is NaN counts.
             if !row.equality && !(outside <= distance) {
                 distance = outside;
                 farthest = Some(position);

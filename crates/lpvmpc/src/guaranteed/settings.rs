@@ -1,4 +1,4 @@
-//! What defines a guarded controller besides its model.
+//! What defines a guaranteed controller besides its model.
 
 use crate::memory::Capacity;
 use crate::model::{LpvModel, Scalar};
@@ -33,7 +33,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> TerminalSet<T, NX, NU> {
 
 /// Quadratic programs per sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct GuardedIterations {
+pub struct GuaranteedIterations {
     /// With the rest of a plan at hand; with 0 the rest is what is applied.
     pub known: usize,
     /// Without one (at the start, after a push), at least 1: they look for a plan, and go on to the
@@ -80,9 +80,9 @@ fn largest_share<T: Scalar, const K: usize>(v: &SVector<T, K>, bounds: &Bounds<T
     shares.fold(T::zero(), T::max)
 }
 
-/// Everything that defines a guarded controller besides its model.
+/// Everything that defines a guaranteed controller besides its model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GuardedSettings<T, const NX: usize, const NU: usize> {
+pub struct GuaranteedSettings<T, const NX: usize, const NU: usize> {
     /// Sampling time in seconds.
     pub t_s: T,
     /// Prediction horizon in samples, at least 1.
@@ -112,17 +112,17 @@ pub struct GuardedSettings<T, const NX: usize, const NU: usize> {
     /// with what is added for the integration error; 4e-3, say.
     pub margin: T,
     /// Quadratic programs per sample.
-    pub iterations: GuardedIterations,
+    pub iterations: GuaranteedIterations,
     /// Linear price of soft state bounds, per width of the bound; quadratic is as much.
     pub soft_price: T,
     /// Settings of the solver.
     pub solver: SolverSettings<T>,
 }
 
-/// A mistake in the [`GuardedSettings`].
+/// A mistake in the [`GuaranteedSettings`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum GuardedError {
-    /// A mistake that a controller without guard would have, too.
+pub enum GuaranteedError {
+    /// A mistake that a controller without guarantee would have, too.
     Controller(ControllerError),
     /// This number must be positive and finite.
     NotPositive(&'static str),
@@ -133,13 +133,13 @@ pub enum GuardedError {
     /// The direction is zero, not finite, or the plant notices where along it it stands: somewhere
     /// within the state bounds A d is not zero, or the scheduling moves with z d.
     Direction,
-    /// The lower set point is above the upper one, or one is not a number.
+    /// The lower set point is above the upper one, or one is NaN.
     SetPoints,
     /// Without a plan, at least one quadratic program per sample is needed.
     Iterations,
 }
 
-impl fmt::Display for GuardedError {
+impl fmt::Display for GuaranteedError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Controller(error) => error.fmt(f),
@@ -165,15 +165,15 @@ impl fmt::Display for GuardedError {
     }
 }
 
-impl core::error::Error for GuardedError {}
+impl core::error::Error for GuaranteedError {}
 
-impl From<ControllerError> for GuardedError {
+impl From<ControllerError> for GuaranteedError {
     fn from(error: ControllerError) -> Self {
         Self::Controller(error)
     }
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
+impl<T: Scalar, const NX: usize, const NU: usize> GuaranteedSettings<T, NX, NU> {
     /// What the quadratic program of a controller with these settings needs: two stages more than the
     /// horizon, and room for every bound that can be active at once.
     pub fn capacity(&self) -> Capacity {
@@ -195,7 +195,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
         &self,
         model: &P,
         largest: usize,
-    ) -> Result<(), GuardedError>
+    ) -> Result<(), GuaranteedError>
     where
         P: LpvModel<T, NX, NU, NS>,
     {
@@ -210,7 +210,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
         ];
         for (value, name) in positive {
             if !(value > T::zero() && value.is_finite()) {
-                return Err(GuardedError::NotPositive(name));
+                return Err(GuaranteedError::NotPositive(name));
             }
         }
         if self.rk4.substeps == 0 {
@@ -222,7 +222,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
         check_bounds(&self.x, "state")?;
         check_bounds(&self.u, "input")?;
         if !self.terminal.gain.iter().all(|entry| entry.is_finite()) {
-            return Err(GuardedError::Gain);
+            return Err(GuaranteedError::Gain);
         }
         let Rollout {
             rk4,
@@ -231,21 +231,21 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
         } = &self.rollout;
         let mut known = error.iter().chain(between.iter());
         if rk4.substeps == 0 || !known.all(|v| *v >= T::zero() && v.is_finite()) {
-            return Err(GuardedError::Rollout);
+            return Err(GuaranteedError::Rollout);
         }
         let [lower, upper] = self.set_points;
         if !(lower <= upper) {
-            return Err(GuardedError::SetPoints);
+            return Err(GuaranteedError::SetPoints);
         }
         if self.iterations.unknown == 0 {
-            return Err(GuardedError::Iterations);
+            return Err(GuaranteedError::Iterations);
         }
         self.check_direction(model)
     }
 
     /// A d = 0 and sigma(x + z d, u) = sigma(x, u), at points spread over the bounds: the plant does
     /// not notice where along d it stands (assumption 4 of `docs/guarantees.md`). Samples, no proof.
-    fn check_direction<P, const NS: usize>(&self, model: &P) -> Result<(), GuardedError>
+    fn check_direction<P, const NS: usize>(&self, model: &P) -> Result<(), GuaranteedError>
     where
         P: LpvModel<T, NX, NU, NS>,
     {
@@ -262,7 +262,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
             let scheduling = model.scheduling(&x, &u);
             let (a, _) = model.matrices(&scheduling);
             let rounding = a.amax() * size * T::default_epsilon();
-            // So that a number that is not one fails.
+            // So that NaN fails.
             holds &= (a * d).iter().all(|rate| rate.abs() <= rounding);
             for z in moves.into_iter().filter(|z| z.is_finite()) {
                 let moved = model.scheduling(&(x + d * z), &u) - scheduling;
@@ -274,7 +274,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuardedSettings<T, NX, NU> {
         if holds {
             Ok(())
         } else {
-            Err(GuardedError::Direction)
+            Err(GuaranteedError::Direction)
         }
     }
 }

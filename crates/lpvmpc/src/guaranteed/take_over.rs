@@ -1,11 +1,11 @@
-//! What a guarded controller leaves to one that takes its place.
+//! What a guaranteed controller leaves to one that takes its place.
 
 use super::aim::Aims;
-use super::{GuardedController, Planner};
+use super::{GuaranteedController, Planner};
 use crate::model::{LpvModel, Scalar};
 use crate::working_set::copy;
 
-impl<P, T, const NX: usize, const NU: usize, const NS: usize> GuardedController<P, T, NX, NU, NS>
+impl<P, T, const NX: usize, const NU: usize, const NS: usize> GuaranteedController<P, T, NX, NU, NS>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS> + PartialEq,

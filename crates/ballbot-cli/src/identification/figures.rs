@@ -1,6 +1,6 @@
 //! The figures of an identification.
 
-use crate::html::Drawing;
+use crate::html::CaptionedFigure;
 use ballbot_identification::{HORIZONS, Identification, IdentifiedRobot, OUTPUTS, SegmentResidual};
 use lpvmpc_design::{Correlation, NORMAL_95};
 use lpvmpc_figures::{Dash, Figure, Panel, Role, Scale, Series, Style};
@@ -20,7 +20,7 @@ pub const NAMES: [[&str; 4]; 3] = [
 ];
 
 /// All figures of all planes.
-pub fn drawings(robot: &IdentifiedRobot) -> Vec<Drawing> {
+pub fn figures(robot: &IdentifiedRobot) -> Vec<CaptionedFigure> {
     let planes = robot.planes.iter().enumerate();
     planes
         .flat_map(|(place, plane)| match robot.plane_name(place) {
@@ -31,21 +31,18 @@ pub fn drawings(robot: &IdentifiedRobot) -> Vec<Drawing> {
 }
 
 /// The figures of a plane, `title` being what follows the title of each.
-fn of_plane(plane: &Identification, names: [&'static str; 4], title: &str) -> Vec<Drawing> {
-    let drawings = [
+fn of_plane(plane: &Identification, names: [&'static str; 4], title: &str) -> Vec<CaptionedFigure> {
+    let figures = [
         Some(fit(plane)),
         Some(residuals(plane)),
         Some(correlations(plane)),
         predictions(plane),
     ];
-    let named = drawings
-        .into_iter()
-        .zip(names)
-        .filter_map(|(drawing, name)| {
-            let mut drawing = Drawing { name, ..drawing? };
-            drawing.figure.title += title;
-            Some(drawing)
-        });
+    let named = figures.into_iter().zip(names).filter_map(|(figure, name)| {
+        let mut figure = CaptionedFigure { name, ..figure? };
+        figure.figure.title += title;
+        Some(figure)
+    });
     named.collect()
 }
 
@@ -87,7 +84,7 @@ fn line() -> Style {
     Style::Line(Dash::Solid)
 }
 
-fn fit(identification: &Identification) -> Drawing {
+fn fit(identification: &Identification) -> CaptionedFigure {
     let segments = shown(identification);
     let mut panels: Vec<Panel> = measured_outputs(identification)
         .map(|output| {
@@ -119,7 +116,7 @@ fn fit(identification: &Identification) -> Drawing {
         |s, row| s.torque[row],
     );
     panels.push(Panel::new("t [s]", "τ [N m]", vec![torque]));
-    Drawing {
+    CaptionedFigure {
         name: NAMES[0][0],
         caption: format!(
             "Measured outputs and those of the fitted robot, simulated segment by segment, over the \
@@ -134,7 +131,7 @@ fn measured_outputs(identification: &Identification) -> impl Iterator<Item = usi
     0..identification.residuals.len()
 }
 
-fn residuals(identification: &Identification) -> Drawing {
+fn residuals(identification: &Identification) -> CaptionedFigure {
     let segments = shown(identification);
     let panels = measured_outputs(identification).map(|output| {
         let residual = series(&segments, "", line(), Role::Lpv, true, |s, row| {
@@ -156,7 +153,7 @@ fn residuals(identification: &Identification) -> Drawing {
         all.extend(bounds);
         Panel::new("t [s]", &label, all)
     });
-    Drawing {
+    CaptionedFigure {
         name: NAMES[0][1],
         caption: "Residuals, measured minus simulated, beside what the noise of the sensors alone \
                   would leave. They should look like noise."
@@ -165,7 +162,7 @@ fn residuals(identification: &Identification) -> Drawing {
     }
 }
 
-fn correlations(identification: &Identification) -> Drawing {
+fn correlations(identification: &Identification) -> CaptionedFigure {
     let mut panels = Vec::new();
     for (output, residual) in OUTPUTS.iter().zip(&identification.residuals) {
         panels.push(correlation(&residual.autocorrelation, output));
@@ -174,7 +171,7 @@ fn correlations(identification: &Identification) -> Drawing {
             &format!("{output}, torque"),
         ));
     }
-    Drawing {
+    CaptionedFigure {
         name: NAMES[0][2],
         caption: "Left: correlation of each residual with itself some rows before; right: with the \
                   torque. Between the lines lie 95 % of the values if there is none (for the torque, \
@@ -208,7 +205,7 @@ fn correlation(correlation: &Correlation, label: &str) -> Panel {
 }
 
 /// Errors of predictions on held-back data; none if nothing was held back for long enough.
-fn predictions(identification: &Identification) -> Option<Drawing> {
+fn predictions(identification: &Identification) -> Option<CaptionedFigure> {
     let series = identification
         .structures
         .iter()
@@ -230,7 +227,7 @@ fn predictions(identification: &Identification) -> Option<Drawing> {
         .any(|error| error.is_finite());
     let mut panel = Panel::new("horizon [s]", "tilt, error (rms) [rad]", series);
     panel.y_scale = Scale::Log;
-    finite.then(|| Drawing {
+    finite.then(|| CaptionedFigure {
         name: NAMES[0][3],
         caption: "Errors of predictions on data that were held back, for each structure of friction. \
                   Over a long horizon an error of the state grows with the unstable mode, whatever the \

@@ -1,22 +1,22 @@
-//! The guarded loop as a planner.
+//! The guaranteed loop as a planner.
 
-use super::Guard;
+use super::Guarantee;
 use super::planner::{Planned, Planner};
 use crate::controller::Reference;
-use crate::guarded::{GuardedController, GuardedSettings, GuardedWorkspace, SetPoints};
+use crate::guaranteed::{GuaranteedController, GuaranteedSettings, GuaranteedWorkspace, SetPoints};
 use crate::list::List;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Bounds;
 use crate::solution::{ActiveSet, BoundId, PackedRow};
 use nalgebra::SVector;
 
-/// Plans with a [`GuardedController`]; `NA` is `NX` + 1.
+/// Plans with a [`GuaranteedController`]; `NA` is `NX` + 1.
 ///
 /// The wanted set points are the reference's coordinates along the direction of the set points. The
 /// bounds are those of its certificate, whatever is allowed otherwise.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
-pub struct Guarded<
+pub struct Guaranteed<
     P,
     T: 'static,
     const NX: usize,
@@ -24,7 +24,7 @@ pub struct Guarded<
     const NS: usize,
     const NA: usize,
 > {
-    controller: GuardedController<P, T, NX, NU, NS>,
+    controller: GuaranteedController<P, T, NX, NU, NS>,
     /// Wanted set points at the stages.
     wanted: List<T>,
     /// The warm start of the next program: the workspace may serve another controller until then.
@@ -35,9 +35,9 @@ pub struct Guarded<
     cost: T,
 }
 
-/// Memory of a [`Guarded`] planner besides its controller's.
+/// Memory of a [`Guaranteed`] planner besides its controller's.
 #[derive(Debug)]
-pub struct GuardedPlannerMemory<T: 'static> {
+pub struct GuaranteedPlannerMemory<T: 'static> {
     /// A wanted set point for each stage of the horizon.
     pub wanted: List<T>,
     /// Rows of the next warm start, as many as may be active.
@@ -45,15 +45,15 @@ pub struct GuardedPlannerMemory<T: 'static> {
 }
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize, const NA: usize>
-    Guarded<P, T, NX, NU, NS, NA>
+    Guaranteed<P, T, NX, NU, NS, NA>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
     /// A planner with this controller.
     pub fn new(
-        controller: GuardedController<P, T, NX, NU, NS>,
-        memory: GuardedPlannerMemory<T>,
+        controller: GuaranteedController<P, T, NX, NU, NS>,
+        memory: GuaranteedPlannerMemory<T>,
     ) -> Self {
         Self {
             controller,
@@ -66,9 +66,9 @@ where
 
     /// The same with memory of its own.
     #[cfg(feature = "alloc")]
-    pub fn allocate(controller: GuardedController<P, T, NX, NU, NS>) -> Self {
+    pub fn allocate(controller: GuaranteedController<P, T, NX, NU, NS>) -> Self {
         let settings = controller.settings();
-        let memory = GuardedPlannerMemory {
+        let memory = GuaranteedPlannerMemory {
             wanted: List::repeat(T::zero(), settings.horizon),
             warm_start: List::repeat(PackedRow::empty(), settings.capacity().active),
         };
@@ -76,18 +76,18 @@ where
     }
 
     /// The controller.
-    pub fn controller(&self) -> &GuardedController<P, T, NX, NU, NS> {
+    pub fn controller(&self) -> &GuaranteedController<P, T, NX, NU, NS> {
         &self.controller
     }
 }
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize, const NA: usize> Planner<T, NX, NU>
-    for Guarded<P, T, NX, NU, NS, NA>
+    for Guaranteed<P, T, NX, NU, NS, NA>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS> + PartialEq,
 {
-    type Workspace = GuardedWorkspace<T, NU, NA>;
+    type Workspace = GuaranteedWorkspace<T, NU, NA>;
 
     fn t_s(&self) -> T {
         self.controller.settings().t_s
@@ -105,7 +105,7 @@ where
         reference: &Reference<'_, T, NX>,
         workspace: &mut Self::Workspace,
     ) -> Planned<T, NX> {
-        let GuardedSettings { direction, .. } = *self.controller.settings();
+        let GuaranteedSettings { direction, .. } = *self.controller.settings();
         let coordinate = |x: &SVector<T, NX>| x.dot(&direction) / direction.norm_squared();
         let seen = reference.stages.len().min(self.wanted.len());
         for (place, x_ref) in self.wanted.iter_mut().zip(reference.stages) {
@@ -123,7 +123,7 @@ where
             status: step.status,
             active_bounds: workspace.active_bounds(),
             gap: step.gap,
-            guard: Some(Guard {
+            guarantee: Some(Guarantee {
                 decision: step.decision,
                 set_point: step.set_point,
             }),

@@ -1,6 +1,6 @@
 //! Figures of costs over distance, and of a run with a long horizon.
 
-use crate::pictures::limits;
+use crate::run_figures::limits;
 use ballbot_studies::optimality::{Case, Outcome};
 use lpvmpc_figures::{Dash, Figure, Panel, PlaneRun, Reference, Role, Series, Style, closed_loop};
 

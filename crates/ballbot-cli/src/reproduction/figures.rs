@@ -1,27 +1,24 @@
 //! The figures of the paper.
 
-use crate::html::Drawing;
-use crate::pictures::{self, Shown};
+use crate::html::CaptionedFigure;
+use crate::run_figures::{self, Shown};
 use ballbot_studies::recorded::Columns;
 use ballbot_studies::reproduction::Reproduction;
 use lpvmpc_figures::{ModelRuns, Role, convergence, models};
 
 /// All figures, in the order of the paper.
-pub fn drawings(reproduction: &Reproduction) -> Vec<Drawing> {
-    let mut drawings = vec![
-        refinement_drawing(reproduction),
-        model_drawing(reproduction),
-    ];
-    drawings.push(two_setpoints_drawing(reproduction));
-    drawings.extend(lissajous_drawings(reproduction));
-    drawings.push(single_setpoint_drawing(reproduction));
-    drawings
+pub fn figures(reproduction: &Reproduction) -> Vec<CaptionedFigure> {
+    let mut figures = vec![refinement_figure(reproduction), model_figure(reproduction)];
+    figures.push(two_setpoints_figure(reproduction));
+    figures.extend(lissajous_figures(reproduction));
+    figures.push(single_setpoint_figure(reproduction));
+    figures
 }
 
-fn refinement_drawing(reproduction: &Reproduction) -> Drawing {
+fn refinement_figure(reproduction: &Reproduction) -> CaptionedFigure {
     let fit = &reproduction.refinement.gauss_newton;
     let norms: Vec<f64> = fit.history.iter().map(|step| step.residual_norm).collect();
-    Drawing {
+    CaptionedFigure {
         name: "convergence",
         caption: format!(
             "Refinement of b from p: the norm of the residual over the steps of the undamped \
@@ -36,12 +33,12 @@ fn refinement_drawing(reproduction: &Reproduction) -> Drawing {
     }
 }
 
-fn model_drawing(reproduction: &Reproduction) -> Drawing {
+fn model_figure(reproduction: &Reproduction) -> CaptionedFigure {
     let runs = &reproduction.models;
     let torque_time = &runs.sampled_time;
     let [phi, theta, ..] = runs.one_step_difference;
     let [fine_phi, fine_theta, ..] = runs.four_step_difference;
-    Drawing {
+    CaptionedFigure {
         name: "models",
         caption: format!(
             "Four models under a multi-harmonic torque, each stabilised by the same sampled \
@@ -68,13 +65,13 @@ fn model_drawing(reproduction: &Reproduction) -> Drawing {
     }
 }
 
-fn two_setpoints_drawing(reproduction: &Reproduction) -> Drawing {
+fn two_setpoints_figure(reproduction: &Reproduction) -> CaptionedFigure {
     let (lpv, linear) = (
         &reproduction.runs.two_setpoints,
         &reproduction.runs.two_setpoints_linear,
     );
     let costs = [lpv, linear].map(|run| run.metrics[0].closed_loop_cost);
-    Drawing {
+    CaptionedFigure {
         name: "two-setpoints",
         caption: format!(
             "Scenario 1: once around and back, LPV MPC against linear MPC. Shaded: outside the \
@@ -83,7 +80,7 @@ fn two_setpoints_drawing(reproduction: &Reproduction) -> Drawing {
             costs[1],
             100.0 * (costs[1] / costs[0] - 1.0)
         ),
-        figure: pictures::one_plane(
+        figure: run_figures::one_plane(
             "Scenario 1: two set points",
             &lpv.prepared,
             &[
@@ -102,7 +99,7 @@ fn two_setpoints_drawing(reproduction: &Reproduction) -> Drawing {
     }
 }
 
-fn lissajous_drawings(reproduction: &Reproduction) -> [Drawing; 3] {
+fn lissajous_figures(reproduction: &Reproduction) -> [CaptionedFigure; 3] {
     let run = &reproduction.runs.lissajous;
     let [x, y] = [&run.columns[0], &run.columns[1]];
     let plane = |columns| Shown {
@@ -112,33 +109,33 @@ fn lissajous_drawings(reproduction: &Reproduction) -> [Drawing; 3] {
     };
     let torques = run.prepared.motor_torques(&run.trajectories);
     [
-        Drawing {
+        CaptionedFigure {
             name: "lissajous-path",
             caption: "Scenario 2: the path on the floor in 70 s, from the origin.".to_owned(),
-            figure: pictures::path("Scenario 2: Lissajous curve", &run.prepared, [x, y]),
+            figure: run_figures::path("Scenario 2: Lissajous curve", &run.prepared, [x, y]),
         },
-        Drawing {
+        CaptionedFigure {
             name: "lissajous-planes",
             caption: "Scenario 2: states and torques of both planes, in the beginning and over 70 s. The robot \
                       starts at rest, where the curve begins at its full speed."
                 .to_owned(),
-            figure: pictures::both_planes(
+            figure: run_figures::both_planes(
                 "Scenario 2: both planes",
                 &run.prepared,
                 [plane(x), plane(y)],
             ),
         },
-        Drawing {
+        CaptionedFigure {
             name: "lissajous-motors",
             caption: "Scenario 2: the torques of the three motors (eq. (6), zenith angle 45°, \
                       no yaw torque)."
                 .to_owned(),
-            figure: pictures::motors("Scenario 2: motor torques", &run.prepared, x, &torques),
+            figure: run_figures::motors("Scenario 2: motor torques", &run.prepared, x, &torques),
         },
     ]
 }
 
-fn single_setpoint_drawing(reproduction: &Reproduction) -> Drawing {
+fn single_setpoint_figure(reproduction: &Reproduction) -> CaptionedFigure {
     let (equality, cost) = (
         &reproduction.runs.terminal_equality,
         &reproduction.runs.terminal_cost,
@@ -150,7 +147,7 @@ fn single_setpoint_drawing(reproduction: &Reproduction) -> Drawing {
             .map(|x| x[0])
             .fold(f64::INFINITY, f64::min)
     };
-    Drawing {
+    CaptionedFigure {
         name: "single-setpoint",
         caption: format!(
             "Scenario 3: half a turn with the terminal equality and with the terminal cost. \
@@ -158,7 +155,7 @@ fn single_setpoint_drawing(reproduction: &Reproduction) -> Drawing {
             lowest(&equality.columns[0]),
             lowest(&cost.columns[0])
         ),
-        figure: pictures::one_plane(
+        figure: run_figures::one_plane(
             "Scenario 3: single set point",
             &cost.prepared,
             &[

@@ -1,20 +1,21 @@
-//! The guarded loop: what it guarantees, and what it does where it can guarantee nothing.
+//! The guaranteed loop: what it guarantees, and what it does where it can guarantee nothing.
 
 use super::plant::CartPole;
 use super::regulator;
 use lpvmpc::riccati::{CostToGo, StageFactor};
 use lpvmpc::{
-    Bounds, Capacity, Common, Decision, GuardedArrays, GuardedController, GuardedError,
-    GuardedIterations, GuardedSettings, GuardedStep, GuardedWorkspace, GuardedWorkspaceArrays,
-    LpvModel, Rk4, Rollout, Scheduling, SolverSettings, Stage, Status, TerminalSet,
+    Bounds, Capacity, Common, Decision, GuaranteedArrays, GuaranteedController, GuaranteedError,
+    GuaranteedIterations, GuaranteedSettings, GuaranteedStep, GuaranteedWorkspace,
+    GuaranteedWorkspaceArrays, LpvModel, Rk4, Rollout, Scheduling, SolverSettings, Stage, Status,
+    TerminalSet,
 };
 use lpvmpc_testkit::rng::Rng;
 use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
 
 const N: usize = 20;
 const RK4: Rk4 = Rk4 { substeps: 2 };
-type Guarded = GuardedController<CartPole, f64, 4, 1, 2>;
-type Settings = GuardedSettings<f64, 4, 1>;
+type Guaranteed = GuaranteedController<CartPole, f64, 4, 1, 2>;
+type Settings = GuaranteedSettings<f64, 4, 1>;
 
 fn plant() -> CartPole {
     CartPole::laboratory()
@@ -61,7 +62,7 @@ fn settings() -> Settings {
         },
         weights: base.weights,
         terminal: TerminalSet {
-            gain: -factor.gain,
+            gain: -factor.feedback,
             p: p * 1.5,
             level: 5.0,
         },
@@ -74,7 +75,7 @@ fn settings() -> Settings {
         set_points: [-50.0, 50.0],
         offset_weight: 1e3,
         margin: 1e-3,
-        iterations: GuardedIterations {
+        iterations: GuaranteedIterations {
             known: 1,
             unknown: 30,
         },
@@ -83,8 +84,8 @@ fn settings() -> Settings {
     }
 }
 
-fn guarded(settings: Settings) -> Guarded {
-    Guarded::allocate(plant(), settings).unwrap()
+fn guaranteed(settings: Settings) -> Guaranteed {
+    Guaranteed::allocate(plant(), settings).unwrap()
 }
 
 /// A state of the terminal set around 0, from the middle to the edge.
@@ -113,7 +114,7 @@ fn the_terminal_set_is_one() {
 }
 
 /// Asserts what every step guarantees, whatever happens.
-fn assert_safe(step: &GuardedStep<f64, 4, 1>) {
+fn assert_safe(step: &GuaranteedStep<f64, 4, 1>) {
     assert!(step.u[0].is_finite());
     assert!(settings().u.contains(&step.u, 0.0));
 }
@@ -123,7 +124,7 @@ fn assert_safe(step: &GuardedStep<f64, 4, 1>) {
 /// the nearest admissible position in the end.
 fn jump_about(settings: Settings, seed: u64, decisions: &mut [usize; 5]) {
     let mut rng = Rng::new(seed);
-    let mut controller = guarded(settings);
+    let mut controller = guaranteed(settings);
     let mut memory = controller.workspace::<5>();
     let mut x = in_terminal_set(&mut rng);
     for _ in 0..4 {
@@ -179,7 +180,7 @@ fn the_nearest_admissible_position_is_reached() {
         // Before anything was wanted, where it stands.
         (f64::NAN, 0.0),
     ] {
-        let mut controller = guarded(settings());
+        let mut controller = guaranteed(settings());
         let mut memory = controller.workspace::<5>();
         let mut x = Vector4::zeros();
         for _ in 0..1200 {
@@ -193,7 +194,7 @@ fn the_nearest_admissible_position_is_reached() {
 /// The applied plan is the nonlinear rollout: what it promised is what happens.
 #[test]
 fn the_plan_happens() {
-    let mut controller = guarded(settings());
+    let mut controller = guaranteed(settings());
     let mut memory = controller.workspace::<5>();
     let mut x = Vector4::zeros();
     for _ in 0..60 {
@@ -211,11 +212,11 @@ fn a_shorter_horizon_is_the_one_of_a_smaller_memory() {
     const SHORT: usize = 13;
     let mut short = settings();
     short.horizon = SHORT;
-    let arrays = Box::leak(Box::new(GuardedArrays::<f64, 4, 1, N>::default()));
-    let mut large = Guarded::new(plant(), short, arrays.lend()).unwrap();
-    let arrays = GuardedWorkspaceArrays::<f64, 1, 5, { N + 2 }, 200>::default();
-    let mut large_memory = GuardedWorkspace::new(Box::leak(Box::new(arrays)).lend());
-    let mut small = guarded(short);
+    let arrays = Box::leak(Box::new(GuaranteedArrays::<f64, 4, 1, N>::default()));
+    let mut large = Guaranteed::new(plant(), short, arrays.lend()).unwrap();
+    let arrays = GuaranteedWorkspaceArrays::<f64, 1, 5, { N + 2 }, 200>::default();
+    let mut large_memory = GuaranteedWorkspace::new(Box::leak(Box::new(arrays)).lend());
+    let mut small = guaranteed(short);
     let mut small_memory = small.workspace::<5>();
     let mut x = Vector4::zeros();
     let mut soft = 0;
@@ -240,7 +241,7 @@ fn a_shorter_horizon_is_the_one_of_a_smaller_memory() {
 fn controllers_that_share_a_workspace_do_not_see_each_other() {
     let mut short = settings();
     (short.horizon, short.soft_price) = (13, 2e4);
-    let (mut long, mut short) = (guarded(settings()), guarded(short));
+    let (mut long, mut short) = (guaranteed(settings()), guaranteed(short));
     let (mut long_alone, mut short_alone) = (long.clone(), short.clone());
     let mut shared = long.workspace::<5>();
     let (mut own, mut other) = (long.workspace::<5>(), short.workspace::<5>());
@@ -282,8 +283,8 @@ fn a_workspace_that_is_too_small_costs_the_new_plans() {
         (Capacity { rows: 0, ..room }, Status::WorkingSetFull),
         (Capacity { active: 0, ..room }, Status::WorkingSetFull),
     ] {
-        let mut controller = guarded(settings());
-        let mut memory = GuardedWorkspace::<f64, 1, 5>::allocate(capacity);
+        let mut controller = guaranteed(settings());
+        let mut memory = GuaranteedWorkspace::<f64, 1, 5>::allocate(capacity);
         let mut x = Vector4::new(0.2, 0.05, 0.0, 0.0);
         let mut statuses = Vec::new();
         for k in 0..100 {
@@ -312,7 +313,7 @@ fn a_workspace_that_is_too_small_costs_the_new_plans() {
 /// A push beyond the bounds: soft bounds bring the pole back into what is guaranteed.
 #[test]
 fn after_a_push_the_bounds_are_soft_until_they_hold_again() {
-    let mut controller = guarded(settings());
+    let mut controller = guaranteed(settings());
     let mut memory = controller.workspace::<5>();
     let mut x = Vector4::zeros();
     let mut seen = [0; 5];
@@ -333,7 +334,7 @@ fn after_a_push_the_bounds_are_soft_until_they_hold_again() {
 /// Measurements and set points that are NaN: a safe input, and business as usual afterwards.
 #[test]
 fn nonsense_is_survived() {
-    let mut controller = guarded(settings());
+    let mut controller = guaranteed(settings());
     let mut memory = controller.workspace::<5>();
     let mut x = Vector4::new(0.1, 0.05, 0.0, 0.0);
     for k in 0..100 {
@@ -359,7 +360,7 @@ fn settings_that_make_no_sense_are_refused() {
     let refused = |change: fn(&mut Settings)| {
         let mut changed = settings();
         change(&mut changed);
-        Guarded::allocate(plant(), changed).err().unwrap()
+        Guaranteed::allocate(plant(), changed).err().unwrap()
     };
     let not_positive = [
         refused(|s| s.t_s = 0.0),
@@ -369,35 +370,35 @@ fn settings_that_make_no_sense_are_refused() {
         refused(|s| s.soft_price = f64::INFINITY),
     ];
     for error in not_positive {
-        assert!(matches!(error, GuardedError::NotPositive(_)), "{error}");
+        assert!(matches!(error, GuaranteedError::NotPositive(_)), "{error}");
     }
     assert_eq!(
         refused(|s| s.terminal.gain[0] = f64::NAN),
-        GuardedError::Gain
+        GuaranteedError::Gain
     );
     assert_eq!(
         refused(|s| s.set_points = [1.0, -1.0]),
-        GuardedError::SetPoints
+        GuaranteedError::SetPoints
     );
     assert_eq!(
         refused(|s| s.iterations.unknown = 0),
-        GuardedError::Iterations
+        GuaranteedError::Iterations
     );
     for horizon in [0, N + 1] {
         let mut changed = settings();
         changed.horizon = horizon;
         let message = format!("the horizon is {horizon}; it must be from 1 to {N} samples");
-        let arrays = Box::leak(Box::new(GuardedArrays::<f64, 4, 1, N>::default()));
-        let outcome = Guarded::new(plant(), changed, arrays.lend());
+        let arrays = Box::leak(Box::new(GuaranteedArrays::<f64, 4, 1, N>::default()));
+        let outcome = Guaranteed::new(plant(), changed, arrays.lend());
         let error = outcome.err().unwrap();
         assert!(error.to_string().contains(&message), "{error}");
     }
     // The tilt is no direction of equilibria.
     let tilted = refused(|s| s.direction = Vector4::new(0.0, 1.0, 0.0, 0.0));
-    assert_eq!(tilted, GuardedError::Direction);
+    assert_eq!(tilted, GuaranteedError::Direction);
     assert!(matches!(
         refused(|s| s.x.lower[1] = 2.0),
-        GuardedError::Controller(_)
+        GuaranteedError::Controller(_)
     ));
     assert!(tilted.to_string().contains("A d = 0"));
 }

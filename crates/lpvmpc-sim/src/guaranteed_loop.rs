@@ -1,8 +1,8 @@
-//! The guarded controller around the continuous plant, with a few faults that cost no more than a
+//! The guaranteed controller around the continuous plant, with a few faults that cost no more than a
 //! campaign can pay.
 
 use crate::plant::{self, PlantError, Tolerances};
-use lpvmpc::{GuardedController, GuardedStep, GuardedWorkspace, LpvModel};
+use lpvmpc::{GuaranteedController, GuaranteedStep, GuaranteedWorkspace, LpvModel};
 use nalgebra::SVector;
 
 /// What becomes of a commanded input on its way to the plant, for one sample.
@@ -25,10 +25,10 @@ impl<const NU: usize> Actuation<NU> {
     }
 }
 
-/// A guarded controller and its plant.
+/// A guaranteed controller and its plant.
 #[derive(Clone, Debug)]
-pub struct GuardedLoop<C, P, const NX: usize, const NU: usize, const NS: usize> {
-    controller: GuardedController<C, f64, NX, NU, NS>,
+pub struct GuaranteedLoop<C, P, const NX: usize, const NU: usize, const NS: usize> {
+    controller: GuaranteedController<C, f64, NX, NU, NS>,
     plant: P,
     tolerances: Tolerances,
     x: SVector<f64, NX>,
@@ -36,14 +36,14 @@ pub struct GuardedLoop<C, P, const NX: usize, const NU: usize, const NS: usize> 
     acting: SVector<f64, NU>,
 }
 
-impl<C, P, const NX: usize, const NU: usize, const NS: usize> GuardedLoop<C, P, NX, NU, NS>
+impl<C, P, const NX: usize, const NU: usize, const NS: usize> GuaranteedLoop<C, P, NX, NU, NS>
 where
     C: LpvModel<f64, NX, NU, NS>,
     P: LpvModel<f64, NX, NU, NS>,
 {
     /// The loop with the plant in the state `x`, no input acting on it.
     pub fn new(
-        controller: GuardedController<C, f64, NX, NU, NS>,
+        controller: GuaranteedController<C, f64, NX, NU, NS>,
         plant: P,
         x: SVector<f64, NX>,
         tolerances: Tolerances,
@@ -76,8 +76,8 @@ where
     pub fn decide<const NA: usize>(
         &mut self,
         wanted: f64,
-        workspace: &mut GuardedWorkspace<f64, NU, NA>,
-    ) -> GuardedStep<f64, NX, NU> {
+        workspace: &mut GuaranteedWorkspace<f64, NU, NA>,
+    ) -> GuaranteedStep<f64, NX, NU> {
         self.controller.step(&self.x, wanted, workspace)
     }
 

@@ -34,7 +34,7 @@ pub struct PlannedStage<T, const NX: usize, const NU: usize> {
     /// u_i.
     pub u: SVector<T, NU>,
     /// K_i: at the state x, the input is u_i + K_i (x - x_i).
-    pub gain: SMatrix<T, NU, NX>,
+    pub feedback: SMatrix<T, NU, NX>,
     /// x_{i+1}.
     pub x: SVector<T, NX>,
     /// The largest values of the states in the sample, at the Runge-Kutta steps.
@@ -49,7 +49,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> PlannedStage<T, NX, NU> {
     pub fn zeros() -> Self {
         Self {
             u: SVector::zeros(),
-            gain: SMatrix::zeros(),
+            feedback: SMatrix::zeros(),
             x: SVector::zeros(),
             highest: SVector::zeros(),
             lowest: SVector::zeros(),
@@ -114,9 +114,10 @@ where
     ) {
         let mut planned = last.stages.iter().zip(last.stages.iter().skip(1));
         self.simulate(x0, plan, |x| match planned.next() {
-            Some((before, PlannedStage { u, gain, .. })) => {
-                (input_at(x, (&before.x, u), gain, &self.settings.u), *gain)
-            }
+            Some((before, PlannedStage { u, feedback, .. })) => (
+                input_at(x, (&before.x, u), feedback, &self.settings.u),
+                *feedback,
+            ),
             None => self.terminal_law(x, last.set_point),
         });
         plan.drift_as(last);
@@ -144,9 +145,9 @@ where
         let gone = (x0 - last.start).dot(d) / d.norm_squared();
         let mut stages = last.states().zip(&last.stages);
         self.simulate(x0, plan, |x| match stages.next() {
-            Some((x_planned, PlannedStage { u, gain, .. })) => {
+            Some((x_planned, PlannedStage { u, feedback, .. })) => {
                 let planned = (&(x_planned + d * gone), u);
-                (input_at(x, planned, gain, &self.settings.u), *gain)
+                (input_at(x, planned, feedback, &self.settings.u), *feedback)
             }
             None => (SVector::zeros(), SMatrix::zeros()),
         });
@@ -181,20 +182,20 @@ where
         self.aim_as_surely(plan, set_point);
     }
 
-    /// The terminal law around the set point, cut off at the input bounds, and its gain.
+    /// The terminal law around the set point, cut off at the input bounds, and its feedback matrix.
     fn terminal_law(
         &self,
         x: &SVector<T, NX>,
         set_point: T,
     ) -> (SVector<T, NU>, SMatrix<T, NU, NX>) {
-        let gain = -self.settings.terminal.gain;
+        let feedback = -self.settings.terminal.gain;
         let origin = self.settings.direction * set_point;
-        let u = input_at(x, (&origin, &SVector::zeros()), &gain, &self.settings.u);
-        (u, gain)
+        let u = input_at(x, (&origin, &SVector::zeros()), &feedback, &self.settings.u);
+        (u, feedback)
     }
 
     /// `plan` becomes that of a policy that lies a `fraction` of the way from `along` to `towards`: planned
-    /// states, inputs and gains from stage 0 on.
+    /// states, inputs and feedback matrices from stage 0 on.
     pub(super) fn go_between(
         &self,
         along: &Plan<T, NX, NU>,
@@ -207,18 +208,19 @@ where
             .zip(along.stages.iter().map(|stage| &stage.u));
         let mut stages = from.zip(towards);
         self.simulate(&along.start, plan, |x| match stages.next() {
-            Some(((x_from, u_from), (x_to, u_to, gain))) => {
+            Some(((x_from, u_from), (x_to, u_to, feedback))) => {
                 let x_planned = x_from + (x_to - x_from) * fraction;
                 let u_planned = u_from + (u_to - u_from) * fraction;
-                let u = input_at(x, (&x_planned, &u_planned), &gain, &self.settings.u);
-                (u, gain)
+                let u = input_at(x, (&x_planned, &u_planned), &feedback, &self.settings.u);
+                (u, feedback)
             }
             None => (SVector::zeros(), SMatrix::zeros()),
         });
         self.aim(plan, along.set_point, self.almost(self.end_drift));
     }
 
-    /// `plan` becomes the rollout under `input`, which gives the input and the gain at each stage's state.
+    /// `plan` becomes the rollout under `input`, which gives the input and the feedback matrix at each
+    /// stage's state.
     fn simulate(
         &self,
         x0: &SVector<T, NX>,
@@ -230,7 +232,7 @@ where
         let step = settings.t_s / convert::<f64, T>(substeps as f64);
         let mut x = *x0;
         for stage in plan.stages.iter_mut() {
-            let (u, gain) = input(&x);
+            let (u, feedback) = input(&x);
             let (mut highest, mut lowest) = (x, x);
             for _ in 0..substeps {
                 x = Rk4 { substeps: 1 }.advance(&self.model, &x, &u, step);
@@ -238,7 +240,7 @@ where
             }
             *stage = PlannedStage {
                 u,
-                gain,
+                feedback,
                 x,
                 highest,
                 lowest,
