@@ -241,7 +241,7 @@ impl ControllerTable {
         Ok(match &self.terminal {
             TerminalTable::None => TerminalIngredient::Cost(Matrix4::zeros()),
             TerminalTable::Equality => TerminalIngredient::Equality,
-            // The certified cost is the guaranteed controller's; without guarantee it is as by default.
+            // The certified cost is the guaranteed controller's; without a guarantee it is as by default.
             TerminalTable::DiscreteRiccati | TerminalTable::Certified(_) => {
                 TerminalIngredient::Cost(self.lqr((a, b), weights, predictor)?)
             }

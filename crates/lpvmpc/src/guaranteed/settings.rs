@@ -122,7 +122,7 @@ pub struct GuaranteedSettings<T, const NX: usize, const NU: usize> {
 /// A mistake in the [`GuaranteedSettings`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum GuaranteedError {
-    /// A mistake that a controller without guarantee would have, too.
+    /// A mistake that a controller without a guarantee would have, too.
     Controller(ControllerError),
     /// This number must be positive and finite.
     NotPositive(&'static str),
