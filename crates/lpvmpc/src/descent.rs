@@ -15,7 +15,7 @@
 //! as in the method of Levenberg and Marquardt.
 
 use crate::by_stage::{CostByStage, PlantByStage};
-use crate::controller::{Controller, next_state};
+use crate::controller::Controller;
 use crate::model::{LpvModel, Scalar};
 use crate::plan::{Aim, Merit, Prices, Trial, at};
 use crate::policy::input_at;
@@ -23,7 +23,6 @@ use crate::settings::{ControllerSettings, TerminalIngredient};
 use crate::small_matrix::product;
 use crate::solution::Status;
 use crate::solver::{SolverSettings, WarmStart};
-use crate::two_parts::Answered;
 use crate::working_set::copy;
 use crate::workspace::Workspace;
 use nalgebra::{SMatrix, SVector, convert};
@@ -38,7 +37,7 @@ pub(crate) enum Along {
 }
 
 /// What came of a program.
-enum Outcome<T> {
+pub(crate) enum Outcome<T> {
     /// It has no answer.
     Unsolved(Status<T>),
     /// It expects to save next to nothing.
@@ -59,8 +58,6 @@ enum Outcome<T> {
     },
 }
 
-/// A difference of two merits is known to so many roundings of one of them, and of its states.
-const ROUNDINGS: f64 = 30.0;
 /// Parts of the way to a program's answer that are tried.
 const STEPS: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
 /// From each of them to the next longer one, at least.
@@ -69,6 +66,8 @@ const LONGER: f64 = 4.0;
 const SUFFICIENT: f64 = 1e-4;
 /// The search ends after so many programs in a row that bring nothing; each is damped more.
 const MOST_FAILURES: usize = 8;
+/// A difference of two merits is known to so many roundings of one of them, and of its states.
+const ROUNDINGS: f64 = 30.0;
 /// A full step of a sample's first program may save so many tolerances and still end the search: it is
 /// what the plan was short of for the time that has passed, and what it leaves is of second order.
 const FIRST: f64 = 10.0;
@@ -131,8 +130,8 @@ where
             match outcome {
                 Outcome::NothingToGain { hidden } if along == Along::Jacobian => {
                     if hidden && !damped {
-                        // The program knows better than the merit can tell, and its states are
-                        // the rollout's to second order.
+                        // The answer d away is a minimum: the program saves at least d'Hd, so where that
+                        // is less than rounding, d is small enough for its states to be the rollout's.
                         copy(&mut self.policy.u, &self.solution.u);
                         copy(&mut self.rollout, &self.solution.x);
                         self.gap = SVector::zeros();
@@ -182,7 +181,7 @@ where
     /// The matrices of the program along the plan from `x`. Their affine terms make the linear model
     /// exact on the plan itself.
     #[inline(never)]
-    fn linearize_plan<D: PlantByStage<P, T, NX, NU, NS>>(
+    pub(crate) fn linearize_plan<D: PlantByStage<P, T, NX, NU, NS>>(
         &self,
         x: &SVector<T, NX>,
         aim: &Aim<'_, T, NX, NU, D>,
@@ -305,7 +304,7 @@ where
     /// The longest step from the plan towards `answer` (state and input of a stage) that lowers the
     /// merit enough, of those up to the `longest`, and the merit of the rollout that it leaves in `trial`.
     #[inline(never)]
-    fn search_line<D: PlantByStage<P, T, NX, NU, NS>>(
+    pub(crate) fn search_line<D: PlantByStage<P, T, NX, NU, NS>>(
         &self,
         x: &SVector<T, NX>,
         merit: &Merit<'_, T, NX, NU, D>,
@@ -337,53 +336,9 @@ where
         None
     }
 
-    /// Makes up for what [`Controller::feedback`] left: the plan, one sample after `x` was measured,
-    /// is the best of what was planned before and of what the program answered. Then the program
-    /// along it is made ready. `false` if nothing is finite.
-    pub(crate) fn prepare_descent<D: PlantByStage<P, T, NX, NU, NS>>(
-        &mut self,
-        answered: Option<Answered<T, NX>>,
-        aim: &Aim<'_, T, NX, NU, D>,
-        workspace: &mut Workspace<T, NX, NU>,
-    ) -> bool {
-        self.track(aim, &mut workspace.ocp);
-        let last = self.last_stage();
-        // Where the plant will be, as far as the model knows.
-        let x = match answered {
-            Some(Answered::At(x)) => {
-                let u = at(&self.solution.u, 0);
-                next_state(&self.model, &self.settings, &x, &u)
-            }
-            Some(Answered::Before(x)) => x,
-            None => at(&self.rollout, 0),
-        };
-        if !self.first_plan(&x, aim, workspace) {
-            return false;
-        }
-        if answered.is_some() && self.solution.status.is_solved() {
-            let mut prices = Prices::none();
-            prices.raise(&self.solution.active);
-            let merit = self.merit(aim, prices);
-            self.policy.cost = merit.of(&x, &self.policy.u, &self.rollout);
-            let trial = &mut workspace.trial;
-            let taken = self.search_line(&x, &merit, (T::zero(), T::one()), trial, &|i| {
-                let u = if i < last {
-                    at(&self.solution.u, i + 1)
-                } else {
-                    at(&self.policy.u, i)
-                };
-                (at(&self.solution.x, i), u)
-            });
-            self.take_if_some(taken.map(|(_, cost)| cost), &workspace.trial);
-            self.adapt_damping(aim, &Outcome::NothingToGain { hidden: false });
-        }
-        self.linearize_plan(&x, aim, Along::Jacobian, workspace);
-        true
-    }
-
     /// The curvature that the last step showed, for the next program of the Jacobian; more where there
     /// was no step.
-    fn adapt_damping<D: PlantByStage<P, T, NX, NU, NS>>(
+    pub(crate) fn adapt_damping<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
         aim: &Aim<'_, T, NX, NU, D>,
         outcome: &Outcome<T>,

@@ -284,7 +284,7 @@ pub struct ControllerMemory<T: 'static, const NX: usize, const NU: usize> {
     pub(crate) x: [List<SVector<T, NX>>; 2],
     /// Inputs of both.
     pub(crate) u: [List<SVector<T, NU>>; 2],
-    /// Gains of the plan, one for each stage.
+    /// Feedback matrices of the plan, one for each stage.
     pub(crate) feedback: List<SMatrix<T, NU, NX>>,
     /// Active bounds.
     pub(crate) active: List<PackedRow<T>>,

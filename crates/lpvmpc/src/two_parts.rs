@@ -2,9 +2,10 @@
 //! later.
 
 use crate::by_stage::PlantByStage;
-use crate::controller::{Controller, Reference};
+use crate::controller::{Controller, Reference, next_state};
+use crate::descent::{Along, Outcome};
 use crate::model::{LpvModel, Scalar};
-use crate::plan::at;
+use crate::plan::{Aim, Prices, at};
 use crate::preview::Preview;
 use crate::settings::Iterations;
 use crate::solution::{Solution, Status};
@@ -119,6 +120,50 @@ where
             Some(Answered::Before(_)) => self.initialised = false,
         }
         copy(&mut self.policy.u, &self.solution.u);
+    }
+
+    /// Makes up for what [`Controller::feedback`] left: the plan, one sample after `x` was measured,
+    /// is the best of what was planned before and of what the program answered. Then the program
+    /// along it is made ready. `false` if nothing is finite.
+    fn prepare_descent<D: PlantByStage<P, T, NX, NU, NS>>(
+        &mut self,
+        answered: Option<Answered<T, NX>>,
+        aim: &Aim<'_, T, NX, NU, D>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) -> bool {
+        self.track(aim, &mut workspace.ocp);
+        let last = self.last_stage();
+        // Where the plant will be, as far as the model knows.
+        let x = match answered {
+            Some(Answered::At(x)) => {
+                let u = at(&self.solution.u, 0);
+                next_state(&self.model, &self.settings, &x, &u)
+            }
+            Some(Answered::Before(x)) => x,
+            None => at(&self.rollout, 0),
+        };
+        if !self.first_plan(&x, aim, workspace) {
+            return false;
+        }
+        if answered.is_some() && self.solution.status.is_solved() {
+            let mut prices = Prices::none();
+            prices.raise(&self.solution.active);
+            let merit = self.merit(aim, prices);
+            self.policy.cost = merit.of(&x, &self.policy.u, &self.rollout);
+            let trial = &mut workspace.trial;
+            let taken = self.search_line(&x, &merit, (T::zero(), T::one()), trial, &|i| {
+                let u = if i < last {
+                    at(&self.solution.u, i + 1)
+                } else {
+                    at(&self.policy.u, i)
+                };
+                (at(&self.solution.x, i), u)
+            });
+            self.take_if_some(taken.map(|(_, cost)| cost), &workspace.trial);
+            self.adapt_damping(aim, &Outcome::NothingToGain { hidden: false });
+        }
+        self.linearize_plan(&x, aim, Along::Jacobian, workspace);
+        true
     }
 
     /// [`prepare`](Self::prepare) with all that may be known ahead of the coming sample.
