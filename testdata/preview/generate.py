@@ -6,7 +6,7 @@ import numpy as np
 
 N, T_S, SUBSTEPS = 20, 0.05, 2
 P = np.array([[147.0, 40.0], [40.0, 15.0]])
-COLUMNS = ["angle", "rate", "phase", "weight", "gust", "gust_stage", "gap", "price", "stiffer"]
+COLUMNS = ["angle", "rate", "phase", "weight", "gust", "gust_stage", "gap", "price", "stiffer", "cross", "slope"]
 
 
 def derivative(x, u, stiffness, push):
@@ -44,11 +44,15 @@ def problem(case):
         if i > 0:
             soft(x[1, i], 0.8 + 0.5 * i / N, case["price"], 2.0)
             opti.subject_to(x[0, i] + 0.2 * x[1, i] <= case["gap"] + 0.5 * np.exp(-0.3 * i))
+        cost += case["slope"] * (0.1 * x[0, i] - 0.05 * x[1, i])
         if i == N:
             cost += ca.bilin(P, error, error)
             break
         cost += (1 + case["weight"] * i / N) * error[0] ** 2 + 0.1 * error[1] ** 2
-        cost += (0.1 + 0.05 * np.cos(i)) * (u[i] + 0.5 * np.sin(0.2 * i)) ** 2
+        away = u[i] + 0.5 * np.sin(0.2 * i)
+        cost += (0.1 + 0.05 * np.cos(i)) * away**2
+        cost += 2 * case["cross"] * away * (0.1 * error[0] + 0.03 * error[1])
+        cost += case["slope"] * 0.2 * np.sin(0.5 * i) * u[i]
         limit = 4 + 2 * np.sin(i + case["phase"])
         opti.subject_to(opti.bounded(-limit, u[i], limit))
         soft(2 * x[0, i] + 0.3 * x[1, i] + u[i], 3.0, 1.0, 10.0)
@@ -97,6 +101,8 @@ def main():
                 "gap": round(rng.uniform(-0.1, 0.1), 3),
                 "price": round(10 ** rng.uniform(0, 2), 3),
                 "stiffer": round(rng.uniform(-4, 4), 3),
+                "cross": round(rng.uniform(-1, 1), 3),
+                "slope": round(rng.uniform(-5, 5), 3),
             }
             best = optimum(case)
             if best is None:

@@ -5,27 +5,36 @@ use crate::model::{LpvModel, Scalar};
 use crate::steady_state::{self, SteadyState, SteadyStateProblem};
 use nalgebra::{SMatrix, SVector};
 
-/// A plant with the scheduling and under the disturbance of one sample.
-pub(crate) struct AtStage<'a, P, T, const NX: usize, const NS: usize> {
+/// A plant with the scheduling and under the disturbances of one sample.
+pub(crate) struct AtStage<'a, P, T, const NX: usize, const NU: usize, const NS: usize> {
     pub plant: &'a P,
     /// `None`: that of the state.
     pub scheduling: Option<&'a SVector<T, NS>>,
     /// What comes on top of x_dot.
     pub disturbance: Option<&'a SVector<T, NX>>,
+    /// What comes on top of u.
+    pub beside: Option<&'a SVector<T, NU>>,
 }
 
-impl<P, T: Scalar, const NX: usize, const NS: usize> AtStage<'_, P, T, NX, NS> {
-    /// Whether it has neither.
+impl<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize>
+    AtStage<'_, P, T, NX, NU, NS>
+{
+    /// Whether it has none of these.
     pub fn is_the_plant(&self) -> bool {
-        self.scheduling.is_none() && self.disturbance.is_none()
+        self.scheduling.is_none() && self.disturbance.is_none() && self.beside.is_none()
     }
 
     fn disturbed(&self, rate: SVector<T, NX>) -> SVector<T, NX> {
         self.disturbance.map_or(rate, |d| rate + d)
     }
 
+    /// The whole input.
+    fn input(&self, u: &SVector<T, NU>) -> SVector<T, NU> {
+        self.beside.map_or(*u, |beside| u + beside)
+    }
+
     /// A, B and the rate of the plant, undisturbed, with a scheduling from outside.
-    fn along<const NU: usize>(
+    fn along(
         &self,
         scheduling: &SVector<T, NS>,
         (x, u): (&SVector<T, NX>, &SVector<T, NU>),
@@ -41,20 +50,25 @@ impl<P, T: Scalar, const NX: usize, const NS: usize> AtStage<'_, P, T, NX, NS> {
 }
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize> LpvModel<T, NX, NU, NS>
-    for AtStage<'_, P, T, NX, NS>
+    for AtStage<'_, P, T, NX, NU, NS>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
     fn scheduling(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NS> {
         let given = self.scheduling.copied();
-        given.unwrap_or_else(|| self.plant.scheduling(x, u))
+        given.unwrap_or_else(|| self.plant.scheduling(x, &self.input(u)))
     }
 
     fn offset(&self, scheduling: &SVector<T, NS>) -> Option<SVector<T, NX>> {
-        match self.plant.offset(scheduling) {
+        let c = match self.plant.offset(scheduling) {
             Some(c) => Some(self.disturbed(c)),
             None => self.disturbance.copied(),
+        };
+        let pushed = self.beside.map(|u| self.plant.matrices(scheduling).1 * u);
+        match (c, pushed) {
+            (Some(c), Some(pushed)) => Some(c + pushed),
+            (c, pushed) => c.or(pushed),
         }
     }
 
@@ -71,9 +85,10 @@ where
     }
 
     fn derivative(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NX> {
+        let u = self.input(u);
         self.disturbed(match self.scheduling {
-            None => self.plant.derivative(x, u),
-            Some(scheduling) => self.along(scheduling, (x, u)).0,
+            None => self.plant.derivative(x, &u),
+            Some(scheduling) => self.along(scheduling, (x, &u)).0,
         })
     }
 
@@ -83,15 +98,16 @@ where
         u: &SVector<T, NU>,
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
         match self.scheduling {
-            None => self.plant.jacobian(x, u),
+            None => self.plant.jacobian(x, &self.input(u)),
             Some(scheduling) => self.plant.matrices(scheduling),
         }
     }
 
     fn tangent(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> Tangent<T, NX, NU> {
+        let u = self.input(u);
         let (rate, a, b) = match self.scheduling {
-            None => self.plant.tangent(x, u),
-            Some(scheduling) => self.along(scheduling, (x, u)),
+            None => self.plant.tangent(x, &u),
+            Some(scheduling) => self.along(scheduling, (x, &u)),
         };
         (self.disturbed(rate), a, b)
     }

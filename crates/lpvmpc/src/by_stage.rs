@@ -28,6 +28,19 @@ pub(crate) trait CostByStage<T: Scalar, const NX: usize, const NU: usize>: Copy 
     fn weights(&self, _i: usize) -> Option<&Weights<T, NX, NU>> {
         None
     }
+    fn cross(&self, _i: usize) -> Option<&SMatrix<T, NU, NX>> {
+        None
+    }
+    /// Whether a stage may have linear costs.
+    fn has_linear_costs(&self) -> bool {
+        false
+    }
+    fn linear_x(&self, _i: usize) -> Option<&SVector<T, NX>> {
+        None
+    }
+    fn linear_u(&self, _i: usize) -> Option<&SVector<T, NU>> {
+        None
+    }
     fn terminal(&self) -> Option<&TerminalIngredient<T, NX>> {
         None
     }
@@ -37,8 +50,10 @@ pub(crate) trait CostByStage<T: Scalar, const NX: usize, const NU: usize>: Copy 
     fn soft_x(&self, _i: usize) -> Option<&SoftBounds<T, NX>> {
         None
     }
-    fn u(&self, _i: usize) -> Option<&Bounds<T, NU>> {
-        None
+    /// Bounds of the input, which are `all` where the stage has none of its own.
+    #[inline(always)]
+    fn u(&self, _i: usize, all: &Bounds<T, NU>) -> Bounds<T, NU> {
+        *all
     }
     fn rows(&self, _i: usize) -> &[GeneralRow<T, NX, NU>] {
         &[]
@@ -175,10 +190,13 @@ impl<T: Scalar, const NS: usize> Scheduling<T, NS> {
     }
 }
 
-/// A preview, beside the rows that hold where it has none.
+/// A preview, beside what holds where it has nothing.
 pub(crate) struct Given<'a, P, T, const NX: usize, const NU: usize, const NS: usize> {
     pub preview: &'a Preview<'a, P, T, NX, NU, NS>,
     pub rows: &'a [GeneralRow<T, NX, NU>],
+    /// What acts on the plant besides the input that is planned. With it that input is a command to
+    /// actuators, whose bounds in the settings hold whatever the preview says.
+    pub beside: Option<&'a SVector<T, NU>>,
 }
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize> Clone
@@ -208,6 +226,18 @@ impl<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize> CostByStag
     fn weights(&self, i: usize) -> Option<&Weights<T, NX, NU>> {
         entry(self.preview.weights, i)
     }
+    fn cross(&self, i: usize) -> Option<&SMatrix<T, NU, NX>> {
+        entry(self.preview.cross, i)
+    }
+    fn has_linear_costs(&self) -> bool {
+        !(self.preview.linear_x.is_empty() && self.preview.linear_u.is_empty())
+    }
+    fn linear_x(&self, i: usize) -> Option<&SVector<T, NX>> {
+        entry(self.preview.linear_x, i)
+    }
+    fn linear_u(&self, i: usize) -> Option<&SVector<T, NU>> {
+        entry(self.preview.linear_u, i)
+    }
     fn terminal(&self) -> Option<&TerminalIngredient<T, NX>> {
         self.preview.terminal.as_ref()
     }
@@ -217,8 +247,18 @@ impl<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize> CostByStag
     fn soft_x(&self, i: usize) -> Option<&SoftBounds<T, NX>> {
         entry(self.preview.soft_x, i)
     }
-    fn u(&self, i: usize) -> Option<&Bounds<T, NU>> {
-        entry(self.preview.u, i)
+    fn u(&self, i: usize, all: &Bounds<T, NU>) -> Bounds<T, NU> {
+        match (entry(self.preview.u, i), self.beside) {
+            (None, _) => *all,
+            (Some(own), None) => *own,
+            (Some(own), Some(_)) => {
+                let within = |bound: &SVector<T, NU>| bound.sup(&all.lower).inf(&all.upper);
+                Bounds {
+                    lower: within(&own.lower),
+                    upper: within(&own.upper),
+                }
+            }
+        }
     }
     fn rows(&self, i: usize) -> &[GeneralRow<T, NX, NU>] {
         entry(self.preview.rows, i).copied().unwrap_or(self.rows)
@@ -230,11 +270,12 @@ where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
-    fn plant(&self, i: usize, plant: &'a P) -> AtStage<'a, P, T, NX, NS> {
+    fn plant(&self, i: usize, plant: &'a P) -> AtStage<'a, P, T, NX, NU, NS> {
         AtStage {
             plant: entry(self.preview.models, i).unwrap_or(plant),
             scheduling: entry(self.preview.scheduling, i),
             disturbance: entry(self.preview.disturbance, i),
+            beside: self.beside,
         }
     }
 }
@@ -290,12 +331,12 @@ where
         let last = end.saturating_sub(1);
         let here = self.plant(last, plant);
         let weights = self.weights(last);
-        let (x, u) = (self.x(end), self.u(last));
+        let x = self.x(end);
         let same = here.is_the_plant()
             && self.preview.models.is_empty()
             && weights.is_none()
             && x.is_none()
-            && u.is_none();
+            && self.preview.u.is_empty();
         let Weights { q, r } = weights.unwrap_or(&settings.weights);
         (!same).then(|| {
             here.steady_state(&SteadyStateProblem {
@@ -303,7 +344,7 @@ where
                 q: q.diagonal(),
                 r: r.diagonal(),
                 x: *x.unwrap_or(&settings.x),
-                u: *u.unwrap_or(&settings.u),
+                u: self.u(last, &settings.u),
             })
         })
     }

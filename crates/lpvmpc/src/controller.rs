@@ -20,7 +20,7 @@ use crate::steady_state::{SteadyState, SteadyStateProblem};
 
 use crate::two_parts::Answered;
 use crate::workspace::Workspace;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{SMatrix, SVector, convert};
 
 /// The state reference along the horizon, in state units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -292,7 +292,7 @@ where
     /// The paper's cost J of the last plan (Algorithm 1), constant terms included, on the
     /// states predicted from `x`, for the arguments of the last step.
     pub fn tracking_cost(&self, x: &SVector<T, NX>, reference: &Reference<'_, T, NX>) -> T {
-        self.own_cost(x, reference, &())
+        self.own_cost(x, reference, ())
     }
 
     /// The same with what the stages have of their own.
@@ -301,20 +301,23 @@ where
         &self,
         x: &SVector<T, NX>,
         reference: &Reference<'_, T, NX>,
-        own: &D,
+        own: D,
     ) -> T {
-        let u_ref = self.u_ref();
+        let aim = Aim {
+            reference,
+            rest: None,
+            u_ref: self.u_ref(),
+            own,
+        };
         let mut total = T::zero();
         let mut x = x;
         let steps = self.solution.u.iter().zip(self.solution.x.iter());
         for (i, (u, x_next)) in steps.enumerate().take(self.settings.horizon) {
-            let error = x - reference.at(i);
-            let Weights { q, r } = own.weights(i).unwrap_or(&self.settings.weights);
-            let input = u - own.u_ref(i).unwrap_or(&u_ref);
-            total += (q * error).dot(&error) + (r * input).dot(&input);
+            total += aim.cost(i, (x, u), &self.settings.weights);
             x = x_next;
         }
-        match own.terminal().unwrap_or(&self.settings.terminal) {
+        total += aim.linear_cost(self.settings.horizon, x, None);
+        match aim.own.terminal().unwrap_or(&self.settings.terminal) {
             TerminalIngredient::Cost(p) => {
                 let error = x - reference.terminal;
                 total + (p * error).dot(&error)
@@ -417,9 +420,7 @@ where
             stage.linear_x = linear_term(&q, aim.at(i));
             stage.linear_u = linear_u;
             if D::SOME {
-                let Weights { q, r } = aim.own.weights(i).unwrap_or(&self.settings.weights);
-                stage.linear_x = -product(q, aim.at(i));
-                stage.linear_u = -product(r, aim.u_ref(i));
+                (stage.linear_x, stage.linear_u) = aim.linear_terms(i, &self.settings.weights);
             }
         }
         let x_ref = *aim.end();
@@ -429,6 +430,11 @@ where
         };
         ocp.terminal.p = p;
         ocp.terminal.linear_x = -linear_term(&p, &x_ref);
+        if D::SOME
+            && let Some(price) = aim.own.linear_x(self.settings.horizon)
+        {
+            ocp.terminal.linear_x += price * convert::<f64, T>(0.5);
+        }
         ocp.terminal.equality = equality;
     }
 

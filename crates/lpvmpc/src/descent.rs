@@ -208,7 +208,7 @@ where
             stage.linear_u = linear_u - u * damping;
             if D::SOME {
                 let r = own.weights(i).unwrap_or(&settings.weights).r;
-                stage.linear_u = -product(&r, aim.u_ref(i)) - u * damping;
+                stage.linear_u = aim.linear_terms(i, &settings.weights).1 - u * damping;
                 if let Some(common) = ocp.own.get_mut(i) {
                     common.r = r + SMatrix::identity() * damping;
                 }
@@ -266,10 +266,15 @@ where
         self.policy.cost = before;
         // What a full step leaves is of second order; what is less than rounding is nothing. The
         // states are rounded, too, which counts where they are far from zero and close to their aim.
-        let from_zero = merit.end(&(aim.end() + aim.end()));
-        let known_to = (before * (before + from_zero)).sqrt() * convert(ROUNDINGS);
+        let size = if D::SOME {
+            before + merit.negative(x, &self.policy.u, &self.rollout)
+        } else {
+            before
+        };
+        let from_zero = merit.end(&(aim.end() + aim.end())).abs();
+        let known_to = (size * (size + from_zero)).sqrt() * convert(ROUNDINGS);
         let rounding = T::default_epsilon() * known_to;
-        let least = (tolerance * tolerance * before).max(rounding);
+        let least = (tolerance * tolerance * size).max(rounding);
         // Negated, so that a NaN ends the search.
         if !(expected > least) {
             let hidden = least == rounding && expected.abs() <= rounding;
@@ -296,7 +301,7 @@ where
         self.gap = at(&self.rollout, last) - at(&self.solution.x, last);
         Outcome::Moved {
             step,
-            gain: (before - cost) / before,
+            gain: (before - cost) / size,
             curvature,
         }
     }
@@ -324,8 +329,8 @@ where
                 let planned = x_plan + (x_answer - x_plan) * step;
                 let u_plan = at(&policy.u, i);
                 let u = u_plan + (u_answer - u_plan) * step;
-                let bounds = merit.aim.own.u(i).unwrap_or(&self.settings.u);
-                input_at(x_i, (&planned, &u), &at(&policy.feedback, i), bounds)
+                let bounds = merit.aim.own.u(i, &self.settings.u);
+                input_at(x_i, (&planned, &u), &at(&policy.feedback, i), &bounds)
             });
             if let Some(cost) = cost
                 && cost < policy.cost
@@ -383,7 +388,7 @@ where
 
     /// Rolls the nonlinear model out from `x` into `trial`, with the inputs that `input` gives for a
     /// stage and its state. Returns the merit; `None` if it is not finite or above `most`, where the
-    /// rollout ends: no stage costs less than nothing.
+    /// rollout ends.
     // Once in the machine code: a call per stage is nothing beside a Runge-Kutta step.
     #[inline(never)]
     pub(crate) fn roll_out_plan<D: PlantByStage<P, T, NX, NU, NS>>(
@@ -396,12 +401,18 @@ where
     ) -> Option<T> {
         let mut state = *x;
         let mut total = T::zero();
+        // No stage costs less than nothing, but for linear costs.
+        let most_before_end = if D::SOME && merit.aim.own.has_linear_costs() {
+            convert(f64::INFINITY)
+        } else {
+            most
+        };
         let places = trial.u.iter_mut().zip(&mut trial.x);
         for (i, (u, next)) in places.enumerate().take(self.settings.horizon) {
             *u = input(i, &state);
             total += merit.stage(i, &state, u);
             // Negated, so that a NaN ends it.
-            if !(total <= most) {
+            if !(total <= most_before_end) {
                 return None;
             }
             let own = &merit.aim.own;

@@ -15,8 +15,8 @@ use nalgebra::{SMatrix, SVector, convert};
 const PARTS: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.01, 0.0];
 /// Stages of the regulator, at least.
 const REGULATOR: usize = 20;
-/// A plan that costs so many times the last one is no longer the only candidate.
-const JUMP: f64 = 2.0;
+/// A plan that costs more by so many times what the last one did is no longer the only candidate.
+const JUMP: f64 = 1.0;
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize> Controller<P, T, NX, NU, NS>
 where
@@ -40,12 +40,12 @@ where
             best = self.roll_out_plan(x, &merit, unlimited, &mut workspace.trial, &|i, x| {
                 let policy = &self.policy;
                 let planned = (&at(&self.rollout, i), &at(&policy.u, i));
-                let bounds = aim.own.u(i).unwrap_or(&self.settings.u);
-                input_at(x, planned, &at(&policy.feedback, i), bounds)
+                let bounds = aim.own.u(i, &self.settings.u);
+                input_at(x, planned, &at(&policy.feedback, i), &bounds)
             });
             self.take_if_some(best, &workspace.trial);
         }
-        if best.is_none_or(|cost| cost > last * convert(JUMP)) {
+        if best.is_none_or(|cost| cost - last > last.abs() * convert(JUMP)) {
             best = self.regulate(x, aim, best, workspace);
         }
         best.is_some()
@@ -68,8 +68,8 @@ where
             let x_aim = aim.end() + away * (T::one() - convert::<f64, T>(part));
             let most = best.unwrap_or(convert(f64::INFINITY));
             let cost = self.roll_out_plan(x, &merit, most, &mut workspace.trial, &|i, x| {
-                let bounds = aim.own.u(i).unwrap_or(&self.settings.u);
-                input_at(x, (&x_aim, aim.u_ref(i)), &feedback, bounds)
+                let bounds = aim.own.u(i, &self.settings.u);
+                input_at(x, (&x_aim, aim.u_ref(i)), &feedback, &bounds)
             });
             if let Some(found) = cost
                 && best.is_none_or(|best| found < best)
@@ -132,8 +132,8 @@ where
         let feedback = at(&self.policy.feedback, last);
         let planned = (aim.end(), aim.u_ref(last));
         let end = at(&self.rollout, last);
-        let bounds = aim.own.u(last).unwrap_or(&self.settings.u);
-        let u = input_at(&end, planned, &feedback, bounds);
+        let bounds = aim.own.u(last, &self.settings.u);
+        let u = input_at(&end, planned, &feedback, &bounds);
         // What comes in from beyond the horizon is overwritten.
         move_on(&mut self.policy.u, last, u);
         move_on(&mut self.policy.feedback, last, feedback);

@@ -38,7 +38,7 @@
 //! |---|---|
 //! | a plant | [`Dynamics`] (f alone), [`Embedding`] (A(s), B(s)), [`LpvModel`] (what is not formulas) |
 //! | a controller, on the heap or in lent memory | [`Controller`], [`ControllerSettings`], [`ControllerArrays`] |
-//! | weights, bounds, rows, disturbances, scheduling or models that are known ahead | [`Preview`], [`Controller::step_with`] |
+//! | weights, bounds, rows, disturbances, scheduling or models that are known ahead | [`Preview`], [`Controller::step_with`], [`OutputFeedback::decide_with`] |
 //! | what changes while it runs | [`Controller::set_settings`], [`Controller::set_rows`], [`Controller::set_model`] |
 //! | one with a guarantee | [`GuaranteedController`] |
 //! | all that stands between sensors and actuators | [`OutputFeedback`], [`Regulator`], [`Estimator`] |

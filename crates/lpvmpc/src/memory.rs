@@ -28,7 +28,7 @@ pub struct Capacity {
 
 impl Capacity {
     /// The same with room for weights and bounds of every stage's own.
-    pub fn with_own_stages(self) -> Self {
+    pub const fn with_own_stages(self) -> Self {
         Self {
             own_stages: self.stages,
             ..self
@@ -36,7 +36,7 @@ impl Capacity {
     }
 
     /// The same with room for so many general rows of each stage, hard or soft.
-    pub fn with_general_rows(self, count: usize) -> Self {
+    pub const fn with_general_rows(self, count: usize) -> Self {
         let all = (self.stages + 1) * count;
         Self {
             rows: self.rows + all,
@@ -76,6 +76,22 @@ pub(crate) struct DualMemory<T: 'static, const NU: usize> {
 }
 
 impl<T, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
+    /// Bytes that a capacity takes, on the heap or as [`SolverArrays`]: to plan memory before there is
+    /// any. An array may have a few more for the alignment of its parts.
+    pub const fn bytes(
+        Capacity {
+            stages,
+            rows,
+            active,
+            ..
+        }: Capacity,
+    ) -> usize {
+        let input = size_of::<SVector<T, NU>>();
+        let stage = size_of::<StageFactor<T, NX, NU>>() + size_of::<[Option<Side>; NU]>();
+        let row = size_of::<Terms<T>>() + (rows + 5) * size_of::<T>();
+        stages * (stage + (rows + 4) * input) + rows * row + active * size_of::<PackedRow<T>>()
+    }
+
     /// The longest horizon that all of its lists have places for.
     pub(crate) fn stages(&self) -> usize {
         let lists = self.dual.deviations.iter().map(|list| list.len());
@@ -190,6 +206,18 @@ pub struct WorkspaceMemory<T: 'static, const NX: usize, const NU: usize> {
     pub(crate) rows: List<GeneralRow<T, NX, NU>>,
 }
 
+impl<T, const NX: usize, const NU: usize> WorkspaceMemory<T, NX, NU> {
+    /// Bytes that a capacity takes, as [`SolverMemory::bytes`].
+    pub const fn bytes(capacity: Capacity) -> usize {
+        let trial = size_of::<SVector<T, NU>>() + size_of::<SVector<T, NX>>();
+        let rows = (capacity.stages + 1) * capacity.general_rows;
+        SolverMemory::<T, NX, NU>::bytes(capacity)
+            + capacity.stages * (size_of::<Stage<T, NX, NU>>() + trial)
+            + capacity.own_stages * size_of::<Common<T, NX, NU>>()
+            + rows * size_of::<GeneralRow<T, NX, NU>>()
+    }
+}
+
 #[cfg(feature = "alloc")]
 impl<T: Scalar, const NX: usize, const NU: usize> WorkspaceMemory<T, NX, NU> {
     /// As much as is needed, on the heap.
@@ -288,6 +316,15 @@ pub struct ControllerMemory<T: 'static, const NX: usize, const NU: usize> {
     pub(crate) feedback: List<SMatrix<T, NU, NX>>,
     /// Active bounds.
     pub(crate) active: List<PackedRow<T>>,
+}
+
+impl<T, const NX: usize, const NU: usize> ControllerMemory<T, NX, NU> {
+    /// Bytes that a capacity takes, as [`SolverMemory::bytes`].
+    pub const fn bytes(Capacity { stages, active, .. }: Capacity) -> usize {
+        let plan = size_of::<SVector<T, NX>>() + size_of::<SVector<T, NU>>();
+        let feedback = size_of::<SMatrix<T, NU, NX>>();
+        stages * (2 * plan + feedback) + active * size_of::<PackedRow<T>>()
+    }
 }
 
 #[cfg(feature = "alloc")]

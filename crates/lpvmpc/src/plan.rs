@@ -40,6 +40,58 @@ where
         self.own.u_ref(i).unwrap_or(&self.u_ref)
     }
 
+    /// What state and input cost at stage `i`, prices apart, with the `weights` of a stage that has
+    /// none of its own.
+    #[inline(always)]
+    pub fn cost(
+        &self,
+        i: usize,
+        (x, u): (&SVector<T, NX>, &SVector<T, NU>),
+        weights: &Weights<T, NX, NU>,
+    ) -> T {
+        let (error, input) = (x - self.at(i), u - self.u_ref(i));
+        let Weights { q, r } = self.own.weights(i).unwrap_or(weights);
+        let cost = squared(q, &error) + squared(r, &input);
+        if !D::SOME {
+            return cost;
+        }
+        let cross = self.own.cross(i).map(|s| input.dot(&(s * error)));
+        let cross = cross.map_or(T::zero(), |half| half + half);
+        cost + cross + self.linear_cost(i, x, Some(u))
+    }
+
+    /// The linear part of the cost of stage `i`; at the end of the horizon there is no input.
+    pub fn linear_cost(&self, i: usize, x: &SVector<T, NX>, u: Option<&SVector<T, NU>>) -> T {
+        let of_x = self.own.linear_x(i).map(|price| price.dot(x));
+        let of_u = u.and_then(|u| self.own.linear_u(i).map(|price| price.dot(u)));
+        of_x.unwrap_or_else(T::zero) + of_u.unwrap_or_else(T::zero)
+    }
+
+    /// The linear terms of stage `i` in a program, whose cost is half of J.
+    pub fn linear_terms(
+        &self,
+        i: usize,
+        weights: &Weights<T, NX, NU>,
+    ) -> (SVector<T, NX>, SVector<T, NU>) {
+        let Weights { q, r } = self.own.weights(i).unwrap_or(weights);
+        let (x_ref, u_ref) = (self.at(i), self.u_ref(i));
+        let (mut of_x, mut of_u) = (-product(q, x_ref), -product(r, u_ref));
+        if let Some(s) = self.own.cross(i) {
+            of_x -= s.tr_mul(u_ref);
+            of_u -= s * x_ref;
+        }
+        let half: T = convert(0.5);
+        of_x += self
+            .own
+            .linear_x(i)
+            .map_or(SVector::zeros(), |price| price * half);
+        of_u += self
+            .own
+            .linear_u(i)
+            .map_or(SVector::zeros(), |price| price * half);
+        (of_x, of_u)
+    }
+
     /// x_ref at the end of the horizon.
     #[inline(always)]
     pub fn end(&self) -> &SVector<T, NX> {
@@ -170,9 +222,7 @@ where
     #[cfg_attr(target_arch = "arm", inline(never))]
     #[cfg_attr(not(target_arch = "arm"), inline(always))]
     pub fn stage(&self, i: usize, x: &SVector<T, NX>, u: &SVector<T, NU>) -> T {
-        let (error, input) = (x - self.aim.at(i), u - self.aim.u_ref(i));
-        let weights = self.aim.own.weights(i).unwrap_or(&self.weights);
-        let mut cost = squared(&weights.q, &error) + squared(&weights.r, &input);
+        let mut cost = self.aim.cost(i, (x, u), &self.weights);
         if D::SOME {
             cost += self.price_of_rows(i, x, Some(u));
         }
@@ -194,7 +244,8 @@ where
         };
         let cost = cost + self.excess(self.horizon, x);
         if D::SOME {
-            cost + self.price_of_rows(self.horizon, x, None)
+            let linear = self.aim.linear_cost(self.horizon, x, None);
+            cost + linear + self.price_of_rows(self.horizon, x, None)
         } else {
             cost
         }
@@ -209,6 +260,21 @@ where
             before = next;
         }
         total + self.end(before)
+    }
+
+    /// How far the linear costs below zero bring the merit down, twice: what is added to the merit
+    /// for the sum of the magnitudes of its parts.
+    pub fn negative(&self, x0: &SVector<T, NX>, u: &[SVector<T, NU>], x: &[SVector<T, NX>]) -> T {
+        if !self.aim.own.has_linear_costs() {
+            return T::zero();
+        }
+        let states = core::iter::once(x0).chain(x);
+        let inputs = u.iter().map(Some).take(self.horizon).chain([None]);
+        let stages = states.zip(inputs).enumerate();
+        stages.fold(T::zero(), |sum, (i, (x, u))| {
+            let linear = self.aim.linear_cost(i, x, u);
+            sum + linear.abs() - linear
+        })
     }
 
     /// The price of the state bounds of stage `i` that `x` exceeds.

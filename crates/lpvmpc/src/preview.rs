@@ -7,7 +7,7 @@ use crate::model::Scalar;
 use crate::ocp::{Bounds, GeneralRow, Penalty, SoftBounds};
 use crate::settings::{ControllerError, TerminalIngredient, Weights, check_bounds, check_weight};
 use core::fmt;
-use nalgebra::{SVector, Vector1};
+use nalgebra::{Cholesky, Const, SMatrix, SVector, Vector1, convert};
 
 /// What is known ahead of a sample, for [`Controller::step_with`](crate::Controller::step_with).
 ///
@@ -37,6 +37,14 @@ pub struct Preview<'a, P, T, const NX: usize, const NU: usize, const NS: usize> 
     pub u_ref: &'a [SVector<T, NU>],
     /// Weights of the stages 0 to N - 1.
     pub weights: &'a [Weights<T, NX, NU>],
+    /// Cross weights S of the stages 0 to N - 1, `NU` x `NX`: 2 (u - u_ref)'S (x - x_ref) on top. With
+    /// them, as without, no stage may cost less than nothing: Q - S' R^-1 S is positive semidefinite.
+    pub cross: &'a [SMatrix<T, NU, NX>],
+    /// Linear costs of the stages 0 to N, in cost per unit of the state: linear_x'x on top. They may
+    /// be negative, and J with them.
+    pub linear_x: &'a [SVector<T, NX>],
+    /// Linear costs of the stages 0 to N - 1, in cost per unit of the input: linear_u'u on top.
+    pub linear_u: &'a [SVector<T, NU>],
     /// What stands at the end of the horizon.
     pub terminal: Option<TerminalIngredient<T, NX>>,
     /// Bounds of x_0 to x_N. The present state x_0 is given: its entry counts nothing.
@@ -82,6 +90,9 @@ impl<'a, P, T, const NX: usize, const NU: usize, const NS: usize> Preview<'a, P,
             reference,
             u_ref: &[],
             weights: &[],
+            cross: &[],
+            linear_x: &[],
+            linear_u: &[],
             terminal: None,
             x: &[],
             soft_x: &[],
@@ -96,6 +107,7 @@ impl<'a, P, T, const NX: usize, const NU: usize, const NS: usize> Preview<'a, P,
     /// Whether a stage may have weights or bounds of its own.
     pub(crate) fn has_own_stages(&self) -> bool {
         !(self.weights.is_empty()
+            && self.cross.is_empty()
             && self.x.is_empty()
             && self.soft_x.is_empty()
             && self.u.is_empty())
@@ -111,6 +123,12 @@ pub enum PreviewPart {
     StateWeight,
     /// R of `weights`.
     InputWeight,
+    /// `cross`.
+    CrossWeight,
+    /// `linear_x`.
+    LinearStateCost,
+    /// `linear_u`.
+    LinearInputCost,
     /// `terminal`.
     Terminal,
     /// `x`.
@@ -134,7 +152,7 @@ pub enum PreviewMistake {
     NotFinite,
     /// A weight is not symmetric, or has a number that is not finite.
     NotSymmetric,
-    /// A weight is not positive definite (R) or semidefinite (Q, P).
+    /// A weight is not positive definite (R) or semidefinite (Q, P, and Q - S' R^-1 S).
     NotDefinite,
     /// A lower bound above its upper bound, or not a number.
     Crossed,
@@ -160,7 +178,9 @@ impl fmt::Display for PreviewMistake {
         f.write_str(match self {
             Self::NotFinite => "every number must be finite",
             Self::NotSymmetric => "it must be symmetric with finite entries",
-            Self::NotDefinite => "it must be positive definite (R) or semidefinite (Q, P)",
+            Self::NotDefinite => {
+                "it must be positive definite (R) or semidefinite (Q, P, and Q - S' R^-1 S)"
+            }
             Self::Crossed => "a lower bound must not exceed its upper bound",
             Self::Price => "a price must be finite and not negative",
             Self::NoRoom => "the workspace has no room for them",
@@ -174,6 +194,9 @@ impl fmt::Display for PreviewError {
             PreviewPart::InputReference => "input reference",
             PreviewPart::StateWeight => "weight Q",
             PreviewPart::InputWeight => "weight R",
+            PreviewPart::CrossWeight => "cross weight S",
+            PreviewPart::LinearStateCost => "linear cost of the state",
+            PreviewPart::LinearInputCost => "linear cost of the input",
             PreviewPart::Terminal => "terminal weight",
             PreviewPart::StateBounds => "state bounds",
             PreviewPart::Prices => "prices of state bounds",
@@ -205,7 +228,11 @@ impl<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize>
     Preview<'_, P, T, NX, NU, NS>
 {
     /// The first mistake within the horizon; the reference's numbers show in the answer's status.
-    pub(crate) fn check(&self, room: &Room) -> Result<(), PreviewError> {
+    pub(crate) fn check(
+        &self,
+        weights: &Weights<T, NX, NU>,
+        room: &Room,
+    ) -> Result<(), PreviewError> {
         use PreviewPart as Part;
         let samples = room.horizon;
         let stages = samples + 1;
@@ -216,6 +243,17 @@ impl<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize>
         each(self.weights, samples, Part::InputWeight, |weights| {
             semidefinite(&weights.r, T::zero())
         })?;
+        for stage in 0..samples.min(self.cross.len().max(self.weights.len())) {
+            let weights = entry(self.weights, stage).unwrap_or(weights);
+            let checked = entry(self.cross, stage).map_or(Ok(()), |s| crossed(weights, s));
+            checked.map_err(|mistake| PreviewError {
+                part: Part::CrossWeight,
+                stage,
+                mistake,
+            })?;
+        }
+        each(self.linear_x, stages, Part::LinearStateCost, finite)?;
+        each(self.linear_u, samples, Part::LinearInputCost, finite)?;
         if let Some(TerminalIngredient::Cost(p)) = &self.terminal {
             each(&[*p], 1, Part::Terminal, |p| {
                 semidefinite(p, T::default_epsilon())
@@ -232,6 +270,8 @@ impl<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize>
         if self.has_own_stages() && room.own_stages < samples {
             let part = if !self.weights.is_empty() {
                 Part::StateWeight
+            } else if !self.cross.is_empty() {
+                Part::CrossWeight
             } else if !self.u.is_empty() {
                 Part::InputBounds
             } else {
@@ -276,7 +316,9 @@ fn each<V>(
     Ok(())
 }
 
-fn finite<T: Scalar, const K: usize>(v: &SVector<T, K>) -> Result<(), PreviewMistake> {
+fn finite<T: Scalar, const R: usize, const C: usize>(
+    v: &SMatrix<T, R, C>,
+) -> Result<(), PreviewMistake> {
     if v.iter().all(|entry| entry.is_finite()) {
         Ok(())
     } else {
@@ -285,13 +327,34 @@ fn finite<T: Scalar, const K: usize>(v: &SVector<T, K>) -> Result<(), PreviewMis
 }
 
 fn semidefinite<T: Scalar, const K: usize>(
-    weight: &nalgebra::SMatrix<T, K, K>,
+    weight: &SMatrix<T, K, K>,
     shift: T,
 ) -> Result<(), PreviewMistake> {
     check_weight(weight, "", shift).map_err(|error| match error {
         ControllerError::WeightSign(_) => PreviewMistake::NotDefinite,
         _ => PreviewMistake::NotSymmetric,
     })
+}
+
+/// Whether the cost with the cross weight `s` is never negative: Q - S' R^-1 S is positive
+/// semidefinite, up to the rounding of its two terms.
+fn crossed<T: Scalar, const NX: usize, const NU: usize>(
+    Weights { q, r }: &Weights<T, NX, NU>,
+    s: &SMatrix<T, NU, NX>,
+) -> Result<(), PreviewMistake> {
+    finite(s)?;
+    let r = Cholesky::<T, Const<NU>>::new(*r).ok_or(PreviewMistake::NotDefinite)?;
+    let saved = s.tr_mul(&r.solve(s));
+    let roundings: T = convert::<f64, T>(10.0 * NX as f64) * T::default_epsilon();
+    let size = q.amax() + saved.amax();
+    let scale = if size > T::zero() { size } else { T::one() };
+    let shift = SMatrix::identity() * (scale * roundings);
+    let rest = q - saved;
+    let half: T = convert(0.5);
+    match Cholesky::<T, Const<NX>>::new((rest + rest.transpose()) * half + shift) {
+        Some(_) => Ok(()),
+        None => Err(PreviewMistake::NotDefinite),
+    }
 }
 
 fn ordered<T: Scalar, const K: usize>(bounds: &Bounds<T, K>) -> Result<(), PreviewMistake> {

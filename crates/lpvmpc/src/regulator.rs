@@ -14,6 +14,7 @@
 
 mod any_planner;
 mod belief;
+mod decide_with;
 #[cfg(feature = "alloc")]
 mod direct;
 mod guaranteed;

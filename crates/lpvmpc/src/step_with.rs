@@ -27,7 +27,19 @@ where
         preview: &Preview<'_, P, T, NX, NU, NS>,
         workspace: &mut Workspace<T, NX, NU>,
     ) -> &Solution<T, NX, NU> {
+        self.step_beside(x, None, preview, workspace)
+    }
+
+    /// The same with a constant input `beside` the planned one, if there is any.
+    pub(crate) fn step_beside(
+        &mut self,
+        x: &SVector<T, NX>,
+        beside: Option<&SVector<T, NU>>,
+        preview: &Preview<'_, P, T, NX, NU, NS>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) -> &Solution<T, NX, NU> {
         self.with_rows(preview, workspace, |controller, given, workspace| {
+            let given = Given { beside, ..given };
             controller.sample(x, &preview.reference, given, workspace);
             controller.keep_inputs_within(&given);
         });
@@ -40,8 +52,12 @@ where
         x: &SVector<T, NX>,
         preview: &Preview<'_, P, T, NX, NU, NS>,
     ) -> T {
-        let given = Given { preview, rows: &[] };
-        self.own_cost(x, &preview.reference, &given)
+        let given = Given {
+            preview,
+            rows: &[],
+            beside: None,
+        };
+        self.own_cost(x, &preview.reference, given)
     }
 
     /// `run` with the preview and the controller's own rows, if they make sense.
@@ -61,8 +77,14 @@ where
             stage: 0,
             mistake,
         });
-        match preview.check(&room).and(fits) {
-            Ok(()) => run(self, Given { preview, rows }, workspace),
+        let checked = preview.check(&self.settings.weights, &room).and(fits);
+        let given = Given {
+            preview,
+            rows,
+            beside: None,
+        };
+        match checked {
+            Ok(()) => run(self, given, workspace),
             Err(error) => self.give_up(Status::Refused(error)),
         }
         self.fixed = fixed;
@@ -71,7 +93,7 @@ where
     /// Also where no program was posed: the inputs of a failure are those of the settings' bounds.
     fn keep_inputs_within<D: CostByStage<T, NX, NU>>(&mut self, own: &D) {
         for (i, u) in self.solution.u.iter_mut().enumerate() {
-            *u = own.u(i).unwrap_or(&self.settings.u).project(u);
+            *u = own.u(i, &self.settings.u).project(u);
         }
     }
 

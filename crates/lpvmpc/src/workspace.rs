@@ -128,10 +128,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
             *common = Common {
                 q,
                 r,
-                s: SMatrix::zeros(),
+                s: own.cross(i).copied().unwrap_or_else(SMatrix::zeros),
                 x: *own.x(i).unwrap_or(&settings.x),
                 soft_x: soft_at(i),
-                u: *own.u(i).unwrap_or(&settings.u),
+                u: own.u(i, &settings.u),
             };
         }
         ocp.terminal.x = *own.x(end).unwrap_or(&settings.x);

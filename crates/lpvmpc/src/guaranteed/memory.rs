@@ -2,14 +2,11 @@
 
 use super::plan::PlannedStage;
 use crate::list::List;
-use crate::memory::{SolverArrays, SolverMemory};
+use crate::memory::{Capacity, SolverArrays, SolverMemory};
 use crate::model::Scalar;
 use crate::ocp::{Common, Stage};
 use crate::solution::PackedRow;
 use nalgebra::SVector;
-
-#[cfg(feature = "alloc")]
-use crate::memory::Capacity;
 
 /// Memory of a [`GuaranteedController`](crate::GuaranteedController): on the heap, or
 /// [lent](GuaranteedArrays::lend) arrays.
@@ -21,6 +18,14 @@ pub struct GuaranteedMemory<T: 'static, const NX: usize, const NU: usize> {
     pub(super) drift: List<SVector<T, NX>>,
     /// One for each sample.
     pub(super) aims: List<T>,
+}
+
+impl<T, const NX: usize, const NU: usize> GuaranteedMemory<T, NX, NU> {
+    /// Bytes that this horizon takes, as [`SolverMemory::bytes`].
+    pub const fn bytes(horizon: usize) -> usize {
+        let stage = 4 * size_of::<PlannedStage<T, NX, NU>>();
+        horizon * (stage + size_of::<SVector<T, NX>>() + size_of::<T>())
+    }
 }
 
 #[cfg(feature = "alloc")]
@@ -77,6 +82,17 @@ pub struct GuaranteedWorkspaceMemory<T: 'static, const NU: usize, const NA: usiz
     pub(super) u: List<SVector<T, NU>>,
     pub(super) x: List<SVector<T, NA>>,
     pub(super) active: List<PackedRow<T>>,
+}
+
+impl<T, const NU: usize, const NA: usize> GuaranteedWorkspaceMemory<T, NU, NA> {
+    /// Bytes that a capacity takes, as [`SolverMemory::bytes`].
+    pub const fn bytes(capacity: Capacity) -> usize {
+        let stage = size_of::<Stage<T, NA, NU>>() + size_of::<Common<T, NA, NU>>();
+        let trial = size_of::<SVector<T, NU>>() + size_of::<SVector<T, NA>>();
+        SolverMemory::<T, NA, NU>::bytes(capacity)
+            + capacity.stages * (stage + trial)
+            + capacity.active * size_of::<PackedRow<T>>()
+    }
 }
 
 #[cfg(feature = "alloc")]

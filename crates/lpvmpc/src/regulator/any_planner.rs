@@ -136,7 +136,7 @@ where
         }
     }
 
-    fn largest_inputs(&self, disturbance: &SVector<T, NU>) -> Option<SVector<T, NU>> {
-        of_any!(self, planner => planner.largest_inputs(disturbance))
+    fn largest_inputs(&self) -> Option<SVector<T, NU>> {
+        of_any!(self, planner => planner.largest_inputs())
     }
 }

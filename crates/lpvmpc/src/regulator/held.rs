@@ -4,6 +4,8 @@ use super::planner::{Planned, Planner, shifted};
 use crate::controller::{Controller, Reference};
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Bounds;
+use crate::preview::Preview;
+use crate::settings::ControllerSettings;
 use crate::solution::BoundId;
 use crate::workspace::Workspace;
 use nalgebra::SVector;
@@ -15,6 +17,8 @@ pub struct Held<P, T: 'static, const NX: usize, const NU: usize, const NS: usize
     controller: Controller<P, T, NX, NU, NS>,
     /// The input to be commanded.
     input: SVector<T, NU>,
+    /// What the inputs of the controller's plan have beside the commanded ones.
+    beside: SVector<T, NU>,
 }
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize> Held<P, T, NX, NU, NS>
@@ -27,6 +31,57 @@ where
         Self {
             controller,
             input: SVector::zeros(),
+            beside: SVector::zeros(),
+        }
+    }
+
+    /// [`plan`](Planner::plan) with all that may be known ahead. Wherever the preview speaks of the
+    /// input, it is the commanded one; `allowed` holds whatever the bounds of the preview are.
+    pub fn plan_with(
+        &mut self,
+        z: &SVector<T, NX>,
+        disturbance: &SVector<T, NU>,
+        allowed: &Bounds<T, NU>,
+        preview: &Preview<'_, P, T, NX, NU, NS>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) -> Planned<T, NX> {
+        self.bound(*allowed);
+        self.beside = SVector::zeros();
+        let beside = Some(disturbance);
+        self.controller.step_beside(z, beside, preview, workspace);
+        self.planned()
+    }
+
+    /// The input to be commanded after a plan.
+    pub(super) fn command(&self) -> SVector<T, NU> {
+        self.input
+    }
+
+    /// The cost J of the last plan, made from `z` with this preview.
+    pub fn cost_with(&self, z: &SVector<T, NX>, preview: &Preview<'_, P, T, NX, NU, NS>) -> T {
+        self.controller.tracking_cost_with(z, preview)
+    }
+
+    /// Plans within these bounds of the controller's input.
+    fn bound(&mut self, u: Bounds<T, NU>) {
+        let ControllerSettings { x, u: before, .. } = *self.controller.settings();
+        if u != before {
+            // Bounds that are NaN are refused; the state is none either then, and the
+            // plan says so.
+            self.controller.set_bounds(x, u).ok();
+        }
+    }
+
+    /// What is to be said about the controller's plan, whose first input is to be commanded.
+    fn planned(&mut self) -> Planned<T, NX> {
+        let plan = self.controller.solution();
+        let (status, active_bounds) = (plan.status, plan.active.len());
+        self.input = plan.first_input() - self.beside;
+        Planned {
+            status,
+            active_bounds,
+            gap: self.controller.gap(),
+            guarantee: None,
         }
     }
 
@@ -60,22 +115,10 @@ where
         reference: &Reference<'_, T, NX>,
         workspace: &mut Self::Workspace,
     ) -> Planned<T, NX> {
-        let controller = &mut self.controller;
-        let (x, u) = (controller.settings().x, shifted(allowed, disturbance));
-        if u != controller.settings().u {
-            // Bounds that are NaN are refused; the state is none either then, and the
-            // plan says so.
-            controller.set_bounds(x, u).ok();
-        }
-        let plan = controller.step(z, reference, workspace);
-        let (status, active_bounds) = (plan.status, plan.active.len());
-        self.input = plan.first_input() - disturbance;
-        Planned {
-            status,
-            active_bounds,
-            gap: controller.gap(),
-            guarantee: None,
-        }
+        self.bound(shifted(allowed, disturbance));
+        self.beside = *disturbance;
+        self.controller.step(z, reference, workspace);
+        self.planned()
     }
 
     fn input(&mut self, _period: T) -> SVector<T, NU> {
@@ -104,10 +147,10 @@ where
         self.controller.take_over(&previous.controller);
     }
 
-    fn largest_inputs(&self, disturbance: &SVector<T, NU>) -> Option<SVector<T, NU>> {
+    fn largest_inputs(&self) -> Option<SVector<T, NU>> {
         let plan = self.controller.solution().u.iter();
         Some(plan.fold(SVector::zeros(), |most, u| {
-            most.sup(&(u - disturbance).abs())
+            most.sup(&(u - self.beside).abs())
         }))
     }
 }

@@ -92,17 +92,17 @@ pub struct OutputFeedback<
     const NY: usize,
     const ND: usize,
 > {
-    belief: Belief<P, T, NX, NU, NS, NY, ND>,
-    planner: K,
-    settings: FeedbackSettings<T, NU>,
+    pub(super) belief: Belief<P, T, NX, NU, NS, NY, ND>,
+    pub(super) planner: K,
+    pub(super) settings: FeedbackSettings<T, NU>,
     /// Largest magnitude of each input that others leave, such as another plane on the same motors.
     share: SVector<T, NU>,
-    commands: DelayLine<T, NU>,
+    pub(super) commands: DelayLine<T, NU>,
     /// The input that was commanded last.
     commanded: SVector<T, NU>,
     window: Window<T, NX>,
     /// The state that the last plan begins with, in the model's coordinates.
-    start: SVector<T, NX>,
+    pub(super) start: SVector<T, NX>,
 }
 
 impl<P, K, T, const NX: usize, const NU: usize, const NS: usize, const NY: usize, const ND: usize>
@@ -223,7 +223,7 @@ where
     /// The largest magnitude of each input that the last plan commands; `None` from a planner whose
     /// bounds must not change.
     pub fn largest_inputs(&self) -> Option<SVector<T, NU>> {
-        self.planner.largest_inputs(&self.belief.disturbance())
+        self.planner.largest_inputs()
     }
 
     /// The cost J of the last plan, constant terms included.
@@ -242,7 +242,7 @@ where
     }
 
     /// The bounds of the input that is commanded.
-    fn allowed(&self) -> Bounds<T, NU> {
+    pub(super) fn allowed(&self) -> Bounds<T, NU> {
         let within = |bound: &SVector<T, NU>| bound.sup(&-self.share).inf(&self.share);
         Bounds {
             lower: within(&self.settings.u.lower),
@@ -258,7 +258,7 @@ where
     }
 
     /// While there is no state to decide for, there is no input.
-    fn without_state(&mut self, x_ref: SVector<T, NX>) -> Command<T, NX, NU> {
+    pub(super) fn without_state(&mut self, x_ref: SVector<T, NX>) -> Command<T, NX, NU> {
         let nothing = Planned {
             status: Status::NotFinite,
             active_bounds: 0,
@@ -268,7 +268,7 @@ where
         self.command(SVector::zeros(), x_ref, nothing)
     }
 
-    fn command(
+    pub(super) fn command(
         &mut self,
         input: SVector<T, NU>,
         x_ref: SVector<T, NX>,

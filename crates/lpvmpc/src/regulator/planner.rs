@@ -74,9 +74,9 @@ pub trait Planner<T: Scalar, const NX: usize, const NU: usize> {
     /// Goes on from the plan of another planner, whose input is `commanded` at the next sample.
     fn take_over(&mut self, previous: &Self, commanded: &SVector<T, NU>);
 
-    /// The largest magnitude of each input that the last plan commands beside the `disturbance`;
-    /// `None` from one whose bounds must not change from sample to sample.
-    fn largest_inputs(&self, _disturbance: &SVector<T, NU>) -> Option<SVector<T, NU>> {
+    /// The largest magnitude of each input that the last plan commands; `None` from one whose bounds
+    /// must not change from sample to sample.
+    fn largest_inputs(&self) -> Option<SVector<T, NU>> {
         None
     }
 }

@@ -10,3 +10,4 @@ mod ramp;
 mod regulator;
 mod set_points;
 mod shaping;
+mod told;

@@ -11,20 +11,20 @@ use lpvmpc::{
 use lpvmpc_testkit::rng::Rng;
 use nalgebra::{Matrix1, Matrix1x2, Matrix2, Matrix3, SVector, Vector1, Vector2, Vector3};
 
-const T_S: f64 = 0.02;
-const DELAY: f64 = 0.03;
-const N: usize = 25;
-const INSTANTS: usize = 16;
-const COMMANDS: usize = 8;
+pub const T_S: f64 = 0.02;
+pub const DELAY: f64 = 0.03;
+pub const N: usize = 25;
+pub const INSTANTS: usize = 16;
+pub const COMMANDS: usize = 8;
 /// Bound of the torque, N m; it holds the pendulum at 0.4 rad at most.
-const LIMIT: f64 = 4.0;
+pub const LIMIT: f64 = 4.0;
 
-type Feedback<K> = OutputFeedback<Pendulum, K, f64, 2, 1, 1, 1, 1>;
-type PlannerOfTorque = Held<Pendulum, f64, 2, 1, 1>;
+pub type Feedback<K> = OutputFeedback<Pendulum, K, f64, 2, 1, 1, 1, 1>;
+pub type PlannerOfTorque = Held<Pendulum, f64, 2, 1, 1>;
 type PlannerOfRate = Ramped<Pendulum, f64, 2, 1, 1, 3>;
-type Regulated<K> = Standalone<Feedback<K>, <K as Planner<f64, 2, 1>>::Workspace>;
+pub type Regulated<K> = Standalone<Feedback<K>, <K as Planner<f64, 2, 1>>::Workspace>;
 
-fn controller_settings(horizon: usize) -> ControllerSettings<f64, 2, 1, 1> {
+pub fn controller_settings(horizon: usize) -> ControllerSettings<f64, 2, 1, 1> {
     ControllerSettings {
         t_s: T_S,
         horizon,
@@ -71,7 +71,7 @@ fn around<K: Planner<f64, 2, 1>>(planner: K) -> Feedback<K> {
 }
 
 /// The torque is held.
-fn held(horizon: usize) -> Regulated<PlannerOfTorque> {
+pub fn held(horizon: usize) -> Regulated<PlannerOfTorque> {
     let controller = Controller::allocate(Pendulum, controller_settings(horizon)).unwrap();
     Standalone {
         workspace: controller.workspace(),
@@ -116,9 +116,9 @@ fn ramped(horizon: usize) -> Regulated<PlannerOfRate> {
 
 /// A pendulum with another torque on it, behind a delay, with noise and readings that are missing
 /// or late.
-struct World {
-    x: Vector2<f64>,
-    disturbance: f64,
+pub struct World {
+    pub x: Vector2<f64>,
+    pub disturbance: f64,
     noise: f64,
     k: usize,
     past: Vec<f64>,
@@ -129,7 +129,7 @@ struct World {
 }
 
 impl World {
-    fn new(disturbance: f64, noise: f64) -> Self {
+    pub fn new(disturbance: f64, noise: f64) -> Self {
         Self {
             x: Vector2::new(0.1, 0.0),
             disturbance,
@@ -142,7 +142,7 @@ impl World {
         }
     }
 
-    fn measurement(&mut self) -> Measurement<f64, 1> {
+    pub fn measurement(&mut self) -> Measurement<f64, 1> {
         self.past.push(self.x[0] + self.noise * self.rng.normal());
         let late = [0, 0, 1, 2][self.k % 4];
         let reading = self.past.len().checked_sub(1 + late).map(|place| Reading {
@@ -155,7 +155,7 @@ impl World {
         }
     }
 
-    fn advance(&mut self, torque: f64) {
+    pub fn advance(&mut self, torque: f64) {
         let now = self.k as f64 * T_S;
         self.travelling.push((now + DELAY, torque));
         for part in 0..4 {
@@ -179,7 +179,7 @@ fn target(t: f64) -> Vector2<f64> {
 }
 
 /// `samples` of a run with this regulator: torques and angles.
-fn run(
+pub fn run(
     regulator: &mut impl Regulator<f64, 2, 1, 1>,
     world: &mut World,
     samples: usize,

@@ -21,6 +21,9 @@ pub struct Case {
     pub x_ref: Vec<SVector<f64, NX>>,
     pub u_ref: Vec<SVector<f64, NU>>,
     pub weights: Vec<Weights<f64, NX, NU>>,
+    pub cross: Vec<SMatrix<f64, NU, NX>>,
+    pub linear_x: Vec<SVector<f64, NX>>,
+    pub linear_u: Vec<SVector<f64, NU>>,
     pub p: SMatrix<f64, NX, NX>,
     pub x: Vec<Bounds<f64, NX>>,
     pub soft_x: Vec<SoftBounds<f64, NX>>,
@@ -41,6 +44,14 @@ pub enum Hardness {
 fn weight<const K: usize>(rng: &mut Rng, shift: f64) -> SMatrix<f64, K, K> {
     let root = rng.matrix::<K, K>();
     root.transpose() * root + SMatrix::identity() * shift
+}
+
+/// S = M K L' with Q = L L', R = M M' and |K| < 1, so that Q - S' R^-1 S = L (1 - K'K) L'.
+fn cross(rng: &mut Rng, Weights { q, r }: &Weights<f64, NX, NU>) -> SMatrix<f64, NU, NX> {
+    let k = rng.matrix::<NU, NX>();
+    let k = k * (rng.uniform(0.0, 0.99) / k.norm());
+    let (l, m) = (q.cholesky().unwrap().l(), r.cholesky().unwrap().l());
+    m * k * l.transpose()
 }
 
 fn around<const K: usize>(rng: &mut Rng, width: f64) -> Bounds<f64, K> {
@@ -101,7 +112,7 @@ impl Case {
                 soft: (hardness == Hardness::Soft || rng.chance(0.5)).then(|| price(rng)),
             }
         };
-        Self {
+        let mut case = Self {
             plant: plant(rng),
             horizon,
             x0: rng.matrix(),
@@ -111,6 +122,9 @@ impl Case {
                 q: weight(rng, 0.0),
                 r: weight(rng, 0.3),
             }),
+            cross: Vec::new(),
+            linear_x: Vec::new(),
+            linear_u: Vec::new(),
             p: weight(rng, 0.0),
             x: list(rng, most, |rng| {
                 let mut x = around(rng, 1.5);
@@ -133,7 +147,22 @@ impl Case {
             } else {
                 Vec::new()
             },
+        };
+        case.linear_x = list(rng, most, |rng| rng.matrix() * 0.5);
+        case.linear_u = list(rng, most, |rng| rng.matrix() * 0.5);
+        if rng.chance(0.5) {
+            // As many as there are weights: each stage has a pair that makes sense.
+            let weights = case.weights.iter();
+            case.cross = weights.map(|weights| cross(rng, weights)).collect();
         }
+        if case.weights.is_empty() {
+            let identities = Weights {
+                q: SMatrix::identity(),
+                r: SMatrix::identity(),
+            };
+            case.cross = list(rng, most, |rng| cross(rng, &identities));
+        }
+        case
     }
 
     /// Settings that stand for what the preview leaves empty.
@@ -184,6 +213,9 @@ impl Case {
             },
             u_ref: &self.u_ref,
             weights: &self.weights,
+            cross: &self.cross,
+            linear_x: &self.linear_x,
+            linear_u: &self.linear_u,
             terminal: Some(TerminalIngredient::Cost(self.p)),
             x: &self.x,
             soft_x: &self.soft_x,

@@ -42,6 +42,31 @@ impl Program {
         self.constant += of.free.dot(&(&w * &of.free));
     }
 
+    /// 2 u'S x on top.
+    fn add_product(&mut self, s: &SMatrix<f64, NU, NX>, u: &Affine, x: &Affine) {
+        let s = DMatrix::from_fn(NU, NX, |i, j| s[(i, j)]);
+        let h = u.map.transpose() * &s * &x.map;
+        let h = &h + h.transpose();
+        let g = u.map.transpose() * &s * &x.free + x.map.transpose() * s.transpose() * &u.free;
+        for i in 0..h.nrows() {
+            for j in i..h.ncols() {
+                self.h.push((i, j, h[(i, j)]));
+            }
+            self.g[i] += g[i];
+        }
+        self.constant += 2.0 * u.free.dot(&(&s * &x.free));
+    }
+
+    /// price'of on top.
+    fn add_linear<const K: usize>(&mut self, price: &SVector<f64, K>, of: &Affine) {
+        let price = DVector::from_fn(K, |i, _| price[i]);
+        let g = of.map.transpose() * &price;
+        for (sum, g) in self.g.iter_mut().zip(g.iter()) {
+            *sum += g / 2.0;
+        }
+        self.constant += of.free.dot(&price);
+    }
+
     /// lower <= coefficients'z + constant <= upper.
     fn bound(
         &mut self,
@@ -160,6 +185,8 @@ pub fn solve(case: &Case, settings: &Settings) -> Answer {
         }
         let error = add(&x, &constant(&case.x_ref[i], size), -1.0);
         let rows = of(&case.rows, i, &Vec::new());
+        let price = of(&case.linear_x, i, &SVector::zeros());
+        program.add_linear(&price, &x);
         if i == n {
             program.add_square(&case.p, &error);
         }
@@ -169,7 +196,10 @@ pub fn solve(case: &Case, settings: &Settings) -> Answer {
             let weights = of(&case.weights, i, &settings.weights);
             program.add_square(&weights.q, &error);
             let wanted = constant(&of(&case.u_ref, i, &u_ref), size);
-            program.add_square(&weights.r, &add(&u, &wanted, -1.0));
+            let away = add(&u, &wanted, -1.0);
+            program.add_square(&weights.r, &away);
+            program.add_product(&of(&case.cross, i, &SMatrix::zeros()), &away, &error);
+            program.add_linear(&of(&case.linear_u, i, &SVector::zeros()), &u);
             let bounds = of(&case.u, i, &settings.u);
             for j in 0..NU {
                 let row: Vec<f64> = u.map.row(j).iter().copied().collect();

@@ -85,6 +85,9 @@ fn simulate(case: &Case, settings: &Settings, u: &[SVector<f64, NU>]) -> (f64, f
                 );
             }
         }
+        if let Some(price) = case.linear_x.get(pick(case.linear_x.len())) {
+            tracking += price.dot(&x);
+        }
         if i == n {
             tracking += error.dot(&(case.p * error));
             break;
@@ -94,6 +97,12 @@ fn simulate(case: &Case, settings: &Settings, u: &[SVector<f64, NU>]) -> (f64, f
         let u_ref = case.u_ref.get(pick(case.u_ref.len())).unwrap_or(&otherwise);
         tracking += error.dot(&(weights.q * error));
         tracking += (u_i - u_ref).dot(&(weights.r * (u_i - u_ref)));
+        if let Some(s) = case.cross.get(pick(case.cross.len())) {
+            tracking += 2.0 * (u_i - u_ref).dot(&(s * error));
+        }
+        if let Some(price) = case.linear_u.get(pick(case.linear_u.len())) {
+            tracking += price.dot(&u_i);
+        }
         let bounds = case.u.get(pick(case.u.len())).unwrap_or(&settings.u);
         assert!(bounds.contains(&u_i, 0.0), "{u_i} at stage {i}");
         let plant = case
@@ -304,6 +313,9 @@ fn single_precision_is_close_to_the_optimum() {
                 },
                 u_ref: &singles(&case.u_ref),
                 weights: &case.weights.iter().map(weights).collect::<Vec<_>>(),
+                cross: &case.cross.iter().map(single).collect::<Vec<_>>(),
+                linear_x: &singles(&case.linear_x),
+                linear_u: &singles(&case.linear_u),
                 terminal: Some(TerminalIngredient::Cost(single(&case.p))),
                 x: &case.x.iter().map(bounds).collect::<Vec<_>>(),
                 soft_x: &case

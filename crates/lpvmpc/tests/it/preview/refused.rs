@@ -7,7 +7,7 @@ use lpvmpc::{
     Preview, PreviewError, PreviewMistake as Mistake, PreviewPart as Part, Reference, Status,
     TerminalIngredient, Weights, Workspace,
 };
-use nalgebra::{Matrix1, Matrix2, Vector1, Vector2};
+use nalgebra::{Matrix1, Matrix2, RowVector2, Vector1, Vector2};
 
 type Told<'a> = Preview<'a, Pendulum<f64>, f64, 2, 1, 1>;
 type Row = GeneralRow<f64, 2, 1>;
@@ -122,6 +122,47 @@ fn weights() {
         ..rest()
     };
     assert_refused(&preview, Part::Terminal, 0, Mistake::NotSymmetric);
+}
+
+/// Q - S' R^-1 S decides: with Q = 1 and R = 0.1 a cross weight of 0.3 is good, one of 0.33 is not.
+#[test]
+fn cross_weights_and_linear_costs() {
+    let weights = [Weights {
+        q: Matrix2::identity(),
+        r: Matrix1::new(0.1),
+    }];
+    let s = |entry| RowVector2::new(0.0, entry);
+    for (bad, mistake) in [
+        (0.33, Mistake::NotDefinite),
+        (-0.33, Mistake::NotDefinite),
+        (f64::NAN, Mistake::NotFinite),
+        (f64::INFINITY, Mistake::NotFinite),
+    ] {
+        let cross = [s(0.3), s(-0.3), s(bad)];
+        let preview = Told {
+            weights: &weights,
+            cross: &cross,
+            ..rest()
+        };
+        assert_refused(&preview, Part::CrossWeight, 2, mistake);
+    }
+    // Beside the settings' own weights, too.
+    let cross = [s(1e3)];
+    let preview = Told {
+        cross: &cross,
+        ..rest()
+    };
+    assert_refused(&preview, Part::CrossWeight, 0, Mistake::NotDefinite);
+    let preview = Told {
+        linear_x: &[Vector2::zeros(), Vector2::new(f64::NAN, 0.0)],
+        ..rest()
+    };
+    assert_refused(&preview, Part::LinearStateCost, 1, Mistake::NotFinite);
+    let preview = Told {
+        linear_u: &[Vector1::new(f64::INFINITY)],
+        ..rest()
+    };
+    assert_refused(&preview, Part::LinearInputCost, 0, Mistake::NotFinite);
 }
 
 #[test]

@@ -3,8 +3,10 @@
 
 use super::support::{capacity, cold, kind, solve, solve_with};
 use lpvmpc::{
-    Bounds, Capacity, GeneralRow, List, Ocp, Solution, Solver, SolverArrays, SolverSettings,
-    Status, kkt_residual,
+    Bounds, Capacity, ControllerArrays, ControllerMemory, GeneralRow, GuaranteedArrays,
+    GuaranteedMemory, GuaranteedWorkspaceArrays, GuaranteedWorkspaceMemory, List, Ocp, Solution,
+    Solver, SolverArrays, SolverMemory, SolverSettings, Status, WorkspaceArrays, WorkspaceMemory,
+    kkt_residual,
 };
 use lpvmpc_testkit::clarabel::{self, Verdict};
 use lpvmpc_testkit::problems::{Family, problem};
@@ -33,6 +35,53 @@ fn assert_same(ocp: &Problem, found: &Answer, expected: &Answer) {
     assert_eq!(found.cost, expected.cost);
     assert_eq!(found.changes, expected.changes);
     assert!(found.active.iter().eq(expected.active.iter()));
+}
+
+/// The bytes that are told before there is memory are those of the arrays, but for alignment: less
+/// than a number for each of their parts.
+#[test]
+fn the_bytes_of_a_capacity_are_those_of_its_arrays() {
+    const M: usize = 7;
+    const OWN: usize = N;
+    const ROWS: usize = 3 * (N + 1);
+    fn of<T: lpvmpc::Scalar>() -> [(usize, usize); 5] {
+        let plain = Capacity {
+            stages: N,
+            rows: M,
+            active: M,
+            ..Capacity::default()
+        };
+        let whole = Capacity {
+            own_stages: OWN,
+            general_rows: 3,
+            ..plain
+        };
+        [
+            (
+                SolverMemory::<T, NX, NU>::bytes(plain),
+                size_of::<SolverArrays<T, NX, NU, N, M>>(),
+            ),
+            (
+                WorkspaceMemory::<T, NX, NU>::bytes(whole),
+                size_of::<WorkspaceArrays<T, NX, NU, N, M, OWN, ROWS>>(),
+            ),
+            (
+                ControllerMemory::<T, NX, NU>::bytes(plain),
+                size_of::<ControllerArrays<T, NX, NU, N, M>>(),
+            ),
+            (
+                GuaranteedMemory::<T, NX, NU>::bytes(N),
+                size_of::<GuaranteedArrays<T, NX, NU, N>>(),
+            ),
+            (
+                GuaranteedWorkspaceMemory::<T, NU, { NX + 1 }>::bytes(plain),
+                size_of::<GuaranteedWorkspaceArrays<T, NU, { NX + 1 }, N, M>>(),
+            ),
+        ]
+    }
+    for (told, arrays) in of::<f64>().into_iter().chain(of::<f32>()) {
+        assert!((told..told + 16).contains(&arrays), "{told} {arrays}");
+    }
 }
 
 /// Lent arrays, longer than any problem and used for all of them one after the other, give the answers
