@@ -123,7 +123,7 @@ pub enum ExcitationError {
     },
     /// The log would not tell what it is recorded for.
     #[error(
-        "a log with that excitation would tell {} to {} only: a larger torque (--amplitude) or a longer \
+        "a log with that excitation would determine {} only to within {}: a larger torque (--amplitude) or a longer \
          log (--length) is needed",
         parameter.words(), percent(*relative)
     )]

@@ -86,7 +86,7 @@ pub enum Verdict {
         refused: bool,
     },
     /// The log does not tell a parameter at all.
-    #[error("the log does not tell {}: hold {parameter} at what you know of it, in [parameters]", parameter.words())]
+    #[error("the log does not determine {}: hold {parameter} at what you know of it, in [parameters]", parameter.words())]
     Untold {
         /// The parameter.
         parameter: Parameter,
@@ -219,7 +219,7 @@ pub enum Verdict {
         refused: bool,
     },
     /// The log does not tell it well.
-    #[error("this log tells {} to {} only: 5 % need {} times the amplitude (or {} times the length); what helps is {}", parameter.words(), percent(*relative), times(*factor), times(factor * factor), parameter.excitation())]
+    #[error("this log determines {} only to within {}: 5 % need {} times the amplitude (or {} times the length); what helps is {}", parameter.words(), percent(*relative), times(*factor), times(factor * factor), parameter.excitation())]
     Weak {
         /// The parameter.
         parameter: Parameter,
@@ -229,7 +229,7 @@ pub enum Verdict {
         factor: f64,
     },
     /// It cannot be told from zero.
-    #[error("{} cannot be told from zero; it is below {} {}. What would tell it is {}", parameter.words(), number(*most), parameter.unit(), parameter.excitation())]
+    #[error("{} cannot be distinguished from zero; it is below {} {}. What would determine it is {}", parameter.words(), number(*most), parameter.unit(), parameter.excitation())]
     IndistinctFromZero {
         /// The parameter.
         parameter: Parameter,
@@ -237,14 +237,14 @@ pub enum Verdict {
         most: f64,
     },
     /// The log tells a delay badly.
-    #[error("this log tells the delay to {:.1} ms only; what helps is {}", standard_deviation * 1e3, Parameter::Delay.excitation())]
+    #[error("this log determines the delay only to within {:.1} ms; what helps is {}", standard_deviation * 1e3, Parameter::Delay.excitation())]
     VagueDelay {
         /// Standard deviation, s.
         standard_deviation: f64,
     },
     /// Only a combination of two is known.
     #[error(
-        "{one} and {other} have a correlation of {correlation:.3}: the log tells little more than one combination of them; fix one if you know it"
+        "{one} and {other} have a correlation of {correlation:.3}: the log determines little more than one combination of them; fix one if you know it"
     )]
     Correlated {
         /// One.

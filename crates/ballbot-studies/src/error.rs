@@ -23,7 +23,7 @@ pub enum StudyError {
     #[error(transparent)]
     Models(#[from] ModelError),
     /// A row of the reference costs lacks a number.
-    #[error("reference costs without {column}: {row}")]
+    #[error("the reference costs have no number in column `{column}` of the row {row}")]
     ReferenceCosts {
         /// The column.
         column: String,

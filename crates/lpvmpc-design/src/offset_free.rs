@@ -24,7 +24,7 @@ pub enum OffsetFreeError {
     },
     /// The rank condition fails.
     #[error(
-        "the disturbances cannot be told from states at rest: rank [A, B_d; C, C_d] is {rank}, it \
+        "the disturbances cannot be distinguished from steady states: rank [A, B_d; C, C_d] is {rank}, it \
          must be {needed}"
     )]
     Rank {

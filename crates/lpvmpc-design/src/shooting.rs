@@ -83,7 +83,7 @@ pub struct ShootingProblem<'a, M, const NX: usize, const NY: usize> {
 pub enum ShootingError {
     /// There is nothing to fit, or not enough to fit it to.
     #[error(
-        "{values} measured values in {segments} segments cannot tell {unknowns} unknowns: \
+        "{values} measured values in {segments} segments cannot determine {unknowns} unknowns: \
          {states} initial states and {parameters} parameters"
     )]
     TooFewValues {
@@ -118,8 +118,8 @@ pub enum ShootingError {
     },
     /// The simulation from the start becomes non-finite.
     #[error(
-        "the simulation of segment {segment} (counted from 0) from the starting values leaves the \
-         numbers; better starting values or shorter segments are needed"
+        "the simulation of segment {segment} (counted from 0) from the starting values \
+         becomes infinite or NaN; better starting values or shorter segments are needed"
     )]
     NonFiniteStart {
         /// The segment.

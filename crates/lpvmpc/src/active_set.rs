@@ -262,7 +262,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     /// Counts one more change of the active set.
     pub(crate) fn count_change(&mut self) -> Result<(), Status<T>> {
         if self.changes >= self.max_changes {
-            return Err(Status::ChangeCap);
+            return Err(Status::MaxChanges);
         }
         self.changes += 1;
         Ok(())

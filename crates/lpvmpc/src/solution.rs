@@ -279,7 +279,7 @@ pub enum Status<T> {
     /// best that were found.
     Inaccurate(BoundId),
     /// The cap on changes of the active set ended the search.
-    ChangeCap,
+    MaxChanges,
     /// More bounds are active at once than the workspace has places for.
     WorkingSetFull,
     /// The problem has more stages than the problem itself, the solver or the solution has memory for.
@@ -319,7 +319,7 @@ impl<T: fmt::Display> fmt::Display for Status<T> {
             Self::Inaccurate(bound) => {
                 write!(f, "inaccurate: rounding keeps the {bound} from being met")
             }
-            Self::ChangeCap => write!(f, "cap on active-set changes reached"),
+            Self::MaxChanges => write!(f, "the maximum number of active-set changes was reached"),
             Self::WorkingSetFull => write!(f, "more active bounds than the workspace holds"),
             Self::HorizonTooLong => write!(f, "the horizon is longer than the workspace"),
             Self::NumericalFailure { stage, pivot } => write!(

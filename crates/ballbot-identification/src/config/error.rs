@@ -17,7 +17,7 @@ pub enum ConfigError {
     },
     /// A mass beside a torque in no unit of torque.
     #[error(
-        "[body] says a mass, and the torque is a current, a voltage or a duty cycle without the torque \
+        "[body] has a mass, and the torque is a current, a voltage or a duty cycle without the torque \
          per unit: give that as factor, or leave [body] out"
     )]
     NoTorque,

@@ -88,7 +88,7 @@ pub enum Problem {
     },
     /// Encoders of wheels are needed, and not named.
     #[error(
-        "the columns of the wheels' encoders are not named: say them in the [log.wheels] table of a \
+        "the columns of the wheels' encoders are not named: give them in the [log.wheels] table of a \
          configuration (`ballbot identify --example`)"
     )]
     NoWheels,
@@ -130,7 +130,7 @@ pub enum Problem {
     },
     /// A column is not there.
     #[error(
-        "there is no column `{name}`{}; the columns are: {}. Say the names in the [log] table of a \
+        "there is no column `{name}`{}; the columns are: {}. Give the names in the [log] table of a \
          configuration (`ballbot identify --example`)",
         nearest.as_ref().map_or(String::new(), |nearest| format!(" (did you mean `{nearest}`?)")),
         present.join(", ")
@@ -256,7 +256,7 @@ pub enum Problem {
     },
     /// The units contradict each other, or no robot moves like that.
     #[error(
-        "{0}. Say the units and signs in the [log] table, or set accept_suspicious_units = true \
+        "{0}. Give the units and signs in the [log] table, or set accept_suspicious_units = true \
          there if they are right"
     )]
     Units(Suspicion),

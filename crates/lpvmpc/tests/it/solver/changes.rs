@@ -47,7 +47,7 @@ fn sweep<const NX: usize, const NU: usize>(longest: usize, rows: usize, count: u
         used.len()
     );
     assert!(verdicts.of("working set full") == 0, "{verdicts}");
-    let capped = verdicts.of("change cap");
+    let capped = verdicts.of("maximum of changes");
     assert!(100 * capped <= used.len(), "{verdicts}");
 }
 
@@ -122,6 +122,6 @@ fn a_long_horizon_gets_the_changes_that_it_needs() {
         ..SolverSettings::default()
     };
     let solution = solve_with(&ocp, &set);
-    assert_eq!(solution.status, Status::ChangeCap);
+    assert_eq!(solution.status, Status::MaxChanges);
     assert_eq!(solution.changes, CONSTANT);
 }

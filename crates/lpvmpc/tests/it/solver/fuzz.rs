@@ -169,7 +169,7 @@ fn nonsense_in_the_problem() {
     for status in [
         "solved",
         "infeasible",
-        "change cap",
+        "maximum of changes",
         "numerical failure",
         "not finite",
         "horizon too long",

@@ -180,7 +180,7 @@ fn cap_on_changes_holds_for_the_warm_start_too() {
     Solver::allocate(capacity(&ocp)).solve(&ocp, &settings, &mut solution);
     assert_eq!(
         (kind(&solution.status), solution.changes),
-        ("change cap", 3)
+        ("maximum of changes", 3)
     );
 }
 

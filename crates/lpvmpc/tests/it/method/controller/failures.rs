@@ -216,7 +216,7 @@ fn the_cap_on_changes_is_kept() {
         assert_safe(plan, &settings.u);
         assert!(plan.changes <= max_changes);
         if max_changes < needed {
-            assert_eq!(plan.status, Status::ChangeCap);
+            assert_eq!(plan.status, Status::MaxChanges);
         } else {
             assert_eq!(plan, &full_answer());
         }

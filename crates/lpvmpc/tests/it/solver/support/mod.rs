@@ -62,7 +62,7 @@ pub fn kind<T>(status: &Status<T>) -> &'static str {
         Status::Solved | Status::Converged | Status::Improved | Status::NoImprovement => "solved",
         Status::Infeasible(_) => "infeasible",
         Status::Inaccurate(_) => "inaccurate",
-        Status::ChangeCap => "change cap",
+        Status::MaxChanges => "maximum of changes",
         Status::WorkingSetFull => "working set full",
         Status::HorizonTooLong => "horizon too long",
         Status::NumericalFailure { .. } => "numerical failure",
