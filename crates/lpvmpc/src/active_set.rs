@@ -92,6 +92,12 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         self.contradicting = T::zero();
     }
 
+    /// Back to the minimiser without bounds, with the changes that are left.
+    pub fn begin_again(&mut self) {
+        let left = self.changes_left();
+        self.reset(self.tolerance, left);
+    }
+
     /// The bound that is violated most, if any is.
     pub fn most_violated<const NX: usize>(
         &self,
@@ -257,6 +263,15 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     /// Changes of the active set that are still allowed.
     pub fn changes_left(&self) -> usize {
         self.max_changes - self.changes
+    }
+
+    /// Counts so many changes of the active set, if there may be as many.
+    pub(crate) fn count_changes(&mut self, count: usize) -> bool {
+        let allowed = count <= self.changes_left();
+        if allowed {
+            self.changes += count;
+        }
+        allowed
     }
 
     /// Counts one more change of the active set.

@@ -7,11 +7,13 @@
 use crate::adjoint::Adjoint;
 use crate::list::List;
 use crate::model::Scalar;
-use crate::ocp::{Common, Ocp, Stage};
+use crate::ocp::{Bounds, Common, Ocp, Stage};
 use crate::riccati::{BadPivot, CostToGo, StageFactor};
-use crate::rows::Trajectory;
+use crate::rows::{self, Trajectory};
 use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
 use crate::solver::{Solver, SolverSettings, WarmStart};
+use crate::working_set::copy;
+use nalgebra::SVector;
 
 /// Searches with held inputs; two are enough in `f64`, more than ten are rare in `f32`.
 const MOST_SEARCHES: usize = 20;
@@ -41,9 +43,20 @@ impl<const NU: usize> HeldInputs<NU> {
         Self { sides, any: false }
     }
 
-    fn release_all(&mut self) {
+    pub fn release_all(&mut self) {
         self.sides.fill([None; NU]);
         self.any = false;
+    }
+
+    /// Who is held, stage by stage.
+    pub fn sides(&self) -> &[[Option<Side>; NU]] {
+        &self.sides
+    }
+
+    /// Holds these inputs, and no others.
+    pub fn hold(&mut self, sides: &[[Option<Side>; NU]]) {
+        copy(&mut self.sides, sides);
+        self.any = true;
     }
 
     /// The sides at `stage`; `None` where no input is held.
@@ -54,6 +67,69 @@ impl<const NU: usize> HeldInputs<NU> {
         } else {
             None
         }
+    }
+
+    /// Holds the inputs whose bounds are among `before`, `shift` stages earlier; whether there are any.
+    pub fn hold_again<T: Scalar, const NX: usize>(
+        &mut self,
+        ocp: &Ocp<T, NX, NU>,
+        before: &ActiveSet<T>,
+        shift: usize,
+    ) -> bool {
+        let rows = before.iter().filter_map(|row| {
+            let stage = row.bound.stage.checked_sub(shift)?;
+            let bound = BoundId { stage, ..row.bound };
+            // The bound may have gone since.
+            let (lower, upper) = rows::limits(ocp, &bound);
+            let limit = if bound.side == Side::Upper {
+                upper
+            } else {
+                lower
+            };
+            limit.is_finite().then_some(ActiveRow { bound, ..row })
+        });
+        self.take_in(rows)
+    }
+
+    /// At stage `i` holds the inputs of `u` that are beyond their bounds by more than the `tolerance`,
+    /// relative to the bounds' size, and lets go of those that the gradient of the cost in the inputs, `pulled`, draws
+    /// into theirs. Returns how many that are.
+    pub fn exchange<T: Scalar>(
+        &mut self,
+        i: usize,
+        bounds: &Bounds<T, NU>,
+        u: &SVector<T, NU>,
+        tolerance: T,
+        pulled: impl Fn() -> SVector<T, NU>,
+    ) -> usize {
+        let Some(held) = self.sides.get_mut(i) else {
+            return 0;
+        };
+        let none = *held == [None; NU];
+        // Most hold nothing and exceed nothing.
+        if none && bounds.hold_at(u) {
+            return 0;
+        }
+        let gradient = if none { SVector::zeros() } else { pulled() };
+        let limits = bounds.lower.iter().zip(bounds.upper.iter());
+        let inputs = u.iter().zip(gradient.iter()).zip(limits);
+        let mut changes = 0;
+        for (place, ((value, slope), (lower, upper))) in held.iter_mut().zip(inputs) {
+            let margin = tolerance * rows::size_of_bound(*lower, *upper);
+            let wanted = match *place {
+                Some(Side::Upper) => (*slope <= T::zero()).then_some(Side::Upper),
+                Some(side) => (*slope >= T::zero()).then_some(side),
+                None if *value > *upper + margin => Some(Side::Upper),
+                None if *value < *lower - margin => Some(Side::Lower),
+                None => None,
+            };
+            if wanted != *place {
+                *place = wanted;
+                changes += 1;
+            }
+        }
+        self.any |= changes > 0;
+        changes
     }
 
     /// Holds the inputs whose bounds are among `rows`; whether that is news.
@@ -167,10 +243,6 @@ pub(crate) fn eliminate_held<T: Scalar, const NX: usize, const NU: usize>(
 impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     /// Tries to answer what the dual method could not, for the rounding at `bound`: with the inputs that
     /// it has found at their bounds held there. `spent` counts the changes of the active set.
-    ///
-    /// Between searches the held inputs are exchanged: those go that are pulled into their bounds, those
-    /// come that the search has found at a bound. The answer of a search is among the choices of the
-    /// next one, so that the cost does not rise and, but for rounding, no set of held inputs comes twice.
     #[cold]
     #[inline(never)]
     pub(crate) fn search_with_held_inputs(
@@ -181,10 +253,37 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         bound: BoundId,
         spent: &mut usize,
     ) -> Result<(), Status<T>> {
-        let inaccurate = Err(Status::Inaccurate(bound));
-        let mut outcome = inaccurate;
         self.held.take_in(self.dual.active());
+        let inaccurate = Status::Inaccurate(bound);
+        let outcome = match self.factorize(ocp) {
+            Ok(()) => self.exchange_held_inputs(ocp, settings, solution, inaccurate, spent),
+            Err(_) => Err(inaccurate),
+        };
+        // Whoever follows the plan needs the regulator of the problem itself.
+        self.held.release_all();
+        self.factorize(ocp).and(outcome)
+    }
+
+    /// Searches with the held inputs, whose factors are known, and exchanges them after each, as long as
+    /// that changes any. What ends without an answer is `inaccurate`.
+    ///
+    /// Those go that are pulled into their bounds, those come that the search has found at a bound. The
+    /// answer of a search is among the choices of the next one, so that the cost does not rise and, but
+    /// for rounding, no set of held inputs comes twice.
+    pub(crate) fn exchange_held_inputs(
+        &mut self,
+        ocp: &Ocp<T, NX, NU>,
+        settings: &SolverSettings<T>,
+        solution: &mut Solution<T, NX, NU>,
+        inaccurate: Status<T>,
+        spent: &mut usize,
+    ) -> Result<(), Status<T>> {
+        let inaccurate = Err(inaccurate);
+        let mut outcome = inaccurate;
         for search in 0..MOST_SEARCHES {
+            if search > 0 && self.factorize(ocp).is_err() {
+                return inaccurate;
+            }
             outcome = self.search_again(ocp, settings, solution, spent);
             let point = Trajectory {
                 x: &solution.x,
@@ -193,10 +292,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             let point = match outcome {
                 Ok(()) => Some(&point),
                 Err(Status::Inaccurate(_)) => None,
-                Err(Status::NumericalFailure { .. }) => {
-                    outcome = inaccurate;
-                    break;
-                }
                 Err(_) => break,
             };
             if point.is_none() {
@@ -229,12 +324,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             }
             outcome = inaccurate;
         }
-        // Whoever follows the plan needs the regulator of the problem itself.
-        self.held.release_all();
-        self.factorize(ocp).and(outcome)
+        outcome
     }
 
-    /// One search from the active rows of the last one, but for those of inputs.
+    /// One search with the factors as they are, from the active rows of the last one but for those of
+    /// inputs.
     fn search_again(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
@@ -246,7 +340,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             warm_start: WarmStart::Same,
             ..*settings
         };
-        self.factorize(ocp)?;
         solution.status = Status::Solved;
         solution.active.clear();
         for row in self.dual.active() {
@@ -254,9 +347,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 solution.active.push(row);
             }
         }
-        let left = self.dual.changes_left();
-        self.dual.reset(self.dual.tolerance, left);
-        let outcome = self.search(ocp, &settings, solution);
+        self.dual.begin_again();
+        let begun = self.roll_out(ocp, solution);
+        let outcome = begun.and_then(|()| self.search(ocp, &settings, solution));
         *spent += self.dual.changes;
         outcome
     }

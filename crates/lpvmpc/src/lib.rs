@@ -82,6 +82,7 @@ mod plan;
 mod policy;
 mod predictor;
 mod preview;
+mod primal_dual;
 mod ramp;
 mod regulator;
 pub mod riccati;
@@ -116,8 +117,8 @@ pub use guaranteed::{
 pub use kkt::{KktResidual, kkt_residual};
 pub use list::List;
 pub use memory::{
-    Capacity, ControllerArrays, ControllerMemory, SolverArrays, SolverMemory, WorkspaceArrays,
-    WorkspaceMemory,
+    Capacity, ControllerArrays, ControllerMemory, PrimalDualArrays, SolverArrays, SolverMemory,
+    WorkspaceArrays, WorkspaceMemory,
 };
 pub use model::{LpvModel, Scalar};
 pub use number::{Dual, Elementary, Number};

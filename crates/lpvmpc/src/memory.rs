@@ -3,7 +3,8 @@
 use crate::list::List;
 use crate::model::Scalar;
 use crate::ocp::{Common, GeneralRow, Stage};
-use crate::riccati::StageFactor;
+use crate::primal_dual::PrimalDual;
+use crate::riccati::{CostToGo, StageFactor};
 use crate::solution::{PackedRow, Side};
 use crate::working_set::Terms;
 use nalgebra::{SMatrix, SVector};
@@ -56,6 +57,8 @@ pub struct SolverMemory<T: 'static, const NX: usize, const NU: usize> {
     pub(crate) held: List<[Option<Side>; NU]>,
     /// What the dual method works with.
     pub(crate) dual: DualMemory<T, NU>,
+    /// Of the first phase, if there is one: on the heap.
+    pub(crate) primal_dual: Option<PrimalDual<T, NX, NU>>,
 }
 
 /// Memory of the dual active-set method.
@@ -76,8 +79,8 @@ pub(crate) struct DualMemory<T: 'static, const NU: usize> {
 }
 
 impl<T, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
-    /// Bytes that a capacity takes, on the heap or as [`SolverArrays`]: to plan memory before there is
-    /// any. An array may have a few more for the alignment of its parts.
+    /// Bytes that a capacity takes: to plan memory before there is any. As [`SolverArrays`] it may take a
+    /// few more, for the alignment of its parts; on the heap it takes those of [`PrimalDualArrays`], too.
     pub const fn bytes(
         Capacity {
             stages,
@@ -134,6 +137,49 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
                 factor: List::repeat(T::zero(), rows * rows),
                 numbers: core::array::from_fn(|_| numbers()),
             },
+            primal_dual: Some(PrimalDual::new(
+                List::repeat(StageFactor::zeros(), stages),
+                List::repeat(CostToGo::zeros(), stages),
+                core::array::from_fn(|_| List::repeat([None; NU], stages)),
+            )),
+        }
+    }
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
+    /// The same with memory for many active input bounds.
+    pub fn with_primal_dual<const N: usize>(
+        self,
+        arrays: &'static mut PrimalDualArrays<T, NX, NU, N>,
+    ) -> Self {
+        let factors = List::Static(&mut arrays.factors);
+        let costs_to_go = List::Static(&mut arrays.costs_to_go);
+        let guesses = arrays.guesses.each_mut().map(|list| List::Static(list));
+        Self {
+            primal_dual: Some(PrimalDual::new(factors, costs_to_go, guesses)),
+            ..self
+        }
+    }
+}
+
+/// Memory with which problems with many active input bounds are solved in less time, for `N` stages. On
+/// the heap it is always there. Where it is not, neither is its machine code; the answers are the same.
+#[derive(Clone, Copy, Debug)]
+pub struct PrimalDualArrays<T, const NX: usize, const NU: usize, const N: usize> {
+    factors: [StageFactor<T, NX, NU>; N],
+    costs_to_go: [CostToGo<T, NX>; N],
+    guesses: [[[Option<Side>; NU]; N]; 2],
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Default
+    for PrimalDualArrays<T, NX, NU, N>
+{
+    #[inline(always)]
+    fn default() -> Self {
+        Self {
+            factors: [StageFactor::zeros(); N],
+            costs_to_go: [CostToGo::zeros(); N],
+            guesses: [[[None; NU]; N]; 2],
         }
     }
 }
@@ -167,6 +213,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
                 factor: List::Static(self.factor.as_flattened_mut()),
                 numbers: self.numbers.each_mut().map(|list| List::Static(list)),
             },
+            primal_dual: None,
         }
     }
 }
@@ -235,6 +282,19 @@ impl<T: Scalar, const NX: usize, const NU: usize> WorkspaceMemory<T, NX, NU> {
             x: List::repeat(SVector::zeros(), stages),
             own: List::repeat(Common::default(), own_stages),
             rows: List::repeat(GeneralRow::default(), (stages + 1) * general_rows),
+        }
+    }
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize> WorkspaceMemory<T, NX, NU> {
+    /// The same with memory for many active input bounds.
+    pub fn with_primal_dual<const N: usize>(
+        self,
+        arrays: &'static mut PrimalDualArrays<T, NX, NU, N>,
+    ) -> Self {
+        Self {
+            solver: self.solver.with_primal_dual(arrays),
+            ..self
         }
     }
 }

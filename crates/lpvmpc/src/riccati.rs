@@ -20,6 +20,16 @@ pub struct CostToGo<T, const NX: usize> {
     pub linear: SVector<T, NX>,
 }
 
+impl<T: Scalar, const NX: usize> CostToGo<T, NX> {
+    /// No cost.
+    pub fn zeros() -> Self {
+        Self {
+            quadratic: SMatrix::zeros(),
+            linear: SVector::zeros(),
+        }
+    }
+}
+
 /// What a stage's minimisation leaves behind: the policy u = K x + k + L^-T v and the dynamics
 /// under it, x+ = (A + BK) x + B L^-T v + (c + B k).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -48,7 +48,7 @@ fn room_of_bound<T: Scalar>(lower: T, upper: T) -> T {
 }
 
 /// The size against which a violation is measured: the larger finite limit, or 1.
-fn size_of_bound<T: Scalar>(lower: T, upper: T) -> T {
+pub(crate) fn size_of_bound<T: Scalar>(lower: T, upper: T) -> T {
     let magnitude = |limit: T| {
         if limit.is_finite() {
             limit.abs()

@@ -10,6 +10,7 @@ use crate::memory::Capacity;
 use crate::memory::SolverMemory;
 use crate::model::Scalar;
 use crate::ocp::{Bounds, Common, Ocp, SoftBounds};
+use crate::primal_dual::PrimalDual;
 use crate::riccati::{CostToGo, StageFactor};
 use crate::rows::Trajectory;
 use crate::small_matrix::{add_product, product};
@@ -76,10 +77,12 @@ impl<T: Scalar> Default for SolverSettings<T> {
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
 pub struct Solver<T: 'static, const NX: usize, const NU: usize> {
-    factors: List<StageFactor<T, NX, NU>>,
+    pub(crate) factors: List<StageFactor<T, NX, NU>>,
     pub(crate) dual: DualActiveSet<T, NU>,
     /// None but within [`Solver::search_with_held_inputs`].
     pub(crate) held: HeldInputs<NU>,
+    /// The first phase, if there is memory for it.
+    primal_dual: Option<PrimalDual<T, NX, NU>>,
     /// The longest horizon that there is memory for.
     stages: usize,
 }
@@ -93,6 +96,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             factors: memory.factors,
             dual: DualActiveSet::new(memory.dual),
             held: HeldInputs::none(memory.held),
+            primal_dual: memory.primal_dual,
         }
     }
 
@@ -140,25 +144,14 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         } else {
             factorized
         };
-        let outcome = loop {
-            let warm = settings.warm_start != WarmStart::Cold && !solution.active.is_empty();
-            let outcome = factorized.and_then(|()| self.search(ocp, settings, solution));
-            spent += self.dual.changes;
-            if !(warm && matches!(outcome, Err(Status::Inaccurate(_)))) {
-                break outcome;
+        let begun = factorized.and_then(|()| self.roll_out(ocp, solution));
+        let outcome = begun.and_then(|()| {
+            if self.solve_at_once(ocp, settings, solution, &mut spent) {
+                Ok(())
+            } else {
+                self.solve_one_by_one(ocp, settings, solution, &mut spent)
             }
-            // A start must not decide whether there is an answer.
-            solution.active.clear();
-            let left = self.dual.changes_left();
-            self.dual.reset(self.dual.tolerance, left);
-        };
-        let outcome = match outcome {
-            Err(Status::Inaccurate(bound)) => match self.prove(ocp, &mut solution.active) {
-                Some(infeasible) => Err(infeasible),
-                None => self.search_with_held_inputs(ocp, settings, solution, bound, &mut spent),
-            },
-            known => known,
-        };
+        });
         solution.changes = spent;
         solution.status = match outcome {
             Ok(()) => Status::Solved,
@@ -170,6 +163,51 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 status
             }
         };
+    }
+
+    /// Whether the first phase, if there is memory for one, has solved the problem, whose trajectory
+    /// without bounds is in the solution.
+    fn solve_at_once(
+        &mut self,
+        ocp: &Ocp<T, NX, NU>,
+        settings: &SolverSettings<T>,
+        solution: &mut Solution<T, NX, NU>,
+        spent: &mut usize,
+    ) -> bool {
+        let Some(mut phase) = self.primal_dual.take() else {
+            return false;
+        };
+        let solved = (phase.run)(&mut phase, self, ocp, settings, solution, spent);
+        self.primal_dual = Some(phase);
+        solved
+    }
+
+    /// The dual method, from the trajectory without bounds; with held inputs where rounding ends it.
+    fn solve_one_by_one(
+        &mut self,
+        ocp: &Ocp<T, NX, NU>,
+        settings: &SolverSettings<T>,
+        solution: &mut Solution<T, NX, NU>,
+        spent: &mut usize,
+    ) -> Result<(), Status<T>> {
+        let warm = settings.warm_start != WarmStart::Cold && !solution.active.is_empty();
+        let mut outcome = self.search(ocp, settings, solution);
+        *spent += self.dual.changes;
+        if warm && matches!(outcome, Err(Status::Inaccurate(_))) {
+            // A start must not decide whether there is an answer.
+            solution.active.clear();
+            self.dual.begin_again();
+            let begun = self.roll_out(ocp, solution);
+            outcome = begun.and_then(|()| self.search(ocp, settings, solution));
+            *spent += self.dual.changes;
+        }
+        match outcome {
+            Err(Status::Inaccurate(bound)) => match self.prove(ocp, &mut solution.active) {
+                Some(infeasible) => Err(infeasible),
+                None => self.search_with_held_inputs(ocp, settings, solution, bound, spent),
+            },
+            known => known,
+        }
     }
 
     /// The verdict that the problem is infeasible, and its `proof`, if the search ended in a conflict
@@ -197,13 +235,13 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         Some(Status::Infeasible(cause.bound))
     }
 
+    /// The dual method, from the trajectory of the deviations as they are.
     pub(crate) fn search(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
         settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
-        self.roll_out(ocp, solution)?;
         if ocp.terminal.equality.is_some() {
             let x_n = terminal_state(ocp, solution);
             self.dual
@@ -257,7 +295,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     }
 
     /// Forward: the trajectory of the current normalised deviations.
-    fn roll_out(
+    pub(crate) fn roll_out(
         &self,
         ocp: &Ocp<T, NX, NU>,
         solution: &mut Solution<T, NX, NU>,

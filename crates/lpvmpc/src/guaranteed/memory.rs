@@ -2,7 +2,7 @@
 
 use super::plan::PlannedStage;
 use crate::list::List;
-use crate::memory::{Capacity, SolverArrays, SolverMemory};
+use crate::memory::{Capacity, PrimalDualArrays, SolverArrays, SolverMemory};
 use crate::model::Scalar;
 use crate::ocp::{Common, Stage};
 use crate::solution::PackedRow;
@@ -107,6 +107,20 @@ impl<T: Scalar, const NU: usize, const NA: usize> GuaranteedWorkspaceMemory<T, N
             u: List::repeat(SVector::zeros(), stages),
             x: List::repeat(SVector::zeros(), stages),
             active: List::repeat(PackedRow::empty(), active),
+        }
+    }
+}
+
+impl<T: Scalar, const NU: usize, const NA: usize> GuaranteedWorkspaceMemory<T, NU, NA> {
+    /// The same with memory for many active input bounds, for two stages more than the horizon has
+    /// samples.
+    pub fn with_primal_dual<const NP: usize>(
+        self,
+        arrays: &'static mut PrimalDualArrays<T, NA, NU, NP>,
+    ) -> Self {
+        Self {
+            solver: self.solver.with_primal_dual(arrays),
+            ..self
         }
     }
 }

@@ -6,8 +6,8 @@ use lpvmpc::riccati::{CostToGo, StageFactor};
 use lpvmpc::{
     Bounds, Capacity, Common, Decision, GuaranteedArrays, GuaranteedController, GuaranteedError,
     GuaranteedIterations, GuaranteedSettings, GuaranteedStep, GuaranteedWorkspace,
-    GuaranteedWorkspaceArrays, LpvModel, Rk4, Rollout, Scheduling, SolverSettings, Stage, Status,
-    TerminalSet,
+    GuaranteedWorkspaceArrays, LpvModel, PrimalDualArrays, Rk4, Rollout, Scheduling,
+    SolverSettings, Stage, Status, TerminalSet,
 };
 use lpvmpc_testkit::rng::Rng;
 use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
@@ -215,7 +215,9 @@ fn a_shorter_horizon_is_the_one_of_a_smaller_memory() {
     let arrays = Box::leak(Box::new(GuaranteedArrays::<f64, 4, 1, N>::default()));
     let mut large = Guaranteed::new(plant(), short, arrays.lend()).unwrap();
     let arrays = GuaranteedWorkspaceArrays::<f64, 1, 5, { N + 2 }, 200>::default();
-    let mut large_memory = GuaranteedWorkspace::new(Box::leak(Box::new(arrays)).lend());
+    let many = Box::leak(Box::new(PrimalDualArrays::<f64, 5, 1, { N + 2 }>::default()));
+    let arrays = Box::leak(Box::new(arrays)).lend();
+    let mut large_memory = GuaranteedWorkspace::new(arrays.with_primal_dual(many));
     let mut small = guaranteed(short);
     let mut small_memory = small.workspace::<5>();
     let mut x = Vector4::zeros();

@@ -5,8 +5,8 @@ use super::case::{Case, Hardness};
 use super::plants::{NU, NX, Pendulum, Scheduled};
 use lpvmpc::{
     Bounds, Capacity, Controller, ControllerArrays, ControllerMemory, ControllerSettings,
-    GeneralRow, Iterations, List, Predictor, Preview, Reference, Rk4, Scheduling, Solution,
-    TerminalIngredient, Weights, Workspace, WorkspaceArrays,
+    GeneralRow, Iterations, List, Predictor, Preview, PrimalDualArrays, Reference, Rk4, Scheduling,
+    Solution, TerminalIngredient, Weights, Workspace, WorkspaceArrays,
 };
 use lpvmpc_testkit::rng::Rng;
 use nalgebra::{Matrix1, Matrix2, Vector1, Vector2};
@@ -156,7 +156,8 @@ fn lent_arrays_give_the_answers_of_the_heap() {
     const ACTIVE: usize = 200;
     type Arrays = WorkspaceArrays<f64, NX, NU, STAGES, ACTIVE, STAGES, { 3 * (STAGES + 1) }>;
     let arrays = Box::leak(Box::new(Arrays::default()));
-    let mut lent_workspace = Workspace::new(arrays.lend());
+    let many = Box::leak(Box::new(PrimalDualArrays::<f64, NX, NU, STAGES>::default()));
+    let mut lent_workspace = Workspace::new(arrays.lend().with_primal_dual(many));
     for seed in 0..60 {
         let case = Case::random(&mut Rng::new(seed), Hardness::Hard);
         let settings = case.settings(Iterations::default());

@@ -69,7 +69,7 @@ impl Findings {
 
 /// An unstable plant whose inputs have little room: most are at a bound, and other ones at last than
 /// those that the regulator saturates first. Its free motion grows at most a millionfold.
-fn saturated<const NX: usize, const NU: usize>(
+pub fn saturated<const NX: usize, const NU: usize>(
     rng: &mut Rng,
     longest: usize,
     rows: usize,

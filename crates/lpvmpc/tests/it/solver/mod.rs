@@ -5,6 +5,7 @@ mod support;
 mod campaign;
 mod changes;
 mod fuzz;
+mod many_bounds;
 mod memory;
 mod optimality;
 mod regressions;

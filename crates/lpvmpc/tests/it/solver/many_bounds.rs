@@ -1,0 +1,187 @@
+//! Many inputs at their bounds: what is found at once is what is found one after the other.
+
+use super::changes::saturated;
+use super::support::{agree, cold, solve};
+use lpvmpc::{
+    Bounds, Capacity, List, Ocp, Solution, Solver, SolverArrays, SolverSettings, Status, WarmStart,
+    kkt_residual,
+};
+use lpvmpc_testkit::problems::{Family, problem};
+use lpvmpc_testkit::rng::Rng;
+use nalgebra::{SMatrix, SVector};
+
+/// What many problems have shown.
+#[derive(Debug, Default)]
+struct Findings {
+    solved: usize,
+    many: usize,
+    /// Changes of both ways, where many bounds are active.
+    at_once: usize,
+    one_by_one: usize,
+    worst_residual: f64,
+    worst_input: f64,
+}
+
+/// Two solvers for up to `N` stages: on the heap, and in lent memory, where bounds are taken one by one.
+struct Both<const NX: usize, const NU: usize> {
+    at_once: (Solver<f64, NX, NU>, Solution<f64, NX, NU>),
+    one_by_one: (Solver<f64, NX, NU>, Solution<f64, NX, NU>),
+}
+
+impl<const NX: usize, const NU: usize> Both<NX, NU> {
+    fn new<const N: usize, const M: usize>() -> Self {
+        let room = Capacity {
+            stages: N,
+            rows: M,
+            active: M,
+            ..Capacity::default()
+        };
+        let arrays = Box::leak(Box::new(SolverArrays::<f64, NX, NU, N, M>::default()));
+        Self {
+            at_once: (Solver::allocate(room), Solution::allocate(room)),
+            one_by_one: (Solver::new(arrays.lend()), Solution::allocate(room)),
+        }
+    }
+
+    fn solve(&mut self, ocp: &Ocp<f64, NX, NU>, warm_start: WarmStart, findings: &mut Findings) {
+        let settings = SolverSettings {
+            warm_start,
+            ..cold()
+        };
+        let (solver, expected) = &mut self.one_by_one;
+        solver.solve(ocp, &settings, expected);
+        let (solver, found) = &mut self.at_once;
+        solver.solve(ocp, &settings, found);
+        assert!(
+            agree(&found.status, &expected.status),
+            "{} for {}",
+            found.status,
+            expected.status
+        );
+        if !(found.status.is_solved() && expected.status.is_solved()) {
+            return;
+        }
+        findings.solved += 1;
+        let n = ocp.horizon;
+        for (i, u) in found.u.iter().enumerate().take(n) {
+            assert!(ocp.common_at(i).u.contains(u, 0.0));
+        }
+        let residual = kkt_residual(ocp, found).largest();
+        findings.worst_residual = findings.worst_residual.max(residual);
+        let size = |u: &[SVector<f64, NU>]| u.iter().map(SVector::amax).fold(1e-300, f64::max);
+        let inputs = found.u.iter().zip(&*expected.u).take(n);
+        let error = inputs.map(|(a, b)| (a - b).amax()).fold(0.0, f64::max);
+        findings.worst_input = findings.worst_input.max(error / size(&expected.u[..n]));
+        if found.active.len() > n * NU / 2 {
+            findings.many += 1;
+            findings.at_once += found.changes;
+            findings.one_by_one += expected.changes;
+        }
+    }
+}
+
+fn sweep<const NX: usize, const NU: usize, const N: usize, const M: usize>(
+    count: u64,
+    problem: fn(u64) -> Ocp<f64, NX, NU>,
+) -> Findings {
+    let mut both = Both::<NX, NU>::new::<N, M>();
+    let mut findings = Findings::default();
+    for seed in 0..count {
+        let mut ocp = problem(seed);
+        both.solve(&ocp, WarmStart::Cold, &mut findings);
+        // A little later.
+        ocp.x0 *= 0.98;
+        both.solve(&ocp, WarmStart::Shifted, &mut findings);
+    }
+    println!("{NX} {NU} {N}: {findings:?}");
+    assert!(findings.many > 20, "{findings:?}");
+    assert!(findings.worst_residual < 1e-8, "{findings:?}");
+    assert!(findings.worst_input < 1e-6, "{findings:?}");
+    findings
+}
+
+/// Unstable plants with hardly any room; one in three has soft state bounds, one hard ones.
+fn hard<const NX: usize, const NU: usize, const N: usize>(seed: u64) -> Ocp<f64, NX, NU> {
+    let mut ocp = saturated::<NX, NU>(&mut Rng::new(seed), N, 0);
+    if !seed.is_multiple_of(3) {
+        let family = [Family::SoftBoth, Family::Tight][seed as usize % 2];
+        let other = problem::<NX, NU>(&mut Rng::new(seed), family, N, 0);
+        ocp.common.x = other.common.x;
+        ocp.common.soft_x = other.common.soft_x;
+    }
+    ocp
+}
+
+/// A stable plant follows waves with a tenth of the inputs that it would need; nothing else is bounded.
+fn narrow<const NX: usize, const NU: usize, const N: usize>(seed: u64) -> Ocp<f64, NX, NU> {
+    let mut ocp = problem::<NX, NU>(&mut Rng::new(seed), Family::Loose, N, 0);
+    ocp.horizon = N;
+    ocp.own = List::empty();
+    (ocp.common.x, ocp.terminal.x) = (Bounds::none(), Bounds::none());
+    ocp.common.u = Bounds::none();
+    for (i, stage) in ocp.stages.iter_mut().enumerate() {
+        stage.a = SMatrix::from_fn(|j, k| {
+            let turn = 0.3 + 0.05 * (j / 2) as f64;
+            let block = [[turn.cos(), turn.sin()], [-turn.sin(), turn.cos()]];
+            let inside = f64::from(j / 2 == k / 2);
+            0.95 * inside * block[j % 2][k % 2]
+        });
+        stage.linear_x = SVector::from_fn(|j, _| (0.4 * i as f64 + j as f64).sin());
+    }
+    let free = solve(&ocp);
+    let limit = free
+        .u
+        .iter()
+        .fold(SVector::zeros(), |most: SVector<f64, NU>, u| {
+            most.sup(&u.abs())
+        });
+    (ocp.common.u.lower, ocp.common.u.upper) = (limit * -0.1, limit * 0.1);
+    ocp
+}
+
+#[test]
+fn bounds_found_at_once_are_those_found_one_by_one() {
+    sweep::<4, 1, 20, 120>(300, hard::<4, 1, 20>);
+    sweep::<8, 2, 20, 200>(150, hard::<8, 2, 20>);
+    sweep::<4, 1, 60, 240>(60, hard::<4, 1, 60>);
+    sweep::<6, 3, 30, 240>(60, hard::<6, 3, 30>);
+    sweep::<12, 4, 25, 240>(30, hard::<12, 4, 25>);
+}
+
+/// Where the inputs alone are bounded, at least a quarter of the work is saved; a guess counts as NX + NU
+/// changes, which takes as long.
+#[test]
+fn many_bounds_at_once_take_fewer_changes() {
+    for found in [
+        sweep::<4, 1, 60, 240>(40, narrow::<4, 1, 60>),
+        sweep::<8, 2, 50, 240>(40, narrow::<8, 2, 50>),
+        sweep::<6, 3, 40, 240>(40, narrow::<6, 3, 40>),
+    ] {
+        assert!(4 * found.at_once < 3 * found.one_by_one, "{found:?}");
+    }
+}
+
+/// Numbers that are not finite, and no room at all, are said as they are without the first phase.
+#[test]
+fn what_has_no_answer_has_none_at_once() {
+    let mut ocp = saturated::<4, 1>(&mut Rng::new(1), 20, 0);
+    ocp.horizon = 20;
+    ocp.common.u = Bounds {
+        lower: SVector::repeat(-1e-3),
+        upper: SVector::repeat(1e-3),
+    };
+    assert!(solve(&ocp).status.is_solved());
+    let mut broken = ocp.clone();
+    broken.stages[7].c[0] = f64::NAN;
+    assert_eq!(solve(&broken).status, Status::NotFinite);
+    let mut broken = ocp.clone();
+    broken.common.u.upper = SVector::repeat(f64::NAN);
+    assert!(!solve(&broken).status.is_solved());
+    // Out of reach: it takes more than all inputs at their bounds.
+    let mut broken = ocp;
+    broken.common.x.lower[0] = solve(&broken).x[5][0].abs() * 10.0 + 1e6;
+    assert!(matches!(
+        solve(&broken).status,
+        Status::Infeasible(_) | Status::Inaccurate(_)
+    ));
+}
