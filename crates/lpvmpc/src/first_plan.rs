@@ -51,8 +51,9 @@ where
         best.is_some()
     }
 
-    /// The regulator's closed loops towards the set point and towards points on the way to it. The
-    /// plan becomes the cheapest of them, if it is cheaper than `best`; returns what it costs then.
+    /// The regulator's closed loops towards the set point and towards points on the way to it, from the
+    /// farthest on, until they become dearer again. The plan becomes the cheapest of them, if it is
+    /// cheaper than `best`; returns what it costs then.
     #[inline(never)]
     fn regulate<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
@@ -64,6 +65,7 @@ where
         let (feedback, indifferent) = self.regulator(aim, &workspace.ocp);
         let away = (x - aim.end()).component_mul(&indifferent);
         let merit = self.merit(aim, Prices::none());
+        let mut found_one = false;
         for part in PARTS {
             let x_aim = aim.end() + away * (T::one() - convert::<f64, T>(part));
             let most = best.unwrap_or(convert(f64::INFINITY));
@@ -79,6 +81,9 @@ where
                 self.policy.feedback.fill(feedback);
                 self.policy.damping = T::zero();
                 self.policy.far = true;
+                found_one = true;
+            } else if found_one {
+                break;
             }
             if away.amax() == T::zero() {
                 break;

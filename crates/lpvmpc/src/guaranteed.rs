@@ -14,6 +14,7 @@
 //! fixed weights and fixed bounds.
 
 mod aim;
+mod least_cost;
 mod memory;
 mod plan;
 mod program;
@@ -326,7 +327,7 @@ where
         if !self.has_plan {
             return Repeated::No;
         }
-        planner.repeat(x, last, trial);
+        planner.repeat(x, last, along.cost, trial);
         if !(trial.cost < along.cost && planner.is_feasible(trial)) {
             return Repeated::No;
         }

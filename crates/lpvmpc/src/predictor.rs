@@ -6,7 +6,7 @@
 //! nonlinear map of the rollout (eq. (5), step 4 of Algorithm 2).
 
 use crate::model::{LpvModel, Scalar};
-use crate::small_matrix::{add_product, add_scaled, product, scale};
+use crate::small_matrix::{add_product, add_scaled, extend, product, scale};
 use nalgebra::{SMatrix, SVector, convert};
 
 /// How a sample of the model becomes a pair of matrices. Each kind carries the Runge-Kutta steps
@@ -275,32 +275,22 @@ impl Rk4 {
         let (mut a_d, mut b_d) = (SMatrix::identity(), SMatrix::zeros());
         let mut x = *x;
         for _ in 0..self.substeps {
-            let (mut rate, mut k, mut l) = at(&x);
-            let (mut a_step, mut b_step) = (SMatrix::identity(), SMatrix::zeros());
-            let mut next = x;
-            add_scaled(&mut a_step, &k, sixth);
-            add_scaled(&mut b_step, &l, sixth);
-            add_scaled(&mut next, &rate, sixth);
-            for (reach, weight) in [(half, third), (half, third), (h, sixth)] {
-                let mut there = x;
-                add_scaled(&mut there, &rate, reach);
-                let (next_rate, mut a, mut b) = at(&there);
-                rate = next_rate;
+            let (mut next, mut a_next, mut b_next) = (x, a_d, b_d);
+            let (mut rate, mut k, mut l) = (SVector::zeros(), SMatrix::zeros(), SMatrix::zeros());
+            let stages = [(T::zero(), sixth), (half, third), (half, third), (h, sixth)];
+            for (reach, weight) in stages {
                 // In place, since copies cost as much as the products where nothing is unrolled.
-                scale(&mut k, reach);
-                scale(&mut l, reach);
-                let (a_k, a_l) = (model.a_times(&a, &k), model.a_times(&a, &l));
-                add_scaled(&mut a, &a_k, T::one());
-                add_scaled(&mut b, &a_l, T::one());
-                (k, l) = (a, b);
-                add_scaled(&mut a_step, &k, weight);
-                add_scaled(&mut b_step, &l, weight);
+                extend(&mut rate, &x, reach);
+                extend(&mut k, &a_d, reach);
+                extend(&mut l, &b_d, reach);
+                let (there, a, b) = at(&rate);
+                (rate, k, l) = (there, model.a_times(&a, &k), model.a_times(&a, &l));
+                add_scaled(&mut l, &b, T::one());
                 add_scaled(&mut next, &rate, weight);
+                add_scaled(&mut a_next, &k, weight);
+                add_scaled(&mut b_next, &l, weight);
             }
-            x = next;
-            b_d = product(&a_step, &b_d);
-            add_scaled(&mut b_d, &b_step, T::one());
-            a_d = product(&a_step, &a_d);
+            (x, a_d, b_d) = (next, a_next, b_next);
         }
         (a_d, b_d)
     }

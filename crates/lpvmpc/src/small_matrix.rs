@@ -71,6 +71,19 @@ pub(crate) fn add_scaled<T: Scalar, const R: usize, const C: usize>(
     }
 }
 
+/// out = A + out factor
+#[inline(always)]
+pub(crate) fn extend<T: Scalar, const R: usize, const C: usize>(
+    out: &mut SMatrix<T, R, C>,
+    a: &SMatrix<T, R, C>,
+    factor: T,
+) {
+    let a = a.data.0.as_flattened();
+    for (out, a) in out.data.0.as_flattened_mut().iter_mut().zip(a) {
+        *out = *a + *out * factor;
+    }
+}
+
 /// A' B
 #[inline(always)]
 pub(crate) fn transposed_product<T: Scalar, const R: usize, const K: usize, const C: usize>(

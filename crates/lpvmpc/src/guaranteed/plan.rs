@@ -1,6 +1,7 @@
 //! Plans on the nonlinear model: their rollout as policies, cost and feasibility.
 
 use super::Planner;
+use super::least_cost::LeastCost;
 use crate::list::List;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Bounds;
@@ -113,7 +114,7 @@ where
         plan: &mut Plan<T, NX, NU>,
     ) {
         let mut planned = last.stages.iter().zip(last.stages.iter().skip(1));
-        self.simulate(x0, plan, |x| match planned.next() {
+        self.simulate(x0, plan, None, |x| match planned.next() {
             Some((before, PlannedStage { u, feedback, .. })) => (
                 input_at(x, (&before.x, u), feedback, &self.settings.u),
                 *feedback,
@@ -133,26 +134,31 @@ where
         self.aim(plan, near, edge.max(almost));
     }
 
-    /// `plan` becomes the whole of `last` once more, from where the plant has gone since: the best plan of
-    /// a plant that is on its way changes little from sample to sample, but for the place.
+    /// `plan` becomes the whole of `last` once more, from where the plant has gone since, unless that
+    /// costs more than `most`: the best plan of a plant that is on its way changes little from sample to
+    /// sample, but for the place.
     pub(super) fn repeat(
         &self,
         x0: &SVector<T, NX>,
         last: &Plan<T, NX, NU>,
+        most: T,
         plan: &mut Plan<T, NX, NU>,
     ) {
         let d = &self.settings.direction;
         let gone = (x0 - last.start).dot(d) / d.norm_squared();
         let mut stages = last.states().zip(&last.stages);
-        self.simulate(x0, plan, |x| match stages.next() {
+        let near = last.set_point + gone;
+        let whole = self.simulate(x0, plan, Some((near, most)), |x| match stages.next() {
             Some((x_planned, PlannedStage { u, feedback, .. })) => {
                 let planned = (&(x_planned + d * gone), u);
                 (input_at(x, planned, feedback, &self.settings.u), *feedback)
             }
             None => (SVector::zeros(), SMatrix::zeros()),
         });
-        self.aim(plan, last.set_point + gone, self.almost(self.end_drift));
-        plan.drift_as(last);
+        if whole {
+            self.aim(plan, near, self.almost(self.end_drift));
+            plan.drift_as(last);
+        }
     }
 
     /// The terminal value that a new plan may reach when the plant ends as far from it as from a plan
@@ -178,7 +184,7 @@ where
         let nearest = weighted.dot(x) / weighted.dot(d);
         let [lower, upper] = self.settings.set_points;
         let set_point = nearest.max(lower).min(upper);
-        self.simulate(x, plan, |x| self.terminal_law(x, set_point));
+        self.simulate(x, plan, None, |x| self.terminal_law(x, set_point));
         self.aim_as_surely(plan, set_point);
     }
 
@@ -194,20 +200,22 @@ where
         (u, feedback)
     }
 
-    /// `plan` becomes that of a policy that lies a `fraction` of the way from `along` to `towards`: planned
-    /// states, inputs and feedback matrices from stage 0 on.
+    /// `plan` becomes that of a policy that lies a `fraction` of the way from `along` to `towards`, unless
+    /// that costs more than `most`: planned states, inputs and feedback matrices from stage 0 on.
     pub(super) fn go_between(
         &self,
         along: &Plan<T, NX, NU>,
         towards: impl Iterator<Item = (SVector<T, NX>, SVector<T, NU>, SMatrix<T, NU, NX>)>,
         fraction: T,
+        most: Option<T>,
         plan: &mut Plan<T, NX, NU>,
     ) {
         let from = along
             .states()
             .zip(along.stages.iter().map(|stage| &stage.u));
         let mut stages = from.zip(towards);
-        self.simulate(&along.start, plan, |x| match stages.next() {
+        let most = most.map(|most| (along.set_point, most));
+        let whole = self.simulate(&along.start, plan, most, |x| match stages.next() {
             Some(((x_from, u_from), (x_to, u_to, feedback))) => {
                 let x_planned = x_from + (x_to - x_from) * fraction;
                 let u_planned = u_from + (u_to - u_from) * fraction;
@@ -216,23 +224,38 @@ where
             }
             None => (SVector::zeros(), SMatrix::zeros()),
         });
-        self.aim(plan, along.set_point, self.almost(self.end_drift));
+        if whole {
+            self.aim(plan, along.set_point, self.almost(self.end_drift));
+        }
     }
 
     /// `plan` becomes the rollout under `input`, which gives the input and the feedback matrix at each
-    /// stage's state.
+    /// stage's state. With a set point nearby and the `most` that it may cost, it ends, and the answer is
+    /// `false`, where every plan that begins like this costs more.
     fn simulate(
         &self,
         x0: &SVector<T, NX>,
         plan: &mut Plan<T, NX, NU>,
+        most: Option<(T, T)>,
         mut input: impl FnMut(&SVector<T, NX>) -> (SVector<T, NU>, SMatrix<T, NU, NX>),
-    ) {
+    ) -> bool {
         let settings = &self.settings;
         let substeps = settings.rollout.rk4.substeps;
         let step = settings.t_s / convert::<f64, T>(substeps as f64);
         let mut x = *x0;
-        for stage in plan.stages.iter_mut() {
+        let mut least = most.map(|(near, most)| {
+            let least = LeastCost::new(settings, &self.aims, near);
+            (least, most)
+        });
+        for (i, stage) in plan.stages.iter_mut().enumerate() {
             let (u, feedback) = input(&x);
+            if let Some((least, most)) = &mut least {
+                least.add(i, &x, &u);
+                if least.value() > *most {
+                    plan.cost = convert(f64::INFINITY);
+                    return false;
+                }
+            }
             let (mut highest, mut lowest) = (x, x);
             for _ in 0..substeps {
                 x = Rk4 { substeps: 1 }.advance(&self.model, &x, &u, step);
@@ -248,6 +271,7 @@ where
             };
         }
         (plan.start, plan.end, plan.end_drift) = (*x0, x, T::zero());
+        true
     }
 
     /// Gives the rollout `plan` the admissible set point that is best for it, and its cost. The cost

@@ -119,7 +119,7 @@ where
             if workspace.solution.status.is_solved() {
                 let origin = planner.settings.direction * along.set_point;
                 let towards = program::answer(workspace, &origin);
-                planner.go_between(along, towards, T::one(), trial);
+                planner.go_between(along, towards, T::one(), None, trial);
                 if trial.cost.is_finite() {
                     swap(along, trial);
                     let horizon = planner.settings.horizon;
@@ -153,10 +153,11 @@ where
         let origin = self.settings.direction * along.set_point;
         let predicted = program::predicted_end(&workspace.solution, horizon, &origin);
         let before = self.merit(along);
+        let most = least.map(|least| least + self.worthwhile(least));
         let mut near = None;
         for fraction in FRACTIONS {
             let towards = program::answer(workspace, &origin);
-            self.go_between(along, towards, convert(fraction), trial);
+            self.go_between(along, towards, convert(fraction), most, trial);
             // What is too dear need not be judged, which takes longer than its rollout.
             let cheaper = least.is_none_or(|least| trial.cost < least);
             let found = Found {
@@ -194,9 +195,14 @@ where
 
     /// Whether a change of the `cost` by so much, up or down, is worth another program.
     fn is_worthwhile(&self, change: T, cost: T) -> bool {
+        !(change.abs() <= self.worthwhile(cost))
+    }
+
+    /// The largest change of the `cost` that is not.
+    fn worthwhile(&self, cost: T) -> T {
         let relative = cost * convert::<f64, T>(WORTHWHILE);
         let absolute = self.settings.terminal.level * T::default_epsilon().powf(convert(0.75));
-        !(change.abs() <= relative + absolute)
+        relative + absolute
     }
 
     /// More damping where a program's answer did not hold, less where all of it did.
