@@ -3,7 +3,7 @@
 use crate::covariance::{inverse, of_parameters};
 use crate::estimate::{Task, problem};
 use crate::log::{BallAngle, Run, Torque};
-use crate::model::{LONGEST_STEP, Robot};
+use crate::model::{Robot, steps};
 use crate::parameter::{Choice, Parameter, Values};
 use crate::poles::linear_model;
 use crate::segments::segments;
@@ -351,7 +351,7 @@ impl ExcitationTask {
     fn simulate(&self, gain: &Vector4<f64>, excitation: &[f64]) -> Motion {
         let robot = Robot::new(self.robot, self.geometry);
         let interval = 1.0 / self.rate;
-        let steps = (interval / LONGEST_STEP).ceil();
+        let steps = steps(interval);
         let late = (self.robot[Parameter::Delay] * self.rate).round() as usize;
         let mut x = Vector4::zeros();
         let mut motion = Motion {

@@ -197,10 +197,15 @@ where
         indices: &[usize],
     ) -> Reduced {
         let blocks = self.blocks(parameters, initial, indices);
+        self.reduced_from(&blocks, parameters, indices)
+    }
+
+    /// [`ShootingProblem::reduced`] from the segments' normal equations in these parameters.
+    fn reduced_from(&self, blocks: &[Block<NX>], parameters: &[f64], indices: &[usize]) -> Reduced {
         let n = indices.len();
         let (mut information, mut gradient) = self.prior_equations(parameters, indices);
         let mut scores = Vec::with_capacity(blocks.len());
-        for block in &blocks {
+        for block in blocks {
             let (segment_information, segment_gradient) = block.eliminated(0.0);
             information += segment_information;
             gradient += &segment_gradient;

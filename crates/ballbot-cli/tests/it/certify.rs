@@ -5,19 +5,28 @@ use ballbot_scenario::TerminalCertificate;
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
+use std::sync::LazyLock;
 
-/// A certificate of a small set, and its path.
-fn certified(folder: &Path) -> (Value, String) {
-    let out = folder.to_str().unwrap();
+/// What the program writes for a small set, once for all tests: the certificate and its page.
+static WRITTEN: LazyLock<[String; 2]> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
     let said = text(&["certify", "--size", "0.05", "--raise", "0", "--out", out]);
     assert_says(
         &said,
         &["the exact state and no delay", "|theta| <= 3.000000 deg"],
     );
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    [read("certificate.json"), read("certificate.html")]
+});
+
+/// The certificate of a small set, and its path in a folder of the test's own.
+fn certified(folder: &Path) -> (Value, String) {
+    let [document, _] = &*WRITTEN;
     let path = folder.join("certificate.json");
-    let document = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, document).unwrap();
     (
-        serde_json::from_str(&document).unwrap(),
+        serde_json::from_str(document).unwrap(),
         path.to_str().unwrap().to_owned(),
     )
 }
@@ -55,8 +64,8 @@ fn a_certificate_is_written_and_verified_again() {
     let verified: Value = crate::json(&["verify", &path, "--json"]);
     assert_eq!(verified["holds"], true);
     assert_eq!(verified["level"], claim["terminal"]["level"]);
-    let page = std::fs::read_to_string(folder.path().join("certificate.html")).unwrap();
-    assert_says(&page, &["<svg", "θ", "level"]);
+    let [_, page] = &*WRITTEN;
+    assert_says(page, &["<svg", "θ", "level"]);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use ballbot_identification::{Choice, Estimate, Parameter, Split, Tables, Task, V
 use rayon::prelude::*;
 
 /// What the robot of a laboratory is.
-fn truth(laboratory: &Laboratory) -> Values {
+pub fn truth(laboratory: &Laboratory) -> Values {
     let mut truth = Values([0.0; Parameter::ALL.len()]);
     for (parameter, value) in [
         (Parameter::B1, laboratory.plant.b1),

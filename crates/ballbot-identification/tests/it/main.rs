@@ -9,6 +9,7 @@ mod chain;
 mod columns;
 mod creep;
 mod excite;
+mod integration;
 mod laboratory;
 mod long;
 mod malformed;

@@ -8,6 +8,18 @@ use super::{ShootingModel, ShootingProblem};
 /// and the rounding, 1e-16 / 1e-6 of the value, are then both far below the noise of any data.
 const DIFFERENCE: f64 = 1e-6;
 
+/// A' A, each product of two columns taken once.
+fn square(a: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut square = DMatrix::zeros(a.ncols(), a.ncols());
+    for j in 0..a.ncols() {
+        for i in 0..=j {
+            square[(i, j)] = a.column(i).dot(&a.column(j));
+            square[(j, i)] = square[(i, j)];
+        }
+    }
+    square
+}
+
 /// Gauss-Newton normal equations of chi^2 / 2 of one segment, in (initial state, parameters).
 #[derive(Debug, Clone)]
 pub(super) struct Block<const NX: usize> {
@@ -77,7 +89,7 @@ impl<const NX: usize> Block<NX> {
         }
         // (simulated + 1) - simulated, with the measured value as what it is moved to.
         fill(columns, measured, -1.0);
-        Self::from_normal_equations(&jacobian.tr_mul(&jacobian), indices.len())
+        Self::from_normal_equations(&square(&jacobian), indices.len())
     }
 
     /// From [J F]'[J F] with the columns (states, parameters, residual).
@@ -89,6 +101,17 @@ impl<const NX: usize> Block<NX> {
             parameters: square.view((NX, NX), (n, n)).into_owned(),
             state_gradient: square.fixed_view::<NX, 1>(0, last).into_owned(),
             parameter_gradient: square.view((NX, last), (n, 1)).column(0).into_owned(),
+        }
+    }
+
+    /// Those of the parameters at these places alone, the others held.
+    pub(super) fn of(&self, places: &[usize]) -> Self {
+        Self {
+            states: self.states,
+            mixed: self.mixed.select_columns(places),
+            parameters: self.parameters.select_columns(places).select_rows(places),
+            state_gradient: self.state_gradient,
+            parameter_gradient: self.parameter_gradient.select_rows(places),
         }
     }
 

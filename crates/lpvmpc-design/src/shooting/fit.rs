@@ -112,26 +112,25 @@ where
         };
         let mut damping = 1e-3;
         let mut history = vec![at.chi_square];
+        let mut equations = Equations::new(self, &at, &free);
         let termination = loop {
             if history.len() > settings.max_iterations {
                 break ShootingTermination::IterationCap {
                     cap: settings.max_iterations,
                 };
             }
-            let equations = Equations::new(self, &at, &free);
             let tolerance = settings.reduction_tolerance * at.chi_square / values as f64;
             match equations.step(self, &at, &mut damping, tolerance) {
                 Step::Better(next) => at = next,
                 Step::Converged => break ShootingTermination::Converged,
                 Step::None => break ShootingTermination::Stagnation,
             }
+            equations = Equations::new(self, &at, &free);
             history.push(at.chi_square);
             progress(history.len() - 1);
         };
-        let inside = Equations::new(self, &at, &free).inside(self.unknowns, &at.parameters);
-        let indices: Vec<usize> = inside.into_iter().map(|place| free[place]).collect();
         Ok(ShootingFit {
-            reduced: self.reduced(&at.parameters, &at.initial, &indices),
+            reduced: equations.reduced(self, &at),
             parameters: at.parameters,
             initial: at.initial,
             chi_square: at.chi_square,
@@ -276,6 +275,18 @@ impl<'a, const NX: usize> Equations<'a, NX> {
             !(held_below || held_above)
         };
         (0..self.free.len()).filter(inside).collect()
+    }
+
+    /// What is left of them where the parameters at a bound are held.
+    fn reduced<M: ShootingModel<NX, NY>, const NY: usize>(
+        &self,
+        problem: &ShootingProblem<'_, M, NX, NY>,
+        at: &Iterate<NX>,
+    ) -> Reduced {
+        let inside = self.inside(problem.unknowns, &at.parameters);
+        let indices: Vec<usize> = inside.iter().map(|&place| self.free[place]).collect();
+        let blocks: Vec<Block<NX>> = self.blocks.iter().map(|one| one.of(&inside)).collect();
+        problem.reduced_from(&blocks, &at.parameters, &indices)
     }
 
     /// The step of the free parameters and by how much it lowers chi^2 of the quadratic model.
