@@ -58,8 +58,8 @@ pub(crate) enum Outcome<T> {
     },
 }
 
-/// Parts of the way to a program's answer that are tried.
-const STEPS: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
+/// Parts of the way to a program's answer that are tried; beyond it only where damping holds it back.
+const STEPS: [f64; 7] = [10.0, 3.0, 1.0, 0.5, 0.25, 0.1, 0.03];
 /// From each of them to the next longer one, at least.
 const LONGER: f64 = 4.0;
 /// Part of the expected gain that a step has to bring (Armijo's condition).
@@ -110,8 +110,10 @@ where
         while self.problems < self.settings.iterations.most() {
             self.linearize_plan(x, aim, along, workspace);
             self.solve_program(workspace);
+            let damped = self.policy.damping > T::zero();
             let longest = match along {
                 Along::Scheduling => longest_step,
+                Along::Jacobian if damped => convert(STEPS[0]),
                 Along::Jacobian => T::one(),
             };
             let outcome = self.improve(x, aim, (tolerance, longest), &mut prices, workspace);
@@ -120,10 +122,9 @@ where
                 longest_step = if *step < longest {
                     *step
                 } else {
-                    *step * convert(LONGER)
+                    (*step * convert(LONGER)).min(T::one())
                 };
             }
-            let damped = self.policy.damping > T::zero();
             if along == Along::Jacobian {
                 self.adapt_damping(aim, &outcome);
             }
@@ -151,7 +152,7 @@ where
                     } else {
                         tolerance
                     };
-                    let settled = step == T::one() && gain <= little;
+                    let settled = step >= T::one() && gain <= little;
                     if settled && along == Along::Jacobian && !damped {
                         status = Status::Converged;
                         break;
@@ -296,12 +297,20 @@ where
         });
         // Along the way to its answer, the program's cost falls by a parabola.
         let parabola = step * (T::one() + T::one() - step);
-        let curvature = (cost - before + expected * parabola) / (change * step * step);
+        let shortfall = (cost - before + expected * parabola) / (change * step * step);
+        let gain = (before - cost) / size;
+        // What a step falls short of that saves next to nothing is the kink of a bound's price rather
+        // than curvature: it asks for no more damping.
+        let curvature = if gain <= tolerance {
+            shortfall.min(self.policy.damping)
+        } else {
+            shortfall
+        };
         self.take_if_some(Some(cost), &workspace.trial);
         self.gap = at(&self.rollout, last) - at(&self.solution.x, last);
         Outcome::Moved {
             step,
-            gain: (before - cost) / size,
+            gain,
             curvature,
         }
     }
@@ -322,7 +331,13 @@ where
         } = self;
         let steps = STEPS.into_iter().map(convert::<f64, T>);
         for step in steps.filter(|step| *step <= longest) {
-            let sufficient = policy.cost - expected * step * convert(SUFFICIENT);
+            // Beyond the answer, all that was expected of it.
+            let part = if step > T::one() {
+                T::one()
+            } else {
+                step * convert(SUFFICIENT)
+            };
+            let sufficient = policy.cost - expected * part;
             let cost = self.roll_out_plan(x, merit, sufficient, trial, &|i, x_i| {
                 let x_plan = i.checked_sub(1).map_or(*x, |j| at(rollout, j));
                 let (x_answer, u_answer) = answer(i);
@@ -363,7 +378,7 @@ where
             Outcome::NothingToGain { .. } => lower,
             // A full step that the program was good enough for.
             Outcome::Moved { step, .. }
-                if *step == T::one() && (before == T::zero() || equality) =>
+                if *step >= T::one() && (before == T::zero() || equality) =>
             {
                 lower
             }
