@@ -59,7 +59,7 @@ pub(crate) enum Outcome<T> {
 }
 
 /// Parts of the way to a program's answer that are tried; beyond it only where damping holds it back.
-const STEPS: [f64; 7] = [10.0, 3.0, 1.0, 0.5, 0.25, 0.1, 0.03];
+const STEPS: [f64; 6] = [3.0, 1.0, 0.5, 0.25, 0.1, 0.03];
 /// From each of them to the next longer one, at least.
 const LONGER: f64 = 4.0;
 /// Part of the expected gain that a step has to bring (Armijo's condition).

@@ -57,8 +57,8 @@ pub struct SolverMemory<T: 'static, const NX: usize, const NU: usize> {
     pub(crate) held: List<[Option<Side>; NU]>,
     /// What the dual method works with.
     pub(crate) dual: DualMemory<T, NU>,
-    /// Of the first phase, if there is one: on the heap.
-    pub(crate) primal_dual: Option<PrimalDual<T, NX, NU>>,
+    /// Of the first phase: no entry, or one.
+    pub(crate) primal_dual: List<PrimalDual<T, NX, NU>>,
 }
 
 /// Memory of the dual active-set method.
@@ -137,11 +137,14 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
                 factor: List::repeat(T::zero(), rows * rows),
                 numbers: core::array::from_fn(|_| numbers()),
             },
-            primal_dual: Some(PrimalDual::new(
-                List::repeat(StageFactor::zeros(), stages),
-                List::repeat(CostToGo::zeros(), stages),
-                core::array::from_fn(|_| List::repeat([None; NU], stages)),
-            )),
+            primal_dual: List::repeat(
+                PrimalDual::new(
+                    List::repeat(StageFactor::zeros(), stages),
+                    List::repeat(CostToGo::zeros(), stages),
+                    core::array::from_fn(|_| List::repeat([None; NU], stages)),
+                ),
+                1,
+            ),
         }
     }
 }
@@ -152,11 +155,17 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
         self,
         arrays: &'static mut PrimalDualArrays<T, NX, NU, N>,
     ) -> Self {
-        let factors = List::Static(&mut arrays.factors);
-        let costs_to_go = List::Static(&mut arrays.costs_to_go);
-        let guesses = arrays.guesses.each_mut().map(|list| List::Static(list));
+        let PrimalDualArrays {
+            factors,
+            costs_to_go,
+            guesses,
+            phase,
+        } = arrays;
+        let guesses = guesses.each_mut().map(|list| List::Static(list));
+        let (factors, costs_to_go) = (List::Static(factors), List::Static(costs_to_go));
+        *phase = [PrimalDual::new(factors, costs_to_go, guesses)];
         Self {
-            primal_dual: Some(PrimalDual::new(factors, costs_to_go, guesses)),
+            primal_dual: List::Static(phase),
             ..self
         }
     }
@@ -164,11 +173,13 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
 
 /// Memory with which problems with many active input bounds are solved in less time, for `N` stages. On
 /// the heap it is always there. Where it is not, neither is its machine code; the answers are the same.
-#[derive(Clone, Copy, Debug)]
-pub struct PrimalDualArrays<T, const NX: usize, const NU: usize, const N: usize> {
+#[derive(Debug)]
+pub struct PrimalDualArrays<T: 'static, const NX: usize, const NU: usize, const N: usize> {
     factors: [StageFactor<T, NX, NU>; N],
     costs_to_go: [CostToGo<T, NX>; N],
     guesses: [[[Option<Side>; NU]; N]; 2],
+    /// What is made of the others once they are lent.
+    phase: [PrimalDual<T, NX, NU>; 1],
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Default
@@ -180,6 +191,11 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Default
             factors: [StageFactor::zeros(); N],
             costs_to_go: [CostToGo::zeros(); N],
             guesses: [[[None; NU]; N]; 2],
+            phase: [PrimalDual::new(
+                List::empty(),
+                List::empty(),
+                [List::empty(), List::empty()],
+            )],
         }
     }
 }
@@ -213,7 +229,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
                 factor: List::Static(self.factor.as_flattened_mut()),
                 numbers: self.numbers.each_mut().map(|list| List::Static(list)),
             },
-            primal_dual: None,
+            primal_dual: List::empty(),
         }
     }
 }

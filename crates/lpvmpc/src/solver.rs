@@ -81,8 +81,8 @@ pub struct Solver<T: 'static, const NX: usize, const NU: usize> {
     pub(crate) dual: DualActiveSet<T, NU>,
     /// None but within [`Solver::search_with_held_inputs`].
     pub(crate) held: HeldInputs<NU>,
-    /// The first phase, if there is memory for it.
-    primal_dual: Option<PrimalDual<T, NX, NU>>,
+    /// The first phase, if there is memory for it; no entry or one.
+    primal_dual: List<PrimalDual<T, NX, NU>>,
     /// The longest horizon that there is memory for.
     stages: usize,
 }
@@ -167,6 +167,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
 
     /// Whether the first phase, if there is memory for one, has solved the problem, whose trajectory
     /// without bounds is in the solution.
+    #[inline(always)]
     fn solve_at_once(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
@@ -174,15 +175,17 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         solution: &mut Solution<T, NX, NU>,
         spent: &mut usize,
     ) -> bool {
-        let Some(mut phase) = self.primal_dual.take() else {
-            return false;
-        };
-        let solved = (phase.run)(&mut phase, self, ocp, settings, solution, spent);
-        self.primal_dual = Some(phase);
+        let mut phase = core::mem::replace(&mut self.primal_dual, List::empty());
+        let solved = phase.iter_mut().any(|phase| {
+            let run = phase.run;
+            run(phase, self, ocp, settings, solution, spent)
+        });
+        self.primal_dual = phase;
         solved
     }
 
     /// The dual method, from the trajectory without bounds; with held inputs where rounding ends it.
+    #[inline(always)]
     fn solve_one_by_one(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
