@@ -92,8 +92,8 @@ impl<const NU: usize> HeldInputs<NU> {
     }
 
     /// At stage `i` holds the inputs of `u` that are beyond their bounds by more than the `tolerance`,
-    /// relative to the bounds' size, and lets go of those that the gradient of the cost in the inputs, `pulled`, draws
-    /// into theirs. Returns how many that are.
+    /// relative to the bounds' size, and lets go of those that the cost, whose gradient in the inputs is
+    /// `pulled`, draws into theirs. Returns how many that are.
     pub fn exchange<T: Scalar>(
         &mut self,
         i: usize,

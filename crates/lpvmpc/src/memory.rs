@@ -137,6 +137,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
                 factor: List::repeat(T::zero(), rows * rows),
                 numbers: core::array::from_fn(|_| numbers()),
             },
+            // A module for a browser has to be small.
+            #[cfg(target_arch = "wasm32")]
+            primal_dual: List::empty(),
+            #[cfg(not(target_arch = "wasm32"))]
             primal_dual: List::repeat(
                 PrimalDual::new(
                     List::repeat(StageFactor::zeros(), stages),
@@ -150,7 +154,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
-    /// The same with memory for many active input bounds.
+    /// The same with memory for many active input bounds, in problems of up to `N` stages.
     pub fn with_primal_dual<const N: usize>(
         self,
         arrays: &'static mut PrimalDualArrays<T, NX, NU, N>,
@@ -172,7 +176,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
 }
 
 /// Memory with which problems with many active input bounds are solved in less time, for `N` stages. On
-/// the heap it is always there. Where it is not, neither is its machine code; the answers are the same.
+/// the heap it is always there, but for WebAssembly. Where it is not, neither is its machine code; the
+/// answers are the same.
 #[derive(Debug)]
 pub struct PrimalDualArrays<T: 'static, const NX: usize, const NU: usize, const N: usize> {
     factors: [StageFactor<T, NX, NU>; N],

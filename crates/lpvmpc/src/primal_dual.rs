@@ -73,7 +73,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> PrimalDual<T, NX, NU> {
         solution: &mut Solution<T, NX, NU>,
         spent: &mut usize,
     ) -> bool {
-        if ocp.terminal.equality.is_some() || !many_are_violated(ocp, solution) {
+        let fits = ocp.length() <= self.factors.len();
+        if !fits || ocp.terminal.equality.is_some() || !many_are_violated(ocp, solution) {
             return false;
         }
         let shift = match settings.warm_start {

@@ -3,8 +3,8 @@
 use super::changes::saturated;
 use super::support::{agree, cold, solve};
 use lpvmpc::{
-    Bounds, Capacity, List, Ocp, Solution, Solver, SolverArrays, SolverSettings, Status, WarmStart,
-    kkt_residual,
+    Bounds, Capacity, List, Ocp, PrimalDualArrays, Solution, Solver, SolverArrays, SolverSettings,
+    Status, WarmStart, kkt_residual,
 };
 use lpvmpc_testkit::problems::{Family, problem};
 use lpvmpc_testkit::rng::Rng;
@@ -158,6 +158,29 @@ fn many_bounds_at_once_take_fewer_changes() {
         sweep::<6, 3, 40, 240>(40, narrow::<6, 3, 40>),
     ] {
         assert!(4 * found.at_once < 3 * found.one_by_one, "{found:?}");
+    }
+}
+
+/// Memory of the first phase for shorter horizons changes nothing for longer ones.
+#[test]
+fn too_little_memory_for_bounds_at_once_is_none() {
+    const M: usize = 60;
+    let arrays = || Box::leak(Box::new(SolverArrays::<f64, 4, 1, 40, M>::default())).lend();
+    let many = Box::leak(Box::new(PrimalDualArrays::<f64, 4, 1, 39>::default()));
+    let mut with = Solver::new(arrays().with_primal_dual(many));
+    let mut without = Solver::new(arrays());
+    let room = Capacity {
+        stages: 40,
+        rows: M,
+        active: M,
+        ..Capacity::default()
+    };
+    for seed in 0..10 {
+        let ocp = narrow::<4, 1, 40>(seed);
+        let [mut found, mut expected] = [(); 2].map(|()| Solution::allocate(room));
+        with.solve(&ocp, &cold(), &mut found);
+        without.solve(&ocp, &cold(), &mut expected);
+        assert_eq!(found, expected);
     }
 }
 
