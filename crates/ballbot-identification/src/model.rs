@@ -244,8 +244,8 @@ impl ShootingModel<4, 3> for SegmentedRuns<'_> {
                 motions.extend(self.states(segment, [robot], [*initial]));
                 continue;
             }
-            // The last once more in the place of each that is missing: four take less time than two
-            // one after the other.
+            // The last once more in the place of each that is missing: side by side, none waits for the
+            // operations of another.
             let [a, b, c, d] = [0, 1, 2, 3].map(|lane| some[lane.min(some.len() - 1)]);
             let each = self.states(segment, [a.0, b.0, c.0, d.0], [a.1, b.1, c.1, d.1]);
             motions.extend(each.into_iter().take(some.len()));

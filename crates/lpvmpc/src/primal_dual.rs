@@ -121,7 +121,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> PrimalDual<T, NX, NU> {
             if patience == 0 {
                 return true;
             }
-            roll_out(solver, ocp, solution);
+            if solver.roll_out(ocp, solution).is_err() {
+                return false;
+            }
             copy(&mut self.guess, solver.held.sides());
             let (wrong, behind) = self.exchange(solver, ocp, solution);
             if wrong == 0 {
@@ -206,22 +208,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> PrimalDual<T, NX, NU> {
             }
         }
         (changes, behind)
-    }
-}
-
-/// Forward: the trajectory with the inputs held that are.
-fn roll_out<T: Scalar, const NX: usize, const NU: usize>(
-    solver: &Solver<T, NX, NU>,
-    ocp: &Ocp<T, NX, NU>,
-    solution: &mut Solution<T, NX, NU>,
-) {
-    let at_rest = SVector::zeros();
-    let mut x = ocp.x0;
-    let places = solution.u.iter_mut().zip(solution.x.iter_mut());
-    for (factor, (u, next)) in solver.factors.iter().zip(places).take(ocp.length()) {
-        *u = factor.policy(&x, &at_rest);
-        x = factor.next(&x, &at_rest);
-        *next = x;
     }
 }
 
