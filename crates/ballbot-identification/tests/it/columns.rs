@@ -21,7 +21,7 @@ fn laboratory() -> Laboratory {
         tilt_offset: 0.01,
         gyro_bias: 0.02,
         rate: 100.0,
-        duration: 15.0,
+        duration: 8.0,
         ..healthy()
     }
 }

@@ -186,7 +186,10 @@ fn both_planes_of_three_wheels_are_one_robot() {
 
 #[test]
 fn a_body_that_is_not_symmetric_is_found_out_and_has_two_inertias() {
-    let laboratories = asymmetric();
+    let laboratories = asymmetric().map(|plane| Laboratory {
+        rate: 100.0,
+        ..plane
+    });
     let text = csv(&rows(&records(&laboratories, 2)));
     let as_one = outcome(&text, CONFIG).unwrap();
     let said = as_one.verdicts();
@@ -224,7 +227,7 @@ fn a_body_that_is_not_symmetric_is_found_out_and_has_two_inertias() {
 fn what_is_wrong_between_the_planes_is_refused_and_named() {
     let short = planes().map(|plane| Laboratory {
         rate: 100.0,
-        duration: 12.0,
+        duration: 8.0,
         // Where the delay is a whole number of rows, chi^2 has a kink, on which a fit may stagnate.
         delay: 0.012,
         ..plane
