@@ -121,7 +121,7 @@ pub use memory::{
     WorkspaceArrays, WorkspaceMemory,
 };
 pub use model::{LpvModel, Scalar};
-pub use number::{Dual, Elementary, Number};
+pub use number::{Bivariate, Dual, Elementary, Number};
 pub use ocp::{Bounds, Common, GeneralRow, Ocp, Penalty, SoftBounds, Stage, Terminal};
 pub use predictor::{Predictor, Rk4};
 pub use preview::{Preview, PreviewError, PreviewMistake, PreviewPart};
