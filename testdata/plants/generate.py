@@ -188,8 +188,9 @@ def main():
             found = [list(map(float, ca.DM(v).full().ravel())) for v in table(*point)]
             values[name].append(dict(zip(["x", "u", "f", "y", "a", "b"], point[:2] + found)))
     with open("values.json", "w") as file:
-        json.dump(values, file, indent=0)
-        file.write("\n")
+        lines = (f'"{name}": [\n' + ",\n".join(map(json.dumps, points)) + "\n]"
+                 for name, points in values.items())
+        file.write("{" + ",\n".join(lines) + "}\n")
 
 
 if __name__ == "__main__":

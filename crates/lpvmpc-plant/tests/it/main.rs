@@ -1,4 +1,8 @@
 //! Plants from files are the plants that they say, and nothing else is one.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on must fail, in its support functions too"
+)]
 
 mod reference;
 mod refused;
