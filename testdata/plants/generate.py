@@ -1,12 +1,13 @@
 """Plants as CasADi has them, in the format of lpvmpc-plant, and their values at random points.
 
-Writes cart-pole.json, functions.json and values.json here.
+Writes cart-pole.json, functions.json, values.json and rays.json here.
 """
 
 import json
 import random
 
 import casadi as ca
+from scipy.integrate import quad_vec
 
 NAMES = {
     ca.OP_ADD: "add", ca.OP_SUB: "sub", ca.OP_MUL: "mul", ca.OP_DIV: "div", ca.OP_NEG: "neg",
@@ -191,6 +192,35 @@ def main():
         lines = (f'"{name}": [\n' + ",\n".join(map(json.dumps, points)) + "\n]"
                  for name, points in values.items())
         file.write("{" + ",\n".join(lines) + "}\n")
+
+
+    with open("rays.json", "w") as file:
+        json.dump(rays(rng), file)
+        file.write("\n")
+
+
+def rays(rng):
+    """Mean derivatives of the cart-pole from (x_r, u_r) to (x, u), by adaptive quadrature."""
+    plant, f = cart_pole()
+    p = [parameter["value"] for parameter in plant["parameters"]]
+    x, u = ca.SX.sym("x", 4), ca.SX.sym("u")
+    rate, _ = f(x, u, p)
+    slopes = ca.Function("slopes", [x, u], [ca.vertcat(
+        dense(ca.jacobian(rate, x)), dense(ca.jacobian(rate, u)))])
+    found = []
+    for at in [[0, 0, 0, 0, 0], [0.3, -0.2, 0.1, 0.4, 2.0]]:
+        for _ in range(10):
+            to = [rng.uniform(-1, 1), rng.uniform(-1.2, 1.2), rng.uniform(-2, 2),
+                  rng.uniform(-3, 3), rng.uniform(-15, 15)]
+
+            def along(part):
+                z = [a + part * (b - a) for a, b in zip(at, to)]
+                return slopes(z[:4], z[4]).full().ravel()
+
+            mean, error = quad_vec(along, 0, 1, epsabs=1e-14, epsrel=1e-14)
+            assert error < 1e-11
+            found.append({"from": at, "to": to, "a": list(mean[:16]), "b": list(mean[16:])})
+    return found
 
 
 if __name__ == "__main__":

@@ -154,7 +154,8 @@ impl Code {
         let zero = N::constant(0.0);
         match self.registers {
             0..=16 => self.evaluate_on(&mut [zero; 16], leaf, result),
-            17..=64 => self.evaluate_on(&mut [zero; 64], leaf, result),
+            17..=32 => self.evaluate_on(&mut [zero; 32], leaf, result),
+            33..=64 => self.evaluate_on(&mut [zero; 64], leaf, result),
             65..=256 => self.evaluate_on(&mut [zero; 256], leaf, result),
             count => self.evaluate_on(&mut vec![zero; count], leaf, result),
         }
