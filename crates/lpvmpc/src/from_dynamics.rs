@@ -71,7 +71,7 @@ where
     };
     (
         rates.map(|rate| rate.value),
-        SMatrix::from_fn(|i, j| slope(i, j)),
+        SMatrix::from_fn(slope),
         SMatrix::from_fn(|i, j| slope(i, NX + j)),
     )
 }

@@ -4,6 +4,7 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
+mod hostile;
 mod ray;
 mod reference;
 mod refused;
