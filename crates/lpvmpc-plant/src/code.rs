@@ -2,6 +2,7 @@
 
 use crate::operation::{Binary, Operation, Unary};
 use lpvmpc::{Bivariate, Elementary, Number};
+use std::collections::HashMap;
 
 /// Where a number comes from that is not worked out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,10 +21,11 @@ pub(crate) enum Function {
     Binary(Binary),
     /// A power by multiplication.
     Whole(i32),
+    /// sin and cos at once; cos goes where `second` says.
+    SinCos,
 }
 
-/// A function of the numbers in two registers (one of which may not count), and where its value
-/// goes.
+/// A function of the numbers in one or two registers, and where its value goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Instruction {
     pub function: Function,
@@ -64,6 +66,36 @@ fn function_of(operations: &[Operation], index: usize) -> Option<Function> {
     }
 }
 
+const SIN: Function = Function::Unary(Unary::Elementary(Elementary::Sin));
+const COS: Function = Function::Unary(Unary::Elementary(Elementary::Cos));
+
+/// Of each sine and cosine of the same angle, the other.
+fn sines_and_cosines(
+    operations: &[Operation],
+    needed: impl Fn(&usize) -> bool,
+) -> HashMap<usize, usize> {
+    let mut seen: HashMap<usize, [Option<usize>; 2]> = HashMap::new();
+    let mut partners = HashMap::new();
+    for index in (0..operations.len()).filter(needed) {
+        let (this, that) = match function_of(operations, index) {
+            Some(SIN) => (0, 1),
+            Some(COS) => (1, 0),
+            _ => continue,
+        };
+        for angle in operations[index].arguments() {
+            let pair = seen.entry(angle).or_default();
+            if pair[this].is_none() {
+                pair[this] = Some(index);
+                if let Some(other) = pair[that] {
+                    partners.insert(index, other);
+                    partners.insert(other, index);
+                }
+            }
+        }
+    }
+    partners
+}
+
 fn leaf_of(operation: Operation) -> Option<Leaf> {
     match operation {
         Operation::Constant(value) => Some(Leaf::Constant(value)),
@@ -79,7 +111,7 @@ fn leaf_of(operation: Operation) -> Option<Leaf> {
 fn needs(operations: &[Operation], index: usize) -> impl Iterator<Item = usize> + use<> {
     let count = match function_of(operations, index) {
         Some(Function::Binary(_)) => 2,
-        Some(Function::Unary(_) | Function::Whole(_)) => 1,
+        Some(Function::Unary(_) | Function::Whole(_) | Function::SinCos) => 1,
         None => 0,
     };
     operations[index].arguments().take(count)
@@ -109,6 +141,7 @@ impl Code {
                 leaves.push(leaf);
             }
         }
+        let partners = sines_and_cosines(operations, needed);
         let mut free: Vec<u32> = Vec::new();
         let mut registers = leaves.len();
         let mut instructions = Vec::new();
@@ -127,17 +160,34 @@ impl Code {
                     free.push(register[argument]);
                 }
             }
-            let target = free.pop().unwrap_or_else(|| {
-                registers += 1;
-                registers as u32 - 1
-            });
+            let mut place = || {
+                free.pop().unwrap_or_else(|| {
+                    registers += 1;
+                    registers as u32 - 1
+                })
+            };
+            let partner = partners.get(&index).copied();
+            if partner.is_some_and(|partner| partner < index) {
+                // It is there already.
+                continue;
+            }
+            let target = place();
             register[index] = target;
-            instructions.push(Instruction {
+            let mut instruction = Instruction {
                 function,
                 first,
                 second,
                 target,
-            });
+            };
+            if let Some(partner) = partner {
+                register[partner] = place();
+                instruction.function = Function::SinCos;
+                instruction.second = register[partner];
+                if function == COS {
+                    std::mem::swap(&mut instruction.second, &mut instruction.target);
+                }
+            }
+            instructions.push(instruction);
         }
         Self {
             leaves,
@@ -183,11 +233,16 @@ impl Code {
 fn run<N: Number>(instructions: &[Instruction], registers: &mut [N]) {
     for instruction in instructions {
         let x = registers[instruction.first as usize];
-        let y = registers[instruction.second as usize];
+        let second = instruction.second as usize;
         registers[instruction.target as usize] = match instruction.function {
             Function::Unary(function) => function.of(x),
-            Function::Binary(function) => function.of(x, y),
+            Function::Binary(function) => function.of(x, registers[second]),
             Function::Whole(exponent) => x.powi(exponent),
+            Function::SinCos => {
+                let (sin, cos) = x.sin_cos();
+                registers[second] = cos;
+                sin
+            }
         };
     }
 }
