@@ -3,7 +3,7 @@
 
 use crate::shares::PlaneTorques;
 use lpvmpc::{Number, Scalar};
-use nalgebra::{Matrix3, SVector, Vector2, Vector3, convert};
+use nalgebra::{Matrix3, RealField, SVector, Vector2, Vector3, convert};
 
 /// Where a wheel stands, and which way it turns.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -138,14 +138,14 @@ impl<T: Scalar + Number> Wheels<T> {
     /// Angle of the wheels' contact points from the top of the ball, rad.
     pub fn zenith_angle(&self) -> T {
         let (sin, cos) = self.sin_cos;
-        sin.atan2(cos)
+        RealField::atan2(sin, cos)
     }
 
     /// Azimuths of the wheels' contact points from the robot's x axis, rad, from -pi to pi.
     pub fn azimuths(&self) -> [T; 3] {
         self.directions.map(|direction| {
             let sense = direction.z;
-            (direction.y * sense).atan2(direction.x * sense)
+            RealField::atan2(direction.y * sense, direction.x * sense)
         })
     }
 

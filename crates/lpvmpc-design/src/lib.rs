@@ -8,6 +8,7 @@
 //! | a linear model of a nonlinear plant | [`linearize`], [`poles`], [`controllability_rank`] |
 //! | a gain and a terminal cost | [`lqr_continuous`], [`lqr_discrete`], [`solve_care`], [`solve_dare`] |
 //! | is an embedding the plant that it stands for? | [`embedding_defect`] |
+//! | nodes for the embedding along rays from a steady state | [`nodes_along_ray`] |
 //! | exact sampling of a frozen model | [`zero_order_hold`] |
 //! | is the gain stable at each scheduling? | [`frozen_stability`] |
 //! | is the integration step short enough? | [`check_rk4_step`] |
@@ -59,6 +60,7 @@ mod modes;
 mod number;
 mod offset_free;
 mod parallel;
+mod ray_nodes;
 mod residual_tests;
 mod riccati;
 mod shooting;
@@ -79,6 +81,7 @@ pub use modes::{controllability_rank, poles};
 pub use number::number_text;
 pub use offset_free::{OffsetFreeError, check_offset_free};
 pub use parallel::{each, each_with};
+pub use ray_nodes::{RayNodes, nodes_along_ray};
 pub use residual_tests::{Correlation, NORMAL_95, autocorrelation, cross_correlation};
 pub use riccati::{LqProblem, RiccatiError, RiccatiSolution, solve_care, solve_dare};
 pub use shooting::{

@@ -112,6 +112,15 @@ where
         (self.disturbed(rate), a, b)
     }
 
+    fn embedded(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> Tangent<T, NX, NU> {
+        let u = self.input(u);
+        let (rate, a, b) = match self.scheduling {
+            None => self.plant.embedded(x, &u),
+            Some(scheduling) => self.along(scheduling, (x, &u)),
+        };
+        (self.disturbed(rate), a, b)
+    }
+
     fn steady_state(
         &self,
         problem: &SteadyStateProblem<T, NX, NU>,

@@ -157,91 +157,16 @@ where
 
 /// A plant that is known by its f alone, written once for every kind of [`Number`].
 ///
-/// [`AlongMotion`] makes an [`LpvModel`] of it.
+/// [`AlongMotion`](crate::AlongMotion) and [`AlongRay`](crate::AlongRay) make an [`LpvModel`] of it.
 pub trait Dynamics<const NX: usize, const NU: usize> {
     /// x_dot = f(x, u), in state units per second.
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX>;
 }
 
-/// The linear models of a plant along its motion: A and B are the derivatives of f at the scheduling
-/// (x, u), and c = f - A x - B u makes the model exact there. No factorisation is done by hand.
-///
-/// `NS` is the number of scheduling parameters, that of states and inputs together: for 2 states and 1
-/// input, `AlongMotion::<_, 3>(plant)`. Any other number does not compile.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AlongMotion<P, const NS: usize>(pub P);
-
-impl<P, const NS: usize> AlongMotion<P, NS> {
-    fn tangent_at<T, const NX: usize, const NU: usize>(
-        &self,
-        scheduling: &SVector<T, NS>,
-    ) -> (SVector<T, NX>, SVector<T, NU>, Tangent<T, NX, NU>)
-    where
-        T: Scalar + Number,
-        P: Dynamics<NX, NU>,
-    {
-        const {
-            assert!(
-                NS == NX + NU,
-                "the scheduling is x and u: NS must be NX + NU"
-            )
-        };
-        let entry = |i: usize| match scheduling.get(i) {
-            Some(entry) => *entry,
-            None => T::zero(),
-        };
-        let x = SVector::from_fn(|i, _| entry(i));
-        let u = SVector::from_fn(|i, _| entry(NX + i));
-        let at = self.tangent(&x, &u);
-        (x, u, at)
-    }
-}
-
-impl<P, T, const NX: usize, const NU: usize, const NS: usize> LpvModel<T, NX, NU, NS>
-    for AlongMotion<P, NS>
-where
-    T: Scalar + Number,
-    P: Dynamics<NX, NU>,
-{
-    /// (x, u).
-    fn scheduling(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NS> {
-        let mut scheduling = SVector::<T, NS>::zeros();
-        for (place, entry) in scheduling.iter_mut().zip(x.iter().chain(u.iter())) {
-            *place = *entry;
-        }
-        scheduling
-    }
-
-    fn matrices(&self, scheduling: &SVector<T, NS>) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-        let (_, _, (_, a, b)) = self.tangent_at(scheduling);
-        (a, b)
-    }
-
-    fn offset(&self, scheduling: &SVector<T, NS>) -> Option<SVector<T, NX>> {
-        let (x, u, (rate, a, b)) = self.tangent_at(scheduling);
-        Some(rate - product(&a, &x) - product(&b, &u))
-    }
-
-    fn derivative(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NX> {
-        self.0.f(x, u)
-    }
-
-    fn jacobian(
-        &self,
-        x: &SVector<T, NX>,
-        u: &SVector<T, NU>,
-    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-        let (_, a, b) = self.tangent(x, u);
-        (a, b)
-    }
-
-    fn tangent(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> Tangent<T, NX, NU> {
-        tangent(
-            x,
-            u,
-            |x: &SVector<Dual<T, NX>, NX>, u| self.0.f(x, u),
-            |x, u| self.0.f(x, u),
-        )
+impl<P: Dynamics<NX, NU>, const NX: usize, const NU: usize> Dynamics<NX, NU> for &P {
+    #[inline(always)]
+    fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
+        P::f(self, x, u)
     }
 }
 

@@ -37,6 +37,7 @@
 //! | for | use |
 //! |---|---|
 //! | a plant | [`Dynamics`] (f alone), [`Embedding`] (A(s), B(s)), [`LpvModel`] (what is not formulas) |
+//! | linear models of f alone | [`AlongMotion`] (its derivatives), [`AlongRay`] (their mean from a steady state on) |
 //! | a controller, on the heap or in lent memory | [`Controller`], [`ControllerSettings`], [`ControllerArrays`] |
 //! | weights, bounds, rows, disturbances, scheduling or models that are known ahead | [`Preview`], [`Controller::step_with`], [`OutputFeedback::decide_with`] |
 //! | what changes while it runs | [`Controller::set_settings`], [`Controller::set_rows`], [`Controller::set_model`] |
@@ -69,6 +70,7 @@ mod embedding;
 mod estimator;
 mod farkas;
 mod first_plan;
+mod from_dynamics;
 mod guaranteed;
 mod held_inputs;
 mod kkt;
@@ -102,12 +104,13 @@ mod workspace;
 pub use clock::{Clock, Tick};
 pub use controller::{Controller, Reference};
 pub use delay::DelayLine;
-pub use embedding::{AlongMotion, Dynamics, Embedding, Tangent};
+pub use embedding::{Dynamics, Embedding, Tangent};
 pub use estimator::{
     Covariance, Estimator, EstimatorArrays, EstimatorError, EstimatorMemory, EstimatorSettings,
     Gate, Observation, Reading, Restart, Verdict,
 };
 pub use farkas::infeasibility_margin;
+pub use from_dynamics::{AlongMotion, AlongRay, GaussLegendre};
 pub use guaranteed::{
     Decision, GuaranteedArrays, GuaranteedController, GuaranteedError, GuaranteedIterations,
     GuaranteedMemory, GuaranteedSettings, GuaranteedStep, GuaranteedWorkspace,
@@ -121,7 +124,7 @@ pub use memory::{
     WorkspaceArrays, WorkspaceMemory,
 };
 pub use model::{LpvModel, Scalar};
-pub use number::{Dual, Elementary, Number};
+pub use number::{Bivariate, Dual, Elementary, Number};
 pub use ocp::{Bounds, Common, GeneralRow, Ocp, Penalty, SoftBounds, Stage, Terminal};
 pub use predictor::{Predictor, Rk4};
 pub use preview::{Preview, PreviewError, PreviewMistake, PreviewPart};

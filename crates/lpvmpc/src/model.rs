@@ -1,6 +1,6 @@
 //! What a plant must offer: a linear model whose matrices depend on a scheduling vector.
 
-use crate::small_matrix::product;
+use crate::small_matrix::{add_product, product};
 use crate::steady_state::{self, SteadyState, SteadyStateProblem};
 use nalgebra::{RealField, SMatrix, SVector, convert};
 
@@ -97,6 +97,27 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
     ) -> (SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
         let (a, b) = self.jacobian(x, u);
         (self.derivative(x, u), a, b)
+    }
+
+    /// x_dot with the matrices that it is made of, (f, A(s), B(s)) with s = sigma(x, u).
+    ///
+    /// A plant whose f and matrices have work in common may override this; it must return the same
+    /// numbers, to rounding.
+    #[inline(always)]
+    fn embedded(
+        &self,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> (SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+        // The embedding is exact, so its product is f.
+        let scheduling = self.scheduling(x, u);
+        let (a, b) = self.matrices(&scheduling);
+        let mut rate = self.a_times(&a, x);
+        add_product(&mut rate, &b, u);
+        if let Some(c) = self.offset(&scheduling) {
+            rate += c;
+        }
+        (rate, a, b)
     }
 
     /// The steady state, f(x, u) = 0 within bounds, that is nearest to a reference; `None` where

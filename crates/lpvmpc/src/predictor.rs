@@ -6,7 +6,7 @@
 //! nonlinear map of the rollout (eq. (5), step 4 of Algorithm 2).
 
 use crate::model::{LpvModel, Scalar};
-use crate::small_matrix::{add_product, add_scaled, extend, product, scale};
+use crate::small_matrix::{add_scaled, extend, product, scale};
 use nalgebra::{SMatrix, SVector, convert};
 
 /// How a sample of the model becomes a pair of matrices. Each kind carries the Runge-Kutta steps
@@ -213,17 +213,7 @@ impl Rk4 {
         T: Scalar,
         P: LpvModel<T, NX, NU, NS>,
     {
-        // The embedding is exact, so its product is f.
-        let embedding = |x: &SVector<T, NX>| {
-            let scheduling = model.scheduling(x, u);
-            let (a, b) = model.matrices(&scheduling);
-            let mut rate = model.a_times(&a, x);
-            add_product(&mut rate, &b, u);
-            if let Some(c) = model.offset(&scheduling) {
-                rate += c;
-            }
-            (rate, a, b)
-        };
+        let embedding = |x: &SVector<T, NX>| model.embedded(x, u);
         #[cfg(target_os = "none")]
         let embedding: &TangentAt<'_, T, NX, NU> = &embedding;
         self.compose(model, x, t_s, embedding)

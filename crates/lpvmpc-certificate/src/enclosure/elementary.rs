@@ -1,7 +1,7 @@
 //! Enclosures of the functions that a plant's formulas may use.
 
 use super::interval::Interval;
-use lpvmpc::{Elementary, Number};
+use lpvmpc::{Bivariate, Elementary, Number};
 use std::sync::LazyLock;
 
 /// Taylor coefficients that are looked at, at most.
@@ -12,11 +12,52 @@ pub type Coefficients<T> = [T; MOST_COEFFICIENTS];
 
 /// Numbers, or sets of numbers, whose functions have Taylor coefficients that can be enclosed.
 pub trait Arithmetic: Number {
+    /// What is not known at all.
+    fn unknown() -> Self;
+
+    /// All its values; of a series, at its beginning.
+    fn range(self) -> Interval;
+
     /// 1/x; without bound where x may be zero.
     fn reciprocal(self) -> Self;
 
     /// f^(n)(x) / n! for n = 0 to `count` - 1; what follows is zero.
     fn taylor_coefficients(self, function: Elementary, count: usize) -> Coefficients<Self>;
+}
+
+/// A function of two numbers. What jumps or has a kink is not known: its series has no meaning.
+pub(super) fn bivariate<T: Arithmetic>(x: T, y: T, function: Bivariate) -> T {
+    match function {
+        Bivariate::Power => (y * x.ln()).exp(),
+        Bivariate::Atan2 => angle(x, y),
+        Bivariate::Min
+        | Bivariate::Max
+        | Bivariate::Less
+        | Bivariate::LessOrEqual
+        | Bivariate::Equal
+        | Bivariate::IfElseZero => T::unknown(),
+    }
+}
+
+/// The angle of the point (`x`, `y`) with y its first coordinate: in the three half-planes where it
+/// does not jump.
+fn angle<T: Arithmetic>(x: T, y: T) -> T {
+    let (above, ahead) = (x.range(), y.range());
+    let right_angle = || {
+        let half = T::constant(1.0).atan();
+        half + half
+    };
+    // Divided by the larger one, as long as there is a choice.
+    let steep = above.lower.max(-above.upper) > ahead.magnitude();
+    if ahead.lower > 0.0 && !steep {
+        (x / y).atan()
+    } else if above.lower > 0.0 {
+        right_angle() - (y / x).atan()
+    } else if above.upper < 0.0 {
+        -right_angle() - (y / x).atan()
+    } else {
+        T::unknown()
+    }
 }
 
 /// Enclosures of f^(n)(x) / n! over `x`, n = 0 to `count` - 1; without bound where `x` leaves the
@@ -27,6 +68,11 @@ pub(super) fn taylor_coefficients(
     x: Interval,
 ) -> Coefficients<Interval> {
     let mut coefficients = [Interval::point(0.0); MOST_COEFFICIENTS];
+    // What has no bound may have no value, and then neither has a bounded function of it.
+    if x == Interval::EVERYTHING {
+        coefficients[..count].fill(Interval::EVERYTHING);
+        return coefficients;
+    }
     let places = coefficients.iter_mut().take(count).enumerate();
     match function {
         Elementary::Sin | Elementary::Cos => {
@@ -56,8 +102,149 @@ pub(super) fn taylor_coefficients(
             let value = rising(x, f64::sqrt);
             recursion(places, value, |n, known| sqrt_next(x, n, known));
         }
+        Elementary::Sinh | Elementary::Cosh => {
+            let (sinh, cosh) = hyperbolic(x);
+            let derivatives = [sinh, cosh];
+            let first = if function == Elementary::Sinh { 0 } else { 1 };
+            for (n, place) in places {
+                *place = derivatives[(first + n) % 2] * TABLES.reciprocal_factorials[n];
+            }
+        }
+        Elementary::ExpM1 => {
+            coefficients = taylor_coefficients(Elementary::Exp, count, x);
+            coefficients[0] = coefficients[0] - Interval::point(1.0);
+        }
+        Elementary::Ln1p => {
+            coefficients = taylor_coefficients(Elementary::Ln, count, x + Interval::point(1.0));
+        }
+        Elementary::Asin
+        | Elementary::Acos
+        | Elementary::Asinh
+        | Elementary::Acosh
+        | Elementary::Atanh => match Inverse::of(function, x) {
+            Some(inverse) => recursion(places, inverse.value, |n, known| inverse.next(n, known)),
+            None => coefficients[..count].fill(Interval::EVERYTHING),
+        },
+        // They have a kink or jump.
+        Elementary::Abs | Elementary::Sign | Elementary::Floor => {
+            coefficients[..count].fill(Interval::EVERYTHING);
+        }
     }
     coefficients
+}
+
+/// (sinh x, cosh x).
+fn hyperbolic(x: Interval) -> (Interval, Interval) {
+    let half = Interval::point(0.5);
+    let at = |x: f64| {
+        let (up, down) = (
+            rising(Interval::point(x), f64::exp),
+            rising(Interval::point(-x), f64::exp),
+        );
+        (half * (up - down), half * (up + down))
+    };
+    let (lower, upper) = (at(x.lower), at(x.upper));
+    let ends = lower.1.hull(upper.1);
+    let one = Interval::point(1.0);
+    let contains_zero = x.lower <= 0.0 && 0.0 <= x.upper;
+    let cosh = if contains_zero { ends.hull(one) } else { ends };
+    let sinh = lower.0.hull(upper.0);
+    (sinh, cosh.common(Interval::new(1.0, f64::INFINITY)))
+}
+
+/// An inverse function h whose derivative is algebraic: with q = 1 - x^2, 1 + x^2 or x^2 - 1,
+/// h' = 1/q (arctanh), or h' = 1/sqrt(q) up to its sign (the others).
+struct Inverse {
+    x: Interval,
+    value: Interval,
+    /// 1/q.
+    over_q: Interval,
+    /// h'.
+    slope: Interval,
+    /// Of h' = 1/q, two more than of the others.
+    order: f64,
+    /// 1 where q = 1 - x^2, else -1.
+    sign: f64,
+}
+
+impl Inverse {
+    /// `None` where `x` leaves the open domain.
+    fn of(function: Elementary, x: Interval) -> Option<Self> {
+        let one = Interval::point(1.0);
+        let square = x.square();
+        let (q, sign) = match function {
+            Elementary::Asinh => (one + square, -1.0),
+            Elementary::Acosh if x.lower > 1.0 => (square - one, -1.0),
+            Elementary::Asin | Elementary::Acos | Elementary::Atanh => (one - square, 1.0),
+            _ => return None,
+        };
+        if q.lower <= 0.0 {
+            return None;
+        }
+        let value = match function {
+            Elementary::Asin => rising(x, f64::asin),
+            Elementary::Acos => rising(Interval::new(-x.upper, -x.lower), |x| (-x).acos()),
+            // By the logarithm: the library's own have no known error.
+            Elementary::Asinh => at_ends(x, asinh),
+            Elementary::Acosh => at_ends(x, |x| logarithm(x + (x.square() - one).square_root())),
+            _ => at_ends(x, |x| {
+                logarithm((one + x) * (one - x).reciprocal()) * Interval::point(0.5)
+            }),
+        };
+        let over_q = q.reciprocal();
+        let (slope, order) = match function {
+            Elementary::Atanh => (over_q, 2.0),
+            Elementary::Acos => (-q.square_root().reciprocal(), 1.0),
+            _ => (q.square_root().reciprocal(), 1.0),
+        };
+        Some(Self {
+            x,
+            value,
+            over_q,
+            slope,
+            order,
+            sign,
+        })
+    }
+
+    /// From q h'' = sign x order h', with d_k = (k + 1) h_(k+1):
+    /// q (k + 1) d_(k+1) = sign ((2 k + order) x d_k + (k - 1 + order) d_(k-1)).
+    fn next(&self, n: usize, known: &[Interval]) -> Interval {
+        let d = |k: usize| whole(k + 1) * known[k + 1];
+        let slope = match n {
+            1 => self.slope,
+            _ => {
+                let k = n - 2;
+                let factor = |value: f64| Interval::point(self.sign * value);
+                let mut sum = factor(2.0 * k as f64 + self.order) * self.x * d(k);
+                if k > 0 {
+                    sum = sum + factor(k as f64 - 1.0 + self.order) * d(k - 1);
+                }
+                sum * self.over_q * whole(k + 1).reciprocal()
+            }
+        };
+        slope * whole(n).reciprocal()
+    }
+}
+
+/// A function that rises over the whole of `x`, from enclosures at its ends.
+fn at_ends(x: Interval, function: impl Fn(Interval) -> Interval) -> Interval {
+    function(Interval::point(x.lower)).hull(function(Interval::point(x.upper)))
+}
+
+fn logarithm(x: Interval) -> Interval {
+    if x.lower > 0.0 {
+        rising(x, f64::ln)
+    } else {
+        Interval::EVERYTHING
+    }
+}
+
+/// The inverse of sinh at a point.
+fn asinh(x: Interval) -> Interval {
+    let value = |x: Interval| logarithm(x + (x.square() + Interval::point(1.0)).square_root());
+    // Of x < 0 the sum would cancel out.
+    if x.upper < 0.0 { -value(-x) } else { value(x) }
 }
 
 /// The first coefficient is `value`; `next` makes coefficient n from those before.

@@ -1,7 +1,7 @@
 //! Intervals with outward rounding.
 
 use super::elementary::{self, Arithmetic, Coefficients};
-use lpvmpc::{Elementary, Number};
+use lpvmpc::{Bivariate, Elementary, Number};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// All real numbers from `lower` to `upper`. The result of an operation contains the result for
@@ -179,9 +179,21 @@ impl Number for Interval {
     fn elementary(self, function: Elementary) -> Self {
         self.taylor_coefficients(function, 1)[0]
     }
+
+    fn bivariate(self, other: Self, function: Bivariate) -> Self {
+        elementary::bivariate(self, other, function)
+    }
 }
 
 impl Arithmetic for Interval {
+    fn unknown() -> Self {
+        Self::EVERYTHING
+    }
+
+    fn range(self) -> Interval {
+        self
+    }
+
     fn reciprocal(self) -> Self {
         if self.lower <= 0.0 && 0.0 <= self.upper {
             return Self::EVERYTHING;

@@ -1,7 +1,8 @@
 //! Power series in time.
 
-use super::elementary::{Arithmetic, Coefficients};
-use lpvmpc::{Elementary, Number};
+use super::elementary::{Arithmetic, Coefficients, bivariate};
+use super::interval::Interval;
+use lpvmpc::{Bivariate, Elementary, Number};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Coefficients that a [`Series`] can hold: more is not needed in one step.
@@ -123,9 +124,21 @@ impl<T: Arithmetic> Number for Series<T> {
     fn elementary(self, function: Elementary) -> Self {
         self.taylor_coefficients(function, 1)[0]
     }
+
+    fn bivariate(self, other: Self, function: Bivariate) -> Self {
+        bivariate(self, other, function)
+    }
 }
 
 impl<T: Arithmetic> Arithmetic for Series<T> {
+    fn unknown() -> Self {
+        Self::new([T::unknown(); CAPACITY].into_iter())
+    }
+
+    fn range(self) -> Interval {
+        self.coefficients[0].range()
+    }
+
     /// r x = 1, coefficient by coefficient.
     fn reciprocal(self) -> Self {
         let inverse = self.coefficients[0].reciprocal();

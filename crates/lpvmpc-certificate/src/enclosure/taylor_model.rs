@@ -2,7 +2,7 @@
 
 use super::elementary::{self, Arithmetic, Coefficients, MOST_COEFFICIENTS};
 use super::interval::Interval;
-use lpvmpc::{Elementary, Number};
+use lpvmpc::{Bivariate, Elementary, Number};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A quantity over the box -1 <= z_i <= 1: at every z its value is within `error` of
@@ -229,9 +229,21 @@ impl<const D: usize> Number for TaylorModel<D> {
     fn elementary(self, function: Elementary) -> Self {
         self.taylor_coefficients(function, 1)[0]
     }
+
+    fn bivariate(self, other: Self, function: Bivariate) -> Self {
+        elementary::bivariate(self, other, function)
+    }
 }
 
 impl<const D: usize> Arithmetic for TaylorModel<D> {
+    fn unknown() -> Self {
+        Self::from(Interval::EVERYTHING)
+    }
+
+    fn range(self) -> Interval {
+        self.range()
+    }
+
     /// 1/x = 1/c - (x - c)/c^2 + (x - c)^2/c^3 - (x - c)^3/(c^3 x).
     fn reciprocal(self) -> Self {
         let inverse = Interval::point(self.middle).reciprocal();

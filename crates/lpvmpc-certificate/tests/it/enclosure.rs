@@ -1,6 +1,6 @@
 //! Enclosures must contain what they enclose.
 
-use lpvmpc::{Embedding, Number, Rk4};
+use lpvmpc::{Bivariate, Elementary, Embedding, Number, Rk4};
 use lpvmpc_certificate::{FlowError, Frame, Interval, SampledLaw, TaylorMap, TaylorModel};
 use nalgebra::{Matrix1x2, Matrix2, Vector1, Vector2};
 use proptest::prelude::*;
@@ -22,6 +22,33 @@ fn truth(x: f64, y: f64) -> f64 {
     let waves = (x.sin() * y - y.cos() * sinc(x)) / (2.0 + x * x) - sinc(x * y) / (2.0 + y.cos());
     let others = (2.0 + x * x).ln() * x.sin().exp() - (2.0 + y * y).sqrt() * (x * y).atan();
     waves + others + (x - y).tanh()
+}
+
+/// A formula with what [`formula`] has not: inverse and hyperbolic functions, powers, an angle.
+fn further<N: Number>(x: N, y: N) -> N {
+    let number = N::constant;
+    let of = |x: N, function| x.elementary(function);
+    let small = x.tanh() / number(1.1);
+    let inverses = of(small, Elementary::Asin) - of(small * y.cos(), Elementary::Acos)
+        + of(small, Elementary::Atanh) * y
+        + of(x * y, Elementary::Asinh)
+        - of(number(1.5) + y * y, Elementary::Acosh);
+    let waves = of(x, Elementary::Sinh) - of(y, Elementary::Cosh)
+        + of(small, Elementary::ExpM1) * of(y * y, Elementary::Ln1p);
+    let powers = (number(2.0) + x * x).powf(y) + x.powi(3) - (number(2.0) + y * y).powi(-2);
+    let angles = x.atan2(number(2.5) + y) + (number(2.5) + y).atan2(x) - (x - number(2.5)).atan2(y);
+    inverses + waves + powers + angles
+}
+
+/// Plain numbers by the standard library, to compare with.
+fn further_truth(x: f64, y: f64) -> f64 {
+    let small = x.tanh() / 1.1;
+    let inverses = small.asin() - (small * y.cos()).acos() + small.atanh() * y + (x * y).asinh()
+        - (1.5 + y * y).acosh();
+    let waves = x.sinh() - y.cosh() + small.exp_m1() * (y * y).ln_1p();
+    let powers = (2.0 + x * x).powf(y) + x.powi(3) - (2.0 + y * y).powi(-2);
+    let angles = x.atan2(2.5 + y) + (2.5 + y).atan2(x) - (x - 2.5).atan2(y);
+    inverses + waves + powers + angles
 }
 
 /// The polynomial of a Taylor model at z.
@@ -58,6 +85,30 @@ proptest! {
         prop_assert!((value - exact).abs() <= form.error + ROUNDING, "{form:?} for {exact}");
         let range = form.range();
         prop_assert!(range.lower <= exact + ROUNDING && exact - ROUNDING <= range.upper);
+    }
+
+    #[test]
+    fn further_functions_are_enclosed(
+        x in -1.9..1.9_f64, y in -1.9..1.9_f64,
+        dx in 0.0..0.5_f64, dy in 0.0..0.5_f64,
+        zx in -1.0..1.0_f64, zy in -1.0..1.0_f64,
+    ) {
+        let exact = further_truth(x + zx * dx, y + zy * dy);
+        let rounding = 1e-12;
+        let range = further(Interval::around(x, dx), Interval::around(y, dy));
+        prop_assert!(range.lower <= exact + rounding && exact - rounding <= range.upper);
+        let form = further(TaylorModel::<2>::symbol(x, dx, 0), TaylorModel::symbol(y, dy, 1));
+        let value = at(&form, [zx, zy]);
+        prop_assert!((value - exact).abs() <= form.error + rounding, "{form:?} for {exact}");
+        // They converge: a point stays next to one, a small box has a small error.
+        let range = further(Interval::point(x), Interval::point(y));
+        prop_assert!(range.upper - range.lower < 1e-11, "{range:?}");
+        let half_width = 1e-3;
+        let form = further(
+            TaylorModel::<2>::symbol(x, half_width, 0),
+            TaylorModel::symbol(y, half_width, 1),
+        );
+        prop_assert!(form.error < 2e-5, "{form:?}");
     }
 
     #[test]
@@ -165,6 +216,95 @@ fn strong_law() -> (SampledLaw<2, 1>, Frame<2>) {
         inverse: identity,
     };
     (law, frame)
+}
+
+/// One function at a time, so that the recursion of each one's coefficients is seen.
+#[test]
+fn every_function_is_enclosed_with_its_curvature() {
+    for (function, truth, middle) in [
+        (Elementary::Asin, f64::asin as fn(f64) -> f64, 0.4),
+        (Elementary::Asin, f64::asin, -0.85),
+        (Elementary::Acos, f64::acos, 0.6),
+        (Elementary::Sinh, f64::sinh, -0.5),
+        (Elementary::Cosh, f64::cosh, 0.1),
+        (Elementary::Asinh, f64::asinh, -3.0),
+        (Elementary::Asinh, f64::asinh, 0.7),
+        (Elementary::Acosh, f64::acosh, 1.4),
+        (Elementary::Atanh, f64::atanh, -0.7),
+        (Elementary::ExpM1, f64::exp_m1, 0.01),
+        (Elementary::Ln1p, f64::ln_1p, -0.3),
+    ] {
+        for half_width in [0.1, 0.01, 0.0] {
+            let form = TaylorModel::<1>::symbol(middle, half_width, 0).elementary(function);
+            for i in -10..=10 {
+                let z = 0.1 * f64::from(i);
+                let exact = truth(middle + z * half_width);
+                let value = form.middle + form.slopes[0] * z + form.squares[0][0] * z * z;
+                assert!(
+                    (value - exact).abs() <= form.error + 1e-15,
+                    "{function:?} {form:?}"
+                );
+            }
+            // Of third order: the largest third derivative, of arcsin, is 943.
+            assert!(
+                form.error < 200.0 * half_width.powi(3) + 1e-13,
+                "{function:?}: {form:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn what_has_no_enclosure_is_everything() {
+    let around = |middle: f64| Interval::around(middle, 0.5);
+    for (function, middle) in [
+        (Elementary::Abs, 3.0),
+        (Elementary::Sign, 3.0),
+        (Elementary::Floor, 3.3),
+        (Elementary::Asin, 0.6),
+        (Elementary::Acos, -0.6),
+        (Elementary::Atanh, 0.6),
+        (Elementary::Acosh, 1.2),
+        (Elementary::Ln1p, -0.6),
+    ] {
+        assert_eq!(
+            around(middle).elementary(function),
+            Interval::EVERYTHING,
+            "{function:?}"
+        );
+        let form = TaylorModel::<1>::symbol(middle, 0.5, 0).elementary(function);
+        assert_eq!(form.range(), Interval::EVERYTHING, "{function:?}");
+    }
+    for function in [
+        Bivariate::Min,
+        Bivariate::Max,
+        Bivariate::Less,
+        Bivariate::LessOrEqual,
+        Bivariate::Equal,
+        Bivariate::IfElseZero,
+    ] {
+        assert_eq!(
+            around(3.0).bivariate(around(9.0), function),
+            Interval::EVERYTHING
+        );
+    }
+    // It jumps where x < 0 and y = 0.
+    let jump = around(0.0).bivariate(around(-3.0), Bivariate::Atan2);
+    assert_eq!(jump, Interval::EVERYTHING);
+    // A bounded function of what may have no value may have none.
+    for function in [
+        Elementary::Sin,
+        Elementary::Tanh,
+        Elementary::Atan,
+        Elementary::Sinc,
+    ] {
+        let hole = around(0.0).elementary(Elementary::Ln);
+        assert_eq!(
+            hole.elementary(function),
+            Interval::EVERYTHING,
+            "{function:?}"
+        );
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Dual numbers: values that carry their derivatives (automatic differentiation, forward mode).
 
-use super::{Elementary, Number};
+use super::{Bivariate, Choice, Elementary, Number, choice};
 use crate::model::Scalar;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use nalgebra::{SVector, convert};
@@ -125,8 +125,53 @@ impl<T: Scalar + Number, const D: usize> Number for Dual<T, D> {
             Elementary::Ln => T::one() / x,
             Elementary::Sqrt => T::one() / (value + value),
             Elementary::Tanh => T::one() - value * value,
+            Elementary::Asin => T::one() / root(one_minus_square(x)),
+            Elementary::Acos => -T::one() / root(one_minus_square(x)),
+            Elementary::Sinh => x.elementary(Elementary::Cosh),
+            Elementary::Cosh => x.elementary(Elementary::Sinh),
+            Elementary::Asinh => T::one() / root(T::one() + x * x),
+            Elementary::Acosh => T::one() / (root(x - T::one()) * root(x + T::one())),
+            Elementary::Atanh => T::one() / one_minus_square(x),
+            Elementary::ExpM1 => value + T::one(),
+            Elementary::Ln1p => T::one() / (T::one() + x),
+            Elementary::Abs if x < T::zero() => -T::one(),
+            Elementary::Abs => T::one(),
+            Elementary::Sign | Elementary::Floor => return Self::fixed(value),
         };
         self.through(value, slope)
+    }
+
+    #[inline(always)]
+    fn bivariate(self, other: Self, function: Bivariate) -> Self {
+        let (x, y) = (self.value, other.value);
+        let value = x.bivariate(y, function);
+        let (by_x, by_y) = match function {
+            Bivariate::Atan2 => {
+                let square = x * x + y * y;
+                (y / square, -x / square)
+            }
+            Bivariate::Power => {
+                let lower = x.bivariate(y - T::one(), Bivariate::Power);
+                (y * lower, value * x.elementary(Elementary::Ln))
+            }
+            _ => {
+                return match choice(x, y, function) {
+                    Some(Choice::First) => self,
+                    Some(Choice::Second) => other,
+                    Some(Choice::One | Choice::Zero) | None => Self::fixed(value),
+                };
+            }
+        };
+        // What does not vary counts for nothing, even where the derivative by it does not exist: that
+        // of x^2 by the exponent at x < 0.
+        let part = |slope: T, by: T| {
+            if slope == T::zero() {
+                slope
+            } else {
+                slope * by
+            }
+        };
+        self.combine(other, value, |a, b| part(a, by_x) + part(b, by_y))
     }
 
     #[inline(always)]
@@ -134,6 +179,15 @@ impl<T: Scalar + Number, const D: usize> Number for Dual<T, D> {
         let (sin, cos) = Number::sin_cos(self.value);
         (self.through(sin, cos), self.through(cos, -sin))
     }
+}
+
+fn root<T: Number>(x: T) -> T {
+    x.elementary(Elementary::Sqrt)
+}
+
+/// 1 - x^2, exact near |x| = 1, too.
+fn one_minus_square<T: Scalar>(x: T) -> T {
+    (T::one() - x) * (T::one() + x)
 }
 
 /// d/dx sin(x)/x at `x`, where sin(x)/x is `sinc`: (cos x - sinc x)/x, and by its series where that

@@ -9,6 +9,7 @@ mod horizon;
 mod plants;
 mod predictor;
 mod predictor_kinds;
+mod ray;
 mod riccati;
 mod runge_kutta;
 

@@ -1,8 +1,9 @@
 //! Plants that are written once: dual numbers, scheduling by the input, affine terms, f alone.
 
 use lpvmpc::{
-    AlongMotion, Bounds, Controller, ControllerSettings, Dual, Dynamics, Elementary, Embedding,
-    Iterations, LpvModel, Number, Predictor, Reference, Rk4, Status, TerminalIngredient, Weights,
+    AlongMotion, Bivariate, Bounds, Controller, ControllerSettings, Dual, Dynamics, Elementary,
+    Embedding, Iterations, LpvModel, Number, Predictor, Reference, Rk4, Status, TerminalIngredient,
+    Weights,
 };
 use lpvmpc_testkit::rng::Rng;
 use nalgebra::{Matrix1, Matrix2, SVector, Vector1, Vector2, Vector4};
@@ -120,16 +121,40 @@ fn dual_numbers_differentiate_every_function() {
         Elementary::Ln,
         Elementary::Sqrt,
         Elementary::Tanh,
+        Elementary::Asin,
+        Elementary::Acos,
+        Elementary::Sinh,
+        Elementary::Cosh,
+        Elementary::Asinh,
+        Elementary::Acosh,
+        Elementary::Atanh,
+        Elementary::ExpM1,
+        Elementary::Ln1p,
+        Elementary::Abs,
+        Elementary::Sign,
+        Elementary::Floor,
     ];
     for function in functions {
         for i in 1..=60 {
             // Both sides of where the slope of sinc changes its formula.
-            let x = 0.05 * f64::from(i);
+            let x = match function {
+                Elementary::Asin | Elementary::Acos | Elementary::Atanh => 0.015 * f64::from(i),
+                Elementary::Acosh => 1.0 + 0.05 * f64::from(i),
+                // Not where it jumps.
+                Elementary::Floor => 0.05 * f64::from(i) + 0.01,
+                _ => 0.05 * f64::from(i),
+            };
             let variable = Dual::variables(&Vector1::new(x))[0];
             let found: Dual<f64, 1> = variable.elementary(function);
             let central =
                 |h: f64| ((x + h).elementary(function) - (x - h).elementary(function)) / (2.0 * h);
-            let h = 1e-3 * x;
+            // Small beside the distance from a singularity, which is at 0, 1 or nowhere.
+            let h = match function {
+                Elementary::Asin | Elementary::Acos | Elementary::Acosh | Elementary::Atanh => {
+                    1e-3 * x.min((x - 1.0).abs())
+                }
+                _ => 1e-3 * x,
+            };
             let expected = (4.0 * central(0.5 * h) - central(h)) / 3.0;
             assert_eq!(found.value, x.elementary(function));
             let error = (found.slopes[0] - expected).abs();
@@ -145,6 +170,104 @@ fn dual_numbers_differentiate_every_function() {
     assert!((slope / (-1e-8 / 3.0) - 1.0).abs() < 1e-14);
 }
 
+/// Against a central difference with Richardson's extrapolation, in both numbers.
+#[test]
+fn dual_numbers_differentiate_functions_of_two_numbers() {
+    for (x, y) in [(0.7, 1.3), (1.9, -0.6), (0.4, 0.2), (2.5, 2.0)] {
+        for function in [
+            Bivariate::Atan2,
+            Bivariate::Power,
+            Bivariate::Min,
+            Bivariate::Max,
+            Bivariate::Less,
+            Bivariate::LessOrEqual,
+            Bivariate::Equal,
+            Bivariate::IfElseZero,
+        ] {
+            let variables = Dual::variables(&Vector2::new(x, y));
+            let found: Dual<f64, 2> = variables[0].bivariate(variables[1], function);
+            assert_eq!(found.value, x.bivariate(y, function));
+            let differences: [&dyn Fn(f64) -> f64; 2] = [
+                &|h| (x + h).bivariate(y, function) - (x - h).bivariate(y, function),
+                &|h| x.bivariate(y + h, function) - x.bivariate(y - h, function),
+            ];
+            for (slope, difference) in found.slopes.iter().zip(differences) {
+                let central = |h: f64| difference(h) / (2.0 * h);
+                let expected = (4.0 * central(5e-4) - central(1e-3)) / 3.0;
+                let error = (slope - expected).abs();
+                assert!(
+                    error < 1e-9 * (1.0 + expected.abs()),
+                    "{function:?} at {x}, {y}"
+                );
+            }
+        }
+    }
+}
+
+/// Where they have a kink or jump, they have a value, and a derivative from one side; NaN is NaN.
+#[test]
+fn functions_that_are_not_smooth_have_values_everywhere() {
+    let dual = |value: f64| Dual::variables(&Vector1::new(value))[0];
+    let fixed = |value: f64| Dual::<f64, 1>::fixed(value);
+    assert_eq!(dual(0.0).elementary(Elementary::Abs).slopes, [1.0]);
+    assert_eq!(dual(-0.5).elementary(Elementary::Abs).slopes, [-1.0]);
+    for (x, sign) in [(-2.0, -1.0), (0.0, 0.0), (3.0, 1.0)] {
+        assert_eq!(dual(x).elementary(Elementary::Sign), fixed(sign));
+    }
+    assert_eq!(dual(-0.5).elementary(Elementary::Floor), fixed(-1.0));
+    // Of equal numbers, the first.
+    assert_eq!(
+        dual(1.0).bivariate(fixed(1.0), Bivariate::Min).slopes,
+        [1.0]
+    );
+    assert_eq!(
+        fixed(1.0).bivariate(dual(1.0), Bivariate::Max).slopes,
+        [0.0]
+    );
+    // What is not taken may have no value.
+    let hole = fixed(0.0).bivariate(dual(f64::NAN), Bivariate::IfElseZero);
+    assert_eq!(hole, fixed(0.0));
+    for function in [
+        Bivariate::Min,
+        Bivariate::Max,
+        Bivariate::Less,
+        Bivariate::LessOrEqual,
+        Bivariate::Equal,
+    ] {
+        assert!(f64::NAN.bivariate(1.0, function).is_nan());
+        assert!(1.0_f64.bivariate(f64::NAN, function).is_nan());
+    }
+    assert!(f64::NAN.bivariate(1.0, Bivariate::IfElseZero).is_nan());
+    assert!(f64::NAN.elementary(Elementary::Sign).is_nan());
+}
+
+#[test]
+fn powers_with_fixed_exponents_have_derivatives_at_any_base() {
+    for (x, n) in [
+        (-1.5, 3),
+        (0.0, 2),
+        (2.0, -3),
+        (-0.7, 0),
+        (1.1, 17),
+        (0.3, i32::MIN),
+    ] {
+        let found: Dual<f64, 1> = Number::powi(Dual::variables(&Vector1::new(x))[0], n);
+        let expected = x.powi(n);
+        if expected.is_finite() {
+            assert!((found.value - expected).abs() <= 1e-14 * expected.abs());
+            let slope = f64::from(n) * x.powi(n - 1);
+            assert!(
+                (found.slopes[0] - slope).abs() <= 1e-14 * slope.abs(),
+                "{x}^{n}"
+            );
+        }
+    }
+    // A whole exponent that is no integer to the compiler.
+    let base = Dual::variables(&Vector1::new(-1.5))[0];
+    let square: Dual<f64, 1> = Number::powf(base, Dual::fixed(2.0));
+    assert_eq!((square.value, square.slopes), (2.25, [-3.0]));
+}
+
 #[test]
 fn single_precision_functions_are_those_of_double_precision() {
     for i in -60..=60 {
@@ -154,6 +277,7 @@ fn single_precision_functions_are_those_of_double_precision() {
             Elementary::Atan,
             Elementary::Exp,
             Elementary::Tanh,
+            Elementary::Asinh,
         ] {
             let (narrow, wide) = ((x as f32).elementary(function), x.elementary(function));
             assert!((f64::from(narrow) - wide).abs() < 2e-7 * (1.0 + wide.abs()));

@@ -1,0 +1,47 @@
+//! Plants in the places of a compiled controller.
+
+use crate::reference::plant;
+use lpvmpc_plant::{SizedEmbedding, SizedPlant};
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let error = SizedPlant::<3, 1>::new(plant("cart-pole")).unwrap_err();
+    assert_eq!(error.to_string(), "states: there are 4, and places for 3");
+    let error = SizedPlant::<3, 1>::new(plant("functions")).unwrap_err();
+    assert_eq!(error.to_string(), "inputs: there are 2, and places for 1");
+    let error = SizedEmbedding::<4, 1, 1>::new(plant("cart-pole")).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "embedding.scheduling: there are 2, and places for 1"
+    );
+    let error = SizedEmbedding::<4, 2, 1>::new(plant("functions")).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "embedding: this plant has none of its own"
+    );
+}
+
+#[test]
+fn bounds_and_equilibrium_are_those_of_the_file() {
+    let cart_pole = SizedPlant::<5, 2>::new(plant("cart-pole")).unwrap();
+    let u = cart_pole.u_bounds();
+    assert_eq!((u.lower[0], u.upper[0]), (-15.0, 15.0));
+    assert_eq!((u.lower[1], u.upper[1]), (f64::NEG_INFINITY, f64::INFINITY));
+    assert!(
+        cart_pole
+            .x_bounds()
+            .lower
+            .iter()
+            .all(|bound| *bound == f64::NEG_INFINITY)
+    );
+    let (x, u) = cart_pole.equilibrium().unwrap();
+    assert_eq!((x.amax(), u.amax()), (0.0, 0.0));
+}
+
+#[test]
+fn an_operation_of_which_there_is_no_proof_has_a_name() {
+    assert_eq!(plant("cart-pole").first_not_smooth(), None);
+    let (index, name) = plant("functions").first_not_smooth().unwrap();
+    assert_eq!(name, plant("functions").data().operations[index].name());
+    assert!(["abs", "sign", "min", "max", "floor", "lt", "le", "eq"].contains(&name));
+}
