@@ -1,7 +1,7 @@
 //! A plant that was checked and made ready for evaluation.
 
 use crate::check::check;
-use crate::code::{Code, Leaf};
+use crate::code::{Code, Given};
 use crate::data::PlantData;
 use crate::error::PlantError;
 use crate::{claims, file};
@@ -208,14 +208,13 @@ impl Plant {
         s: &[N],
         result: impl FnMut(usize, N),
     ) {
-        let leaf = |leaf| match leaf {
-            Leaf::Constant(value) => N::constant(value),
-            Leaf::State(i) => x[i],
-            Leaf::Input(i) => u[i],
-            Leaf::Parameter(i) => N::constant(self.parameters[i]),
-            Leaf::Scheduling(i) => s[i],
+        let given = Given {
+            parameters: &self.parameters,
+            x,
+            u,
+            s,
         };
-        code.evaluate(leaf, result);
+        code.evaluate(given, result);
     }
 
     /// The first operation of which no proof can be had, since it has a kink or jumps, with its index; `None` where all
