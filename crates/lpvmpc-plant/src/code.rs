@@ -51,7 +51,8 @@ pub(crate) struct Code {
     pub instructions: Vec<Instruction>,
     /// The registers of the results.
     pub results: Vec<u32>,
-    registers: usize,
+    /// How many registers it takes.
+    pub registers: usize,
 }
 
 /// Constant exponents of larger size are left to the power function.

@@ -80,6 +80,7 @@ mod file;
 mod operation;
 mod plant;
 mod sized;
+mod source;
 
 pub use data::{EmbeddingData, Equilibrium, Parameter, PlantData, Signal};
 pub use error::PlantError;

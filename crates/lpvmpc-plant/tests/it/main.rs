@@ -5,6 +5,7 @@
 )]
 
 mod hostile;
+mod printed;
 mod ray;
 mod reference;
 mod refused;
