@@ -5,7 +5,8 @@ mod names;
 use crate::code::{Code, Function};
 use crate::operation::{Binary, Unary};
 use crate::plant::Plant;
-use names::{Names, text, type_name};
+use names::Names;
+pub(crate) use names::{text, type_name};
 use std::fmt::Write;
 
 /// A writer into a string cannot fail.
@@ -87,7 +88,7 @@ pub(crate) fn print(plant: &Plant) -> String {
         line!(out, "            {}: {value:?},", printer.parameters.at(i));
     }
     line!(out, "        }}\n    }}\n}}\n");
-    let allow = "#[allow(\n    clippy::all,\n    unused_variables,\n    reason = \"printed from a straight-line program\"\n)]";
+    let allow = "#[allow(\n    clippy::all,\n    dead_code,\n    unused_variables,\n    reason = \"printed from a straight-line program\"\n)]";
     line!(out, "{allow}");
     let motion = format!("&self, x: &SVector<N, {states}>, u: &SVector<N, {inputs}>");
     match embedding {

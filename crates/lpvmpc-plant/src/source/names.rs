@@ -45,7 +45,7 @@ impl Names {
 }
 
 /// The name of a type: "cart-pole" becomes CartPole.
-pub(super) fn type_name(name: &str) -> String {
+pub(crate) fn type_name(name: &str) -> String {
     let words = name.split(|c: char| !c.is_ascii_alphanumeric());
     let camel: String = words
         .flat_map(|word| {
@@ -63,7 +63,7 @@ pub(super) fn type_name(name: &str) -> String {
 }
 
 /// A name or unit as code in a comment, without what has a meaning there.
-pub(super) fn text(name: &str) -> String {
+pub(crate) fn text(name: &str) -> String {
     let kept: String = { name.chars() }
         .map(|c| {
             let plain =

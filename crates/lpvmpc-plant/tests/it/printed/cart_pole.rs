@@ -44,6 +44,7 @@ impl Default for CartPole {
 
 #[allow(
     clippy::all,
+    dead_code,
     unused_variables,
     reason = "printed from a straight-line program"
 )]
@@ -140,6 +141,7 @@ impl Embedding<4, 1, 2> for CartPole {
 
 #[allow(
     clippy::all,
+    dead_code,
     unused_variables,
     reason = "printed from a straight-line program"
 )]

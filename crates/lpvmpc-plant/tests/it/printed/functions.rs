@@ -30,6 +30,7 @@ impl Default for Functions {
 
 #[allow(
     clippy::all,
+    dead_code,
     unused_variables,
     reason = "printed from a straight-line program"
 )]
