@@ -40,7 +40,8 @@
 //! | for | use |
 //! |---|---|
 //! | a plant from a file, its values at run-time sizes | [`Plant`] |
-//! | a plant made in Rust | [`PlantData`], [`Plant::new`] |
+//! | a plant written in Rust as a file | [`PlantData::of_dynamics`], [`PlantData::of_embedding`] |
+//! | a plant made operation by operation | [`PlantData`], [`Plant::new`] |
 //! | a controller, estimator or simulation | [`SizedPlant`] by f alone, [`SizedEmbedding`] by its own A(s), B(s) |
 //! | the plant as Rust | [`Plant::to_rust`] |
 //! | a program for a microcontroller | [`Plant::to_firmware`] |
@@ -89,6 +90,7 @@ mod file;
 mod firmware;
 mod operation;
 mod plant;
+mod recording;
 mod sized;
 mod source;
 

@@ -8,6 +8,7 @@ mod firmware;
 mod hostile;
 mod printed;
 mod ray;
+mod recording;
 mod reference;
 mod refused;
 mod round_trip;

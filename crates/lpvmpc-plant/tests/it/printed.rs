@@ -2,9 +2,9 @@
 
 // Made by `print_rust`, the example of this crate.
 #[rustfmt::skip]
-mod cart_pole;
+pub mod cart_pole;
 #[rustfmt::skip]
-mod functions;
+pub mod functions;
 
 use crate::reference::{plant, points};
 use crate::round_trip::drift;
