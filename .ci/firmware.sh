@@ -34,3 +34,24 @@ for board in mps2-an386 mps2-an500; do
         firmware/limits.toml "$compiler" \
         "$(flash bare_controllers)" "$(flash timer)" "$output"
 done
+
+# The program around a plant from a file, printed and built as it is, brings the plant to rest.
+printf '\na printed plant\n'
+folder=$(mktemp -d)
+trap 'rm -rf "$output" "$folder"' EXIT
+cargo run --locked -p lpvmpc-plant --example firmware "$folder/plant"
+# The same versions of the same dependencies.
+cp firmware/Cargo.lock "$folder/plant"
+(
+    cd "$folder/plant"
+    CARGO_TARGET_DIR=$CARGO_TARGET_DIR/cross "$cross" "$target" build --offline --release
+)
+firmware/run-qemu.sh "$images/plant-controller" >"$output"
+awk '
+    { gsub(/[][,]/, " "); solved += $2 }
+    END {
+        for (i = 4; i < 8; i++) if ($i < -1e-3 || $i > 1e-3) far = 1
+        printf "%d of %d samples solved, the last state: %s %s %s %s\n", solved, NR, $4, $5, $6, $7
+        exit far || solved != NR || NR != 100
+    }
+' "$output"

@@ -4,14 +4,24 @@ use crate::operation::{Binary, Operation, Unary};
 use lpvmpc::{Bivariate, Elementary, Number};
 use std::collections::HashMap;
 
-/// Where a number comes from that is not worked out.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Leaf {
-    Constant(f64),
-    State(usize),
-    Input(usize),
-    Parameter(usize),
-    Scheduling(usize),
+/// The numbers that are given, in the order of their registers, which are the first ones.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Leaves {
+    pub constants: Vec<f64>,
+    /// Indices of parameters, states and so on.
+    pub parameters: Vec<usize>,
+    pub states: Vec<usize>,
+    pub inputs: Vec<usize>,
+    pub scheduling: Vec<usize>,
+}
+
+/// Where given numbers come from.
+#[derive(Clone, Copy)]
+pub(crate) struct Given<'a, N> {
+    pub parameters: &'a [f64],
+    pub x: &'a [N],
+    pub u: &'a [N],
+    pub s: &'a [N],
 }
 
 /// What an instruction does.
@@ -37,12 +47,12 @@ pub(crate) struct Instruction {
 /// The part of a program that some results need.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Code {
-    /// What the first registers hold.
-    pub leaves: Vec<Leaf>,
+    pub leaves: Leaves,
     pub instructions: Vec<Instruction>,
     /// The registers of the results.
     pub results: Vec<u32>,
-    registers: usize,
+    /// How many registers it takes.
+    pub registers: usize,
 }
 
 /// Constant exponents of larger size are left to the power function.
@@ -96,14 +106,67 @@ fn sines_and_cosines(
     partners
 }
 
-fn leaf_of(operation: Operation) -> Option<Leaf> {
-    match operation {
-        Operation::Constant(value) => Some(Leaf::Constant(value)),
-        Operation::State(i) => Some(Leaf::State(i)),
-        Operation::Input(i) => Some(Leaf::Input(i)),
-        Operation::Parameter(i) => Some(Leaf::Parameter(i)),
-        Operation::Scheduling(i) => Some(Leaf::Scheduling(i)),
-        Operation::Unary(..) | Operation::Binary(..) => None,
+impl Leaves {
+    /// Those of the `needed` operations, and the register of each of these.
+    fn new(operations: &[Operation], needed: impl Fn(&usize) -> bool) -> (Self, Vec<u32>) {
+        let mut leaves = Self::default();
+        let mut places = vec![Vec::new(); 5];
+        for index in (0..operations.len()).filter(needed) {
+            let (kind, list, given) = match operations[index] {
+                Operation::Constant(value) => {
+                    leaves.constants.push(value);
+                    places[0].push(index);
+                    continue;
+                }
+                Operation::Parameter(i) => (1, &mut leaves.parameters, i),
+                Operation::State(i) => (2, &mut leaves.states, i),
+                Operation::Input(i) => (3, &mut leaves.inputs, i),
+                Operation::Scheduling(i) => (4, &mut leaves.scheduling, i),
+                Operation::Unary(..) | Operation::Binary(..) => continue,
+            };
+            list.push(given);
+            places[kind].push(index);
+        }
+        let mut register = vec![0; operations.len()];
+        for (place, index) in places.into_iter().flatten().enumerate() {
+            register[index] = place as u32;
+        }
+        (leaves, register)
+    }
+
+    /// How many there are.
+    fn count(&self) -> usize {
+        let lists = [
+            &self.parameters,
+            &self.states,
+            &self.inputs,
+            &self.scheduling,
+        ];
+        self.constants.len() + lists.map(Vec::len).iter().sum::<usize>()
+    }
+
+    /// Puts them into the first registers.
+    #[inline(always)]
+    fn fill<N: Number>(&self, registers: &mut [N], given: Given<'_, N>) {
+        let (constants, rest) = registers.split_at_mut(self.constants.len());
+        for (register, value) in constants.iter_mut().zip(&self.constants) {
+            *register = N::constant(*value);
+        }
+        let (parameters, mut rest) = rest.split_at_mut(self.parameters.len());
+        for (register, i) in parameters.iter_mut().zip(&self.parameters) {
+            *register = N::constant(given.parameters[*i]);
+        }
+        for (list, values) in [
+            (&self.states, given.x),
+            (&self.inputs, given.u),
+            (&self.scheduling, given.s),
+        ] {
+            let (places, others) = rest.split_at_mut(list.len());
+            for (register, i) in places.iter_mut().zip(list) {
+                *register = values[*i];
+            }
+            rest = others;
+        }
     }
 }
 
@@ -133,17 +196,11 @@ impl Code {
             }
         }
         let needed = |index: &usize| last_read[*index].is_some();
-        let mut register = vec![0_u32; operations.len()];
-        let mut leaves: Vec<Leaf> = Vec::new();
-        for index in (0..operations.len()).filter(needed) {
-            if let Some(leaf) = leaf_of(operations[index]) {
-                register[index] = leaves.len() as u32;
-                leaves.push(leaf);
-            }
-        }
+        let (leaves, mut register) = Leaves::new(operations, needed);
+        let given = leaves.count();
         let partners = sines_and_cosines(operations, needed);
         let mut free: Vec<u32> = Vec::new();
-        let mut registers = leaves.len();
+        let mut registers = given;
         let mut instructions = Vec::new();
         for index in (0..operations.len()).filter(needed) {
             let Some(function) = function_of(operations, index) else {
@@ -155,8 +212,8 @@ impl Code {
             // What is read for the last time makes room for the value itself.
             arguments.dedup();
             for argument in arguments {
-                let is_leaf = leaf_of(operations[argument]).is_some();
-                if last_read[argument] == Some(index) && !is_leaf {
+                let worked_out = register[argument] as usize >= given;
+                if last_read[argument] == Some(index) && worked_out {
                     free.push(register[argument]);
                 }
             }
@@ -197,17 +254,16 @@ impl Code {
         }
     }
 
-    /// Works the results out: `leaf` gives the numbers that are given, `result` takes the results by
-    /// their place. No heap is needed for up to 256 registers.
+    /// Works the results out; `result` takes them by their place. No heap is needed for up to 256
+    /// registers.
     #[inline(always)]
-    pub fn evaluate<N: Number>(&self, leaf: impl Fn(Leaf) -> N, result: impl FnMut(usize, N)) {
+    pub fn evaluate<N: Number>(&self, given: Given<'_, N>, result: impl FnMut(usize, N)) {
         let zero = N::constant(0.0);
         match self.registers {
-            0..=16 => self.evaluate_on(&mut [zero; 16], leaf, result),
-            17..=32 => self.evaluate_on(&mut [zero; 32], leaf, result),
-            33..=64 => self.evaluate_on(&mut [zero; 64], leaf, result),
-            65..=256 => self.evaluate_on(&mut [zero; 256], leaf, result),
-            count => self.evaluate_on(&mut vec![zero; count], leaf, result),
+            0..=32 => self.evaluate_on(&mut [zero; 32], given, result),
+            33..=64 => self.evaluate_on(&mut [zero; 64], given, result),
+            65..=256 => self.evaluate_on(&mut [zero; 256], given, result),
+            count => self.evaluate_on(&mut vec![zero; count], given, result),
         }
     }
 
@@ -215,12 +271,10 @@ impl Code {
     fn evaluate_on<N: Number>(
         &self,
         registers: &mut [N],
-        leaf: impl Fn(Leaf) -> N,
+        given: Given<'_, N>,
         mut result: impl FnMut(usize, N),
     ) {
-        for (register, given) in registers.iter_mut().zip(&self.leaves) {
-            *register = leaf(*given);
-        }
+        self.leaves.fill(registers, given);
         run(&self.instructions, registers);
         for (place, register) in self.results.iter().enumerate() {
             result(place, registers[*register as usize]);
@@ -232,17 +286,36 @@ impl Code {
 #[inline(never)]
 fn run<N: Number>(instructions: &[Instruction], registers: &mut [N]) {
     for instruction in instructions {
-        let x = registers[instruction.first as usize];
-        let second = instruction.second as usize;
-        registers[instruction.target as usize] = match instruction.function {
-            Function::Unary(function) => function.of(x),
-            Function::Binary(function) => function.of(x, registers[second]),
-            Function::Whole(exponent) => x.powi(exponent),
-            Function::SinCos => {
-                let (sin, cos) = x.sin_cos();
-                registers[second] = cos;
-                sin
+        let [first, second, target] =
+            [instruction.first, instruction.second, instruction.target].map(|i| i as usize);
+        // Each stores its own value: a common place for all values would be copied once more.
+        match instruction.function {
+            Function::Binary(Binary::Add) => {
+                registers[target] = registers[first] + registers[second];
             }
-        };
+            Function::Binary(Binary::Subtract) => {
+                registers[target] = registers[first] - registers[second];
+            }
+            Function::Binary(Binary::Multiply) => {
+                registers[target] = registers[first] * registers[second];
+            }
+            Function::Binary(Binary::Divide) => {
+                registers[target] = registers[first] / registers[second];
+            }
+            Function::Unary(Unary::Negative) => registers[target] = -registers[first],
+            Function::Unary(Unary::Square) => {
+                registers[target] = registers[first] * registers[first];
+            }
+            Function::SinCos => {
+                let (sin, cos) = registers[first].sin_cos();
+                registers[target] = sin;
+                registers[second] = cos;
+            }
+            Function::Unary(function) => registers[target] = function.of(registers[first]),
+            Function::Binary(function) => {
+                registers[target] = function.of(registers[first], registers[second]);
+            }
+            Function::Whole(exponent) => registers[target] = registers[first].powi(exponent),
+        }
     }
 }

@@ -6,7 +6,7 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{place}: {fault}")]
 pub struct PlantError {
-    /// The part of the plant or of its file: "operation 17", "states[2]".
+    /// The part of the plant or of its file: `operation 17`, `states[2]`.
     pub place: String,
     /// What is wrong with it, and what would be right.
     pub fault: String,

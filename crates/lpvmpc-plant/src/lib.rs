@@ -37,6 +37,16 @@
 //! # }
 //! ```
 //!
+//! | for | use |
+//! |---|---|
+//! | a plant from a file, its values at run-time sizes | [`Plant`] |
+//! | a plant written in Rust as a file | [`PlantData::of_dynamics`], [`PlantData::of_embedding`] |
+//! | a plant made operation by operation | [`PlantData`], [`Plant::new`] |
+//! | a controller, estimator or simulation | [`SizedPlant`] by f alone, [`SizedEmbedding`] by its own A(s), B(s) |
+//! | the plant as Rust | [`Plant::to_rust`] |
+//! | a program for a microcontroller | [`Plant::to_firmware`] |
+//! | is a proof to be had of it? | [`Plant::first_not_smooth`] |
+//!
 //! # The format
 //!
 //! | key | holds |
@@ -77,13 +87,17 @@ mod code;
 mod data;
 mod error;
 mod file;
+mod firmware;
 mod operation;
 mod plant;
+mod recording;
 mod sized;
+mod source;
 
 pub use data::{EmbeddingData, Equilibrium, Parameter, PlantData, Signal};
 pub use error::PlantError;
 pub use file::Schema;
+pub use firmware::{Files, FirmwareSettings};
 pub use operation::{Binary, Operation, Unary};
 pub use plant::Plant;
 pub use sized::{SizedEmbedding, SizedPlant};

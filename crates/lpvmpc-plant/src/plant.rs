@@ -1,10 +1,10 @@
 //! A plant that was checked and made ready for evaluation.
 
 use crate::check::check;
-use crate::code::{Code, Leaf};
+use crate::code::{Code, Given};
 use crate::data::PlantData;
 use crate::error::PlantError;
-use crate::{claims, file};
+use crate::{claims, file, source};
 use lpvmpc::Number;
 use std::path::Path;
 use std::sync::Arc;
@@ -23,8 +23,8 @@ pub struct Plant {
 #[derive(Debug, PartialEq)]
 pub(crate) struct Formulas {
     data: PlantData,
-    derivative: Code,
-    output: Code,
+    pub derivative: Code,
+    pub output: Code,
     pub embedding: Option<EmbeddingCode>,
 }
 
@@ -99,6 +99,15 @@ impl Plant {
         let path = path.as_ref();
         std::fs::write(path, self.to_json())
             .map_err(|error| PlantError::new(path.display().to_string(), error.to_string()))
+    }
+
+    /// The plant as Rust source with its parameters as they are now: a module with a type that is a
+    /// [`Dynamics`](lpvmpc::Dynamics), or an [`Embedding`](lpvmpc::Embedding) if the file has one, of exactly the
+    /// plant's sizes, without std or heap. On every kind of number it has the same values as this plant, to the last bit.
+    ///
+    /// It needs `lpvmpc` and `nalgebra`, and nothing of this crate.
+    pub fn to_rust(&self) -> String {
+        source::print(self)
     }
 
     /// What stands in its file: names, units, bounds, formulas.
@@ -208,14 +217,13 @@ impl Plant {
         s: &[N],
         result: impl FnMut(usize, N),
     ) {
-        let leaf = |leaf| match leaf {
-            Leaf::Constant(value) => N::constant(value),
-            Leaf::State(i) => x[i],
-            Leaf::Input(i) => u[i],
-            Leaf::Parameter(i) => N::constant(self.parameters[i]),
-            Leaf::Scheduling(i) => s[i],
+        let given = Given {
+            parameters: &self.parameters,
+            x,
+            u,
+            s,
         };
-        code.evaluate(leaf, result);
+        code.evaluate(given, result);
     }
 
     /// The first operation of which no proof can be had, since it has a kink or jumps, with its index; `None` where all

@@ -4,8 +4,11 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
+mod firmware;
 mod hostile;
+mod printed;
 mod ray;
+mod recording;
 mod reference;
 mod refused;
 mod round_trip;

@@ -1,0 +1,221 @@
+//! A program for a microcontroller around a plant.
+
+use crate::error::PlantError;
+use crate::plant::Plant;
+use crate::source::{text, type_name};
+use std::path::Path;
+
+/// What the controller of a printed program is set to. All numbers are in the units of the plant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FirmwareSettings {
+    /// Where the crate `lpvmpc` is, as it is to stand in the program's Cargo.toml.
+    pub lpvmpc: String,
+    /// Sampling time, s.
+    pub t_s: f64,
+    /// Samples of the horizon.
+    pub horizon: usize,
+    /// Weights of the states, the diagonal of Q.
+    pub q: Vec<f64>,
+    /// Weights of the inputs, the diagonal of R.
+    pub r: Vec<f64>,
+    /// Cost beyond the horizon, the rows of P.
+    pub p: Vec<Vec<f64>>,
+    /// Where the plant is to go.
+    pub target: Vec<f64>,
+    /// Where its demonstration begins.
+    pub start: Vec<f64>,
+    /// Samples of the demonstration.
+    pub samples: usize,
+}
+
+/// The files of a program, by their paths in its folder.
+pub type Files = Vec<(&'static str, String)>;
+
+impl Plant {
+    /// A program in `f32` for a Cortex-M4F that controls this plant: a whole crate, for `cargo build` and, on an
+    /// emulated board, `cargo run`. The bounds are those of the plant, of states soft ones.
+    ///
+    /// # Errors
+    /// A list of `settings` does not fit the plant, or a number has no place in an `f32`.
+    pub fn to_firmware(&self, settings: &FirmwareSettings) -> Result<Files, PlantError> {
+        let data = self.data();
+        let (states, inputs) = (data.states.len(), data.inputs.len());
+        if inputs == 0 {
+            return Err(PlantError::new(
+                "inputs",
+                "there is none to control the plant with",
+            ));
+        }
+        for (name, list, count) in [
+            ("q", &settings.q, states),
+            ("r", &settings.r, inputs),
+            ("target", &settings.target, states),
+            ("start", &settings.start, states),
+        ] {
+            fits(name, list, count)?;
+        }
+        if settings.p.len() != states {
+            let fault = format!("{} rows for {states} states", settings.p.len());
+            return Err(PlantError::new("p", fault));
+        }
+        for (i, row) in settings.p.iter().enumerate() {
+            fits(&format!("p[{i}]"), row, states)?;
+        }
+        fits("t_s", &[settings.t_s], 1)?;
+        if settings.t_s <= 0.0 {
+            let fault = format!("{} s is no time between samples", settings.t_s);
+            return Err(PlantError::new("t_s", fault));
+        }
+        if settings.horizon == 0 {
+            return Err(PlantError::new("horizon", "it has at least one sample"));
+        }
+        let name = type_name(&data.name);
+        let (schedulings, model, make) = match &data.embedding {
+            Some(embedding) => (
+                embedding.scheduling.len(),
+                name.clone(),
+                format!("{name}::default()"),
+            ),
+            None => (
+                states + inputs,
+                format!("lpvmpc::AlongMotion<{name}, NS>"),
+                format!("lpvmpc::AlongMotion({name}::default())"),
+            ),
+        };
+        let bound = |signals: &[crate::Signal], lower: bool| {
+            let bounds = signals.iter().map(|signal| {
+                let (value, none) = match lower {
+                    true => (signal.lower, f64::NEG_INFINITY),
+                    false => (signal.upper, f64::INFINITY),
+                };
+                value.unwrap_or(none)
+            });
+            bounds.collect::<Vec<f64>>()
+        };
+        let bounded = { data.states.iter() }
+            .filter(|signal| signal.lower.is_some() || signal.upper.is_some())
+            .count();
+        let soft = format!(
+            ".soft_bounds(Bounds {{\n        lower: SVector::from([{}]),\n        upper: SVector::from([{}]),\n    }})",
+            list(&bound(&data.states, true)),
+            list(&bound(&data.states, false)),
+        );
+        let rows: Vec<String> = settings
+            .p
+            .iter()
+            .map(|row| format!("        [{}],", list(row)))
+            .collect();
+        let values = [
+            ("TEXT", text(&data.name)),
+            ("TYPE", name),
+            ("NX", states.to_string()),
+            ("NU", inputs.to_string()),
+            ("NS", schedulings.to_string()),
+            ("HORIZON", settings.horizon.to_string()),
+            ("SAMPLES", settings.samples.to_string()),
+            (
+                "ACTIVE",
+                (settings.horizon * (inputs + bounded) + states).to_string(),
+            ),
+            ("T_S", number(settings.t_s)),
+            ("TARGET", list(&settings.target)),
+            ("START", list(&settings.start)),
+            ("MODEL", model),
+            ("MAKE", make),
+            ("Q", list(&settings.q)),
+            ("R", list(&settings.r)),
+            ("P", rows.join("\n")),
+            ("U_LOWER", list(&bound(&data.inputs, true))),
+            ("U_UPPER", list(&bound(&data.inputs, false))),
+            ("X", if bounded > 0 { soft } else { String::new() }),
+            ("CRATE", "plant-controller".to_owned()),
+            ("LPVMPC", format!("{:?}", settings.lpvmpc)),
+        ];
+        let fill = |template: &str| {
+            { values.iter() }.fold(template.to_owned(), |text, (key, value)| {
+                text.replace(&format!("@{key}@"), value)
+            })
+        };
+        Ok(vec![
+            ("Cargo.toml", fill(include_str!("firmware/Cargo.toml.txt"))),
+            (
+                ".cargo/config.toml",
+                include_str!("firmware/config.toml.txt").to_owned(),
+            ),
+            (
+                "build.rs",
+                // It has no examples.
+                { include_str!("../../../firmware/build.rs").lines() }
+                    .filter(|line| !line.contains("rustc-link-arg-examples"))
+                    .map(|line| format!("{line}\n"))
+                    .collect(),
+            ),
+            (
+                "memory.x",
+                include_str!("../../../firmware/memory.x").to_owned(),
+            ),
+            ("src/main.rs", fill(include_str!("firmware/main.rs.txt"))),
+            (
+                "src/failure.rs",
+                include_str!("../../../firmware/src/bin/measure/failure.rs").to_owned(),
+            ),
+            ("src/plant.rs", self.to_rust()),
+        ])
+    }
+
+    /// Writes the files of [`Self::to_firmware`] into a new `folder`.
+    ///
+    /// # Errors
+    /// As that; or the folder is there already, or cannot be written.
+    pub fn save_firmware(
+        &self,
+        settings: &FirmwareSettings,
+        folder: impl AsRef<Path>,
+    ) -> Result<(), PlantError> {
+        let files = self.to_firmware(settings)?;
+        let folder = folder.as_ref();
+        let failed = |path: &Path, error: std::io::Error| {
+            PlantError::new(path.display().to_string(), error.to_string())
+        };
+        std::fs::create_dir(folder).map_err(|error| failed(folder, error))?;
+        for (path, content) in files {
+            let path = folder.join(path);
+            if let Some(parent) = path.parent() {
+                std::fs::create_dir_all(parent).map_err(|error| failed(parent, error))?;
+            }
+            std::fs::write(&path, content).map_err(|error| failed(&path, error))?;
+        }
+        Ok(())
+    }
+}
+
+/// `count` numbers that are finite in `f32`, too.
+fn fits(place: &str, list: &[f64], count: usize) -> Result<(), PlantError> {
+    if list.len() != count {
+        let fault = format!("{} numbers where {count} are needed", list.len());
+        return Err(PlantError::new(place, fault));
+    }
+    match list.iter().find(|value| !(**value as f32).is_finite()) {
+        Some(value) => Err(PlantError::new(
+            place,
+            format!("{value:?} is no finite number in f32"),
+        )),
+        None => Ok(()),
+    }
+}
+
+fn list(values: &[f64]) -> String {
+    let values: Vec<String> = values.iter().map(|value| number(*value)).collect();
+    values.join(", ")
+}
+
+/// As a literal of Rust.
+fn number(value: f64) -> String {
+    if value == f64::INFINITY {
+        "f32::INFINITY".to_owned()
+    } else if value == f64::NEG_INFINITY {
+        "f32::NEG_INFINITY".to_owned()
+    } else {
+        format!("{:?}", value as f32)
+    }
+}
