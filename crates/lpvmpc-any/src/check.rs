@@ -1,0 +1,166 @@
+//! From sizes that a user chose to places that were compiled: shapes are checked, what is left over
+//! is filled.
+
+use crate::error::MpcError;
+use crate::settings::{Limits, Row};
+use lpvmpc::{Bounds, GeneralRow};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+
+/// The names of a plant's states and inputs.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Names {
+    pub states: Vec<String>,
+    pub inputs: Vec<String>,
+}
+
+/// Which of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Axis {
+    States,
+    Inputs,
+}
+
+impl Names {
+    pub fn of(&self, axis: Axis) -> &[String] {
+        match axis {
+            Axis::States => &self.states,
+            Axis::Inputs => &self.inputs,
+        }
+    }
+
+    /// "4 (position, angle, ...)", as a message says what was expected.
+    fn expected(&self, axis: Axis) -> String {
+        let names = self.of(axis);
+        format!("{} ({})", names.len(), names.join(", "))
+    }
+
+    /// A vector with an entry for each state or input.
+    pub fn vector<const K: usize>(
+        &self,
+        axis: Axis,
+        place: &str,
+        entries: &[f64],
+    ) -> Result<SVector<f64, K>, MpcError> {
+        let names = self.of(axis);
+        if entries.len() != names.len() {
+            let fault = format!(
+                "it has {} entries; there must be {}",
+                entries.len(),
+                self.expected(axis)
+            );
+            return Err(MpcError::new(place, fault));
+        }
+        Ok(SVector::from_fn(|i, _| entries.get(i).copied().unwrap_or(0.0)))
+    }
+
+    /// A vector of finite numbers.
+    pub fn finite<const K: usize>(
+        &self,
+        axis: Axis,
+        place: &str,
+        entries: &[f64],
+    ) -> Result<SVector<f64, K>, MpcError> {
+        let vector = self.vector(axis, place, entries)?;
+        match entries.iter().position(|entry| !entry.is_finite()) {
+            None => Ok(vector),
+            Some(i) => {
+                let fault = format!("{} is {}; it must be finite", self.of(axis)[i], entries[i]);
+                Err(MpcError::new(place, fault))
+            }
+        }
+    }
+
+    /// A matrix of finite numbers, with rows and columns for these; `rest` stands on the diagonal of
+    /// what is left over.
+    pub fn matrix<const R: usize, const C: usize>(
+        &self,
+        axes: (Axis, Axis),
+        place: &str,
+        entries: &DMatrix<f64>,
+        rest: f64,
+    ) -> Result<SMatrix<f64, R, C>, MpcError> {
+        let shape = (self.of(axes.0).len(), self.of(axes.1).len());
+        if entries.shape() != shape {
+            let fault = format!(
+                "it is {} x {}; it must be {} x {} ({} by {})",
+                entries.nrows(),
+                entries.ncols(),
+                shape.0,
+                shape.1,
+                self.of(axes.0).join(", "),
+                self.of(axes.1).join(", ")
+            );
+            return Err(MpcError::new(place, fault));
+        }
+        for i in 0..shape.0 {
+            for j in 0..shape.1 {
+                if !entries[(i, j)].is_finite() {
+                    let fault = format!(
+                        "the entry ({i}, {j}) is {}; it must be finite",
+                        entries[(i, j)]
+                    );
+                    return Err(MpcError::new(place, fault));
+                }
+            }
+        }
+        Ok(SMatrix::from_fn(|i, j| match entries.get((i, j)) {
+            Some(entry) => *entry,
+            None if i == j => rest,
+            None => 0.0,
+        }))
+    }
+
+    /// Bounds for each state or input.
+    pub fn bounds<const K: usize>(
+        &self,
+        axis: Axis,
+        place: &str,
+        limits: &Limits,
+    ) -> Result<Bounds<f64, K>, MpcError> {
+        let mut bounds = Bounds::none();
+        let lower: SVector<f64, K> =
+            self.vector(axis, &format!("{place}, lower"), &limits.lower)?;
+        let upper: SVector<f64, K> =
+            self.vector(axis, &format!("{place}, upper"), &limits.upper)?;
+        for (i, name) in self.of(axis).iter().enumerate() {
+            let (least, most) = (lower[i], upper[i]);
+            // Negated, so that a bound that is NaN fails.
+            if !(least <= most && least < f64::INFINITY && most > f64::NEG_INFINITY) {
+                let fault = format!(
+                    "{name} must lie from {least} to {most}; the lower bound must not exceed the \
+                     upper one"
+                );
+                return Err(MpcError::new(place, fault));
+            }
+            (bounds.lower[i], bounds.upper[i]) = (least, most);
+        }
+        Ok(bounds)
+    }
+
+    /// A linear row.
+    pub fn row<const NX: usize, const NU: usize>(
+        &self,
+        place: &str,
+        row: &Row,
+    ) -> Result<GeneralRow<f64, NX, NU>, MpcError> {
+        let place = format!("{place} `{}`", row.name);
+        let entries = |vector: &DVector<f64>| vector.as_slice().to_vec();
+        if !(row.lower <= row.upper
+            && row.lower < f64::INFINITY
+            && row.upper > f64::NEG_INFINITY)
+        {
+            let fault = format!(
+                "its lower bound is {} and its upper one {}; the lower must not exceed the upper",
+                row.lower, row.upper
+            );
+            return Err(MpcError::new(place, fault));
+        }
+        Ok(GeneralRow {
+            x: self.finite(Axis::States, &format!("{place}, x"), &entries(&row.x))?,
+            u: self.finite(Axis::Inputs, &format!("{place}, u"), &entries(&row.u))?,
+            lower: row.lower,
+            upper: row.upper,
+            soft: row.soft,
+        })
+    }
+}

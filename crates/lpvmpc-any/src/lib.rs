@@ -1,0 +1,53 @@
+//! Predictive control of any plant: states, inputs and horizon are chosen at run time, and answers
+//! speak the plant's own names.
+//!
+//! A [`Plant`](lpvmpc_plant::Plant) is formulas from a file. An [`Mpc`] is its controller, with up to
+//! [`MOST_STATES`] states and [`MOST_INPUTS`] inputs. A pendulum stands up from 0.8 rad:
+//!
+//! ```
+//! use lpvmpc_any::{Mpc, MpcSettings, Preview};
+//! use lpvmpc_plant::Plant;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let plant = Plant::from_json(r#"{
+//!     "schema": 1,
+//!     "name": "pendulum",
+//!     "states": [{"name": "angle", "unit": "rad"}, {"name": "rate", "unit": "rad/s"}],
+//!     "inputs": [{"name": "torque", "unit": "N m", "lower": -8, "upper": 8}],
+//!     "operations": [
+//!         ["state", 0], ["state", 1], ["input", 0], ["constant", 9.81],
+//!         ["sin", 0], ["mul", 3, 4], ["add", 5, 2]
+//!     ],
+//!     "derivative": [1, 6]
+//! }"#)?;
+//! let mut mpc = Mpc::new(&plant, &MpcSettings::new(0.05, 30, &[1.0, 1.0], &[0.1]))?;
+//! let plan = mpc.step(&[0.8, 0.0], &Preview::default())?;
+//! println!("{}: {:.2} N m now, {}", plan.status, plan.u[(0, 0)], plan.active_bounds());
+//! assert!(plan.is_solved() && plan.u[(0, 0)] == -8.0);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! It is the controller of `lpvmpc`, compiled for a few sizes. A plant that is smaller than the
+//! size that serves it leaves places over; what stands there stays zero, and nothing depends on it.
+#![allow(
+    clippy::neg_cmp_op_on_partial_ord,
+    reason = "a comparison with NaN must take the failing branch"
+)]
+
+mod check;
+mod error;
+mod model;
+mod mpc;
+mod plan;
+mod preview;
+mod settings;
+mod sized;
+mod words;
+
+pub use error::MpcError;
+pub use lpvmpc::{Iterations, Penalty};
+pub use mpc::{MOST_INPUTS, MOST_STATES, Mpc};
+pub use plan::{ActiveBound, Plan};
+pub use preview::Preview;
+pub use settings::{LinearModels, Limits, MpcSettings, Row, StateBounds, Terminal};

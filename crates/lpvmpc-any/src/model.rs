@@ -1,0 +1,162 @@
+//! The linear models of a plant in places that were compiled.
+
+use crate::error::MpcError;
+use crate::settings::LinearModels;
+use lpvmpc::{
+    AlongMotion, AlongRay, Dynamics, Embedding, GaussLegendre, LpvModel, Number, Tangent,
+};
+use lpvmpc_plant::{Plant, SizedEmbedding, SizedPlant};
+use nalgebra::{SMatrix, SVector};
+
+/// A plant in more places than it has states. What stands in those left over decays, x_dot = -x, so
+/// that it stays zero and a steady state of all is one of the plant.
+#[derive(Debug, Clone)]
+pub(crate) struct Filled<P> {
+    plant: P,
+    states: usize,
+}
+
+impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for Filled<SizedPlant<NX, NU>> {
+    fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
+        decaying(self.plant.f(x, u), x, self.states)
+    }
+}
+
+fn decaying<N: Number, const NX: usize>(
+    mut rate: SVector<N, NX>,
+    x: &SVector<N, NX>,
+    from: usize,
+) -> SVector<N, NX> {
+    for i in from..NX {
+        rate[i] = -x[i];
+    }
+    rate
+}
+
+impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
+    for Filled<SizedEmbedding<NX, NU, NS>>
+{
+    fn scheduling<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NS> {
+        Embedding::scheduling(&self.plant, x, u)
+    }
+
+    fn matrices<N: Number>(
+        &self,
+        scheduling: &SVector<N, NS>,
+    ) -> (SMatrix<N, NX, NX>, SMatrix<N, NX, NU>) {
+        let (mut a, b) = Embedding::matrices(&self.plant, scheduling);
+        for i in self.states..NX {
+            a[(i, i)] = N::constant(-1.0);
+        }
+        (a, b)
+    }
+
+    fn offset<N: Number>(&self, scheduling: &SVector<N, NS>) -> Option<SVector<N, NX>> {
+        Embedding::offset(&self.plant, scheduling)
+    }
+
+    fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
+        decaying(Embedding::f(&self.plant, x, u), x, self.states)
+    }
+}
+
+/// Nodes along a ray where none are asked for. Of a cart-pole (`cargo run --release -p lpvmpc-plant
+/// --example descent`) more made no descent shorter and no loop cheaper.
+const USUAL_NODES: usize = 3;
+
+/// A plant with its linear models.
+#[derive(Debug, Clone)]
+pub(crate) enum Model<const NX: usize, const NU: usize, const NS: usize> {
+    Motion(AlongMotion<Filled<SizedPlant<NX, NU>>, NS>),
+    Ray(AlongRay<Filled<SizedPlant<NX, NU>>, f64, NX, NU, NS>),
+    Own(Filled<SizedEmbedding<NX, NU, NS>>),
+}
+
+impl<const NX: usize, const NU: usize, const NS: usize> Model<NX, NU, NS> {
+    /// `plant` with the linear models that are wanted; rays begin at (`x`, `u`).
+    pub fn new(
+        plant: &Plant,
+        models: LinearModels,
+        (x, u): (SVector<f64, NX>, SVector<f64, NU>),
+    ) -> Result<Self, MpcError> {
+        let states = plant.data().states.len();
+        let place = |error: lpvmpc_plant::PlantError| MpcError::new(error.place, error.fault);
+        let filled = || -> Result<_, MpcError> {
+            let plant = SizedPlant::new(plant.clone()).map_err(place)?;
+            Ok(Filled { plant, states })
+        };
+        Ok(match models {
+            LinearModels::Own if plant.data().embedding.is_some() => Self::Own(Filled {
+                plant: SizedEmbedding::new(plant.clone()).map_err(place)?,
+                states,
+            }),
+            LinearModels::AlongMotion => Self::Motion(AlongMotion(filled()?)),
+            LinearModels::Own | LinearModels::AlongRay { .. } => {
+                let nodes = match models {
+                    LinearModels::AlongRay { nodes } => nodes,
+                    _ => USUAL_NODES,
+                };
+                if nodes == 0 || nodes > GaussLegendre::MOST {
+                    let fault = format!("{nodes} nodes; there must be 1 to {}", GaussLegendre::MOST);
+                    return Err(MpcError::new("linear_models", fault));
+                }
+                Self::Ray(AlongRay {
+                    plant: filled()?,
+                    x,
+                    u,
+                    nodes: GaussLegendre::with_nodes(nodes),
+                })
+            }
+        })
+    }
+}
+
+/// The same expression for whichever model it is.
+macro_rules! whichever {
+    ($model:expr, $is:ident => $answer:expr) => {
+        match $model {
+            Model::Motion($is) => $answer,
+            Model::Ray($is) => $answer,
+            Model::Own($is) => $answer,
+        }
+    };
+}
+
+impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS>
+    for Model<NX, NU, NS>
+{
+    fn scheduling(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> SVector<f64, NS> {
+        whichever!(self, model => LpvModel::scheduling(model, x, u))
+    }
+
+    fn matrices(
+        &self,
+        scheduling: &SVector<f64, NS>,
+    ) -> (SMatrix<f64, NX, NX>, SMatrix<f64, NX, NU>) {
+        whichever!(self, model => LpvModel::matrices(model, scheduling))
+    }
+
+    fn offset(&self, scheduling: &SVector<f64, NS>) -> Option<SVector<f64, NX>> {
+        whichever!(self, model => LpvModel::offset(model, scheduling))
+    }
+
+    fn embedded(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> Tangent<f64, NX, NU> {
+        whichever!(self, model => LpvModel::embedded(model, x, u))
+    }
+
+    fn derivative(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> SVector<f64, NX> {
+        whichever!(self, model => LpvModel::derivative(model, x, u))
+    }
+
+    fn jacobian(
+        &self,
+        x: &SVector<f64, NX>,
+        u: &SVector<f64, NU>,
+    ) -> (SMatrix<f64, NX, NX>, SMatrix<f64, NX, NU>) {
+        whichever!(self, model => LpvModel::jacobian(model, x, u))
+    }
+
+    fn tangent(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> Tangent<f64, NX, NU> {
+        whichever!(self, model => LpvModel::tangent(model, x, u))
+    }
+}

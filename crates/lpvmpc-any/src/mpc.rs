@@ -1,0 +1,88 @@
+//! A controller of any size.
+
+use crate::error::MpcError;
+use crate::plan::Plan;
+use crate::preview::Preview;
+use crate::settings::MpcSettings;
+use crate::sized::{AnySize, Sized};
+use lpvmpc_plant::Plant;
+
+/// The most states that a plant may have.
+pub const MOST_STATES: usize = 16;
+/// The most inputs.
+pub const MOST_INPUTS: usize = 6;
+
+/// The LPV MPC controller of a plant that is data.
+pub struct Mpc {
+    sized: Box<dyn AnySize>,
+    states: usize,
+}
+
+/// The first of these sizes, smallest first, in which a plant has room.
+macro_rules! smallest {
+    ($plant:expr, $settings:expr, $($nx:literal $nu:literal $ns:literal),+) => {{
+        let data = $plant.data();
+        let (n, m) = (data.states.len(), data.inputs.len());
+        $(if n <= $nx && m <= $nu {
+            return Ok(Self {
+                sized: Box::new(Sized::<$nx, $nu, $ns>::new($plant, $settings)?),
+                states: n,
+            });
+        })+
+        let fault = format!(
+            "there are {n} states and {m} inputs; a controller has at most {MOST_STATES} and \
+             {MOST_INPUTS}"
+        );
+        Err(MpcError::new("plant", fault))
+    }};
+}
+
+impl Mpc {
+    /// A controller for `plant`.
+    ///
+    /// # Errors
+    /// The setting that makes no sense, by its name, and what would be right.
+    pub fn new(plant: &Plant, settings: &MpcSettings) -> Result<Self, MpcError> {
+        if plant.data().inputs.is_empty() {
+            return Err(MpcError::new("plant", "it has no input to control it with"));
+        }
+        smallest!(plant, settings, 2 1 3, 4 1 5, 4 2 6, 6 2 8, 8 4 12, 12 4 16, 16 6 22)
+    }
+
+    /// One sample: from the measured state `x` and what is known ahead to the plan, whose first
+    /// input is to be applied until the next sample.
+    ///
+    /// A state that is not finite is answered by a plan whose status says so.
+    ///
+    /// # Errors
+    /// A list of the preview that has not the plant's sizes, or has a number that makes no sense.
+    pub fn step(&mut self, x: &[f64], preview: &Preview) -> Result<Plan, MpcError> {
+        self.sized.step(x, preview)
+    }
+
+    /// Other settings from the next step on. Horizon and sampling time stay.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new); the controller is as it was then.
+    pub fn set_settings(&mut self, settings: &MpcSettings) -> Result<(), MpcError> {
+        self.sized.set_settings(settings)
+    }
+
+    /// Another value of a parameter of the plant from the next step on.
+    ///
+    /// # Errors
+    /// There is no such parameter, or the value is not finite.
+    pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), MpcError> {
+        self.sized.set_parameter(name, value)
+    }
+
+    /// Forgets the last plan: the next step is as the first.
+    pub fn reset(&mut self) {
+        self.sized.reset();
+    }
+
+    /// How many states the plant has.
+    pub fn states(&self) -> usize {
+        self.states
+    }
+}

@@ -1,0 +1,43 @@
+//! What a step is told besides the state.
+
+use crate::settings::{Limits, Row};
+use nalgebra::{DMatrix, DVector};
+
+/// What is known ahead of a step. Each list has one entry per stage, from the present one on; from where
+/// it ends its last entry holds, and an empty one means what the settings say. So a list of one
+/// entry is a value for the whole horizon.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Preview {
+    /// x_ref; empty means the plant's steady state, or zero where the plant's file names none.
+    pub x_ref: Vec<DVector<f64>>,
+    /// u_ref, the input that costs nothing. With one, x_ref is taken as it is.
+    pub u_ref: Vec<DVector<f64>>,
+    /// Q and R.
+    pub weights: Vec<(DMatrix<f64>, DMatrix<f64>)>,
+    /// Cross weights S, m x n: 2 (u - u_ref)'S (x - x_ref) on top.
+    pub cross: Vec<DMatrix<f64>>,
+    /// Linear costs of the states, in cost per unit.
+    pub linear_x: Vec<DVector<f64>>,
+    /// Linear costs of the inputs, in cost per unit.
+    pub linear_u: Vec<DVector<f64>>,
+    /// Bounds of the states.
+    pub x_bounds: Vec<Limits>,
+    /// Bounds of the inputs.
+    pub u_bounds: Vec<Limits>,
+    /// Linear rows in place of those of the settings.
+    pub rows: Vec<Vec<Row>>,
+    /// Measured disturbances d in state units per second: x_dot = f(x, u) + d.
+    pub disturbance: Vec<DVector<f64>>,
+    /// The plant's parameters.
+    pub parameters: Vec<Vec<f64>>,
+}
+
+impl Preview {
+    /// One reference for the whole horizon.
+    pub fn to(x_ref: &[f64]) -> Self {
+        Self {
+            x_ref: vec![DVector::from_row_slice(x_ref)],
+            ..Self::default()
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! What defines a controller besides its plant.
+
+use lpvmpc::{Iterations, Penalty};
+use nalgebra::{DMatrix, DVector};
+
+/// Everything that defines a controller besides its plant. `n` states, `m` inputs, in the order and in the
+/// units of the plant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MpcSettings {
+    /// Sampling time, s.
+    pub t_s: f64,
+    /// Prediction horizon in samples, 1 to 65 535.
+    pub horizon: usize,
+    /// Runge-Kutta steps per sample, at least 1.
+    pub substeps: usize,
+    /// Q, n x n, symmetric positive semidefinite: (x - x_ref)'Q (x - x_ref) per sample.
+    pub q: DMatrix<f64>,
+    /// R, m x m, symmetric positive definite: (u - u_ref)'R (u - u_ref) per sample.
+    pub r: DMatrix<f64>,
+    /// What stands at the end of the horizon.
+    pub terminal: Terminal,
+    /// Bounds of x_1 to x_N; `None` means those of the plant.
+    pub x_bounds: Option<Limits>,
+    /// What becomes of a plan that cannot keep the bounds of the states.
+    pub state_bounds: StateBounds,
+    /// Bounds of the inputs, always kept; `None` means those of the plant.
+    pub u_bounds: Option<Limits>,
+    /// u_ref, the input that costs nothing; `None` means the input that holds the end of the reference,
+    /// from the nonlinear model.
+    pub u_ref: Option<DVector<f64>>,
+    /// Linear rows that hold at every stage.
+    pub rows: Vec<Row>,
+    /// Which linear models the programs have.
+    pub linear_models: LinearModels,
+    /// Quadratic programs per sample.
+    pub iterations: Iterations<f64>,
+}
+
+impl MpcSettings {
+    /// What a controller must be told, with the diagonals of Q and R; the rest serves as a rule: one Runge-Kutta step
+    /// per sample, the cost of the linear-quadratic regulator at the end, the bounds of the plant,
+    /// those of states soft, and a descent of at most eight programs per sample.
+    pub fn new(t_s: f64, horizon: usize, q: &[f64], r: &[f64]) -> Self {
+        let diagonal = |entries: &[f64]| DMatrix::from_diagonal(&DVector::from_row_slice(entries));
+        Self {
+            t_s,
+            horizon,
+            substeps: 1,
+            q: diagonal(q),
+            r: diagonal(r),
+            terminal: Terminal::Lqr,
+            x_bounds: None,
+            state_bounds: StateBounds::Soft,
+            u_bounds: None,
+            u_ref: None,
+            rows: Vec::new(),
+            linear_models: LinearModels::default(),
+            iterations: Iterations::default(),
+        }
+    }
+}
+
+/// What stands at the end of the horizon.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Terminal {
+    /// The cost of the linear-quadratic regulator from there on, about the plant's steady state; about zero
+    /// where the plant's file names none.
+    Lqr,
+    /// (x_N - x_ref)'P (x_N - x_ref) with this P, n x n, symmetric positive semidefinite.
+    Cost(DMatrix<f64>),
+    /// x_N = x_ref.
+    Equality,
+}
+
+/// A lower and an upper bound for each component; infinite where there is none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limits {
+    /// The least values.
+    pub lower: Vec<f64>,
+    /// The largest values.
+    pub upper: Vec<f64>,
+}
+
+/// What becomes of a plan that cannot keep the bounds of the states.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StateBounds {
+    /// They are exceeded as little as possible, at the price of [`lpvmpc::exact_prices`].
+    Soft,
+    /// It is infeasible.
+    Hard,
+    /// Each state has a price of its own per unit of excess, in the unit of the cost; hard where it
+    /// has none.
+    Priced(Vec<Option<Penalty<f64>>>),
+}
+
+/// A linear row lower <= x'x_i + u'u_i <= upper.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Its name in messages.
+    pub name: String,
+    /// Coefficients of the states.
+    pub x: DVector<f64>,
+    /// Coefficients of the inputs.
+    pub u: DVector<f64>,
+    /// The least value; minus infinity for none.
+    pub lower: f64,
+    /// The largest value; infinity for none.
+    pub upper: f64,
+    /// The price of exceeding it; hard without.
+    pub soft: Option<Penalty<f64>>,
+}
+
+/// Which linear models the programs of a sample have. All are exact on the motion that is expected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LinearModels {
+    /// The plant's own embedding where it has one, otherwise as [`AlongRay`](Self::AlongRay) with
+    /// three nodes.
+    #[default]
+    Own,
+    /// The derivatives of f along the expected motion.
+    AlongMotion,
+    /// The mean derivatives from the plant's steady state to the expected motion, over so many nodes (1 to 16).
+    AlongRay {
+        /// Nodes of the Gauss-Legendre formula.
+        nodes: usize,
+    },
+}

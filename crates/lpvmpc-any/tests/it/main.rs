@@ -1,0 +1,6 @@
+//! Controllers of any size.
+
+mod agreement;
+mod messages;
+mod plants;
+mod stages;

@@ -1,0 +1,100 @@
+//! What a step is told stage by stage.
+
+use crate::plants::{cart_pole, chain};
+use lpvmpc_any::{Limits, LinearModels, Mpc, MpcSettings, Preview};
+use nalgebra::DVector;
+
+fn settings() -> MpcSettings {
+    MpcSettings {
+        u_bounds: Some(Limits {
+            lower: vec![-10.0],
+            upper: vec![10.0],
+        }),
+        ..MpcSettings::new(0.05, 30, &[10.0, 10.0, 0.1, 0.1], &[0.01])
+    }
+}
+
+/// A push that is told ahead costs less than one that is not.
+#[test]
+fn a_disturbance_that_is_known_ahead_is_met_before_it_comes() {
+    let mut mpc = Mpc::new(&cart_pole(), &settings()).unwrap();
+    let mut disturbance = vec![DVector::zeros(4); 10];
+    disturbance.push(DVector::from_row_slice(&[0.0, 0.0, 3.0, 0.0]));
+    disturbance.push(DVector::zeros(4));
+    let told = Preview {
+        disturbance,
+        ..Preview::default()
+    };
+    let plan = mpc.step(&[0.0; 4], &told).unwrap();
+    assert!(plan.is_solved(), "{}", plan.status);
+    // It leans against the push before stage 10.
+    assert!((1..10).any(|i| plan.x[(i, 0)].abs() > 1e-3), "{}", plan.x);
+    mpc.reset();
+    let calm = mpc.step(&[0.0; 4], &Preview::default()).unwrap();
+    assert!(calm.u.amax() < 1e-9 && calm.cost < 1e-12, "{} {}", calm.u, calm.cost);
+}
+
+#[test]
+fn bounds_and_weights_hold_where_they_are_said() {
+    let mut mpc = Mpc::new(&cart_pole(), &settings()).unwrap();
+    let of = |force: f64| Limits {
+        lower: vec![-force],
+        upper: vec![force],
+    };
+    let mut u_bounds = vec![of(0.0); 5];
+    u_bounds.push(of(4.0));
+    let preview = Preview {
+        u_bounds,
+        ..Preview::to(&[0.5, 0.0, 0.0, 0.0])
+    };
+    let plan = mpc.step(&[0.0; 4], &preview).unwrap();
+    assert!(plan.is_solved(), "{}", plan.status);
+    for i in 0..30 {
+        let most = if i < 5 { 0.0 } else { 4.0 };
+        assert!(plan.u[(i, 0)].abs() <= most + 1e-9, "stage {i}: {}", plan.u[(i, 0)]);
+    }
+    assert!(plan.u.amax() > 1.0);
+}
+
+/// Whatever linear models the programs have, a descent ends at the same plan; from afar it may be
+/// another one.
+#[test]
+fn the_linear_models_do_not_decide_where_a_descent_ends() {
+    let costs = [
+        LinearModels::AlongMotion,
+        LinearModels::AlongRay { nodes: 8 },
+        LinearModels::Own,
+    ]
+    .map(|linear_models| {
+        let settings = MpcSettings {
+            linear_models,
+            iterations: lpvmpc_any::Iterations::Descent {
+                tolerance: 1e-10,
+                most: 100,
+            },
+            ..settings()
+        };
+        let mut mpc = Mpc::new(&cart_pole(), &settings).unwrap();
+        let plan = mpc.step(&[0.0, 0.3, 0.0, 0.0], &Preview::default()).unwrap();
+        assert_eq!(plan.status, "converged");
+        plan.cost
+    });
+    for cost in costs {
+        assert!((cost / costs[0] - 1.0).abs() < 1e-8, "{costs:?}");
+    }
+}
+
+/// Sixteen states and six inputs come to rest.
+#[test]
+fn the_largest_plant_is_held() {
+    let settings = MpcSettings::new(0.1, 10, &[1.0; 16], &[0.1; 6]);
+    let mut mpc = Mpc::new(&chain::<16, 6>(), &settings).unwrap();
+    let mut x: Vec<f64> = (0..16).map(|i| 0.5 * f64::from(i).sin()).collect();
+    for _ in 0..200 {
+        let plan = mpc.step(&x, &Preview::default()).unwrap();
+        assert!(plan.is_solved(), "{}", plan.status);
+        x = plan.x.row(1).iter().copied().collect();
+    }
+    let largest = x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    assert!(largest < 1e-2, "{largest}");
+}
