@@ -205,10 +205,12 @@ where
         relative + absolute
     }
 
-    /// More damping where a program's answer did not hold, less where all of it did.
+    /// More damping where a program's answer did not hold, less where all of it did. At its largest it is
+    /// not what the last one to hold had asked for, and falls faster.
     fn damp(&mut self, fraction: Option<f64>) {
-        let least: T = convert(0.1);
+        let [least, most] = [0.1, 1e3].map(convert::<f64, T>);
         let factor = match fraction {
+            Some(1.0) if self.damping >= most => 0.03,
             Some(1.0) => 0.1,
             Some(0.5) => 1.5,
             Some(_) => 3.0,
@@ -218,7 +220,7 @@ where
         self.damping = if damping < least {
             T::zero()
         } else {
-            damping.min(convert(1e3))
+            damping.min(most)
         };
     }
 
