@@ -187,10 +187,7 @@ where
     /// Whether the rollout keeps all bounds wherever the plant can be that follows it, which is worked out
     /// where it does so itself.
     fn judge(&self, plan: &mut Plan<T, NX, NU>) -> bool {
-        self.is_feasible(plan) && {
-            self.find_drift(plan);
-            self.is_robust(plan)
-        }
+        self.is_feasible(plan) && self.becomes_robust(plan)
     }
 
     /// Whether a change of the `cost` by so much, up or down, is worth another program.
