@@ -19,13 +19,15 @@ where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
-    /// Quadratic programs along the plan `along`, each answer confirmed by the rollout. Where one or more
+    /// Quadratic programs along the plan `along`, the first from a `warm_start`, each answer confirmed by the
+    /// rollout. Where one or more
     /// are confirmed and cost less than what is `known` (its kind, and the least cost), `along` becomes
     /// the best of them, and the answer is its gap. The search goes on after a first one as long as there
     /// are programs left and the cost falls.
     pub(super) fn improve<const NA: usize>(
         &mut self,
         known: Option<(Decision, T)>,
+        mut warm_start: WarmStart,
         workspace: &mut GuaranteedWorkspace<T, NU, NA>,
     ) -> Option<SVector<T, NX>> {
         let Self {
@@ -44,7 +46,6 @@ where
         let mut improved = None;
         let mut in_vain = 0;
         let mut served = planner.damping;
-        let mut warm_start = WarmStart::Same;
         for _ in 0..most {
             planner.pose(along, &mut workspace.ocp);
             planner.solve(workspace, warm_start);
