@@ -321,8 +321,16 @@ where
         plan.cost = self.cost(plan);
     }
 
+    /// Aims at what was `wanted` before, if anything else was since, and gives the `plan` its cost for it.
+    pub(super) fn aim_again(&mut self, wanted: Option<(T, usize)>, plan: &mut Plan<T, NX, NU>) {
+        if let Some(wanted) = wanted {
+            self.aims.go_on(wanted);
+            plan.cost = self.cost(plan);
+        }
+    }
+
     /// The plan's cost for what it is aimed at.
-    fn cost(&self, plan: &Plan<T, NX, NU>) -> T {
+    pub(super) fn cost(&self, plan: &Plan<T, NX, NU>) -> T {
         let (settings, aims) = (&self.settings, &self.aims);
         let offset = plan.set_point - aims.end;
         let mut cost = settings.offset_weight * offset * offset;

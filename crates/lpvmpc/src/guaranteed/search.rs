@@ -46,6 +46,8 @@ where
         let mut improved = None;
         let mut in_vain = 0;
         let mut served = planner.damping;
+        // What is aimed at, while a first plan is looked for without it.
+        let mut wanted = None;
         for _ in 0..most {
             planner.pose(along, &mut workspace.ocp);
             planner.solve(workspace, warm_start);
@@ -78,7 +80,14 @@ where
                         // At a plan that nothing improves on, damping says nothing of the next
                         // sample's.
                         planner.damping = served;
-                        break;
+                        if least.is_some() || wanted.is_some() {
+                            break;
+                        }
+                        // A far set point draws plans to the bounds; away from it there may be one.
+                        wanted = Some(planner.aims.stay(along.set_point));
+                        along.cost = planner.cost(along);
+                        (planner.damping, planner.slope) = (T::zero(), Slope::Jacobian);
+                        in_vain = 0;
                     }
                     continue;
                 }
@@ -91,6 +100,7 @@ where
                 least.is_some_and(|least| !planner.is_worthwhile(least - trial.cost, least));
             swap(along, trial);
             if found.feasible {
+                planner.aim_again(wanted.take(), along);
                 least = Some(along.cost);
                 improved = Some(found.gap);
             }
@@ -98,6 +108,7 @@ where
                 break;
             }
         }
+        planner.aim_again(wanted, along);
         improved
     }
 
