@@ -178,11 +178,8 @@ fn where_bounds_of_states_decide_inputs_are_not_guessed() {
     ocp.common.r = SMatrix::<f64, 1, 1>::new(0.1);
     ocp.terminal.p = ocp.common.q * 100.0;
     ocp.terminal.linear_x = SVector::<f64, 3>::new(-1e5, 0.0, 0.0);
-    let symmetric = |limit: SVector<f64, 3>| Bounds {
-        lower: -limit,
-        upper: limit,
-    };
-    ocp.common.x = symmetric(SVector::<f64, 3>::new(f64::INFINITY, 1.0, 1.0));
+    ocp.common.x.upper = SVector::<f64, 3>::new(f64::INFINITY, 1.0, 1.0);
+    ocp.common.x.lower = -ocp.common.x.upper;
     ocp.terminal.x = ocp.common.x;
     (ocp.common.u.lower[0], ocp.common.u.upper[0]) = (-1.0, 1.0);
     let mut both = Both::<3, 1>::new::<N, 120>();
