@@ -29,6 +29,7 @@ use crate::model::{LpvModel, Scalar};
 #[cfg(feature = "alloc")]
 use crate::settings::LONGEST_HORIZON;
 use crate::solution::{BoundId, Quantity, Side, Status};
+use crate::solver::WarmStart;
 use aim::Aims;
 pub use aim::SetPoints;
 use core::fmt;
@@ -255,7 +256,13 @@ where
             Repeated::ToLookAlong => self.nearer.cost,
             Repeated::No | Repeated::Plan => self.along.cost,
         };
-        let improved = self.improve(known.map(|decision| (decision, least)), workspace);
+        // The rest of a plan begins a sample later than the last program did; the plan once more does not.
+        let warm_start = match repeated {
+            Repeated::No => WarmStart::Shifted,
+            Repeated::Plan | Repeated::ToLookAlong => WarmStart::Same,
+        };
+        let known_cost = known.map(|decision| (decision, least));
+        let improved = self.improve(known_cost, warm_start, workspace);
         let status = workspace.solution.status;
         let (decision, gap) = match (improved, known) {
             (Some(gap), _) => (Decision::NewPlan, gap),

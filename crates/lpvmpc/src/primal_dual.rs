@@ -13,9 +13,10 @@ use crate::list::List;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::riccati::{BadPivot, CostToGo, StageFactor};
+use crate::rows;
 use crate::small_matrix::{add_product, product, transposed_product};
 use crate::solution::{Side, Solution, Status};
-use crate::solver::{Solver, SolverSettings, WarmStart};
+use crate::solver::{Solver, SolverSettings, WarmStart, trajectory};
 use crate::working_set::{copy, first};
 use nalgebra::SVector;
 
@@ -74,7 +75,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> PrimalDual<T, NX, NU> {
         spent: &mut usize,
     ) -> bool {
         let fits = ocp.length() <= self.factors.len();
-        if !fits || ocp.terminal.equality.is_some() || !many_are_violated(ocp, solution) {
+        if !fits || ocp.terminal.equality.is_some() || !inputs_are_most(ocp, solution) {
             return false;
         }
         let shift = match settings.warm_start {
@@ -234,8 +235,8 @@ fn hold_clipped<T: Scalar, const NX: usize, const NU: usize>(
 }
 
 /// Whether so many inputs are beyond their bounds that a few factorisations cost less than a pass for
-/// each of them.
-fn many_are_violated<T: Scalar, const NX: usize, const NU: usize>(
+/// each of them, and more than states and rows: where these decide, a guess of the inputs is of no use.
+fn inputs_are_most<T: Scalar, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
     solution: &Solution<T, NX, NU>,
 ) -> bool {
@@ -243,17 +244,18 @@ fn many_are_violated<T: Scalar, const NX: usize, const NU: usize>(
     let pass = 4 * NX * NX + 4 * NX * NU;
     // The more inputs move a state, the more guesses it takes.
     let many = (1 + NU) * factorisation / pass;
-    let mut violated = 0;
+    let mut inputs = 0;
     for (i, u) in first(&solution.u, ocp.length()).iter().enumerate() {
         let bounds = &ocp.common_at(i).u;
         if !bounds.hold_at(u) {
             let inside = bounds.project(u);
-            violated += u
-                .iter()
-                .zip(&inside)
-                .filter(|(u, inside)| u != inside)
-                .count();
+            let sides = u.iter().zip(&inside);
+            inputs += sides.filter(|(u, inside)| u != inside).count();
         }
     }
-    violated >= many
+    inputs >= many && {
+        let mut all = 0;
+        rows::violated_bounds(ocp, &trajectory(solution), &mut |_| all += 1);
+        2 * inputs > all
+    }
 }

@@ -349,7 +349,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     }
 }
 
-fn trajectory<T, const NX: usize, const NU: usize>(
+pub(crate) fn trajectory<T, const NX: usize, const NU: usize>(
     solution: &Solution<T, NX, NU>,
 ) -> Trajectory<'_, T, NX, NU> {
     Trajectory {

@@ -120,6 +120,7 @@ impl CertifiedTable {
                 "a guarantee needs the stage_consistent predictor, which is the default",
             ));
         };
+        rollout::check_derivatives(ballbot, plain, rk4)?;
         let certificate = files.certificate(self.certificate.as_deref())?;
         check_plant(&certificate, ballbot, plain.t_s)?;
         check_cost(&certificate, &plain.weights)?;

@@ -8,6 +8,10 @@
 //! rates and torques over their bounds, corners included, among the motions that stay within them;
 //! twice that is taken for what lies between the points. It is an estimate with a safety factor, not a
 //! proof. The same goes for how far a state lies beyond both ends of a step, which is taken as it is.
+//!
+//! Deviations from a plan are carried on by the derivatives of the prediction, whose Runge-Kutta steps
+//! are coarser. Their error is that of step doubling on the same grid, and has to be small against the
+//! factor of 2.
 
 use crate::error::ScenarioError;
 use crate::number::text;
@@ -22,6 +26,9 @@ const STATES: usize = 9;
 const TORQUES: usize = 5;
 /// What the grid may miss.
 const SAFETY: f64 = 2.0;
+/// How far the derivatives may be off by which deviations from a plan are carried on, relative to the
+/// largest of the sample.
+const DERIVATIVES: f64 = 0.01;
 
 /// The coarsest rollout whose error fits into `margin`, or one with as many steps as are `wanted`.
 ///
@@ -93,6 +100,59 @@ pub(crate) fn accurate(
     }
 }
 
+/// Whether the derivatives of the prediction, with `rk4`, are accurate enough to carry deviations on.
+///
+/// # Errors
+/// They are too coarse.
+pub(crate) fn check_derivatives(
+    ballbot: &Ballbot<f64>,
+    plain: &ControllerSettings<f64>,
+    rk4: Rk4,
+) -> Result<(), ScenarioError> {
+    let off = |substeps: usize| derivatives_error(ballbot, plain, Rk4 { substeps });
+    if off(rk4.substeps) <= DERIVATIVES {
+        return Ok(());
+    }
+    let needed = (rk4.substeps..=MOST_SUBSTEPS).find(|substeps| off(*substeps) <= DERIVATIVES);
+    let needed = needed.map_or_else(
+        || "more; take a shorter sampling time, or narrower bounds".to_owned(),
+        |needed| needed.to_string(),
+    );
+    Err(ScenarioError::value(
+        "controller.predictor.stage_consistent.substeps",
+        rk4.substeps,
+        format!(
+            "too coarse for the derivatives that a guarantee rests on: with these bounds and this \
+             sampling time it needs {needed}"
+        ),
+    ))
+}
+
+/// The largest error of a sample's derivatives, relative to the largest of them, in units of the bounds
+/// (for phi: what the largest rate makes of it in a sample).
+fn derivatives_error(ballbot: &Ballbot<f64>, plain: &ControllerSettings<f64>, rk4: Rk4) -> f64 {
+    let fine = Rk4 {
+        substeps: 2 * rk4.substeps,
+    };
+    let width = plain.x.upper - plain.x.lower;
+    let unit = Vector4::new(width[2] * plain.t_s, width[1], width[2], width[3]);
+    let mut worst = 0.0_f64;
+    for (start, u) in motions(ballbot, plain, fine) {
+        let of = |rk4: Rk4| {
+            let (a, b) = rk4.differentiate(ballbot, &start, &u, plain.t_s);
+            let a = Matrix4::from_fn(|i, j| a[(i, j)] * unit[j] / unit[i]);
+            (a, b.component_div(&unit))
+        };
+        let ((a, b), (a_fine, b_fine)) = (of(rk4), of(fine));
+        let off = [
+            (a - a_fine).amax() / a_fine.amax(),
+            (b - b_fine).amax() / b_fine.amax(),
+        ];
+        worst = off.into_iter().fold(worst, f64::max);
+    }
+    worst * 16.0 / 15.0
+}
+
 /// The number of steps beyond those of `rollout` that fits, by the orders of the error, 4, and of what
 /// lies beyond both ends of a step, 2.
 fn extrapolated(
@@ -123,30 +183,8 @@ fn error(
     };
     let steps = rk4.substeps as f64;
     let (mut error, mut between) = (Vector4::zeros(), Vector4::zeros());
-    let limits = [&plain.x.lower, &plain.x.upper];
-    let [lower, upper] = limits.map(|limit| Vector4::new(0.0, limit[1], limit[2], limit[3]));
-    let at = |i: usize, lower: f64, upper: f64, points: usize| {
-        lower + (upper - lower) * i as f64 / (points - 1) as f64
-    };
-    for point in 0..STATES.pow(3) * TORQUES {
-        let places = [
-            point % STATES,
-            point / STATES % STATES,
-            point / STATES.pow(2) % STATES,
-        ];
-        let state = |i: usize| at(places[i - 1], lower[i], upper[i], STATES);
-        let start = Vector4::new(0.0, state(1), state(2), state(3));
-        let torque = at(
-            point / STATES.pow(3),
-            plain.u.lower[0],
-            plain.u.upper[0],
-            TORQUES,
-        );
-        let u = Vector1::new(torque);
+    for (start, u) in motions(ballbot, plain, fine) {
         let end = fine.advance(ballbot, &start, &u, plain.t_s);
-        if !stays(&plain.x, &end) {
-            continue;
-        }
         let coarse = rk4.advance(ballbot, &start, &u, plain.t_s);
         let share = lpvmpc::share_of_bounds(&start, &plain.x, &u, &plain.u);
         if share > 0.0 {
@@ -163,6 +201,33 @@ fn error(
         }
     }
     (error, between)
+}
+
+/// States and torques on a grid over their bounds from which a sample, with `rk4`, ends within the bounds.
+fn motions(
+    ballbot: &Ballbot<f64>,
+    plain: &ControllerSettings<f64>,
+    rk4: Rk4,
+) -> impl Iterator<Item = (Vector4<f64>, Vector1<f64>)> {
+    let limits = [&plain.x.lower, &plain.x.upper];
+    let [lower, upper] = limits.map(|limit| Vector4::new(0.0, limit[1], limit[2], limit[3]));
+    let at = |i: usize, lower: f64, upper: f64, points: usize| {
+        lower + (upper - lower) * i as f64 / (points - 1) as f64
+    };
+    let point = move |point: usize| {
+        let places = [
+            point % STATES,
+            point / STATES % STATES,
+            point / STATES.pow(2) % STATES,
+        ];
+        let state = |i: usize| at(places[i - 1], lower[i], upper[i], STATES);
+        let (least, most) = (plain.u.lower[0], plain.u.upper[0]);
+        let torque = at(point / STATES.pow(3), least, most, TORQUES);
+        let start = Vector4::new(0.0, state(1), state(2), state(3));
+        (start, Vector1::new(torque))
+    };
+    let points = (0..STATES.pow(3) * TORQUES).map(point);
+    points.filter(move |(start, u)| stays(&plain.x, &rk4.advance(ballbot, start, u, plain.t_s)))
 }
 
 /// Whether the tilt and the rates are within their bounds.
@@ -201,7 +266,7 @@ fn drift(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Scenario;
+    use crate::{PredictorTable, Scenario};
     use lpvmpc_sim::{Random, Tolerances};
     use std::path::Path;
 
@@ -223,6 +288,50 @@ mod tests {
         assert!(
             fine.contains("controller.t_s") && fine.contains("needs about 128"),
             "{fine}"
+        );
+    }
+
+    /// Between the points of the grid the derivatives are off by no more than there, beside many fine steps;
+    /// a prediction too coarse for them is refused with the number needed.
+    #[test]
+    fn derivatives_are_as_accurate_as_a_guarantee_needs() {
+        let mut scenario = Scenario::load("far-setpoints").unwrap();
+        let prepared = scenario.prepare(Path::new(".")).unwrap();
+        let (ballbot, plain) = (prepared.ballbot, prepared.settings);
+        let rk4 = prepared.guaranteed().unwrap().rk4;
+        assert_eq!(rk4.substeps, 4);
+        let grid = derivatives_error(&ballbot, &plain, rk4);
+        assert!((0.003..0.005).contains(&grid), "{grid}");
+        let fine = Rk4 { substeps: 48 };
+        let mut random = Random::new(8, 0);
+        let mut worst = 0.0_f64;
+        for _ in 0..3000 {
+            let start = plain.x.upper.map(|limit| {
+                let part = random.symmetric();
+                if limit.is_finite() { part * limit } else { 0.0 }
+            });
+            let u = plain.u.upper * random.symmetric();
+            if !stays(&plain.x, &fine.advance(&ballbot, &start, &u, plain.t_s)) {
+                continue;
+            }
+            let (a, b) = rk4.differentiate(&ballbot, &start, &u, plain.t_s);
+            let (a_fine, b_fine) = fine.differentiate(&ballbot, &start, &u, plain.t_s);
+            let unit = plain.x.upper;
+            let unit = Vector4::new(unit[2] * plain.t_s, unit[1], unit[2], unit[3]);
+            let scaled =
+                |a: &Matrix4<f64>| Matrix4::from_fn(|i, j| a[(i, j)] * unit[j] / unit[i]).amax();
+            let by_state = scaled(&(a - a_fine)) / scaled(&a_fine);
+            let by_input = (b - b_fine).component_div(&unit).amax();
+            let by_input = by_input / b_fine.component_div(&unit).amax();
+            worst = worst.max(by_state).max(by_input);
+        }
+        assert!(worst < 1.3 * grid && worst > 0.5 * grid, "{worst} {grid}");
+
+        scenario.controller.predictor = Some(PredictorTable::StageConsistent { substeps: Some(2) });
+        let refused = scenario.prepare(Path::new(".")).unwrap_err().to_string();
+        assert!(
+            refused.contains("stage_consistent.substeps") && refused.contains("it needs 4"),
+            "{refused}"
         );
     }
 

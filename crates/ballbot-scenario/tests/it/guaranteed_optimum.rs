@@ -2,7 +2,7 @@
 //! (`testdata/guaranteed-optimum`).
 
 use ballbot::GuaranteedController;
-use ballbot_scenario::{CertifiedTable, Prepared, Scenario, TerminalTable};
+use ballbot_scenario::{Prepared, Scenario};
 use lpvmpc::Rk4;
 use nalgebra::Vector4;
 use std::path::Path;
@@ -39,36 +39,22 @@ fn quantile(values: &mut [f64], part: f64) -> f64 {
 }
 
 /// Tilts to 59 degrees, set points to 100 rad, horizons 5 to 60: there is a plan from every start that
-/// IPOPT finds one from, and it costs as much. The plan keeps bounds between the samples and room for
-/// the integration error besides, which IPOPT's need not: from one start of a thousand, with a horizon
-/// of a quarter of a second, there is only a plan with more Runge-Kutta steps and so less room. It once
-/// began with twelve times the cost: the search ended at its first plan.
+/// IPOPT finds one from, and it costs as much, although it keeps bounds between the samples and room for
+/// the integration error besides. It once began with twelve times the cost: the search ended at its first
+/// plan. From one start it once found none: the far set point drew every proposal beyond a bound.
 #[test]
 fn the_first_plan_is_the_optimum() {
     let prepared = prepared();
-    let first = |prepared: &Prepared, row: &[f64]| {
-        let mut controller = controller(prepared, row[0], 1);
-        let mut workspace = controller.workspace::<5>();
-        let step = controller.step(&start(row), row[5], &mut workspace);
-        step.decision.is_guaranteed().then_some(step.cost / row[7])
-    };
     let rows = rows("optima.csv");
     assert_eq!(rows.len(), 1000);
-    let (known, unknown): (Vec<_>, Vec<_>) = rows
-        .iter()
-        .map(|row| (row, first(&prepared, row)))
-        .partition(|(_, ratio)| ratio.is_some());
-    assert!(unknown.len() <= 1, "{unknown:?}");
-    let mut finer = Scenario::load("far-setpoints").unwrap();
-    finer.controller.terminal = TerminalTable::Certified(CertifiedTable {
-        substeps: Some(20),
-        ..Default::default()
-    });
-    let finer = finer.prepare(Path::new(".")).unwrap();
-    for (row, _) in unknown {
-        assert!(first(&finer, row).is_some(), "{row:?}");
-    }
-    let mut ratios: Vec<f64> = known.into_iter().filter_map(|(_, ratio)| ratio).collect();
+    let ratio = |row: &Vec<f64>| {
+        let mut controller = controller(&prepared, row[0], 1);
+        let mut workspace = controller.workspace::<5>();
+        let step = controller.step(&start(row), row[5], &mut workspace);
+        assert!(step.decision.is_guaranteed(), "{row:?}: {step:?}");
+        step.cost / row[7]
+    };
+    let mut ratios: Vec<f64> = rows.iter().map(ratio).collect();
     assert!(quantile(&mut ratios, 0.0) > 0.999, "{ratios:?}");
     assert!(quantile(&mut ratios, 0.5) < 1.005, "{ratios:?}");
     assert!(quantile(&mut ratios, 0.95) < 1.1, "{ratios:?}");
@@ -82,9 +68,8 @@ fn the_first_plan_is_the_optimum() {
 fn closed_loops_cost_what_converged_nonlinear_mpc_costs() {
     let prepared = prepared();
     let rows = rows("loops.csv");
-    assert_eq!(rows.len(), 607);
+    assert_eq!(rows.len(), 1000);
     let mut ratios = closed_loop_costs(&prepared, 1, &rows);
-    assert!(ratios.len() >= 606, "{}", ratios.len());
     assert!(quantile(&mut ratios, 0.5) < 1.01, "{ratios:?}");
     assert!(quantile(&mut ratios, 0.95) < 1.05, "{ratios:?}");
     assert!(quantile(&mut ratios, 1.0) < 1.1, "{ratios:?}");
@@ -94,30 +79,26 @@ fn closed_loops_cost_what_converged_nonlinear_mpc_costs() {
 #[test]
 fn closed_loops_with_three_programs_cost_still_less() {
     let mut ratios = closed_loop_costs(&prepared(), 3, &rows("loops.csv")[..90]);
-    assert_eq!(ratios.len(), 90);
     assert!(quantile(&mut ratios, 0.5) < 1.01, "{ratios:?}");
     assert!(quantile(&mut ratios, 1.0) < 1.06, "{ratios:?}");
 }
 
-/// The closed loops' costs in IPOPT's, where there is a first plan; every later sample must have one.
+/// The closed loops' costs in IPOPT's; every sample must have a plan.
 fn closed_loop_costs(prepared: &Prepared, programs: usize, rows: &[Vec<f64>]) -> Vec<f64> {
     let weights = prepared.settings.weights;
     let plant = Rk4 { substeps: 40 };
-    let mut ratio = |row: &Vec<f64>| {
+    let ratio = |row: &Vec<f64>| {
         let mut controller = controller(prepared, row[0], programs);
         let mut workspace = controller.workspace::<5>();
         let (mut x, mut cost) = (start(row), 0.0);
         for k in 0..row[6] as usize {
             let step = controller.step(&x, row[5], &mut workspace);
-            if !step.decision.is_guaranteed() {
-                assert_eq!(k, 0, "{row:?}: {step:?}");
-                return None;
-            }
+            assert!(step.decision.is_guaranteed(), "{k} {row:?}: {step:?}");
             let error = x - Vector4::x() * row[5];
             cost += (weights.q * error).dot(&error) + (weights.r * step.u).dot(&step.u);
             x = plant.advance(&prepared.ballbot, &x, &step.u, 0.05);
         }
-        Some(cost / row[7])
+        cost / row[7]
     };
-    rows.iter().filter_map(&mut ratio).collect()
+    rows.iter().map(ratio).collect()
 }

@@ -63,6 +63,18 @@ impl<T: Scalar> Aims<T> {
         let last_change = self.stages.iter().rposition(|aim| *aim != end);
         self.changes = last_change.map_or(0, |i| i + 1);
     }
+
+    /// Aims at `set_point` alone; the answer is what [`Aims::go_on`] takes back.
+    pub fn stay(&mut self, set_point: T) -> (T, usize) {
+        let before = (self.end, self.changes);
+        (self.end, self.changes) = (set_point, 0);
+        before
+    }
+
+    /// Aims at what was aimed at `before`.
+    pub fn go_on(&mut self, before: (T, usize)) {
+        (self.end, self.changes) = before;
+    }
 }
 
 /// The farthest set point whose distance, squared, still tells a move by `extent`.

@@ -50,3 +50,198 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> LeastCost<'a, T, NX, NU> {
         self.constant - self.slope * self.slope / self.curvature
     }
 }
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use crate::guaranteed::plan::Plan;
+    use crate::guaranteed::{
+        GuaranteedController, GuaranteedIterations, GuaranteedSettings, Rollout, SetPoints,
+        TerminalSet,
+    };
+    use crate::list::List;
+    use crate::model::LpvModel;
+    use crate::ocp::Bounds;
+    use crate::predictor::Rk4;
+    use crate::settings::Weights;
+    use crate::solver::SolverSettings;
+    use alloc::vec::Vec;
+    use lpvmpc_testkit::rng::Rng;
+    use nalgebra::{Matrix1, Matrix1x3, Matrix3, Vector1, Vector3};
+
+    const N: usize = 12;
+
+    /// Place, speed and the lag of a drive; drag grows with the speed squared.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    struct Carriage {
+        drag: f64,
+        lag: f64,
+    }
+
+    impl LpvModel<f64, 3, 1, 1> for Carriage {
+        fn scheduling(&self, x: &Vector3<f64>, _: &Vector1<f64>) -> Vector1<f64> {
+            Vector1::new(x[1] * x[1])
+        }
+
+        fn matrices(&self, s: &Vector1<f64>) -> (Matrix3<f64>, Vector3<f64>) {
+            let drag = -self.drag * s[0];
+            let a = Matrix3::new(0.0, 1.0, 0.0, 0.0, drag, 1.0, 0.0, 0.0, -self.lag);
+            (a, Vector3::new(0.0, 0.0, self.lag))
+        }
+    }
+
+    fn vector<const K: usize>(random: &mut Rng, size: f64) -> SVector<f64, K> {
+        SVector::from_fn(|_, _| random.uniform(-size, size))
+    }
+
+    /// Positive definite, of random size.
+    fn weight(random: &mut Rng) -> Matrix3<f64> {
+        let root = Matrix3::from_fn(|_, _| random.uniform(-1.0, 1.0));
+        (root * root.transpose() + Matrix3::identity() * 0.01) * random.power_of_ten(-1.0, 3.0)
+    }
+
+    fn settings(random: &mut Rng) -> GuaranteedSettings<f64, 3, 1> {
+        GuaranteedSettings {
+            t_s: 0.1,
+            horizon: N,
+            rk4: Rk4 { substeps: 1 },
+            rollout: Rollout {
+                rk4: Rk4 { substeps: 2 },
+                error: Vector3::repeat(1e-6),
+                between: Vector3::repeat(1e-3),
+            },
+            weights: Weights {
+                q: weight(random),
+                r: Matrix1::new(random.power_of_ten(-2.0, 2.0)),
+            },
+            terminal: TerminalSet {
+                gain: Matrix1x3::new(1.0, 1.5, 0.5),
+                p: weight(random) * 10.0,
+                level: random.power_of_ten(0.0, 6.0),
+            },
+            x: Bounds {
+                lower: Vector3::new(f64::NEG_INFINITY, -3.0, -3.0),
+                upper: Vector3::new(f64::INFINITY, 3.0, 3.0),
+            },
+            u: Bounds {
+                lower: Vector1::new(-2.0),
+                upper: Vector1::new(2.0),
+            },
+            direction: Vector3::x(),
+            set_points: [f64::NEG_INFINITY, f64::INFINITY],
+            offset_weight: random.power_of_ten(-1.0, 4.0),
+            margin: 4e-3,
+            iterations: GuaranteedIterations {
+                known: 1,
+                unknown: 10,
+            },
+            soft_price: 1e3,
+            solver: SolverSettings::default(),
+        }
+    }
+
+    fn aims(random: &mut Rng, last: f64) -> Aims<f64> {
+        let mut aims = Aims::new(List::repeat(0.0, N));
+        let stages: [f64; N] = core::array::from_fn(|_| random.uniform(-9.0, 9.0));
+        let seen = random.index(N + 1);
+        let wanted = SetPoints {
+            stages: &stages[..seen],
+            end: random.uniform(-99.0, 99.0),
+        };
+        aims.take(&wanted, last, [f64::NEG_INFINITY, f64::INFINITY]);
+        aims
+    }
+
+    /// For any first samples, no set point makes them and the offset cheaper, and one is as cheap.
+    #[test]
+    fn it_is_the_least_cost_over_all_set_points() {
+        let mut random = Rng::new(5);
+        for _ in 0..300 {
+            let settings = settings(&mut random);
+            let near = random.uniform(-99.0, 99.0);
+            let aims = aims(&mut random, near);
+            let Weights { q, r } = settings.weights;
+            let samples: Vec<(Vector3<f64>, Vector1<f64>)> = (0..1 + random.index(N))
+                .map(|_| {
+                    let x = vector(&mut random, 5.0) + Vector3::x() * near;
+                    (x, vector(&mut random, 2.0))
+                })
+                .collect();
+            let mut least = LeastCost::new(&settings, &aims, near);
+            for (i, (x, u)) in samples.iter().enumerate() {
+                least.add(i, x, u);
+            }
+            let cost = |z: f64| {
+                let stage = |(i, (x, u)): (usize, &(Vector3<f64>, Vector1<f64>))| {
+                    let aim = if i < aims.changes { aims.stages[i] } else { z };
+                    let error = x - Vector3::x() * aim;
+                    (error.transpose() * q * error + u.transpose() * r * u)[0]
+                };
+                let stages: f64 = samples.iter().enumerate().map(stage).sum();
+                stages + settings.offset_weight * (z - aims.end).powi(2)
+            };
+            // Golden sections: it is a parabola.
+            let (mut low, mut high) = (-1e3, 1e3);
+            for _ in 0..100 {
+                let part = 0.381_966_011_250_105 * (high - low);
+                if cost(low + part) < cost(high - part) {
+                    high -= part;
+                } else {
+                    low += part;
+                }
+            }
+            let smallest = cost(low);
+            let rounding = 1e-9 * cost(near).max(smallest);
+            let value = least.value();
+            assert!((value - smallest).abs() <= rounding, "{value} {smallest}");
+        }
+    }
+
+    /// A rollout that is ended would have cost more than what it had to beat, or have left the bounds; any
+    /// other is the one without an end.
+    #[test]
+    fn what_it_ends_is_no_better_plan() {
+        let mut random = Rng::new(6);
+        let (mut ended, mut whole) = (0, 0);
+        for _ in 0..300 {
+            let plant = Carriage {
+                drag: random.uniform(0.0, 1.0),
+                lag: random.uniform(1.0, 9.0),
+            };
+            let settings = settings(&mut random);
+            let mut planner = GuaranteedController::allocate(plant, settings)
+                .unwrap()
+                .planner;
+            let start: Vector3<f64> = vector(&mut random, 2.5);
+            planner.aims = aims(&mut random, start[0]);
+            let plan = || Plan::new(List::repeat(super::super::PlannedStage::zeros(), N));
+            let [mut along, mut expected, mut found] = [plan(), plan(), plan()];
+            planner.follow_terminal_law(&start, &mut along);
+            let policy: Vec<_> = along
+                .states()
+                .zip(&along.stages)
+                .map(|(x, stage)| {
+                    let gain = Matrix1x3::from_fn(|_, _| random.uniform(-1.0, 0.0));
+                    let x = x + vector::<3>(&mut random, 1.0);
+                    (x, stage.u + vector::<1>(&mut random, 1.0), gain)
+                })
+                .collect();
+            let towards = || policy.iter().copied();
+            planner.go_between(&along, towards(), 1.0, None, &mut expected);
+            for part in [0.3, 0.9, 0.999, 1.001, 1.1, 3.0] {
+                let most = expected.cost * part;
+                planner.go_between(&along, towards(), 1.0, Some(most), &mut found);
+                if found.cost.is_finite() {
+                    whole += 1;
+                    assert_eq!(found.stages[..], expected.stages[..]);
+                    assert_eq!(found.cost, expected.cost);
+                    assert_eq!(found.set_point, expected.set_point);
+                } else {
+                    ended += 1;
+                    assert!(expected.cost > most || !planner.is_feasible(&expected));
+                }
+            }
+        }
+        assert!(ended > 300 && whole > 300, "{ended} {whole}");
+    }
+}

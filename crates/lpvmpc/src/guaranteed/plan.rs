@@ -135,7 +135,7 @@ where
     }
 
     /// `plan` becomes the whole of `last` once more, from where the plant has gone since, unless that
-    /// costs more than `most`: the best plan of a plant that is on its way changes little from sample to
+    /// leaves the bounds or costs more than `most`: the best plan of a plant that is on its way changes little from sample to
     /// sample, but for the place.
     pub(super) fn repeat(
         &self,
@@ -200,8 +200,9 @@ where
         (u, feedback)
     }
 
-    /// `plan` becomes that of a policy that lies a `fraction` of the way from `along` to `towards`, unless
-    /// that costs more than `most`: planned states, inputs and feedback matrices from stage 0 on.
+    /// `plan` becomes that of a policy that lies a `fraction` of the way from `along` to `towards`, planned
+    /// states, inputs and feedback matrices from stage 0 on; with the `most` that it may cost, unless it costs
+    /// more or leaves the bounds.
     pub(super) fn go_between(
         &self,
         along: &Plan<T, NX, NU>,
@@ -231,7 +232,7 @@ where
 
     /// `plan` becomes the rollout under `input`, which gives the input and the feedback matrix at each
     /// stage's state. With a set point nearby and the `most` that it may cost, it ends, and the answer is
-    /// `false`, where every plan that begins like this costs more.
+    /// `false`, where every plan that begins like this costs more or leaves the bounds.
     fn simulate(
         &self,
         x0: &SVector<T, NX>,
@@ -269,6 +270,10 @@ where
                 lowest,
                 drift: SVector::zeros(),
             };
+            if most.is_some() && !self.keeps(&settings.x, stage, &SVector::zeros()) {
+                plan.cost = convert(f64::INFINITY);
+                return false;
+            }
         }
         (plan.start, plan.end, plan.end_drift) = (*x0, x, T::zero());
         true
@@ -316,8 +321,16 @@ where
         plan.cost = self.cost(plan);
     }
 
+    /// Aims at what was `wanted` before, if anything else was since, and gives the `plan` its cost for it.
+    pub(super) fn aim_again(&mut self, wanted: Option<(T, usize)>, plan: &mut Plan<T, NX, NU>) {
+        if let Some(wanted) = wanted {
+            self.aims.go_on(wanted);
+            plan.cost = self.cost(plan);
+        }
+    }
+
     /// The plan's cost for what it is aimed at.
-    fn cost(&self, plan: &Plan<T, NX, NU>) -> T {
+    pub(super) fn cost(&self, plan: &Plan<T, NX, NU>) -> T {
         let (settings, aims) = (&self.settings, &self.aims);
         let offset = plan.set_point - aims.end;
         let mut cost = settings.offset_weight * offset * offset;
@@ -348,8 +361,31 @@ where
         let after = plan.stages.iter().map(|stage| stage.drift);
         let before = core::iter::once(SVector::zeros()).chain(after.clone());
         let drift = before.zip(after).map(|(before, after)| before.sup(&after));
-        let rounding = self.settings.margin * convert::<f64, T>(0.01);
-        self.holds(plan, drift, plan.end_drift, rounding)
+        self.holds(plan, drift, plan.end_drift, self.rounding())
+    }
+
+    /// The same, and how far from `plan` that is, as far as it has to be known.
+    pub(super) fn becomes_robust(&self, plan: &mut Plan<T, NX, NU>) -> bool {
+        let x = shrunk(&self.settings.x, self.rounding());
+        self.find_drift_while(plan, |stage, before| {
+            self.keeps(&x, stage, &before.sup(&stage.drift))
+        }) && self.is_robust(plan)
+    }
+
+    /// The part of the bounds' width that new plans keep away from them for rounding.
+    fn rounding(&self) -> T {
+        self.settings.margin * convert::<f64, T>(0.01)
+    }
+
+    /// Whether a sample keeps away from the bounds `x` by `drift`, between the Runge-Kutta steps, too.
+    fn keeps(
+        &self,
+        x: &Bounds<T, NX>,
+        stage: &PlannedStage<T, NX, NU>,
+        drift: &SVector<T, NX>,
+    ) -> bool {
+        let room = self.settings.rollout.between + drift;
+        x.hold_at(&(stage.highest + room)) && x.hold_at(&(stage.lowest - room))
     }
 
     /// Whether the plan keeps away from all bounds by `drift` and `margin` times their width.
@@ -365,7 +401,6 @@ where
         let [lower, upper] = settings.set_points;
         let reached = self.terminal_value(&plan.end, plan.set_point).sqrt() + end_drift;
         let level = settings.terminal.level * (T::one() - margin);
-        let between = settings.rollout.between;
         // Where nothing drifts, the end is compared as it is: a root rounds.
         let inside = if end_drift > T::zero() {
             reached * reached <= level
@@ -373,10 +408,11 @@ where
             self.terminal_value(&plan.end, plan.set_point) <= level
         };
         plan.cost.is_finite()
-            && plan.stages.iter().zip(drift).all(|(stage, drift)| {
-                let room = between + drift;
-                x.hold_at(&(stage.highest + room)) && x.hold_at(&(stage.lowest - room))
-            })
+            && plan
+                .stages
+                .iter()
+                .zip(drift)
+                .all(|(stage, drift)| self.keeps(&x, stage, &drift))
             && plan
                 .stages
                 .iter()

@@ -19,13 +19,15 @@ where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
-    /// Quadratic programs along the plan `along`, each answer confirmed by the rollout. Where one or more
+    /// Quadratic programs along the plan `along`, the first from a `warm_start`, each answer confirmed by the
+    /// rollout. Where one or more
     /// are confirmed and cost less than what is `known` (its kind, and the least cost), `along` becomes
     /// the best of them, and the answer is its gap. The search goes on after a first one as long as there
     /// are programs left and the cost falls.
     pub(super) fn improve<const NA: usize>(
         &mut self,
         known: Option<(Decision, T)>,
+        mut warm_start: WarmStart,
         workspace: &mut GuaranteedWorkspace<T, NU, NA>,
     ) -> Option<SVector<T, NX>> {
         let Self {
@@ -44,7 +46,8 @@ where
         let mut improved = None;
         let mut in_vain = 0;
         let mut served = planner.damping;
-        let mut warm_start = WarmStart::Same;
+        // What is aimed at, while a first plan is looked for without it.
+        let mut wanted = None;
         for _ in 0..most {
             planner.pose(along, &mut workspace.ocp);
             planner.solve(workspace, warm_start);
@@ -77,7 +80,14 @@ where
                         // At a plan that nothing improves on, damping says nothing of the next
                         // sample's.
                         planner.damping = served;
-                        break;
+                        if least.is_some() || wanted.is_some() {
+                            break;
+                        }
+                        // A far set point draws plans to the bounds; away from it there may be one.
+                        wanted = Some(planner.aims.stay(along.set_point));
+                        along.cost = planner.cost(along);
+                        (planner.damping, planner.slope) = (T::zero(), Slope::Jacobian);
+                        in_vain = 0;
                     }
                     continue;
                 }
@@ -90,6 +100,7 @@ where
                 least.is_some_and(|least| !planner.is_worthwhile(least - trial.cost, least));
             swap(along, trial);
             if found.feasible {
+                planner.aim_again(wanted.take(), along);
                 least = Some(along.cost);
                 improved = Some(found.gap);
             }
@@ -97,6 +108,7 @@ where
                 break;
             }
         }
+        planner.aim_again(wanted, along);
         improved
     }
 
@@ -187,10 +199,7 @@ where
     /// Whether the rollout keeps all bounds wherever the plant can be that follows it, which is worked out
     /// where it does so itself.
     fn judge(&self, plan: &mut Plan<T, NX, NU>) -> bool {
-        self.is_feasible(plan) && {
-            self.find_drift(plan);
-            self.is_robust(plan)
-        }
+        self.is_feasible(plan) && self.becomes_robust(plan)
     }
 
     /// Whether a change of the `cost` by so much, up or down, is worth another program.
@@ -205,10 +214,12 @@ where
         relative + absolute
     }
 
-    /// More damping where a program's answer did not hold, less where all of it did.
+    /// More damping where a program's answer did not hold, less where all of it did. At its largest it is
+    /// not what the last one to hold had asked for, and falls faster.
     fn damp(&mut self, fraction: Option<f64>) {
-        let least: T = convert(0.1);
+        let [least, most] = [0.1, 1e3].map(convert::<f64, T>);
         let factor = match fraction {
+            Some(1.0) if self.damping >= most => 0.03,
             Some(1.0) => 0.1,
             Some(0.5) => 1.5,
             Some(_) => 3.0,
@@ -218,7 +229,7 @@ where
         self.damping = if damping < least {
             T::zero()
         } else {
-            damping.min(convert(1e3))
+            damping.min(most)
         };
     }
 

@@ -24,15 +24,28 @@ where
 {
     /// Works out how far the plant may be from the states of `plan`.
     pub(super) fn find_drift(&self, plan: &mut Plan<T, NX, NU>) {
+        self.find_drift_while(plan, |_, _| true);
+    }
+
+    /// The same, as long as the samples, each with the drift before it, are `accepted`; whether all are.
+    pub(super) fn find_drift_while(
+        &self,
+        plan: &mut Plan<T, NX, NU>,
+        accepted: impl Fn(&PlannedStage<T, NX, NU>, &SVector<T, NX>) -> bool,
+    ) -> bool {
         let mut shape = SMatrix::zeros();
-        let mut x = plan.start;
+        let (mut x, mut before) = (plan.start, SVector::zeros());
         for stage in plan.stages.iter_mut() {
             let slopes = self.slopes(&x, &stage.u);
             shape = self.carried(&shape, (&x, &stage.u), &slopes, &stage.feedback);
             stage.drift = shape.diagonal().map(root);
-            x = stage.x;
+            if !accepted(stage, &before) {
+                return false;
+            }
+            (x, before) = (stage.x, stage.drift);
         }
         plan.end_drift = self.size_at_end(&shape);
+        true
     }
 
     /// The same under the policy of the program that was made along `plan`, with its derivatives: what

@@ -161,6 +161,39 @@ fn many_bounds_at_once_take_fewer_changes() {
     }
 }
 
+/// A body on its way to a far target, at its largest speed and acceleration: bounds of states decide.
+/// Guesses of the inputs come to nothing there, and are not made.
+#[test]
+fn where_bounds_of_states_decide_inputs_are_not_guessed() {
+    const N: usize = 40;
+    let mut ocp = Ocp::<f64, 3, 1>::allocate(N);
+    ocp.horizon = N;
+    let h = 0.1;
+    for stage in ocp.stages.iter_mut() {
+        stage.a = SMatrix::<f64, 3, 3>::new(1.0, h, h * h / 2.0, 0.0, 1.0, h, 0.0, 0.0, 1.0);
+        stage.b = SMatrix::<f64, 3, 1>::new(h * h * h / 6.0, h * h / 2.0, h);
+        stage.linear_x = SVector::<f64, 3>::new(-1e3, 0.0, 0.0);
+    }
+    ocp.common.q = SMatrix::from_diagonal(&SVector::<f64, 3>::new(1.0, 0.1, 0.1));
+    ocp.common.r = SMatrix::<f64, 1, 1>::new(0.1);
+    ocp.terminal.p = ocp.common.q * 100.0;
+    ocp.terminal.linear_x = SVector::<f64, 3>::new(-1e5, 0.0, 0.0);
+    ocp.common.x.upper = SVector::<f64, 3>::new(f64::INFINITY, 1.0, 1.0);
+    ocp.common.x.lower = -ocp.common.x.upper;
+    ocp.terminal.x = ocp.common.x;
+    (ocp.common.u.lower[0], ocp.common.u.upper[0]) = (-1.0, 1.0);
+    let mut both = Both::<3, 1>::new::<N, 120>();
+    for speed in [0.0, 0.5, 1.0] {
+        let mut findings = Findings::default();
+        ocp.x0[1] = speed;
+        for warm_start in [WarmStart::Cold, WarmStart::Same] {
+            both.solve(&ocp, warm_start, &mut findings);
+        }
+        assert_eq!(findings.many, 2, "{findings:?}");
+        assert_eq!(findings.at_once, findings.one_by_one, "{findings:?}");
+    }
+}
+
 /// Memory of the first phase for shorter horizons changes nothing for longer ones.
 #[test]
 fn too_little_memory_for_bounds_at_once_is_none() {
