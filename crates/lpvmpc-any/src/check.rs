@@ -50,7 +50,9 @@ impl Names {
             );
             return Err(MpcError::new(place, fault));
         }
-        Ok(SVector::from_fn(|i, _| entries.get(i).copied().unwrap_or(0.0)))
+        Ok(SVector::from_fn(|i, _| {
+            entries.get(i).copied().unwrap_or(0.0)
+        }))
     }
 
     /// A vector of finite numbers.
@@ -145,10 +147,7 @@ impl Names {
     ) -> Result<GeneralRow<f64, NX, NU>, MpcError> {
         let place = format!("{place} `{}`", row.name);
         let entries = |vector: &DVector<f64>| vector.as_slice().to_vec();
-        if !(row.lower <= row.upper
-            && row.lower < f64::INFINITY
-            && row.upper > f64::NEG_INFINITY)
-        {
+        if !(row.lower <= row.upper && row.lower < f64::INFINITY && row.upper > f64::NEG_INFINITY) {
             let fault = format!(
                 "its lower bound is {} and its upper one {}; the lower must not exceed the upper",
                 row.lower, row.upper

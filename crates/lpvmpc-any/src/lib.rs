@@ -50,4 +50,4 @@ pub use lpvmpc::{Iterations, Penalty};
 pub use mpc::{MOST_INPUTS, MOST_STATES, Mpc};
 pub use plan::{ActiveBound, Plan};
 pub use preview::Preview;
-pub use settings::{LinearModels, Limits, MpcSettings, Row, StateBounds, Terminal};
+pub use settings::{Limits, LinearModels, MpcSettings, Row, StateBounds, Terminal};

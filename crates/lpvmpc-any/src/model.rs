@@ -97,7 +97,8 @@ impl<const NX: usize, const NU: usize, const NS: usize> Model<NX, NU, NS> {
                     _ => USUAL_NODES,
                 };
                 if nodes == 0 || nodes > GaussLegendre::MOST {
-                    let fault = format!("{nodes} nodes; there must be 1 to {}", GaussLegendre::MOST);
+                    let fault =
+                        format!("{nodes} nodes; there must be 1 to {}", GaussLegendre::MOST);
                     return Err(MpcError::new("linear_models", fault));
                 }
                 Self::Ray(AlongRay {

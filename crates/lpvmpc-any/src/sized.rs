@@ -12,8 +12,8 @@ use lpvmpc::{
     Predictor, Quantity, Reference, Rk4, TerminalIngredient, Weights, Workspace,
 };
 use lpvmpc_design::{
-    MatrixError, check_positive_definite, check_positive_semidefinite, checked_symmetric, lqr_discrete,
-    zero_order_hold,
+    MatrixError, check_positive_definite, check_positive_semidefinite, checked_symmetric,
+    lqr_discrete, zero_order_hold,
 };
 use lpvmpc_plant::{Plant, Signal, SizedPlant};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
@@ -90,11 +90,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         set.map_err(|error| MpcError::new("rows", error.to_string()))
     }
 
-    fn rows(
-        &self,
-        place: &str,
-        rows: &[Row],
-    ) -> Result<Vec<GeneralRow<f64, NX, NU>>, MpcError> {
+    fn rows(&self, place: &str, rows: &[Row]) -> Result<Vec<GeneralRow<f64, NX, NU>>, MpcError> {
         let rows = rows.iter();
         rows.map(|row| self.names.row(place, row)).collect()
     }
@@ -152,7 +148,12 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
     /// The plant with other parameters.
     fn model_with(&self, place: &str, values: &[f64]) -> Result<Model<NX, NU, NS>, MpcError> {
         let mut plant = self.plant.clone();
-        let known: Vec<String> = plant.data().parameters.iter().map(|p| p.name.clone()).collect();
+        let known: Vec<String> = plant
+            .data()
+            .parameters
+            .iter()
+            .map(|p| p.name.clone())
+            .collect();
         if values.len() != known.len() {
             let fault = format!(
                 "it has {} values; there must be {} ({})",
@@ -170,7 +171,13 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
     }
 
     /// The answer of the last step, in the plant's sizes and names.
-    fn plan(&self, x: &SVector<f64, NX>, rows: &[Vec<String>], filled: &Filled<NX, NU, NS>, cost: f64) -> Plan {
+    fn plan(
+        &self,
+        x: &SVector<f64, NX>,
+        rows: &[Vec<String>],
+        filled: &Filled<NX, NU, NS>,
+        cost: f64,
+    ) -> Plan {
         let solution = self.controller.solution();
         let (n, m) = (self.names.states.len(), self.names.inputs.len());
         let horizon = self.settings.horizon;
@@ -321,7 +328,9 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
         self.controller
             .set_settings(of_controller)
             .map_err(refused)?;
-        self.controller.set_rows(List::Owned(rows.into_boxed_slice())).map_err(refused)?;
+        self.controller
+            .set_rows(List::Owned(rows.into_boxed_slice()))
+            .map_err(refused)?;
         self.controller.set_model(model);
         let capacity = of_controller.capacity().with_own_stages();
         self.workspace = Workspace::allocate(capacity.with_general_rows(settings.rows.len()));
@@ -394,8 +403,14 @@ fn controller_settings<const NX: usize, const NU: usize, const NS: usize>(
     let limits = |given: &Option<Limits>, signals: &[Signal]| match given {
         Some(limits) => limits.clone(),
         None => Limits {
-            lower: signals.iter().map(|one| one.lower.unwrap_or(f64::NEG_INFINITY)).collect(),
-            upper: signals.iter().map(|one| one.upper.unwrap_or(f64::INFINITY)).collect(),
+            lower: signals
+                .iter()
+                .map(|one| one.lower.unwrap_or(f64::NEG_INFINITY))
+                .collect(),
+            upper: signals
+                .iter()
+                .map(|one| one.upper.unwrap_or(f64::INFINITY))
+                .collect(),
         },
     };
     let x = limits(&settings.x_bounds, &data.states);
@@ -445,7 +460,10 @@ fn controller_settings<const NX: usize, const NU: usize, const NS: usize>(
                 }
             }
             let mut soft_x = [None; NX];
-            soft_x.iter_mut().zip(prices).for_each(|(place, price)| *place = *price);
+            soft_x
+                .iter_mut()
+                .zip(prices)
+                .for_each(|(place, price)| *place = *price);
             ControllerSettings {
                 x: bounds.x,
                 soft_x,

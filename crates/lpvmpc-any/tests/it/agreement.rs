@@ -3,10 +3,10 @@
 use crate::plants::{CartPole, Chain, cart_pole, chain};
 use ballbot::Ballbot;
 use lpvmpc::{
-    AlongMotion, Bounds, Controller, ControllerSettings, InputReference, LpvModel, Reference, Rk4,
-    TerminalIngredient, Weights,
+    AlongMotion, Bounds, Controller, ControllerSettings, InputReference, Iterations, LpvModel,
+    Reference, Rk4, TerminalIngredient, Weights,
 };
-use lpvmpc_any::{LinearModels, Limits, Mpc, MpcSettings, Preview, StateBounds, Terminal};
+use lpvmpc_any::{Limits, LinearModels, Mpc, MpcSettings, Preview, StateBounds, Terminal};
 use lpvmpc_plant::{Plant, PlantData};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
@@ -28,7 +28,8 @@ where
     P: LpvModel<f64, NX, NU, NS>,
 {
     fn new(model: P, plant: &Plant, settings: ControllerSettings<f64, NX, NU, NS>) -> Self {
-        let dynamic = |rows: usize, entries: &[f64]| DMatrix::from_column_slice(rows, rows, entries);
+        let dynamic =
+            |rows: usize, entries: &[f64]| DMatrix::from_column_slice(rows, rows, entries);
         let any = MpcSettings {
             q: dynamic(NX, settings.weights.q.as_slice()),
             r: dynamic(NU, settings.weights.r.as_slice()),
@@ -59,7 +60,12 @@ where
 
     /// The largest difference of the inputs in so many samples, each towards one of the references for half
     /// of them.
-    fn largest_difference(&mut self, start: [f64; NX], references: [[f64; NX]; 2], samples: usize) -> f64 {
+    fn largest_difference(
+        &mut self,
+        start: [f64; NX],
+        references: [[f64; NX]; 2],
+        samples: usize,
+    ) -> f64 {
         let mut workspace = self.fixed.workspace();
         let mut x = SVector::<f64, NX>::from(start);
         let mut largest = 0.0_f64;
@@ -93,23 +99,38 @@ fn weights<const NX: usize, const NU: usize>(q: [f64; NX], r: [f64; NU]) -> Weig
 
 fn bounds<const K: usize>(half: [f64; K]) -> Bounds<f64, K> {
     let upper = SVector::from(half);
-    Bounds { lower: -upper, upper }
+    Bounds {
+        lower: -upper,
+        upper,
+    }
 }
 
 #[test]
 fn a_ballbot_from_data_is_driven_as_the_one_in_rust() {
     let robot = Ballbot::<f64>::paper();
     let plant = Plant::new(PlantData::of_embedding("ballbot", &robot)).unwrap();
-    for terminal in [
-        TerminalIngredient::Cost(SMatrix::<f64, 4, 4>::identity() * 50.0),
-        TerminalIngredient::Equality,
-    ] {
-        let weights = weights([20.0, 0.1, 1.0, 1.0], [10.0]);
-        let settings = ControllerSettings::new(0.05, 20, weights, terminal, bounds([0.6]));
-        let settings = settings.soft_bounds(bounds([20.0, 0.4, 10.0, 4.0]));
-        let mut pair = Pair::new(robot, &plant, settings);
-        let difference = pair.largest_difference([0.0; 4], [[3.0, 0.0, 0.0, 0.0], [0.0; 4]], 120);
-        assert!(difference < 1e-10, "{terminal:?}: {difference:e} N m");
+    // The robot's own f is in closed form, its file's is A(s) x + B(s) u: they differ by rounding. A
+    // descent compares costs, which then may decide by their last bits, to its tolerance.
+    let descent = Iterations::default();
+    for (iterations, bound) in [(Iterations::Fixed(1), 1e-10), (descent, 1e-7)] {
+        for terminal in [
+            TerminalIngredient::Cost(SMatrix::<f64, 4, 4>::identity() * 50.0),
+            TerminalIngredient::Equality,
+        ] {
+            let weights = weights([20.0, 0.1, 1.0, 1.0], [10.0]);
+            let settings = ControllerSettings {
+                iterations,
+                ..ControllerSettings::new(0.05, 20, weights, terminal, bounds([0.6]))
+            };
+            let settings = settings.soft_bounds(bounds([20.0, 0.4, 10.0, 4.0]));
+            let mut pair = Pair::new(robot, &plant, settings);
+            let references = [[1.0, 0.0, 0.0, 0.0], [0.0; 4]];
+            let difference = pair.largest_difference([0.0; 4], references, 120);
+            assert!(
+                difference < bound,
+                "{iterations:?}, {terminal:?}: {difference:e} N m"
+            );
+        }
     }
 }
 
@@ -132,7 +153,11 @@ fn chain_difference<const NX: usize, const NU: usize, const NS: usize>() -> f64 
         TerminalIngredient::Cost(SMatrix::<f64, NX, NX>::identity() * 20.0),
         TerminalIngredient::Equality,
     ] {
-        let horizon = if terminal == TerminalIngredient::Equality { 40 } else { 15 };
+        let horizon = if terminal == TerminalIngredient::Equality {
+            40
+        } else {
+            15
+        };
         let weights = weights([1.0; NX], [0.1; NU]);
         let settings = ControllerSettings::new(0.1, horizon, weights, terminal, bounds([2.5; NU]));
         let settings = settings.soft_bounds(bounds([1.2; NX]));

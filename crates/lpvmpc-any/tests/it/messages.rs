@@ -18,7 +18,12 @@ fn settings() -> MpcSettings {
 fn an_infeasible_plan_names_the_bounds_that_contradict_each_other() {
     let track = MpcSettings {
         x_bounds: Some(Limits {
-            lower: vec![-0.5, f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY],
+            lower: vec![
+                -0.5,
+                f64::NEG_INFINITY,
+                f64::NEG_INFINITY,
+                f64::NEG_INFINITY,
+            ],
             upper: vec![0.5, f64::INFINITY, f64::INFINITY, f64::INFINITY],
         }),
         state_bounds: StateBounds::Hard,
@@ -26,10 +31,16 @@ fn an_infeasible_plan_names_the_bounds_that_contradict_each_other() {
     };
     let mut mpc = Mpc::new(&cart_pole(), &track).unwrap();
     // At 3 m/s the cart needs 0.45 m to stop with 10 m/s^2, and there are 0.1 m.
-    let plan = mpc.step(&[0.4, 0.0, 3.0, 0.0], &Preview::default()).unwrap();
+    let plan = mpc
+        .step(&[0.4, 0.0, 3.0, 0.0], &Preview::default())
+        .unwrap();
     assert!(!plan.is_solved());
     assert!(plan.status.starts_with("infeasible: "), "{}", plan.status);
-    for word in ["position <= 0.5 m at stage ", " against ", "force >= -10 N at stages "] {
+    for word in [
+        "position <= 0.5 m at stage ",
+        " against ",
+        "force >= -10 N at stages ",
+    ] {
         assert!(plan.status.contains(word), "{}", plan.status);
     }
     assert!(plan.u.iter().all(|u| u.abs() <= 10.0));
@@ -38,10 +49,20 @@ fn an_infeasible_plan_names_the_bounds_that_contradict_each_other() {
 #[test]
 fn active_bounds_speak_the_plants_names() {
     let mut mpc = Mpc::new(&cart_pole(), &settings()).unwrap();
-    let plan = mpc.step(&[0.0, 0.5, 0.0, 0.0], &Preview::to(&[2.0, 0.0, 0.0, 0.0])).unwrap();
+    let plan = mpc
+        .step(&[0.0, 0.5, 0.0, 0.0], &Preview::to(&[2.0, 0.0, 0.0, 0.0]))
+        .unwrap();
     assert!(plan.is_solved(), "{}", plan.status);
-    assert!(plan.active_bounds().contains("force"), "{}", plan.active_bounds());
-    assert!(plan.active.iter().all(|one| one.multiplier >= 0.0 && !one.exceeded));
+    assert!(
+        plan.active_bounds().contains("force"),
+        "{}",
+        plan.active_bounds()
+    );
+    assert!(
+        plan.active
+            .iter()
+            .all(|one| one.multiplier >= 0.0 && !one.exceeded)
+    );
     // A row of the builder's own.
     let both = Row {
         name: "cart and pole".to_owned(),
@@ -51,11 +72,21 @@ fn active_bounds_speak_the_plants_names() {
         upper: 0.2,
         soft: None,
     };
-    let rows = MpcSettings { rows: vec![both], ..settings() };
+    let rows = MpcSettings {
+        rows: vec![both],
+        ..settings()
+    };
     mpc.set_settings(&rows).unwrap();
-    let plan = mpc.step(&[0.0, 0.1, 0.0, 0.0], &Preview::to(&[2.0, 0.0, 0.0, 0.0])).unwrap();
+    let plan = mpc
+        .step(&[0.0, 0.1, 0.0, 0.0], &Preview::to(&[2.0, 0.0, 0.0, 0.0]))
+        .unwrap();
     assert!(plan.is_solved(), "{}", plan.status);
-    assert!(plan.active_bounds().contains("cart and pole <= 0.2 at stage"), "{}", plan.active_bounds());
+    assert!(
+        plan.active_bounds()
+            .contains("cart and pole <= 0.2 at stage"),
+        "{}",
+        plan.active_bounds()
+    );
     for i in 1..=20 {
         assert!(plan.x[(i, 0)] + 0.5 * plan.x[(i, 1)] <= 0.2 + 1e-6);
     }
@@ -78,22 +109,50 @@ fn settings_without_sense_are_refused_by_name() {
     refused(&|s| s.t_s = f64::NAN, &["t_s", "NaN"]);
     refused(&|s| s.horizon = 0, &["horizon is 0"]);
     refused(&|s| s.substeps = 0, &["sub-step"]);
-    refused(&|s| s.q = DMatrix::identity(3, 3), &["q", "3 x 3", "4 x 4", "position, angle, speed, rate"]);
-    refused(&|s| s.q[(1, 1)] = f64::NAN, &["q", "(1, 1) is NaN"]);
-    refused(&|s| s.q[(0, 0)] = -1.0, &["Q is not positive semidefinite", "-1"]);
-    refused(&|s| s.r[(0, 0)] = 0.0, &["R is not positive definite"]);
-    refused(&|s| s.terminal = Terminal::Cost(DMatrix::identity(2, 2)), &["terminal", "2 x 2"]);
-    refused(&|s| s.u_ref = Some(DVector::zeros(2)), &["u_ref", "2 entries", "1 (force)"]);
-    refused(&|s| s.linear_models = LinearModels::AlongRay { nodes: 40 }, &["40 nodes"]);
     refused(
-        &|s| s.u_bounds = Some(Limits { lower: vec![1.0], upper: vec![-1.0] }),
+        &|s| s.q = DMatrix::identity(3, 3),
+        &["q", "3 x 3", "4 x 4", "position, angle, speed, rate"],
+    );
+    refused(&|s| s.q[(1, 1)] = f64::NAN, &["q", "(1, 1) is NaN"]);
+    refused(
+        &|s| s.q[(0, 0)] = -1.0,
+        &["Q is not positive semidefinite", "-1"],
+    );
+    refused(&|s| s.r[(0, 0)] = 0.0, &["R is not positive definite"]);
+    refused(
+        &|s| s.terminal = Terminal::Cost(DMatrix::identity(2, 2)),
+        &["terminal", "2 x 2"],
+    );
+    refused(
+        &|s| s.u_ref = Some(DVector::zeros(2)),
+        &["u_ref", "2 entries", "1 (force)"],
+    );
+    refused(
+        &|s| s.linear_models = LinearModels::AlongRay { nodes: 40 },
+        &["40 nodes"],
+    );
+    refused(
+        &|s| {
+            s.u_bounds = Some(Limits {
+                lower: vec![1.0],
+                upper: vec![-1.0],
+            })
+        },
         &["u_bounds", "force", "from 1 to -1"],
     );
     refused(
-        &|s| s.u_bounds = Some(Limits { lower: vec![f64::NAN], upper: vec![1.0] }),
+        &|s| {
+            s.u_bounds = Some(Limits {
+                lower: vec![f64::NAN],
+                upper: vec![1.0],
+            })
+        },
         &["u_bounds", "force"],
     );
-    refused(&|s| s.state_bounds = StateBounds::Priced(vec![None; 3]), &["3 prices for 4 states"]);
+    refused(
+        &|s| s.state_bounds = StateBounds::Priced(vec![None; 3]),
+        &["3 prices for 4 states"],
+    );
     // No weight sees the position, which drifts: no regulator exists for it.
     refused(&|s| s.q.fill(0.0), &["terminal", "regulator"]);
 }
@@ -102,19 +161,42 @@ fn settings_without_sense_are_refused_by_name() {
 fn a_step_that_is_told_nonsense_is_refused_and_changes_nothing() {
     let mut mpc = Mpc::new(&cart_pole(), &settings()).unwrap();
     let x = [0.0, 0.2, 0.0, 0.0];
-    let said = mpc.step(&x[..3], &Preview::default()).unwrap_err().to_string();
-    assert_eq!(said, "x: it has 3 entries; there must be 4 (position, angle, speed, rate)");
+    let said = mpc
+        .step(&x[..3], &Preview::default())
+        .unwrap_err()
+        .to_string();
+    assert_eq!(
+        said,
+        "x: it has 3 entries; there must be 4 (position, angle, speed, rate)"
+    );
     let preview = Preview {
-        x_ref: vec![DVector::zeros(4), DVector::from_row_slice(&[0.0, f64::INFINITY, 0.0, 0.0])],
+        x_ref: vec![
+            DVector::zeros(4),
+            DVector::from_row_slice(&[0.0, f64::INFINITY, 0.0, 0.0]),
+        ],
         ..Preview::default()
     };
     let said = mpc.step(&x, &preview).unwrap_err().to_string();
     assert_eq!(said, "x_ref, stage 1: angle is inf; it must be finite");
-    let preview = Preview { parameters: vec![vec![1.0]], ..Preview::default() };
-    assert!(mpc.step(&x, &preview).unwrap_err().to_string().contains("there must be 0"));
+    let preview = Preview {
+        parameters: vec![vec![1.0]],
+        ..Preview::default()
+    };
+    assert!(
+        mpc.step(&x, &preview)
+            .unwrap_err()
+            .to_string()
+            .contains("there must be 0")
+    );
     // A measurement that is not finite has no plan, and the inputs are within their bounds.
-    let plan = mpc.step(&[0.0, f64::NAN, 0.0, 0.0], &Preview::default()).unwrap();
-    assert!(!plan.is_solved() && plan.u.iter().all(|u| u.abs() <= 10.0), "{}", plan.status);
+    let plan = mpc
+        .step(&[0.0, f64::NAN, 0.0, 0.0], &Preview::default())
+        .unwrap();
+    assert!(
+        !plan.is_solved() && plan.u.iter().all(|u| u.abs() <= 10.0),
+        "{}",
+        plan.status
+    );
     assert!(mpc.step(&x, &Preview::default()).unwrap().is_solved());
     assert!(mpc.set_parameter("mass", 1.0).is_err());
 }

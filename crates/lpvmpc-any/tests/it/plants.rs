@@ -43,7 +43,11 @@ impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for Chain {
         let number = N::constant;
         SVector::from_fn(|i, _| {
             let next = x[(i + 1) % NX];
-            let fed = if i % 2 == 0 { u[i / 2 % NU] } else { number(0.0) };
+            let fed = if i % 2 == 0 {
+                u[i / 2 % NU]
+            } else {
+                number(0.0)
+            };
             number(0.3) * x[i].sin() + number(1.5) * next.tanh() + fed
         })
     }

@@ -31,7 +31,12 @@ fn a_disturbance_that_is_known_ahead_is_met_before_it_comes() {
     assert!((1..10).any(|i| plan.x[(i, 0)].abs() > 1e-3), "{}", plan.x);
     mpc.reset();
     let calm = mpc.step(&[0.0; 4], &Preview::default()).unwrap();
-    assert!(calm.u.amax() < 1e-9 && calm.cost < 1e-12, "{} {}", calm.u, calm.cost);
+    assert!(
+        calm.u.amax() < 1e-9 && calm.cost < 1e-12,
+        "{} {}",
+        calm.u,
+        calm.cost
+    );
 }
 
 #[test]
@@ -51,7 +56,11 @@ fn bounds_and_weights_hold_where_they_are_said() {
     assert!(plan.is_solved(), "{}", plan.status);
     for i in 0..30 {
         let most = if i < 5 { 0.0 } else { 4.0 };
-        assert!(plan.u[(i, 0)].abs() <= most + 1e-9, "stage {i}: {}", plan.u[(i, 0)]);
+        assert!(
+            plan.u[(i, 0)].abs() <= most + 1e-9,
+            "stage {i}: {}",
+            plan.u[(i, 0)]
+        );
     }
     assert!(plan.u.amax() > 1.0);
 }
@@ -75,7 +84,9 @@ fn the_linear_models_do_not_decide_where_a_descent_ends() {
             ..settings()
         };
         let mut mpc = Mpc::new(&cart_pole(), &settings).unwrap();
-        let plan = mpc.step(&[0.0, 0.3, 0.0, 0.0], &Preview::default()).unwrap();
+        let plan = mpc
+            .step(&[0.0, 0.3, 0.0, 0.0], &Preview::default())
+            .unwrap();
         assert_eq!(plan.status, "converged");
         plan.cost
     });
