@@ -114,7 +114,7 @@ pub struct Row {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LinearModels {
     /// The plant's own embedding where it has one, otherwise as [`AlongRay`](Self::AlongRay) with
-    /// three nodes.
+    /// two nodes.
     #[default]
     Own,
     /// The derivatives of f along the expected motion.

@@ -1,4 +1,9 @@
 //! Controllers of any size.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on must fail, in its support functions too"
+)]
 
 mod agreement;
 mod messages;
