@@ -3,7 +3,7 @@
 
 use crate::error::MpcError;
 use crate::settings::{Limits, Row};
-use lpvmpc::{Bounds, GeneralRow};
+use lpvmpc::{Bounds, GeneralRow, Penalty};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 /// The names of a plant's states and inputs.
@@ -154,6 +154,9 @@ impl Names {
             );
             return Err(MpcError::new(place, fault));
         }
+        if let Some(price) = &row.soft {
+            check_price(&place, "it", price)?;
+        }
         Ok(GeneralRow {
             x: self.finite(Axis::States, &format!("{place}, x"), &entries(&row.x))?,
             u: self.finite(Axis::Inputs, &format!("{place}, u"), &entries(&row.u))?,
@@ -162,4 +165,17 @@ impl Names {
             soft: row.soft,
         })
     }
+}
+
+/// The price of exceeding a bound of `whose`.
+pub(crate) fn check_price(place: &str, whose: &str, price: &Penalty<f64>) -> Result<(), MpcError> {
+    let sound = |price: f64| price >= 0.0 && price.is_finite();
+    if sound(price.linear) && sound(price.quadratic) {
+        return Ok(());
+    }
+    let fault = format!(
+        "the prices of exceeding {whose} are {} and {}; they must be finite and not negative",
+        price.linear, price.quadratic
+    );
+    Err(MpcError::new(place, fault))
 }

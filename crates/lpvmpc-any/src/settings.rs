@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 pub struct MpcSettings {
     /// Sampling time, s.
     pub t_s: f64,
-    /// Prediction horizon in samples, 1 to 65 535.
+    /// Prediction horizon in samples, 1 to 1000.
     pub horizon: usize,
     /// Runge-Kutta steps per sample, at least 1.
     pub substeps: usize,
@@ -64,7 +64,7 @@ impl MpcSettings {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Terminal {
     /// The cost of the linear-quadratic regulator from there on, about the plant's steady state; about zero
-    /// where the plant's file names none.
+    /// where the plant's file names none, if it stands there.
     Lqr,
     /// (x_N - x_ref)'P (x_N - x_ref) with this P, n x n, symmetric positive semidefinite.
     Cost(DMatrix<f64>),

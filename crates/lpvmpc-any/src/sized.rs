@@ -1,6 +1,6 @@
 //! The controller of a size that was compiled, behind one that was chosen.
 
-use crate::check::{Axis, Names};
+use crate::check::{Axis, Names, check_price};
 use crate::error::MpcError;
 use crate::model::Model;
 use crate::plan::{ActiveBound, Plan};
@@ -17,6 +17,12 @@ use lpvmpc_design::{
 };
 use lpvmpc_plant::{Plant, Signal, SizedPlant};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+
+/// The longest horizon: the memory of a working set grows with its square.
+pub(crate) const MOST_SAMPLES: usize = 1000;
+
+/// What stands, up to rounding: the largest derivative of a state, in its unit per second.
+const AT_REST: f64 = 1e-6;
 
 /// A controller whose size nobody sees.
 pub(crate) trait AnySize: Send {
@@ -399,6 +405,10 @@ fn controller_settings<const NX: usize, const NU: usize, const NS: usize>(
         let fault = format!("it is {t_s} s; it must be a positive number of seconds");
         return Err(MpcError::new("t_s", fault));
     }
+    if horizon == 0 || horizon > MOST_SAMPLES {
+        let fault = format!("it is {horizon}; it must be from 1 to {MOST_SAMPLES} samples");
+        return Err(MpcError::new("horizon", fault));
+    }
     let data = plant.data();
     let limits = |given: &Option<Limits>, signals: &[Signal]| match given {
         Some(limits) => limits.clone(),
@@ -449,14 +459,9 @@ fn controller_settings<const NX: usize, const NU: usize, const NS: usize>(
                 );
                 return Err(MpcError::new("state_bounds", fault));
             }
-            let sound = |price: f64| price >= 0.0 && price.is_finite();
-            for (name, price) in names.states.iter().zip(prices.iter().flatten()) {
-                if !(sound(price.linear) && sound(price.quadratic)) {
-                    let fault = format!(
-                        "the prices of {name} are {} and {}; they must be finite and not negative",
-                        price.linear, price.quadratic
-                    );
-                    return Err(MpcError::new("state_bounds", fault));
+            for (name, price) in names.states.iter().zip(prices.iter()) {
+                if let Some(price) = price {
+                    check_price("state_bounds", name, price)?;
                 }
             }
             let mut soft_x = [None; NX];
@@ -482,6 +487,16 @@ fn cost_to_go<const NX: usize, const NU: usize, const NS: usize>(
     (x, u): (SVector<f64, NX>, SVector<f64, NU>),
 ) -> Result<SMatrix<f64, NX, NX>, MpcError> {
     let (n, m) = (names.states.len(), names.inputs.len());
+    let largest = model.derivative(&x, &u).amax();
+    if !(largest <= AT_REST) {
+        let fault = format!(
+            "the plant does not stand where its regulator is designed, at {:?} under {:?}: a state \
+             changes by {largest} per second. Give a steady state in the plant's file, or a cost",
+            &x.as_slice()[..n],
+            &u.as_slice()[..m]
+        );
+        return Err(MpcError::new("terminal", fault));
+    }
     let (a, b) = model.jacobian(&x, &u);
     let a = DMatrix::from_fn(n, n, |i, j| a[(i, j)]);
     let b = DMatrix::from_fn(n, m, |i, j| b[(i, j)]);

@@ -1,7 +1,10 @@
 //! What is refused, and what is said in the plant's names.
 
 use crate::plants::{cart_pole, chain};
-use lpvmpc_any::{Limits, LinearModels, Mpc, MpcSettings, Preview, Row, StateBounds, Terminal};
+use lpvmpc_any::{
+    Limits, LinearModels, Mpc, MpcSettings, Penalty, Preview, Row, StateBounds, Terminal,
+};
+use lpvmpc_plant::Plant;
 use nalgebra::{DMatrix, DVector};
 
 fn settings() -> MpcSettings {
@@ -107,7 +110,8 @@ fn settings_without_sense_are_refused_by_name() {
     };
     refused(&|s| s.t_s = 0.0, &["t_s", "0 s", "positive"]);
     refused(&|s| s.t_s = f64::NAN, &["t_s", "NaN"]);
-    refused(&|s| s.horizon = 0, &["horizon is 0"]);
+    refused(&|s| s.horizon = 0, &["horizon: it is 0", "1 to 1000"]);
+    refused(&|s| s.horizon = 1001, &["horizon: it is 1001", "1 to 1000"]);
     refused(&|s| s.substeps = 0, &["sub-step"]);
     refused(
         &|s| s.q = DMatrix::identity(3, 3),
@@ -211,4 +215,70 @@ fn what_is_too_large_is_refused_with_what_fits() {
         error.to_string(),
         "plant: there are 17 states and 2 inputs; a controller has at most 16 and 6"
     );
+}
+
+/// A pendulum that hangs at an angle of pi stands at zero, too; one under a constant torque does not.
+#[test]
+fn a_regulator_is_designed_only_where_the_plant_stands() {
+    let pushed = |equilibrium: &str| {
+        let text = format!(
+            r#"{{"schema": 1, "name": "pushed pendulum",
+            "states": [{{"name": "angle", "unit": "rad"}}, {{"name": "rate", "unit": "rad/s"}}],
+            "inputs": [{{"name": "torque", "unit": "N m"}}],
+            "operations": [["state", 0], ["state", 1], ["input", 0], ["constant", 9.81],
+                ["sin", 0], ["mul", 3, 4], ["add", 5, 2], ["constant", 2], ["add", 6, 7]],
+            "derivative": [1, 8]{equilibrium}}}"#
+        );
+        Plant::from_json(&text).unwrap()
+    };
+    let settings = MpcSettings::new(0.05, 20, &[1.0, 1.0], &[0.1]);
+    let Err(error) = Mpc::new(&pushed(""), &settings) else {
+        panic!("it does not stand at zero")
+    };
+    assert_eq!(error.place, "terminal");
+    assert!(error.fault.contains("2 per second"), "{error}");
+    // Held by a torque against the push it does, and that is where it goes.
+    let plant = pushed(r#", "equilibrium": {"x": [0, 0], "u": [-2]}"#);
+    let mut mpc = Mpc::new(&plant, &settings).unwrap();
+    let plan = mpc.step(&[0.0, 0.0], &Preview::default()).unwrap();
+    assert!((plan.u[(0, 0)] + 2.0).abs() < 1e-6, "{}", plan.u);
+}
+
+/// Settings that are refused leave the controller as it was, rows included.
+#[test]
+fn settings_that_are_refused_change_nothing() {
+    let mut mpc = Mpc::new(&cart_pole(), &settings()).unwrap();
+    let x = [0.0, 0.2, 0.0, 0.0];
+    let before = mpc.step(&x, &Preview::default()).unwrap();
+    let row = Row {
+        name: "both".to_owned(),
+        x: DVector::from_row_slice(&[1.0, 1.0, 0.0, 0.0]),
+        u: DVector::zeros(1),
+        lower: -1.0,
+        upper: 1.0,
+        soft: Some(Penalty {
+            linear: -1.0,
+            quadratic: 0.0,
+        }),
+    };
+    let other = MpcSettings {
+        u_bounds: Some(Limits {
+            lower: vec![-1.0],
+            upper: vec![1.0],
+        }),
+        rows: vec![row],
+        ..settings()
+    };
+    let said = mpc.set_settings(&other).unwrap_err().to_string();
+    assert!(
+        said.contains("rows `both`: the prices of exceeding it are -1 and 0"),
+        "{said}"
+    );
+    let longer = MpcSettings {
+        horizon: 30,
+        ..settings()
+    };
+    assert!(mpc.set_settings(&longer).is_err());
+    mpc.reset();
+    assert_eq!(mpc.step(&x, &Preview::default()).unwrap(), before);
 }
