@@ -3,7 +3,10 @@
 
 use crate::error::MpcError;
 use crate::settings::{Limits, Row};
-use lpvmpc::{Bounds, GeneralRow, Penalty};
+use lpvmpc::{Bounds, GeneralRow, Penalty, Weights};
+use lpvmpc_design::{
+    MatrixError, check_positive_definite, check_positive_semidefinite, checked_symmetric,
+};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 /// The names of a plant's states and inputs.
@@ -139,8 +142,39 @@ impl Names {
         Ok(bounds)
     }
 
+    /// Q and R.
+    pub fn weights<const NX: usize, const NU: usize>(
+        &self,
+        place: &str,
+        q: &DMatrix<f64>,
+        r: &DMatrix<f64>,
+    ) -> Result<Weights<f64, NX, NU>, MpcError> {
+        let (states, inputs) = ((Axis::States, Axis::States), (Axis::Inputs, Axis::Inputs));
+        let refused = |error: MatrixError| MpcError::new(place, error.to_string());
+        let weights = Weights {
+            q: self.matrix(states, &format!("{place}, q"), q, 0.0)?,
+            // An input that is left over must cost something to be none.
+            r: self.matrix(inputs, &format!("{place}, r"), r, 1.0)?,
+        };
+        let q = checked_symmetric("Q", q).map_err(refused)?;
+        check_positive_semidefinite("Q", &q).map_err(refused)?;
+        let r = checked_symmetric("R", r).map_err(refused)?;
+        check_positive_definite("R", &r).map_err(refused)?;
+        Ok(weights)
+    }
+
+    /// Linear rows.
+    pub fn rows<const NX: usize, const NU: usize>(
+        &self,
+        place: &str,
+        rows: &[Row],
+    ) -> Result<Vec<GeneralRow<f64, NX, NU>>, MpcError> {
+        let rows = rows.iter();
+        rows.map(|row| self.row(place, row)).collect()
+    }
+
     /// A linear row.
-    pub fn row<const NX: usize, const NU: usize>(
+    fn row<const NX: usize, const NU: usize>(
         &self,
         place: &str,
         row: &Row,

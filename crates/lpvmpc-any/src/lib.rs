@@ -36,6 +36,7 @@
 )]
 
 mod check;
+mod controller_settings;
 mod error;
 mod model;
 mod mpc;
@@ -43,6 +44,7 @@ mod plan;
 mod preview;
 mod settings;
 mod sized;
+mod stage_lists;
 mod words;
 
 pub use error::MpcError;

@@ -1,0 +1,87 @@
+//! A preview in the places that were compiled.
+
+use crate::check::{Axis, Names};
+use crate::error::MpcError;
+use crate::model::Model;
+use crate::preview::Preview;
+use lpvmpc::{Bounds, GeneralRow, Weights};
+use nalgebra::{DVector, SMatrix, SVector};
+
+/// The lists of a preview.
+pub(crate) struct StageLists<const NX: usize, const NU: usize, const NS: usize> {
+    pub x_ref: Vec<SVector<f64, NX>>,
+    pub u_ref: Vec<SVector<f64, NU>>,
+    pub weights: Vec<Weights<f64, NX, NU>>,
+    pub cross: Vec<SMatrix<f64, NU, NX>>,
+    pub linear_x: Vec<SVector<f64, NX>>,
+    pub linear_u: Vec<SVector<f64, NU>>,
+    pub x_bounds: Vec<Bounds<f64, NX>>,
+    pub u_bounds: Vec<Bounds<f64, NU>>,
+    pub rows: Vec<Vec<GeneralRow<f64, NX, NU>>>,
+    pub disturbance: Vec<SVector<f64, NX>>,
+    pub models: Vec<Model<NX, NU, NS>>,
+}
+
+impl<const NX: usize, const NU: usize, const NS: usize> StageLists<NX, NU, NS> {
+    /// The lists of `preview`, whose shapes are checked; `model` is the plant with the parameters of a stage.
+    pub fn new(
+        names: &Names,
+        preview: &Preview,
+        model: impl Fn(&str, &[f64]) -> Result<Model<NX, NU, NS>, MpcError>,
+    ) -> Result<Self, MpcError> {
+        let axes = (Axis::Inputs, Axis::States);
+        Ok(Self {
+            x_ref: names.vectors(Axis::States, "x_ref", &preview.x_ref)?,
+            u_ref: names.vectors(Axis::Inputs, "u_ref", &preview.u_ref)?,
+            weights: by_stage("weights", &preview.weights, |place, (q, r)| {
+                names.weights(place, q, r)
+            })?,
+            cross: by_stage("cross", &preview.cross, |place, s| {
+                names.matrix(axes, place, s, 0.0)
+            })?,
+            linear_x: names.vectors(Axis::States, "linear_x", &preview.linear_x)?,
+            linear_u: names.vectors(Axis::Inputs, "linear_u", &preview.linear_u)?,
+            x_bounds: by_stage("x_bounds", &preview.x_bounds, |place, limits| {
+                names.bounds(Axis::States, place, limits)
+            })?,
+            u_bounds: by_stage("u_bounds", &preview.u_bounds, |place, limits| {
+                names.bounds(Axis::Inputs, place, limits)
+            })?,
+            rows: by_stage("rows", &preview.rows, |place, rows| names.rows(place, rows))?,
+            disturbance: names.vectors(Axis::States, "disturbance", &preview.disturbance)?,
+            models: by_stage("parameters", &preview.parameters, |place, values| {
+                model(place, values)
+            })?,
+        })
+    }
+}
+
+/// The entry that holds at a stage: the list's last one from where it ends.
+pub(crate) fn held<V>(list: &[V], stage: usize) -> Option<&V> {
+    list.get(stage).or(list.last())
+}
+
+/// Each entry of a list, with its place in messages: "x_ref, stage 3".
+fn by_stage<V, W>(
+    name: &str,
+    list: &[V],
+    fill: impl Fn(&str, &V) -> Result<W, MpcError>,
+) -> Result<Vec<W>, MpcError> {
+    let list = list.iter().enumerate();
+    list.map(|(stage, entry)| fill(&format!("{name}, stage {stage}"), entry))
+        .collect()
+}
+
+impl Names {
+    /// A vector of finite numbers for each stage.
+    fn vectors<const K: usize>(
+        &self,
+        axis: Axis,
+        name: &str,
+        list: &[DVector<f64>],
+    ) -> Result<Vec<SVector<f64, K>>, MpcError> {
+        by_stage(name, list, |place, entries| {
+            self.finite(axis, place, entries.as_slice())
+        })
+    }
+}
