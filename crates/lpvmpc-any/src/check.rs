@@ -7,6 +7,7 @@ use lpvmpc::{Bounds, GeneralRow, Penalty, Weights};
 use lpvmpc_design::{
     MatrixError, check_positive_definite, check_positive_semidefinite, checked_symmetric,
 };
+use lpvmpc_plant::{Plant, Signal};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 /// The names of a plant's states and inputs.
@@ -24,6 +25,14 @@ pub(crate) enum Axis {
 }
 
 impl Names {
+    pub fn new(plant: &Plant) -> Self {
+        let all = |signals: &[Signal]| signals.iter().map(|one| one.name.clone()).collect();
+        Self {
+            states: all(&plant.data().states),
+            inputs: all(&plant.data().inputs),
+        }
+    }
+
     pub fn of(&self, axis: Axis) -> &[String] {
         match axis {
             Axis::States => &self.states,

@@ -28,6 +28,9 @@
 //! # }
 //! ```
 //!
+//! A [`World`] moves such a plant, with sensors, actuators, delay and pushes, for a controller to be
+//! tried on.
+//!
 //! It is the controller of `lpvmpc`, compiled for a few sizes. A plant that is smaller than the
 //! size that serves it leaves places over; what stands there stays zero, and nothing depends on it.
 #![allow(
@@ -46,10 +49,13 @@ mod settings;
 mod sized;
 mod stage_lists;
 mod words;
+mod world;
 
 pub use error::MpcError;
-pub use lpvmpc::{Iterations, Penalty};
+pub use lpvmpc::{Iterations, Penalty, Reading};
+pub use lpvmpc_sim::{Actuator, Tolerances};
 pub use mpc::{MOST_INPUTS, MOST_STATES, Mpc};
 pub use plan::{ActiveBound, Plan};
 pub use preview::Preview;
 pub use settings::{Limits, LinearModels, MpcSettings, Row, StateBounds, Terminal};
+pub use world::{Disturbance, Sensor, World, WorldSettings};

@@ -14,7 +14,7 @@ use lpvmpc_plant::{Plant, Signal, SizedPlant};
 use nalgebra::{DMatrix, SVector};
 
 /// A controller whose size nobody sees.
-pub(crate) trait AnySize: Send {
+pub(crate) trait AnySize: Send + Sync {
     /// See [`crate::Mpc::step`].
     fn step(&mut self, x: &[f64], preview: &Preview) -> Result<Plan, MpcError>;
     /// See [`crate::Mpc::set_settings`].
@@ -45,7 +45,7 @@ pub(crate) struct Sized<const NX: usize, const NU: usize, const NS: usize> {
 impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
     /// A controller for `plant`, which fits into the places.
     pub fn new(plant: &Plant, settings: &MpcSettings) -> Result<Self, MpcError> {
-        let names = names(plant);
+        let names = Names::new(plant);
         let sized = SizedPlant::<NX, NU>::new(plant.clone());
         let sized = sized.map_err(|error| MpcError::new(error.place, error.fault))?;
         let rest = sized
@@ -267,13 +267,5 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
 
     fn reset(&mut self) {
         self.controller.reset();
-    }
-}
-
-fn names(plant: &Plant) -> Names {
-    let all = |signals: &[Signal]| signals.iter().map(|one| one.name.clone()).collect();
-    Names {
-        states: all(&plant.data().states),
-        inputs: all(&plant.data().inputs),
     }
 }

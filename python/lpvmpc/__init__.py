@@ -1,0 +1,48 @@
+"""Model predictive control of nonlinear plants, fast.
+
+A plant comes from CasADi, do-mpc, acados, SymPy or matrices; a controller is made of it in one
+line, and steps in microseconds:
+
+>>> import lpvmpc
+>>> integrator = lpvmpc.Plant.from_matrices([[0, 1], [0, 0]], [[0], [1]])
+>>> mpc = lpvmpc.Mpc(integrator, t_s=0.1, horizon=20, q=[1, 0.1], r=[0.01], u_bounds=([-1], [1]))
+>>> mpc.step([1, 0]).u0.tolist()
+[-1.0]
+"""
+
+from .design import Lqr, lqr
+from .errors import (
+    LpvmpcError,
+    MissingPackageError,
+    PlantError,
+    SettingError,
+    SimulationError,
+)
+from .mpc import ActiveBound, Mpc, Penalty, Plan, Row
+from .plant import Plant, Signal
+from .simulation import Actuator, Jump, Load, Run, Sensor, simulate
+
+__all__ = [
+    "ActiveBound",
+    "Actuator",
+    "Jump",
+    "Load",
+    "Lqr",
+    "LpvmpcError",
+    "MissingPackageError",
+    "Mpc",
+    "Penalty",
+    "Plan",
+    "Plant",
+    "PlantError",
+    "Row",
+    "Run",
+    "Sensor",
+    "SettingError",
+    "Signal",
+    "SimulationError",
+    "lqr",
+    "simulate",
+]
+
+__version__ = "0.1.0"

@@ -1,0 +1,92 @@
+"""What users give as numbers, as arrays of the right form."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import SettingError
+
+Array = NDArray[np.float64]
+
+
+def numbers(place: str, given: ArrayLike, error: type[Exception] = SettingError) -> Array:
+    """An array of real numbers."""
+    try:
+        array = np.asarray(given)
+        if np.iscomplexobj(array):
+            raise ValueError
+        return np.ascontiguousarray(array, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise error(f"{place}: {_short(given)} is no array of real numbers") from None
+
+
+def column(
+    place: str, given: ArrayLike, size: int, error: type[Exception] = SettingError
+) -> Array:
+    """A vector of `size` numbers; a column or a row of a matrix is one, too."""
+    array = numbers(place, given, error)
+    if array.ndim == 2 and 1 in array.shape:
+        array = array.ravel()
+    if array.shape != (size,) and not (array.ndim == 0 and size == 1):
+        raise error(f"{place}: its shape is {array.shape}; it must be ({size},)")
+    return array.reshape(size)
+
+
+def table(place: str, given: ArrayLike, error: type[Exception] = SettingError) -> Array:
+    """A matrix of finite numbers."""
+    array = numbers(place, given, error)
+    if array.ndim != 2:
+        raise error(f"{place}: it has {array.ndim} dimensions; it must have 2")
+    if not np.isfinite(array).all():
+        raise error(f"{place}: it has an entry that is not finite")
+    return array
+
+
+def weight(place: str, given: ArrayLike, size: int) -> Array:
+    """A weight matrix: given whole, or by its diagonal."""
+    array = numbers(place, given)
+    if array.ndim == 0 and size == 1:
+        array = array.reshape(1)
+    if array.shape == (size,):
+        return np.diag(array)
+    if array.shape == (size, size):
+        return array
+    raise SettingError(
+        f"{place}: its shape is {array.shape}; it must be ({size},), the diagonal, or ({size}, {size})"
+    )
+
+
+def by_stage(place: str, given: ArrayLike, size: int) -> Array:
+    """A vector for each stage as rows; one vector is a single row."""
+    array = numbers(place, given)
+    if array.ndim == 0 and size == 1:
+        array = array.reshape(1)
+    if array.shape == (size,):
+        return array.reshape(1, size)
+    if array.ndim == 2 and array.shape[1] == size and array.shape[0] > 0:
+        return array
+    raise SettingError(
+        f"{place}: its shape is {array.shape}; it must be ({size},), or (stages, {size})"
+    )
+
+
+def matrices_by_stage(place: str, given: ArrayLike, shape: tuple[int, int]) -> Array:
+    """A matrix for each stage; one matrix, or the diagonal of one, is a single stage."""
+    array = numbers(place, given)
+    if shape[0] == shape[1] and array.shape == (shape[0],):
+        array = np.diag(array)
+    if array.shape == shape:
+        return array.reshape(1, *shape)
+    if array.ndim == 3 and array.shape[1:] == shape and array.shape[0] > 0:
+        return array
+    raise SettingError(
+        f"{place}: its shape is {array.shape}; it must be {shape}, or (stages, {shape[0]}, {shape[1]})"
+    )
+
+
+def _short(given: Any) -> str:
+    text = repr(given)
+    return text if len(text) <= 60 else text[:57] + "..."

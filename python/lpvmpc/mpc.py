@@ -1,0 +1,518 @@
+"""Model predictive control of a plant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, Union
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _lpvmpc
+from ._arrays import by_stage, column, matrices_by_stage, weight
+from .errors import SettingError
+from .plant import Plant, Signal
+
+Array = NDArray[np.float64]
+
+Limits = Union[
+    "tuple[ArrayLike, ArrayLike]", Mapping[str, "tuple[float | None, float | None]"]
+]
+"""Bounds: (lower, upper), each with a number for every state or input, or by name; None or an
+infinite number where there is no bound."""
+
+
+@dataclass(frozen=True)
+class Penalty:
+    """The price of exceeding a bound by e: ``linear * e + quadratic * e**2``, in units of the cost."""
+
+    linear: float = 0.0
+    quadratic: float = 0.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """A linear constraint lower <= x'x_i + u'u_i <= upper at every stage.
+
+    Parameters
+    ----------
+    name
+        What it is called in messages.
+    x, u
+        The coefficients: by name of a state or an input (others are zero), or one for each.
+    lower, upper
+        Its bounds; None for none.
+    soft
+        The price of exceeding it; hard without.
+    """
+
+    name: str
+    x: Mapping[str, float] | ArrayLike | None = None
+    u: Mapping[str, float] | ArrayLike | None = None
+    lower: float | None = None
+    upper: float | None = None
+    soft: Penalty | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ActiveBound:
+    """A bound that a plan runs into."""
+
+    stage: int
+    """The stage, from 0 to N."""
+    bound: str
+    """The bound in words: ``"force >= -10 N"``."""
+    multiplier: float
+    """Its Lagrange multiplier, in cost per unit of the quantity."""
+    exceeded: bool
+    """Whether it is a soft bound that is exceeded."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Plan:
+    """The plan of a sample: what `Mpc.step` answers.
+
+    Whatever the status, the inputs are finite and within their bounds; unless `is_solved` they
+    are a fallback, not an optimum.
+    """
+
+    u: Array
+    """The inputs u_0 to u_{N-1}, shape (N, m), in input units."""
+    x: Array
+    """The states x_0 to x_N, shape (N + 1, n), in state units: the measured one, and what the model makes
+    of the inputs."""
+    status: str
+    """``"converged"``, ``"improved"``, ``"no improvement"`` (a descent), ``"solved"`` (a fixed number of
+    programs), and of those that are no plan ``"infeasible"``, ``"inaccurate"``, ``"max changes"``,
+    ``"no memory"``, ``"numerical failure"``, ``"not finite"``, ``"refused"``."""
+    message: str
+    """The status in words, with the plant's names: ``"infeasible: position <= 0.5 m at stage 7 against
+    force >= -10 N at stages 0 to 6"``."""
+    is_solved: bool
+    """Whether the inputs are a plan: an optimum, or a motion of the nonlinear model that the
+    programs confirm or improve."""
+    cost: float
+    """The cost along `x` and `u`, without the prices of bounds."""
+    programs: int
+    """How many quadratic programs were solved."""
+    _active: list[tuple[int, str, float, bool]]
+    active_bounds: str
+    """The bounds that hold with equality or are exceeded, in words: ``"force >= -10 N at stages 0
+    to 6"``, or ``"no active bound"``."""
+
+    @property
+    def u0(self) -> Array:
+        """The input to apply until the next sample, shape (m,)."""
+        first: Array = self.u[0]
+        return first
+
+    @property
+    def active(self) -> list[ActiveBound]:
+        """The bounds that hold with equality, or are exceeded at a price, by stage."""
+        return [ActiveBound(*one) for one in self._active]
+
+    def __repr__(self) -> str:
+        inputs = ", ".join(f"{one:.6g}" for one in self.u0)
+        return f"<Plan: {self.message}; u0 = [{inputs}], cost {self.cost:.6g}, {self.active_bounds}>"
+
+
+class Mpc:
+    """A model predictive controller of a plant, with states, inputs and horizon of any size up to
+    16, 6 and 1000.
+
+    At every sample it minimises ::
+
+        sum over i = 0 .. N-1 of (x_i - x_ref)'Q (x_i - x_ref) + (u_i - u_ref)'R (u_i - u_ref)
+            + (x_N - x_ref)'P (x_N - x_ref)
+
+    over the motion of the nonlinear plant, sampled by Runge-Kutta steps with the input held, within the bounds.
+    Each sample solves a few quadratic programs, each an improvement of the plan.
+
+    Parameters
+    ----------
+    plant
+        The plant; its bounds hold unless others are given.
+    t_s
+        Sampling time, s.
+    horizon
+        Prediction horizon N in samples, 1 to 1000.
+    q
+        Q, positive semidefinite: the diagonal, shape (n,), or whole, (n, n).
+    r
+        R, positive definite: the diagonal, shape (m,), or whole, (m, m).
+    terminal
+        P: ``"lqr"``, the cost of the linear-quadratic regulator about the plant's equilibrium (about zero
+        without one) from there on; a matrix (n, n) or its diagonal; or ``"equality"``, x_N = x_ref.
+    x_bounds, u_bounds
+        Bounds of x_1 to x_N and of the inputs: (lower, upper), or by name,
+        ``{"position": (-1, 1)}``; a state or input that is not named has those of the plant.
+    state_bounds
+        What becomes of a plan that cannot keep the bounds of the states: ``"soft"`` (exceeded as little as
+        possible), ``"hard"`` (infeasible), or prices by name, ``{"position": Penalty(1e3)}``; states
+        that are not named are hard then.
+    u_ref
+        The input that costs nothing, shape (m,). Without, the input that holds the plant at the end of
+        the reference.
+    rows
+        Linear constraints that hold at every stage.
+    linear_models
+        Which linear models the programs have: ``"own"`` (the plant's own embedding where it has one,
+        else as ``"ray"``), ``"motion"`` (derivatives along the expected motion), or ``"ray"`` (mean
+        derivatives from the equilibrium to it).
+    nodes
+        Nodes of the mean in ``"ray"``, 1 to 16.
+    substeps
+        Runge-Kutta steps per sample, at least 1.
+    method
+        ``"descent"``: every program is an improvement of the nonlinear plan, or is not taken; or
+        ``"fixed"``: exactly `max_programs`, each answer taken as it is (the paper: one).
+    max_programs
+        Quadratic programs per sample, at most (descent) or exactly (fixed).
+    tolerance
+        A descent ends when the cost falls by less than this part of it.
+
+    Raises
+    ------
+    SettingError
+        A setting makes no sense; the message names it and says what would be right.
+
+    Examples
+    --------
+    >>> import lpvmpc
+    >>> integrator = lpvmpc.Plant.from_matrices(
+    ...     [[0, 1], [0, 0]], [[0], [1]], states=["position", "speed"], inputs=["force"],
+    ...     bounds={"force": (-1, 1)})
+    >>> mpc = lpvmpc.Mpc(integrator, t_s=0.1, horizon=20, q=[1, 0.1], r=[0.01])
+    >>> plan = mpc.step([0, 0], x_ref=[1, 0])
+    >>> plan.status, plan.u0.tolist(), plan.active_bounds
+    ('converged', [1.0], 'force <= 1 at stages 0 to 8, force >= -1 at stages 11 to 15')
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        t_s: float,
+        horizon: int,
+        q: ArrayLike,
+        r: ArrayLike,
+        *,
+        terminal: Literal["lqr", "equality"] | ArrayLike = "lqr",
+        x_bounds: Limits | None = None,
+        u_bounds: Limits | None = None,
+        state_bounds: Literal["soft", "hard"] | Mapping[str, Penalty] = "soft",
+        u_ref: ArrayLike | None = None,
+        rows: Sequence[Row] = (),
+        linear_models: Literal["own", "motion", "ray"] = "own",
+        nodes: int = 2,
+        substeps: int = 1,
+        method: Literal["descent", "fixed"] = "descent",
+        max_programs: int = 8,
+        tolerance: float = 1e-5,
+    ) -> None:
+        if not isinstance(plant, Plant):
+            raise SettingError(f"plant: {type(plant).__name__} is no lpvmpc.Plant")
+        self._plant = plant
+        self._settings: dict[str, Any] = {
+            "t_s": t_s, "horizon": horizon, "q": q, "r": r, "terminal": terminal,
+            "x_bounds": x_bounds, "u_bounds": u_bounds, "state_bounds": state_bounds,
+            "u_ref": u_ref, "rows": tuple(rows), "linear_models": linear_models, "nodes": nodes,
+            "substeps": substeps, "method": method, "max_programs": max_programs,
+            "tolerance": tolerance,
+        }  # fmt: skip
+        self._n, self._m = len(plant.states), len(plant.inputs)
+        self._native = _lpvmpc.Mpc(plant._native, _to_native(plant, self._settings))
+
+    @property
+    def plant(self) -> Plant:
+        """The plant that it controls, with its present parameters."""
+        return self._plant
+
+    @property
+    def t_s(self) -> float:
+        """Sampling time, s."""
+        return float(self._settings["t_s"])
+
+    @property
+    def horizon(self) -> int:
+        """Prediction horizon in samples."""
+        return int(self._settings["horizon"])
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The settings as they were given, by the names of the arguments."""
+        return dict(self._settings)
+
+    @property
+    def bounds(self) -> dict[str, tuple[float, float]]:
+        """The bounds of states and inputs that it keeps to, by name; infinite where there are none."""
+        found: dict[str, tuple[float, float]] = {}
+        for name, signals in (("x_bounds", self._plant.states), ("u_bounds", self._plant.inputs)):
+            lower, upper = _limits(name, self._settings[name] or {}, signals) or ([], [])
+            found |= {one.name: (a, b) for one, a, b in zip(signals, lower, upper, strict=True)}
+        return found
+
+    def step(
+        self,
+        x: ArrayLike,
+        x_ref: ArrayLike | None = None,
+        *,
+        u_ref: ArrayLike | None = None,
+        q: ArrayLike | None = None,
+        r: ArrayLike | None = None,
+        cross: ArrayLike | None = None,
+        linear_x: ArrayLike | None = None,
+        linear_u: ArrayLike | None = None,
+        x_bounds: tuple[ArrayLike, ArrayLike] | None = None,
+        u_bounds: tuple[ArrayLike, ArrayLike] | None = None,
+        rows: Sequence[Sequence[Row]] | None = None,
+        disturbance: ArrayLike | None = None,
+        parameters: ArrayLike | None = None,
+    ) -> Plan:
+        """One sample: from the measured state and what is known ahead to the plan.
+
+        Everything but `x` may be given by stage, an array with one more dimension in front, from the present
+        stage on; from where it ends its last entry holds. So one vector is a value for the whole horizon.
+
+        Parameters
+        ----------
+        x
+            The measured state, shape (n,). One that is not finite is answered by a plan whose
+            status says so.
+        x_ref
+            The reference, (n,) or (stages, n). Without: the plant's equilibrium, or zero.
+        u_ref
+            The input that costs nothing, (m,) or (stages, m). With one, `x_ref` is taken as it is.
+        q, r
+            Other weights, both or neither: (n,), (n, n) or (stages, n, n), and so on.
+        cross
+            S of 2 (u - u_ref)'S (x - x_ref), (m, n) or (stages, m, n).
+        linear_x, linear_u
+            Linear costs, (n,) or (stages, n), and (m,) or (stages, m).
+        x_bounds, u_bounds
+            (lower, upper), each (n,) or (stages, n), and (m,) or (stages, m).
+        rows
+            For each stage its linear constraints, in place of those of the settings.
+        disturbance
+            What is added to f, in state units per second: (n,) or (stages, n).
+        parameters
+            The plant's parameters in their order, (k,) or (stages, k).
+
+        Returns
+        -------
+        Plan
+            The plan; apply ``plan.u0`` until the next sample.
+
+        Raises
+        ------
+        SettingError
+            An array has not the shape that it must have, or an entry that makes no sense.
+        """
+        n, m = self._n, self._m
+        known: dict[str, Any] = {"x_ref": None}
+        for name, given, size in (
+            ("x_ref", x_ref, n), ("u_ref", u_ref, m), ("linear_x", linear_x, n),
+            ("linear_u", linear_u, m), ("disturbance", disturbance, n),
+            ("parameters", parameters, len(self._plant.parameters) if parameters is not None else 0),
+        ):  # fmt: skip
+            if given is not None:
+                known[name] = by_stage(name, given, size)
+        for name, given, shape in (("q", q, (n, n)), ("r", r, (m, m)), ("cross", cross, (m, n))):
+            if given is not None:
+                known[name] = matrices_by_stage(name, given, shape)
+        if (q is None) != (r is None):
+            raise SettingError("q, r: give both or neither")
+        if q is not None:
+            known["q"], known["r"] = _equally_long(known["q"], known["r"])
+        for name, bounds, size in (("x", x_bounds, n), ("u", u_bounds, m)):
+            if bounds is not None:
+                lower, upper = _pair(f"{name}_bounds", bounds)
+                known[f"{name}_lower"], known[f"{name}_upper"] = _equally_long(
+                    by_stage(f"{name}_bounds, lower", _open(lower, -np.inf), size),
+                    by_stage(f"{name}_bounds, upper", _open(upper, np.inf), size),
+                )
+        if rows is not None:
+            known["rows"] = [[_row(self._plant, row) for row in stage] for stage in rows]
+        fields = self._native.step(column("x", x, n), known)
+        return Plan(*fields)
+
+    def set(self, **changes: Any) -> None:
+        """Other settings from the next step on, by the names of the arguments of `Mpc`.
+
+        The plan goes on; sampling time and horizon stay.
+
+        Raises
+        ------
+        SettingError
+            A setting makes no sense; the controller is then as it was.
+        """
+        for name in changes:
+            if name not in self._settings:
+                raise SettingError(
+                    f"{name}: there is no such setting; there are {', '.join(self._settings)}"
+                )
+        new = {**self._settings, **changes}
+        for name in ("t_s", "horizon"):
+            if new[name] != self._settings[name]:
+                raise SettingError(f"{name}: it stays; make another controller")
+        self._native.set_settings(_to_native(self._plant, new))
+        self._settings = new
+
+    def set_parameters(self, **values: float) -> None:
+        """Other values of the plant's parameters from the next step on.
+
+        Raises
+        ------
+        PlantError
+            There is no such parameter, or a value is not finite; the controller is then as it was.
+        """
+        plant = self._plant.with_parameters(**values)
+        self._native.set_parameters({name: float(value) for name, value in values.items()})
+        self._plant = plant
+
+    def reset(self) -> None:
+        """Forgets the last plan: the next step is as the first."""
+        self._native.reset()
+
+    def __getstate__(self) -> tuple[Plant, dict[str, Any]]:
+        return self._plant, self._settings
+
+    def __setstate__(self, state: tuple[Plant, dict[str, Any]]) -> None:
+        """The controller with the same settings, without the last plan."""
+        plant, settings = state
+        self.__init__(plant, **settings)  # type: ignore[misc]
+
+    def __repr__(self) -> str:
+        return f"<Mpc of {self._plant.name!r}: {self.horizon} samples of {self.t_s} s>"
+
+
+def _to_native(plant: Plant, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings as the native half takes them."""
+    states, inputs = plant.states, plant.inputs
+    n, m = len(states), len(inputs)
+    settings = dict(given)
+    for name in ("horizon", "nodes", "substeps", "max_programs"):
+        settings[name] = _whole(name, given[name])
+    for name in ("t_s", "tolerance"):
+        settings[name] = _number(name, given[name])
+    settings["q"], settings["r"] = weight("q", given["q"], n), weight("r", given["r"], m)
+    if not isinstance(given["terminal"], str):
+        settings["terminal"] = weight("terminal", given["terminal"], n)
+    settings["x_bounds"] = _limits("x_bounds", given["x_bounds"], states)
+    settings["u_bounds"] = _limits("u_bounds", given["u_bounds"], inputs)
+    if isinstance(given["state_bounds"], Mapping):
+        settings["state_bounds"] = _prices(given["state_bounds"], states)
+    if given["u_ref"] is not None:
+        settings["u_ref"] = column("u_ref", given["u_ref"], m)
+    settings["rows"] = [_row(plant, row) for row in given["rows"]]
+    return settings
+
+
+def _whole(name: str, given: Any) -> int:
+    if isinstance(given, (int, np.integer)) and not isinstance(given, bool) and given >= 0:
+        return int(given)
+    raise SettingError(f"{name}: it is {given!r}; it must be a whole number from 1 on")
+
+
+def _number(name: str, given: Any) -> float:
+    try:
+        return float(given)
+    except (TypeError, ValueError):
+        raise SettingError(f"{name}: it is {given!r}; it must be a number") from None
+
+
+def _pair(place: str, given: Any) -> tuple[Any, Any]:
+    try:
+        lower, upper = given
+    except (TypeError, ValueError):
+        raise SettingError(f"{place}: it must be (lower, upper)") from None
+    return lower, upper
+
+
+def _open(given: Any, infinite: float) -> Any:
+    """Bounds with an infinite one for None."""
+    if isinstance(given, (list, tuple)):
+        return [infinite if one is None else _open(one, infinite) for one in given]
+    return given
+
+
+def _limits(
+    place: str, given: Limits | None, signals: list[Signal]
+) -> tuple[list[float], list[float]] | None:
+    if given is None:
+        return None
+    if isinstance(given, Mapping):
+        names = [signal.name for signal in signals]
+        for name in given:
+            if name not in names:
+                raise SettingError(f"{place}: there is no {name!r}; there are {', '.join(names)}")
+        pairs = [
+            _pair(f"{place}, {signal.name}", given[signal.name])
+            if signal.name in given
+            else (signal.lower, signal.upper)
+            for signal in signals
+        ]
+        lower, upper = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+    else:
+        lower, upper = _pair(place, given)
+    size = len(signals)
+    return (
+        column(f"{place}, lower", _open(lower, -np.inf), size).tolist(),
+        column(f"{place}, upper", _open(upper, np.inf), size).tolist(),
+    )
+
+
+def _price(place: str, price: Any) -> tuple[float, float]:
+    if not isinstance(price, Penalty):
+        raise SettingError(f"{place}: {price!r} is no Penalty(linear, quadratic)")
+    return _number(place, price.linear), _number(place, price.quadratic)
+
+
+def _prices(
+    given: Mapping[str, Penalty], states: list[Signal]
+) -> list[tuple[float, float] | None]:
+    names = [signal.name for signal in states]
+    for name in given:
+        if name not in names:
+            raise SettingError(f"state_bounds: there is no {name!r}; there are {', '.join(names)}")
+    return [
+        _price(f"state_bounds, {name}", given[name]) if name in given else None for name in names
+    ]
+
+
+def _row(plant: Plant, row: Row) -> tuple[Any, ...]:
+    if not isinstance(row, Row):
+        raise SettingError(f"rows: {row!r} is no lpvmpc.Row")
+    place = f"rows, {row.name}"
+    return (
+        str(row.name),
+        _coefficients(f"{place}, x", row.x, plant.states),
+        _coefficients(f"{place}, u", row.u, plant.inputs),
+        -np.inf if row.lower is None else _number(f"{place}, lower", row.lower),
+        np.inf if row.upper is None else _number(f"{place}, upper", row.upper),
+        None if row.soft is None else _price(f"{place}, soft", row.soft),
+    )
+
+
+def _coefficients(place: str, given: Any, signals: list[Signal]) -> list[float]:
+    if given is None:
+        return [0.0] * len(signals)
+    if isinstance(given, Mapping):
+        names = [signal.name for signal in signals]
+        for name in given:
+            if name not in names:
+                raise SettingError(f"{place}: there is no {name!r}; there are {', '.join(names)}")
+        return [_number(place, given.get(name, 0.0)) for name in names]
+    found: list[float] = column(place, given, len(signals)).tolist()
+    return found
+
+
+def _equally_long(one: Array, other: Array) -> tuple[Array, Array]:
+    """Two lists by stage, the last entry of the shorter one repeated."""
+    stages = max(len(one), len(other))
+
+    def extended(array: Array) -> Array:
+        missing = stages - len(array)
+        return np.concatenate([array, np.repeat(array[-1:], missing, axis=0)]) if missing else array
+
+    return extended(one), extended(other)

@@ -1,0 +1,648 @@
+"""Plants: x_dot = f(x, u, p), with names, units, bounds and parameters."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _casadi, _lpvmpc, _sympy
+from ._arrays import column, table
+from ._tape import Tape
+from .errors import PlantError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A state, an input or an output."""
+
+    name: str
+    unit: str = ""
+    lower: float | None = None
+    """The least value that it may have; none without."""
+    upper: float | None = None
+    """The largest value that it may have; none without."""
+
+
+class Plant:
+    """A plant x_dot = f(x, u, p), perhaps with outputs y = g(x, u, p).
+
+    Make one by `from_casadi`, `from_do_mpc`, `from_acados`, `from_sympy`, `from_matrices`, `load` or
+    `from_json`. A plant does not change: `with_parameters` makes another one. It can be pickled.
+    """
+
+    def __init__(self, native: _lpvmpc.Plant) -> None:
+        if not isinstance(native, _lpvmpc.Plant):
+            raise TypeError("make a plant by Plant.from_casadi, Plant.load and their like")
+        self._native = native
+
+    # Where plants come from.
+
+    @classmethod
+    def from_json(cls, text: str) -> Plant:
+        """The plant in the text of a file.
+
+        Raises
+        ------
+        PlantError
+            It is no plant; the message names the place.
+        """
+        return cls(_lpvmpc.Plant.from_json(text))
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Plant:
+        """The plant in the file at `path`.
+
+        Raises
+        ------
+        PlantError
+            The file cannot be read, or is no plant; the message names the place.
+        """
+        return cls(_lpvmpc.Plant.load(Path(path)))
+
+    @classmethod
+    def from_casadi(
+        cls,
+        x: Any,
+        u: Any,
+        xdot: Any,
+        *,
+        p: Any = None,
+        y: Any = None,
+        name: str = "plant",
+        states: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+        parameters: Mapping[str, float] | Sequence[float] | None = None,
+        units: Mapping[str, str] | None = None,
+        bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
+        equilibrium: tuple[ArrayLike, ArrayLike] | None = None,
+    ) -> Plant:
+        """A plant from CasADi expressions.
+
+        Parameters
+        ----------
+        x, u
+            The states and inputs, ``SX`` or ``MX`` symbols: a column, or a list of symbols.
+        xdot
+            f(x, u, p), the derivatives of the states in state units per second: a column, or a list.
+        p
+            The parameters, symbols as `x`.
+        y
+            g(x, u, p), the outputs: a column, or a list.
+        name
+            What the plant is called.
+        states, inputs, outputs
+            Their names. Without: what the symbols are called, and ``y_0``, ``y_1``, ...
+        parameters
+            The values of `p`, by name in the order of `p`, or as a list.
+        units
+            Units by name, for messages and figures.
+        bounds
+            (lower, upper) by name of a state or an input, in its unit; None where there is none.
+        equilibrium
+            A steady state (x, u), f(x, u) = 0.
+
+        Raises
+        ------
+        PlantError
+            The expressions make no plant; the message names the place.
+        MissingPackageError
+            CasADi is not installed.
+
+        Examples
+        --------
+        >>> import casadi as ca
+        >>> x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+        >>> pendulum = Plant.from_casadi(
+        ...     x, u, ca.vertcat(x[1], 9.81 * ca.sin(x[0]) + u),
+        ...     states=["angle", "rate"], inputs=["torque"],
+        ...     units={"angle": "rad", "rate": "rad/s", "torque": "N m"},
+        ...     bounds={"torque": (-8, 8)}, equilibrium=([0, 0], [0]),
+        ... )
+        >>> pendulum.f([0.5, 0.1], [2.0]).round(3).tolist()
+        [0.1, 6.703]
+        """
+        xs, us = _casadi.symbols("x", x), _casadi.symbols("u", u)
+        ps = _casadi.symbols("p", p)
+        groups = [("state", xs), ("input", us), ("parameter", ps)]
+        formulas = [_casadi.column(xdot)]
+        if y is not None:
+            formulas.append(_casadi.column(y))
+        tape = Tape()
+        results = _casadi.take(tape, groups, formulas)
+        return cls._assemble(
+            tape,
+            derivative=results[0],
+            output=results[1] if y is not None else [],
+            name=name,
+            states=_named("states", states, _casadi.names(xs)),
+            inputs=_named("inputs", inputs, _casadi.names(us)),
+            outputs=outputs,
+            parameters=_values(parameters, _casadi.names(ps)),
+            units=units,
+            bounds=bounds,
+            equilibrium=equilibrium,
+        )
+
+    @classmethod
+    def from_do_mpc(
+        cls,
+        model: Any,
+        *,
+        parameters: Mapping[str, float] | Sequence[float] | None = None,
+        units: Mapping[str, str] | None = None,
+        bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
+        equilibrium: tuple[ArrayLike, ArrayLike] | None = None,
+    ) -> Plant:
+        """The plant of a do-mpc ``Model`` after its ``setup()``.
+
+        Its time-varying parameters become parameters after the others (`Mpc.step` takes them by stage).
+
+        Parameters
+        ----------
+        model
+            A ``do_mpc.model.Model`` in continuous time, without algebraic states.
+        parameters
+            The values of its parameters, by name or in its order.
+        units, bounds, equilibrium
+            As of `from_casadi`.
+
+        Raises
+        ------
+        PlantError
+            The model is none that can be a plant: the message says why.
+        """
+        if not getattr(model, "flags", {}).get("setup", False):
+            raise PlantError("model: call its setup() first")
+        if model.model_type != "continuous":
+            raise PlantError(f"model: it is {model.model_type}; it must be continuous")
+        if model.n_z:
+            raise PlantError(
+                f"model: it has {model.n_z} algebraic states; solve for them and put them in"
+            )
+        return cls.from_casadi(
+            model._x,
+            model._u,
+            model._rhs,  # what setup() has made of set_rhs()
+            p=[model._p.cat, model._tvp.cat],
+            name="do-mpc",
+            states=_labels(model._x),
+            inputs=_labels(model._u),
+            parameters=_by_label(parameters, _labels(model._p) + _labels(model._tvp)),
+            units=units,
+            bounds=bounds,
+            equilibrium=equilibrium,
+        )
+
+    @classmethod
+    def from_acados(
+        cls,
+        model: Any,
+        *,
+        parameters: Mapping[str, float] | Sequence[float] | None = None,
+        units: Mapping[str, str] | None = None,
+        bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
+        equilibrium: tuple[ArrayLike, ArrayLike] | None = None,
+    ) -> Plant:
+        """The plant of an ``AcadosModel``, or of any object with `x`, `u`, `p` and ``f_expl_expr``.
+
+        Parameters
+        ----------
+        model
+            The object. ``x_labels``, ``u_labels`` and ``name`` are taken where they are set.
+        parameters
+            The values of ``p``, by name in its order or as a list.
+        units, bounds, equilibrium
+            As of `from_casadi`.
+
+        Raises
+        ------
+        PlantError
+            The model has no explicit dynamics, or makes no plant.
+        """
+        explicit = getattr(model, "f_expl_expr", None)
+        if explicit is None or (hasattr(explicit, "numel") and explicit.numel() == 0):
+            raise PlantError("model: it has no f_expl_expr; explicit dynamics are needed")
+        z = getattr(model, "z", None)
+        if z is not None and hasattr(z, "numel") and z.numel():
+            raise PlantError("model: it has algebraic variables z; solve for them and put them in")
+        p = getattr(model, "p", None)
+        return cls.from_casadi(
+            model.x,
+            model.u,
+            explicit,
+            p=None if p is None or isinstance(p, (list, tuple)) and not p else p,
+            name=getattr(model, "name", None) or "acados",
+            states=getattr(model, "x_labels", None),
+            inputs=getattr(model, "u_labels", None),
+            parameters=parameters,
+            units=units,
+            bounds=bounds,
+            equilibrium=equilibrium,
+        )
+
+    @classmethod
+    def from_sympy(
+        cls,
+        x: Sequence[Any],
+        u: Sequence[Any],
+        xdot: Any,
+        *,
+        y: Any = None,
+        name: str = "plant",
+        parameters: Mapping[Any, float] | None = None,
+        states: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+        units: Mapping[str, str] | None = None,
+        bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
+        equilibrium: tuple[ArrayLike, ArrayLike] | None = None,
+    ) -> Plant:
+        """A plant from SymPy expressions.
+
+        Parameters
+        ----------
+        x, u
+            The symbols (or functions of time) that are states and inputs.
+        xdot
+            f(x, u, p): a list or a column ``Matrix``.
+        y
+            g(x, u, p), the outputs: a list or a column ``Matrix``.
+        parameters
+            The values of all other symbols, ``{m: 0.3}``.
+        name, states, inputs, outputs, units, bounds, equilibrium
+            As of `from_casadi`.
+
+        Raises
+        ------
+        PlantError
+            The expressions make no plant; the message names the place.
+        """
+        values = dict(parameters or {})
+        leaves = {
+            symbol: (leaf, i)
+            for leaf, symbols in (("state", x), ("input", u), ("parameter", values))
+            for i, symbol in enumerate(symbols)
+        }
+        if len(leaves) != len(x) + len(u) + len(values):
+            raise PlantError("formulas: a symbol is there twice among states, inputs and parameters")
+        rates, output = list(xdot), list(y) if y is not None else []
+        tape = Tape()
+        places = _sympy.take(tape, leaves, rates + output)
+        return cls._assemble(
+            tape,
+            derivative=places[: len(rates)],
+            output=places[len(rates) :],
+            name=name,
+            states=_named("states", states, [_symbol_name(symbol) for symbol in x]),
+            inputs=_named("inputs", inputs, [_symbol_name(symbol) for symbol in u]),
+            outputs=outputs,
+            parameters={_symbol_name(symbol): value for symbol, value in values.items()},
+            units=units,
+            bounds=bounds,
+            equilibrium=equilibrium,
+        )
+
+    @classmethod
+    def from_matrices(
+        cls,
+        a: ArrayLike,
+        b: ArrayLike,
+        c: ArrayLike | None = None,
+        d: ArrayLike | None = None,
+        *,
+        offset: ArrayLike | None = None,
+        name: str = "plant",
+        states: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+        units: Mapping[str, str] | None = None,
+        bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
+        equilibrium: tuple[ArrayLike, ArrayLike] | None = None,
+    ) -> Plant:
+        """A linear plant x_dot = A x + B u + offset, y = C x + D u, in continuous time.
+
+        Parameters
+        ----------
+        a, b
+            Shapes (n, n) and (n, m).
+        c, d
+            Shapes (k, n) and (k, m).
+        offset
+            Shape (n,), in state units per second.
+        name, states, inputs, outputs, units, bounds, equilibrium
+            As of `from_casadi`.
+
+        Raises
+        ------
+        PlantError
+            The shapes do not fit, or a number is not finite.
+        """
+        a_matrix, b_matrix = table("a", a, PlantError), table("b", b, PlantError)
+        n = a_matrix.shape[0]
+        if a_matrix.shape != (n, n) or b_matrix.shape[0] != n:
+            raise PlantError(
+                f"a is {_shape(a_matrix)} and b {_shape(b_matrix)}; a must be square, and b have as "
+                "many rows"
+            )
+        m = b_matrix.shape[1]
+        rest = np.zeros(n) if offset is None else column("offset", offset, n, PlantError)
+        tape = Tape()
+        derivative = _affine(tape, a_matrix, b_matrix, rest)
+        output: list[int] = []
+        if c is not None or d is not None:
+            rows = len(np.asarray(c if c is not None else d))
+            c_matrix = table("c", c if c is not None else np.zeros((rows, n)), PlantError)
+            d_matrix = table("d", d if d is not None else np.zeros((rows, m)), PlantError)
+            if c_matrix.shape != (rows, n) or d_matrix.shape != (rows, m):
+                raise PlantError(
+                    f"c is {_shape(c_matrix)} and d {_shape(d_matrix)}; they must be {rows} x {n} and "
+                    f"{rows} x {m}"
+                )
+            output = _affine(tape, c_matrix, d_matrix, np.zeros(rows))
+        return cls._assemble(
+            tape,
+            derivative=derivative,
+            output=output,
+            name=name,
+            states=_named("states", states, [f"x_{i}" for i in range(n)]),
+            inputs=_named("inputs", inputs, [f"u_{i}" for i in range(m)]),
+            outputs=outputs,
+            parameters={},
+            units=units,
+            bounds=bounds,
+            equilibrium=equilibrium,
+        )
+
+    @classmethod
+    def _assemble(
+        cls,
+        tape: Tape,
+        *,
+        derivative: list[int],
+        output: list[int],
+        name: str,
+        states: Sequence[str],
+        inputs: Sequence[str],
+        outputs: Sequence[str] | None,
+        parameters: Mapping[str, float],
+        units: Mapping[str, str] | None,
+        bounds: Mapping[str, tuple[float | None, float | None]] | None,
+        equilibrium: tuple[ArrayLike, ArrayLike] | None,
+    ) -> Plant:
+        called = _named("outputs", outputs, [f"y_{i}" for i in range(len(output))])
+        units, bounds = dict(units or {}), dict(bounds or {})
+        known = [*states, *inputs, *called, *parameters]
+        for place, given in (("units", units), ("bounds", bounds)):
+            for unknown in given:
+                if unknown not in known:
+                    raise PlantError(f"{place}: there is no {unknown!r}; there are {', '.join(known)}")
+        for bounded in bounds:
+            if bounded in parameters or bounded in called:
+                raise PlantError(f"bounds: {bounded!r} is neither a state nor an input")
+
+        def signal(one: str) -> dict[str, Any]:
+            entry: dict[str, Any] = {"name": str(one), "unit": str(units.get(one, ""))}
+            try:
+                lower, upper = bounds.get(one, (None, None))
+            except (TypeError, ValueError):
+                raise PlantError(
+                    f"bounds: of {one} they are {bounds[one]!r}; they must be (lower, upper)"
+                ) from None
+            for key, limit in (("lower", lower), ("upper", upper)):
+                if limit is not None and np.isnan(limit):
+                    raise PlantError(f"bounds: the {key} one of {one} is NaN")
+                if limit is not None and np.isfinite(limit):
+                    entry[key] = float(limit)
+            return entry
+
+        data: dict[str, Any] = {
+            "schema": 1,
+            "name": name,
+            "states": [signal(one) for one in states],
+            "inputs": [signal(one) for one in inputs],
+            "parameters": [
+                {"name": one, "unit": str(units.get(one, "")), "value": float(value)}
+                for one, value in parameters.items()
+            ],
+            "outputs": [signal(one) for one in called],
+            "operations": tape.operations,
+            "derivative": derivative,
+        }
+        if output:
+            data["output"] = output
+        if equilibrium is not None:
+            x, u = equilibrium
+            data["equilibrium"] = {
+                "x": column("equilibrium, x", x, len(states), PlantError).tolist(),
+                "u": column("equilibrium, u", u, len(inputs), PlantError).tolist(),
+            }
+        try:
+            text = json.dumps(data, allow_nan=False)
+        except ValueError:
+            raise PlantError(
+                "formulas: they contain a number that is not finite (a division by zero, an overflow)"
+            ) from None
+        return cls.from_json(text)
+
+    # What a plant is.
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return self._native.name
+
+    @property
+    def states(self) -> list[Signal]:
+        """The states, in the order of x."""
+        return [Signal(*one) for one in self._native.states]
+
+    @property
+    def inputs(self) -> list[Signal]:
+        """The inputs, in the order of u."""
+        return [Signal(*one) for one in self._native.inputs]
+
+    @property
+    def outputs(self) -> list[Signal]:
+        """The outputs, in the order of y."""
+        return [Signal(*one) for one in self._native.outputs]
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The values of the parameters by name, in the order of p."""
+        return {name: value for name, _, value in self._native.parameters}
+
+    @property
+    def equilibrium(self) -> tuple[Array, Array] | None:
+        """The steady state (x, u) that was given."""
+        found = self._native.equilibrium
+        return None if found is None else (np.array(found[0]), np.array(found[1]))
+
+    def with_parameters(self, **values: float) -> Plant:
+        """This plant with other values of some parameters.
+
+        Raises
+        ------
+        PlantError
+            There is no such parameter, or a value is not finite.
+        """
+        return Plant(self._native.with_parameters(list(values.items())))
+
+    # What it does.
+
+    def f(self, x: ArrayLike, u: ArrayLike) -> Array:
+        """x_dot = f(x, u), shape (n,), in state units per second.
+
+        Raises
+        ------
+        PlantError
+            `x` is not of shape (n,), or `u` not of shape (m,).
+        """
+        return self._native.f(*self._point(x, u))
+
+    def g(self, x: ArrayLike, u: ArrayLike) -> Array:
+        """y = g(x, u), shape (k,), in the units of the outputs.
+
+        Raises
+        ------
+        PlantError
+            `x` is not of shape (n,), or `u` not of shape (m,).
+        """
+        return self._native.g(*self._point(x, u))
+
+    def jacobian(self, x: ArrayLike, u: ArrayLike) -> tuple[Array, Array]:
+        """The derivatives of f, (df/dx, df/du), shapes (n, n) and (n, m).
+
+        Raises
+        ------
+        PlantError
+            `x` is not of shape (n,), or `u` not of shape (m,).
+        """
+        return self._native.jacobian(*self._point(x, u))
+
+    def _point(self, x: ArrayLike, u: ArrayLike) -> tuple[Array, Array]:
+        return (
+            column("x", x, len(self._native.states), PlantError),
+            column("u", u, len(self._native.inputs), PlantError),
+        )
+
+    # Where it goes.
+
+    def to_json(self) -> str:
+        """The text of its file, which is read as the same plant to the last bit. Its parameters are those with
+        which the plant was made."""
+        return self._native.to_json()
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Writes its file.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written.
+        """
+        Path(path).write_text(self.to_json(), encoding="utf-8")
+
+    def to_rust(self) -> str:
+        """The plant as a module of Rust, for `f32` and `f64`, without std and heap, with its parameters as they
+        are now: for the crate `lpvmpc` on a microcontroller."""
+        return self._native.to_rust()
+
+    def __getstate__(self) -> tuple[str, dict[str, float]]:
+        return self.to_json(), self.parameters
+
+    def __setstate__(self, state: tuple[str, dict[str, float]]) -> None:
+        text, parameters = state
+        native = _lpvmpc.Plant.from_json(text)
+        self._native = native.with_parameters(list(parameters.items()))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Plant) and self._native == other._native
+
+    def __hash__(self) -> int:
+        return hash((self.to_json(), tuple(self.parameters.items())))
+
+    def __repr__(self) -> str:
+        def listed(signals: list[Signal]) -> str:
+            return ", ".join(f"{s.name} [{s.unit}]" if s.unit else s.name for s in signals)
+
+        return f"<Plant {self.name!r}: states {listed(self.states)}; inputs {listed(self.inputs)}>"
+
+
+def _named(place: str, given: Sequence[str] | None, usual: list[str]) -> list[str]:
+    if given is None:
+        return usual
+    if isinstance(given, str) or len(given) != len(usual):
+        raise PlantError(f"{place}: {given!r} are not {len(usual)} names")
+    return [str(one) for one in given]
+
+
+def _values(
+    given: Mapping[str, float] | Sequence[float] | None, names: list[str]
+) -> dict[str, float]:
+    """The values of the parameters by name: the keys of a mapping are their names, in order."""
+    values = list(given.values()) if isinstance(given, Mapping) else list(given or [])
+    if len(values) != len(names):
+        raise PlantError(
+            f"parameters: there are values for {len(values)}, and p has {len(names)} "
+            f"({', '.join(names)})"
+        )
+    called = [str(one) for one in given] if isinstance(given, Mapping) else names
+    return dict(zip(called, values, strict=True))
+
+
+def _by_label(
+    given: Mapping[str, float] | Sequence[float] | None, labels: list[str]
+) -> Mapping[str, float]:
+    """The values of the parameters that are called `labels`, in that order."""
+    if not isinstance(given, Mapping):
+        return _values(given, labels)
+    if set(given) != set(labels):
+        raise PlantError(
+            f"parameters: there are values for {', '.join(given) or 'none'}; the model has "
+            f"{', '.join(labels) or 'none'}"
+        )
+    return {label: given[label] for label in labels}
+
+
+def _labels(structure: Any) -> list[str]:
+    """What the entries of a structure of do-mpc are called; it may have empty ones."""
+    found: list[str] = []
+    for key in structure.keys():
+        count = structure[key].numel()
+        found += [key] if count == 1 else [f"{key}_{i}" for i in range(count)]
+    return found
+
+
+def _symbol_name(symbol: Any) -> str:
+    return str(getattr(symbol, "func", symbol) if getattr(symbol, "args", ()) else symbol)
+
+
+def _affine(tape: Tape, a: Array, b: Array, rest: Array) -> list[int]:
+    """The places of the rows of a x + b u + rest."""
+    places = []
+    for a_row, b_row, constant in zip(a, b, rest, strict=True):
+        terms = []
+        for leaf, row in (("state", a_row), ("input", b_row)):
+            for i, entry in enumerate(row):
+                if entry == 1.0:
+                    terms.append(tape.add(leaf, i))
+                elif entry != 0.0:
+                    terms.append(tape.add("mul", tape.constant(entry), tape.add(leaf, i)))
+        if constant != 0.0:
+            terms.append(tape.constant(constant))
+        places.append(tape.sum(terms))
+    return places
+
+
+def _shape(matrix: Array) -> str:
+    return " x ".join(str(size) for size in matrix.shape)

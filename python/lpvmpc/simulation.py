@@ -1,0 +1,447 @@
+"""Closed loops on a simulated plant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Union
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _lpvmpc
+from ._arrays import column, numbers
+from ._progress import samples_of
+from .errors import MissingPackageError, SettingError, SimulationError
+from .mpc import Mpc, Plan
+from .plant import Plant, Signal
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+Reference = Union[ArrayLike, Callable[[float], ArrayLike], None]
+"""A constant reference (n,), one by sample (samples, n) whose last row holds from its end, or a
+function of time."""
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A measured state, and what is wrong with the reading. All in the state's unit."""
+
+    noise: float = 0.0
+    """Standard deviation of white Gaussian noise."""
+    bias: float = 0.0
+    """Constant error that is added."""
+    resolution: float = 0.0
+    """Step between two readings; 0 for a continuous one."""
+    dropout: float = 0.0
+    """Probability that a sample is missing: the controller then has the last one."""
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """What becomes of a commanded input, in input units: limited, less the dead zone, with a lag."""
+
+    limit: float = np.inf
+    """Largest magnitude."""
+    dead_zone: float = 0.0
+    """Commands of this magnitude or less have no effect, larger ones lose it."""
+    lag: float = 0.0
+    """Time constant of a first-order lag, s."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """A constant load for a while: x_dot = f(x, u) + load."""
+
+    start: float
+    """From when on, s."""
+    end: float
+    """Until when, s; infinite for ever."""
+    load: ArrayLike
+    """In state units per second, shape (n,)."""
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A jump of the state: a collision."""
+
+    time: float
+    """When, s."""
+    change: ArrayLike
+    """Added to the state, shape (n,)."""
+
+
+@dataclass(frozen=True, repr=False)
+class Run:
+    """A closed loop from beginning to end, K samples long."""
+
+    plant: Plant
+    """The simulated plant."""
+    t: Array
+    """Times of the samples, s, and of the end: shape (K + 1,)."""
+    x: Array
+    """The true states at these times, shape (K + 1, n)."""
+    u: Array
+    """The commanded inputs, shape (K, m)."""
+    y: Array
+    """The outputs at the samples, under the input there, shape (K, k)."""
+    x_measured: Array
+    """What the controller was given, shape (K, n)."""
+    x_ref: Array | None
+    """The reference at the samples, shape (K, n); None where there was none."""
+    plans: list[Plan] = field(default_factory=list)
+    """The plans, where the controller is an `Mpc`."""
+    step_times: Array = field(default_factory=lambda: np.zeros(0))
+    """How long the controller took for each sample, s, shape (K,)."""
+    bounds: dict[str, tuple[float, float]] = field(default_factory=dict)
+    """The bounds that the controller kept to, by name."""
+
+    def __getitem__(self, name: str) -> Array:
+        """The column of a state, an input or an output by its name."""
+        for signals, table in (
+            (self.plant.states, self.x), (self.plant.inputs, self.u), (self.plant.outputs, self.y),
+        ):  # fmt: skip
+            for i, signal in enumerate(signals):
+                if signal.name == name:
+                    found: Array = table[:, i]
+                    return found
+        raise KeyError(f"{name!r}: there are {', '.join(self._names())}")
+
+    def _names(self) -> list[str]:
+        plant = self.plant
+        return [one.name for one in (*plant.states, *plant.inputs, *plant.outputs)]
+
+    @property
+    def status(self) -> list[str]:
+        """The status of each sample's plan."""
+        return [plan.status for plan in self.plans]
+
+    @property
+    def is_solved(self) -> bool:
+        """Whether every sample had a plan."""
+        return all(plan.is_solved for plan in self.plans)
+
+    def cost(self, q: ArrayLike, r: ArrayLike, u_ref: ArrayLike = 0.0) -> float:
+        """The closed-loop cost: the sum over the samples of (x - x_ref)'Q (x - x_ref) +
+        (u - u_ref)'R (u - u_ref).
+
+        Parameters
+        ----------
+        q, r
+            The weights: diagonals, (n,) and (m,), or whole.
+        u_ref
+            The input that costs nothing, (m,).
+        """
+        from ._arrays import weight
+
+        n, m = self.x.shape[1], self.u.shape[1]
+        q_matrix, r_matrix = weight("q", q, n), weight("r", r, m)
+        e = self.x[:-1] - (0.0 if self.x_ref is None else self.x_ref)
+        v = self.u - np.asarray(u_ref)
+        return float(np.einsum("ki,ij,kj", e, q_matrix, e) + np.einsum("ki,ij,kj", v, r_matrix, v))
+
+    def to_dataframe(self) -> Any:
+        """A pandas ``DataFrame`` with the time in s as its index and a column for each state, input, output
+        and reference; the last row, the end, has no input.
+
+        Raises
+        ------
+        MissingPackageError
+            pandas is not installed.
+        """
+        try:
+            import pandas as pd
+        except ImportError as error:
+            raise MissingPackageError(
+                "this needs pandas: pip install pandas, or pip install lpvmpc[pandas]"
+            ) from error
+        columns: dict[str, Array] = {}
+
+        def put(signals: Sequence[Signal], table: Array, suffix: str = "") -> None:
+            for i, signal in enumerate(signals):
+                values = np.full(len(self.t), np.nan)
+                values[: len(table)] = table[:, i]
+                columns[signal.name + suffix] = values
+
+        put(self.plant.states, self.x)
+        put(self.plant.inputs, self.u)
+        put(self.plant.outputs, self.y)
+        if self.x_ref is not None:
+            put(self.plant.states, self.x_ref, "_ref")
+        return pd.DataFrame(columns, index=pd.Index(self.t, name="t"))
+
+    def plot(self, signals: Sequence[str] | None = None, figure: Figure | None = None) -> Figure:
+        """A figure of the run: each state, input and output over time, with its reference and its bounds.
+
+        Parameters
+        ----------
+        signals
+            Names of those to be shown; all without.
+        figure
+            A figure of matplotlib to draw in; a new one without.
+
+        Raises
+        ------
+        MissingPackageError
+            matplotlib is not installed.
+        """
+        from ._plot import plot_run
+
+        return plot_run(self, signals, figure)
+
+    def __repr__(self) -> str:
+        return f"<Run of {self.plant.name!r}: {len(self.u)} samples, {self.t[-1]:g} s>"
+
+
+Controller = Union[Mpc, Callable[[float, Array], ArrayLike]]
+"""An `Mpc`, or a function of time in s and the measured state (n,) that returns the input (m,)."""
+
+
+def simulate(
+    plant: Plant,
+    controller: Controller,
+    x0: ArrayLike,
+    duration: float,
+    x_ref: Reference = None,
+    *,
+    u_ref: ArrayLike | None = None,
+    t_s: float | None = None,
+    sensors: Mapping[str, Sensor] | None = None,
+    actuators: Mapping[str, Actuator] | None = None,
+    delay: float = 0.0,
+    disturbances: Sequence[Load | Jump] = (),
+    seed: int = 0,
+    relative_tolerance: float = 1e-9,
+    absolute_tolerance: float = 1e-9,
+    progress: bool = False,
+) -> Run:
+    """A controller on a simulated plant, which moves in continuous time.
+
+    Parameters
+    ----------
+    plant
+        The plant as it really is; it may have other parameters than the controller's.
+    controller
+        An `Mpc`, or a function of time (s) and measured state.
+    x0
+        The state at time 0, shape (n,).
+    duration
+        How long, s; a whole number of samples, rounded up.
+    x_ref
+        The reference: constant, by sample, or a function of time. An `Mpc` sees it ahead over its horizon.
+    u_ref
+        The input that costs nothing, for an `Mpc`, shape (m,).
+    t_s
+        The sampling time, s, of a controller that is a function.
+    sensors
+        What is wrong with the measured states, by name; the others are measured perfectly.
+    actuators
+        What is wrong with the inputs, by name.
+    delay
+        Time from a command to its arrival at the plant, s.
+    disturbances
+        Loads and jumps.
+    seed
+        Seed of the noise: the same seed, the same run.
+    relative_tolerance, absolute_tolerance
+        Of the integration of the plant (Dormand-Prince 5(4), adaptive).
+    progress
+        Whether to show a progress bar (needs tqdm).
+
+    Returns
+    -------
+    Run
+        What happened.
+
+    Raises
+    ------
+    SettingError
+        An argument makes no sense; the message names it.
+    SimulationError
+        The motion cannot be integrated: it became infinite, or a controller's input is not finite. The
+        message says when.
+
+    Examples
+    --------
+    >>> import lpvmpc
+    >>> cart = lpvmpc.Plant.from_matrices([[0, 1], [0, 0]], [[0], [1]], states=["position", "speed"])
+    >>> mpc = lpvmpc.Mpc(cart, t_s=0.1, horizon=20, q=[1, 0.1], r=[0.1], u_bounds=([-1], [1]))
+    >>> run = lpvmpc.simulate(cart, mpc, x0=[0, 0], duration=8, x_ref=[1, 0])
+    >>> float(run["position"][-1].round(3)), run.is_solved
+    (1.0, True)
+    """
+    states, inputs = plant.states, plant.inputs
+    n, m = len(states), len(inputs)
+    mpc = controller if isinstance(controller, Mpc) else None
+    if mpc is not None:
+        if (mpc._n, mpc._m) != (n, m):
+            raise SettingError(
+                f"controller: it is for {mpc._n} states and {mpc._m} inputs; the plant has {n} and {m}"
+            )
+        if t_s is not None and t_s != mpc.t_s:
+            raise SettingError(f"t_s: it is {t_s} s, and that of the controller {mpc.t_s} s")
+        period = mpc.t_s
+    elif t_s is None:
+        raise SettingError("t_s: a controller that is a function needs a sampling time")
+    else:
+        period = float(t_s)
+    if not callable(controller) and mpc is None:
+        raise SettingError(f"controller: {type(controller).__name__} is neither an Mpc nor a function")
+    if not (np.isfinite(period) and period > 0):
+        raise SettingError(f"t_s: it is {period} s; it must be a positive number of seconds")
+    if not (np.isfinite(duration) and duration > 0):
+        raise SettingError(f"duration: it is {duration} s; it must be a positive number of seconds")
+    count = int(np.ceil(duration / period - 1e-9))
+    horizon = mpc.horizon if mpc is not None else 0
+    reference = _reference(x_ref, n, count + horizon + 1, period)
+    world = _lpvmpc.World(
+        plant._native,
+        column("x0", x0, n),
+        {
+            "period": period,
+            "sensors": _sensors(sensors, states),
+            "actuators": _actuators(actuators, inputs),
+            "delay": _seconds("delay", delay),
+            "pushes": [_push(i, push, n) for i, push in enumerate(disturbances)],
+            "seed": _seed(seed),
+            "relative_tolerance": float(relative_tolerance),
+            "absolute_tolerance": float(absolute_tolerance),
+        },
+    )
+    if mpc is not None:
+        mpc.reset()
+    return _run(plant, controller, mpc, world, count, period, reference, u_ref, progress)
+
+
+def _run(
+    plant: Plant,
+    controller: Controller,
+    mpc: Mpc | None,
+    world: _lpvmpc.World,
+    count: int,
+    period: float,
+    reference: Array | None,
+    u_ref: ArrayLike | None,
+    progress: bool,
+) -> Run:
+    from time import perf_counter
+
+    n, m, k = len(plant.states), len(plant.inputs), len(plant.outputs)
+    x, u, y = np.empty((count + 1, n)), np.empty((count, m)), np.empty((count, k))
+    measured, step_times = np.empty((count, n)), np.empty(count)
+    plans: list[Plan] = []
+    seen = world.x  # where a reading is missing, the last one holds
+    x[0] = seen
+    for i in samples_of(count, progress):
+        for j, reading in enumerate(world.readings):
+            if reading is not None:
+                seen[j] = reading[0]
+        measured[i] = seen
+        start = perf_counter()
+        if mpc is not None:
+            ahead = None if reference is None else reference[i : i + mpc.horizon + 1]
+            plan = mpc.step(seen, ahead, u_ref=u_ref)
+            plans.append(plan)
+            u[i] = plan.u0
+        else:
+            u[i] = column("controller", controller(i * period, seen.copy()), m)  # type: ignore[operator]
+        step_times[i] = perf_counter() - start
+        if not np.isfinite(u[i]).all():
+            raise SimulationError(
+                f"the controller's input {u[i].tolist()} at {i * period:g} s is not finite"
+            )
+        if k:
+            y[i] = plant.g(x[i], u[i])
+        world.command(u[i])
+        try:
+            world.advance()
+        except SimulationError as error:
+            raise SimulationError(f"after {i * period:g} s, sample {i}: {error}") from None
+        x[i + 1] = world.x
+    return Run(
+        plant=plant,
+        t=np.arange(count + 1, dtype=np.float64) * period,
+        x=x,
+        u=u,
+        y=y,
+        x_measured=measured,
+        x_ref=None if reference is None else reference[:count],
+        plans=plans,
+        step_times=step_times,
+        bounds={} if mpc is None else mpc.bounds,
+    )
+
+
+def _reference(given: Reference, n: int, stages: int, period: float) -> Array | None:
+    """The reference at each sample and over the last horizon."""
+    if given is None:
+        return None
+    if callable(given):
+        return np.array([column(f"x_ref at {i * period:g} s", given(i * period), n) for i in range(stages)])
+    array = numbers("x_ref", given)
+    if array.shape == (n,) or (array.ndim == 0 and n == 1):
+        return np.tile(array.reshape(1, n), (stages, 1))
+    if array.ndim == 2 and array.shape[1] == n and len(array):
+        held = np.repeat(array[-1:], max(0, stages - len(array)), axis=0)
+        return np.concatenate([array, held])[:stages]
+    raise SettingError(
+        f"x_ref: its shape is {array.shape}; it must be ({n},), (samples, {n}) or a function of time"
+    )
+
+
+def _by_name(place: str, given: Mapping[str, Any] | None, signals: list[Signal], kind: type) -> None:
+    names = [signal.name for signal in signals]
+    for name, one in (given or {}).items():
+        if name not in names:
+            raise SettingError(f"{place}: there is no {name!r}; there are {', '.join(names)}")
+        if not isinstance(one, kind):
+            raise SettingError(f"{place}, {name}: {one!r} is no lpvmpc.{kind.__name__}")
+
+
+def _sensors(
+    given: Mapping[str, Sensor] | None, states: list[Signal]
+) -> list[tuple[Any, ...]] | None:
+    _by_name("sensors", given, states, Sensor)
+    if not given:
+        return None
+    found = []
+    for i, state in enumerate(states):
+        one = given.get(state.name, Sensor())
+        row = [1.0 if j == i else 0.0 for j in range(len(states))]
+        found.append((row, one.noise, one.bias, one.resolution, one.dropout, 1, 0))
+    return found
+
+
+def _actuators(
+    given: Mapping[str, Actuator] | None, inputs: list[Signal]
+) -> list[tuple[float, float, float]] | None:
+    _by_name("actuators", given, inputs, Actuator)
+    if not given:
+        return None
+    all_of_them = [given.get(signal.name, Actuator()) for signal in inputs]
+    return [(one.limit, one.dead_zone, one.lag) for one in all_of_them]
+
+
+def _push(i: int, push: Load | Jump, n: int) -> tuple[Any, ...]:
+    place = f"disturbances[{i}]"
+    if isinstance(push, Load):
+        return float(push.start), float(push.end), column(place, push.load, n).tolist()
+    if isinstance(push, Jump):
+        return float(push.time), column(place, push.change, n).tolist()
+    raise SettingError(f"{place}: {push!r} is neither an lpvmpc.Load nor an lpvmpc.Jump")
+
+
+def _seconds(name: str, given: Any) -> float:
+    try:
+        return float(given)
+    except (TypeError, ValueError):
+        raise SettingError(f"{name}: it is {given!r}; it must be a number of seconds") from None
+
+
+def _seed(given: Any) -> int:
+    if isinstance(given, (int, np.integer)) and 0 <= given < 2**64:
+        return int(given)
+    raise SettingError(f"seed: it is {given!r}; it must be a whole number from 0 to 2^64 - 1")

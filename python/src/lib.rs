@@ -1,0 +1,25 @@
+//! The native half of the Python package `lpvmpc`: plants, controllers and simulated worlds of any
+//! size. What people call is in `lpvmpc/`, with its documentation; numbers arrive here with their
+//! shapes checked for form only, and the libraries check what they mean.
+
+mod arrays;
+mod design;
+mod errors;
+mod mpc;
+mod plan;
+mod plant;
+mod world;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _lpvmpc {
+    #[pymodule_export]
+    use super::design::lqr;
+    #[pymodule_export]
+    use super::mpc::Mpc;
+    #[pymodule_export]
+    use super::plant::Plant;
+    #[pymodule_export]
+    use super::world::World;
+}

@@ -1,0 +1,271 @@
+//! Controllers.
+
+use crate::arrays::{Matrices, Matrix, Vector, entries, matrix, pairs, rows, stack};
+use crate::errors::{of_setting, setting};
+use crate::plan::{PlanTuple, fields};
+use crate::plant::Plant;
+use lpvmpc_any::{
+    Iterations, Limits, LinearModels, MpcSettings, Penalty, Preview, Row, StateBounds, Terminal,
+};
+use nalgebra::{DMatrix, DVector};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// A linear row: name, coefficients of x and u, bounds, linear and quadratic price.
+type RowTuple = (String, Vec<f64>, Vec<f64>, f64, f64, Option<(f64, f64)>);
+
+fn row((name, x, u, lower, upper, soft): RowTuple) -> Row {
+    Row {
+        name,
+        x: DVector::from_vec(x),
+        u: DVector::from_vec(u),
+        lower,
+        upper,
+        soft: soft.map(penalty),
+    }
+}
+
+fn penalty((linear, quadratic): (f64, f64)) -> Penalty<f64> {
+    Penalty { linear, quadratic }
+}
+
+fn limits((lower, upper): (Vec<f64>, Vec<f64>)) -> Limits {
+    Limits { lower, upper }
+}
+
+/// The price of a state bound, as Python hands it over.
+#[derive(FromPyObject)]
+enum StateBoundsArgument {
+    Word(String),
+    Prices(Vec<Option<(f64, f64)>>),
+}
+
+/// A terminal ingredient, as Python hands it over.
+#[derive(FromPyObject)]
+enum TerminalArgument<'py> {
+    Word(String),
+    Cost(Matrix<'py>),
+}
+
+/// Settings, as Python hands them over: all keys are there.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Settings<'py> {
+    t_s: f64,
+    horizon: usize,
+    substeps: usize,
+    q: Matrix<'py>,
+    r: Matrix<'py>,
+    terminal: TerminalArgument<'py>,
+    x_bounds: Option<(Vec<f64>, Vec<f64>)>,
+    u_bounds: Option<(Vec<f64>, Vec<f64>)>,
+    state_bounds: StateBoundsArgument,
+    u_ref: Option<Vector<'py>>,
+    rows: Vec<RowTuple>,
+    linear_models: String,
+    nodes: usize,
+    method: String,
+    max_programs: usize,
+    tolerance: f64,
+}
+
+impl Settings<'_> {
+    fn build(self) -> PyResult<MpcSettings> {
+        Ok(MpcSettings {
+            t_s: self.t_s,
+            horizon: self.horizon,
+            substeps: self.substeps,
+            q: matrix(&self.q),
+            r: matrix(&self.r),
+            terminal: match self.terminal {
+                TerminalArgument::Cost(p) => Terminal::Cost(matrix(&p)),
+                TerminalArgument::Word(word) => match word.as_str() {
+                    "lqr" => Terminal::Lqr,
+                    "equality" => Terminal::Equality,
+                    _ => {
+                        return Err(one_of(
+                            "terminal",
+                            &word,
+                            "\"lqr\", \"equality\" or a matrix P",
+                        ));
+                    }
+                },
+            },
+            x_bounds: self.x_bounds.map(limits),
+            u_bounds: self.u_bounds.map(limits),
+            state_bounds: match self.state_bounds {
+                StateBoundsArgument::Prices(prices) => {
+                    let prices = prices.into_iter();
+                    StateBounds::Priced(prices.map(|price| price.map(penalty)).collect())
+                }
+                StateBoundsArgument::Word(word) => match word.as_str() {
+                    "soft" => StateBounds::Soft,
+                    "hard" => StateBounds::Hard,
+                    _ => {
+                        let right = "\"soft\", \"hard\" or a price for each state";
+                        return Err(one_of("state_bounds", &word, right));
+                    }
+                },
+            },
+            u_ref: self.u_ref.map(|u_ref| DVector::from_vec(entries(&u_ref))),
+            rows: self.rows.into_iter().map(row).collect(),
+            linear_models: match self.linear_models.as_str() {
+                "own" => LinearModels::Own,
+                "motion" => LinearModels::AlongMotion,
+                "ray" => LinearModels::AlongRay { nodes: self.nodes },
+                other => {
+                    return Err(one_of(
+                        "linear_models",
+                        other,
+                        "\"own\", \"motion\" or \"ray\"",
+                    ));
+                }
+            },
+            iterations: match self.method.as_str() {
+                "descent" => Iterations::Descent {
+                    tolerance: self.tolerance,
+                    most: self.max_programs,
+                },
+                "fixed" => Iterations::Fixed(self.max_programs),
+                other => return Err(one_of("method", other, "\"descent\" or \"fixed\"")),
+            },
+        })
+    }
+}
+
+fn one_of(place: &str, found: &str, right: &str) -> PyErr {
+    setting(place, &format!("it is {found:?}; it must be {right}"))
+}
+
+/// What is known ahead, as Python hands it over: every key but the first may be absent.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Known<'py> {
+    x_ref: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    u_ref: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    q: Option<Matrices<'py>>,
+    #[pyo3(default)]
+    r: Option<Matrices<'py>>,
+    #[pyo3(default)]
+    cross: Option<Matrices<'py>>,
+    #[pyo3(default)]
+    linear_x: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    linear_u: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    x_lower: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    x_upper: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    u_lower: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    u_upper: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    rows: Option<Vec<Vec<RowTuple>>>,
+    #[pyo3(default)]
+    disturbance: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    parameters: Option<Matrix<'py>>,
+}
+
+fn bounds(
+    place: &str,
+    lower: Option<&Matrix<'_>>,
+    upper: Option<&Matrix<'_>>,
+) -> PyResult<Vec<Limits>> {
+    let pairs = pairs(place, rows(lower), rows(upper))?;
+    let pairs = pairs.into_iter();
+    Ok(pairs
+        .map(|(lower, upper)| Limits {
+            lower: lower.as_slice().to_vec(),
+            upper: upper.as_slice().to_vec(),
+        })
+        .collect())
+}
+
+impl Known<'_> {
+    fn build(self) -> PyResult<Preview> {
+        let weights: Vec<(DMatrix<f64>, DMatrix<f64>)> =
+            pairs("weights", stack(self.q.as_ref()), stack(self.r.as_ref()))?;
+        let parameters = rows(self.parameters.as_ref());
+        Ok(Preview {
+            x_ref: rows(self.x_ref.as_ref()),
+            u_ref: rows(self.u_ref.as_ref()),
+            weights,
+            cross: stack(self.cross.as_ref()),
+            linear_x: rows(self.linear_x.as_ref()),
+            linear_u: rows(self.linear_u.as_ref()),
+            x_bounds: bounds("x_bounds", self.x_lower.as_ref(), self.x_upper.as_ref())?,
+            u_bounds: bounds("u_bounds", self.u_lower.as_ref(), self.u_upper.as_ref())?,
+            rows: match self.rows {
+                Some(stages) => {
+                    let stages = stages.into_iter();
+                    stages
+                        .map(|rows| rows.into_iter().map(row).collect())
+                        .collect()
+                }
+                None => Vec::new(),
+            },
+            disturbance: rows(self.disturbance.as_ref()),
+            parameters: parameters
+                .iter()
+                .map(|values| values.as_slice().to_vec())
+                .collect(),
+        })
+    }
+}
+
+/// The controller of a plant.
+#[pyclass(module = "lpvmpc._lpvmpc")]
+pub struct Mpc {
+    inner: lpvmpc_any::Mpc,
+}
+
+#[pymethods]
+impl Mpc {
+    #[new]
+    fn new(py: Python<'_>, plant: &Plant, settings: Settings<'_>) -> PyResult<Self> {
+        let settings = settings.build()?;
+        let inner = py.detach(|| lpvmpc_any::Mpc::new(&plant.inner, &settings));
+        Ok(Self {
+            inner: inner.map_err(of_setting)?,
+        })
+    }
+
+    fn step<'py>(
+        &mut self,
+        py: Python<'py>,
+        x: Vector<'py>,
+        known: Option<Known<'py>>,
+    ) -> PyResult<PlanTuple<'py>> {
+        let x = entries(&x);
+        let preview = match known {
+            Some(known) => known.build()?,
+            None => Preview::default(),
+        };
+        let inner = &mut self.inner;
+        let plan = py.detach(|| inner.step(&x, &preview));
+        Ok(fields(py, plan.map_err(of_setting)?))
+    }
+
+    fn set_settings(&mut self, settings: Settings<'_>) -> PyResult<()> {
+        let settings = settings.build()?;
+        self.inner.set_settings(&settings).map_err(of_setting)
+    }
+
+    fn set_parameters(&mut self, values: &Bound<'_, PyDict>) -> PyResult<()> {
+        for (name, value) in values {
+            let name: String = name.extract()?;
+            self.inner
+                .set_parameter(&name, value.extract()?)
+                .map_err(of_setting)?;
+        }
+        Ok(())
+    }
+
+    fn reset(&mut self) {
+        self.inner.reset();
+    }
+}

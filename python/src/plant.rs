@@ -1,0 +1,203 @@
+//! Plants.
+
+use crate::errors::of_plant;
+use lpvmpc::{AlongMotion, LpvModel};
+use lpvmpc_any::{MOST_INPUTS, MOST_STATES};
+use lpvmpc_plant::{FirmwareSettings, PlantData, Signal, SizedPlant};
+use nalgebra::{DMatrix, SVector};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+/// A plant that was checked. It does not change: another value of a parameter makes another plant.
+#[pyclass(module = "lpvmpc._lpvmpc", frozen)]
+pub struct Plant {
+    pub inner: lpvmpc_plant::Plant,
+}
+
+/// Name, unit, lower and upper bound.
+type Column = (String, String, Option<f64>, Option<f64>);
+
+fn columns(signals: &[Signal]) -> Vec<Column> {
+    let signals = signals.iter();
+    signals
+        .map(|one| (one.name.clone(), one.unit.clone(), one.lower, one.upper))
+        .collect()
+}
+
+impl Plant {
+    fn data(&self) -> &PlantData {
+        self.inner.data()
+    }
+}
+
+#[pymethods]
+impl Plant {
+    #[staticmethod]
+    fn from_json(py: Python<'_>, text: &str) -> PyResult<Self> {
+        let inner = py.detach(|| lpvmpc_plant::Plant::from_json(text));
+        Ok(Self {
+            inner: inner.map_err(of_plant)?,
+        })
+    }
+
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let inner = py.detach(|| lpvmpc_plant::Plant::load(path));
+        Ok(Self {
+            inner: inner.map_err(of_plant)?,
+        })
+    }
+
+    fn to_json(&self) -> String {
+        self.inner.to_json()
+    }
+
+    fn to_rust(&self) -> String {
+        self.inner.to_rust()
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
+    fn save_firmware(
+        &self,
+        folder: PathBuf,
+        lpvmpc: String,
+        t_s: f64,
+        horizon: usize,
+        q: Vec<f64>,
+        r: Vec<f64>,
+        p: Vec<Vec<f64>>,
+        target: Vec<f64>,
+        start: Vec<f64>,
+        samples: usize,
+    ) -> PyResult<()> {
+        let settings = FirmwareSettings {
+            lpvmpc,
+            t_s,
+            horizon,
+            q,
+            r,
+            p,
+            target,
+            start,
+            samples,
+        };
+        self.inner
+            .save_firmware(&settings, folder)
+            .map_err(of_plant)
+    }
+
+    fn with_parameters(&self, values: Vec<(String, f64)>) -> PyResult<Self> {
+        let mut inner = self.inner.clone();
+        for (name, value) in values {
+            inner.set_parameter(&name, value).map_err(of_plant)?;
+        }
+        Ok(Self { inner })
+    }
+
+    fn f<'py>(
+        &self,
+        py: Python<'py>,
+        x: Vec<f64>,
+        u: Vec<f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let rate = self.inner.derivative(&x, &u).map_err(of_plant)?;
+        Ok(PyArray1::from_vec(py, rate))
+    }
+
+    fn g<'py>(
+        &self,
+        py: Python<'py>,
+        x: Vec<f64>,
+        u: Vec<f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let y = self.inner.output(&x, &u).map_err(of_plant)?;
+        Ok(PyArray1::from_vec(py, y))
+    }
+
+    #[expect(clippy::type_complexity, reason = "a pair of arrays")]
+    fn jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        x: Vec<f64>,
+        u: Vec<f64>,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+        // For its checks of the sizes.
+        self.inner.derivative(&x, &u).map_err(of_plant)?;
+        let (a, b) = jacobian(&self.inner, &x, &u).map_err(of_plant)?;
+        Ok((
+            crate::arrays::to_numpy(py, &a),
+            crate::arrays::to_numpy(py, &b),
+        ))
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.data().name
+    }
+
+    #[getter]
+    fn states(&self) -> Vec<Column> {
+        columns(&self.data().states)
+    }
+
+    #[getter]
+    fn inputs(&self) -> Vec<Column> {
+        columns(&self.data().inputs)
+    }
+
+    #[getter]
+    fn outputs(&self) -> Vec<Column> {
+        columns(&self.data().outputs)
+    }
+
+    /// Name, unit and present value.
+    #[getter]
+    fn parameters(&self) -> Vec<(String, String, f64)> {
+        let values = self.inner.parameters().iter();
+        let parameters = self.data().parameters.iter().zip(values);
+        parameters
+            .map(|(one, value)| (one.name.clone(), one.unit.clone(), *value))
+            .collect()
+    }
+
+    #[getter]
+    fn equilibrium(&self) -> Option<(Vec<f64>, Vec<f64>)> {
+        let equilibrium = self.data().equilibrium.as_ref()?;
+        Some((equilibrium.x.clone(), equilibrium.u.clone()))
+    }
+
+    #[getter]
+    fn has_embedding(&self) -> bool {
+        self.data().embedding.is_some()
+    }
+
+    #[getter]
+    fn operations(&self) -> usize {
+        self.data().operations.len()
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.inner == other.inner
+    }
+}
+
+/// (df/dx, df/du) at `x` and `u`, of the plant's sizes.
+pub fn jacobian(
+    plant: &lpvmpc_plant::Plant,
+    x: &[f64],
+    u: &[f64],
+) -> Result<(DMatrix<f64>, DMatrix<f64>), lpvmpc_plant::PlantError> {
+    const BOTH: usize = MOST_STATES + MOST_INPUTS;
+    let placed = SizedPlant::<MOST_STATES, MOST_INPUTS>::new(plant.clone())?;
+    let filled = |values: &[f64], i: usize| values.get(i).copied().unwrap_or(0.0);
+    let (a, b) = AlongMotion::<_, BOTH>(placed).jacobian(
+        &SVector::from_fn(|i, _| filled(x, i)),
+        &SVector::from_fn(|i, _| filled(u, i)),
+    );
+    let (n, m) = (x.len(), u.len());
+    Ok((
+        DMatrix::from_fn(n, n, |i, j| a[(i, j)]),
+        DMatrix::from_fn(n, m, |i, j| b[(i, j)]),
+    ))
+}
