@@ -1,0 +1,312 @@
+"""Controllers, against programs that share no code with them."""
+
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import lpvmpc
+from plants import cart_pole, cart_pole_formulas, double_integrator
+
+Q, R, T_S, N = np.diag([2.0, 5.0, 0.2, 0.2]), np.diag([0.05]), 0.05, 25
+
+
+def rk4(f, x, u, t_s):
+    k1 = f(x, u)
+    k2 = f(x + t_s / 2 * k1, u)
+    k3 = f(x + t_s / 2 * k2, u)
+    k4 = f(x + t_s * k3, u)
+    return x + t_s / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+
+
+def by_ipopt(x0, p, references):
+    """The optimal inputs and their cost for the cart-pole, by multiple shooting and IPOPT."""
+    x, u, parameters, f, values = cart_pole_formulas()
+    rate = ca.Function("f", [x, u], [ca.substitute(f, parameters, ca.DM(list(values.values())))])
+    opti = ca.Opti()
+    xs, us = opti.variable(4, N + 1), opti.variable(1, N)
+    cost = 0
+    opti.subject_to(xs[:, 0] == x0)
+    for k in range(N):
+        e = xs[:, k] - references[k]
+        cost += ca.bilin(ca.DM(Q), e, e) + R[0, 0] * us[k] ** 2
+        opti.subject_to(xs[:, k + 1] == rk4(rate, xs[:, k], us[k], T_S))
+        opti.subject_to(opti.bounded(-15, us[k], 15))
+    e = xs[:, N] - references[N]
+    cost += ca.bilin(ca.DM(p), e, e)
+    opti.minimize(cost)
+    opti.solver("ipopt", {"print_time": False}, {"print_level": 0, "tol": 1e-10, "sb": "yes"})
+    solution = opti.solve()
+    return solution.value(us), solution.value(cost)
+
+
+@pytest.mark.parametrize(
+    ("x0", "steps"),
+    [
+        ([0, 0.5, 0, 0], [0.0]),
+        ([0.3, -0.6, -1, 1], [0.0]),
+        ([0, 0, 0, 0], [0.8]),
+        ([-0.5, 0.3, 0.5, -0.5], [0.0] * 10 + [0.5] * 16),
+    ],
+)
+def test_a_converged_plan_is_that_of_ipopt(x0, steps):
+    plant = cart_pole()
+    p = lpvmpc.lqr(plant, T_S, Q, R).p
+    mpc = lpvmpc.Mpc(plant, T_S, N, Q, R, terminal=p, u_ref=[0.0], max_programs=60, tolerance=1e-12)
+    x_ref = np.array([[position, 0, 0, 0] for position in steps])
+    plan = mpc.step(x0, x_ref)
+    every = np.vstack([x_ref, np.repeat(x_ref[-1:], N + 1 - len(x_ref), axis=0)])
+    inputs, cost = by_ipopt(np.array(x0), p, every)
+    assert plan.is_solved
+    assert plan.cost == pytest.approx(cost, rel=1e-6)
+    np.testing.assert_allclose(plan.u[:, 0], inputs, atol=2e-3)
+
+
+def test_the_plan_is_a_motion_of_the_plant():
+    plant = cart_pole()
+    plan = lpvmpc.Mpc(plant, T_S, N, Q, R).step([0, 0.4, 0, 0])
+    assert plan.u.shape == (N, 1) and plan.x.shape == (N + 1, 4)
+    for i in range(N):
+        after = rk4(plant.f, plan.x[i], plan.u[i], T_S)
+        np.testing.assert_allclose(plan.x[i + 1], after, rtol=1e-9, atol=1e-9)
+    assert (plan.u0 == plan.u[0]).all()
+
+
+def test_without_bounds_a_linear_plant_is_under_its_regulator():
+    plant = double_integrator()
+    q, r = [1.0, 0.1], [0.5]
+    regulator = lpvmpc.lqr(plant, 0.1, q, r)
+    mpc = lpvmpc.Mpc(plant, 0.1, 10, q, r)
+    for x in ([1, 0], [-2, 3]):
+        np.testing.assert_allclose(mpc.step(x).u0, regulator(0.0, x), rtol=1e-9)
+        assert mpc.step(x).cost == pytest.approx(np.array(x) @ regulator.p @ np.array(x))
+
+
+def test_the_regulator_solves_the_riccati_equation_of_scipy():
+    from scipy.linalg import expm, solve_discrete_are
+
+    plant = cart_pole()
+    a, b = plant.jacobian([0] * 4, [0])
+    both = expm(np.block([[a, b], [np.zeros((1, 5))]]) * T_S)
+    a_d, b_d = both[:4, :4], both[:4, 4:]
+    p = solve_discrete_are(a_d, b_d, Q, R)
+    found = lpvmpc.lqr(plant, T_S, Q, R)
+    np.testing.assert_allclose(found.p, p, rtol=1e-8)
+    k = np.linalg.solve(R + b_d.T @ p @ b_d, b_d.T @ p @ a_d)
+    np.testing.assert_allclose(found.k, k, rtol=1e-8)
+
+
+def test_an_infeasible_problem_is_said_in_the_plant_s_names():
+    plant = double_integrator()
+    mpc = lpvmpc.Mpc(
+        plant, 0.1, 20, [1, 1], [1], u_bounds=([-1], [1]), x_bounds={"position": (None, 0.5)},
+        state_bounds="hard",
+    )  # fmt: skip
+    plan = mpc.step([0.4, 2.0])
+    assert plan.status == "infeasible" and not plan.is_solved
+    assert plan.message.startswith("infeasible: position <= 0.5 at stage")
+    assert "against force >= -1 at stages 0 to" in plan.message
+    assert (np.abs(plan.u) <= 1).all()
+    assert mpc.step([0.0, 0.0]).is_solved
+
+
+def test_soft_bounds_are_exceeded_at_their_price():
+    plant = double_integrator()
+    limits = {"position": (None, 0.5)}
+    excess = []
+    for price in (0.1, 1.0, 1e4):
+        mpc = lpvmpc.Mpc(
+            plant, 0.1, 20, [1, 0.1], [1], u_bounds=([-1], [1]), x_bounds=limits,
+            state_bounds={"position": lpvmpc.Penalty(price, price)},
+        )  # fmt: skip
+        plan = mpc.step([0.4, 0.6], [1, 0])
+        assert plan.is_solved
+        excess.append(plan.x[:, 0].max() - 0.5)
+    assert excess[0] > excess[1] > excess[2] > 0
+    assert any(one.exceeded for one in plan.active)
+
+
+def test_a_row_holds():
+    plant = double_integrator()
+    row = lpvmpc.Row("braking", x={"position": 1, "speed": 1}, upper=0.7)
+    mpc = lpvmpc.Mpc(plant, 0.1, 20, [1, 0.1], [0.01], rows=[row], u_bounds=([-2], [2]))
+    plan = mpc.step([0, 0], [1, 0])
+    assert (plan.x[1:-1].sum(axis=1) <= 0.7 + 1e-8).all()
+    assert "braking <= 0.7" in plan.active_bounds
+    free = mpc.step([0, 0], [1, 0], rows=[[]])
+    assert free.x.sum(axis=1).max() > 0.71
+
+
+def test_bounds_weights_and_disturbances_by_stage():
+    plant = double_integrator()
+    mpc = lpvmpc.Mpc(plant, 0.1, 20, [1, 0.1], [0.1])
+    lower = np.full((20, 1), -1.0)
+    upper = np.concatenate([np.full((5, 1), 0.2), np.full((15, 1), 1.0)])
+    plan = mpc.step([0, 0], [3, 0], u_bounds=(lower, upper))
+    assert (plan.u[:5] <= 0.2 + 1e-12).all() and plan.u[5:].max() > 0.5
+    assert (mpc.step([0, 0], [3, 0], u_bounds=([None], [0.1])).u <= 0.1 + 1e-12).all()
+    gust = np.zeros((10, 2))
+    gust[5:, 1] = 0.4
+    told = mpc.step([0, 0], disturbance=gust)
+    np.testing.assert_allclose(told.x[1:, 1] - told.x[:-1, 1] - 0.1 * told.u[:, 0],
+                               [0.0] * 5 + [0.04] * 15, atol=1e-9)  # fmt: skip
+    dear = mpc.step([0, 0], [3, 0], q=[1, 0.1], r=[10.0])
+    assert np.abs(dear.u0) < np.abs(mpc.step([0, 0], [3, 0]).u0)
+
+
+def test_linear_costs_against_the_normal_equations():
+    """The condensed problem of a linear plant without bounds, solved densely."""
+    q, r, t_s, horizon = np.diag([1.0, 0.1]), 0.1, 0.1, 12
+    plant = double_integrator()
+    p = lpvmpc.lqr(plant, t_s, q, [r]).p
+    a, b = np.array([[1, t_s], [0, 1]]), np.array([t_s**2 / 2, t_s])
+    powers = [np.linalg.matrix_power(a, i) for i in range(horizon + 1)]
+    to_x = np.zeros((horizon, 2, horizon))
+    for i in range(horizon):
+        for j in range(i + 1):
+            to_x[i, :, j] = powers[i - j] @ b
+    x0, linear_x, linear_u = np.array([0.5, -1.0]), np.array([0.3, -0.7]), 0.4
+    hessian, gradient = 2 * r * np.eye(horizon), np.full(horizon, linear_u)
+    for i in range(horizon):
+        weight = q if i + 1 < horizon else p
+        hessian += 2 * to_x[i].T @ weight @ to_x[i]
+        gradient += 2 * to_x[i].T @ weight @ powers[i + 1] @ x0
+        if i + 1 < horizon:
+            gradient += to_x[i].T @ linear_x
+    expected = np.linalg.solve(hessian, -gradient)
+    mpc = lpvmpc.Mpc(plant, t_s, horizon, q, [r], max_programs=20, tolerance=1e-12)
+    stages = np.vstack([np.tile(linear_x, (horizon, 1)), np.zeros((1, 2))])
+    plan = mpc.step(x0, linear_x=stages, linear_u=[linear_u])
+    np.testing.assert_allclose(plan.u[:, 0], expected, atol=1e-8)
+
+
+def test_settings_change_while_it_runs():
+    plant = cart_pole()
+    mpc = lpvmpc.Mpc(plant, T_S, N, Q, R)
+    mpc.step([0, 0.3, 0, 0])
+    mpc.set(u_bounds={"force": (-3, 3)}, r=[1.0])
+    mpc.reset()
+    fresh = lpvmpc.Mpc(plant, T_S, N, Q, [1.0], u_bounds=([-3], [3]))
+    assert (mpc.step([0, 0.3, 0, 0]).u == fresh.step([0, 0.3, 0, 0]).u).all()
+    assert mpc.bounds["force"] == (-3.0, 3.0) and mpc.settings["r"] == [1.0]
+    with pytest.raises(lpvmpc.SettingError, match="horizon: it stays"):
+        mpc.set(horizon=3)
+    with pytest.raises(lpvmpc.SettingError, match="weight: there is no such setting"):
+        mpc.set(weight=3)
+    with pytest.raises(lpvmpc.SettingError):
+        mpc.set(r=[-1.0])
+    assert mpc.settings["r"] == [1.0]
+
+
+def test_parameters_change_while_it_runs():
+    mpc = lpvmpc.Mpc(cart_pole(), T_S, N, Q, R, terminal=Q)
+    mpc.set_parameters(pole_mass=0.6)
+    other = lpvmpc.Mpc(cart_pole().with_parameters(pole_mass=0.6), T_S, N, Q, R, terminal=Q)
+    found = mpc.step([0, 0.3, 0, 0])
+    np.testing.assert_allclose(found.u, other.step([0, 0.3, 0, 0]).u, atol=1e-9)
+    assert mpc.plant.parameters["pole_mass"] == 0.6
+    before = lpvmpc.Mpc(cart_pole(), T_S, N, Q, R, terminal=Q)
+    values = [1.0, 0.6, 0.5]
+    told = before.step([0, 0.3, 0, 0], parameters=values)
+    np.testing.assert_allclose(told.u, found.u, atol=1e-9)
+    with pytest.raises(lpvmpc.PlantError, match="mass"):
+        mpc.set_parameters(mass=1)
+
+
+def test_a_state_that_is_not_finite_gets_an_input_that_is():
+    mpc = lpvmpc.Mpc(cart_pole(), T_S, N, Q, R)
+    for bad in (np.nan, np.inf):
+        plan = mpc.step([0, bad, 0, 0])
+        assert plan.status == "not finite" and not plan.is_solved
+        assert np.isfinite(plan.u).all() and (np.abs(plan.u) <= 15).all()
+    assert mpc.step([0, 0.1, 0, 0]).is_solved
+
+
+def test_a_controller_can_be_pickled():
+    mpc = lpvmpc.Mpc(cart_pole(), T_S, N, Q, R, x_bounds={"position": (-1, 1)})
+    again = pickle.loads(pickle.dumps(mpc))
+    assert (again.step([0, 0.3, 0, 0]).u == mpc.step([0, 0.3, 0, 0]).u).all()
+    plan = pickle.loads(pickle.dumps(mpc.step([0, 0.3, 0, 0])))
+    assert plan.is_solved and plan.x.shape == (N + 1, 4)
+
+
+def test_controllers_work_side_by_side():
+    """The lock of the interpreter is let go; each thread has its own answers."""
+    plant = cart_pole()
+    starts = [[0, 0.1 * i, 0, 0] for i in range(1, 5)]
+
+    def first(x):
+        mpc = lpvmpc.Mpc(plant, T_S, N, Q, R)
+        return [mpc.step(x).u0[0] for _ in range(50)]
+
+    alone = [first(x) for x in starts]
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(first, starts)) == alone
+
+
+def make(**changes):
+    settings = {"t_s": T_S, "horizon": N, "q": Q, "r": R, **changes}
+    return lpvmpc.Mpc(cart_pole(), **settings)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: make(t_s=0), "t_s"),
+        (lambda: make(t_s=float("nan")), "t_s"),
+        (lambda: make(t_s="fast"), "t_s: it is 'fast'"),
+        (lambda: make(horizon=0), "horizon"),
+        (lambda: make(horizon=2.5), "horizon: it is 2.5"),
+        (lambda: make(horizon=10**7), "horizon"),
+        (lambda: make(q=[1, 1, 1]), r"q: its shape is \(3,\); it must be \(4,\)"),
+        (lambda: make(q=[1, 1, 1, -1]), "not positive semidefinite"),
+        (lambda: make(q=np.triu(np.ones((4, 4)))), "symmetric"),
+        (lambda: make(q=[1, 1, 1, np.nan]), "finite"),
+        (lambda: make(r=[0]), "positive definite"),
+        (lambda: make(terminal="lqg"), "terminal: it is \"lqg\""),
+        (lambda: make(terminal=[1, 1]), "terminal"),
+        (lambda: make(u_bounds=([1], [-1])), "force"),
+        (lambda: make(u_bounds=3), r"u_bounds: it must be \(lower, upper\)"),
+        (lambda: make(u_bounds={"torque": (0, 1)}), "there is no 'torque'; there are force"),
+        (lambda: make(x_bounds=([0], [1])), r"x_bounds, lower: its shape is \(1,\)"),
+        (lambda: make(state_bounds="firm"), "state_bounds"),
+        (lambda: make(state_bounds={"tilt": 3.0}), "no Penalty"),
+        (lambda: make(state_bounds={"tilt": lpvmpc.Penalty(-1.0)}), "not negative"),
+        (lambda: make(rows=["a"]), "no lpvmpc.Row"),
+        (lambda: make(rows=[lpvmpc.Row("a", x={"height": 1})]), "there is no 'height'"),
+        (lambda: make(rows=[lpvmpc.Row("a", x=[1, 0, 0, 0], lower=2, upper=1)]), "a"),
+        (lambda: make(linear_models="magic"), "linear_models"),
+        (lambda: make(linear_models="ray", nodes=99), "nodes"),
+        (lambda: make(substeps=0), "."),
+        (lambda: make(method="newton"), "method"),
+        (lambda: make(max_programs=0), "."),
+        (lambda: make(tolerance=-1.0), "."),
+        (lambda: lpvmpc.Mpc("plant", T_S, N, Q, R), "plant: str is no"),
+        (lambda: make().step([0, 0]), "x: its shape"),
+        (lambda: make().step("up"), "x: 'up' is no array"),
+        (lambda: make().step([0] * 4, [1, 2]), "x_ref: its shape"),
+        (lambda: make().step([0] * 4, [np.nan] * 4), "x_ref, stage 0"),
+        (lambda: make().step([0] * 4, np.zeros((0, 4))), "x_ref"),
+        (lambda: make().step([0] * 4, q=Q), "both or neither"),
+        (lambda: make().step([0] * 4, u_bounds=([1], [0])), "u_bounds, stage 0"),
+        (lambda: make().step([0] * 4, parameters=[1.0]), "parameters"),
+        (lambda: make().step([0] * 4, disturbance=[np.inf] * 4), "disturbance"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(call, message):
+    with pytest.raises(lpvmpc.SettingError, match=message):
+        call()
+
+
+def test_the_largest_plant_that_fits():
+    rng = np.random.default_rng(3)
+    a = rng.normal(size=(16, 16)) * 0.2
+    b = rng.normal(size=(16, 6))
+    plant = lpvmpc.Plant.from_matrices(a, b)
+    mpc = lpvmpc.Mpc(plant, 0.1, 200, np.ones(16), np.ones(6), u_bounds=([-1] * 6, [1] * 6))
+    assert mpc.step(np.full(16, 0.5)).is_solved
+    with pytest.raises(lpvmpc.SettingError, match="17 states"):
+        big = lpvmpc.Plant.from_matrices(np.zeros((17, 17)), np.ones((17, 1)))
+        lpvmpc.Mpc(big, 0.1, 5, np.ones(17), [1])

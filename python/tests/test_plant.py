@@ -1,0 +1,257 @@
+"""Plants from everywhere have the values of the program that they come from."""
+
+import pickle
+from types import SimpleNamespace
+
+import casadi as ca
+import numpy as np
+import pytest
+import sympy as sp
+
+import lpvmpc
+from plants import cart_pole, cart_pole_formulas
+
+
+def points(n, m, count=30):
+    rng = np.random.default_rng(5)
+    return [(rng.uniform(-2, 2, n), rng.uniform(-3, 3, m)) for _ in range(count)]
+
+
+def agree(plant, x, u, f, p=(), values=(), tolerance=1e-12):
+    """The plant's f and its Jacobian are CasADi's."""
+    arguments = [x, u, *p]
+    reference = ca.Function("r", arguments, [f, ca.jacobian(f, x), ca.jacobian(f, u)])
+    for at, under in points(x.numel(), u.numel()):
+        rate, a, b = (np.array(one) for one in reference(at, under, *values))
+        np.testing.assert_allclose(plant.f(at, under), rate.ravel(), rtol=tolerance, atol=tolerance)
+        found_a, found_b = plant.jacobian(at, under)
+        np.testing.assert_allclose(found_a, a, rtol=tolerance, atol=tolerance)
+        np.testing.assert_allclose(found_b, b, rtol=tolerance, atol=tolerance)
+
+
+def test_of_casadi():
+    x, u, p, f, values = cart_pole_formulas()
+    agree(cart_pole(), x, u, f, [p], [list(values.values())])
+
+
+def test_parameters_change():
+    x, u, p, f, values = cart_pole_formulas()
+    changed = {**values, "pole_mass": 0.55}
+    plant = cart_pole()
+    agree(plant.with_parameters(pole_mass=0.55), x, u, f, [p], [list(changed.values())])
+    assert plant.parameters == values
+
+
+def test_every_operation_of_casadi():
+    x, u = ca.SX.sym("x", 3), ca.SX.sym("u", 2)
+    a, b, c = ca.vertsplit(x)
+    v, w = ca.vertsplit(u)
+    small = ca.tanh(a) / 2
+    f = ca.vertcat(
+        ca.asin(small) + ca.acos(small) - ca.atan(b * w) * ca.sinh(a) + ca.cosh(b) + ca.asinh(a)
+        - ca.acosh(2 + c**2) + ca.atanh(small) * ca.tan(small) + ca.exp(a / 3) + ca.sin(a) / a,
+        ca.log(2 + c**2) + (1 + a**2) ** b + (2 + b**2) ** -1.3 + c**3 + ca.sqrt(1 + v**2)
+        + ca.atan2(b, c) + ca.expm1(a) - ca.log1p(b**2) + ca.hypot(v, w) + 1 / (3 + w**2) + 2 * a,
+        ca.fabs(a) + ca.sign(b) * c - ca.fmin(a, b) * ca.fmax(v, c) + ca.floor(w) + ca.ceil(v)
+        + ca.if_else(a < b, ca.sin(v), c**2) + ca.if_else(ca.logic_and(a <= c, v != w), v, b)
+        + ca.if_else(ca.logic_or(ca.logic_not(a < v), b <= w), 1, -c),
+    )  # fmt: skip
+    agree(lpvmpc.Plant.from_casadi(x, u, f), x, u, f, tolerance=1e-11)
+
+
+def test_truth_is_what_is_not_zero():
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    f = ca.if_else(ca.logic_or(-x, u), 2, 3) + ca.if_else(ca.logic_and(x, u), 5, 7)
+    plant = lpvmpc.Plant.from_casadi(x, u, f)
+    reference = ca.Function("f", [x, u], [f])
+    for at in (-2.0, 0.0, 1.0):
+        for under in (-0.5, 0.0):
+            assert plant.f([at], [under])[0] == float(reference(at, under))
+
+
+@pytest.mark.parametrize("symbols", [ca.SX, ca.MX])
+def test_of_lists_of_symbols(symbols):
+    position, speed, force = (symbols.sym(name) for name in ("position", "speed", "force"))
+    plant = lpvmpc.Plant.from_casadi([position, speed], [force], [speed, force - position**3])
+    assert [one.name for one in plant.states] == ["position", "speed"]
+    assert plant.f([2, 3], [1]).tolist() == [3.0, -7.0]
+
+
+def test_of_a_function_of_matrices():
+    x, u = ca.MX.sym("x", 4), ca.MX.sym("u", 2)
+    a = np.arange(16.0).reshape(4, 4)
+    f = a @ ca.sin(x) + ca.vertcat(u, ca.dot(x, x), ca.norm_2(x))
+    plant = lpvmpc.Plant.from_casadi(x, u, f)
+    agree(plant, x, u, f, tolerance=1e-11)
+    assert [one.name for one in plant.states] == ["x_0", "x_1", "x_2", "x_3"]
+
+
+def test_of_do_mpc_s_model():
+    """Any object with what a Model has after its setup()."""
+
+    class Structure:
+        def __init__(self, **parts):
+            self.parts = parts
+            self.cat = ca.vertcat(*parts.values()) if parts else ca.SX(0, 1)
+
+        def keys(self):
+            return self.parts.keys()
+
+        def __getitem__(self, key):
+            return self.parts[key]
+
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    mass, wind = ca.SX.sym("mass"), ca.SX.sym("wind")
+    empty = ca.SX(0, 1)
+    model = SimpleNamespace(
+        flags={"setup": True},
+        model_type="continuous",
+        n_z=0,
+        _x=Structure(x=x),
+        _u=Structure(default=empty, thrust=u),
+        _p=Structure(default=empty, mass=mass),
+        _tvp=Structure(default=empty, wind=wind),
+        _rhs=Structure(x=ca.vertcat(x[1], u / mass + wind)),
+    )
+    plant = lpvmpc.Plant.from_do_mpc(model, parameters={"wind": 0.5, "mass": 2.0})
+    assert plant.parameters == {"mass": 2.0, "wind": 0.5}
+    assert [one.name for one in (*plant.states, *plant.inputs)] == ["x_0", "x_1", "thrust"]
+    assert plant.f([0, 3], [4]).tolist() == [3.0, 2.5]
+    model.flags = {"setup": False}
+    with pytest.raises(lpvmpc.PlantError, match="setup"):
+        lpvmpc.Plant.from_do_mpc(model)
+
+
+def test_of_acados_model():
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    model = SimpleNamespace(
+        x=x, u=u, p=[], z=None, f_expl_expr=ca.vertcat(x[1], u), name="cart", x_labels=["s", "v"]
+    )
+    plant = lpvmpc.Plant.from_acados(model)
+    assert (plant.name, plant.states[1].name) == ("cart", "v")
+    assert plant.f([1, 2], [3]).tolist() == [2.0, 3.0]
+    model.f_expl_expr = None
+    with pytest.raises(lpvmpc.PlantError, match="f_expl_expr"):
+        lpvmpc.Plant.from_acados(model)
+
+
+def test_of_sympy():
+    a, b, v, m, g = sp.symbols("a b v m g")
+    f = [
+        b / m + sp.sin(a) / a + sp.sqrt(1 + a**2) * sp.exp(-b) + sp.Rational(1, 3) * a**3,
+        g * sp.sin(a) ** 2 - v / (m + a**2) + sp.atan2(b, a) + sp.Abs(b) ** sp.Rational(3, 2)
+        + sp.Max(a, b, v) - sp.Min(a, v) + sp.Piecewise((a, a < b), (b**2, a > 1), (v, True))
+        + sp.pi * sp.cosh(a) + sp.sign(a) * sp.floor(b),
+    ]  # fmt: skip
+    plant = lpvmpc.Plant.from_sympy([a, b], [v], f, y=[a * b], parameters={m: 2.0, g: 9.81})
+    exact = sp.lambdify([a, b, v, m, g], f, modules=[{"atan2": np.arctan2}, "numpy"])
+    for at, under in points(2, 1):
+        expected = exact(*at, *under, 2.0, 9.81)
+        np.testing.assert_allclose(plant.f(at, under), expected, rtol=1e-13, atol=1e-13)
+        np.testing.assert_allclose(plant.g(at, under), [at[0] * at[1]])
+    assert plant.parameters == {"m": 2.0, "g": 9.81}
+    with pytest.raises(lpvmpc.PlantError, match="m is neither a state"):
+        lpvmpc.Plant.from_sympy([a, b], [v], f, parameters={g: 9.81})
+
+
+def test_of_matrices():
+    rng = np.random.default_rng(1)
+    a, b, c, d = (rng.normal(size=shape) for shape in ((3, 3), (3, 2), (2, 3), (2, 2)))
+    plant = lpvmpc.Plant.from_matrices(a, b, c, d, offset=[1, 2, 3])
+    for x, u in points(3, 2, 5):
+        np.testing.assert_allclose(plant.f(x, u), a @ x + b @ u + [1, 2, 3], rtol=1e-13, atol=1e-13)
+        np.testing.assert_allclose(plant.g(x, u), c @ x + d @ u, rtol=1e-13, atol=1e-13)
+
+
+def test_files_and_pickles_hold_the_same_plant(tmp_path):
+    plant = cart_pole()
+    plant.save(tmp_path / "plant.json")
+    assert lpvmpc.Plant.load(tmp_path / "plant.json") == plant
+    other = plant.with_parameters(pole_mass=0.4)
+    again = pickle.loads(pickle.dumps(other))
+    assert again == other and again != plant and hash(again) == hash(other)
+    assert (again.f([0, 1, 0, 0], [1]) == other.f([0, 1, 0, 0], [1])).all()
+
+
+def test_what_a_plant_says_of_itself():
+    plant = cart_pole()
+    assert plant.inputs == [lpvmpc.Signal("force", "N", -15.0, 15.0)]
+    assert plant.states[0] == lpvmpc.Signal("position", "m")
+    assert [one.name for one in plant.outputs] == ["tip_position", "tip_height"]
+    x, u = plant.equilibrium
+    assert (x == 0).all() and (u == 0).all()
+    assert "position [m]" in repr(plant)
+    assert "impl" in plant.to_rust()
+
+
+X, U = ca.SX.sym("x", 2), ca.SX.sym("u")
+F = ca.vertcat(X[1], U)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: lpvmpc.Plant.from_casadi(X, U, ca.SX.sym("free") * F), "free"),
+        (lambda: lpvmpc.Plant.from_casadi(X + 1, U, F), "x: .* is no symbol"),
+        (lambda: lpvmpc.Plant.from_casadi(3.0, U, F), "x: 3.0 is no symbol"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, X[0]), "derivative"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, F, states=["a"]), "not 2 names"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, F, states=["a", "a"]), "a"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, F, units={"b": "m"}), "there is no 'b'"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, F, bounds={"u": (1, -1)}), "1"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, F, bounds={"u": 3}), r"\(lower, upper\)"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, F, bounds={"u": (float("nan"), 1)}), "NaN"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, F, equilibrium=([0, 1], [0])), "equilibrium"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, F, equilibrium=([0], [0])), "equilibrium, x"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, F, parameters={"m": 1}), "parameters"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, F * ca.inf), "not finite"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, ca.vertcat(X[1], ca.erf(U))), "no counterpart"),
+        (lambda: lpvmpc.Plant.from_matrices([[0, 1]], [[1]]), "square"),
+        (lambda: lpvmpc.Plant.from_matrices([[np.nan]], [[1]]), "a: .* not finite"),
+        (lambda: lpvmpc.Plant.from_matrices([["one"]], [[1]]), "no array of real numbers"),
+        (lambda: lpvmpc.Plant.from_matrices([[1j]], [[1]]), "no array of real numbers"),
+        (lambda: lpvmpc.Plant.load("nowhere.json"), "nowhere.json"),
+        (lambda: cart_pole().with_parameters(mass=1), "there are cart_mass"),
+        (lambda: cart_pole().with_parameters(cart_mass=float("inf")), "finite"),
+        (lambda: cart_pole().f([0, 0, 0], [0]), r"x: its shape is \(3,\); it must be \(4,\)"),
+        (lambda: lpvmpc.Plant.from_sympy([sp.Symbol("a")], [sp.Symbol("a")], [1]), "twice"),
+    ],
+)
+def test_what_makes_no_plant_is_refused(make, message):
+    with pytest.raises(lpvmpc.PlantError, match=message):
+        make()
+
+
+def test_a_broken_file_is_refused_and_nothing_else_happens():
+    """Thousands of damaged files: each is a plant or a PlantError."""
+    rng = np.random.default_rng(11)
+    text = cart_pole().to_json()
+    refused = 0
+    for _ in range(3000):
+        damaged = list(text)
+        for _ in range(rng.integers(1, 4)):
+            at = int(rng.integers(len(damaged)))
+            kind = rng.integers(4)
+            if kind == 0:
+                del damaged[at:]
+            elif kind == 1:
+                damaged[at] = chr(rng.integers(32, 127))
+            elif kind == 2:
+                damaged.insert(at, str(rng.choice(["1e999", "-1", "[", "{", '"', "9" * 30, "null"])))
+            else:
+                end = int(rng.integers(at, min(at + 200, len(damaged)) + 1))
+                damaged[at:end] = damaged[: int(rng.integers(0, 50))]
+            if not damaged:
+                damaged = ["x"]
+        try:
+            plant = lpvmpc.Plant.from_json("".join(damaged))
+            if len(plant.states) == 4 and len(plant.inputs) == 1:
+                plant.f([0.1, 0.2, 0.3, 0.4], [1.0])
+        except lpvmpc.PlantError:
+            refused += 1
+    assert refused > 2000
+    for hostile in ("[" * 100_000, '{"schema":' * 5000, '{"schema": 99}', "\0" * 10, ""):
+        with pytest.raises(lpvmpc.PlantError):
+            lpvmpc.Plant.from_json(hostile)
+    with pytest.raises(lpvmpc.PlantError, match="version 2"):
+        lpvmpc.Plant.from_json(text.replace('"schema":1', '"schema":2'))
