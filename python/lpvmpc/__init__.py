@@ -19,7 +19,7 @@ from .errors import (
     SimulationError,
 )
 from .mpc import ActiveBound, Mpc, Penalty, Plan, Row
-from .plant import Plant, Signal
+from .plant import Plant, Signal, SteadyState
 from .simulation import Actuator, Jump, Load, Run, Sensor, simulate
 
 __all__ = [
@@ -41,6 +41,7 @@ __all__ = [
     "SettingError",
     "Signal",
     "SimulationError",
+    "SteadyState",
     "lqr",
     "simulate",
 ]

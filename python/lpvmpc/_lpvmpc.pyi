@@ -37,6 +37,9 @@ class Plant:
     def jacobian(
         self, x: _Array | Sequence[float], u: _Array | Sequence[float]
     ) -> tuple[_Array, _Array]: ...
+    def steady_state(
+        self, x_ref: _Array | Sequence[float], weights: _Array | Sequence[float]
+    ) -> tuple[_Array, _Array, bool]: ...
     @property
     def name(self) -> str: ...
     @property

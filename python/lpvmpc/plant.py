@@ -32,6 +32,19 @@ class Signal:
     """The largest value that it may have; none without."""
 
 
+@dataclass(frozen=True)
+class SteadyState:
+    """Where a plant stands, f(x, u) = 0."""
+
+    x: Array
+    """The state, shape (n,)."""
+    u: Array
+    """The input that holds it there, shape (m,)."""
+    reached: bool
+    """Whether x is the reference itself, to 1e-4 of its size. If not, it is the nearest state at which the
+    plant can stand."""
+
+
 class Plant:
     """A plant x_dot = f(x, u, p), perhaps with outputs y = g(x, u, p).
 
@@ -528,6 +541,33 @@ class Plant:
             `x` is not of shape (n,), or `u` not of shape (m,).
         """
         return self._native.jacobian(*self._point(x, u))
+
+    def steady_state(self, x_ref: ArrayLike, weights: ArrayLike | None = None) -> SteadyState:
+        """The steady state within the plant's bounds that is nearest to a reference.
+
+        Parameters
+        ----------
+        x_ref
+            The reference, shape (n,).
+        weights
+            What a distance in each state counts, shape (n,); one without. A state of weight zero is
+            wherever the others want it.
+
+        Raises
+        ------
+        SettingError
+            None was found: there is none within the bounds, or Newton's method does not find it from the
+            reference.
+
+        Examples
+        --------
+        >>> tank = Plant.from_matrices([[-0.1]], [[1]], states=["level"], inputs=["inflow"])
+        >>> tank.steady_state([2.0]).u.round(6).tolist()
+        [0.2]
+        """
+        n = len(self._native.states)
+        weight = np.ones(n) if weights is None else column("weights", weights, n)
+        return SteadyState(*self._native.steady_state(column("x_ref", x_ref, n), weight))
 
     def _point(self, x: ArrayLike, u: ArrayLike) -> tuple[Array, Array]:
         return (

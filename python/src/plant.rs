@@ -1,6 +1,6 @@
 //! Plants.
 
-use crate::errors::of_plant;
+use crate::errors::{of_plant, of_setting};
 use lpvmpc::{AlongMotion, LpvModel};
 use lpvmpc_any::{MOST_INPUTS, MOST_STATES};
 use lpvmpc_plant::{FirmwareSettings, PlantData, Signal, SizedPlant};
@@ -128,6 +128,21 @@ impl Plant {
         Ok((
             crate::arrays::to_numpy(py, &a),
             crate::arrays::to_numpy(py, &b),
+        ))
+    }
+
+    #[expect(clippy::type_complexity, reason = "x, u, and whether x is the reference")]
+    fn steady_state<'py>(
+        &self,
+        py: Python<'py>,
+        x_ref: Vec<f64>,
+        weights: Vec<f64>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, bool)> {
+        let found = lpvmpc_any::steady_state(&self.inner, &x_ref, &weights).map_err(of_setting)?;
+        Ok((
+            PyArray1::from_vec(py, found.x),
+            PyArray1::from_vec(py, found.u),
+            found.reached,
         ))
     }
 

@@ -255,3 +255,19 @@ def test_a_broken_file_is_refused_and_nothing_else_happens():
             lpvmpc.Plant.from_json(hostile)
     with pytest.raises(lpvmpc.PlantError, match="version 2"):
         lpvmpc.Plant.from_json(text.replace('"schema":1', '"schema":2'))
+
+
+def test_steady_states():
+    """A chain of two leaking tanks: what flows in flows out, and a level of the second needs one of the first."""
+    h, q = ca.SX.sym("h", 2), ca.SX.sym("q")
+    out = 0.5 * ca.sqrt(h + 0.01)
+    tanks = lpvmpc.Plant.from_casadi(h, q, ca.vertcat(q - out[0], out[0] - out[1]))
+    found = tanks.steady_state([0.0, 1.5], weights=[0, 1])
+    np.testing.assert_allclose(found.x, [1.5, 1.5], rtol=1e-6)
+    np.testing.assert_allclose(found.u, [0.5 * np.sqrt(1.51)], rtol=1e-6)
+    assert not found.reached and tanks.steady_state([1.5, 1.5]).reached
+    with pytest.raises(lpvmpc.SettingError, match="weights: h_0 is -1"):
+        tanks.steady_state([0, 1], weights=[-1, 1])
+    runaway = lpvmpc.Plant.from_casadi(h, q, ca.vertcat(1 + q**2, h[0]))
+    with pytest.raises(lpvmpc.SettingError, match="no steady state"):
+        runaway.steady_state([0, 0])

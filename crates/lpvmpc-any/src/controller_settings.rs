@@ -44,16 +44,7 @@ pub(crate) fn controller_settings<const NX: usize, const NU: usize, const NS: us
     let data = plant.data();
     let limits = |given: &Option<Limits>, signals: &[Signal]| match given {
         Some(limits) => limits.clone(),
-        None => Limits {
-            lower: signals
-                .iter()
-                .map(|one| one.lower.unwrap_or(f64::NEG_INFINITY))
-                .collect(),
-            upper: signals
-                .iter()
-                .map(|one| one.upper.unwrap_or(f64::INFINITY))
-                .collect(),
-        },
+        None => plant_limits(signals),
     };
     let x = limits(&settings.x_bounds, &data.states);
     let u = limits(&settings.u_bounds, &data.inputs);
@@ -109,6 +100,20 @@ pub(crate) fn controller_settings<const NX: usize, const NU: usize, const NS: us
         }
     };
     Ok((new, bounds))
+}
+
+/// The bounds of the plant's file.
+pub(crate) fn plant_limits(signals: &[Signal]) -> Limits {
+    let signals = signals.iter();
+    let pairs = signals.map(|one| {
+        let (lower, upper) = (one.lower, one.upper);
+        (
+            lower.unwrap_or(f64::NEG_INFINITY),
+            upper.unwrap_or(f64::INFINITY),
+        )
+    });
+    let (lower, upper) = pairs.unzip();
+    Limits { lower, upper }
 }
 
 /// The cost of the linear-quadratic regulator about the plant's steady state, sampled.

@@ -48,6 +48,7 @@ mod preview;
 mod settings;
 mod sized;
 mod stage_lists;
+mod steady_state;
 mod words;
 mod world;
 
@@ -58,4 +59,5 @@ pub use mpc::{MOST_INPUTS, MOST_STATES, Mpc};
 pub use plan::{ActiveBound, Plan};
 pub use preview::Preview;
 pub use settings::{Limits, LinearModels, MpcSettings, Row, StateBounds, Terminal};
+pub use steady_state::{SteadyState, steady_state};
 pub use world::{Disturbance, Sensor, World, WorldSettings};

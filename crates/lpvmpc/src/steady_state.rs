@@ -5,7 +5,7 @@
 
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Bounds;
-use nalgebra::{Cholesky, Const, SMatrix, SVector, convert};
+use nalgebra::{SMatrix, SVector, convert};
 
 /// A steady state that is looked for: f(x, u) = 0 within the bounds, as near to the reference as
 /// can be.
@@ -97,20 +97,21 @@ where
     let one_if = |free: bool| if free { T::one() } else { T::zero() };
     // A state without weight may move, but not for nothing.
     let least = (problem.q.amax() * convert(1e-6)).max(convert(1e-12));
-    let ease_x = SVector::from_fn(|i, _| one_if(free.x[i]) / problem.q[i].max(least));
-    let ease_u = SVector::from_fn(|i, _| one_if(free.u[i]) / (problem.r[i] * nearly_nothing));
+    // The units in which a unit of each component costs 1; a component that is not free has none.
+    let unit_x = SVector::from_fn(|i, _| one_if(free.x[i]) / problem.q[i].max(least).sqrt());
+    let unit_u =
+        SVector::from_fn(|i, _| one_if(free.u[i]) / (problem.r[i] * nearly_nothing).sqrt());
     for step in 0..MOST_STEPS {
         let (a, b) = model.jacobian(x, u);
         let towards_x =
             (problem.x_ref - *x).component_mul(&SVector::from_fn(|i, _| one_if(free.x[i])));
         let towards_u = (-*u).component_mul(&SVector::from_fn(|i, _| one_if(free.u[i])));
         let missing = model.derivative(x, u) + a * towards_x + b * towards_u;
-        let (eased_a, eased_b) = (scaled_columns(&a, &ease_x), scaled_columns(&b, &ease_u));
-        let gram = eased_a * a.transpose() + eased_b * b.transpose();
-        let price = solve_scaled(&gram, &missing)?;
+        let columns = (scaled_columns(&a, &unit_x), scaled_columns(&b, &unit_u));
+        let (away_x, away_u) = least_norm(columns, missing)?;
         let part = convert::<f64, T>(0.5).powi(i32::try_from(step / PATIENCE).unwrap_or(i32::MAX));
-        let dx = (towards_x - eased_a.tr_mul(&price)) * part;
-        let du = (towards_u - eased_b.tr_mul(&price)) * part;
+        let dx = (towards_x - away_x.component_mul(&unit_x)) * part;
+        let du = (towards_u - away_u.component_mul(&unit_u)) * part;
         *x += dx;
         *u += du;
         let settled = |change: &T, value: &T| change.abs() <= small * (T::one() + value.abs());
@@ -176,32 +177,41 @@ fn scaled_columns<T: Scalar, const R: usize, const C: usize>(
     SMatrix::from_fn(|i, j| m[(i, j)] * factors[j])
 }
 
-/// G^-1 v for a symmetric positive semidefinite G, scaled to a diagonal of ones. A row of zeros is
-/// a derivative that nothing moves: it answers with zero.
-fn solve_scaled<T: Scalar, const K: usize>(
-    gram: &SMatrix<T, K, K>,
-    v: &SVector<T, K>,
-) -> Option<SVector<T, K>> {
-    let scale = SVector::<T, K>::from_fn(|i, _| {
-        let diagonal = gram[(i, i)];
-        if diagonal > T::zero() {
-            T::one() / diagonal.sqrt()
+/// The shortest (y, z) with A y + B z = v, by orthogonal rows: its error grows with the condition of [A B],
+/// not with the square, and what the state and what the input may cost are twelve orders of magnitude apart.
+/// A row that depends on those before it, as one of zeros does, is left out. `None` if a number is not finite.
+fn least_norm<T: Scalar, const NX: usize, const NU: usize>(
+    (mut a, mut b): (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>),
+    mut v: SVector<T, NX>,
+) -> Option<(SVector<T, NX>, SVector<T, NU>)> {
+    let rounding = T::default_epsilon() * convert(4.0 * NX as f64);
+    let (mut y, mut z) = (SVector::<T, NX>::zeros(), SVector::<T, NU>::zeros());
+    for i in 0..NX {
+        let (mut row_a, mut row_b) = (a.row(i).into_owned(), b.row(i).into_owned());
+        let before = (row_a.norm_squared() + row_b.norm_squared()).sqrt();
+        // Twice, so that rounding of the first pass is taken out, too.
+        for _ in 0..2 {
+            for j in 0..i {
+                let (one_a, one_b) = (a.row(j).into_owned(), b.row(j).into_owned());
+                let share = one_a.dot(&row_a) + one_b.dot(&row_b);
+                row_a -= one_a * share;
+                row_b -= one_b * share;
+                let known = v[j];
+                v[i] -= known * share;
+            }
+        }
+        let length = (row_a.norm_squared() + row_b.norm_squared()).sqrt();
+        let own = if length > rounding * before {
+            T::one() / length
         } else {
             T::zero()
-        }
-    });
-    let lifted: T = T::one() + T::default_epsilon() * convert(K as f64 * 4.0);
-    let scaled = SMatrix::from_fn(|i, j| {
-        if i == j {
-            lifted
-        } else {
-            gram[(i, j)] * scale[i] * scale[j]
-        }
-    });
-    let factor = Cholesky::<T, Const<K>>::new(scaled)?;
-    let solved = factor.solve(&v.component_mul(&scale)).component_mul(&scale);
-    solved
-        .iter()
-        .all(|entry| entry.is_finite())
-        .then_some(solved)
+        };
+        v[i] *= own;
+        a.set_row(i, &(row_a * own));
+        b.set_row(i, &(row_b * own));
+        y += a.row(i).transpose() * v[i];
+        z += b.row(i).transpose() * v[i];
+    }
+    let finite = y.iter().chain(z.iter()).all(|entry| entry.is_finite());
+    finite.then_some((y, z))
 }

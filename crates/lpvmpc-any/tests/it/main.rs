@@ -9,3 +9,4 @@ mod agreement;
 mod messages;
 mod plants;
 mod stages;
+mod world;

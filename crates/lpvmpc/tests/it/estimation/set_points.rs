@@ -2,11 +2,13 @@
 
 use super::pendulum::Pendulum;
 use lpvmpc::{
-    Bounds, Controller, ControllerSettings, InputReference, Iterations, LpvModel, Predictor,
-    RampedInput, Reference, Rk4, Scheduling, SolverSettings, SteadyStateProblem,
-    TerminalIngredient, Weights,
+    AlongMotion, Bounds, Controller, ControllerSettings, Dynamics, InputReference, Iterations,
+    LpvModel, Number, Predictor, RampedInput, Reference, Rk4, Scalar, Scheduling, SolverSettings,
+    SteadyStateProblem, TerminalIngredient, Weights,
 };
-use nalgebra::{Matrix1, Matrix1x2, Matrix2, Matrix3, SMatrix, Vector1, Vector2, Vector3};
+use nalgebra::{
+    Matrix1, Matrix1x2, Matrix2, Matrix3, SMatrix, SVector, Vector1, Vector2, Vector3, convert,
+};
 
 const RK4: Rk4 = Rk4 { substeps: 2 };
 const T_S: f64 = 0.05;
@@ -242,4 +244,61 @@ fn of_several_inputs_that_hold_a_state_the_cheapest_is_taken() {
         ..unbounded
     };
     assert!(TwoPumps.steady_state(&drained).is_none());
+}
+
+/// A cart with a hanging load, x = (position, angle from upright, their rates): one input that moves
+/// both, so that a held angle is out of the question.
+struct CartPole;
+
+impl Dynamics<4, 1> for CartPole {
+    fn f<N: Number>(&self, x: &SVector<N, 4>, u: &SVector<N, 1>) -> SVector<N, 4> {
+        let number = N::constant;
+        let (sin, cos) = x[1].sin_cos();
+        let speed = (u[0] + number(0.3) * sin * (number(9.81) * cos - number(0.5) * x[3] * x[3]))
+            / (number(1.0) + number(0.3) * sin * sin);
+        let turning = (number(9.81) * sin + cos * speed) / number(0.5);
+        SVector::from([x[2], x[3], speed, turning])
+    }
+}
+
+#[test]
+fn from_where_a_plant_cannot_stand_the_nearest_place_is_found() {
+    fn find<T: Scalar + Number>(angle: f64, r: f64) -> [f64; 5] {
+        let model = AlongMotion::<_, 5>(CartPole);
+        let found = LpvModel::<T, 4, 1, 5>::steady_state(
+            &model,
+            &SteadyStateProblem {
+                x_ref: SVector::<T, 4>::from([1.5, angle, 0.0, 0.0].map(convert::<f64, T>)),
+                q: SVector::repeat(T::one()),
+                r: Vector1::new(convert::<f64, T>(r)),
+                x: Bounds::none(),
+                u: Bounds::none(),
+            },
+        );
+        let found = found.unwrap_or_else(|| panic!("nothing from {angle} rad with {r}"));
+        let near = convert_to_f64(T::default_epsilon()).powf(0.25);
+        assert_eq!(found.reached, angle.abs() <= near);
+        let entries = found.x.iter().chain(found.u.iter());
+        let entries: Vec<f64> = entries.map(|entry| convert_to_f64(*entry)).collect();
+        entries.try_into().unwrap()
+    }
+
+    fn convert_to_f64<T: Scalar>(number: T) -> f64 {
+        nalgebra::try_convert(number).unwrap()
+    }
+
+    // What the input costs beside the state must not matter.
+    for angle in [0.0, 0.001, 0.05, 0.2, -0.4, 0.8] {
+        for r in [1e-4, 0.01, 1.0, 100.0] {
+            for (found, tolerance) in [(find::<f64>(angle, r), 1e-9), (find::<f32>(angle, r), 1e-3)]
+            {
+                for (entry, expected) in found.iter().zip([1.5, 0.0, 0.0, 0.0, 0.0]) {
+                    assert!(
+                        (entry - expected).abs() < tolerance,
+                        "{angle} {r}: {found:?}"
+                    );
+                }
+            }
+        }
+    }
 }
