@@ -19,12 +19,13 @@ from .errors import (
     SimulationError,
 )
 from .mpc import ActiveBound, Mpc, Penalty, Plan, Row
-from .plant import Plant, Signal, SteadyState
+from .plant import Embedding, Plant, Signal, SteadyState
 from .simulation import Actuator, Jump, Load, Run, Sensor, simulate
 
 __all__ = [
     "ActiveBound",
     "Actuator",
+    "Embedding",
     "Jump",
     "Load",
     "Lqr",

@@ -33,6 +33,28 @@ class Signal:
 
 
 @dataclass(frozen=True)
+class Embedding:
+    """A plant's own linear parameter-varying form, f = A(s) x + B(s) u + c(s) with s = sigma(x, u), in
+    expressions of CasADi.
+
+    It must be f itself, not its linearisation, at every s; ``ca.sin(s) / s`` is 1 at zero if it is written as
+    one quotient. From far away it leads to better plans than derivatives
+    do, and certificates need one.
+    """
+
+    s: Any
+    """The scheduling, symbols."""
+    sigma: Any
+    """sigma(x, u, p), what they are at a state and an input."""
+    a: Any
+    """A(s, p), shape (n, n)."""
+    b: Any
+    """B(s, p), shape (n, m)."""
+    c: Any = None
+    """c(s, p), shape (n,); none without."""
+
+
+@dataclass(frozen=True)
 class SteadyState:
     """Where a plant stands, f(x, u) = 0."""
 
@@ -98,6 +120,7 @@ class Plant:
         units: Mapping[str, str] | None = None,
         bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
         equilibrium: tuple[ArrayLike, ArrayLike] | None = None,
+        embedding: Embedding | None = None,
     ) -> Plant:
         """A plant from CasADi expressions.
 
@@ -123,6 +146,8 @@ class Plant:
             (lower, upper) by name of a state or an input, in its unit; None where there is none.
         equilibrium
             A steady state (x, u), f(x, u) = 0.
+        embedding
+            The plant's own linear parameter-varying form, if it has one.
 
         Raises
         ------
@@ -152,6 +177,7 @@ class Plant:
             formulas.append(_casadi.column(y))
         tape = Tape()
         results = _casadi.take(tape, groups, formulas)
+        sizes = (sum(one.numel() for one in xs), sum(one.numel() for one in us))
         return cls._assemble(
             tape,
             derivative=results[0],
@@ -164,6 +190,7 @@ class Plant:
             units=units,
             bounds=bounds,
             equilibrium=equilibrium,
+            embedding=None if embedding is None else _embedding(tape, embedding, groups, sizes),
         )
 
     @classmethod
@@ -411,6 +438,7 @@ class Plant:
         units: Mapping[str, str] | None,
         bounds: Mapping[str, tuple[float | None, float | None]] | None,
         equilibrium: tuple[ArrayLike, ArrayLike] | None,
+        embedding: dict[str, Any] | None = None,
     ) -> Plant:
         called = _named("outputs", outputs, [f"y_{i}" for i in range(len(output))])
         units, bounds = dict(units or {}), dict(bounds or {})
@@ -459,6 +487,8 @@ class Plant:
                 "x": column("equilibrium, x", x, len(states), PlantError).tolist(),
                 "u": column("equilibrium, u", u, len(inputs), PlantError).tolist(),
             }
+        if embedding is not None:
+            data["embedding"] = embedding
         try:
             text = json.dumps(data, allow_nan=False)
         except ValueError:
@@ -616,6 +646,31 @@ class Plant:
             return ", ".join(f"{s.name} [{s.unit}]" if s.unit else s.name for s in signals)
 
         return f"<Plant {self.name!r}: states {listed(self.states)}; inputs {listed(self.inputs)}>"
+
+
+def _embedding(
+    tape: Tape, given: Embedding, groups: list[tuple[str, list[Any]]], sizes: tuple[int, int]
+) -> dict[str, Any]:
+    """An embedding as a file has it: the places of sigma, of the rows of A and B, and of c."""
+    n, m = sizes
+    (scheduling,) = _casadi.take(tape, groups, [_casadi.column(given.sigma)])
+    own = [("scheduling", _casadi.symbols("embedding, s", given.s)), groups[-1]]
+    formulas = []
+    for name, matrix, columns in (("a", given.a, n), ("b", given.b, m)):
+        if tuple(getattr(matrix, "shape", ())) != (n, columns):
+            raise PlantError(f"embedding, {name}: it must be an expression of shape ({n}, {columns})")
+        formulas.append(_casadi.column(matrix.T))  # row by row
+    if given.c is not None:
+        formulas.append(_casadi.column(given.c))
+    a, b, *c = _casadi.take(tape, own, formulas)
+    found: dict[str, Any] = {
+        "scheduling": scheduling,
+        "a": [a[i * n : (i + 1) * n] for i in range(n)],
+        "b": [b[i * m : (i + 1) * m] for i in range(n)],
+    }
+    if c:
+        found["c"] = c[0]
+    return found
 
 
 def _named(place: str, given: Sequence[str] | None, usual: list[str]) -> list[str]:

@@ -1,5 +1,6 @@
 """Plants from everywhere have the values of the program that they come from."""
 
+import json
 import pickle
 from types import SimpleNamespace
 
@@ -271,3 +272,32 @@ def test_steady_states():
     runaway = lpvmpc.Plant.from_casadi(h, q, ca.vertcat(1 + q**2, h[0]))
     with pytest.raises(lpvmpc.SettingError, match="no steady state"):
         runaway.steady_state([0, 0])
+
+
+def test_an_embedding_of_its_own():
+    x, u, s, p = ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("s"), ca.SX.sym("p")
+    f = ca.vertcat(x[1], p * ca.sin(x[0]) + u)
+    a = ca.blockcat([[0, 1], [p * (ca.sin(s) / s), 0]])
+    b = ca.SX([0, 1])
+
+    def plant(**changes):
+        own = lpvmpc.Embedding(**{"s": s, "sigma": x[0], "a": a, "b": b, **changes})
+        return lpvmpc.Plant.from_casadi(
+            x, u, f, p=p, parameters={"gravity": 9.81}, inputs=["torque"], embedding=own,
+            equilibrium=([0, 0], [0]),
+        )  # fmt: skip
+
+    found = json.loads(plant().to_json())["embedding"]
+    assert len(found["scheduling"]) == 1 and len(found["a"]) == 2 and len(found["b"][0]) == 1
+    plans = [
+        lpvmpc.Mpc(plant(), 0.05, 20, [1, 1], [0.1], linear_models=models, tolerance=1e-12,
+                   max_programs=50).step([0.7, 0.0])
+        for models in ("own", "motion")
+    ]  # fmt: skip
+    np.testing.assert_allclose(plans[0].u, plans[1].u, atol=1e-4)
+    with pytest.raises(lpvmpc.PlantError, match="embedding"):  # it is not f
+        plant(a=2 * a)
+    with pytest.raises(lpvmpc.PlantError, match=r"embedding, a: .* \(2, 2\)"):
+        plant(a=a[0, :])
+    with pytest.raises(lpvmpc.PlantError, match="x"):  # of s and p alone
+        plant(a=a * x[0])

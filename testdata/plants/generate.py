@@ -1,4 +1,4 @@
-"""Plants as CasADi has them, in the format of lpvmpc-plant, and their values at random points.
+"""Plants as CasADi has them, in the format of lpvmpc-plant, and CasADi's values of them at random points.
 
 Writes cart-pole.json, functions.json, values.json and rays.json here.
 """
@@ -7,73 +7,8 @@ import json
 import random
 
 import casadi as ca
+import lpvmpc
 from scipy.integrate import quad_vec
-
-NAMES = {
-    ca.OP_ADD: "add", ca.OP_SUB: "sub", ca.OP_MUL: "mul", ca.OP_DIV: "div", ca.OP_NEG: "neg",
-    ca.OP_EXP: "exp", ca.OP_LOG: "log", ca.OP_POW: "pow", ca.OP_CONSTPOW: "pow",
-    ca.OP_SQRT: "sqrt", ca.OP_SQ: "sq", ca.OP_INV: "inv", ca.OP_SIN: "sin", ca.OP_COS: "cos",
-    ca.OP_TAN: "tan", ca.OP_ASIN: "asin", ca.OP_ACOS: "acos", ca.OP_ATAN: "atan",
-    ca.OP_ATAN2: "atan2", ca.OP_SINH: "sinh", ca.OP_COSH: "cosh", ca.OP_TANH: "tanh",
-    ca.OP_ASINH: "asinh", ca.OP_ACOSH: "acosh", ca.OP_ATANH: "atanh", ca.OP_EXPM1: "expm1",
-    ca.OP_LOG1P: "log1p", ca.OP_FABS: "abs", ca.OP_SIGN: "sign", ca.OP_FLOOR: "floor",
-    ca.OP_FMIN: "min", ca.OP_FMAX: "max", ca.OP_LT: "lt", ca.OP_LE: "le", ca.OP_EQ: "eq",
-    ca.OP_IF_ELSE_ZERO: "if_else_zero",
-}
-
-
-class Program:
-    """Operations, each once; sin(x)/x is one, which has a value at 0, too."""
-
-    def __init__(self):
-        self.operations = []
-        self.known = {}
-
-    def add(self, *operation):
-        if operation[0] == "div" and self.operations[operation[1]] == ["sin", operation[2]]:
-            operation = ("sinc", operation[2])
-        if operation not in self.known:
-            self.known[operation] = len(self.operations)
-            self.operations.append(list(operation))
-        return self.known[operation]
-
-    def take(self, inputs, outputs):
-        """The results of the SX expressions `outputs`, of inputs [(leaf name, SX vector), ...]."""
-        f = ca.Function("f", [vector for _, vector in inputs], outputs, {"cse": True})
-        results = [[None] * f.nnz_out(i) for i in range(f.n_out())]
-        work = {}
-        for k in range(f.n_instructions()):
-            op = f.instruction_id(k)
-            arguments, places = f.instruction_input(k), f.instruction_output(k)
-            if op == ca.OP_INPUT:
-                work[places[0]] = self.add(inputs[arguments[0]][0], arguments[1])
-            elif op == ca.OP_CONST:
-                work[places[0]] = self.add("constant", f.instruction_constant(k))
-            elif op == ca.OP_OUTPUT:
-                results[places[0]][places[1]] = work[arguments[0]]
-            else:
-                of = [work[a] for a in arguments]
-                if op == ca.OP_TWICE:
-                    result = self.add("add", of[0], of[0])
-                elif op == ca.OP_NOT:
-                    result = self.add("eq", of[0], self.add("constant", 0.0))
-                elif op == ca.OP_NE:
-                    equal = self.add("eq", *of)
-                    result = self.add("eq", equal, self.add("constant", 0.0))
-                elif op == ca.OP_AND:
-                    result = self.add("mul", *of)
-                elif op == ca.OP_OR:
-                    result = self.add("max", *of)
-                elif op == ca.OP_HYPOT:
-                    result = self.add("sqrt", self.add("add", *[self.add("sq", a) for a in of]))
-                else:
-                    result = self.add(NAMES[op], *of)
-                work[places[0]] = result
-        return results
-
-
-def signals(names):
-    return [{"name": name, "unit": unit} for name, unit in names]
 
 
 def dense(expression):
@@ -110,33 +45,18 @@ def cart_pole():
     )
     tip = ca.vertcat(x[0] + 2 * half * ca.sin(x[1]), 2 * half * ca.cos(x[1]))
     a, b = matrices(s[0], s[1])
-    program = Program()
-    motion = [("state", x), ("input", u), ("parameter", p)]
-    f_results, tip_results = program.take(motion, [f, tip])
-    a_results, b_results = program.take([("scheduling", s), ("parameter", p)], [dense(a), b])
-    plant = {
-        "schema": 1,
-        "name": "cart-pole",
-        "states": signals([("position", "m"), ("tilt", "rad"), ("speed", "m/s"), ("rate", "rad/s")]),
-        "inputs": [{"name": "force", "unit": "N", "lower": -15, "upper": 15}],
-        "parameters": [
-            {"name": name, "unit": unit, "value": value}
-            for name, unit, value in [
-                ("cart_mass", "kg", 1.0), ("pole_mass", "kg", 0.3), ("half_length", "m", 0.5),
-                ("friction", "N s/m", 0.1), ("gravity", "m/s^2", 9.81),
-            ]
-        ],
-        "outputs": signals([("tip_position", "m"), ("tip_height", "m")]),
-        "operations": program.operations,
-        "derivative": f_results,
-        "output": tip_results,
-        "embedding": {
-            "scheduling": [program.add("state", 1), program.add("state", 3)],
-            "a": [a_results[4 * i:4 * i + 4] for i in range(4)],
-            "b": [[i] for i in b_results],
-        },
-        "equilibrium": {"x": [0, 0, 0, 0], "u": [0]},
-    }
+    plant = lpvmpc.Plant.from_casadi(
+        x, u, f, p=p, y=tip, name="cart-pole",
+        states=["position", "tilt", "speed", "rate"], inputs=["force"],
+        outputs=["tip_position", "tip_height"],
+        parameters={"cart_mass": 1.0, "pole_mass": 0.3, "half_length": 0.5, "friction": 0.1,
+                    "gravity": 9.81},
+        units={"position": "m", "tilt": "rad", "speed": "m/s", "rate": "rad/s", "force": "N",
+               "cart_mass": "kg", "pole_mass": "kg", "half_length": "m", "friction": "N s/m",
+               "gravity": "m/s^2", "tip_position": "m", "tip_height": "m"},
+        bounds={"force": (-15, 15)}, equilibrium=([0, 0, 0, 0], [0]),
+        embedding=lpvmpc.Embedding(s=s, sigma=ca.vertcat(x[1], x[3]), a=a, b=b),
+    )
     return plant, ca.Function("f", [x, u, p], [f, tip])
 
 
@@ -155,17 +75,10 @@ def functions():
         + ca.if_else(a < b, ca.sin(v), c**2) + ca.if_else(ca.logic_and(a <= c, v != w), p * v, b)
         + ca.if_else(ca.logic_or(ca.logic_not(a < v), b <= w), 1, -c),
     )
-    program = Program()
-    (results,) = program.take([("state", x), ("input", u), ("parameter", p)], [f])
-    plant = {
-        "schema": 1,
-        "name": "functions",
-        "states": signals([("a", ""), ("b", ""), ("c", "")]),
-        "inputs": signals([("v", ""), ("w", "")]),
-        "parameters": [{"name": "p", "unit": "", "value": 0.7}],
-        "operations": program.operations,
-        "derivative": results,
-    }
+    plant = lpvmpc.Plant.from_casadi(
+        x, u, f, p=p, name="functions", states=["a", "b", "c"], inputs=["v", "w"],
+        parameters={"p": 0.7},
+    )
     return plant, ca.Function("f", [x, u, p], [f, ca.SX(0, 1)])
 
 
@@ -173,10 +86,8 @@ def main():
     rng = random.Random(17)
     values = {}
     for plant, f in [cart_pole(), functions()]:
-        name = plant["name"]
-        with open(f"{name}.json", "w") as file:
-            json.dump(plant, file)
-            file.write("\n")
+        name = plant.name
+        plant.save(f"{name}.json")
         x, u, p = (ca.SX.sym(name, f.size1_in(i)) for i, name in enumerate("xup"))
         rate, y = f(x, u, p)
         table = ca.Function("table", [x, u, p], [
@@ -185,7 +96,7 @@ def main():
         values[name] = []
         for _ in range(40):
             point = [[rng.uniform(-3, 3) for _ in range(f.size1_in(i))] for i in range(2)]
-            point.append([parameter["value"] for parameter in plant["parameters"]])
+            point.append(list(plant.parameters.values()))
             found = [list(map(float, ca.DM(v).full().ravel())) for v in table(*point)]
             values[name].append(dict(zip(["x", "u", "f", "y", "a", "b"], point[:2] + found)))
     with open("values.json", "w") as file:
@@ -202,7 +113,7 @@ def main():
 def rays(rng):
     """Mean derivatives of the cart-pole from (x_r, u_r) to (x, u), by adaptive quadrature."""
     plant, f = cart_pole()
-    p = [parameter["value"] for parameter in plant["parameters"]]
+    p = list(plant.parameters.values())
     x, u = ca.SX.sym("x", 4), ca.SX.sym("u")
     rate, _ = f(x, u, p)
     slopes = ca.Function("slopes", [x, u], [ca.vertcat(
