@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, SMatrix, SVector};
 /// The longest horizon: the memory of a working set grows with its square.
 const MOST_SAMPLES: usize = 1000;
 
-/// What stands, up to rounding: the largest derivative of a state, in its unit per second.
+/// What stands, up to rounding: the largest change of a state, in its unit per second or per period.
 const AT_REST: f64 = 1e-6;
 
 /// Bounds that hold at every stage.
@@ -35,6 +35,13 @@ pub(crate) fn controller_settings<const NX: usize, const NU: usize, const NS: us
     let MpcSettings { t_s, horizon, .. } = *settings;
     if !(t_s > 0.0 && t_s.is_finite()) {
         let fault = format!("it is {t_s} s; it must be a positive number of seconds");
+        return Err(MpcError::new("t_s", fault));
+    }
+    if let Some(period) = plant.period()
+        && t_s != period
+    {
+        let fault =
+            format!("it is {t_s} s; the plant is in discrete time with a period of {period} s");
         return Err(MpcError::new("t_s", fault));
     }
     if horizon == 0 || horizon > MOST_SAMPLES {
@@ -119,13 +126,16 @@ fn cost_to_go<const NX: usize, const NU: usize, const NS: usize>(
     (x, u): (SVector<f64, NX>, SVector<f64, NU>),
 ) -> Result<SMatrix<f64, NX, NX>, MpcError> {
     let (n, m) = (names.states.len(), names.inputs.len());
-    let largest = model.derivative(&x, &u).amax();
+    let discrete = model.period().is_some();
+    let motion = model.derivative(&x, &u);
+    let largest = if discrete { motion - x } else { motion }.amax();
     if !(largest <= AT_REST) {
         let fault = format!(
             "the plant does not stand where its regulator is designed, at {:?} under {:?}: a state \
-             changes by {largest} per second. Give a steady state in the plant's file, or a cost",
+             changes by {largest} per {}. Give a steady state in the plant's file, or a cost",
             &x.as_slice()[..n],
-            &u.as_slice()[..m]
+            &u.as_slice()[..m],
+            if discrete { "period" } else { "second" }
         );
         return Err(MpcError::new("terminal", fault));
     }
@@ -139,8 +149,12 @@ fn cost_to_go<const NX: usize, const NU: usize, const NS: usize>(
         );
         MpcError::new("terminal", fault)
     };
-    let (a_d, b_d) =
-        zero_order_hold(&a, &b, settings.t_s).map_err(|error| refused(error.to_string()))?;
+    let (a_d, b_d) = match discrete {
+        true => (a, b),
+        false => {
+            zero_order_hold(&a, &b, settings.t_s).map_err(|error| refused(error.to_string()))?
+        }
+    };
     let lqr = lqr_discrete(&a_d, &b_d, &settings.q, &settings.r);
     let lqr = lqr.map_err(|error| refused(error.to_string()))?;
     let axes = (Axis::States, Axis::States);

@@ -8,7 +8,7 @@ use lpvmpc::{
 use lpvmpc_plant::{Plant, SizedEmbedding, SizedPlant};
 use nalgebra::{SMatrix, SVector};
 
-/// A plant in more places than it has states. What stands in those left over decays, x_dot = -x, so
+/// A plant in more places than it has states. What stands in those left over decays, x_dot = -x or x+ = 0, so
 /// that it stays zero and a steady state of all is one of the plant.
 #[derive(Debug, Clone)]
 pub(crate) struct Filled<P> {
@@ -17,8 +17,16 @@ pub(crate) struct Filled<P> {
 }
 
 impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for Filled<SizedPlant<NX, NU>> {
+    fn period(&self) -> Option<f64> {
+        Dynamics::period(&self.plant)
+    }
+
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
-        decaying(self.plant.f(x, u), x, self.states)
+        let from = match self.period() {
+            None => self.states,
+            Some(_) => NX,
+        };
+        decaying(self.plant.f(x, u), x, from)
     }
 }
 
@@ -36,6 +44,10 @@ fn decaying<N: Number, const NX: usize>(
 impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
     for Filled<SizedEmbedding<NX, NU, NS>>
 {
+    fn period(&self) -> Option<f64> {
+        Embedding::period(&self.plant)
+    }
+
     fn scheduling<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NS> {
         Embedding::scheduling(&self.plant, x, u)
     }
@@ -45,8 +57,10 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         scheduling: &SVector<N, NS>,
     ) -> (SMatrix<N, NX, NX>, SMatrix<N, NX, NU>) {
         let (mut a, b) = Embedding::matrices(&self.plant, scheduling);
-        for i in self.states..NX {
-            a[(i, i)] = N::constant(-1.0);
+        if Embedding::period(self).is_none() {
+            for i in self.states..NX {
+                a[(i, i)] = N::constant(-1.0);
+            }
         }
         (a, b)
     }
@@ -56,7 +70,11 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
     }
 
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
-        decaying(Embedding::f(&self.plant, x, u), x, self.states)
+        let from = match Embedding::period(self) {
+            None => self.states,
+            Some(_) => NX,
+        };
+        decaying(Embedding::f(&self.plant, x, u), x, from)
     }
 }
 
@@ -130,6 +148,10 @@ macro_rules! whichever {
 impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS>
     for Model<NX, NU, NS>
 {
+    fn period(&self) -> Option<f64> {
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::period(model))
+    }
+
     fn scheduling(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> SVector<f64, NS> {
         whichever!(self, model => LpvModel::scheduling(model, x, u))
     }

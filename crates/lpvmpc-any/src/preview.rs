@@ -26,7 +26,8 @@ pub struct Preview {
     pub u_bounds: Vec<Limits>,
     /// Linear rows in place of those of the settings.
     pub rows: Vec<Vec<Row>>,
-    /// Measured disturbances d in state units per second: x_dot = f(x, u) + d.
+    /// Measured disturbances d in state units per second: x_dot = f(x, u) + d; of a plant in discrete time in state
+    /// units: x+ = F(x, u) + d.
     pub disturbance: Vec<DVector<f64>>,
     /// The plant's parameters.
     pub parameters: Vec<Vec<f64>>,

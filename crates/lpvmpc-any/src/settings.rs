@@ -7,11 +7,11 @@ use nalgebra::{DMatrix, DVector};
 /// units of the plant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MpcSettings {
-    /// Sampling time, s.
+    /// Sampling time, s; of a plant in discrete time its period.
     pub t_s: f64,
     /// Prediction horizon in samples, 1 to 1000.
     pub horizon: usize,
-    /// Runge-Kutta steps per sample, at least 1.
+    /// Runge-Kutta steps per sample, at least 1; a plant in discrete time has none.
     pub substeps: usize,
     /// Q, n x n, symmetric positive semidefinite: (x - x_ref)'Q (x - x_ref) per sample.
     pub q: DMatrix<f64>,

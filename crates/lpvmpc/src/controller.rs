@@ -11,7 +11,7 @@ use crate::plan::{Aim, Policy, at};
 use crate::settings::LONGEST_HORIZON;
 use crate::settings::{
     ControllerError, ControllerSettings, InputReference, Iterations, TerminalIngredient, Weights,
-    check,
+    check, check_period,
 };
 use crate::small_matrix::product;
 use crate::solution::{Solution, Status};
@@ -101,6 +101,9 @@ where
         let places = x.iter().map(|list| list.len());
         let places = places.chain(u.iter().map(|list| list.len()));
         check(&settings, places.fold(feedback.len(), usize::min))?;
+        if let Some(period) = model.period() {
+            check_period(period, settings.t_s)?;
+        }
         let horizon = settings.horizon;
         let [rollout, x] = x.map(|list| list.shortened(horizon));
         let [planned, u] = u.map(|list| list.shortened(horizon));

@@ -59,7 +59,7 @@ pub struct Preview<'a, P, T, const NX: usize, const NU: usize, const NS: usize> 
     /// input.
     pub rows: &'a [&'a [GeneralRow<T, NX, NU>]],
     /// Measured disturbances or affine terms d of the samples 0 to N - 1, in state units per second:
-    /// x_dot = f(x, u) + d, constant over each sample.
+    /// x_dot = f(x, u) + d, constant over each sample; of a model with a period, in state units: x+ = F(x, u) + d.
     pub disturbance: &'a [SVector<T, NX>],
     /// Scheduling from outside, constant over each of the samples 0 to N - 1: the plant is then
     /// x_dot = A(s_i) x + B(s_i) u + d_i, whatever its state.

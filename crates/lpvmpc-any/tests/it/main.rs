@@ -6,6 +6,8 @@
 )]
 
 mod agreement;
+mod discrete;
 mod messages;
 mod plants;
+mod quadratic;
 mod stages;
