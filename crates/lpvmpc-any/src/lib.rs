@@ -35,9 +35,13 @@
     reason = "a comparison with NaN must take the failing branch"
 )]
 
+mod answers;
 mod check;
 mod controller_settings;
 mod error;
+mod horizon;
+mod last_input;
+mod linear_model;
 mod model;
 mod mpc;
 mod plan;
@@ -45,11 +49,13 @@ mod preview;
 mod settings;
 mod sized;
 mod stage_lists;
+mod target;
+mod tasks;
 mod words;
 
 pub use error::MpcError;
 pub use lpvmpc::{Iterations, Penalty};
 pub use mpc::{MOST_INPUTS, MOST_STATES, Mpc};
-pub use plan::{ActiveBound, Plan};
-pub use preview::Preview;
+pub use plan::{ActiveBound, Plan, Target};
+pub use preview::{Preview, StageMatrices};
 pub use settings::{Limits, LinearModels, MpcSettings, Row, StateBounds, Terminal};

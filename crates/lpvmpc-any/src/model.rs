@@ -1,6 +1,7 @@
 //! The linear models of a plant in places that were compiled.
 
 use crate::error::MpcError;
+use crate::linear_model::LinearModel;
 use crate::settings::LinearModels;
 use lpvmpc::{
     AlongMotion, AlongRay, Dynamics, Embedding, GaussLegendre, LpvModel, Number, Tangent,
@@ -89,6 +90,7 @@ pub(crate) enum Model<const NX: usize, const NU: usize, const NS: usize> {
     Motion(AlongMotion<Filled<SizedPlant<NX, NU>>, NS>),
     Ray(Box<AlongRay<Filled<SizedPlant<NX, NU>>, f64, NX, NU, NS>>),
     Own(Filled<SizedEmbedding<NX, NU, NS>>),
+    Given(Box<LinearModel<NX, NU>>),
 }
 
 impl<const NX: usize, const NU: usize, const NS: usize> Model<NX, NU, NS> {
@@ -141,6 +143,10 @@ macro_rules! whichever {
                 $answer
             }
             Model::Own($is) => $answer,
+            Model::Given($is) => {
+                let $is = &**$is;
+                $answer
+            }
         }
     };
 }
@@ -153,26 +159,26 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
     }
 
     fn scheduling(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> SVector<f64, NS> {
-        whichever!(self, model => LpvModel::scheduling(model, x, u))
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::scheduling(model, x, u))
     }
 
     fn matrices(
         &self,
         scheduling: &SVector<f64, NS>,
     ) -> (SMatrix<f64, NX, NX>, SMatrix<f64, NX, NU>) {
-        whichever!(self, model => LpvModel::matrices(model, scheduling))
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::matrices(model, scheduling))
     }
 
     fn offset(&self, scheduling: &SVector<f64, NS>) -> Option<SVector<f64, NX>> {
-        whichever!(self, model => LpvModel::offset(model, scheduling))
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::offset(model, scheduling))
     }
 
     fn embedded(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> Tangent<f64, NX, NU> {
-        whichever!(self, model => LpvModel::embedded(model, x, u))
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::embedded(model, x, u))
     }
 
     fn derivative(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> SVector<f64, NX> {
-        whichever!(self, model => LpvModel::derivative(model, x, u))
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::derivative(model, x, u))
     }
 
     fn jacobian(
@@ -180,10 +186,10 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
         x: &SVector<f64, NX>,
         u: &SVector<f64, NU>,
     ) -> (SMatrix<f64, NX, NX>, SMatrix<f64, NX, NU>) {
-        whichever!(self, model => LpvModel::jacobian(model, x, u))
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::jacobian(model, x, u))
     }
 
     fn tangent(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> Tangent<f64, NX, NU> {
-        whichever!(self, model => LpvModel::tangent(model, x, u))
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::tangent(model, x, u))
     }
 }

@@ -84,6 +84,10 @@ fn check_time(plant: &PlantData) -> Result<(), PlantError> {
             let fault = "it is of a plant in discrete time, which has a `period`, too";
             Err(PlantError::new("next", fault))
         }
+        None if plant.derivative.is_empty() => {
+            let fault = "it is missing; in discrete time `period` and `next` stand in its place";
+            Err(PlantError::new("derivative", fault))
+        }
         Some(_) if !plant.derivative.is_empty() => {
             let fault = "a plant with a `period` is in discrete time: it has `next` in its place";
             Err(PlantError::new("derivative", fault))

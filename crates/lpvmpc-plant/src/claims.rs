@@ -74,10 +74,9 @@ fn check_embedding(plant: &Plant) -> Result<(), PlantError> {
     let data = plant.data();
     let (states, inputs) = (data.states.len(), data.inputs.len());
     let sides = sides(plant);
-    let formulas = if plant.period().is_some() {
-        "next"
-    } else {
-        "derivative"
+    let (formula, is) = match plant.period() {
+        None => ("f", "the derivative of"),
+        Some(_) => ("F", "one period later"),
     };
     for point in 0..POINTS {
         // From the middle on they fill the box evenly: multiples of irrational numbers, without their
@@ -108,7 +107,7 @@ fn check_embedding(plant: &Plant) -> Result<(), PlantError> {
             // Negated, so that what is not finite where f is finite is not f.
             if rate.is_finite() && !((embedded - rate).abs() <= EMBEDDING * size) {
                 let fault = format!(
-                    "it is not {formulas}: at x = {x:?}, u = {u:?} the {formulas} of {} is {rate}, and {embedded} by A x + B u + c",
+                    "it is not {formula}: at x = {x:?}, u = {u:?} {is} {} is {rate}, and {embedded} by A x + B u + c",
                     data.states[i].name
                 );
                 return Err(PlantError::new("embedding", fault));

@@ -6,8 +6,11 @@
 )]
 
 mod agreement;
+mod changes;
 mod discrete;
+mod matrices;
 mod messages;
+mod outputs;
 mod plants;
 mod quadratic;
 mod stages;

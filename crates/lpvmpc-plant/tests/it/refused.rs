@@ -77,7 +77,7 @@ fn a_period_goes_with_next() {
             ],
             "next: 1 results, one for each state makes 2",
         ),
-        (vec![("derivative", json!([]))], "derivative: 0 results"),
+        (vec![("derivative", json!([]))], "derivative: it is missing"),
         (
             // x+ = (rate, ...) is zero at zero; one radian off it is not where it was.
             vec![
@@ -275,7 +275,7 @@ fn a_key_too_many_or_too_few_is_named() {
     assert!(message(&plant).starts_with("file: unknown field `outptu`, expected one of"));
     let mut plant = valid();
     plant.as_object_mut().unwrap().remove("derivative");
-    assert!(message(&plant).starts_with("file: missing field `derivative`"));
+    assert!(message(&plant).starts_with("derivative: it is missing"));
     let mut plant = valid();
     plant.as_object_mut().unwrap().remove("schema");
     assert!(message(&plant).starts_with("file: missing field `schema`"));
