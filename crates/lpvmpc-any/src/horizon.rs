@@ -99,7 +99,11 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
     }
 
     /// The models of the samples; none where they are the controller's.
-    pub fn models(&self, preview: &Preview) -> Result<Vec<Sampled<NX, NU, NS>>, MpcError> {
+    pub fn models(
+        &self,
+        preview: &Preview,
+        acting: Option<(SVector<f64, NU>, SVector<f64, NX>)>,
+    ) -> Result<Vec<Sampled<NX, NU, NS>>, MpcError> {
         let plants = self.plants(preview)?;
         let matrices = by_stage("matrices", &preview.matrices, |place, matrices| {
             self.given(place, matrices)
@@ -123,6 +127,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             matrices.len(),
             preview.scheduling.len(),
             disturbances.len(),
+            usize::from(acting.is_some()),
         ];
         let count = counts.into_iter().max().unwrap_or(0);
         (0..count.min(self.settings.horizon))
@@ -134,7 +139,11 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
                     (None, None) => Model::new(plant, self.settings.linear_models, self.rest)?,
                 };
                 let mut model = Sampled::new(model, self.last_input);
-                model.rates.disturbance = held(&disturbances, i).copied();
+                let known = held(&disturbances, i).copied();
+                let found = acting.map(|(_, disturbance)| disturbance);
+                let parts = [known, found].into_iter().flatten();
+                model.rates.disturbance = parts.reduce(|sum, part| sum + part);
+                model.rates.beside = acting.map(|(beside, _)| beside);
                 Ok(model)
             })
             .collect()
@@ -321,7 +330,11 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         if given.is_empty() {
             let model = held(&lists.models, last).unwrap_or(self.controller.model());
             let mut model = model.rates.clone();
-            model.disturbance = held(&disturbed, last).copied();
+            if self.last_input.is_none() {
+                let parts = [model.disturbance, held(&disturbed, last).copied()];
+                let parts = parts.into_iter().flatten();
+                model.disturbance = parts.reduce(|sum, part| sum + part);
+            }
             found = self.stand(preview, lists, tasks.as_deref_mut(), &model);
         }
         if let Some(tasks) = tasks

@@ -39,6 +39,7 @@ mod answers;
 mod check;
 mod controller_settings;
 mod error;
+mod estimator;
 mod horizon;
 mod last_input;
 mod linear_model;
@@ -54,7 +55,8 @@ mod tasks;
 mod words;
 
 pub use error::MpcError;
-pub use lpvmpc::{Iterations, Penalty};
+pub use estimator::{Disturbance, Estimate, EstimatorSettings};
+pub use lpvmpc::{Gate, Iterations, Penalty, Verdict};
 pub use mpc::{MOST_INPUTS, MOST_STATES, Mpc};
 pub use plan::{ActiveBound, Plan, Target};
 pub use preview::{Preview, StageMatrices};

@@ -1,10 +1,12 @@
 //! A controller of any size.
 
 use crate::error::MpcError;
+use crate::estimator::{Estimate, EstimatorSettings};
 use crate::plan::Plan;
 use crate::preview::Preview;
 use crate::settings::MpcSettings;
 use crate::sized::{AnySize, Sized};
+use lpvmpc::Verdict;
 use lpvmpc_plant::Plant;
 
 /// The most states that a plant may have.
@@ -91,6 +93,7 @@ impl Mpc {
         // The last inputs need more places: the next step is as the first.
         let mut larger = sized(self.sized.plant(), settings)?;
         larger.set_last_input(&self.sized.last_input())?;
+        larger.set_estimator(self.sized.estimator())?;
         self.sized = larger;
         Ok(())
     }
@@ -110,6 +113,42 @@ impl Mpc {
     /// It has not the plant's sizes, or is not finite.
     pub fn set_last_input(&mut self, u: &[f64]) -> Result<(), MpcError> {
         self.sized.set_last_input(u)
+    }
+
+    /// From now on the state is estimated from readings, and inputs act after a delay: see [`Self::observe`] and
+    /// [`Self::decide`]. One that is there already is taken over with its state; `None` ends it.
+    ///
+    /// # Errors
+    /// The setting that makes no sense; a disturbance that the readings cannot tell. All is as it was then.
+    pub fn set_estimator(&mut self, settings: Option<&EstimatorSettings>) -> Result<(), MpcError> {
+        self.sized.set_estimator(settings)
+    }
+
+    /// Takes in the readings of the time `t` (s, on any clock), in the order of
+    /// [`EstimatorSettings::measured`], `None` where one is missing; and says what became of each. May be called more often
+    /// than once a sample.
+    ///
+    /// # Errors
+    /// There is no estimator, or not as many readings.
+    pub fn observe(&mut self, t: f64, readings: &[Option<f64>]) -> Result<Vec<Verdict>, MpcError> {
+        self.sized.observe(t, readings)
+    }
+
+    /// One sample from the last readings: as [`Self::step`], from the estimated state when the input will act, under
+    /// the estimated disturbances. Its first input must be sent: the estimator counts on it. Stage 0 of the preview is when it
+    /// acts, the delay after the last readings.
+    ///
+    /// While there is no estimate, the plan's status says so, and its inputs are those nearest to zero.
+    ///
+    /// # Errors
+    /// There is no estimator; or as [`Self::step`].
+    pub fn decide(&mut self, preview: &Preview) -> Result<Plan, MpcError> {
+        self.sized.decide(preview)
+    }
+
+    /// The estimate at the last readings; `None` without an estimator.
+    pub fn estimate(&self) -> Option<Estimate> {
+        self.sized.estimate()
     }
 
     /// Forgets the last plan and the last input: the next step is as the first.

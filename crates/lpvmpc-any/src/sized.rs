@@ -4,13 +4,14 @@ use crate::answers::Said;
 use crate::check::{Axis, Names};
 use crate::controller_settings::{StageBounds, controller_settings};
 use crate::error::MpcError;
+use crate::estimator::{Estimate, EstimatorSettings, Filter};
 use crate::last_input::{LastInput, Sampled};
 use crate::model::Model;
 use crate::plan::{Plan, Target};
 use crate::preview::Preview;
 use crate::settings::MpcSettings;
 use crate::stage_lists::StageLists;
-use lpvmpc::{Controller, GeneralRow, List, Reference, Rk4, Workspace};
+use lpvmpc::{Controller, GeneralRow, List, Reference, Rk4, Verdict, Workspace};
 use lpvmpc_plant::{Plant, Signal, SizedPlant};
 use nalgebra::SVector;
 
@@ -32,6 +33,16 @@ pub(crate) trait AnySize: Send {
     fn last_input(&self) -> Vec<f64>;
     /// The places for states.
     fn places(&self) -> usize;
+    /// See [`crate::Mpc::set_estimator`].
+    fn set_estimator(&mut self, settings: Option<&EstimatorSettings>) -> Result<(), MpcError>;
+    /// See [`crate::Mpc::observe`].
+    fn observe(&mut self, t: f64, readings: &[Option<f64>]) -> Result<Vec<Verdict>, MpcError>;
+    /// See [`crate::Mpc::decide`].
+    fn decide(&mut self, preview: &Preview) -> Result<Plan, MpcError>;
+    /// See [`crate::Mpc::estimate`].
+    fn estimate(&self) -> Option<Estimate>;
+    /// The settings of the estimator.
+    fn estimator(&self) -> Option<&EstimatorSettings>;
 }
 
 type Planner<const NX: usize, const NU: usize, const NS: usize> =
@@ -53,6 +64,7 @@ pub(crate) struct Sized<const NX: usize, const NU: usize, const NS: usize> {
     pub last_input: Option<LastInput>,
     /// The input that was applied last.
     pub applied: SVector<f64, NU>,
+    filter: Option<Filter<NX, NU, NS>>,
 }
 
 /// What is made of settings.
@@ -120,17 +132,26 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             room,
             last_input,
             applied: rest.1,
+            filter: None,
         })
     }
-}
 
-impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU, NS> {
-    fn step(&mut self, x: &[f64], preview: &Preview) -> Result<Plan, MpcError> {
-        let mut x: SVector<f64, NX> = self.names.vector(Axis::States, "x", x)?;
+    fn filter_with(&self, settings: &EstimatorSettings) -> Result<Filter<NX, NU, NS>, MpcError> {
+        let settings = (&self.settings, settings);
+        Filter::new(&self.plant, &self.names, settings, self.rest)
+    }
+
+    /// The plan from `x`, where more acts on the plant than its input.
+    fn plan_from(
+        &mut self,
+        mut x: SVector<f64, NX>,
+        acting: Option<(SVector<f64, NU>, SVector<f64, NX>)>,
+        preview: &Preview,
+    ) -> Result<Plan, MpcError> {
         if let Some(last) = &self.last_input {
             last.write(&mut x, &self.applied);
         }
-        let models = self.models(preview)?;
+        let models = self.models(preview, acting)?;
         let mut lists = StageLists::new(&self.names, preview, models)?;
         let mut tasks = self.tasks(preview)?;
         let target = self.aim(preview, &mut lists, tasks.as_mut());
@@ -190,6 +211,13 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
         };
         Ok(self.plan(&x, &said, cost, target))
     }
+}
+
+impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU, NS> {
+    fn step(&mut self, x: &[f64], preview: &Preview) -> Result<Plan, MpcError> {
+        let x = self.names.vector(Axis::States, "x", x)?;
+        self.plan_from(x, None, preview)
+    }
 
     fn set_settings(&mut self, settings: &MpcSettings) -> Result<(), MpcError> {
         let made = Made::new(&self.plant, &self.names, settings, self.rest)?;
@@ -247,6 +275,55 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
     fn places(&self) -> usize {
         NX
     }
+
+    fn set_estimator(&mut self, settings: Option<&EstimatorSettings>) -> Result<(), MpcError> {
+        let mut filter = match settings {
+            Some(settings) => Some(self.filter_with(settings)?),
+            None => None,
+        };
+        if let (Some(filter), Some(previous)) = (&mut filter, &self.filter) {
+            filter.take_over(previous);
+        }
+        self.filter = filter;
+        Ok(())
+    }
+
+    fn observe(&mut self, t: f64, readings: &[Option<f64>]) -> Result<Vec<Verdict>, MpcError> {
+        let filter = self.filter.as_mut().ok_or_else(no_estimator)?;
+        let observation = filter.observe(t, readings)?;
+        if observation.restart.is_some() {
+            // The plan belongs to the state before.
+            self.controller.reset();
+        }
+        Ok(observation.verdicts[..readings.len()].to_vec())
+    }
+
+    fn decide(&mut self, preview: &Preview) -> Result<Plan, MpcError> {
+        let filter = self.filter.as_ref().ok_or_else(no_estimator)?;
+        let (x, acting) = (filter.ahead(), filter.disturbance());
+        let known = self
+            .names
+            .vectors(Axis::States, "disturbance", &preview.disturbance)?;
+        let plan = self.plan_from(x, Some(acting), preview)?;
+        let known = known.first().copied().unwrap_or_else(SVector::zeros);
+        if let Some(filter) = &mut self.filter {
+            filter.send(&self.applied, &known);
+        }
+        Ok(plan)
+    }
+
+    fn estimate(&self) -> Option<Estimate> {
+        let filter = self.filter.as_ref()?;
+        Some(filter.estimate(self.names.states.len()))
+    }
+
+    fn estimator(&self) -> Option<&EstimatorSettings> {
+        Some(&self.filter.as_ref()?.settings)
+    }
+}
+
+fn no_estimator() -> MpcError {
+    MpcError::new("estimator", "there is none: see `set_estimator`")
 }
 
 fn names(plant: &Plant) -> Names {

@@ -472,6 +472,11 @@ where
         value: T,
         estimate: &Estimate<T, NX, ND>,
     ) -> (T, SVector<T, NX>, SVector<T, ND>) {
+        let state = estimate.z - self.settings.state_offset * estimate.d;
+        if let Some((expected, c_z)) = self.model.sensor(i, &state) {
+            let c_d = -(self.settings.state_offset.transpose() * c_z);
+            return (value - expected, c_z, c_d);
+        }
         // Not `row(i)`, which could panic.
         let rows = self.settings.c.row_iter().nth(i);
         let c_z = rows.map_or_else(SVector::zeros, |row| row.transpose());

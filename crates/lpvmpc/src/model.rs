@@ -130,6 +130,15 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
         (rate, a, b)
     }
 
+    /// What the sensor `i` of an [`Estimator`](crate::Estimator) measures at the state `x`, and its derivatives,
+    /// of a sensor that is not linear; `None`, as a rule, where it is the row `i` of
+    /// [`EstimatorSettings::c`](crate::EstimatorSettings::c).
+    #[inline(always)]
+    fn sensor(&self, i: usize, x: &SVector<T, NX>) -> Option<(T, SVector<T, NX>)> {
+        let _ = (i, x);
+        None
+    }
+
     /// The steady state, f(x, u) = 0 (F(x, u) = x of a model with a period) within bounds, that is nearest to a reference; `None` where
     /// none is found.
     ///

@@ -8,6 +8,7 @@
 mod agreement;
 mod changes;
 mod discrete;
+mod estimation;
 mod matrices;
 mod messages;
 mod outputs;

@@ -107,10 +107,7 @@ fn plans_of_a_linear_plant_are_those_of_clarabel() {
             "{cost} {with_prices}"
         );
         let active = plan.active_bounds();
-        assert!(
-            active.contains("y0 ") && active.contains("y1 "),
-            "{active}"
-        );
+        assert!(active.contains("y0 ") && active.contains("y1 "), "{active}");
     }
 }
 
