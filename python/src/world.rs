@@ -2,7 +2,7 @@
 
 use crate::errors::{of_setting, of_simulation};
 use crate::plant::Plant;
-use lpvmpc_any::{Actuator, Disturbance, Sensor, Tolerances, WorldSettings};
+use lpvmpc_any::{Actuator, Push, Sensor, Tolerances, WorldSettings};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
@@ -13,16 +13,16 @@ type ActuatorTuple = (f64, f64, f64);
 
 /// A push, as Python hands it over.
 #[derive(FromPyObject)]
-enum Push {
+enum PushTuple {
     Load(f64, f64, Vec<f64>),
     Jump(f64, Vec<f64>),
 }
 
-impl From<Push> for Disturbance {
-    fn from(push: Push) -> Self {
+impl From<PushTuple> for Push {
+    fn from(push: PushTuple) -> Self {
         match push {
-            Push::Load(from, until, load) => Self::Load { from, until, load },
-            Push::Jump(time, change) => Self::Jump { time, change },
+            PushTuple::Load(from, until, load) => Self::Load { from, until, load },
+            PushTuple::Jump(time, change) => Self::Jump { time, change },
         }
     }
 }
@@ -35,7 +35,7 @@ struct Settings {
     sensors: Option<Vec<SensorTuple>>,
     actuators: Option<Vec<ActuatorTuple>>,
     delay: f64,
-    pushes: Vec<Push>,
+    pushes: Vec<PushTuple>,
     seed: u64,
     relative_tolerance: f64,
     absolute_tolerance: f64,
@@ -66,7 +66,7 @@ impl From<Settings> for WorldSettings {
                 .actuators
                 .map(|all| all.into_iter().map(actuator).collect()),
             delay: settings.delay,
-            disturbances: settings.pushes.into_iter().map(Into::into).collect(),
+            pushes: settings.pushes.into_iter().map(Into::into).collect(),
             seed: settings.seed,
             tolerances: Tolerances {
                 relative: settings.relative_tolerance,
@@ -120,8 +120,8 @@ impl World {
         self.inner.command(&u).map_err(of_setting)
     }
 
-    fn push(&mut self, push: Push) -> PyResult<()> {
-        self.inner.disturb(&push.into()).map_err(of_setting)
+    fn push(&mut self, push: PushTuple) -> PyResult<()> {
+        self.inner.push(&push.into()).map_err(of_setting)
     }
 
     fn advance(&mut self, py: Python<'_>) -> PyResult<()> {

@@ -10,11 +10,12 @@ use lpvmpc_design::{
 use lpvmpc_plant::{Plant, Signal};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-/// The names of a plant's states and inputs.
+/// The names of a plant's states, inputs and outputs.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Names {
     pub states: Vec<String>,
     pub inputs: Vec<String>,
+    pub outputs: Vec<String>,
 }
 
 /// Which of them.
@@ -22,6 +23,7 @@ pub(crate) struct Names {
 pub(crate) enum Axis {
     States,
     Inputs,
+    Outputs,
 }
 
 impl Names {
@@ -30,6 +32,7 @@ impl Names {
         Self {
             states: all(&plant.data().states),
             inputs: all(&plant.data().inputs),
+            outputs: all(&plant.data().outputs),
         }
     }
 
@@ -37,6 +40,7 @@ impl Names {
         match axis {
             Axis::States => &self.states,
             Axis::Inputs => &self.inputs,
+            Axis::Outputs => &self.outputs,
         }
     }
 
@@ -46,6 +50,18 @@ impl Names {
         format!("{} ({})", names.len(), names.join(", "))
     }
 
+    /// As many entries as there are states, inputs or outputs.
+    fn check_length(&self, axis: Axis, place: &str, length: usize) -> Result<(), MpcError> {
+        if length == self.of(axis).len() {
+            return Ok(());
+        }
+        let fault = format!(
+            "it has {length} entries; there must be {}",
+            self.expected(axis)
+        );
+        Err(MpcError::new(place, fault))
+    }
+
     /// A vector with an entry for each state or input.
     pub fn vector<const K: usize>(
         &self,
@@ -53,15 +69,7 @@ impl Names {
         place: &str,
         entries: &[f64],
     ) -> Result<SVector<f64, K>, MpcError> {
-        let names = self.of(axis);
-        if entries.len() != names.len() {
-            let fault = format!(
-                "it has {} entries; there must be {}",
-                entries.len(),
-                self.expected(axis)
-            );
-            return Err(MpcError::new(place, fault));
-        }
+        self.check_length(axis, place, entries.len())?;
         Ok(SVector::from_fn(|i, _| {
             entries.get(i).copied().unwrap_or(0.0)
         }))
@@ -74,9 +82,15 @@ impl Names {
         place: &str,
         entries: &[f64],
     ) -> Result<SVector<f64, K>, MpcError> {
-        let vector = self.vector(axis, place, entries)?;
+        self.check_finite(axis, place, entries)?;
+        self.vector(axis, place, entries)
+    }
+
+    /// Finite numbers, one for each state, input or output.
+    pub fn check_finite(&self, axis: Axis, place: &str, entries: &[f64]) -> Result<(), MpcError> {
+        self.check_length(axis, place, entries.len())?;
         match entries.iter().position(|entry| !entry.is_finite()) {
-            None => Ok(vector),
+            None => Ok(()),
             Some(i) => {
                 let fault = format!("{} is {}; it must be finite", self.of(axis)[i], entries[i]);
                 Err(MpcError::new(place, fault))
@@ -93,6 +107,21 @@ impl Names {
         entries: &DMatrix<f64>,
         rest: f64,
     ) -> Result<SMatrix<f64, R, C>, MpcError> {
+        self.check_matrix(axes, place, entries)?;
+        Ok(SMatrix::from_fn(|i, j| match entries.get((i, j)) {
+            Some(entry) => *entry,
+            None if i == j => rest,
+            None => 0.0,
+        }))
+    }
+
+    /// A matrix of finite numbers, with rows and columns for these.
+    pub fn check_matrix(
+        &self,
+        axes: (Axis, Axis),
+        place: &str,
+        entries: &DMatrix<f64>,
+    ) -> Result<(), MpcError> {
         let shape = (self.of(axes.0).len(), self.of(axes.1).len());
         if entries.shape() != shape {
             let fault = format!(
@@ -117,11 +146,7 @@ impl Names {
                 }
             }
         }
-        Ok(SMatrix::from_fn(|i, j| match entries.get((i, j)) {
-            Some(entry) => *entry,
-            None if i == j => rest,
-            None => 0.0,
-        }))
+        Ok(())
     }
 
     /// Bounds for each state or input.
@@ -131,24 +156,45 @@ impl Names {
         place: &str,
         limits: &Limits,
     ) -> Result<Bounds<f64, K>, MpcError> {
+        self.check_limits(axis, place, limits)?;
         let mut bounds = Bounds::none();
-        let lower: SVector<f64, K> =
-            self.vector(axis, &format!("{place}, lower"), &limits.lower)?;
-        let upper: SVector<f64, K> =
-            self.vector(axis, &format!("{place}, upper"), &limits.upper)?;
-        for (i, name) in self.of(axis).iter().enumerate() {
-            let (least, most) = (lower[i], upper[i]);
+        let sides = limits.lower.iter().zip(&limits.upper);
+        for (i, (lower, upper)) in sides.enumerate() {
+            (bounds.lower[i], bounds.upper[i]) = (*lower, *upper);
+        }
+        Ok(bounds)
+    }
+
+    /// A lower bound that does not exceed the upper one, for each of these.
+    pub fn check_limits(&self, axis: Axis, place: &str, limits: &Limits) -> Result<(), MpcError> {
+        let Limits { lower, upper } = limits;
+        self.check_length(axis, &format!("{place}, lower"), lower.len())?;
+        self.check_length(axis, &format!("{place}, upper"), upper.len())?;
+        for (name, (least, most)) in self.of(axis).iter().zip(lower.iter().zip(upper)) {
             // Negated, so that a bound that is NaN fails.
-            if !(least <= most && least < f64::INFINITY && most > f64::NEG_INFINITY) {
+            if !(least <= most && *least < f64::INFINITY && *most > f64::NEG_INFINITY) {
                 let fault = format!(
                     "{name} must lie from {least} to {most}; the lower bound must not exceed the \
                      upper one"
                 );
                 return Err(MpcError::new(place, fault));
             }
-            (bounds.lower[i], bounds.upper[i]) = (least, most);
         }
-        Ok(bounds)
+        Ok(())
+    }
+
+    /// A symmetric positive semidefinite weight called `symbol`.
+    pub fn check_weight(
+        &self,
+        axis: Axis,
+        place: &str,
+        symbol: &'static str,
+        weight: &DMatrix<f64>,
+    ) -> Result<(), MpcError> {
+        self.check_matrix((axis, axis), place, weight)?;
+        let refused = |error: MatrixError| MpcError::new(place, error.to_string());
+        let weight = checked_symmetric(symbol, weight).map_err(refused)?;
+        check_positive_semidefinite(symbol, &weight).map_err(refused)
     }
 
     /// Q and R.

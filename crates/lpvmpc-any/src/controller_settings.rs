@@ -2,19 +2,22 @@
 
 use crate::check::{Axis, Names, check_price};
 use crate::error::MpcError;
+use crate::last_input::LastInput;
 use crate::model::Model;
 use crate::settings::{Limits, MpcSettings, StateBounds, Terminal};
+use crate::target::output_tangent;
 use lpvmpc::{
-    Bounds, ControllerSettings, InputReference, LpvModel, Predictor, Rk4, TerminalIngredient,
+    Bounds, ControllerSettings, InputReference, LpvModel, Penalty, Predictor, Rk4,
+    TerminalIngredient, exact_prices,
 };
 use lpvmpc_design::{lqr_discrete, zero_order_hold};
 use lpvmpc_plant::{Plant, Signal};
-use nalgebra::{DMatrix, SMatrix, SVector};
+use nalgebra::{DMatrix, Matrix1, SMatrix, SVector, Vector1};
 
 /// The longest horizon: the memory of a working set grows with its square.
 const MOST_SAMPLES: usize = 1000;
 
-/// What stands, up to rounding: the largest derivative of a state, in its unit per second.
+/// What stands, up to rounding: the largest change of a state, in its unit per second or per period.
 const AT_REST: f64 = 1e-6;
 
 /// Bounds that hold at every stage.
@@ -30,11 +33,18 @@ pub(crate) fn controller_settings<const NX: usize, const NU: usize, const NS: us
     names: &Names,
     settings: &MpcSettings,
     model: &Model<NX, NU, NS>,
-    rest: (SVector<f64, NX>, SVector<f64, NU>),
+    (rest, last_input): ((SVector<f64, NX>, SVector<f64, NU>), Option<LastInput>),
 ) -> Result<(ControllerSettings<f64, NX, NU, NS>, StageBounds<NX, NU>), MpcError> {
     let MpcSettings { t_s, horizon, .. } = *settings;
     if !(t_s > 0.0 && t_s.is_finite()) {
         let fault = format!("it is {t_s} s; it must be a positive number of seconds");
+        return Err(MpcError::new("t_s", fault));
+    }
+    if let Some(period) = plant.period()
+        && t_s != period
+    {
+        let fault =
+            format!("it is {t_s} s; the plant is in discrete time with a period of {period} s");
         return Err(MpcError::new("t_s", fault));
     }
     if horizon == 0 || horizon > MOST_SAMPLES {
@@ -42,10 +52,6 @@ pub(crate) fn controller_settings<const NX: usize, const NU: usize, const NS: us
         return Err(MpcError::new("horizon", fault));
     }
     let data = plant.data();
-    let limits = |given: &Option<Limits>, signals: &[Signal]| match given {
-        Some(limits) => limits.clone(),
-        None => plant_limits(signals),
-    };
     let x = limits(&settings.x_bounds, &data.states);
     let u = limits(&settings.u_bounds, &data.inputs);
     let bounds = StageBounds {
@@ -59,7 +65,13 @@ pub(crate) fn controller_settings<const NX: usize, const NU: usize, const NS: us
             let axes = (Axis::States, Axis::States);
             TerminalIngredient::Cost(names.matrix(axes, "terminal cost", p, 0.0)?)
         }
-        Terminal::Lqr => TerminalIngredient::Cost(cost_to_go(names, settings, model, rest)?),
+        Terminal::Lqr => TerminalIngredient::Cost(cost_to_go(
+            plant,
+            names,
+            settings,
+            model,
+            (rest, last_input),
+        )?),
     };
     let mut new = ControllerSettings::new(t_s, horizon, weights, terminal, bounds.u);
     new.predictor = Predictor::StageConsistent(Rk4 {
@@ -102,35 +114,37 @@ pub(crate) fn controller_settings<const NX: usize, const NU: usize, const NS: us
     Ok((new, bounds))
 }
 
-/// The bounds of the plant's file.
-pub(crate) fn plant_limits(signals: &[Signal]) -> Limits {
-    let signals = signals.iter();
-    let pairs = signals.map(|one| {
-        let (lower, upper) = (one.lower, one.upper);
-        (
-            lower.unwrap_or(f64::NEG_INFINITY),
-            upper.unwrap_or(f64::INFINITY),
-        )
-    });
-    let (lower, upper) = pairs.unzip();
-    Limits { lower, upper }
+/// The bounds that are given, or those of the `signals`.
+pub(crate) fn limits(given: &Option<Limits>, signals: &[Signal]) -> Limits {
+    let bounds = |of: &dyn Fn(&Signal) -> f64| signals.iter().map(of).collect();
+    match given {
+        Some(limits) => limits.clone(),
+        None => Limits {
+            lower: bounds(&|one| one.lower.unwrap_or(f64::NEG_INFINITY)),
+            upper: bounds(&|one| one.upper.unwrap_or(f64::INFINITY)),
+        },
+    }
 }
 
 /// The cost of the linear-quadratic regulator about the plant's steady state, sampled.
 fn cost_to_go<const NX: usize, const NU: usize, const NS: usize>(
+    plant: &Plant,
     names: &Names,
     settings: &MpcSettings,
     model: &Model<NX, NU, NS>,
-    (x, u): (SVector<f64, NX>, SVector<f64, NU>),
+    ((x, u), last_input): ((SVector<f64, NX>, SVector<f64, NU>), Option<LastInput>),
 ) -> Result<SMatrix<f64, NX, NX>, MpcError> {
     let (n, m) = (names.states.len(), names.inputs.len());
-    let largest = model.derivative(&x, &u).amax();
+    let discrete = model.period().is_some();
+    let motion = model.derivative(&x, &u);
+    let largest = if discrete { motion - x } else { motion }.amax();
     if !(largest <= AT_REST) {
         let fault = format!(
             "the plant does not stand where its regulator is designed, at {:?} under {:?}: a state \
-             changes by {largest} per second. Give a steady state in the plant's file, or a cost",
+             changes by {largest} per {}. Give a steady state in the plant's file, or a cost",
             &x.as_slice()[..n],
-            &u.as_slice()[..m]
+            &u.as_slice()[..m],
+            if discrete { "period" } else { "second" }
         );
         return Err(MpcError::new("terminal", fault));
     }
@@ -144,10 +158,126 @@ fn cost_to_go<const NX: usize, const NU: usize, const NS: usize>(
         );
         MpcError::new("terminal", fault)
     };
-    let (a_d, b_d) =
-        zero_order_hold(&a, &b, settings.t_s).map_err(|error| refused(error.to_string()))?;
-    let lqr = lqr_discrete(&a_d, &b_d, &settings.q, &settings.r);
+    let (a_d, b_d) = match discrete {
+        true => (a, b),
+        false => {
+            zero_order_hold(&a, &b, settings.t_s).map_err(|error| refused(error.to_string()))?
+        }
+    };
+    let mut cost = StageCost {
+        q: settings.q.clone(),
+        r: settings.r.clone(),
+        s: DMatrix::zeros(m, n),
+    };
+    if let Some(q_y) = &settings.q_y {
+        let tangent = output_tangent(plant, &x.as_slice()[..n], &u.as_slice()[..m]);
+        let (_, slopes) =
+            tangent.ok_or_else(|| refused("the outputs have no value there".into()))?;
+        let (c, d) = (slopes.columns(0, n), slopes.columns(n, m));
+        cost.q += c.transpose() * q_y * c;
+        cost.r += d.transpose() * q_y * d;
+        cost.s += d.transpose() * q_y * c;
+    }
+    let with_last = last_input.is_some();
+    let (a_d, b_d) = match with_last {
+        true => cost.join_last_input(&a_d, &b_d, settings.r_du.as_ref()),
+        false => (a_d, b_d),
+    };
+    // Without cross weight, of what the input is beside -R^-1 S x.
+    let along = { cost.r.clone().cholesky() }
+        .map(|r| r.solve(&cost.s))
+        .ok_or_else(|| refused("R is not positive definite".into()))?;
+    let q = &cost.q - cost.s.transpose() * &along;
+    let q = (&q + q.transpose()) * 0.5;
+    let lqr = lqr_discrete(&(a_d - &b_d * along), &b_d, &q, &cost.r);
     let lqr = lqr.map_err(|error| refused(error.to_string()))?;
-    let axes = (Axis::States, Axis::States);
-    names.matrix(axes, "terminal", &lqr.p, 0.0)
+    Ok(SMatrix::from_fn(|i, j| {
+        lqr.p.get((i, j)).copied().unwrap_or(0.0)
+    }))
+}
+
+/// x'Q x + u'R u + 2 u'S x.
+struct StageCost {
+    q: DMatrix<f64>,
+    r: DMatrix<f64>,
+    s: DMatrix<f64>,
+}
+
+impl StageCost {
+    /// With the last input v as further states, v+ = u, and the cost of u - v.
+    fn join_last_input(
+        &mut self,
+        a: &DMatrix<f64>,
+        b: &DMatrix<f64>,
+        r_du: Option<&DMatrix<f64>>,
+    ) -> (DMatrix<f64>, DMatrix<f64>) {
+        let (n, m) = b.shape();
+        let place = |matrix: &DMatrix<f64>, shape: (usize, usize), at: (usize, usize)| {
+            let mut larger = DMatrix::zeros(shape.0, shape.1);
+            larger.view_mut(at, matrix.shape()).copy_from(matrix);
+            larger
+        };
+        let all = (n + m, n + m);
+        self.q = place(&self.q, all, (0, 0));
+        self.s = place(&self.s, (m, n + m), (0, 0));
+        if let Some(r_du) = r_du {
+            self.q += place(r_du, all, (n, n));
+            self.r += r_du;
+            self.s -= place(r_du, (m, n + m), (0, n));
+        }
+        let unit = DMatrix::identity(m, m);
+        let b = place(b, (n + m, m), (0, 0)) + place(&unit, (n + m, m), (n, 0));
+        (place(a, all, (0, 0)), b)
+    }
+}
+
+/// Prices of exceeding the bounds of outputs, each with its signal's place in the plant.
+pub(crate) fn output_prices<const NX: usize, const NU: usize, const NS: usize>(
+    plant: &Plant,
+    names: &Names,
+    settings: &MpcSettings,
+    (limits, of_controller): (&Limits, &ControllerSettings<f64, NX, NU, NS>),
+    (x, u): (SVector<f64, NX>, SVector<f64, NU>),
+) -> Vec<Option<Penalty<f64>>> {
+    let count = names.outputs.len();
+    match &settings.output_bounds {
+        StateBounds::Hard => vec![None; count],
+        StateBounds::Priced(prices) => prices.clone(),
+        StateBounds::Soft => {
+            let (n, m) = (names.states.len(), names.inputs.len());
+            let tangent = output_tangent(plant, &x.as_slice()[..n], &u.as_slice()[..m]);
+            let samples = settings.horizon as f64;
+            let p = match &of_controller.terminal {
+                TerminalIngredient::Cost(p) if p.amax() > 0.0 => {
+                    DMatrix::from_fn(n, n, |i, j| p[(i, j)])
+                }
+                _ => &settings.q * samples,
+            };
+            let q_y = settings.q_y.as_ref();
+            let prices = (0..count).map(|k| {
+                // What a unit of the output costs that comes the shortest way from state and input.
+                let row = tangent
+                    .as_ref()
+                    .map(|(_, slopes)| slopes.row(k).transpose());
+                let row = row.filter(|row| row.norm() > 1e-6 && row.iter().all(|c| c.is_finite()));
+                let of_motion = row.map_or(p.amax(), |row| {
+                    let (c, d) = (row.rows(0, n), row.rows(n, m));
+                    let cost = c.dot(&(&p * c)) + d.dot(&(&settings.r * d));
+                    cost / row.norm_squared().powi(2)
+                });
+                let of_weight = q_y.map_or(0.0, |q_y| q_y[(k, k)] * samples);
+                let bounds = Bounds {
+                    lower: Vector1::new(limits.lower[k]),
+                    upper: Vector1::new(limits.upper[k]),
+                };
+                let largest = [of_motion + of_weight, settings.q.amax(), settings.r.amax()];
+                let cost = match largest[0] > 0.0 {
+                    true => largest[0],
+                    false => largest[1].max(largest[2]),
+                };
+                exact_prices(&Matrix1::new(cost), &bounds)[0]
+            });
+            prices.collect()
+        }
+    }
 }

@@ -38,9 +38,14 @@
     reason = "a comparison with NaN must take the failing branch"
 )]
 
+mod answers;
 mod check;
 mod controller_settings;
 mod error;
+mod estimator;
+mod horizon;
+mod last_input;
+mod linear_model;
 mod model;
 mod mpc;
 mod plan;
@@ -49,15 +54,18 @@ mod settings;
 mod sized;
 mod stage_lists;
 mod steady_state;
+mod target;
+mod tasks;
 mod words;
 mod world;
 
 pub use error::MpcError;
-pub use lpvmpc::{Iterations, Penalty, Reading};
+pub use estimator::{Disturbance, Estimate, EstimatorSettings};
+pub use lpvmpc::{Gate, Iterations, Penalty, Reading, Verdict};
 pub use lpvmpc_sim::{Actuator, Tolerances};
 pub use mpc::{MOST_INPUTS, MOST_STATES, Mpc};
-pub use plan::{ActiveBound, Plan};
-pub use preview::Preview;
+pub use plan::{ActiveBound, Plan, Target};
+pub use preview::{Preview, StageMatrices};
 pub use settings::{Limits, LinearModels, MpcSettings, Row, StateBounds, Terminal};
 pub use steady_state::{SteadyState, steady_state};
-pub use world::{Disturbance, Sensor, World, WorldSettings};
+pub use world::{Push, Sensor, World, WorldSettings};

@@ -1,6 +1,7 @@
 //! The linear models of a plant in places that were compiled.
 
 use crate::error::MpcError;
+use crate::linear_model::LinearModel;
 use crate::settings::LinearModels;
 use lpvmpc::{
     AlongMotion, AlongRay, Dynamics, Embedding, GaussLegendre, LpvModel, Number, Tangent,
@@ -8,7 +9,7 @@ use lpvmpc::{
 use lpvmpc_plant::{Plant, SizedEmbedding, SizedPlant};
 use nalgebra::{SMatrix, SVector};
 
-/// A plant in more places than it has states. What stands in those left over decays, x_dot = -x, so
+/// A plant in more places than it has states. What stands in those left over decays, x_dot = -x or x+ = 0, so
 /// that it stays zero and a steady state of all is one of the plant.
 #[derive(Debug, Clone)]
 pub(crate) struct Filled<P> {
@@ -17,8 +18,16 @@ pub(crate) struct Filled<P> {
 }
 
 impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for Filled<SizedPlant<NX, NU>> {
+    fn period(&self) -> Option<f64> {
+        Dynamics::period(&self.plant)
+    }
+
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
-        decaying(self.plant.f(x, u), x, self.states)
+        let from = match self.period() {
+            None => self.states,
+            Some(_) => NX,
+        };
+        decaying(self.plant.f(x, u), x, from)
     }
 }
 
@@ -36,6 +45,10 @@ fn decaying<N: Number, const NX: usize>(
 impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
     for Filled<SizedEmbedding<NX, NU, NS>>
 {
+    fn period(&self) -> Option<f64> {
+        Embedding::period(&self.plant)
+    }
+
     fn scheduling<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NS> {
         Embedding::scheduling(&self.plant, x, u)
     }
@@ -45,8 +58,10 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         scheduling: &SVector<N, NS>,
     ) -> (SMatrix<N, NX, NX>, SMatrix<N, NX, NU>) {
         let (mut a, b) = Embedding::matrices(&self.plant, scheduling);
-        for i in self.states..NX {
-            a[(i, i)] = N::constant(-1.0);
+        if Embedding::period(self).is_none() {
+            for i in self.states..NX {
+                a[(i, i)] = N::constant(-1.0);
+            }
         }
         (a, b)
     }
@@ -56,7 +71,11 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
     }
 
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
-        decaying(Embedding::f(&self.plant, x, u), x, self.states)
+        let from = match Embedding::period(self) {
+            None => self.states,
+            Some(_) => NX,
+        };
+        decaying(Embedding::f(&self.plant, x, u), x, from)
     }
 }
 
@@ -71,6 +90,7 @@ pub(crate) enum Model<const NX: usize, const NU: usize, const NS: usize> {
     Motion(AlongMotion<Filled<SizedPlant<NX, NU>>, NS>),
     Ray(Box<AlongRay<Filled<SizedPlant<NX, NU>>, f64, NX, NU, NS>>),
     Own(Filled<SizedEmbedding<NX, NU, NS>>),
+    Given(Box<LinearModel<NX, NU>>),
 }
 
 impl<const NX: usize, const NU: usize, const NS: usize> Model<NX, NU, NS> {
@@ -123,6 +143,10 @@ macro_rules! whichever {
                 $answer
             }
             Model::Own($is) => $answer,
+            Model::Given($is) => {
+                let $is = &**$is;
+                $answer
+            }
         }
     };
 }
@@ -130,27 +154,31 @@ macro_rules! whichever {
 impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS>
     for Model<NX, NU, NS>
 {
+    fn period(&self) -> Option<f64> {
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::period(model))
+    }
+
     fn scheduling(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> SVector<f64, NS> {
-        whichever!(self, model => LpvModel::scheduling(model, x, u))
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::scheduling(model, x, u))
     }
 
     fn matrices(
         &self,
         scheduling: &SVector<f64, NS>,
     ) -> (SMatrix<f64, NX, NX>, SMatrix<f64, NX, NU>) {
-        whichever!(self, model => LpvModel::matrices(model, scheduling))
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::matrices(model, scheduling))
     }
 
     fn offset(&self, scheduling: &SVector<f64, NS>) -> Option<SVector<f64, NX>> {
-        whichever!(self, model => LpvModel::offset(model, scheduling))
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::offset(model, scheduling))
     }
 
     fn embedded(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> Tangent<f64, NX, NU> {
-        whichever!(self, model => LpvModel::embedded(model, x, u))
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::embedded(model, x, u))
     }
 
     fn derivative(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> SVector<f64, NX> {
-        whichever!(self, model => LpvModel::derivative(model, x, u))
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::derivative(model, x, u))
     }
 
     fn jacobian(
@@ -158,10 +186,10 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
         x: &SVector<f64, NX>,
         u: &SVector<f64, NU>,
     ) -> (SMatrix<f64, NX, NX>, SMatrix<f64, NX, NU>) {
-        whichever!(self, model => LpvModel::jacobian(model, x, u))
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::jacobian(model, x, u))
     }
 
     fn tangent(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> Tangent<f64, NX, NU> {
-        whichever!(self, model => LpvModel::tangent(model, x, u))
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::tangent(model, x, u))
     }
 }

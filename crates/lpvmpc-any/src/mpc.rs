@@ -1,10 +1,12 @@
 //! A controller of any size.
 
 use crate::error::MpcError;
+use crate::estimator::{Estimate, EstimatorSettings};
 use crate::plan::Plan;
 use crate::preview::Preview;
 use crate::settings::MpcSettings;
 use crate::sized::{AnySize, Sized};
+use lpvmpc::Verdict;
 use lpvmpc_plant::Plant;
 
 /// The most states that a plant may have.
@@ -21,20 +23,36 @@ pub struct Mpc {
 /// The first of these sizes, smallest first, in which a plant has room.
 macro_rules! smallest {
     ($plant:expr, $settings:expr, $($nx:literal $nu:literal $ns:literal),+) => {{
-        let data = $plant.data();
-        let (n, m) = (data.states.len(), data.inputs.len());
+        let (n, m) = places($plant, $settings);
         $(if n <= $nx && m <= $nu {
-            return Ok(Self {
-                sized: Box::new(Sized::<$nx, $nu, $ns>::new($plant, $settings)?),
-                states: n,
-            });
+            return Ok(Box::new(Sized::<$nx, $nu, $ns>::new($plant, $settings)?));
         })+
-        let fault = format!(
-            "there are {n} states and {m} inputs; a controller has at most {MOST_STATES} and \
-             {MOST_INPUTS}"
-        );
+        let states = $plant.data().states.len();
+        let fault = match n == states {
+            true => format!(
+                "there are {n} states and {m} inputs; a controller has at most {MOST_STATES} and \
+                 {MOST_INPUTS}"
+            ),
+            false => format!(
+                "there are {states} states and {m} inputs; where changes of the inputs cost \
+                 something or are bounded, the last inputs count as states, of which a controller \
+                 has at most {MOST_STATES}, beside at most {MOST_INPUTS} inputs"
+            ),
+        };
         Err(MpcError::new("plant", fault))
     }};
+}
+
+/// The states, with the last inputs where they are among them, and the inputs.
+fn places(plant: &Plant, settings: &MpcSettings) -> (usize, usize) {
+    let data = plant.data();
+    let (n, m) = (data.states.len(), data.inputs.len());
+    (if settings.with_last_input() { n + m } else { n }, m)
+}
+
+/// A controller in the smallest size.
+fn sized(plant: &Plant, settings: &MpcSettings) -> Result<Box<dyn AnySize>, MpcError> {
+    smallest!(plant, settings, 2 1 3, 4 1 5, 4 2 6, 6 2 8, 8 4 12, 12 4 16, 16 6 22)
 }
 
 impl Mpc {
@@ -46,7 +64,10 @@ impl Mpc {
         if plant.data().inputs.is_empty() {
             return Err(MpcError::new("plant", "it has no input to control it with"));
         }
-        smallest!(plant, settings, 2 1 3, 4 1 5, 4 2 6, 6 2 8, 8 4 12, 12 4 16, 16 6 22)
+        Ok(Self {
+            sized: sized(plant, settings)?,
+            states: plant.data().states.len(),
+        })
     }
 
     /// One sample: from the measured state `x` and what is known ahead to the plan, whose first
@@ -60,12 +81,21 @@ impl Mpc {
         self.sized.step(x, preview)
     }
 
-    /// Other settings from the next step on. Horizon and sampling time stay.
+    /// Other settings from the next step on. Horizon and sampling time stay. Where changes of the input begin or
+    /// cease to count, the next step is made without the last plan.
     ///
     /// # Errors
     /// As [`new`](Self::new); the controller is as it was then.
     pub fn set_settings(&mut self, settings: &MpcSettings) -> Result<(), MpcError> {
-        self.sized.set_settings(settings)
+        if places(self.sized.plant(), settings).0 <= self.sized.places() {
+            return self.sized.set_settings(settings);
+        }
+        // The last inputs need more places: the next step is as the first.
+        let mut larger = sized(self.sized.plant(), settings)?;
+        larger.set_last_input(&self.sized.last_input())?;
+        larger.set_estimator(self.sized.estimator())?;
+        self.sized = larger;
+        Ok(())
     }
 
     /// Another value of a parameter of the plant from the next step on.
@@ -76,7 +106,52 @@ impl Mpc {
         self.sized.set_parameter(name, value)
     }
 
-    /// Forgets the last plan: the next step is as the first.
+    /// The input that was really applied last, where that is another than the last plan's first one; before the first
+    /// step it is that of the plant's steady state. Changes of the input count from it.
+    ///
+    /// # Errors
+    /// It has not the plant's sizes, or is not finite.
+    pub fn set_last_input(&mut self, u: &[f64]) -> Result<(), MpcError> {
+        self.sized.set_last_input(u)
+    }
+
+    /// From now on the state is estimated from readings, and inputs act after a delay: see [`Self::observe`] and
+    /// [`Self::decide`]. One that is there already is taken over with its state; `None` ends it.
+    ///
+    /// # Errors
+    /// The setting that makes no sense; a disturbance that the readings cannot tell. All is as it was then.
+    pub fn set_estimator(&mut self, settings: Option<&EstimatorSettings>) -> Result<(), MpcError> {
+        self.sized.set_estimator(settings)
+    }
+
+    /// Takes in the readings of the time `t` (s, on any clock), in the order of
+    /// [`EstimatorSettings::measured`], `None` where one is missing; and says what became of each. May be called more often
+    /// than once a sample.
+    ///
+    /// # Errors
+    /// There is no estimator, or not as many readings.
+    pub fn observe(&mut self, t: f64, readings: &[Option<f64>]) -> Result<Vec<Verdict>, MpcError> {
+        self.sized.observe(t, readings)
+    }
+
+    /// One sample from the last readings: as [`Self::step`], from the estimated state when the input will act, under
+    /// the estimated disturbances. Its first input must be sent: the estimator counts on it. Stage 0 of the preview is when it
+    /// acts, the delay after the last readings.
+    ///
+    /// While there is no estimate, the plan's status says so, and its inputs are those nearest to zero.
+    ///
+    /// # Errors
+    /// There is no estimator; or as [`Self::step`].
+    pub fn decide(&mut self, preview: &Preview) -> Result<Plan, MpcError> {
+        self.sized.decide(preview)
+    }
+
+    /// The estimate at the last readings; `None` without an estimator.
+    pub fn estimate(&self) -> Option<Estimate> {
+        self.sized.estimate()
+    }
+
+    /// Forgets the last plan and the last input: the next step is as the first.
     pub fn reset(&mut self) {
         self.sized.reset();
     }

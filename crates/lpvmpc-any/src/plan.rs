@@ -24,6 +24,18 @@ pub struct Plan {
     pub active: Vec<ActiveBound>,
     /// Quadratic programs that were solved.
     pub problems: usize,
+    /// The steady state that it heads for: the nearest to the end of the references. `None` with an input
+    /// reference that was given, and where none was found.
+    pub target: Option<Target>,
+}
+
+/// A steady state.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Target {
+    /// The state, in the plant's units.
+    pub x: Vec<f64>,
+    /// The input that holds it.
+    pub u: Vec<f64>,
 }
 
 /// A bound that the plan runs into.

@@ -26,13 +26,48 @@ pub struct Preview {
     pub u_bounds: Vec<Limits>,
     /// Linear rows in place of those of the settings.
     pub rows: Vec<Vec<Row>>,
-    /// Measured disturbances d in state units per second: x_dot = f(x, u) + d.
+    /// Measured disturbances d in state units per second: x_dot = f(x, u) + d; of a plant in discrete time in state
+    /// units: x+ = F(x, u) + d.
     pub disturbance: Vec<DVector<f64>>,
     /// The plant's parameters.
     pub parameters: Vec<Vec<f64>>,
+    /// y_ref; empty means the outputs where the plant stands nearest to x_ref. Without x_ref, x_ref is where the
+    /// plant stands nearest to the end of y_ref.
+    pub y_ref: Vec<DVector<f64>>,
+    /// Q_y, where the settings have one.
+    pub q_y: Vec<DMatrix<f64>>,
+    /// Bounds of the outputs.
+    pub y_bounds: Vec<Limits>,
+    /// R_du, where the settings have one.
+    pub r_du: Vec<DMatrix<f64>>,
+    /// Bounds of the changes of the input, where the settings have any.
+    pub du_bounds: Vec<Limits>,
+    /// Linear models x+ = A x + B u + c over the samples, in place of the plant.
+    pub matrices: Vec<StageMatrices>,
+    /// Scheduling from outside: the plant's own embedding x_dot = A(s) x + B(s) u + c(s) at these s, whatever its state.
+    pub scheduling: Vec<DVector<f64>>,
+}
+
+/// A linear model of a sample, x+ = A x + B u + c.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StageMatrices {
+    /// A, n x n.
+    pub a: DMatrix<f64>,
+    /// B, n x m.
+    pub b: DMatrix<f64>,
+    /// c, n; zero without.
+    pub affine: Option<DVector<f64>>,
 }
 
 impl Preview {
+    /// One reference of the outputs for the whole horizon.
+    pub fn to_outputs(y_ref: &[f64]) -> Self {
+        Self {
+            y_ref: vec![DVector::from_row_slice(y_ref)],
+            ..Self::default()
+        }
+    }
+
     /// One reference for the whole horizon.
     pub fn to(x_ref: &[f64]) -> Self {
         Self {

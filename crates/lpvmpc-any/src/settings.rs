@@ -7,11 +7,11 @@ use nalgebra::{DMatrix, DVector};
 /// units of the plant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MpcSettings {
-    /// Sampling time, s.
+    /// Sampling time, s; of a plant in discrete time its period.
     pub t_s: f64,
     /// Prediction horizon in samples, 1 to 1000.
     pub horizon: usize,
-    /// Runge-Kutta steps per sample, at least 1.
+    /// Runge-Kutta steps per sample, at least 1; a plant in discrete time has none.
     pub substeps: usize,
     /// Q, n x n, symmetric positive semidefinite: (x - x_ref)'Q (x - x_ref) per sample.
     pub q: DMatrix<f64>,
@@ -30,6 +30,22 @@ pub struct MpcSettings {
     pub u_ref: Option<DVector<f64>>,
     /// Linear rows that hold at every stage.
     pub rows: Vec<Row>,
+    /// Q_y, for p outputs p x p, symmetric positive semidefinite: (y - y_ref)'Q_y (y - y_ref) per sample on top.
+    pub q_y: Option<DMatrix<f64>>,
+    /// Bounds of the outputs; `None` means those of the plant. Of an output that depends on the input they
+    /// hold at the stages 0 to N - 1, of another at 1 to N. A constraint h(x, u) <= 0 is an output with the
+    /// upper bound 0.
+    pub y_bounds: Option<Limits>,
+    /// What becomes of a plan that cannot keep them. A program has them linear about the plan, so hard ones of a
+    /// nonlinear output may be infeasible there although some plan keeps them; soft ones at a price above their
+    /// multiplier, which then lead to the same plan, are not.
+    pub output_bounds: StateBounds,
+    /// R_du, m x m, symmetric positive semidefinite: (u_i - u_{i-1})'R_du (u_i - u_{i-1}) per sample on top; u_{-1} is
+    /// the input that was applied last ([`crate::Mpc::set_last_input`]).
+    pub r_du: Option<DMatrix<f64>>,
+    /// Bounds of the changes u_i - u_{i-1} from sample to sample, hard. Where u_{-1} is too far beyond the bounds of the
+    /// input, the first change is as large as these ask for.
+    pub du_bounds: Option<Limits>,
     /// Which linear models the programs have.
     pub linear_models: LinearModels,
     /// Quadratic programs per sample.
@@ -54,6 +70,11 @@ impl MpcSettings {
             u_bounds: None,
             u_ref: None,
             rows: Vec::new(),
+            q_y: None,
+            y_bounds: None,
+            output_bounds: StateBounds::Soft,
+            r_du: None,
+            du_bounds: None,
             linear_models: LinearModels::default(),
             iterations: Iterations::default(),
         }
@@ -81,14 +102,15 @@ pub struct Limits {
     pub upper: Vec<f64>,
 }
 
-/// What becomes of a plan that cannot keep the bounds of the states.
+/// What becomes of a plan that cannot keep the bounds of the states, or of the outputs.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StateBounds {
-    /// They are exceeded as little as possible, at the price of [`lpvmpc::exact_prices`].
+    /// They are exceeded as little as possible, at the price of [`lpvmpc::exact_prices`]; of outputs at one
+    /// that is made in the same way of their derivatives where the plant stands.
     Soft,
     /// It is infeasible.
     Hard,
-    /// Each state has a price of its own per unit of excess, in the unit of the cost; hard where it
+    /// Each state, or output, has a price of its own per unit of excess, in the unit of the cost; hard where it
     /// has none.
     Priced(Vec<Option<Penalty<f64>>>),
 }

@@ -1,17 +1,19 @@
 //! The controller of a size that was compiled, behind one that was chosen.
 
+use crate::answers::Said;
 use crate::check::{Axis, Names};
 use crate::controller_settings::{StageBounds, controller_settings};
 use crate::error::MpcError;
+use crate::estimator::{Estimate, EstimatorSettings, Filter};
+use crate::last_input::{LastInput, Sampled};
 use crate::model::Model;
-use crate::plan::{ActiveBound, Plan};
+use crate::plan::{Plan, Target};
 use crate::preview::Preview;
 use crate::settings::MpcSettings;
-use crate::stage_lists::{StageLists, held};
-use crate::words::{Bounded, Named};
-use lpvmpc::{BoundId, Controller, GeneralRow, List, Quantity, Reference, Workspace};
-use lpvmpc_plant::{Plant, Signal, SizedPlant};
-use nalgebra::{DMatrix, SVector};
+use crate::stage_lists::StageLists;
+use lpvmpc::{Controller, GeneralRow, List, Reference, Rk4, Verdict, Workspace};
+use lpvmpc_plant::{Plant, SizedPlant};
+use nalgebra::SVector;
 
 /// A controller whose size nobody sees.
 pub(crate) trait AnySize: Send + Sync {
@@ -21,25 +23,84 @@ pub(crate) trait AnySize: Send + Sync {
     fn set_settings(&mut self, settings: &MpcSettings) -> Result<(), MpcError>;
     /// See [`crate::Mpc::set_parameter`].
     fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), MpcError>;
+    /// See [`crate::Mpc::set_last_input`].
+    fn set_last_input(&mut self, u: &[f64]) -> Result<(), MpcError>;
     /// See [`crate::Mpc::reset`].
     fn reset(&mut self);
+    /// The plant, with its parameters as they are now.
+    fn plant(&self) -> &Plant;
+    /// The input that was applied last.
+    fn last_input(&self) -> Vec<f64>;
+    /// The places for states.
+    fn places(&self) -> usize;
+    /// See [`crate::Mpc::set_estimator`].
+    fn set_estimator(&mut self, settings: Option<&EstimatorSettings>) -> Result<(), MpcError>;
+    /// See [`crate::Mpc::observe`].
+    fn observe(&mut self, t: f64, readings: &[Option<f64>]) -> Result<Vec<Verdict>, MpcError>;
+    /// See [`crate::Mpc::decide`].
+    fn decide(&mut self, preview: &Preview) -> Result<Plan, MpcError>;
+    /// See [`crate::Mpc::estimate`].
+    fn estimate(&self) -> Option<Estimate>;
+    /// The settings of the estimator.
+    fn estimator(&self) -> Option<&EstimatorSettings>;
 }
 
 type Planner<const NX: usize, const NU: usize, const NS: usize> =
-    Controller<Model<NX, NU, NS>, f64, NX, NU, NS>;
+    Controller<Sampled<NX, NU, NS>, f64, NX, NU, NS>;
 
 /// A controller in the places of `NX` states and `NU` inputs; `NS` is their sum.
 pub(crate) struct Sized<const NX: usize, const NU: usize, const NS: usize> {
-    plant: Plant,
-    names: Names,
-    settings: MpcSettings,
-    bounds: StageBounds<NX, NU>,
+    pub plant: Plant,
+    pub names: Names,
+    pub settings: MpcSettings,
+    pub bounds: StageBounds<NX, NU>,
     /// The plant's steady state.
-    rest: (SVector<f64, NX>, SVector<f64, NU>),
-    controller: Planner<NX, NU, NS>,
+    pub rest: (SVector<f64, NX>, SVector<f64, NU>),
+    pub controller: Planner<NX, NU, NS>,
     workspace: Workspace<f64, NX, NU>,
     /// Rows of a stage that the workspace has room for.
     room: usize,
+    /// Where the last input stands among the states, if it does.
+    pub last_input: Option<LastInput>,
+    /// The input that was applied last.
+    pub applied: SVector<f64, NU>,
+    filter: Option<Filter<NX, NU, NS>>,
+}
+
+/// What is made of settings.
+struct Made<const NX: usize, const NU: usize, const NS: usize> {
+    model: Sampled<NX, NU, NS>,
+    of_controller: lpvmpc::ControllerSettings<f64, NX, NU, NS>,
+    bounds: StageBounds<NX, NU>,
+    rows: Vec<GeneralRow<f64, NX, NU>>,
+}
+
+impl<const NX: usize, const NU: usize, const NS: usize> Made<NX, NU, NS> {
+    fn new(
+        plant: &Plant,
+        names: &Names,
+        settings: &MpcSettings,
+        rest: (SVector<f64, NX>, SVector<f64, NU>),
+    ) -> Result<Self, MpcError> {
+        let model = Model::new(plant, settings.linear_models, rest)?;
+        let last_input = settings.with_last_input().then_some(LastInput {
+            at: names.states.len(),
+            inputs: names.inputs.len(),
+            t_s: settings.t_s,
+            rk4: Rk4 {
+                substeps: settings.substeps,
+            },
+        });
+        settings.check_tasks(names)?;
+        let about = (rest, last_input);
+        let (of_controller, bounds) = controller_settings(plant, names, settings, &model, about)?;
+        Ok(Self {
+            model: Sampled::new(model, last_input),
+            of_controller,
+            bounds,
+            rows: names.rows("rows", &settings.rows)?,
+        })
+    }
 }
 
 impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
@@ -51,156 +112,56 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         let rest = sized
             .equilibrium()
             .unwrap_or((SVector::zeros(), SVector::zeros()));
-        let model = Model::new(plant, settings.linear_models, rest)?;
-        let (of_controller, bounds) = controller_settings(plant, &names, settings, &model, rest)?;
-        let capacity = of_controller.capacity().with_own_stages();
-        let controller = Controller::allocate(model, of_controller)
-            .map_err(|error| MpcError::new("settings", error.to_string()))?;
-        let mut new = Self {
+        let made = Made::new(plant, &names, settings, rest)?;
+        let refused = |error: lpvmpc::ControllerError| MpcError::new("settings", error.to_string());
+        let last_input = made.model.last_input;
+        let mut controller =
+            Controller::allocate(made.model, made.of_controller).map_err(refused)?;
+        let rows = List::Owned(made.rows.into_boxed_slice());
+        controller.set_rows(rows).map_err(refused)?;
+        let capacity = made.of_controller.capacity().with_own_stages();
+        let room = settings.rows.len();
+        Ok(Self {
             plant: plant.clone(),
             names,
             settings: settings.clone(),
-            bounds,
+            bounds: made.bounds,
             rest,
             controller,
-            workspace: Workspace::allocate(capacity.with_general_rows(settings.rows.len())),
-            room: settings.rows.len(),
-        };
-        new.set_rows()?;
-        Ok(new)
+            workspace: Workspace::allocate(capacity.with_general_rows(room)),
+            room,
+            last_input,
+            applied: rest.1,
+            filter: None,
+        })
     }
 
-    /// The rows of the settings, for every sample.
-    fn set_rows(&mut self) -> Result<(), MpcError> {
-        let rows = self.names.rows("rows", &self.settings.rows)?;
-        let rows = List::Owned(rows.into_boxed_slice());
-        let set = self.controller.set_rows(rows);
-        set.map_err(|error| MpcError::new("rows", error.to_string()))
+    fn filter_with(&self, settings: &EstimatorSettings) -> Result<Filter<NX, NU, NS>, MpcError> {
+        let settings = (&self.settings, settings);
+        Filter::new(&self.plant, &self.names, settings, self.rest)
     }
 
-    /// The plant with other parameters.
-    fn model_with(&self, place: &str, values: &[f64]) -> Result<Model<NX, NU, NS>, MpcError> {
-        let mut plant = self.plant.clone();
-        let known: Vec<String> = plant
-            .data()
-            .parameters
-            .iter()
-            .map(|p| p.name.clone())
-            .collect();
-        if values.len() != known.len() {
-            let fault = format!(
-                "it has {} values; there must be {} ({})",
-                values.len(),
-                known.len(),
-                known.join(", ")
-            );
-            return Err(MpcError::new(place, fault));
+    /// The plan from `x`, where more acts on the plant than its input.
+    fn plan_from(
+        &mut self,
+        mut x: SVector<f64, NX>,
+        acting: Option<(SVector<f64, NU>, SVector<f64, NX>)>,
+        preview: &Preview,
+    ) -> Result<Plan, MpcError> {
+        if let Some(last) = &self.last_input {
+            last.write(&mut x, &self.applied);
         }
-        for (name, value) in known.iter().zip(values) {
-            let set = plant.set_parameter(name, *value);
-            set.map_err(|error| MpcError::new(place, error.to_string()))?;
-        }
-        Model::new(&plant, self.settings.linear_models, self.rest)
-    }
-
-    /// The answer of the last step, in the plant's sizes and names.
-    fn plan(
-        &self,
-        x: &SVector<f64, NX>,
-        rows: &[Vec<String>],
-        lists: &StageLists<NX, NU, NS>,
-        cost: f64,
-    ) -> Plan {
-        let solution = self.controller.solution();
-        let (n, m) = (self.names.states.len(), self.names.inputs.len());
-        let horizon = self.settings.horizon;
-        let of = |bound: BoundId| self.named(bound, rows, lists);
-        let bounded = Bounded { of: &of };
-        let mut active: Vec<ActiveBound> = solution
-            .active
-            .iter()
-            .map(|row| ActiveBound {
-                stage: row.bound.stage,
-                bound: bounded.words(row.bound),
-                multiplier: row.multiplier,
-                exceeded: row.exceeded,
-            })
-            .collect();
-        active.sort_by_key(|one| one.stage);
-        Plan {
-            u: DMatrix::from_fn(horizon, m, |i, j| solution.u[i][j]),
-            x: DMatrix::from_fn(horizon + 1, n, |i, j| match i.checked_sub(1) {
-                None => x[j],
-                Some(i) => solution.x[i][j],
-            }),
-            status: bounded.status(&solution.status, &solution.active),
-            kind: solution.status,
-            cost,
-            active,
-            problems: self.controller.problems(),
-        }
-    }
-
-    /// What a bound acts on.
-    fn named(
-        &self,
-        bound: BoundId,
-        rows: &[Vec<String>],
-        lists: &StageLists<NX, NU, NS>,
-    ) -> Option<Named> {
-        let data = self.plant.data();
-        let of = |signals: &[Signal], i: usize, lower: f64, upper: f64| {
-            let signal = signals.get(i)?;
-            Some(Named {
-                name: signal.name.clone(),
-                unit: signal.unit.clone(),
-                lower,
-                upper,
-            })
-        };
-        let stage = bound.stage;
-        match bound.quantity {
-            Quantity::State(i) => {
-                let x = held(&lists.x_bounds, stage).unwrap_or(&self.bounds.x);
-                of(&data.states, i, x.lower[i], x.upper[i])
-            }
-            Quantity::Input(i) => {
-                let u = held(&lists.u_bounds, stage).unwrap_or(&self.bounds.u);
-                of(&data.inputs, i, u.lower[i], u.upper[i])
-            }
-            Quantity::Row(i) => {
-                let own = held(&lists.rows, stage).and_then(|rows| rows.get(i));
-                let (lower, upper) = match own {
-                    Some(row) => (row.lower, row.upper),
-                    None => {
-                        let row = self.settings.rows.get(i)?;
-                        (row.lower, row.upper)
-                    }
-                };
-                let names: Option<&Vec<String>> = held(rows, stage);
-                let name = match names {
-                    Some(names) => names.get(i)?.clone(),
-                    None => self.settings.rows.get(i)?.name.clone(),
-                };
-                Some(Named {
-                    name,
-                    unit: String::new(),
-                    lower,
-                    upper,
-                })
-            }
-        }
-    }
-}
-
-impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU, NS> {
-    fn step(&mut self, x: &[f64], preview: &Preview) -> Result<Plan, MpcError> {
-        let x: SVector<f64, NX> = self.names.vector(Axis::States, "x", x)?;
-        let lists = StageLists::new(&self.names, preview, |place, values| {
-            self.model_with(place, values)
-        })?;
+        let models = self.models(preview, acting)?;
+        let mut lists = StageLists::new(&self.names, preview, models)?;
+        let mut tasks = self.tasks(preview)?;
+        let target = self.aim(preview, &mut lists, tasks.as_mut());
+        let u_first = tasks
+            .as_ref()
+            .and_then(|tasks| self.bound_first_change(&mut lists, tasks));
         // Rows are a matter of memory, which is there for those of the settings.
-        let most = lists.rows.iter().map(Vec::len).max().unwrap_or(0);
+        let of_stages = lists.rows.iter().map(Vec::len).max();
+        let of_tasks = tasks.as_ref().map_or(0, |tasks| tasks.bounded.len());
+        let most = of_stages.unwrap_or(self.settings.rows.len()) + of_tasks;
         if most > self.room {
             let capacity = self.controller.settings().capacity().with_own_stages();
             self.workspace = Workspace::allocate(capacity.with_general_rows(most));
@@ -208,6 +169,9 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
         }
         let rows: Vec<&[GeneralRow<f64, NX, NU>]> = lists.rows.iter().map(Vec::as_slice).collect();
         let terminal = lists.x_ref.last().copied().unwrap_or(self.rest.0);
+        let outputs = tasks
+            .as_ref()
+            .map(|tasks| tasks as &dyn lpvmpc::Outputs<f64, NX, NU>);
         let preview_of_controller = lpvmpc::Preview {
             u_ref: &lists.u_ref,
             weights: &lists.weights,
@@ -219,6 +183,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
             rows: &rows,
             disturbance: &lists.disturbance,
             models: &lists.models,
+            outputs,
             ..lpvmpc::Preview::new(Reference {
                 stages: &lists.x_ref,
                 terminal,
@@ -227,30 +192,53 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
         let controller = &mut self.controller;
         controller.step_with(&x, &preview_of_controller, &mut self.workspace);
         let cost = controller.tracking_cost_with(&x, &preview_of_controller);
+        self.applied = controller.solution().first_input();
+        let target = target.or_else(|| {
+            let found = self.controller.target()?;
+            Some(Target {
+                x: found.x.as_slice()[..self.names.states.len()].to_vec(),
+                u: found.u.as_slice()[..self.names.inputs.len()].to_vec(),
+            })
+        });
         let names = preview.rows.iter();
-        let names: Vec<Vec<String>> = names
-            .map(|rows| rows.iter().map(|row| row.name.clone()).collect())
-            .collect();
-        Ok(self.plan(&x, &names, &lists, cost))
+        let said = Said {
+            lists: &lists,
+            tasks: &tasks,
+            rows: names
+                .map(|rows| rows.iter().map(|row| row.name.clone()).collect())
+                .collect(),
+            u_first,
+        };
+        Ok(self.plan(&x, &said, cost, target))
+    }
+}
+
+impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU, NS> {
+    fn step(&mut self, x: &[f64], preview: &Preview) -> Result<Plan, MpcError> {
+        let x = self.names.vector(Axis::States, "x", x)?;
+        self.plan_from(x, None, preview)
     }
 
     fn set_settings(&mut self, settings: &MpcSettings) -> Result<(), MpcError> {
-        let model = Model::new(&self.plant, settings.linear_models, self.rest)?;
-        let (of_controller, bounds) =
-            controller_settings(&self.plant, &self.names, settings, &model, self.rest)?;
-        let rows = self.names.rows("rows", &settings.rows)?;
+        let made = Made::new(&self.plant, &self.names, settings, self.rest)?;
         let refused = |error: lpvmpc::ControllerError| MpcError::new("settings", error.to_string());
         self.controller
-            .set_settings(of_controller)
+            .set_settings(made.of_controller)
             .map_err(refused)?;
         self.controller
-            .set_rows(List::Owned(rows.into_boxed_slice()))
+            .set_rows(List::Owned(made.rows.into_boxed_slice()))
             .map_err(refused)?;
-        self.controller.set_model(model);
-        let capacity = of_controller.capacity().with_own_stages();
+        let last_input = made.model.last_input;
+        self.controller.set_model(made.model);
+        if last_input != self.last_input {
+            // The plan's states are others.
+            self.controller.reset();
+            self.last_input = last_input;
+        }
+        let capacity = made.of_controller.capacity().with_own_stages();
         self.workspace = Workspace::allocate(capacity.with_general_rows(settings.rows.len()));
         self.room = settings.rows.len();
-        (self.settings, self.bounds) = (settings.clone(), bounds);
+        (self.settings, self.bounds) = (settings.clone(), made.bounds);
         Ok(())
     }
 
@@ -260,12 +248,80 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
             .set_parameter(name, value)
             .map_err(|error| MpcError::new(error.place, error.fault))?;
         let model = Model::new(&plant, self.settings.linear_models, self.rest)?;
-        self.controller.set_model(model);
+        self.controller
+            .set_model(Sampled::new(model, self.last_input));
         self.plant = plant;
+        Ok(())
+    }
+
+    fn set_last_input(&mut self, u: &[f64]) -> Result<(), MpcError> {
+        self.applied = self.names.finite(Axis::Inputs, "last input", u)?;
         Ok(())
     }
 
     fn reset(&mut self) {
         self.controller.reset();
+        self.applied = self.rest.1;
     }
+
+    fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    fn last_input(&self) -> Vec<f64> {
+        self.applied.as_slice()[..self.names.inputs.len()].to_vec()
+    }
+
+    fn places(&self) -> usize {
+        NX
+    }
+
+    fn set_estimator(&mut self, settings: Option<&EstimatorSettings>) -> Result<(), MpcError> {
+        let mut filter = match settings {
+            Some(settings) => Some(self.filter_with(settings)?),
+            None => None,
+        };
+        if let (Some(filter), Some(previous)) = (&mut filter, &self.filter) {
+            filter.take_over(previous);
+        }
+        self.filter = filter;
+        Ok(())
+    }
+
+    fn observe(&mut self, t: f64, readings: &[Option<f64>]) -> Result<Vec<Verdict>, MpcError> {
+        let filter = self.filter.as_mut().ok_or_else(no_estimator)?;
+        let observation = filter.observe(t, readings)?;
+        if observation.restart.is_some() {
+            // The plan belongs to the state before.
+            self.controller.reset();
+        }
+        Ok(observation.verdicts[..readings.len()].to_vec())
+    }
+
+    fn decide(&mut self, preview: &Preview) -> Result<Plan, MpcError> {
+        let filter = self.filter.as_ref().ok_or_else(no_estimator)?;
+        let (x, acting) = (filter.ahead(), filter.disturbance());
+        let known = self
+            .names
+            .vectors(Axis::States, "disturbance", &preview.disturbance)?;
+        let plan = self.plan_from(x, Some(acting), preview)?;
+        let known = known.first().copied().unwrap_or_else(SVector::zeros);
+        if let Some(filter) = &mut self.filter {
+            filter.send(&self.applied, &known);
+        }
+        Ok(plan)
+    }
+
+    fn estimate(&self) -> Option<Estimate> {
+        let filter = self.filter.as_ref()?;
+        Some(filter.estimate(self.names.states.len()))
+    }
+
+    fn estimator(&self) -> Option<&EstimatorSettings> {
+        Some(&self.filter.as_ref()?.settings)
+    }
+}
+
+fn no_estimator() -> MpcError {
+    MpcError::new("estimator", "there is none: see `set_estimator`")
 }

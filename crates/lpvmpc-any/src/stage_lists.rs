@@ -2,7 +2,7 @@
 
 use crate::check::{Axis, Names};
 use crate::error::MpcError;
-use crate::model::Model;
+use crate::last_input::Sampled;
 use crate::preview::Preview;
 use lpvmpc::{Bounds, GeneralRow, Weights};
 use nalgebra::{DVector, SMatrix, SVector};
@@ -19,15 +19,15 @@ pub(crate) struct StageLists<const NX: usize, const NU: usize, const NS: usize> 
     pub u_bounds: Vec<Bounds<f64, NU>>,
     pub rows: Vec<Vec<GeneralRow<f64, NX, NU>>>,
     pub disturbance: Vec<SVector<f64, NX>>,
-    pub models: Vec<Model<NX, NU, NS>>,
+    pub models: Vec<Sampled<NX, NU, NS>>,
 }
 
 impl<const NX: usize, const NU: usize, const NS: usize> StageLists<NX, NU, NS> {
-    /// The lists of `preview`, whose shapes are checked; `model` is the plant with the parameters of a stage.
+    /// The lists of `preview`, whose shapes are checked, with the `models` of its samples.
     pub fn new(
         names: &Names,
         preview: &Preview,
-        model: impl Fn(&str, &[f64]) -> Result<Model<NX, NU, NS>, MpcError>,
+        models: Vec<Sampled<NX, NU, NS>>,
     ) -> Result<Self, MpcError> {
         let axes = (Axis::Inputs, Axis::States);
         Ok(Self {
@@ -49,9 +49,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> StageLists<NX, NU, NS> {
             })?,
             rows: by_stage("rows", &preview.rows, |place, rows| names.rows(place, rows))?,
             disturbance: names.vectors(Axis::States, "disturbance", &preview.disturbance)?,
-            models: by_stage("parameters", &preview.parameters, |place, values| {
-                model(place, values)
-            })?,
+            models,
         })
     }
 }
@@ -62,7 +60,7 @@ pub(crate) fn held<V>(list: &[V], stage: usize) -> Option<&V> {
 }
 
 /// Each entry of a list, with its place in messages: "x_ref, stage 3".
-fn by_stage<V, W>(
+pub(crate) fn by_stage<V, W>(
     name: &str,
     list: &[V],
     fill: impl Fn(&str, &V) -> Result<W, MpcError>,
@@ -74,7 +72,7 @@ fn by_stage<V, W>(
 
 impl Names {
     /// A vector of finite numbers for each stage.
-    fn vectors<const K: usize>(
+    pub fn vectors<const K: usize>(
         &self,
         axis: Axis,
         name: &str,

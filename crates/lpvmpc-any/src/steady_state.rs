@@ -1,7 +1,7 @@
 //! Where a plant of any size can stand.
 
 use crate::check::{Axis, Names};
-use crate::controller_settings::plant_limits;
+use crate::controller_settings::limits;
 use crate::error::MpcError;
 use crate::model::Model;
 use crate::mpc::{MOST_INPUTS, MOST_STATES};
@@ -53,8 +53,8 @@ pub fn steady_state(
         x_ref,
         q,
         r: SVector::repeat(1.0),
-        x: names.bounds(Axis::States, "bounds", &plant_limits(&data.states))?,
-        u: names.bounds(Axis::Inputs, "bounds", &plant_limits(&data.inputs))?,
+        x: names.bounds(Axis::States, "bounds", &limits(&None, &data.states))?,
+        u: names.bounds(Axis::Inputs, "bounds", &limits(&None, &data.inputs))?,
     });
     let Some(found) = found else {
         let fault = "no steady state within the plant's bounds was found from it; there is none, or \

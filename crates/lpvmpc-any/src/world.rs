@@ -20,7 +20,7 @@ pub struct WorldSettings {
     /// Time from a command to its arrival at the actuators, s.
     pub delay: f64,
     /// What pushes the plant, in any order.
-    pub disturbances: Vec<Disturbance>,
+    pub pushes: Vec<Push>,
     /// Seed of all noise: the same seed, the same run.
     pub seed: u64,
     /// Tolerances of the plant's integration.
@@ -35,7 +35,7 @@ impl WorldSettings {
             sensors: None,
             actuators: None,
             delay: 0.0,
-            disturbances: Vec::new(),
+            pushes: Vec::new(),
             seed: 0,
             tolerances: Tolerances {
                 relative: 1e-9,
@@ -82,7 +82,7 @@ impl Sensor {
 
 /// A push at a known time. A load is added to the derivative of the state: x_dot = f(x, u) + load.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Disturbance {
+pub enum Push {
     /// The state jumps.
     Jump {
         /// When, s.
@@ -138,11 +138,15 @@ impl World {
         let names = Names::new(plant);
         let place = |error: lpvmpc_plant::PlantError| MpcError::new(error.place, error.fault);
         let x = names.finite(Axis::States, "x", x)?;
+        if plant.data().period.is_some() {
+            let fault = "it is in discrete time; a world moves plants in continuous time";
+            return Err(MpcError::new("plant", fault));
+        }
         let (sensors, count) = sensors(&names, settings)?;
         let actuators = actuators(&names, settings)?;
-        let disturbances = settings.disturbances.iter().enumerate();
-        let disturbances: Result<Vec<_>, _> = disturbances
-            .map(|(i, push)| names.push(&format!("disturbances[{i}]"), push))
+        let pushes = settings.pushes.iter().enumerate();
+        let pushes: Result<Vec<_>, _> = pushes
+            .map(|(i, push)| names.push(&format!("pushes[{i}]"), push))
             .collect();
         // The integrator's error is a mean over the places; those left over have none.
         let share = (names.states.len() as f64 / MOST_STATES as f64).sqrt();
@@ -159,7 +163,7 @@ impl World {
                 sensors,
                 actuators,
                 delay: settings.delay,
-                disturbances: disturbances?,
+                disturbances: pushes?,
                 seed: settings.seed,
                 tolerances: Tolerances {
                     relative: (relative * share).max(1e-14),
@@ -207,8 +211,8 @@ impl World {
     ///
     /// # Errors
     /// Its numbers make no sense.
-    pub fn disturb(&mut self, push: &Disturbance) -> Result<(), MpcError> {
-        let push = self.names.push("disturbance", push)?;
+    pub fn push(&mut self, push: &Push) -> Result<(), MpcError> {
+        let push = self.names.push("push", push)?;
         let refused = |error: lpvmpc_sim::WorldError| MpcError::new("world", error.to_string());
         self.inner.disturb(push).map_err(refused)
     }
@@ -277,14 +281,14 @@ impl Names {
     fn push(
         &self,
         place: &str,
-        push: &Disturbance,
+        push: &Push,
     ) -> Result<lpvmpc_sim::Disturbance<MOST_STATES, MOST_STATES>, MpcError> {
         Ok(match push {
-            Disturbance::Jump { time, change } => lpvmpc_sim::Disturbance::Jump {
+            Push::Jump { time, change } => lpvmpc_sim::Disturbance::Jump {
                 time: *time,
                 change: self.finite(Axis::States, place, change)?,
             },
-            Disturbance::Load { from, until, load } => lpvmpc_sim::Disturbance::Load {
+            Push::Load { from, until, load } => lpvmpc_sim::Disturbance::Load {
                 from: *from,
                 until: *until,
                 load: self.finite(Axis::States, place, load)?,

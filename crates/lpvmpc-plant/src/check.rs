@@ -33,7 +33,13 @@ pub(crate) fn check(plant: &PlantData) -> Result<(), PlantError> {
     let motion = |place: &str, list: &[usize], count: usize, of: &str| {
         results.check(place, list, count, of, Allowed::Motion)
     };
-    motion("derivative", &plant.derivative, plant.states.len(), "state")?;
+    check_time(plant)?;
+    let formulas = if plant.period.is_some() {
+        "next"
+    } else {
+        "derivative"
+    };
+    motion(formulas, plant.motion(), plant.states.len(), "state")?;
     motion("output", &plant.output, plant.outputs.len(), "output")?;
     if let Some(embedding) = &plant.embedding {
         let scheduling = &embedding.scheduling;
@@ -69,6 +75,29 @@ pub(crate) fn check(plant: &PlantData) -> Result<(), PlantError> {
         }
     }
     check_equilibrium(plant)
+}
+
+/// Either a derivative, or a period and the state one period later.
+fn check_time(plant: &PlantData) -> Result<(), PlantError> {
+    match plant.period {
+        None if !plant.next.is_empty() => {
+            let fault = "it is of a plant in discrete time, which has a `period`, too";
+            Err(PlantError::new("next", fault))
+        }
+        None if plant.derivative.is_empty() => {
+            let fault = "it is missing; in discrete time `period` and `next` stand in its place";
+            Err(PlantError::new("derivative", fault))
+        }
+        Some(_) if !plant.derivative.is_empty() => {
+            let fault = "a plant with a `period` is in discrete time: it has `next` in its place";
+            Err(PlantError::new("derivative", fault))
+        }
+        Some(period) if !(period > 0.0 && period.is_finite()) => {
+            let fault = format!("it is {period} s; it must be a positive number of seconds");
+            Err(PlantError::new("period", fault))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn check_signals(plant: &PlantData) -> Result<(), PlantError> {

@@ -23,7 +23,13 @@ fn check_equilibrium(plant: &Plant) -> Result<(), PlantError> {
     let Some(equilibrium) = &plant.data().equilibrium else {
         return Ok(());
     };
-    let rates = plant.derivative(&equilibrium.x, &equilibrium.u)?;
+    // In discrete time it stands where it is one period later.
+    let discrete = plant.period().is_some();
+    let mut rates = plant.motion(&equilibrium.x, &equilibrium.u)?;
+    if discrete {
+        let pairs = rates.iter_mut().zip(&equilibrium.x);
+        pairs.for_each(|(next, x)| *next -= x);
+    }
     // What f may be for states and inputs that are rounded.
     let mut sizes = vec![1.0; rates.len()];
     let fixed = |values: &[f64]| -> Vec<Dual<f64, 1>> {
@@ -38,17 +44,23 @@ fn check_equilibrium(plant: &Plant) -> Result<(), PlantError> {
         };
         *place = Dual::variables(&Vector1::new(place.value))[0];
         let reach = 1.0 + place.value.abs();
-        for (size, rate) in sizes.iter_mut().zip(plant.derivative(&x, &u)?) {
+        for (size, rate) in sizes.iter_mut().zip(plant.motion(&x, &u)?) {
             *size += rate.slopes[0].abs() * reach;
         }
     }
     for ((signal, rate), size) in plant.data().states.iter().zip(rates).zip(sizes) {
         // Negated, so that a NaN is no equilibrium.
         if !(rate.abs() <= EQUILIBRIUM * size) {
-            let fault = format!(
-                "it is none: the derivative of {} is {rate} there",
-                signal.name
-            );
+            let fault = match discrete {
+                false => format!(
+                    "it is none: the derivative of {} is {rate} there",
+                    signal.name
+                ),
+                true => format!(
+                    "it is none: {} changes by {rate} per period there",
+                    signal.name
+                ),
+            };
             return Err(PlantError::new("equilibrium", fault));
         }
     }
@@ -62,6 +74,10 @@ fn check_embedding(plant: &Plant) -> Result<(), PlantError> {
     let data = plant.data();
     let (states, inputs) = (data.states.len(), data.inputs.len());
     let sides = sides(plant);
+    let (formula, is) = match plant.period() {
+        None => ("f", "the derivative of"),
+        Some(_) => ("F", "one period later"),
+    };
     for point in 0..POINTS {
         // From the middle on they fill the box evenly: multiples of irrational numbers, without their
         // whole part.
@@ -71,7 +87,7 @@ fn check_embedding(plant: &Plant) -> Result<(), PlantError> {
         };
         let values: Vec<f64> = sides.iter().enumerate().map(at).collect();
         let (x, u) = values.split_at(states);
-        let rates = plant.derivative(x, u)?;
+        let rates = plant.motion(x, u)?;
         let s = plant.values(&embedding.scheduling, (x, u), &[]);
         let entries = plant.values(&embedding.matrices, (&[], &[]), &s);
         let (a, b) = entries.split_at(states * states);
@@ -91,7 +107,7 @@ fn check_embedding(plant: &Plant) -> Result<(), PlantError> {
             // Negated, so that what is not finite where f is finite is not f.
             if rate.is_finite() && !((embedded - rate).abs() <= EMBEDDING * size) {
                 let fault = format!(
-                    "it is not f: at x = {x:?}, u = {u:?} the derivative of {} is {rate}, and {embedded} by A x + B u + c",
+                    "it is not {formula}: at x = {x:?}, u = {u:?} {is} {} is {rate}, and {embedded} by A x + B u + c",
                     data.states[i].name
                 );
                 return Err(PlantError::new("embedding", fault));

@@ -26,17 +26,37 @@ pub struct PlantData {
     /// All formulas, as one straight-line program.
     #[serde(with = "crate::file::operations")]
     pub operations: Vec<Operation>,
-    /// x_dot = f(x, u, p): for each state the operation whose result is its derivative.
+    /// x_dot = f(x, u, p): for each state the operation whose result is its derivative. Empty of a plant in
+    /// discrete time.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub derivative: Vec<usize>,
+    /// The period of a plant in discrete time, s; absent of one in continuous time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub period: Option<f64>,
+    /// x+ = F(x, u, p), the state one period later: for each state the operation whose result it is. Empty of a
+    /// plant in continuous time.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub next: Vec<usize>,
     /// y = g(x, u, p): for each output the operation whose result it is.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub output: Vec<usize>,
-    /// The plant's own x_dot = A(s, p) x + B(s, p) u + c(s, p).
+    /// The plant's own x_dot = A(s, p) x + B(s, p) u + c(s, p), or x+ of a plant in discrete time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub embedding: Option<EmbeddingData>,
-    /// A steady state, f(x, u) = 0.
+    /// A steady state, f(x, u) = 0, or F(x, u) = x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub equilibrium: Option<Equilibrium>,
+}
+
+impl PlantData {
+    /// The formulas of the motion: [`derivative`](Self::derivative), or [`next`](Self::next) of a plant in
+    /// discrete time.
+    pub fn motion(&self) -> &[usize] {
+        match self.period {
+            None => &self.derivative,
+            Some(_) => &self.next,
+        }
+    }
 }
 
 /// A state, an input or an output.
@@ -65,6 +85,13 @@ impl Signal {
             ..Self::default()
         }
     }
+}
+
+/// Signals x0, x1 and so on.
+pub(crate) fn numbered(symbol: &str, count: usize) -> Vec<Signal> {
+    (0..count)
+        .map(|i| Signal::new(&format!("{symbol}{i}"), ""))
+        .collect()
 }
 
 /// A parameter.

@@ -66,6 +66,12 @@ impl Plant {
             let fault = format!("{} s is no time between samples", settings.t_s);
             return Err(PlantError::new("t_s", fault));
         }
+        if let Some(period) = data.period
+            && settings.t_s != period
+        {
+            let fault = format!("{} s, but the plant's period is {period} s", settings.t_s);
+            return Err(PlantError::new("t_s", fault));
+        }
         if settings.horizon == 0 {
             return Err(PlantError::new("horizon", "it has at least one sample"));
         }

@@ -1,6 +1,6 @@
 //! Plants as data: formulas in a file, evaluated on any kind of number.
 //!
-//! A plant is x_dot = f(x, u, p) with named states, inputs and parameters, and if it has them outputs
+//! A plant is x_dot = f(x, u, p), or in discrete time x+ = F(x, u, p), with named states, inputs and parameters, and if it has them outputs
 //! y = g(x, u, p), an embedding of its own, bounds and a steady state. All its formulas are one
 //! straight-line program, as other tools have them, too (CasADi's instructions of an `SX` function).
 //! A [`Plant`] is read from JSON or made in Rust; [`SizedPlant`] and [`SizedEmbedding`] are what the
@@ -41,6 +41,7 @@
 //! |---|---|
 //! | a plant from a file, its values at run-time sizes | [`Plant`] |
 //! | a plant written in Rust as a file | [`PlantData::of_dynamics`], [`PlantData::of_embedding`] |
+//! | a linear plant | [`PlantData::of_matrices`] |
 //! | a plant made operation by operation | [`PlantData`], [`Plant::new`] |
 //! | a controller, estimator or simulation | [`SizedPlant`] by f alone, [`SizedEmbedding`] by its own A(s), B(s) |
 //! | the plant as Rust | [`Plant::to_rust`] |
@@ -57,11 +58,12 @@
 //! | `parameters` | `name`, `unit`, `value` |
 //! | `operations` | the program: each operation refers to results of earlier ones, counted from 0 |
 //! | `derivative` | the results that are x_dot, one for each state |
+//! | `period`, `next` | in place of `derivative`, of a plant in discrete time: its period in s, and the results that are x+, the state one period later |
 //! | `output` | the results that are y, one for each output |
 //! | `embedding` | `scheduling`: the results that are s; `a`, `b`: the rows of A(s), B(s); `c`: c(s), where it is not zero |
-//! | `equilibrium` | `x` and `u` of a steady state |
+//! | `equilibrium` | `x` and `u` of a steady state, f(x, u) = 0 or F(x, u) = x |
 //!
-//! `states`, `operations`, `derivative` and the first two must be there. Names and units are free text.
+//! `states`, `operations`, `derivative` (or `period` and `next`) and the first two must be there. Names and units are free text.
 //!
 //! | operation | is |
 //! |---|---|
@@ -88,6 +90,7 @@ mod data;
 mod error;
 mod file;
 mod firmware;
+mod linear;
 mod operation;
 mod plant;
 mod recording;
@@ -98,6 +101,7 @@ pub use data::{EmbeddingData, Equilibrium, Parameter, PlantData, Signal};
 pub use error::PlantError;
 pub use file::Schema;
 pub use firmware::{Files, FirmwareSettings};
+pub use linear::Matrices;
 pub use operation::{Binary, Operation, Unary};
 pub use plant::Plant;
 pub use sized::{SizedEmbedding, SizedPlant};

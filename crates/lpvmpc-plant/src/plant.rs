@@ -23,7 +23,8 @@ pub struct Plant {
 #[derive(Debug, PartialEq)]
 pub(crate) struct Formulas {
     data: PlantData,
-    pub derivative: Code,
+    /// f, or F of a plant in discrete time.
+    pub motion: Code,
     pub output: Code,
     pub embedding: Option<EmbeddingCode>,
 }
@@ -59,7 +60,7 @@ impl Plant {
         let plant = Self {
             parameters: data.parameters.iter().map(|p| p.value).collect(),
             formulas: Arc::new(Formulas {
-                derivative: code(&data.derivative),
+                motion: code(data.motion()),
                 output: code(&data.output),
                 embedding,
                 data,
@@ -149,13 +150,39 @@ impl Plant {
         Ok(())
     }
 
+    /// The period of a plant in discrete time, s; `None` of one in continuous time.
+    pub fn period(&self) -> Option<f64> {
+        self.data().period
+    }
+
     /// x_dot = f(x, u), in state units per second.
     ///
     /// # Errors
-    /// `x` or `u` has not as many components as the plant has states or inputs.
+    /// `x` or `u` has not as many components as the plant has states or inputs; or it is in discrete time.
     pub fn derivative<N: Number>(&self, x: &[N], u: &[N]) -> Result<Vec<N>, PlantError> {
+        if self.period().is_some() {
+            let fault = "this plant is in discrete time, and has none: see `next`";
+            return Err(PlantError::new("derivative", fault));
+        }
+        self.motion(x, u)
+    }
+
+    /// x+ = F(x, u), the state one period later, in state units.
+    ///
+    /// # Errors
+    /// `x` or `u` has not as many components as the plant has states or inputs; or it is in continuous time.
+    pub fn next<N: Number>(&self, x: &[N], u: &[N]) -> Result<Vec<N>, PlantError> {
+        if self.period().is_none() {
+            let fault = "this plant is in continuous time, and has no period: see `derivative`";
+            return Err(PlantError::new("next", fault));
+        }
+        self.motion(x, u)
+    }
+
+    /// f, or F of a plant in discrete time.
+    pub(crate) fn motion<N: Number>(&self, x: &[N], u: &[N]) -> Result<Vec<N>, PlantError> {
         self.check_sizes(x.len(), u.len())?;
-        Ok(self.values(&self.formulas.derivative, (x, u), &[]))
+        Ok(self.values(&self.formulas.motion, (x, u), &[]))
     }
 
     /// y = g(x, u), in the units of the outputs.
@@ -188,14 +215,14 @@ impl Plant {
         values
     }
 
-    /// f.
+    /// f, or F of a plant in discrete time.
     #[inline(always)]
-    pub(crate) fn evaluate_derivative<N: Number>(
+    pub(crate) fn evaluate_motion<N: Number>(
         &self,
         motion: (&[N], &[N]),
         result: impl FnMut(usize, N),
     ) {
-        self.evaluate(&self.formulas.derivative, motion, &[], result);
+        self.evaluate(&self.formulas.motion, motion, &[], result);
     }
 
     /// g.
@@ -236,7 +263,7 @@ impl Plant {
             let matrices = e.a.iter().chain(&e.b).flatten();
             matrices.chain(&e.scheduling).chain(e.c.iter().flatten())
         });
-        for result in data.derivative.iter().chain(entries) {
+        for result in data.motion().iter().chain(entries) {
             needed[*result] = true;
         }
         let mut first = None;

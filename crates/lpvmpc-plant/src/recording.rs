@@ -1,7 +1,7 @@
 //! Plants in Rust as data: their formulas are evaluated once on numbers that write down what is done
 //! with them.
 
-use crate::data::{EmbeddingData, PlantData, Signal};
+use crate::data::{EmbeddingData, PlantData, numbered};
 use crate::operation::{Binary, Operation, Unary};
 use lpvmpc::{Bivariate, Dynamics, Elementary, Embedding, Number};
 use nalgebra::SVector;
@@ -92,11 +92,12 @@ fn places<const K: usize>(results: &SVector<Recorded, K>) -> Vec<usize> {
     results.iter().map(|result| result.0).collect()
 }
 
-/// Signals x0, x1 and so on.
-fn numbered(symbol: &str, count: usize) -> Vec<Signal> {
-    (0..count)
-        .map(|i| Signal::new(&format!("{symbol}{i}"), ""))
-        .collect()
+/// The formulas of the motion as `derivative` and `next`.
+pub(crate) fn by_time(motion: Vec<usize>, period: Option<f64>) -> (Vec<usize>, Vec<usize>) {
+    match period {
+        None => (motion, Vec::new()),
+        Some(_) => (Vec::new(), motion),
+    }
 }
 
 impl PlantData {
@@ -128,13 +129,16 @@ impl PlantData {
     {
         PROGRAM.take();
         let (x, u) = (leaves(Operation::State), leaves(Operation::Input));
-        let derivative = places(&plant.f(&x, &u));
+        let motion = places(&plant.f(&x, &u));
+        let (derivative, next) = by_time(motion, plant.period());
         Self {
             name: name.to_owned(),
             states: numbered("x", NX),
             inputs: numbered("u", NU),
             operations: PROGRAM.take(),
             derivative,
+            period: plant.period(),
+            next,
             ..Self::default()
         }
     }
@@ -149,7 +153,8 @@ impl PlantData {
     {
         PROGRAM.take();
         let (x, u) = (leaves(Operation::State), leaves(Operation::Input));
-        let derivative = places(&plant.f(&x, &u));
+        let motion = places(&plant.f(&x, &u));
+        let (derivative, next) = by_time(motion, plant.period());
         let scheduling = places(&plant.scheduling(&x, &u));
         let s = leaves(Operation::Scheduling);
         let (a, b) = plant.matrices(&s);
@@ -170,6 +175,8 @@ impl PlantData {
             inputs: numbered("u", NU),
             operations: PROGRAM.take(),
             derivative,
+            period: plant.period(),
+            next,
             embedding: Some(embedding),
             ..Self::default()
         }

@@ -6,7 +6,7 @@ use lpvmpc::{Bounds, Dynamics, Embedding, Number};
 use nalgebra::{SMatrix, SVector};
 
 /// A [`Plant`] in the places of `NX` states and `NU` inputs, of which it may need fewer: what is left over has the
-/// derivative zero, and nothing depends on it.
+/// derivative zero (is zero one period later, in discrete time), and nothing depends on it.
 ///
 /// It is a plant known by its f: [`AlongMotion`](lpvmpc::AlongMotion) makes the model of a controller of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,10 +101,14 @@ fn bounds<const K: usize>(signals: &[crate::Signal]) -> Bounds<f64, K> {
 }
 
 impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for SizedPlant<NX, NU> {
+    fn period(&self) -> Option<f64> {
+        self.plant.period()
+    }
+
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
         let mut rate = SVector::repeat(N::constant(0.0));
         self.plant
-            .evaluate_derivative((x.as_slice(), u.as_slice()), |i, value| rate[i] = value);
+            .evaluate_motion((x.as_slice(), u.as_slice()), |i, value| rate[i] = value);
         rate
     }
 }
@@ -153,6 +157,10 @@ impl<const NX: usize, const NU: usize, const NS: usize> SizedEmbedding<NX, NU, N
 impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
     for SizedEmbedding<NX, NU, NS>
 {
+    fn period(&self) -> Option<f64> {
+        self.plant.plant.period()
+    }
+
     fn scheduling<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NS> {
         let mut s = SVector::repeat(N::constant(0.0));
         let plant = &self.plant.plant;

@@ -139,11 +139,15 @@ pub(crate) fn print(plant: &Plant) -> String {
             }
         }
     }
+    if let Some(period) = plant.period() {
+        line!(out, "    fn period(&self) -> Option<f64> {{");
+        line!(out, "        Some({period:?})\n    }}\n");
+    }
     line!(
         out,
         "    fn f<N: Number>({motion}) -> SVector<N, {states}> {{"
     );
-    printer.vector(&mut out, &plant.formulas().derivative, states);
+    printer.vector(&mut out, &plant.formulas().motion, states);
     let end = out.trim_end().len();
     out.truncate(end);
     line!(out, "\n}}");

@@ -1,6 +1,6 @@
 //! The continuous plant between two samples.
 
-use lpvmpc::LpvModel;
+use lpvmpc::{LpvModel, Rk4};
 use nalgebra::SVector;
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dopri5, System};
@@ -110,7 +110,8 @@ where
 /// The state `duration` seconds after `x` under the constant input `u`, by the adaptive
 /// Dormand-Prince 5(4) method (Dormand and Prince 1980; Hairer, Norsett, Wanner, Solving
 /// Ordinary Differential Equations I, ch. II.5). Each call starts afresh, so a jump of the
-/// input between two calls is never stepped across.
+/// input between two calls is never stepped across. A model with a period moves by as many periods as are nearest
+/// to the duration.
 ///
 /// # Errors
 /// [`PlantError`] if the tolerances are out of range, or the motion becomes non-finite.
@@ -124,6 +125,13 @@ pub fn advance<P, const NX: usize, const NU: usize, const NS: usize>(
 where
     P: LpvModel<f64, NX, NU, NS>,
 {
+    if model.period().is_some() {
+        return if duration >= 0.0 && duration.is_finite() {
+            Ok(Rk4 { substeps: 1 }.advance(model, x, u, duration))
+        } else {
+            Err(PlantError::Duration { duration })
+        };
+    }
     let motion = |_, x: &SVector<f64, NX>| model.derivative(x, u);
     integrate(motion, x, duration, tolerances, duration)
 }

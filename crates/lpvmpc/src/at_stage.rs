@@ -55,6 +55,10 @@ where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
+    fn period(&self) -> Option<T> {
+        self.plant.period()
+    }
+
     fn scheduling(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NS> {
         let given = self.scheduling.copied();
         given.unwrap_or_else(|| self.plant.scheduling(x, &self.input(u)))

@@ -8,6 +8,7 @@ use crate::controller::next_state;
 use crate::descent::Along;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Bounds, GeneralRow, SoftBounds};
+use crate::outputs::Outputs;
 use crate::preview::Preview;
 use crate::settings::{ControllerSettings, Scheduling, TerminalIngredient, Weights};
 use crate::steady_state::{SteadyState, SteadyStateProblem};
@@ -57,6 +58,9 @@ pub(crate) trait CostByStage<T: Scalar, const NX: usize, const NU: usize>: Copy 
     }
     fn rows(&self, _i: usize) -> &[GeneralRow<T, NX, NU>] {
         &[]
+    }
+    fn outputs(&self) -> Option<&dyn Outputs<T, NX, NU>> {
+        None
     }
 }
 
@@ -262,6 +266,9 @@ impl<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize> CostByStag
     }
     fn rows(&self, i: usize) -> &[GeneralRow<T, NX, NU>] {
         entry(self.preview.rows, i).copied().unwrap_or(self.rows)
+    }
+    fn outputs(&self) -> Option<&dyn Outputs<T, NX, NU>> {
+        self.preview.outputs
     }
 }
 

@@ -6,12 +6,13 @@ use crate::list::List;
 use crate::memory::ControllerMemory;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Ocp;
+use crate::outputs;
 use crate::plan::{Aim, Policy, at};
 #[cfg(feature = "alloc")]
 use crate::settings::LONGEST_HORIZON;
 use crate::settings::{
     ControllerError, ControllerSettings, InputReference, Iterations, TerminalIngredient, Weights,
-    check,
+    check, check_period,
 };
 use crate::small_matrix::product;
 use crate::solution::{Solution, Status};
@@ -101,6 +102,9 @@ where
         let places = x.iter().map(|list| list.len());
         let places = places.chain(u.iter().map(|list| list.len()));
         check(&settings, places.fold(feedback.len(), usize::min))?;
+        if let Some(period) = model.period() {
+            check_period(period, settings.t_s)?;
+        }
         let horizon = settings.horizon;
         let [rollout, x] = x.map(|list| list.shortened(horizon));
         let [planned, u] = u.map(|list| list.shortened(horizon));
@@ -183,9 +187,12 @@ where
         self.initialise_scheduling(x);
         self.predict(x, own, ocp);
         self.track(aim, ocp);
+        if D::SOME {
+            self.pose_outputs((x, &self.solution.u), 1, (aim, T::zero()), ocp);
+        }
         solver.solve(ocp, &self.settings.solver, &mut self.solution);
         self.roll_out(x, own);
-        self.iterate(x, own, workspace);
+        self.iterate(x, aim, workspace);
     }
 
     /// Weights, bounds and rows of the program.
@@ -314,6 +321,11 @@ where
         let steps = self.solution.u.iter().zip(self.solution.x.iter());
         for (i, (u, x_next)) in steps.enumerate().take(self.settings.horizon) {
             total += aim.cost(i, (x, u), &self.settings.weights);
+            if D::SOME
+                && let Some(outputs) = aim.own.outputs()
+            {
+                total += outputs::cost(outputs, i, (x, u));
+            }
             x = x_next;
         }
         total += aim.linear_cost(self.settings.horizon, x, None);
@@ -386,10 +398,11 @@ where
     fn iterate<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
         x: &SVector<T, NX>,
-        own: D,
+        aim: &Aim<'_, T, NX, NU, D>,
         workspace: &mut Workspace<T, NX, NU>,
     ) {
         self.problems = 1;
+        let own = aim.own;
         let Workspace { ocp, solver, .. } = workspace;
         let settings = SolverSettings {
             warm_start: WarmStart::Same,
@@ -400,6 +413,9 @@ where
             && self.solution.status.is_solved()
         {
             self.linearize(x, &self.solution.u, 0, own, ocp);
+            if D::SOME {
+                self.pose_outputs((x, &self.solution.u), 0, (aim, T::zero()), ocp);
+            }
             solver.solve(ocp, &settings, &mut self.solution);
             self.roll_out(x, own);
             self.problems += 1;
@@ -436,6 +452,52 @@ where
             ocp.terminal.linear_x += price * convert::<f64, T>(0.5);
         }
         ocp.terminal.equality = equality;
+    }
+
+    /// The outputs of the program, where there are any, linear about the last rollout from its sample `first`
+    /// (0 or 1) on, which began at `x` and had these `inputs`. What changes of the inputs costs extra by the
+    /// `damping`.
+    #[inline(never)]
+    pub(crate) fn pose_outputs<D: CostByStage<T, NX, NU>>(
+        &self,
+        (x, inputs): (&SVector<T, NX>, &[SVector<T, NU>]),
+        first: usize,
+        (aim, damping): (&Aim<'_, T, NX, NU, D>, T),
+        ocp: &mut Ocp<T, NX, NU>,
+    ) {
+        let Some(outputs) = aim.own.outputs() else {
+            return;
+        };
+        let horizon = self.settings.horizon;
+        let bounded = outputs::rows(&aim.own);
+        let per_stage = ocp.rows_per_stage;
+        let states = core::iter::once(x).chain(self.rollout.iter()).skip(first);
+        let inputs = inputs.iter().take(horizon);
+        let window = states.zip(inputs.clone().skip(first).chain(inputs.last()));
+        let samples = ocp.stages.iter_mut().zip(ocp.own.iter_mut()).zip(window);
+        for (i, ((stage, common), (x, u))) in samples.enumerate().take(horizon) {
+            let Weights { q, r } = *aim.own.weights(i).unwrap_or(&self.settings.weights);
+            (common.q, common.r) = (q, r + SMatrix::identity() * damping);
+            common.s = aim.own.cross(i).copied().unwrap_or_else(SMatrix::zeros);
+            (stage.linear_x, stage.linear_u) = aim.linear_terms(i, &self.settings.weights);
+            stage.linear_u -= u * damping;
+            let linear = (&mut stage.linear_x, &mut stage.linear_u);
+            outputs::add_costs(outputs, i, (x, u), common, linear);
+            let rows = ocp.rows.get_mut(i * per_stage..i * per_stage + bounded);
+            outputs::write_rows(outputs, i, (x, u), false, rows.unwrap_or_default());
+        }
+        let end = at(&self.rollout, self.last_stage());
+        let rows = ocp
+            .rows
+            .get_mut(horizon * per_stage..horizon * per_stage + bounded);
+        let still = SVector::zeros();
+        outputs::write_rows(
+            outputs,
+            horizon,
+            (&end, &still),
+            true,
+            rows.unwrap_or_default(),
+        );
     }
 
     /// The last stage of the horizon.

@@ -215,6 +215,9 @@ where
                 }
             }
         }
+        if D::SOME {
+            self.pose_outputs((x, &self.policy.u), 0, (aim, damping), ocp);
+        }
     }
 
     fn solve_program(&mut self, workspace: &mut Workspace<T, NX, NU>) {
@@ -262,7 +265,8 @@ where
         prices.raise(&answer.active);
         let merit = self.merit(aim, *prices);
         let before = merit.of(x, &self.policy.u, &self.rollout);
-        let expected = before - merit.of(x, &answer.u, &answer.x);
+        let plan = (&*self.policy.u, &*self.rollout);
+        let expected = before - merit.of_answer(x, (&answer.u, &answer.x), plan);
         self.gap = at(&self.rollout, last) - at(&answer.x, last);
         self.policy.cost = before;
         // What a full step leaves is of second order; what is less than rounding is nothing. The

@@ -4,7 +4,7 @@ use crate::model::{LpvModel, Scalar};
 use crate::number::{Dual, Number};
 use crate::small_matrix::product;
 use crate::steady_state::{self, SteadyState, SteadyStateProblem};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{SMatrix, SVector, convert};
 
 /// f and its derivatives at a point: (f, df/dx, df/du).
 pub type Tangent<T, const NX: usize, const NU: usize> =
@@ -21,6 +21,12 @@ pub type Tangent<T, const NX: usize, const NU: usize> =
 /// with `NX` states, `NU` inputs and `NS` scheduling parameters, in SI units. A plant that is known
 /// by its f alone is a [`Dynamics`].
 pub trait Embedding<const NX: usize, const NU: usize, const NS: usize> {
+    /// See [`LpvModel::period`], s.
+    #[inline(always)]
+    fn period(&self) -> Option<f64> {
+        None
+    }
+
     /// sigma(x, u): the scheduling vector.
     fn scheduling<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NS>;
 
@@ -104,6 +110,11 @@ where
     P: Embedding<NX, NU, NS>,
 {
     #[inline(always)]
+    fn period(&self) -> Option<T> {
+        Embedding::period(self).map(convert)
+    }
+
+    #[inline(always)]
     fn scheduling(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NS> {
         Embedding::scheduling(self, x, u)
     }
@@ -159,11 +170,22 @@ where
 ///
 /// [`AlongMotion`](crate::AlongMotion) and [`AlongRay`](crate::AlongRay) make an [`LpvModel`] of it.
 pub trait Dynamics<const NX: usize, const NU: usize> {
-    /// x_dot = f(x, u), in state units per second.
+    /// See [`LpvModel::period`], s.
+    #[inline(always)]
+    fn period(&self) -> Option<f64> {
+        None
+    }
+
+    /// x_dot = f(x, u), in state units per second; with a [`period`](Self::period) x+ = F(x, u), in state units.
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX>;
 }
 
 impl<P: Dynamics<NX, NU>, const NX: usize, const NU: usize> Dynamics<NX, NU> for &P {
+    #[inline(always)]
+    fn period(&self) -> Option<f64> {
+        P::period(self)
+    }
+
     #[inline(always)]
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
         P::f(self, x, u)

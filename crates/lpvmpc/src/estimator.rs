@@ -9,6 +9,7 @@ mod settings;
 use crate::clock::{Clock, Tick};
 use crate::delay::DelayLine;
 use crate::model::{LpvModel, Scalar};
+use crate::predictor::{over_periods, periods};
 pub use covariance::Covariance;
 use history::{Estimate, History, Instant, Taken, Trust};
 pub use memory::{EstimatorArrays, EstimatorMemory};
@@ -306,7 +307,10 @@ where
         let settings = &self.settings;
         let predictor = settings.predictor(duration);
         let (a, b) = self.model.matrices(&self.model.scheduling(&from.z, u));
-        let (a, b) = predictor.discretize(&a, &b, duration);
+        let (a, b) = match self.model.period() {
+            Some(period) => over_periods(&a, &b, periods(period, duration)),
+            None => predictor.discretize(&a, &b, duration),
+        };
         let g = b * settings.input_offset;
         let Covariance { zz, zd, dd } = from.covariance;
         let mixed = a * zd * g.transpose();
@@ -468,6 +472,11 @@ where
         value: T,
         estimate: &Estimate<T, NX, ND>,
     ) -> (T, SVector<T, NX>, SVector<T, ND>) {
+        let state = estimate.z - self.settings.state_offset * estimate.d;
+        if let Some((expected, c_z)) = self.model.sensor(i, &state) {
+            let c_d = -(self.settings.state_offset.transpose() * c_z);
+            return (value - expected, c_z, c_d);
+        }
         // Not `row(i)`, which could panic.
         let rows = self.settings.c.row_iter().nth(i);
         let c_z = rows.map_or_else(SVector::zeros, |row| row.transpose());

@@ -5,6 +5,7 @@ use crate::controller::Controller;
 use crate::descent::Along;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Ocp, Stage};
+use crate::outputs;
 use crate::plan::{Aim, Prices, at};
 use crate::policy::input_at;
 use crate::riccati::{CostToGo, StageFactor};
@@ -104,8 +105,15 @@ where
         let end = (aim.end(), aim.u_ref(last));
         let (model, settings) = (&self.model, &self.settings);
         let (a, b) = { &aim.own }.sample_matrices(last, model, settings, end, Along::Jacobian);
+        let own;
         let weights = if D::SOME {
-            ocp.common_at(last)
+            let mut common = *ocp.common_at(last);
+            if let Some(outputs) = aim.own.outputs() {
+                let (mut of_x, mut of_u) = (SVector::zeros(), SVector::zeros());
+                outputs::add_costs(outputs, last, end, &mut common, (&mut of_x, &mut of_u));
+            }
+            own = common;
+            &own
         } else {
             &ocp.common
         };

@@ -39,7 +39,7 @@
 //! | a plant | [`Dynamics`] (f alone), [`Embedding`] (A(s), B(s)), [`LpvModel`] (what is not formulas) |
 //! | linear models of f alone | [`AlongMotion`] (its derivatives), [`AlongRay`] (their mean from a steady state on) |
 //! | a controller, on the heap or in lent memory | [`Controller`], [`ControllerSettings`], [`ControllerArrays`] |
-//! | weights, bounds, rows, disturbances, scheduling or models that are known ahead | [`Preview`], [`Controller::step_with`], [`OutputFeedback::decide_with`] |
+//! | weights, bounds, rows, outputs, disturbances, scheduling or models that are known ahead | [`Preview`], [`Outputs`], [`Controller::step_with`], [`OutputFeedback::decide_with`] |
 //! | what changes while it runs | [`Controller::set_settings`], [`Controller::set_rows`], [`Controller::set_model`] |
 //! | one with a guarantee | [`GuaranteedController`] |
 //! | all that stands between sensors and actuators | [`OutputFeedback`], [`Regulator`], [`Estimator`] |
@@ -80,6 +80,7 @@ mod memory;
 mod model;
 mod number;
 mod ocp;
+mod outputs;
 mod plan;
 mod policy;
 mod predictor;
@@ -126,6 +127,7 @@ pub use memory::{
 pub use model::{LpvModel, Scalar};
 pub use number::{Bivariate, Dual, Elementary, Number};
 pub use ocp::{Bounds, Common, GeneralRow, Ocp, Penalty, SoftBounds, Stage, Terminal};
+pub use outputs::{OutputGoal, Outputs};
 pub use predictor::{Predictor, Rk4};
 pub use preview::{Preview, PreviewError, PreviewMistake, PreviewPart};
 pub use ramp::RampedInput;

@@ -23,6 +23,16 @@ impl<T: RealField + Copy> Scalar for T {}
 /// every kind of number, and with this for nothing. Implement it by itself for what is not
 /// formulas: tables, other programs.
 pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize> {
+    /// The period, s, of a model that is sampled itself; `None`, as a rule, of one in continuous time.
+    ///
+    /// With a period, wherever this trait speaks of x_dot it is x+ instead, the state one period later:
+    /// x+ = F(x, u) = A(s) x + B(s) u + c(s), in state units, with the derivatives of F. The input is held over
+    /// whole periods only, and [`Rk4`](crate::Rk4) steps become as many periods as are nearest to their time.
+    #[inline(always)]
+    fn period(&self) -> Option<T> {
+        None
+    }
+
     /// sigma(x, u): the scheduling vector at the state `x` and the input `u`.
     fn scheduling(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NS>;
 
@@ -120,7 +130,16 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
         (rate, a, b)
     }
 
-    /// The steady state, f(x, u) = 0 within bounds, that is nearest to a reference; `None` where
+    /// What the sensor `i` of an [`Estimator`](crate::Estimator) measures at the state `x`, and its derivatives,
+    /// of a sensor that is not linear; `None`, as a rule, where it is the row `i` of
+    /// [`EstimatorSettings::c`](crate::EstimatorSettings::c).
+    #[inline(always)]
+    fn sensor(&self, i: usize, x: &SVector<T, NX>) -> Option<(T, SVector<T, NX>)> {
+        let _ = (i, x);
+        None
+    }
+
+    /// The steady state, f(x, u) = 0 (F(x, u) = x of a model with a period) within bounds, that is nearest to a reference; `None` where
     /// none is found.
     ///
     /// By Newton's method from the reference. A plant that knows its steady states in closed form

@@ -5,6 +5,7 @@ use crate::controller::Reference;
 use crate::list::List;
 use crate::model::Scalar;
 use crate::ocp::{Bounds, SoftBounds};
+use crate::outputs;
 use crate::settings::{ControllerSettings, TerminalIngredient, Weights};
 use crate::small_matrix::product;
 use crate::solution::{ActiveSet, Quantity, Side};
@@ -222,9 +223,21 @@ where
     #[cfg_attr(target_arch = "arm", inline(never))]
     #[cfg_attr(not(target_arch = "arm"), inline(always))]
     pub fn stage(&self, i: usize, x: &SVector<T, NX>, u: &SVector<T, NU>) -> T {
+        self.stage_along(i, x, u, None)
+    }
+
+    /// The same with outputs that are linear `about` a plan's state and input.
+    #[inline(always)]
+    fn stage_along(
+        &self,
+        i: usize,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+        about: Option<(&SVector<T, NX>, &SVector<T, NU>)>,
+    ) -> T {
         let mut cost = self.aim.cost(i, (x, u), &self.weights);
         if D::SOME {
-            cost += self.price_of_rows(i, x, Some(u));
+            cost += self.price_of_rows(i, x, Some(u)) + self.of_outputs(i, (x, Some(u)), about);
         }
         if i > 0 {
             cost + self.excess(i, x)
@@ -237,6 +250,12 @@ where
     #[cfg_attr(target_arch = "arm", inline(never))]
     #[cfg_attr(not(target_arch = "arm"), inline(always))]
     pub fn end(&self, x: &SVector<T, NX>) -> T {
+        self.end_along(x, None)
+    }
+
+    /// The same with outputs that are linear `about` a plan's state.
+    #[inline(always)]
+    fn end_along(&self, x: &SVector<T, NX>, about: Option<&SVector<T, NX>>) -> T {
         let error = x - self.aim.end();
         let cost = match &self.terminal {
             TerminalIngredient::Cost(p) => squared(p, &error),
@@ -245,7 +264,10 @@ where
         let cost = cost + self.excess(self.horizon, x);
         if D::SOME {
             let linear = self.aim.linear_cost(self.horizon, x, None);
-            cost + linear + self.price_of_rows(self.horizon, x, None)
+            let still = SVector::zeros();
+            let about = about.map(|about| (about, &still));
+            let outputs = self.of_outputs(self.horizon, (x, None), about);
+            cost + linear + self.price_of_rows(self.horizon, x, None) + outputs
         } else {
             cost
         }
@@ -260,6 +282,40 @@ where
             before = next;
         }
         total + self.end(before)
+    }
+
+    /// Of the answer `u` and `x` of a program along the plan `about`: of what the program expects of outputs, which
+    /// are linear there.
+    pub fn of_answer(
+        &self,
+        x0: &SVector<T, NX>,
+        (u, x): (&[SVector<T, NU>], &[SVector<T, NX>]),
+        about: (&[SVector<T, NU>], &[SVector<T, NX>]),
+    ) -> T {
+        if !D::SOME || self.aim.own.outputs().is_none() {
+            return self.of(x0, u, x);
+        }
+        let (mut before, mut planned) = (x0, x0);
+        let mut total = T::zero();
+        let stages = u.iter().zip(x).zip(about.0.iter().zip(about.1));
+        for (i, ((u, next), (u_plan, next_plan))) in stages.enumerate().take(self.horizon) {
+            total += self.stage_along(i, before, u, Some((planned, u_plan)));
+            (before, planned) = (next, next_plan);
+        }
+        total + self.end_along(before, Some(planned))
+    }
+
+    /// What the outputs of stage `i` cost, with the prices of their bounds.
+    fn of_outputs(
+        &self,
+        i: usize,
+        motion: (&SVector<T, NX>, Option<&SVector<T, NU>>),
+        about: Option<(&SVector<T, NX>, &SVector<T, NU>)>,
+    ) -> T {
+        let outputs = self.aim.own.outputs();
+        outputs.map_or(T::zero(), |outputs| {
+            outputs::merit(outputs, i, motion, about, (self.prices.rows, excess))
+        })
     }
 
     /// How far the linear costs below zero bring the merit down, twice: what is added to the merit

@@ -69,6 +69,9 @@ impl Predictor {
         }
         let scheduling = held.copied().unwrap_or_else(|| model.scheduling(x, u));
         let (a, b) = model.matrices(&scheduling);
+        if let Some(period) = model.period() {
+            return over_periods(&a, &b, periods(period, t_s));
+        }
         match self {
             Self::FrozenRk4(rk4) | Self::StageConsistent(rk4) => {
                 rk4.discretize_with(|a, v| model.a_times(a, v), &a, &b, t_s)
@@ -115,6 +118,9 @@ impl Predictor {
         }
         // It acts as an input of 1 does.
         let (a, _) = model.matrices(&scheduling);
+        if let Some(period) = model.period() {
+            return Some(over_periods(&a, &c, periods(period, t_s)).1);
+        }
         let (_, c_d) = self.discretize(&a, &c, t_s);
         Some(c_d)
     }
@@ -214,6 +220,9 @@ impl Rk4 {
         P: LpvModel<T, NX, NU, NS>,
     {
         let embedding = |x: &SVector<T, NX>| model.embedded(x, u);
+        if let Some(period) = model.period() {
+            return follow_periods(x, periods(period, t_s), embedding);
+        }
         #[cfg(target_os = "none")]
         let embedding: &TangentAt<'_, T, NX, NU> = &embedding;
         self.compose(model, x, t_s, embedding)
@@ -235,6 +244,9 @@ impl Rk4 {
         P: LpvModel<T, NX, NU, NS>,
     {
         let tangent = |x: &SVector<T, NX>| model.tangent(x, u);
+        if let Some(period) = model.period() {
+            return follow_periods(x, periods(period, t_s), tangent);
+        }
         #[cfg(target_os = "none")]
         let tangent: &TangentAt<'_, T, NX, NU> = &tangent;
         self.compose(model, x, t_s, tangent)
@@ -297,6 +309,10 @@ impl Rk4 {
         T: Scalar,
         M: LpvModel<T, NX, NU, NS>,
     {
+        if let Some(period) = model.period() {
+            let periods = periods(period, t_s);
+            return (0..periods).fold(*x, |x, _| model.derivative(&x, u));
+        }
         let h = self.step_length(t_s);
         let mut x = [*x];
         for _ in 0..self.substeps {
@@ -343,6 +359,43 @@ impl Rk4 {
     fn step_length<T: Scalar>(self, t_s: T) -> T {
         t_s / convert::<f64, T>(self.substeps as f64)
     }
+}
+
+/// How many periods are nearest to `duration` s: of a time that was summed up from periods, as many as there
+/// were.
+pub(crate) fn periods<T: Scalar>(period: T, duration: T) -> usize {
+    let half: T = convert(0.5);
+    let mut count = 0;
+    while count < MOST_STEPS && (convert::<f64, T>(count as f64) + half) * period <= duration {
+        count += 1;
+    }
+    count
+}
+
+/// The pair over so many periods of a model that is sampled itself, for its constant pair over one.
+pub(crate) fn over_periods<T: Scalar, const NX: usize, const NU: usize>(
+    a: &SMatrix<T, NX, NX>,
+    b: &SMatrix<T, NX, NU>,
+    periods: usize,
+) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+    let none = (SMatrix::identity(), SMatrix::zeros());
+    (0..periods).fold(none, |(a_d, b_d), _| {
+        (product(a, &a_d), product(a, &b_d) + b)
+    })
+}
+
+/// The pair over so many periods, along the motion from `x`, from the map and its pair `at` each state.
+fn follow_periods<T: Scalar, const NX: usize, const NU: usize>(
+    x: &SVector<T, NX>,
+    periods: usize,
+    at: impl Fn(&SVector<T, NX>) -> (SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>),
+) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
+    let begin = (*x, SMatrix::identity(), SMatrix::zeros());
+    let (_, a_d, b_d) = (0..periods).fold(begin, |(x, a_d, b_d), _| {
+        let (next, a, b) = at(&x);
+        (next, product(&a, &a_d), product(&a, &b_d) + b)
+    });
+    (a_d, b_d)
 }
 
 /// One step of length `h` seconds for a constant pair, the Taylor polynomials of order four: with

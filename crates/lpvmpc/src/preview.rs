@@ -5,6 +5,7 @@ use crate::by_stage::entry;
 use crate::controller::Reference;
 use crate::model::Scalar;
 use crate::ocp::{Bounds, GeneralRow, Penalty, SoftBounds};
+use crate::outputs::{OutputGoal, Outputs};
 use crate::settings::{ControllerError, TerminalIngredient, Weights, check_bounds, check_weight};
 use core::fmt;
 use nalgebra::{Cholesky, Const, SMatrix, SVector, Vector1, convert};
@@ -59,13 +60,15 @@ pub struct Preview<'a, P, T, const NX: usize, const NU: usize, const NS: usize> 
     /// input.
     pub rows: &'a [&'a [GeneralRow<T, NX, NU>]],
     /// Measured disturbances or affine terms d of the samples 0 to N - 1, in state units per second:
-    /// x_dot = f(x, u) + d, constant over each sample.
+    /// x_dot = f(x, u) + d, constant over each sample; of a model with a period, in state units: x+ = F(x, u) + d.
     pub disturbance: &'a [SVector<T, NX>],
     /// Scheduling from outside, constant over each of the samples 0 to N - 1: the plant is then
     /// x_dot = A(s_i) x + B(s_i) u + d_i, whatever its state.
     pub scheduling: &'a [SVector<T, NS>],
     /// The plant over the samples 0 to N - 1, where it changes along the horizon.
     pub models: &'a [P],
+    /// Outputs that cost something or are bounded, which are linear about the plan in each program.
+    pub outputs: Option<&'a dyn Outputs<T, NX, NU>>,
 }
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize> Clone
@@ -101,6 +104,7 @@ impl<'a, P, T, const NX: usize, const NU: usize, const NS: usize> Preview<'a, P,
             disturbance: &[],
             scheduling: &[],
             models: &[],
+            outputs: None,
         }
     }
 
@@ -110,7 +114,8 @@ impl<'a, P, T, const NX: usize, const NU: usize, const NS: usize> Preview<'a, P,
             && self.cross.is_empty()
             && self.x.is_empty()
             && self.soft_x.is_empty()
-            && self.u.is_empty())
+            && self.u.is_empty()
+            && self.outputs.is_none())
     }
 }
 
@@ -143,6 +148,8 @@ pub enum PreviewPart {
     Disturbance,
     /// `scheduling`.
     Scheduling,
+    /// `outputs`.
+    Outputs,
 }
 
 /// What is wrong with it.
@@ -204,6 +211,7 @@ impl fmt::Display for PreviewError {
             PreviewPart::Rows => "general rows",
             PreviewPart::Disturbance => "disturbance",
             PreviewPart::Scheduling => "scheduling",
+            PreviewPart::Outputs => "outputs",
         };
         write!(f, "the {part} at stage {}: {}", self.stage, self.mistake)
     }
@@ -267,6 +275,17 @@ impl<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize>
         each(self.rows, stages, Part::Rows, |rows| check_rows(rows))?;
         each(self.disturbance, samples, Part::Disturbance, finite)?;
         each(self.scheduling, samples, Part::Scheduling, finite)?;
+        if let Some(outputs) = self.outputs {
+            for stage in 0..stages {
+                for j in 0..outputs.count() {
+                    check_goal(&outputs.goal(stage, j)).map_err(|mistake| PreviewError {
+                        part: Part::Outputs,
+                        stage,
+                        mistake,
+                    })?;
+                }
+            }
+        }
         if self.has_own_stages() && room.own_stages < samples {
             let part = if !self.weights.is_empty() {
                 Part::StateWeight
@@ -274,6 +293,8 @@ impl<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize>
                 Part::CrossWeight
             } else if !self.u.is_empty() {
                 Part::InputBounds
+            } else if self.outputs.is_some() {
+                Part::Outputs
             } else {
                 Part::StateBounds
             };
@@ -284,8 +305,14 @@ impl<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize>
             });
         }
         each(self.rows, stages, Part::Rows, |rows| {
-            fit(rows.len(), stages, room.rows)
+            fit(rows.len() + self.output_rows(), stages, room.rows)
         })
+    }
+
+    /// Rows that the bounds of outputs take at each stage.
+    pub(crate) fn output_rows(&self) -> usize {
+        self.outputs
+            .map_or(0, |outputs| outputs.bounded().min(outputs.count()))
     }
 }
 
@@ -369,6 +396,28 @@ fn price<T: Scalar>(price: &Option<Penalty<T>>) -> Result<(), PreviewMistake> {
         }
         _ => Ok(()),
     }
+}
+
+fn check_goal<T: Scalar>(goal: &OutputGoal<T>) -> Result<(), PreviewMistake> {
+    let OutputGoal {
+        weight,
+        reference,
+        lower,
+        upper,
+        soft,
+    } = goal;
+    if !(weight.is_finite() && reference.is_finite()) {
+        return Err(PreviewMistake::NotFinite);
+    }
+    if *weight < T::zero() {
+        return Err(PreviewMistake::NotDefinite);
+    }
+    let bounds = Bounds {
+        lower: Vector1::new(*lower),
+        upper: Vector1::new(*upper),
+    };
+    ordered(&bounds)?;
+    price(soft)
 }
 
 /// The first mistake in the rows of a stage.

@@ -16,6 +16,9 @@ use nalgebra::{SMatrix, SVector};
 /// to be applied from a sample on is the ramp u(t) = u + r (t - t_k), its value at the next
 /// sample at the latest. Bounds on u are state bounds, bounds on r input bounds, R stands in the
 /// last block of Q.
+///
+/// The plant is one in continuous time: between the samples of a model with a
+/// [period](LpvModel::period) there is no ramp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RampedInput<P, const NX: usize>(pub P);
 

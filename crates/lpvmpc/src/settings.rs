@@ -3,7 +3,7 @@
 use crate::memory::Capacity;
 use crate::model::Scalar;
 use crate::ocp::{Bounds, Penalty, SoftBounds};
-use crate::predictor::{Predictor, Rk4};
+use crate::predictor::{Predictor, Rk4, periods};
 use crate::preview::PreviewMistake;
 use crate::solver::SolverSettings;
 use core::fmt;
@@ -237,6 +237,8 @@ pub fn exact_prices<T: Scalar, const NX: usize>(
 pub enum ControllerError {
     /// The sampling time is not a positive number.
     SamplingTime,
+    /// The sampling time is not a whole number of the periods of a model that is sampled itself.
+    Period,
     /// The horizon is not between 1 and the largest that there is memory for.
     Horizon {
         /// What was asked for.
@@ -278,6 +280,10 @@ impl fmt::Display for ControllerError {
             Self::SamplingTime => {
                 write!(f, "the sampling time must be a positive number of seconds")
             }
+            Self::Period => write!(
+                f,
+                "the sampling time must be a whole number of periods of the model, which is sampled itself"
+            ),
             Self::Horizon { given, largest } => {
                 write!(
                     f,
@@ -356,6 +362,18 @@ pub(crate) fn check<T: Scalar, const NX: usize, const NU: usize, const NS: usize
         }
         _ => Ok(()),
     }
+}
+
+/// Whether `t_s` is a whole number of periods, at least one.
+pub(crate) fn check_period<T: Scalar>(period: T, t_s: T) -> Result<(), ControllerError> {
+    let count = periods(period, t_s);
+    let whole: T = period * convert(count as f64);
+    let rounding: T = t_s * T::default_epsilon().sqrt();
+    // Negated, so that a period that is NaN fails.
+    if count == 0 || !((whole - t_s).abs() <= rounding) {
+        return Err(ControllerError::Period);
+    }
+    Ok(())
 }
 
 /// The longest horizon at all: active bounds have 16 bits for their stage.

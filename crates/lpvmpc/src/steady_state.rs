@@ -24,7 +24,7 @@ pub struct SteadyStateProblem<T, const NX: usize, const NU: usize> {
     pub u: Bounds<T, NU>,
 }
 
-/// A steady state, f(x, u) = 0.
+/// A steady state, f(x, u) = 0; of a model with a period F(x, u) = x.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SteadyState<T, const NX: usize, const NU: usize> {
     /// The state at which the plant stands.
@@ -79,6 +79,40 @@ where
     None
 }
 
+/// What is zero where the plant stands: f(x, u), or F(x, u) - x of a model with a period.
+fn rate<P, T, const NX: usize, const NU: usize, const NS: usize>(
+    model: &P,
+    x: &SVector<T, NX>,
+    u: &SVector<T, NU>,
+) -> SVector<T, NX>
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS> + ?Sized,
+{
+    let there = model.derivative(x, u);
+    match model.period() {
+        Some(_) => there - x,
+        None => there,
+    }
+}
+
+/// Its derivatives.
+fn rates_of<P, T, const NX: usize, const NU: usize, const NS: usize>(
+    model: &P,
+    x: &SVector<T, NX>,
+    u: &SVector<T, NU>,
+) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>)
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS> + ?Sized,
+{
+    let (a, b) = model.jacobian(x, u);
+    match model.period() {
+        Some(_) => (a - SMatrix::identity(), b),
+        None => (a, b),
+    }
+}
+
 /// Newton's method for the free components; `None` if it does not converge.
 fn newton<P, T, const NX: usize, const NU: usize, const NS: usize>(
     model: &P,
@@ -102,11 +136,11 @@ where
     let unit_u =
         SVector::from_fn(|i, _| one_if(free.u[i]) / (problem.r[i] * nearly_nothing).sqrt());
     for step in 0..MOST_STEPS {
-        let (a, b) = model.jacobian(x, u);
+        let (a, b) = rates_of(model, x, u);
         let towards_x =
             (problem.x_ref - *x).component_mul(&SVector::from_fn(|i, _| one_if(free.x[i])));
         let towards_u = (-*u).component_mul(&SVector::from_fn(|i, _| one_if(free.u[i])));
-        let missing = model.derivative(x, u) + a * towards_x + b * towards_u;
+        let missing = rate(model, x, u) + a * towards_x + b * towards_u;
         let columns = (scaled_columns(&a, &unit_x), scaled_columns(&b, &unit_u));
         let (away_x, away_u) = least_norm(columns, missing)?;
         let part = convert::<f64, T>(0.5).powi(i32::try_from(step / PATIENCE).unwrap_or(i32::MAX));
@@ -115,7 +149,7 @@ where
         *x += dx;
         *u += du;
         let settled = |change: &T, value: &T| change.abs() <= small * (T::one() + value.abs());
-        let f = model.derivative(x, u);
+        let f = rate(model, x, u);
         let standing = f.iter().zip(a.row_iter()).all(|(f, row)| {
             let size = row.iter().fold(T::one(), |sum, a| sum + a.abs());
             f.abs() <= small * size

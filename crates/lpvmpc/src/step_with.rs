@@ -71,7 +71,8 @@ where
         let fixed = self.fixed.take();
         let rows: &[_] = fixed.as_ref().map_or(&[], |fixed| &fixed.rows);
         let used = if preview.rows.is_empty() { rows } else { &[] };
-        let fits = fit(used.len(), room.horizon + 1, room.rows);
+        let used = used.len() + preview.output_rows();
+        let fits = fit(used, room.horizon + 1, room.rows);
         let fits = fits.map_err(|mistake| PreviewError {
             part: PreviewPart::Rows,
             stage: 0,

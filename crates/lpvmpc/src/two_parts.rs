@@ -70,6 +70,10 @@ where
             let x = at(&self.rollout, 0);
             self.predict(&x, own, &mut workspace.ocp);
             self.track(aim, &mut workspace.ocp);
+            if D::SOME {
+                let plan = (&x, &*self.solution.u);
+                self.pose_outputs(plan, 1, (aim, T::zero()), &mut workspace.ocp);
+            }
         }
         self.prepared = Some(workspace.solver.factorize(&workspace.ocp));
     }

@@ -7,6 +7,7 @@ use crate::memory::Capacity;
 use crate::memory::WorkspaceMemory;
 use crate::model::Scalar;
 use crate::ocp::{Common, Ocp, Penalty, SoftBounds};
+use crate::outputs;
 use crate::plan::Trial;
 use crate::preview::Room;
 use crate::settings::{ControllerSettings, Weights};
@@ -137,7 +138,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
         ocp.terminal.x = *own.x(end).unwrap_or(&settings.x);
         ocp.terminal.soft_x = soft_at(end);
         let counts = (0..=end).map(|i| own.rows(i).len());
-        ocp.rows_per_stage = counts.max().unwrap_or(0);
+        // Those of outputs come first; they are written with each program.
+        let of_outputs = outputs::rows(own);
+        ocp.rows_per_stage = counts.max().unwrap_or(0) + of_outputs;
         for (place, row) in ocp.rows.iter_mut().enumerate() {
             let (i, j) = match ocp.rows_per_stage {
                 0 => break,
@@ -146,7 +149,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
             if i > end {
                 break;
             }
-            let given = own.rows(i).get(j);
+            let given = j.checked_sub(of_outputs).and_then(|j| own.rows(i).get(j));
             let counting = given.filter(|row| row.counts(i == 0, i == end));
             *row = counting.copied().unwrap_or_default();
             row.soft = row.soft.map(half);
@@ -160,7 +163,7 @@ fn halved<T: Scalar, const NX: usize>(soft: &SoftBounds<T, NX>) -> SoftBounds<T,
 }
 
 #[inline(always)]
-fn half<T: Scalar>(Penalty { linear, quadratic }: Penalty<T>) -> Penalty<T> {
+pub(crate) fn half<T: Scalar>(Penalty { linear, quadratic }: Penalty<T>) -> Penalty<T> {
     let half: T = convert(0.5);
     Penalty {
         linear: linear * half,

@@ -6,7 +6,13 @@
 )]
 
 mod agreement;
+mod changes;
+mod discrete;
+mod estimation;
+mod matrices;
 mod messages;
+mod outputs;
 mod plants;
+mod quadratic;
 mod stages;
 mod world;

@@ -1,6 +1,7 @@
 //! Plants of several sizes, in Rust and as data.
 
 use lpvmpc::{Dynamics, Number};
+use lpvmpc_any::Limits;
 use lpvmpc_plant::{Plant, PlantData, Signal};
 use nalgebra::SVector;
 
@@ -55,4 +56,12 @@ impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for Chain {
 
 pub fn chain<const NX: usize, const NU: usize>() -> Plant {
     Plant::new(PlantData::of_dynamics::<_, NX, NU>("chain", &Chain)).unwrap()
+}
+
+/// As far to either side.
+pub fn limits(half: &[f64]) -> Option<Limits> {
+    Some(Limits {
+        lower: half.iter().map(|half| -half).collect(),
+        upper: half.to_vec(),
+    })
 }

@@ -2,7 +2,7 @@
 
 use crate::plants::{CartPole, cart_pole};
 use lpvmpc::AlongMotion;
-use lpvmpc_any::{Disturbance, Sensor, Tolerances, World, WorldSettings, steady_state};
+use lpvmpc_any::{Push, Sensor, Tolerances, World, WorldSettings, steady_state};
 use nalgebra::{Vector1, Vector4};
 
 #[test]
@@ -37,17 +37,17 @@ fn a_plant_moves_as_one_of_its_own_size() {
 
 #[test]
 fn a_load_moves_a_state_by_its_integral() {
-    let load = Disturbance::Load {
+    let load = Push::Load {
         from: 0.02,
         until: 0.07,
         load: vec![2.0, 0.0, 0.0, 0.0],
     };
-    let jump = Disturbance::Jump {
+    let jump = Push::Jump {
         time: 0.08,
         change: vec![0.5, 0.0, 0.0, 0.0],
     };
     let settings = WorldSettings {
-        disturbances: vec![load, jump],
+        pushes: vec![load, jump],
         ..WorldSettings::ideal(0.05)
     };
     let mut world = World::new(&cart_pole(), &[0.0; 4], &settings).unwrap();

@@ -23,6 +23,9 @@ pub enum FlowError {
     /// A motion with an affine term is not linear in initial state and input.
     #[error("the plant has an affine term: its motion is not linear in initial state and input")]
     AffineTerm,
+    /// The plant is sampled itself.
+    #[error("the plant is in discrete time: there is no motion between its samples")]
+    DiscreteTime,
 }
 
 /// The law u = **-K** x(0), held over a sample of `t_s` seconds.
@@ -98,6 +101,9 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
         };
         let gain = TaylorMap::of(&gain);
         let mut x = product(&t, &y).map(|[x]| x);
+        if model.period().is_some() {
+            return Err(FlowError::DiscreteTime);
+        }
         let scheduling = model.scheduling(&SVector::from(x), &SVector::from(step.input));
         if model.offset(&scheduling).is_some() {
             return Err(FlowError::AffineTerm);

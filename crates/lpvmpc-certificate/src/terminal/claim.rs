@@ -13,6 +13,11 @@ pub enum ClaimError {
          only, with the equilibrium at x = 0, u = 0"
     )]
     AffineTerm,
+    /// The plant is sampled itself.
+    #[error(
+        "the plant is in discrete time: a terminal set can be certified in continuous time only"
+    )]
+    DiscreteTime,
     /// A number that cannot be.
     #[error("{name} = {value}: it must be {expected}", value = number_text(*value))]
     Value {
@@ -140,6 +145,7 @@ impl ClaimError {
             | Self::NotSemidefinite { .. }
             | Self::LimitNotShown { .. }
             | Self::AffineTerm
+            | Self::DiscreteTime
             | Self::DecreaseNotShown { .. }
             | Self::QuadraticStabilityNotShown { .. } => false,
         }

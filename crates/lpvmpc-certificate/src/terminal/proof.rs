@@ -169,6 +169,9 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
             let reach = check_row(ellipsoid, &row, self.input_limits[i], &name)?;
             *range = symmetric(reach);
         }
+        if model.period().is_some() {
+            return Err(ClaimError::DiscreteTime);
+        }
         let scheduling = model.scheduling(&box_of_states, &box_of_inputs);
         if model.offset(&scheduling).is_some() {
             return Err(ClaimError::AffineTerm);

@@ -42,6 +42,58 @@ fn the_plant_is_fine_as_it_is() {
     Plant::from_json(&valid().to_string()).unwrap();
 }
 
+/// A plant is either in continuous or in discrete time.
+#[test]
+fn a_period_goes_with_next() {
+    let with = |changes: &[(&str, Value)]| {
+        let mut plant = valid();
+        for (key, value) in changes {
+            plant[*key] = value.clone();
+        }
+        message(&plant)
+    };
+    for (changes, expected) in [
+        (
+            vec![("period", json!(0.1))],
+            "derivative: a plant with a `period` is in discrete time",
+        ),
+        (
+            vec![("next", json!([1, 6]))],
+            "next: it is of a plant in discrete time, which has a `period`",
+        ),
+        (
+            vec![
+                ("period", json!(0)),
+                ("next", json!([1, 6])),
+                ("derivative", json!([])),
+            ],
+            "period: it is 0 s; it must be a positive number",
+        ),
+        (
+            vec![
+                ("period", json!(0.1)),
+                ("next", json!([1])),
+                ("derivative", json!([])),
+            ],
+            "next: 1 results, one for each state makes 2",
+        ),
+        (vec![("derivative", json!([]))], "derivative: it is missing"),
+        (
+            // x+ = (rate, ...) is zero at zero; one radian off it is not where it was.
+            vec![
+                ("period", json!(0.1)),
+                ("next", json!([1, 6])),
+                ("derivative", json!([])),
+                ("equilibrium", json!({"x": [1, 0], "u": [0]})),
+            ],
+            "equilibrium: it is none: angle changes by -1 per period there",
+        ),
+    ] {
+        let said = with(&changes);
+        assert!(said.starts_with(expected), "{said}");
+    }
+}
+
 #[test]
 fn a_wrong_operation_is_named() {
     for (operation, expected) in [
@@ -223,7 +275,7 @@ fn a_key_too_many_or_too_few_is_named() {
     assert!(message(&plant).starts_with("file: unknown field `outptu`, expected one of"));
     let mut plant = valid();
     plant.as_object_mut().unwrap().remove("derivative");
-    assert!(message(&plant).starts_with("file: missing field `derivative`"));
+    assert!(message(&plant).starts_with("derivative: it is missing"));
     let mut plant = valid();
     plant.as_object_mut().unwrap().remove("schema");
     assert!(message(&plant).starts_with("file: missing field `schema`"));

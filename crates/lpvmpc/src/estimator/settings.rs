@@ -29,7 +29,7 @@ pub struct EstimatorSettings<T, const NX: usize, const NU: usize, const NY: usiz
 {
     /// Longest Runge-Kutta step of the prediction, s.
     pub longest_step: T,
-    /// C, `NY` x `NX`.
+    /// C, `NY` x `NX`; a row is not read where the model has a [`sensor`](crate::LpvModel::sensor) in its place.
     pub c: SMatrix<T, NY, NX>,
     /// E_x, `NX` x `ND`.
     pub state_offset: SMatrix<T, NX, ND>,

@@ -5,7 +5,7 @@ use crate::embedding::{Dynamics, Tangent};
 use crate::model::{LpvModel, Scalar};
 use crate::number::Number;
 use crate::small_matrix::product;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{SMatrix, SVector, convert};
 
 /// The linear models of a plant along its motion: A and B are the derivatives of f at the scheduling
 /// (x, u), and c = f - A x - B u makes the model exact there. No factorisation is done by hand.
@@ -21,6 +21,11 @@ where
     T: Scalar + Number,
     P: Dynamics<NX, NU>,
 {
+    #[inline(always)]
+    fn period(&self) -> Option<T> {
+        self.0.period().map(convert)
+    }
+
     /// (x, u).
     fn scheduling(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NS> {
         joined(x, u)

@@ -65,6 +65,11 @@ where
     T: Scalar + Number,
     P: Dynamics<NX, NU>,
 {
+    #[inline(always)]
+    fn period(&self) -> Option<T> {
+        self.plant.period().map(convert)
+    }
+
     /// (x, u).
     fn scheduling(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NS> {
         joined(x, u)

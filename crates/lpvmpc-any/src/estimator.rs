@@ -1,0 +1,383 @@
+//! What is known of a plant's state from what is measured, for plants of any size.
+
+use crate::check::{Axis, Names};
+use crate::error::MpcError;
+use crate::model::Model;
+use crate::settings::{LinearModels, MpcSettings};
+use crate::target::output_tangent;
+use lpvmpc::{
+    DelayLine, Dual, Estimator, EstimatorSettings as OfEstimator, Gate, LpvModel, Observation,
+    Reading,
+};
+use lpvmpc_design::check_offset_free;
+use lpvmpc_plant::Plant;
+use nalgebra::{DMatrix, SMatrix, SVector};
+
+/// An extended Kalman filter that finds state and disturbances, and the delay of the input.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EstimatorSettings {
+    /// What is measured: names of states or of outputs that do not depend on the input, in the order of the
+    /// readings. No more than the controller has places for states.
+    pub measured: Vec<String>,
+    /// Variances of the readings, in squared units, positive.
+    pub measurement_noise: Vec<f64>,
+    /// Variances that the states gain per second, in squared units per s: what the plant does not know.
+    pub state_noise: Vec<f64>,
+    /// Variances of the states about zero before the first reading.
+    pub initial_state: Vec<f64>,
+    /// What acts on the plant besides its inputs, constant or slow; no more than readings.
+    pub disturbances: Vec<Disturbance>,
+    /// Time from a measurement to the input that answers it, s; of a plant in discrete time a whole number of periods.
+    pub delay: f64,
+    /// Which readings are not believed; none as a rule.
+    pub gate: Gate<f64>,
+}
+
+/// A disturbance that the filter finds, so that the controller tracks without offset.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Disturbance {
+    /// The input beside which it acts, or the state whose derivative (next value, in discrete time) it adds to.
+    pub on: String,
+    /// Variance that it gains per second: how fast it may wander.
+    pub noise: f64,
+    /// Its variance about zero at the start.
+    pub initial: f64,
+}
+
+impl EstimatorSettings {
+    /// Readings of these states or outputs with these variances, and noises of the states; no disturbances, no
+    /// delay, large variances at the start.
+    pub fn new(measured: &[&str], measurement_noise: &[f64], state_noise: &[f64]) -> Self {
+        Self {
+            measured: measured.iter().map(|name| (*name).to_owned()).collect(),
+            measurement_noise: measurement_noise.to_vec(),
+            state_noise: state_noise.to_vec(),
+            initial_state: vec![1.0; state_noise.len()],
+            disturbances: Vec::new(),
+            delay: 0.0,
+            gate: Gate {
+                deviations: f64::INFINITY,
+                patience: 0,
+                oldest: f64::INFINITY,
+                longest_gap: f64::INFINITY,
+            },
+        }
+    }
+}
+
+/// What a filter knows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// The state at the last measurement, in the plant's units.
+    pub x: Vec<f64>,
+    /// The disturbances, in the order of the settings.
+    pub disturbances: Vec<f64>,
+}
+
+/// Where a reading comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Source {
+    State(usize),
+    Output(usize),
+}
+
+/// A plant with its sensors. Its inputs are those of the plant, and then a push on each state: x_dot = f(x, u) + w, or
+/// x+ = F(x, u) + w.
+#[derive(Debug, Clone)]
+struct Sensed<const NX: usize, const NU: usize, const NS: usize> {
+    model: Model<NX, NU, NS>,
+    plant: Plant,
+    measured: Vec<Source>,
+}
+
+impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NS, NS>
+    for Sensed<NX, NU, NS>
+{
+    fn period(&self) -> Option<f64> {
+        self.model.period()
+    }
+
+    fn scheduling(&self, x: &SVector<f64, NX>, w: &SVector<f64, NS>) -> SVector<f64, NS> {
+        self.model.scheduling(x, &input(w))
+    }
+
+    fn matrices(
+        &self,
+        scheduling: &SVector<f64, NS>,
+    ) -> (SMatrix<f64, NX, NX>, SMatrix<f64, NX, NS>) {
+        let (a, b) = self.model.matrices(scheduling);
+        let joint = SMatrix::from_fn(|i, j| match j.checked_sub(NU) {
+            None => b[(i, j)],
+            Some(j) => f64::from(u8::from(i == j)),
+        });
+        (a, joint)
+    }
+
+    fn derivative(&self, x: &SVector<f64, NX>, w: &SVector<f64, NS>) -> SVector<f64, NX> {
+        self.model.derivative(x, &input(w)) + push(w)
+    }
+
+    fn sensor(&self, i: usize, x: &SVector<f64, NX>) -> Option<(f64, SVector<f64, NX>)> {
+        let Some(Source::Output(k)) = self.measured.get(i) else {
+            return None;
+        };
+        let data = self.plant.data();
+        let states: Vec<Dual<f64, NX>> = Dual::variables(x).iter().copied().collect();
+        let inputs = vec![Dual::fixed(0.0); data.inputs.len()];
+        let y = self
+            .plant
+            .output(&states[..data.states.len()], &inputs)
+            .ok()?;
+        let y = y.get(*k)?;
+        Some((y.value, SVector::from(y.slopes)))
+    }
+}
+
+fn input<const NU: usize, const NS: usize>(w: &SVector<f64, NS>) -> SVector<f64, NU> {
+    SVector::from_fn(|j, _| w[j])
+}
+
+fn push<const NX: usize, const NS: usize>(w: &SVector<f64, NS>) -> SVector<f64, NX> {
+    SVector::from_fn(|i, _| w[NS - NX + i])
+}
+
+/// A filter and the inputs on their way.
+pub(crate) struct Filter<const NX: usize, const NU: usize, const NS: usize> {
+    pub settings: EstimatorSettings,
+    estimator: Estimator<Sensed<NX, NU, NS>, f64, NX, NS, NS, NX, NX>,
+    line: DelayLine<f64, NS>,
+}
+
+impl<const NX: usize, const NU: usize, const NS: usize> Filter<NX, NU, NS> {
+    pub fn new(
+        plant: &Plant,
+        names: &Names,
+        (mpc, settings): (&MpcSettings, &EstimatorSettings),
+        rest: (SVector<f64, NX>, SVector<f64, NU>),
+    ) -> Result<Self, MpcError> {
+        let place = |part: &str| format!("estimator, {part}");
+        let measured = sources(plant, names, settings, NX)?;
+        let count = measured.len();
+        let same = |part: &str, found: usize, needed: usize, of: &str| {
+            if found == needed {
+                return Ok(());
+            }
+            let fault =
+                format!("it has {found} entries; there must be {needed}, one for each {of}");
+            Err(MpcError::new(place(part), fault))
+        };
+        let (n, m) = (names.states.len(), names.inputs.len());
+        same(
+            "measurement_noise",
+            settings.measurement_noise.len(),
+            count,
+            "reading",
+        )?;
+        same("state_noise", settings.state_noise.len(), n, "state")?;
+        same("initial_state", settings.initial_state.len(), n, "state")?;
+        let delay = settings.delay;
+        if !(delay >= 0.0 && delay <= 1000.0 * mpc.t_s) {
+            let fault = format!("it is {delay} s; it must be from 0 to 1000 samples");
+            return Err(MpcError::new(place("delay"), fault));
+        }
+        if let Some(period) = plant.period()
+            && ((delay / period).round() * period - delay).abs() > 1e-9 * period
+        {
+            let fault =
+                format!("it is {delay} s; it must be a whole number of periods of {period} s");
+            return Err(MpcError::new(place("delay"), fault));
+        }
+        let mut offset = SMatrix::<f64, NS, NX>::zeros();
+        for (k, disturbance) in settings.disturbances.iter().enumerate() {
+            let of = |list: &[String]| list.iter().position(|name| *name == disturbance.on);
+            let place = match (of(&names.inputs), of(&names.states)) {
+                (Some(j), _) => j,
+                (None, Some(i)) => NU + i,
+                (None, None) => {
+                    let known: Vec<String> = [&names.inputs[..], &names.states[..]].concat();
+                    let fault = format!(
+                        "{:?} is no input or state; there are {}",
+                        disturbance.on,
+                        known.join(", ")
+                    );
+                    return Err(MpcError::new(place("disturbances"), fault));
+                }
+            };
+            if k >= NX {
+                let fault = format!("there are more than {NX}");
+                return Err(MpcError::new("estimator, disturbances", fault));
+            }
+            offset[(place, k)] = 1.0;
+        }
+        let model = Model::new(plant, LinearModels::AlongMotion, rest)?;
+        let sensed = Sensed {
+            model,
+            plant: plant.clone(),
+            measured,
+        };
+        sensed.check_observable(settings, (n, m), rest, &offset)?;
+        let filled =
+            |entries: &[f64]| SVector::from_fn(|i, _| entries.get(i).copied().unwrap_or(0.0));
+        let of_disturbances = |of: &dyn Fn(&Disturbance) -> f64| {
+            let all: Vec<f64> = settings.disturbances.iter().map(of).collect();
+            filled(&all)
+        };
+        let noise = &settings.measurement_noise;
+        let of_estimator = OfEstimator {
+            longest_step: mpc.t_s / mpc.substeps.max(1) as f64,
+            c: SMatrix::from_fn(|i, j| match sensed.measured.get(i) {
+                Some(Source::State(k)) => f64::from(u8::from(*k == j)),
+                _ => 0.0,
+            }),
+            state_offset: SMatrix::zeros(),
+            input_offset: offset,
+            state_noise: filled(&settings.state_noise),
+            disturbance_noise: of_disturbances(&|one| one.noise),
+            // What is left over is no sensor.
+            measurement_noise: SVector::from_fn(|i, _| {
+                noise.get(i).copied().unwrap_or(f64::INFINITY)
+            }),
+            initial_state: filled(&settings.initial_state),
+            initial_disturbance: of_disturbances(&|one| one.initial),
+            gate: settings.gate,
+        };
+        let estimator = Estimator::allocate(sensed, of_estimator, SVector::zeros(), 1)
+            .map_err(|error| MpcError::new("estimator", error.to_string()))?;
+        let commands = (delay / mpc.t_s).ceil() as usize + 3;
+        Ok(Self {
+            settings: settings.clone(),
+            estimator,
+            line: DelayLine::allocate(commands),
+        })
+    }
+
+    /// Goes on from where `previous` stands.
+    pub fn take_over(&mut self, previous: &Self) {
+        self.estimator.take_over(&previous.estimator);
+        self.line.copy_from(&previous.line);
+    }
+
+    pub fn observe(
+        &mut self,
+        t: f64,
+        readings: &[Option<f64>],
+    ) -> Result<Observation<NX>, MpcError> {
+        let count = self.settings.measured.len();
+        if readings.len() != count {
+            let names = self.settings.measured.join(", ");
+            let fault = format!(
+                "{} readings; there must be {count} ({names})",
+                readings.len()
+            );
+            return Err(MpcError::new("readings", fault));
+        }
+        let readings = std::array::from_fn(|i| {
+            let reading = readings.get(i).copied().flatten();
+            reading.map(Reading::fresh)
+        });
+        Ok(self.estimator.observe(t, &mut self.line, &readings))
+    }
+
+    /// The state when the next input will act; not a number where there is no estimate.
+    pub fn ahead(&self) -> SVector<f64, NX> {
+        if self.estimator.time().is_none() || self.estimator.is_lost() {
+            return SVector::repeat(f64::NAN);
+        }
+        let mut z = *self.estimator.model_state();
+        self.line.for_each(self.settings.delay, |duration, w| {
+            z = self.estimator.predict(&z, w, duration);
+        });
+        z
+    }
+
+    /// What acts beside the input, and on the states.
+    pub fn disturbance(&self) -> (SVector<f64, NU>, SVector<f64, NX>) {
+        let w = self.estimator.input_disturbance();
+        (input(&w), push(&w))
+    }
+
+    /// The input `u` was sent, and the disturbance `d` is known to act with it.
+    pub fn send(&mut self, u: &SVector<f64, NU>, d: &SVector<f64, NX>) {
+        let w = SVector::from_fn(|i, _| match i.checked_sub(NU) {
+            None => u[i],
+            Some(i) => d[i],
+        });
+        self.line.command(w, self.settings.delay);
+    }
+
+    pub fn estimate(&self, states: usize) -> Estimate {
+        let d = self.estimator.disturbance();
+        Estimate {
+            x: self.estimator.state().as_slice()[..states].to_vec(),
+            disturbances: d.as_slice()[..self.settings.disturbances.len()].to_vec(),
+        }
+    }
+}
+
+impl<const NX: usize, const NU: usize, const NS: usize> Sensed<NX, NU, NS> {
+    /// Whether the disturbances can be told from the readings where the plant stands.
+    fn check_observable(
+        &self,
+        settings: &EstimatorSettings,
+        (n, m): (usize, usize),
+        (x, u): (SVector<f64, NX>, SVector<f64, NU>),
+        offset: &SMatrix<f64, NS, NX>,
+    ) -> Result<(), MpcError> {
+        let (a, b) = self.model.jacobian(&x, &u);
+        let discrete = f64::from(u8::from(self.period().is_some()));
+        let unit = |i: usize, j: usize| f64::from(u8::from(i == j));
+        let a = DMatrix::from_fn(n, n, |i, j| a[(i, j)] - discrete * unit(i, j));
+        let b_d = DMatrix::from_fn(n, settings.disturbances.len(), |i, k| {
+            let of_inputs: f64 = (0..m).map(|j| b[(i, j)] * offset[(j, k)]).sum();
+            of_inputs + offset[(NU + i, k)]
+        });
+        let outputs = output_tangent(&self.plant, &x.as_slice()[..n], &u.as_slice()[..m]);
+        let c = DMatrix::from_fn(self.measured.len(), n, |i, j| match self.measured[i] {
+            Source::State(k) => unit(k, j),
+            Source::Output(k) => outputs
+                .as_ref()
+                .map_or(f64::NAN, |(_, slopes)| slopes[(k, j)]),
+        });
+        let c_d = DMatrix::zeros(c.nrows(), b_d.ncols());
+        check_offset_free(&a, &b_d, &c, &c_d)
+            .map_err(|error| MpcError::new("estimator, disturbances", error.to_string()))
+    }
+}
+
+/// Where the readings come from.
+fn sources(
+    plant: &Plant,
+    names: &Names,
+    settings: &EstimatorSettings,
+    most: usize,
+) -> Result<Vec<Source>, MpcError> {
+    let place = "estimator, measured";
+    if settings.measured.is_empty() || settings.measured.len() > most {
+        let fault = format!(
+            "there are {}; there must be from 1 to {most}",
+            settings.measured.len()
+        );
+        return Err(MpcError::new(place, fault));
+    }
+    let of_input = crate::tasks::outputs_of_input(plant.data());
+    let source = |name: &String| {
+        let of = |axis: Axis| names.of(axis).iter().position(|known| known == name);
+        match (of(Axis::States), of(Axis::Outputs)) {
+            (Some(i), _) => Ok(Source::State(i)),
+            (None, Some(k)) if of_input[k] => {
+                let fault = format!("{name:?} depends on the input, which a sensor must not");
+                Err(MpcError::new(place, fault))
+            }
+            (None, Some(k)) => Ok(Source::Output(k)),
+            (None, None) => {
+                let known = [names.of(Axis::States), names.of(Axis::Outputs)].concat();
+                let fault = format!(
+                    "{name:?} is no state or output; there are {}",
+                    known.join(", ")
+                );
+                Err(MpcError::new(place, fault))
+            }
+        }
+    };
+    settings.measured.iter().map(source).collect()
+}

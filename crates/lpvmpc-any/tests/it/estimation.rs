@@ -1,0 +1,226 @@
+//! Behind an estimator and a delay.
+
+use crate::plants::limits;
+use lpvmpc_any::{Disturbance, EstimatorSettings, Mpc, MpcSettings, Preview, Verdict};
+use lpvmpc_plant::{Matrices, Plant, PlantData};
+use nalgebra::{DMatrix, DVector, dmatrix, dvector};
+
+fn cart_pole() -> Plant {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/plants/");
+    Plant::load(format!("{folder}cart-pole.json")).unwrap()
+}
+
+/// The plant as it really is, in many small steps.
+fn moved(plant: &Plant, x: &DVector<f64>, force: f64, duration: f64) -> DVector<f64> {
+    const STEPS: usize = 40;
+    let h = duration / STEPS as f64;
+    let f = |x: &DVector<f64>| DVector::from_vec(plant.derivative(x.as_slice(), &[force]).unwrap());
+    (0..STEPS).fold(x.clone(), |x, _| {
+        let half = &x + f(&x) * (h / 2.0);
+        &x + f(&half) * h
+    })
+}
+
+fn settings(with_changes: bool) -> MpcSettings {
+    MpcSettings {
+        r_du: with_changes.then(|| dmatrix![0.05]),
+        du_bounds: with_changes.then(|| limits(&[4.0])).flatten(),
+        ..MpcSettings::new(0.04, 40, &[20.0, 10.0, 0.1, 0.1], &[0.01])
+    }
+}
+
+fn estimator(delay: f64, disturbances: Vec<Disturbance>) -> EstimatorSettings {
+    EstimatorSettings {
+        delay,
+        disturbances,
+        initial_state: vec![0.1, 0.1, 0.1, 0.1],
+        ..EstimatorSettings::new(
+            &["tip_position", "tilt"],
+            &[1e-6, 1e-6],
+            &[1e-6, 1e-6, 1e-3, 1e-3],
+        )
+    }
+}
+
+/// The last positions of a loop on a cart with a heavier pole, more friction and a constant force, whose input acts
+/// late: the mean of the last second.
+fn position(with_changes: bool, disturbances: Vec<Disturbance>, delay: usize) -> f64 {
+    let mut real = cart_pole();
+    real.set_parameter("pole_mass", 0.36).unwrap();
+    real.set_parameter("friction", 0.3).unwrap();
+    let (t_s, push) = (0.04, 1.5);
+    let mut mpc = Mpc::new(&cart_pole(), &settings(with_changes)).unwrap();
+    mpc.set_estimator(Some(&estimator(delay as f64 * t_s, disturbances)))
+        .unwrap();
+    let mut x = dvector![0.0, 0.05, 0.0, 0.0];
+    let mut sent = vec![0.0; delay];
+    let (mut sum, mut last) = (0.0, 0.0_f64);
+    const SAMPLES: usize = 400;
+    for k in 0..SAMPLES {
+        let y = real.output(x.as_slice(), &[0.0]).unwrap();
+        let verdicts = mpc
+            .observe(k as f64 * t_s, &[Some(y[0]), Some(x[1])])
+            .unwrap();
+        assert!(
+            verdicts.iter().all(|verdict| verdict.is_used()),
+            "{k}: {verdicts:?}"
+        );
+        let plan = mpc.decide(&Preview::to(&[0.4, 0.0, 0.0, 0.0])).unwrap();
+        assert!(plan.is_solved(), "{k}: {}", plan.status);
+        let u = plan.first_input()[0];
+        assert!(!with_changes || (u - last).abs() <= 4.0 + 1e-9);
+        last = u;
+        sent.push(u);
+        x = moved(&real, &x, sent[k] + push, t_s);
+        sum += if k >= SAMPLES - 25 { x[0] / 25.0 } else { 0.0 };
+    }
+    sum
+}
+
+fn force() -> Vec<Disturbance> {
+    vec![Disturbance {
+        on: "force".to_owned(),
+        noise: 0.1,
+        initial: 1.0,
+    }]
+}
+
+/// With the force among what is estimated the cart comes to its place, whatever acts on it and however wrong its
+/// parameters are; without it does not.
+#[test]
+fn a_loop_tracks_without_offset_behind_a_delay() {
+    for (with_changes, delay) in [(false, 2), (true, 2), (false, 0)] {
+        let position = position(with_changes, force(), delay);
+        assert!(
+            (position - 0.4).abs() < 1e-4,
+            "{with_changes}, {delay}: {position}"
+        );
+    }
+    let without = position(false, Vec::new(), 2);
+    assert!((without - 0.4).abs() > 0.02, "{without}");
+}
+
+/// Disturbances of a state and beside an input in discrete time, and one that is known: found to the last digits, and
+/// tracked without offset.
+#[test]
+fn disturbances_of_a_sampled_plant_are_found() {
+    let matrices = Matrices {
+        a: dmatrix![1.0, 0.1, 0.0; -0.05, 0.95, 0.02; 0.0, 0.1, 0.9],
+        b: dmatrix![0.005, 0.0; 0.1, 0.02; 0.0, 0.1],
+        c: Some(dmatrix![1.0, 0.0, 0.5; 0.0, 0.0, 1.0]),
+        period: Some(0.1),
+        ..Matrices::default()
+    };
+    let plant = Plant::new(PlantData::of_matrices("linear", &matrices).unwrap()).unwrap();
+    let settings = MpcSettings {
+        q_y: Some(DMatrix::from_diagonal(&dvector![10.0, 5.0])),
+        ..MpcSettings::new(0.1, 25, &[0.0, 0.1, 0.0], &[0.05, 0.1])
+    };
+    let disturbance = |on: &str| Disturbance {
+        on: on.to_owned(),
+        noise: 1e-3,
+        initial: 1.0,
+    };
+    let estimator = EstimatorSettings {
+        disturbances: vec![disturbance("x1"), disturbance("u1")],
+        delay: 0.3,
+        ..EstimatorSettings::new(&["y0", "y1"], &[1e-8, 1e-8], &[1e-6; 3])
+    };
+    let mut mpc = Mpc::new(&plant, &settings).unwrap();
+    mpc.set_estimator(Some(&estimator)).unwrap();
+    let c = matrices.c.as_ref().unwrap();
+    let known = |k: usize| dvector![0.0, 0.02 * (0.1 * k as f64).sin(), 0.0];
+    let mut x = dvector![0.5, 0.0, -0.2];
+    let mut sent = vec![dvector![0.0, 0.0]; 3];
+    for k in 0..250 {
+        let y = c * &x;
+        mpc.observe(0.1 * k as f64, &[Some(y[0]), (k % 3 != 1).then_some(y[1])])
+            .unwrap();
+        let preview = Preview {
+            disturbance: (k + 3..k + 30).map(known).collect(),
+            ..Preview::to_outputs(&[0.3, 0.05])
+        };
+        let plan = mpc.decide(&preview).unwrap();
+        assert!(plan.is_solved(), "{k}: {}", plan.status);
+        sent.push(DVector::from_vec(plan.first_input()));
+        let acting = &sent[k] + dvector![0.0, 0.3];
+        // What is known acts from when it was told.
+        let known = if k < 3 { DVector::zeros(3) } else { known(k) };
+        x = &matrices.a * &x + &matrices.b * acting + dvector![0.0, -0.04, 0.0] + known;
+    }
+    let estimate = mpc.estimate().unwrap();
+    assert!(
+        (estimate.disturbances[0] + 0.04).abs() < 1e-4,
+        "{estimate:?}"
+    );
+    assert!(
+        (estimate.disturbances[1] - 0.3).abs() < 1e-3,
+        "{estimate:?}"
+    );
+    let y = c * &x;
+    assert!(
+        (y[0] - 0.3).abs() < 0.02 && (y[1] - 0.05).abs() < 0.02,
+        "{y}"
+    );
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    let mut mpc = Mpc::new(&cart_pole(), &settings(false)).unwrap();
+    let said = mpc.decide(&Preview::default()).unwrap_err().to_string();
+    assert_eq!(said, "estimator: there is none: see `set_estimator`");
+    let sound = estimator(0.08, force());
+    let mut refused = |change: &dyn Fn(&mut EstimatorSettings)| {
+        let mut settings = sound.clone();
+        change(&mut settings);
+        mpc.set_estimator(Some(&settings)).unwrap_err().to_string()
+    };
+    for (found, expected) in [
+        (
+            refused(&|s| s.measured[0] = "tip".to_owned()),
+            "estimator, measured: \"tip\" is no state or output; there are position, tilt, speed, rate, tip_position, tip_height",
+        ),
+        (
+            refused(&|s| s.measurement_noise = vec![1.0]),
+            "estimator, measurement_noise: it has 1 entries; there must be 2, one for each reading",
+        ),
+        (
+            refused(&|s| s.disturbances[0].on = "wind".to_owned()),
+            "estimator, disturbances: \"wind\" is no input or state; there are force, position, tilt, speed, rate",
+        ),
+        (
+            refused(&|s| s.delay = -1.0),
+            "estimator, delay: it is -1 s; it must be from 0 to 1000 samples",
+        ),
+    ] {
+        assert_eq!(found, expected);
+    }
+    // From the tilt alone a force that is constant cannot be told from one that the cart's friction takes.
+    let said = refused(&|s| {
+        (s.measured, s.measurement_noise) = (vec!["tilt".to_owned()], vec![1e-6]);
+        s.disturbances.push(Disturbance {
+            on: "speed".to_owned(),
+            noise: 0.0,
+            initial: 1.0,
+        });
+    });
+    assert!(
+        said.contains("2 disturbances cannot be found with 1"),
+        "{said}"
+    );
+    let said = refused(&|s| s.state_noise[0] = f64::NAN);
+    assert!(said.contains("variance of the state's noise 0"), "{said}");
+    // Nothing was measured yet: the answer says so, and sends nothing.
+    mpc.set_estimator(Some(&sound)).unwrap();
+    let plan = mpc.decide(&Preview::default()).unwrap();
+    assert!(
+        !plan.is_solved() && plan.u[(0, 0)] == 0.0,
+        "{}",
+        plan.status
+    );
+    assert_eq!(
+        mpc.observe(0.0, &[Some(f64::NAN), None]).unwrap(),
+        [Verdict::NotFinite, Verdict::Missing]
+    );
+    assert!(mpc.observe(0.0, &[None]).is_err());
+}
