@@ -8,7 +8,7 @@
 
 use crate::model::Scalar;
 use crate::ocp::{Common, Stage};
-use crate::small_matrix::{add_product, product, transposed_product};
+use crate::small_matrix::*;
 use nalgebra::{SMatrix, SVector, convert};
 
 /// Cost-to-go x'Px/2 + p'x.
@@ -30,8 +30,9 @@ impl<T: Scalar, const NX: usize> CostToGo<T, NX> {
     }
 }
 
-/// What a stage's minimisation leaves behind: the policy u = K x + k + L^-T v and the dynamics
-/// under it, x+ = (A + BK) x + B L^-T v + (c + B k).
+/// What a stage's minimisation leaves behind: the policy u = K x + k + L^-T v and, once
+/// [`close_loop`](Self::close_loop) has been called, how the next state answers to x and v under it,
+/// x+ = (A + BK) x + B L^-T v + const.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StageFactor<T, const NX: usize, const NU: usize> {
     /// Feedback K, `NU` x `NX`, with the sign of u = K x; gains are for u = -K x throughout.
@@ -44,8 +45,6 @@ pub struct StageFactor<T, const NX: usize, const NU: usize> {
     pub closed_loop: SMatrix<T, NX, NX>,
     /// B L^-T, `NX` x `NU`.
     pub input: SMatrix<T, NX, NU>,
-    /// c + B k, `NX`.
-    pub drift: SVector<T, NX>,
 }
 
 /// R + B'PB is not positive definite: the pivot that is not positive (or not finite).
@@ -61,12 +60,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
             inverse_factor: SMatrix::zeros(),
             closed_loop: SMatrix::zeros(),
             input: SMatrix::zeros(),
-            drift: SVector::zeros(),
         }
     }
 
     /// One backward step: takes the cost-to-go behind `stage`, whose bounds do not matter here, to the
-    /// one in front of it, and leaves the stage's factor in `self`.
+    /// one in front of it, and leaves the stage's policy in `self`.
     ///
     /// # Errors
     /// [`BadPivot`] if R + B'PB is not numerically positive definite.
@@ -79,35 +77,42 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     ) -> Result<(), BadPivot<T>> {
         let Stage { a, b, c, .. } = stage;
         let CostToGo { quadratic, linear } = cost_to_go;
-        let p_a = product(quadratic, a);
-        let p_b = product(quadratic, b);
-        let p_next = *linear + product(quadratic, c);
+        let (a_t, b_t) = (a.transpose(), b.transpose());
+        let p_b = block_product(quadratic, b);
 
-        // H u = -(G x + g) is the condition for the stage's minimum. P is symmetric, so
-        // B'P = (P B)'.
-        let hessian = weights.r + transposed_product(b, &p_b);
-        let g_x = weights.s + transposed_product(&p_b, a);
-        let g = stage.linear_u + transposed_product(b, &p_next);
+        // H u = -(G x + g) is the condition for the stage's minimum.
+        let hessian = sum_of_product(&weights.r, &b_t, &p_b);
         let UnitFactor { inverse, pivots } = UnitFactor::new(&hessian)?;
         let reciprocals = pivots.map(|pivot| T::one() / pivot);
-        let l_g_x = product(&inverse, &g_x);
-        let scaled_g_x = scaled_rows(&l_g_x, &reciprocals);
-        let scaled_g = scaled_rows(&product(&inverse, &g), &reciprocals);
-        self.feedback = -transposed_product(&inverse, &scaled_g_x);
-        self.feedforward = -transposed_product(&inverse, &scaled_g);
+
+        let p_a = block_product(quadratic, a);
+        let p_next = sum_of_product(linear, quadratic, c);
+        let g_t = sum_of_product(&weights.s.transpose(), &a_t, &p_b);
+        let g = sum_of_product(&stage.linear_u, &b_t, &p_next);
+
+        // L^-1 G, transposed, and -D^-1 of it.
+        let z = times_transposed_lower(&g_t, &inverse);
+        let z_scaled = SMatrix::<T, NX, NU>::from_fn(|i, j| -(z[(i, j)] * reciprocals[j]));
+        let l_g = product(&inverse, &g);
+        let g_scaled = -scaled_rows(&l_g, &reciprocals);
+        self.feedback = times_lower(&z_scaled, &inverse).transpose();
+        self.feedforward = transposed_product(&inverse, &g_scaled);
 
         // A'P(A + BK) + Q + S'K, and the same for the linear part.
-        *quadratic = symmetric(
-            &(weights.q + transposed_product(a, &p_a) - transposed_product(&l_g_x, &scaled_g_x)),
-        );
-        *linear =
-            stage.linear_x + transposed_product(a, &p_next) - transposed_product(&l_g_x, &scaled_g);
+        symmetric_sum_of_products(quadratic, &weights.q, (&a_t, &p_a), (&z, &z_scaled.transpose()));
+        *linear = sum_of_products(&stage.linear_x, (&a_t, &p_next), (&z, &g_scaled));
 
         self.inverse_factor = scaled_rows(&inverse, &reciprocals.map(|d| d.sqrt()));
-        self.closed_loop = a + product(b, &self.feedback);
-        self.input = product(b, &self.inverse_factor.transpose());
-        self.drift = c + product(b, &self.feedforward);
         Ok(())
+    }
+
+    /// Leaves the derivatives of the next state under the policy that [`eliminate`](Self::eliminate)
+    /// found for `stage` in `closed_loop` and `input`. Only who forms rows of bounds needs them, and
+    /// for many states they are a good part of the work.
+    #[inline(never)]
+    pub fn close_loop(&mut self, stage: &Stage<T, NX, NU>) {
+        self.closed_loop = sum_of_product(&stage.a, &stage.b, &self.feedback);
+        self.input = times_transposed_lower(&stage.b, &self.inverse_factor);
     }
 
     /// The input at the state `x` with the normalised deviation `v`.
@@ -118,21 +123,44 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         u += transposed_product(&self.inverse_factor, v);
         u
     }
-
-    /// The next state under the policy.
-    #[inline(always)]
-    pub fn next(&self, x: &SVector<T, NX>, v: &SVector<T, NU>) -> SVector<T, NX> {
-        let mut next = self.drift;
-        add_product(&mut next, &self.input, v);
-        add_product(&mut next, &self.closed_loop, x);
-        next
-    }
 }
 
+/// M L' with lower triangular L.
 #[inline(always)]
-/// The mean of `m` and its transpose: rounding would make the cost-to-go drift apart.
-fn symmetric<T: Scalar, const K: usize>(m: &SMatrix<T, K, K>) -> SMatrix<T, K, K> {
-    (m + m.transpose()) * convert::<f64, T>(0.5)
+fn times_transposed_lower<T: Scalar, const R: usize, const K: usize>(
+    m: &SMatrix<T, R, K>,
+    l: &SMatrix<T, K, K>,
+) -> SMatrix<T, R, K> {
+    let mut out = SMatrix::zeros();
+    for i in 0..K {
+        let mut column = m.data.0[i].map(|e| e * l[(i, i)]);
+        for k in 0..i {
+            for (o, m) in column.iter_mut().zip(&m.data.0[k]) {
+                *o += *m * l[(i, k)];
+            }
+        }
+        out.data.0[i] = column;
+    }
+    out
+}
+
+/// M L with lower triangular L.
+#[inline(always)]
+fn times_lower<T: Scalar, const R: usize, const K: usize>(
+    m: &SMatrix<T, R, K>,
+    l: &SMatrix<T, K, K>,
+) -> SMatrix<T, R, K> {
+    let mut out = SMatrix::zeros();
+    for i in 0..K {
+        let mut column = m.data.0[i].map(|e| e * l[(i, i)]);
+        for k in i + 1..K {
+            for (o, m) in column.iter_mut().zip(&m.data.0[k]) {
+                *o += *m * l[(k, i)];
+            }
+        }
+        out.data.0[i] = column;
+    }
+    out
 }
 
 #[inline(always)]
