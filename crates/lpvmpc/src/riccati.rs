@@ -31,8 +31,8 @@ impl<T: Scalar, const NX: usize> CostToGo<T, NX> {
 }
 
 /// What a stage's minimisation leaves behind: the policy u = K x + k + L^-T v and, once
-/// [`close_loop`](Self::close_loop) has been called, how the next state answers to x and v under it,
-/// x+ = (A + BK) x + B L^-T v + const.
+/// [`close_loop`](Self::close_loop) has been called, the dynamics under it,
+/// x+ = (A + BK) x + B L^-T v + (c + B k).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StageFactor<T, const NX: usize, const NU: usize> {
     /// Feedback K, `NU` x `NX`, with the sign of u = K x; gains are for u = -K x throughout.
@@ -45,6 +45,8 @@ pub struct StageFactor<T, const NX: usize, const NU: usize> {
     pub closed_loop: SMatrix<T, NX, NX>,
     /// B L^-T, `NX` x `NU`.
     pub input: SMatrix<T, NX, NU>,
+    /// c + B k, `NX`.
+    pub drift: SVector<T, NX>,
 }
 
 /// R + B'PB is not positive definite: the pivot that is not positive (or not finite).
@@ -60,6 +62,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
             inverse_factor: SMatrix::zeros(),
             closed_loop: SMatrix::zeros(),
             input: SMatrix::zeros(),
+            drift: SVector::zeros(),
         }
     }
 
@@ -106,13 +109,22 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         Ok(())
     }
 
-    /// Leaves the derivatives of the next state under the policy that [`eliminate`](Self::eliminate)
-    /// found for `stage` in `closed_loop` and `input`. Only who forms rows of bounds needs them, and
-    /// for many states they are a good part of the work.
+    /// Leaves the dynamics under the policy that [`eliminate`](Self::eliminate) has found for `stage` in
+    /// `self`. Only rows of bounds need them, and with many states they are a good part of the work.
     #[inline(never)]
     pub fn close_loop(&mut self, stage: &Stage<T, NX, NU>) {
         self.closed_loop = sum_of_product(&stage.a, &stage.b, &self.feedback);
         self.input = times_transposed_lower(&stage.b, &self.inverse_factor);
+        self.drift = sum_of_product(&stage.c, &stage.b, &self.feedforward);
+    }
+
+    /// The next state under the policy, by the closed loop.
+    #[inline(always)]
+    pub fn next(&self, x: &SVector<T, NX>, v: &SVector<T, NU>) -> SVector<T, NX> {
+        let mut next = self.drift;
+        add_product(&mut next, &self.input, v);
+        add_product(&mut next, &self.closed_loop, x);
+        next
     }
 
     /// The input at the state `x` with the normalised deviation `v`.

@@ -329,7 +329,12 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         let stages = ocp.stages.iter().zip(policy);
         for ((stage, (factor, v)), (u, x_next)) in stages.zip(places) {
             *u = factor.policy(&x, v);
-            x = stage.next(&x, u);
+            // Once there are rows, they and the trajectory are of the same matrices.
+            x = if self.closed {
+                factor.next(&x, v)
+            } else {
+                stage.next(&x, u)
+            };
             *x_next = x;
         }
         // A number that is not finite anywhere spreads to the last state or its input.
