@@ -8,8 +8,8 @@
 
 use crate::model::Scalar;
 use crate::ocp::{Common, Stage};
-use crate::small_matrix::*;
-use nalgebra::{SMatrix, SVector, convert};
+use crate::small_matrix::{add_product, plus_product, product, symmetric_sum, transposed_product};
+use nalgebra::{SMatrix, SVector};
 
 /// Cost-to-go x'Px/2 + p'x.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,30 +80,33 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     ) -> Result<(), BadPivot<T>> {
         let Stage { a, b, c, .. } = stage;
         let CostToGo { quadratic, linear } = cost_to_go;
-        let (a_t, b_t) = (a.transpose(), b.transpose());
-        let p_b = block_product(quadratic, b);
 
         // H u = -(G x + g) is the condition for the stage's minimum.
-        let hessian = sum_of_product(&weights.r, &b_t, &p_b);
+        let b_t = b.transpose();
+        let p_b = product(quadratic, b);
+        let hessian = plus_product(&weights.r, &b_t, &p_b);
         let UnitFactor { inverse, pivots } = UnitFactor::new(&hessian)?;
         let reciprocals = pivots.map(|pivot| T::one() / pivot);
 
-        let p_a = block_product(quadratic, a);
-        let p_next = sum_of_product(linear, quadratic, c);
-        let g_t = sum_of_product(&weights.s.transpose(), &a_t, &p_b);
-        let g = sum_of_product(&stage.linear_u, &b_t, &p_next);
+        let a_t = a.transpose();
+        let p_a = product(quadratic, a);
+        let p_next = plus_product(linear, quadratic, c);
+        // P is symmetric, so G' = S' + A'P B.
+        let g_x_t = plus_product(&weights.s.transpose(), &a_t, &p_b);
+        let g = plus_product(&stage.linear_u, &b_t, &p_next);
 
-        // L^-1 G, transposed, and -D^-1 of it.
-        let z = times_transposed_lower(&g_t, &inverse);
-        let z_scaled = SMatrix::<T, NX, NU>::from_fn(|i, j| -(z[(i, j)] * reciprocals[j]));
-        let l_g = product(&inverse, &g);
-        let g_scaled = -scaled_rows(&l_g, &reciprocals);
-        self.feedback = times_lower(&z_scaled, &inverse).transpose();
-        self.feedforward = transposed_product(&inverse, &g_scaled);
+        // (L^-1 G)' and -(D^-1 L^-1 G)', whose columns are as long as a state.
+        let l_g_x_t = times_transposed_lower(&g_x_t, &inverse);
+        let scaled_g_x_t = scaled_columns(&l_g_x_t, &-reciprocals);
+        let scaled_g = -scaled_rows(&product(&inverse, &g), &reciprocals);
+        self.feedback = times_lower(&scaled_g_x_t, &inverse).transpose();
+        self.feedforward = transposed_product(&inverse, &scaled_g);
 
         // A'P(A + BK) + Q + S'K, and the same for the linear part.
-        symmetric_sum_of_products(quadratic, &weights.q, (&a_t, &p_a), (&z, &z_scaled.transpose()));
-        *linear = sum_of_products(&stage.linear_x, (&a_t, &p_next), (&z, &g_scaled));
+        let scaled_g_x = scaled_g_x_t.transpose();
+        symmetric_sum(quadratic, &weights.q, (&a_t, &p_a), (&l_g_x_t, &scaled_g_x));
+        let front = plus_product(&stage.linear_x, &a_t, &p_next);
+        *linear = plus_product(&front, &l_g_x_t, &scaled_g);
 
         self.inverse_factor = scaled_rows(&inverse, &reciprocals.map(|d| d.sqrt()));
         Ok(())
@@ -113,9 +116,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     /// `self`. Only rows of bounds need them, and with many states they are a good part of the work.
     #[inline(never)]
     pub fn close_loop(&mut self, stage: &Stage<T, NX, NU>) {
-        self.closed_loop = sum_of_product(&stage.a, &stage.b, &self.feedback);
+        self.closed_loop = plus_product(&stage.a, &stage.b, &self.feedback);
         self.input = times_transposed_lower(&stage.b, &self.inverse_factor);
-        self.drift = sum_of_product(&stage.c, &stage.b, &self.feedforward);
+        self.drift = plus_product(&stage.c, &stage.b, &self.feedforward);
     }
 
     /// The next state under the policy, by the closed loop.
@@ -137,46 +140,65 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     }
 }
 
-/// M L' with lower triangular L.
+/// `m` L' with the lower triangular matrix `l`.
 #[inline(always)]
 fn times_transposed_lower<T: Scalar, const R: usize, const K: usize>(
     m: &SMatrix<T, R, K>,
     l: &SMatrix<T, K, K>,
 ) -> SMatrix<T, R, K> {
-    let mut out = SMatrix::zeros();
-    for i in 0..K {
-        let mut column = m.data.0[i].map(|e| e * l[(i, i)]);
+    let mut out = SMatrix::<T, R, K>::zeros();
+    for (i, out) in out.data.0.iter_mut().enumerate() {
+        let mut column = m.data.0[i].map(|entry| entry * l[(i, i)]);
         for k in 0..i {
-            for (o, m) in column.iter_mut().zip(&m.data.0[k]) {
-                *o += *m * l[(i, k)];
-            }
+            add_scaled(&mut column, &m.data.0[k], l[(i, k)]);
         }
-        out.data.0[i] = column;
+        *out = column;
     }
     out
 }
 
-/// M L with lower triangular L.
+/// `m` L with the lower triangular matrix `l`.
 #[inline(always)]
 fn times_lower<T: Scalar, const R: usize, const K: usize>(
     m: &SMatrix<T, R, K>,
     l: &SMatrix<T, K, K>,
 ) -> SMatrix<T, R, K> {
-    let mut out = SMatrix::zeros();
-    for i in 0..K {
-        let mut column = m.data.0[i].map(|e| e * l[(i, i)]);
-        for k in i + 1..K {
-            for (o, m) in column.iter_mut().zip(&m.data.0[k]) {
-                *o += *m * l[(k, i)];
-            }
+    let mut out = SMatrix::<T, R, K>::zeros();
+    for (j, out) in out.data.0.iter_mut().enumerate() {
+        let mut column = m.data.0[j].map(|entry| entry * l[(j, j)]);
+        for k in j + 1..K {
+            add_scaled(&mut column, &m.data.0[k], l[(k, j)]);
         }
-        out.data.0[i] = column;
+        *out = column;
     }
     out
 }
 
+/// sum += `column` factor
 #[inline(always)]
+fn add_scaled<T: Scalar, const R: usize>(sum: &mut [T; R], column: &[T; R], factor: T) {
+    for (sum, entry) in sum.iter_mut().zip(column) {
+        *sum += *entry * factor;
+    }
+}
+
+/// `m` diag(`factors`)
+#[inline(always)]
+fn scaled_columns<T: Scalar, const R: usize, const C: usize>(
+    m: &SMatrix<T, R, C>,
+    factors: &SVector<T, C>,
+) -> SMatrix<T, R, C> {
+    let mut out = *m;
+    for (column, factor) in out.data.0.iter_mut().zip(&factors.data.0[0]) {
+        for entry in column {
+            *entry *= *factor;
+        }
+    }
+    out
+}
+
 /// diag(`factors`) `m`
+#[inline(always)]
 fn scaled_rows<T: Scalar, const R: usize, const C: usize>(
     m: &SMatrix<T, R, C>,
     factors: &SVector<T, R>,
