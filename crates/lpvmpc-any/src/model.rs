@@ -3,7 +3,7 @@
 use crate::error::MpcError;
 use crate::settings::LinearModels;
 use lpvmpc::{
-    AlongMotion, AlongRay, Dynamics, Embedding, GaussLegendre, LpvModel, Number, Tangent,
+    AlongMotion, AlongRay, Dynamics, Embedding, GaussLegendre, LpvModel, Number, Scalar, Tangent,
 };
 use lpvmpc_plant::{Plant, SizedEmbedding, SizedPlant};
 use nalgebra::{SMatrix, SVector};
@@ -19,6 +19,23 @@ pub(crate) struct Filled<P> {
 impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for Filled<SizedPlant<NX, NU>> {
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
         decaying(self.plant.f(x, u), x, self.states)
+    }
+
+    fn tangent<T: Scalar + Number>(
+        &self,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> Option<Tangent<T, NX, NU>> {
+        let (rate, mut a, b) = Dynamics::tangent(&self.plant, x, u)?;
+        decay(&mut a, self.states);
+        Some((decaying(rate, x, self.states), a, b))
+    }
+}
+
+/// The derivatives of what decays.
+fn decay<N: Number, const NX: usize>(a: &mut SMatrix<N, NX, NX>, from: usize) {
+    for i in from..NX {
+        a[(i, i)] = N::constant(-1.0);
     }
 }
 
@@ -45,9 +62,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         scheduling: &SVector<N, NS>,
     ) -> (SMatrix<N, NX, NX>, SMatrix<N, NX, NU>) {
         let (mut a, b) = Embedding::matrices(&self.plant, scheduling);
-        for i in self.states..NX {
-            a[(i, i)] = N::constant(-1.0);
-        }
+        decay(&mut a, self.states);
         (a, b)
     }
 
@@ -57,6 +72,26 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
 
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
         decaying(Embedding::f(&self.plant, x, u), x, self.states)
+    }
+
+    fn tangent<T: Scalar + Number>(
+        &self,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> Tangent<T, NX, NU> {
+        let (rate, mut a, b) = Embedding::tangent(&self.plant, x, u);
+        decay(&mut a, self.states);
+        (decaying(rate, x, self.states), a, b)
+    }
+
+    fn embedded<T: Scalar + Number>(
+        &self,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> Option<Tangent<T, NX, NU>> {
+        let (rate, mut a, b) = Embedding::embedded(&self.plant, x, u)?;
+        decay(&mut a, self.states);
+        Some((decaying(rate, x, self.states), a, b))
     }
 }
 

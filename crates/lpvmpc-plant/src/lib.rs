@@ -85,14 +85,18 @@ mod check;
 mod claims;
 mod code;
 mod data;
+mod derive;
 mod error;
 mod file;
 mod firmware;
 mod operation;
 mod plant;
+mod prepared;
+mod program;
 mod recording;
 mod sized;
 mod source;
+mod tangent;
 
 pub use data::{EmbeddingData, Equilibrium, Parameter, PlantData, Signal};
 pub use error::PlantError;

@@ -1,6 +1,6 @@
 //! A plant written once, for every kind of number.
 
-use crate::model::{LpvModel, Scalar};
+use crate::model::{LpvModel, Scalar, embedded_by_products};
 use crate::number::{Dual, Number};
 use crate::small_matrix::product;
 use crate::steady_state::{self, SteadyState, SteadyStateProblem};
@@ -68,12 +68,24 @@ pub trait Embedding<const NX: usize, const NU: usize, const NS: usize> {
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
     ) -> Tangent<T, NX, NU> {
-        tangent(
+        tangent_by_duals(
             x,
             u,
             |x: &SVector<Dual<T, NX>, NX>, u| self.f(x, u),
             |x, u| self.f(x, u),
         )
+    }
+
+    /// f with the matrices that it is made of, (f, A(s), B(s)), of a plant that has them cheaper together than one
+    /// by one; the same numbers, to rounding.
+    #[inline(always)]
+    fn embedded<T: Scalar + Number>(
+        &self,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> Option<Tangent<T, NX, NU>> {
+        let _ = (x, u);
+        None
     }
 
     /// See [`LpvModel::a_times`].
@@ -147,6 +159,12 @@ where
         Embedding::tangent(self, x, u)
     }
 
+    #[inline(always)]
+    fn embedded(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> Tangent<T, NX, NU> {
+        let together = Embedding::embedded(self, x, u);
+        together.unwrap_or_else(|| embedded_by_products(self, x, u))
+    }
+
     fn steady_state(
         &self,
         problem: &SteadyStateProblem<T, NX, NU>,
@@ -161,6 +179,18 @@ where
 pub trait Dynamics<const NX: usize, const NU: usize> {
     /// x_dot = f(x, u), in state units per second.
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX>;
+
+    /// f with its derivatives at `x` and `u`, of a plant that has them cheaper than by dual numbers; the same
+    /// numbers, to rounding.
+    #[inline(always)]
+    fn tangent<T: Scalar + Number>(
+        &self,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> Option<Tangent<T, NX, NU>> {
+        let _ = (x, u);
+        None
+    }
 }
 
 impl<P: Dynamics<NX, NU>, const NX: usize, const NU: usize> Dynamics<NX, NU> for &P {
@@ -168,11 +198,21 @@ impl<P: Dynamics<NX, NU>, const NX: usize, const NU: usize> Dynamics<NX, NU> for
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
         P::f(self, x, u)
     }
+
+    #[inline(always)]
+    fn tangent<T: Scalar + Number>(
+        &self,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> Option<Tangent<T, NX, NU>> {
+        P::tangent(self, x, u)
+    }
 }
 
-/// (f, df/dx, df/du) by two passes of dual numbers: one for the states, one for the inputs.
+/// (f, df/dx, df/du) at `x` and `u` by two passes of dual numbers: one for the states, one for the inputs. `by_x` and
+/// `by_u` are f of these.
 #[inline(always)]
-fn tangent<T: Scalar + Number, const NX: usize, const NU: usize>(
+pub fn tangent_by_duals<T: Scalar + Number, const NX: usize, const NU: usize>(
     x: &SVector<T, NX>,
     u: &SVector<T, NU>,
     by_x: impl Fn(&SVector<Dual<T, NX>, NX>, &SVector<Dual<T, NX>, NU>) -> SVector<Dual<T, NX>, NX>,

@@ -39,7 +39,7 @@ fn parted<T: Scalar, const NX: usize, const NU: usize, const NS: usize>(
     )
 }
 
-/// (f, df/dx, df/du) by one pass of dual numbers with `NS` = `NX` + `NU` slopes.
+/// (f, df/dx, df/du) as the plant has them, or by one pass of dual numbers with `NS` = `NX` + `NU` slopes.
 fn tangent<T, P, const NX: usize, const NU: usize, const NS: usize>(
     plant: &P,
     x: &SVector<T, NX>,
@@ -55,6 +55,9 @@ where
             "the scheduling is x and u: NS must be NX + NU"
         )
     };
+    if let Some(tangent) = plant.tangent(x, u) {
+        return tangent;
+    }
     let variable = |value: T, place: usize| {
         let mut variable = Dual::<T, NS>::fixed(value);
         if let Some(slope) = variable.slopes.get_mut(place) {

@@ -109,15 +109,7 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
     ) -> (SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-        // The embedding is exact, so its product is f.
-        let scheduling = self.scheduling(x, u);
-        let (a, b) = self.matrices(&scheduling);
-        let mut rate = self.a_times(&a, x);
-        add_product(&mut rate, &b, u);
-        if let Some(c) = self.offset(&scheduling) {
-            rate += c;
-        }
-        (rate, a, b)
+        embedded_by_products(self, x, u)
     }
 
     /// The steady state, f(x, u) = 0 within bounds, that is nearest to a reference; `None` where
@@ -131,6 +123,28 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
     ) -> Option<SteadyState<T, NX, NU>> {
         steady_state::nearest(self, problem)
     }
+}
+
+/// (f, A(s), B(s)), f as the sum of products that it is.
+#[inline(always)]
+pub(crate) fn embedded_by_products<P, T, const NX: usize, const NU: usize, const NS: usize>(
+    model: &P,
+    x: &SVector<T, NX>,
+    u: &SVector<T, NU>,
+) -> (SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>)
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS> + ?Sized,
+{
+    // The embedding is exact, so its product is f.
+    let scheduling = model.scheduling(x, u);
+    let (a, b) = model.matrices(&scheduling);
+    let mut rate = model.a_times(&a, x);
+    add_product(&mut rate, &b, u);
+    if let Some(c) = model.offset(&scheduling) {
+        rate += c;
+    }
+    (rate, a, b)
 }
 
 /// The derivatives of `g` at `at`, by central differences.
