@@ -21,21 +21,30 @@ impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for Filled<SizedPlant<NX
         decaying(self.plant.f(x, u), x, self.states)
     }
 
-    fn tangent<T: Scalar + Number>(
+    const TOGETHER: bool = true;
+
+    fn tangent_each<T: Scalar + Number, const POINTS: usize>(
         &self,
-        x: &SVector<T, NX>,
-        u: &SVector<T, NU>,
-    ) -> Option<Tangent<T, NX, NU>> {
-        let (rate, mut a, b) = Dynamics::tangent(&self.plant, x, u)?;
-        decay(&mut a, self.states);
-        Some((decaying(rate, x, self.states), a, b))
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
+        let mut tangents = Dynamics::tangent_each(&self.plant, x, u)?;
+        fill(&mut tangents, x, self.states);
+        Some(tangents)
     }
 }
 
-/// The derivatives of what decays.
-fn decay<N: Number, const NX: usize>(a: &mut SMatrix<N, NX, NX>, from: usize) {
-    for i in from..NX {
-        a[(i, i)] = N::constant(-1.0);
+/// What decays, from this state on.
+fn fill<T: Scalar, const NX: usize, const NU: usize>(
+    tangents: &mut [Tangent<T, NX, NU>],
+    x: &[SVector<T, NX>],
+    from: usize,
+) {
+    for ((rate, a, _), x) in tangents.iter_mut().zip(x) {
+        for i in from..NX {
+            rate[i] = -x[i];
+            a[(i, i)] = -T::one();
+        }
     }
 }
 
@@ -62,7 +71,9 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         scheduling: &SVector<N, NS>,
     ) -> (SMatrix<N, NX, NX>, SMatrix<N, NX, NU>) {
         let (mut a, b) = Embedding::matrices(&self.plant, scheduling);
-        decay(&mut a, self.states);
+        for i in self.states..NX {
+            a[(i, i)] = N::constant(-1.0);
+        }
         (a, b)
     }
 
@@ -79,19 +90,30 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
     ) -> Tangent<T, NX, NU> {
-        let (rate, mut a, b) = Embedding::tangent(&self.plant, x, u);
-        decay(&mut a, self.states);
-        (decaying(rate, x, self.states), a, b)
+        let [tangent] = Embedding::tangent_each(self, &[*x], &[*u]);
+        tangent
     }
 
-    fn embedded<T: Scalar + Number>(
+    const TOGETHER: bool = true;
+
+    fn tangent_each<T: Scalar + Number, const POINTS: usize>(
         &self,
-        x: &SVector<T, NX>,
-        u: &SVector<T, NU>,
-    ) -> Option<Tangent<T, NX, NU>> {
-        let (rate, mut a, b) = Embedding::embedded(&self.plant, x, u)?;
-        decay(&mut a, self.states);
-        Some((decaying(rate, x, self.states), a, b))
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS] {
+        let mut tangents = Embedding::tangent_each(&self.plant, x, u);
+        fill(&mut tangents, x, self.states);
+        tangents
+    }
+
+    fn embedded_each<T: Scalar + Number, const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
+        let mut embedded = Embedding::embedded_each(&self.plant, x, u)?;
+        fill(&mut embedded, x, self.states);
+        Some(embedded)
     }
 }
 
@@ -198,5 +220,27 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
 
     fn tangent(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> Tangent<f64, NX, NU> {
         whichever!(self, model => LpvModel::tangent(model, x, u))
+    }
+
+    const TOGETHER: bool = true;
+
+    fn embedded_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<f64, NX>; POINTS],
+        u: &[SVector<f64, NU>; POINTS],
+    ) -> [Tangent<f64, NX, NU>; POINTS] {
+        whichever!(self, model => LpvModel::embedded_each(model, x, u))
+    }
+
+    fn tangent_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<f64, NX>; POINTS],
+        u: &[SVector<f64, NU>; POINTS],
+    ) -> [Tangent<f64, NX, NU>; POINTS] {
+        whichever!(self, model => LpvModel::tangent_each(model, x, u))
+    }
+
+    fn has_offset(&self) -> bool {
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::has_offset(model))
     }
 }

@@ -89,6 +89,7 @@ mod derive;
 mod error;
 mod file;
 mod firmware;
+mod lanes;
 mod operation;
 mod plant;
 mod prepared;

@@ -1,8 +1,10 @@
 //! Codes with what can be worked out before they are evaluated.
 
 use crate::code::{Code, Leaf};
+use crate::lanes::Lanes;
 use crate::operation::Operation;
 use lpvmpc::Number;
+use nalgebra::SVector;
 use std::any::{Any, TypeId};
 
 /// The part of a program that some results need, in two forms.
@@ -96,6 +98,41 @@ impl Prepared {
             self.moving.evaluate_fast(&fixed.moving, leaf, result);
         } else {
             self.code.evaluate(&fixed.code, leaf, result);
+        }
+    }
+
+    /// The results at several states and inputs of at least the plant's sizes: in `f64` at once.
+    #[inline(always)]
+    pub fn evaluate_each<
+        N: Number,
+        const NX: usize,
+        const NU: usize,
+        const POINTS: usize,
+    >(
+        &self,
+        fixed: &Fixed,
+        x: &[SVector<N, NX>; POINTS],
+        u: &[SVector<N, NU>; POINTS],
+        mut result: impl FnMut(usize, [N; POINTS]),
+    ) {
+        // Known when this is compiled.
+        if TypeId::of::<N>() == TypeId::of::<f64>() {
+            let leaf = |leaf: Leaf| match leaf {
+                Leaf::State(i) => Lanes(std::array::from_fn(|k| float(x[k][i]))),
+                Leaf::Input(i) => Lanes(std::array::from_fn(|k| float(u[k][i]))),
+                Leaf::Scheduling(_) => Lanes([f64::NAN; POINTS]),
+            };
+            let result =
+                |place, values: Lanes<POINTS>| result(place, values.0.map(N::constant));
+            return self.moving.evaluate_fast(&fixed.moving, leaf, result);
+        }
+        let mut points = vec![[N::constant(0.0); POINTS]; self.code.results.len()];
+        for k in 0..POINTS {
+            let motion = (x[k].as_slice(), u[k].as_slice());
+            self.evaluate(fixed, motion, &[], |place, value| points[place][k] = value);
+        }
+        for (place, values) in points.into_iter().enumerate() {
+            result(place, values);
         }
     }
 

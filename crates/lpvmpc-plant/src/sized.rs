@@ -116,14 +116,16 @@ impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for SizedPlant<NX, NU> {
         rate
     }
 
+    const TOGETHER: bool = true;
+
     /// By formulas of their own, unless these would take longer than dual numbers.
-    fn tangent<T: Scalar + Number>(
+    fn tangent_each<T: Scalar + Number, const POINTS: usize>(
         &self,
-        x: &SVector<T, NX>,
-        u: &SVector<T, NU>,
-    ) -> Option<Tangent<T, NX, NU>> {
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
         let code = self.plant.formulas().tangent()?;
-        Some(code.evaluate(self.tangent.as_ref()?, x, u))
+        Some(code.evaluate_each(self.tangent.as_ref()?, x, u))
     }
 }
 
@@ -222,25 +224,36 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
     ) -> Tangent<T, NX, NU> {
-        let tangent = Dynamics::tangent(&self.plant, x, u);
-        let by_duals = || {
+        let [tangent] = Embedding::tangent_each(self, &[*x], &[*u]);
+        tangent
+    }
+
+    const TOGETHER: bool = true;
+
+    fn tangent_each<T: Scalar + Number, const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS] {
+        let by_duals = |i: usize| {
             lpvmpc::tangent_by_duals(
-                x,
-                u,
+                &x[i],
+                &u[i],
                 |x: &SVector<Dual<T, NX>, NX>, u| self.plant.f(x, u),
                 |x, u| self.plant.f(x, u),
             )
         };
-        tangent.unwrap_or_else(by_duals)
+        let tangents = Dynamics::tangent_each(&self.plant, x, u);
+        tangents.unwrap_or_else(|| std::array::from_fn(by_duals))
     }
 
-    /// As formulas of their own, without the products with what is always zero.
-    fn embedded<T: Scalar + Number>(
+    /// By formulas of their own, without the products with what is always zero.
+    fn embedded_each<T: Scalar + Number, const POINTS: usize>(
         &self,
-        x: &SVector<T, NX>,
-        u: &SVector<T, NU>,
-    ) -> Option<Tangent<T, NX, NU>> {
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
         let code = self.plant.plant.formulas().embedded()?;
-        Some(code.evaluate(self.embedded.as_ref()?, x, u))
+        Some(code.evaluate_each(self.embedded.as_ref()?, x, u))
     }
 }

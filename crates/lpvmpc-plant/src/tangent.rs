@@ -5,7 +5,7 @@ use crate::derive::{Varying, derive, needed};
 use crate::operation::Operation;
 use crate::prepared::{Fixed, Prepared};
 use crate::program::Program;
-use lpvmpc::Number;
+use lpvmpc::{Number, Scalar, Tangent};
 use nalgebra::{SMatrix, SVector};
 
 /// A code is no longer than this, nor are there more derivatives of all operations together: it takes some 10 ms to
@@ -107,28 +107,31 @@ impl TangentCode {
         self.code.fixed(parameters)
     }
 
-    /// x_dot and both matrices at a state and an input of at least the plant's sizes; what is left over is zero.
+    /// x_dot and both matrices at states and inputs of at least the plant's sizes; what is left over is zero.
     #[inline(always)]
-    pub fn evaluate<N: Number, const NX: usize, const NU: usize>(
+    pub fn evaluate_each<
+        T: Scalar + Number,
+        const NX: usize,
+        const NU: usize,
+        const POINTS: usize,
+    >(
         &self,
         fixed: &Fixed,
-        x: &SVector<N, NX>,
-        u: &SVector<N, NU>,
-    ) -> (SVector<N, NX>, SMatrix<N, NX, NX>, SMatrix<N, NX, NU>) {
-        let zero = N::constant(0.0);
-        let mut rate = SVector::repeat(zero);
-        let (mut a, mut b) = (SMatrix::repeat(zero), SMatrix::repeat(zero));
-        let motion = (x.as_slice(), u.as_slice());
-        self.code.evaluate(fixed, motion, &[], |place, value| {
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS] {
+        let mut tangents = [(SVector::zeros(), SMatrix::zeros(), SMatrix::zeros()); POINTS];
+        self.code.evaluate_each(fixed, x, u, |place, values| {
+            let places = tangents.iter_mut().zip(values);
             match place.checked_sub(self.rates) {
-                None => rate[place] = value,
+                None => places.for_each(|((rate, ..), value)| rate[place] = value),
                 Some(k) => match k.checked_sub(self.by_x.len()) {
-                    None => a[self.by_x[k]] = value,
-                    Some(k) => b[self.by_u[k]] = value,
+                    None => places.for_each(|((_, a, _), value)| a[self.by_x[k]] = value),
+                    Some(k) => places.for_each(|((.., b), value)| b[self.by_u[k]] = value),
                 },
             }
         });
-        (rate, a, b)
+        tangents
     }
 }
 

@@ -76,14 +76,27 @@ pub trait Embedding<const NX: usize, const NU: usize, const NS: usize> {
         )
     }
 
-    /// f with the matrices that it is made of, (f, A(s), B(s)), of a plant that has them cheaper together than one
-    /// by one; the same numbers, to rounding.
+    /// See [`LpvModel::TOGETHER`].
+    const TOGETHER: bool = false;
+
+    /// [`tangent`](Self::tangent) at several points.
     #[inline(always)]
-    fn embedded<T: Scalar + Number>(
+    fn tangent_each<T: Scalar + Number, const POINTS: usize>(
         &self,
-        x: &SVector<T, NX>,
-        u: &SVector<T, NU>,
-    ) -> Option<Tangent<T, NX, NU>> {
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS] {
+        core::array::from_fn(|i| self.tangent(&x[i], &u[i]))
+    }
+
+    /// f with the matrices that it is made of, (f, A(s), B(s)), at several points, of a plant that has them cheaper
+    /// together than one by one; the same numbers, to rounding.
+    #[inline(always)]
+    fn embedded_each<T: Scalar + Number, const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
         let _ = (x, u);
         None
     }
@@ -161,8 +174,33 @@ where
 
     #[inline(always)]
     fn embedded(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> Tangent<T, NX, NU> {
-        let together = Embedding::embedded(self, x, u);
-        together.unwrap_or_else(|| embedded_by_products(self, x, u))
+        match Embedding::embedded_each(self, &[*x], &[*u]) {
+            Some([embedded]) => embedded,
+            None => embedded_by_products(self, x, u),
+        }
+    }
+
+    const TOGETHER: bool = P::TOGETHER;
+
+    #[inline(always)]
+    fn embedded_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS] {
+        match Embedding::embedded_each(self, x, u) {
+            Some(embedded) => embedded,
+            None => core::array::from_fn(|i| embedded_by_products(self, &x[i], &u[i])),
+        }
+    }
+
+    #[inline(always)]
+    fn tangent_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS] {
+        Embedding::tangent_each(self, x, u)
     }
 
     fn steady_state(
@@ -180,14 +218,17 @@ pub trait Dynamics<const NX: usize, const NU: usize> {
     /// x_dot = f(x, u), in state units per second.
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX>;
 
-    /// f with its derivatives at `x` and `u`, of a plant that has them cheaper than by dual numbers; the same
+    /// See [`LpvModel::TOGETHER`].
+    const TOGETHER: bool = false;
+
+    /// f with its derivatives at several points, of a plant that has them cheaper than by dual numbers; the same
     /// numbers, to rounding.
     #[inline(always)]
-    fn tangent<T: Scalar + Number>(
+    fn tangent_each<T: Scalar + Number, const POINTS: usize>(
         &self,
-        x: &SVector<T, NX>,
-        u: &SVector<T, NU>,
-    ) -> Option<Tangent<T, NX, NU>> {
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
         let _ = (x, u);
         None
     }
@@ -199,13 +240,15 @@ impl<P: Dynamics<NX, NU>, const NX: usize, const NU: usize> Dynamics<NX, NU> for
         P::f(self, x, u)
     }
 
+    const TOGETHER: bool = P::TOGETHER;
+
     #[inline(always)]
-    fn tangent<T: Scalar + Number>(
+    fn tangent_each<T: Scalar + Number, const POINTS: usize>(
         &self,
-        x: &SVector<T, NX>,
-        u: &SVector<T, NU>,
-    ) -> Option<Tangent<T, NX, NU>> {
-        P::tangent(self, x, u)
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
+        P::tangent_each(self, x, u)
     }
 }
 

@@ -55,7 +55,7 @@ where
             "the scheduling is x and u: NS must be NX + NU"
         )
     };
-    if let Some(tangent) = plant.tangent(x, u) {
+    if let Some([tangent]) = plant.tangent_each(&[*x], &[*u]) {
         return tangent;
     }
     let variable = |value: T, place: usize| {
@@ -77,4 +77,20 @@ where
         SMatrix::from_fn(slope),
         SMatrix::from_fn(|i, j| slope(i, NX + j)),
     )
+}
+
+/// [`tangent`] at several points.
+fn tangent_each<T, P, const NX: usize, const NU: usize, const NS: usize, const POINTS: usize>(
+    plant: &P,
+    x: &[SVector<T, NX>; POINTS],
+    u: &[SVector<T, NU>; POINTS],
+) -> [Tangent<T, NX, NU>; POINTS]
+where
+    T: Scalar + Number,
+    P: Dynamics<NX, NU>,
+{
+    let together = plant.tangent_each(x, u);
+    let one_by_one =
+        || core::array::from_fn(|i| tangent::<_, _, NX, NU, NS>(plant, &x[i], &u[i]));
+    together.unwrap_or_else(one_by_one)
 }

@@ -112,6 +112,34 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
         embedded_by_products(self, x, u)
     }
 
+    /// Whether [`embedded_each`](Self::embedded_each) and [`tangent_each`](Self::tangent_each) take less time than one
+    /// point after the other.
+    const TOGETHER: bool = false;
+
+    /// [`embedded`](Self::embedded) at several points.
+    fn embedded_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [(SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>); POINTS] {
+        core::array::from_fn(|i| self.embedded(&x[i], &u[i]))
+    }
+
+    /// [`tangent`](Self::tangent) at several points.
+    fn tangent_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [(SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>); POINTS] {
+        core::array::from_fn(|i| self.tangent(&x[i], &u[i]))
+    }
+
+    /// Whether there is an [`offset`](Self::offset).
+    #[inline(always)]
+    fn has_offset(&self) -> bool {
+        self.offset(&SVector::zeros()).is_some()
+    }
+
     /// The steady state, f(x, u) = 0 within bounds, that is nearest to a reference; `None` where
     /// none is found.
     ///
