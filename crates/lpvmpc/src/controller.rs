@@ -415,7 +415,8 @@ where
             let Some(made) = samples((&states, &inputs)) else {
                 break;
             };
-            for (stage, made) in (&mut stages).zip(made) {
+            // In this order: a zip that ends has taken one more of its first part.
+            for (made, stage) in made.into_iter().zip(&mut stages) {
                 (stage.a, stage.b, stage.c) = made;
             }
             done += GROUP;
