@@ -2,6 +2,7 @@
 
 use crate::operation::{Binary, Operation, Unary};
 use lpvmpc::{Bivariate, Elementary, Number};
+use std::cell::RefCell;
 use std::collections::HashMap;
 
 /// The numbers that are given, in the order of their registers, which are the first ones.
@@ -71,6 +72,16 @@ pub(crate) struct Code {
     pub results: Vec<u32>,
     /// How many registers it takes.
     pub registers: usize,
+    /// The instructions again, of a code that takes few registers.
+    short: Vec<ShortInstruction>,
+}
+
+/// An instruction on few registers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ShortInstruction {
+    function: Function,
+    sources: [u8; MOST_SOURCES],
+    target: u8,
 }
 
 /// An operation with what it takes: the places of earlier ones.
@@ -345,7 +356,9 @@ impl Code {
             }
             instructions.push(instruction);
         }
+        let short = instructions.iter().filter(|_| registers <= FEW).map(short);
         Self {
+            short: short.collect(),
             leaves,
             instructions,
             results: results.iter().map(|result| register[*result]).collect(),
@@ -370,142 +383,142 @@ impl Code {
     ) {
         let zero = N::constant(0.0);
         match self.registers {
-            0..=32 => self.evaluate_on(&mut Checked(&mut [zero; 32]), fixed, leaf, result),
-            33..=64 => self.evaluate_on(&mut Checked(&mut [zero; 64]), fixed, leaf, result),
-            65..=256 => self.evaluate_on(&mut Checked(&mut [zero; 256]), fixed, leaf, result),
-            count => self.evaluate_on(&mut Checked(&mut vec![zero; count]), fixed, leaf, result),
+            0..=32 => self.evaluate_on(&mut [zero; 32], fixed, leaf, result),
+            33..=64 => self.evaluate_on(&mut [zero; 64], fixed, leaf, result),
+            65..=256 => self.evaluate_on(&mut [zero; 256], fixed, leaf, result),
+            count => self.evaluate_on(&mut vec![zero; count], fixed, leaf, result),
         }
     }
 
-    /// The same for a kind of number of which there is little code, and in less time.
+    /// The same for a kind of number with registers that are kept, and in less time.
     #[inline(always)]
-    pub fn evaluate_fast<N: Number>(
+    pub fn evaluate_fast<N: Kept>(
         &self,
-        fixed: &[f64],
-        leaf: impl Fn(Leaf) -> N,
-        result: impl FnMut(usize, N),
-    ) {
-        let zero = N::constant(0.0);
-        match self.registers {
-            0..=32 => self.evaluate_on(&mut Masked([zero; 32]), fixed, leaf, result),
-            33..=64 => self.evaluate_on(&mut Masked([zero; 64]), fixed, leaf, result),
-            65..=256 => self.evaluate_on(&mut Masked([zero; 256]), fixed, leaf, result),
-            count => self.evaluate_on(&mut Checked(&mut vec![zero; count]), fixed, leaf, result),
-        }
-    }
-
-    #[inline(always)]
-    fn evaluate_on<N: Number, R: Registers<N>>(
-        &self,
-        registers: &mut R,
         fixed: &[f64],
         leaf: impl Fn(Leaf) -> N,
         mut result: impl FnMut(usize, N),
     ) {
-        self.leaves.fill(registers.list(), fixed, leaf);
+        if self.registers > FEW {
+            return self.evaluate(fixed, leaf, result);
+        }
+        N::with(|registers| {
+            self.leaves.fill(registers, fixed, leaf);
+            run_short(&self.short, registers);
+            for (place, register) in self.results.iter().enumerate() {
+                result(place, registers[*register as u8 as usize]);
+            }
+        });
+    }
+
+    #[inline(always)]
+    fn evaluate_on<N: Number>(
+        &self,
+        registers: &mut [N],
+        fixed: &[f64],
+        leaf: impl Fn(Leaf) -> N,
+        mut result: impl FnMut(usize, N),
+    ) {
+        self.leaves.fill(registers, fixed, leaf);
         run(&self.instructions, registers);
         for (place, register) in self.results.iter().enumerate() {
-            result(place, registers.at(*register));
+            result(place, registers[*register as usize]);
         }
     }
 }
 
-/// Where numbers are kept. A code asks for no register that is not there.
-trait Registers<N> {
-    fn list(&mut self) -> &mut [N];
-    fn at(&self, register: u32) -> N;
-    fn set(&mut self, register: u32, value: N);
-}
+/// So many registers are kept: any `u8` is one of them, and need not be checked.
+pub(crate) const FEW: usize = 256;
 
-/// `LEN` registers, a power of two: any index is brought within them by a mask, which is cheaper than to
-/// check it.
-struct Masked<N, const LEN: usize>([N; LEN]);
-
-impl<N: Number, const LEN: usize> Registers<N> for Masked<N, LEN> {
-    #[inline(always)]
-    fn list(&mut self) -> &mut [N] {
-        &mut self.0
-    }
-
-    #[inline(always)]
-    fn at(&self, register: u32) -> N {
-        self.0[register as usize & (LEN - 1)]
-    }
-
-    #[inline(always)]
-    fn set(&mut self, register: u32, value: N) {
-        self.0[register as usize & (LEN - 1)] = value;
+fn short(instruction: &Instruction) -> ShortInstruction {
+    ShortInstruction {
+        function: instruction.function,
+        sources: instruction.sources.map(|source| source as u8),
+        target: instruction.target as u8,
     }
 }
 
-/// Any number of registers.
-struct Checked<'a, N>(&'a mut [N]);
+/// A kind of number with registers that are kept from one evaluation to the next: to clear them would take longer than
+/// many a code.
+pub(crate) trait Kept: Number {
+    /// Calls `run` with registers that hold anything.
+    fn with(run: impl FnOnce(&mut [Self; FEW]));
+}
 
-impl<N: Number> Registers<N> for Checked<'_, N> {
-    #[inline(always)]
-    fn list(&mut self) -> &mut [N] {
-        self.0
-    }
+thread_local! {
+    static FLOATS: RefCell<[f64; FEW]> = const { RefCell::new([0.0; FEW]) };
+}
 
+impl Kept for f64 {
     #[inline(always)]
-    fn at(&self, register: u32) -> N {
-        self.0[register as usize]
-    }
-
-    #[inline(always)]
-    fn set(&mut self, register: u32, value: N) {
-        self.0[register as usize] = value;
+    fn with(run: impl FnOnce(&mut [Self; FEW])) {
+        FLOATS.with_borrow_mut(run);
     }
 }
 
-/// Once in the machine code for each kind of number and of registers.
+/// Works the instructions out on the registers that `at` and `set` reach.
+macro_rules! work {
+    ($instructions:expr, $at:ident, $set:ident) => {
+        for instruction in $instructions {
+            let [x, y, z, w] = instruction.sources;
+            let target = instruction.target;
+            // Each stores its own value: a common place for all values would be copied once more.
+            match instruction.function {
+                Function::Add => $set!(target, $at!(x) + $at!(y)),
+                Function::Subtract => $set!(target, $at!(x) - $at!(y)),
+                Function::Multiply => $set!(target, $at!(x) * $at!(y)),
+                Function::Divide => $set!(target, $at!(x) / $at!(y)),
+                Function::Negative => $set!(target, -$at!(x)),
+                Function::Square => $set!(target, $at!(x) * $at!(x)),
+                Function::MultiplyAdd => $set!(target, $at!(x) * $at!(y) + $at!(z)),
+                Function::MultiplySubtract => $set!(target, $at!(x) * $at!(y) - $at!(z)),
+                Function::SubtractProduct => $set!(target, $at!(z) - $at!(x) * $at!(y)),
+                Function::AddProducts => $set!(target, $at!(x) * $at!(y) + $at!(z) * $at!(w)),
+                Function::SubtractProducts => {
+                    $set!(target, $at!(x) * $at!(y) - $at!(z) * $at!(w))
+                }
+                Function::SinCos => {
+                    let (sin, cos) = $at!(x).sin_cos();
+                    $set!(target, sin);
+                    $set!(y, cos);
+                }
+                Function::Whole(exponent) => $set!(target, $at!(x).powi(exponent.into())),
+                Function::Unary(function) => $set!(target, function.of($at!(x))),
+                Function::Bivariate(function) => {
+                    $set!(target, $at!(x).bivariate($at!(y), function))
+                }
+            }
+        }
+    };
+}
+
+/// Once in the machine code for each kind of number.
 #[inline(never)]
-fn run<N: Number, R: Registers<N>>(instructions: &[Instruction], registers: &mut R) {
-    for instruction in instructions {
-        let Instruction {
-            sources, target, ..
-        } = *instruction;
-        let [x, y, z, w] = sources;
-        // Each stores its own value: a common place for all values would be copied once more.
-        match instruction.function {
-            Function::Add => registers.set(target, registers.at(x) + registers.at(y)),
-            Function::Subtract => registers.set(target, registers.at(x) - registers.at(y)),
-            Function::Multiply => registers.set(target, registers.at(x) * registers.at(y)),
-            Function::Divide => registers.set(target, registers.at(x) / registers.at(y)),
-            Function::Negative => registers.set(target, -registers.at(x)),
-            Function::Square => registers.set(target, registers.at(x) * registers.at(x)),
-            Function::MultiplyAdd => {
-                let product = registers.at(x) * registers.at(y);
-                registers.set(target, product + registers.at(z));
-            }
-            Function::MultiplySubtract => {
-                let product = registers.at(x) * registers.at(y);
-                registers.set(target, product - registers.at(z));
-            }
-            Function::SubtractProduct => {
-                let product = registers.at(x) * registers.at(y);
-                registers.set(target, registers.at(z) - product);
-            }
-            Function::AddProducts => {
-                let product = registers.at(x) * registers.at(y);
-                registers.set(target, product + registers.at(z) * registers.at(w));
-            }
-            Function::SubtractProducts => {
-                let product = registers.at(x) * registers.at(y);
-                registers.set(target, product - registers.at(z) * registers.at(w));
-            }
-            Function::SinCos => {
-                let (sin, cos) = registers.at(x).sin_cos();
-                registers.set(target, sin);
-                registers.set(y, cos);
-            }
-            Function::Whole(exponent) => {
-                registers.set(target, registers.at(x).powi(exponent.into()));
-            }
-            Function::Unary(function) => registers.set(target, function.of(registers.at(x))),
-            Function::Bivariate(function) => {
-                registers.set(target, registers.at(x).bivariate(registers.at(y), function));
-            }
-        }
+fn run<N: Number>(instructions: &[Instruction], registers: &mut [N]) {
+    macro_rules! at {
+        ($register:expr) => {
+            registers[$register as usize]
+        };
     }
+    macro_rules! set {
+        ($register:expr, $value:expr) => {
+            registers[$register as usize] = $value
+        };
+    }
+    work!(instructions, at, set);
+}
+
+/// The same on few registers.
+#[inline(never)]
+fn run_short<N: Number>(instructions: &[ShortInstruction], registers: &mut [N; FEW]) {
+    macro_rules! at {
+        ($register:expr) => {
+            registers[usize::from($register)]
+        };
+    }
+    macro_rules! set {
+        ($register:expr, $value:expr) => {
+            registers[usize::from($register)] = $value
+        };
+    }
+    work!(instructions, at, set);
 }

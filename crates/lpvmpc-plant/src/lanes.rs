@@ -1,7 +1,10 @@
 //! Several numbers at once.
 
+use crate::code::{FEW, Kept};
 use lpvmpc::{Bivariate, Elementary, Number};
+use std::any::Any;
 use std::array::from_fn;
+use std::cell::RefCell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// The same quantity at several points. An instruction is read once for all of them, and none waits for another's
@@ -84,5 +87,23 @@ impl<const POINTS: usize> Number for Lanes<POINTS> {
             (sin.0[k], cos.0[k]) = Number::sin_cos(self.0[k]);
         }
         (sin, cos)
+    }
+}
+
+thread_local! {
+    static FOURS: RefCell<[Lanes<4>; FEW]> = const { RefCell::new([Lanes([0.0; 4]); FEW]) };
+}
+
+impl<const POINTS: usize> Kept for Lanes<POINTS> {
+    /// Kept for the number of points that a controller takes together.
+    #[inline(always)]
+    fn with(run: impl FnOnce(&mut [Self; FEW])) {
+        FOURS.with_borrow_mut(|fours| {
+            let fours: &mut dyn Any = fours;
+            match fours.downcast_mut() {
+                Some(registers) => run(registers),
+                None => run(&mut [Self([0.0; POINTS]); FEW]),
+            }
+        });
     }
 }

@@ -116,7 +116,7 @@ impl Prepared {
         mut result: impl FnMut(usize, [N; POINTS]),
     ) {
         // Known when this is compiled.
-        if TypeId::of::<N>() == TypeId::of::<f64>() {
+        if TypeId::of::<N>() == TypeId::of::<f64>() && POINTS > 1 {
             let leaf = |leaf: Leaf| match leaf {
                 Leaf::State(i) => Lanes(std::array::from_fn(|k| float(x[k][i]))),
                 Leaf::Input(i) => Lanes(std::array::from_fn(|k| float(u[k][i]))),
@@ -125,6 +125,12 @@ impl Prepared {
             let result =
                 |place, values: Lanes<POINTS>| result(place, values.0.map(N::constant));
             return self.moving.evaluate_fast(&fixed.moving, leaf, result);
+        }
+        if POINTS == 1 {
+            let motion = (x[0].as_slice(), u[0].as_slice());
+            return self.evaluate(fixed, motion, &[], |place, value| {
+                result(place, [value; POINTS]);
+            });
         }
         let mut points = vec![[N::constant(0.0); POINTS]; self.code.results.len()];
         for k in 0..POINTS {

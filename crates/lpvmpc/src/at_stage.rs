@@ -128,6 +128,9 @@ where
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
     ) -> [Tangent<T, NX, NU>; POINTS] {
+        if self.is_the_plant() {
+            return self.plant.embedded_each(x, u);
+        }
         if self.scheduling.is_some() {
             return core::array::from_fn(|i| self.embedded(&x[i], &u[i]));
         }
@@ -140,6 +143,9 @@ where
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
     ) -> [Tangent<T, NX, NU>; POINTS] {
+        if self.is_the_plant() {
+            return self.plant.tangent_each(x, u);
+        }
         if self.scheduling.is_some() {
             return core::array::from_fn(|i| self.tangent(&x[i], &u[i]));
         }
