@@ -4,7 +4,7 @@ use crate::error::MpcError;
 use crate::linear_model::LinearModel;
 use crate::settings::LinearModels;
 use lpvmpc::{
-    AlongMotion, AlongRay, Dynamics, Embedding, GaussLegendre, LpvModel, Number, Tangent,
+    AlongMotion, AlongRay, Dynamics, Embedding, GaussLegendre, LpvModel, Number, Scalar, Tangent,
 };
 use lpvmpc_plant::{Plant, SizedEmbedding, SizedPlant};
 use nalgebra::{SMatrix, SVector};
@@ -17,17 +17,51 @@ pub(crate) struct Filled<P> {
     states: usize,
 }
 
+impl<P> Filled<P> {
+    /// The first of `places` that decays as x_dot = -x: in discrete time none, where what
+    /// nothing moves is zero after a period.
+    fn first_decaying(&self, places: usize, period: Option<f64>) -> usize {
+        match period {
+            None => self.states,
+            Some(_) => places,
+        }
+    }
+}
+
 impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for Filled<SizedPlant<NX, NU>> {
     fn period(&self) -> Option<f64> {
         Dynamics::period(&self.plant)
     }
 
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
-        let from = match self.period() {
-            None => self.states,
-            Some(_) => NX,
-        };
+        let from = self.first_decaying(NX, self.period());
         decaying(self.plant.f(x, u), x, from)
+    }
+
+    const TOGETHER: bool = true;
+
+    fn tangent_each<T: Scalar + Number, const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
+        let mut tangents = Dynamics::tangent_each(&self.plant, x, u)?;
+        fill(&mut tangents, x, self.first_decaying(NX, self.period()));
+        Some(tangents)
+    }
+}
+
+/// What decays, from this state on.
+fn fill<T: Scalar, const NX: usize, const NU: usize>(
+    tangents: &mut [Tangent<T, NX, NU>],
+    x: &[SVector<T, NX>],
+    from: usize,
+) {
+    for ((rate, a, _), x) in tangents.iter_mut().zip(x) {
+        for i in from..NX {
+            rate[i] = -x[i];
+            a[(i, i)] = -T::one();
+        }
     }
 }
 
@@ -58,10 +92,8 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         scheduling: &SVector<N, NS>,
     ) -> (SMatrix<N, NX, NX>, SMatrix<N, NX, NU>) {
         let (mut a, b) = Embedding::matrices(&self.plant, scheduling);
-        if Embedding::period(self).is_none() {
-            for i in self.states..NX {
-                a[(i, i)] = N::constant(-1.0);
-            }
+        for i in self.first_decaying(NX, Embedding::period(self))..NX {
+            a[(i, i)] = N::constant(-1.0);
         }
         (a, b)
     }
@@ -71,11 +103,47 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
     }
 
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
-        let from = match Embedding::period(self) {
-            None => self.states,
-            Some(_) => NX,
-        };
+        let from = self.first_decaying(NX, Embedding::period(self));
         decaying(Embedding::f(&self.plant, x, u), x, from)
+    }
+
+    fn tangent<T: Scalar + Number>(
+        &self,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> Tangent<T, NX, NU> {
+        let [tangent] = Embedding::tangent_each(self, &[*x], &[*u]);
+        tangent
+    }
+
+    const TOGETHER: bool = true;
+
+    fn tangent_each<T: Scalar + Number, const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS] {
+        let mut tangents = Embedding::tangent_each(&self.plant, x, u);
+        fill(
+            &mut tangents,
+            x,
+            self.first_decaying(NX, Embedding::period(self)),
+        );
+        tangents
+    }
+
+    fn embedded_each<T: Scalar + Number, const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
+        let mut embedded = Embedding::embedded_each(&self.plant, x, u)?;
+        fill(
+            &mut embedded,
+            x,
+            self.first_decaying(NX, Embedding::period(self)),
+        );
+        Some(embedded)
     }
 }
 
@@ -191,5 +259,27 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
 
     fn tangent(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> Tangent<f64, NX, NU> {
         whichever!(self, model => LpvModel::<f64, NX, NU, NS>::tangent(model, x, u))
+    }
+
+    const TOGETHER: bool = true;
+
+    fn embedded_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<f64, NX>; POINTS],
+        u: &[SVector<f64, NU>; POINTS],
+    ) -> [Tangent<f64, NX, NU>; POINTS] {
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::embedded_each(model, x, u))
+    }
+
+    fn tangent_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<f64, NX>; POINTS],
+        u: &[SVector<f64, NU>; POINTS],
+    ) -> [Tangent<f64, NX, NU>; POINTS] {
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::tangent_each(model, x, u))
+    }
+
+    fn has_offset(&self) -> bool {
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::has_offset(model))
     }
 }

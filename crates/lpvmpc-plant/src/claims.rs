@@ -68,10 +68,10 @@ fn check_equilibrium(plant: &Plant) -> Result<(), PlantError> {
 }
 
 fn check_embedding(plant: &Plant) -> Result<(), PlantError> {
-    let Some(embedding) = &plant.formulas().embedding else {
-        return Ok(());
-    };
     let data = plant.data();
+    if data.embedding.is_none() {
+        return Ok(());
+    }
     let (states, inputs) = (data.states.len(), data.inputs.len());
     let sides = sides(plant);
     let (formula, is) = match plant.period() {
@@ -88,11 +88,11 @@ fn check_embedding(plant: &Plant) -> Result<(), PlantError> {
         let values: Vec<f64> = sides.iter().enumerate().map(at).collect();
         let (x, u) = values.split_at(states);
         let rates = plant.motion(x, u)?;
-        let s = plant.values(&embedding.scheduling, (x, u), &[]);
-        let entries = plant.values(&embedding.matrices, (&[], &[]), &s);
+        let (mut s, mut entries, mut c) = (Vec::new(), Vec::new(), Vec::new());
+        plant.evaluate_scheduling((x, u), |_, value| s.push(value));
+        plant.evaluate_matrices(&s, |_, value| entries.push(value));
+        plant.evaluate_offset(&s, |_, value| c.push(value));
         let (a, b) = entries.split_at(states * states);
-        let offset = embedding.offset.as_ref();
-        let c = offset.map(|c| plant.values(c, (&[], &[]), &s));
         for (i, rate) in rates.iter().enumerate() {
             let row = |matrix: &[f64], columns: usize, by: &[f64]| -> (f64, f64) {
                 let terms = matrix[i * columns..].iter().zip(by).map(|(m, v)| m * v);
@@ -101,7 +101,7 @@ fn check_embedding(plant: &Plant) -> Result<(), PlantError> {
                 })
             };
             let (of_x, of_u) = (row(a, states, x), row(b, inputs, u));
-            let c = c.as_ref().map_or(0.0, |c| c[i]);
+            let c = c.get(i).map_or(0.0, |c| *c);
             let embedded = of_x.0 + of_u.0 + c;
             let size = 1.0 + of_x.1 + of_u.1 + c.abs() + rate.abs();
             // Negated, so that what is not finite where f is finite is not f.

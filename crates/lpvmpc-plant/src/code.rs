@@ -2,6 +2,7 @@
 
 use crate::operation::{Binary, Operation, Unary};
 use lpvmpc::{Bivariate, Elementary, Number};
+use std::cell::RefCell;
 use std::collections::HashMap;
 
 /// The numbers that are given, in the order of their registers, which are the first ones.
@@ -15,34 +16,52 @@ pub(crate) struct Leaves {
     pub scheduling: Vec<usize>,
 }
 
-/// Where given numbers come from.
-#[derive(Clone, Copy)]
-pub(crate) struct Given<'a, N> {
-    pub parameters: &'a [f64],
-    pub x: &'a [N],
-    pub u: &'a [N],
-    pub s: &'a [N],
+/// Which of the numbers that vary.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Leaf {
+    State(usize),
+    Input(usize),
+    Scheduling(usize),
 }
 
-/// What an instruction does.
+/// What an instruction does with the numbers x, y, z and w of its sources.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Function {
-    Unary(Unary),
-    Binary(Binary),
-    /// A power by multiplication.
-    Whole(i32),
-    /// sin and cos at once; cos goes where `second` says.
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Negative,
+    Square,
+    /// x y + z, rounded twice as one by one.
+    MultiplyAdd,
+    /// x y - z.
+    MultiplySubtract,
+    /// z - x y.
+    SubtractProduct,
+    /// x y + z w.
+    AddProducts,
+    /// x y - z w.
+    SubtractProducts,
+    /// sin and cos at once; cos goes where the second source says.
     SinCos,
+    /// A power by multiplication.
+    Whole(i8),
+    Unary(Unary),
+    Bivariate(Bivariate),
 }
 
-/// A function of the numbers in one or two registers, and where its value goes.
+/// A function of the numbers in some registers, and where its value goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Instruction {
     pub function: Function,
-    pub first: u32,
-    pub second: u32,
+    /// As many as the function takes; zero beyond.
+    pub sources: [u32; MOST_SOURCES],
     pub target: u32,
 }
+
+/// No function takes more numbers.
+const MOST_SOURCES: usize = 4;
 
 /// The part of a program that some results need.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,47 +72,95 @@ pub(crate) struct Code {
     pub results: Vec<u32>,
     /// How many registers it takes.
     pub registers: usize,
+    /// The instructions again, of a code that takes few registers.
+    short: Vec<ShortInstruction>,
+}
+
+/// An instruction on few registers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ShortInstruction {
+    function: Function,
+    sources: [u8; MOST_SOURCES],
+    target: u8,
+}
+
+/// An operation with what it takes: the places of earlier ones.
+#[derive(Clone)]
+struct Step {
+    function: Function,
+    sources: Vec<usize>,
 }
 
 /// Constant exponents of larger size are left to the power function.
 const LARGEST_WHOLE: f64 = 64.0;
 
-/// What the operation of an index becomes: a power with a constant exponent is products, or a root.
-fn function_of(operations: &[Operation], index: usize) -> Option<Function> {
-    match operations[index] {
-        Operation::Unary(function, _) => Some(Function::Unary(function)),
-        Operation::Binary(Binary::Bivariate(Bivariate::Power), _, exponent) => {
-            Some(match operations[exponent] {
-                Operation::Constant(0.5) => Function::Unary(Unary::Elementary(Elementary::Sqrt)),
+/// What the operation of an index becomes, if it is no leaf: a power with a constant exponent is products, or a root.
+fn step(operations: &[Operation], index: usize) -> Option<Step> {
+    let (function, sources) = match operations[index] {
+        Operation::Unary(function, x) => (
+            match function {
+                Unary::Negative => Function::Negative,
+                Unary::Square => Function::Square,
+                _ => Function::Unary(function),
+            },
+            vec![x],
+        ),
+        Operation::Binary(function, x, y) => match function {
+            Binary::Add => (Function::Add, vec![x, y]),
+            Binary::Subtract => (Function::Subtract, vec![x, y]),
+            Binary::Multiply => (Function::Multiply, vec![x, y]),
+            Binary::Divide => (Function::Divide, vec![x, y]),
+            Binary::Bivariate(Bivariate::Power) => match operations[y] {
+                Operation::Constant(0.5) => (
+                    Function::Unary(Unary::Elementary(Elementary::Sqrt)),
+                    vec![x],
+                ),
                 Operation::Constant(n) if n == n.trunc() && n.abs() <= LARGEST_WHOLE => {
-                    Function::Whole(n as i32)
+                    (Function::Whole(n as i8), vec![x])
                 }
-                _ => Function::Binary(Binary::Bivariate(Bivariate::Power)),
-            })
+                _ => (Function::Bivariate(Bivariate::Power), vec![x, y]),
+            },
+            Binary::Bivariate(function) => (Function::Bivariate(function), vec![x, y]),
+        },
+        _ => return None,
+    };
+    Some(Step { function, sources })
+}
+
+/// What the operations become that `results` need: `None` for leaves and for what is not needed; and which are needed.
+fn steps(operations: &[Operation], results: &[usize]) -> (Vec<Option<Step>>, Vec<bool>) {
+    let mut needed = vec![false; operations.len()];
+    results.iter().for_each(|result| needed[*result] = true);
+    let mut steps = vec![None; operations.len()];
+    for index in (0..operations.len()).rev() {
+        if needed[index] {
+            steps[index] = step(operations, index);
+            let step = steps[index].iter();
+            step.flat_map(|step| &step.sources)
+                .for_each(|source| needed[*source] = true);
         }
-        Operation::Binary(function, ..) => Some(Function::Binary(function)),
-        _ => None,
     }
+    (steps, needed)
 }
 
 const SIN: Function = Function::Unary(Unary::Elementary(Elementary::Sin));
 const COS: Function = Function::Unary(Unary::Elementary(Elementary::Cos));
 
 /// Of each sine and cosine of the same angle, the other.
-fn sines_and_cosines(
-    operations: &[Operation],
-    needed: impl Fn(&usize) -> bool,
-) -> HashMap<usize, usize> {
+fn sines_and_cosines(steps: &[Option<Step>]) -> HashMap<usize, usize> {
     let mut seen: HashMap<usize, [Option<usize>; 2]> = HashMap::new();
     let mut partners = HashMap::new();
-    for index in (0..operations.len()).filter(needed) {
-        let (this, that) = match function_of(operations, index) {
-            Some(SIN) => (0, 1),
-            Some(COS) => (1, 0),
+    for (index, step) in steps.iter().enumerate() {
+        let Some(Step { function, sources }) = step else {
+            continue;
+        };
+        let (this, that) = match *function {
+            SIN => (0, 1),
+            COS => (1, 0),
             _ => continue,
         };
-        for angle in operations[index].arguments() {
-            let pair = seen.entry(angle).or_default();
+        for angle in sources {
+            let pair = seen.entry(*angle).or_default();
             if pair[this].is_none() {
                 pair[this] = Some(index);
                 if let Some(other) = pair[that] {
@@ -106,12 +173,66 @@ fn sines_and_cosines(
     partners
 }
 
+/// Products that are read but once, by a sum or a difference, become parts of it.
+fn join_products(steps: &mut [Option<Step>], results: &[usize]) {
+    let mut reads = vec![0_usize; steps.len()];
+    for read in { steps.iter().flatten() }
+        .flat_map(|step| &step.sources)
+        .chain(results)
+    {
+        reads[*read] += 1;
+    }
+    for index in 0..steps.len() {
+        let Some(Step { function, sources }) = &steps[index] else {
+            continue;
+        };
+        let [x, y] = sources[..] else {
+            continue;
+        };
+        let product = |place: usize| match &steps[place] {
+            Some(Step {
+                function: Function::Multiply,
+                sources,
+            }) if reads[place] == 1 => Some(sources.clone()),
+            _ => None,
+        };
+        let joined = match (*function, product(x), product(y)) {
+            (Function::Add, Some(first), Some(second)) => {
+                (Function::AddProducts, [first, second].concat())
+            }
+            (Function::Subtract, Some(first), Some(second)) => {
+                (Function::SubtractProducts, [first, second].concat())
+            }
+            (Function::Add, Some(first), None) => {
+                (Function::MultiplyAdd, [first, vec![y]].concat())
+            }
+            (Function::Add, None, Some(second)) => {
+                (Function::MultiplyAdd, [second, vec![x]].concat())
+            }
+            (Function::Subtract, Some(first), None) => {
+                (Function::MultiplySubtract, [first, vec![y]].concat())
+            }
+            (Function::Subtract, None, Some(second)) => {
+                (Function::SubtractProduct, [second, vec![x]].concat())
+            }
+            _ => continue,
+        };
+        let inside = [x, y].map(|source| product(source).map(|_| source));
+        let (function, sources) = joined;
+        inside
+            .into_iter()
+            .flatten()
+            .for_each(|source| steps[source] = None);
+        steps[index] = Some(Step { function, sources });
+    }
+}
+
 impl Leaves {
     /// Those of the `needed` operations, and the register of each of these.
-    fn new(operations: &[Operation], needed: impl Fn(&usize) -> bool) -> (Self, Vec<u32>) {
+    fn new(operations: &[Operation], needed: &[bool]) -> (Self, Vec<u32>) {
         let mut leaves = Self::default();
         let mut places = vec![Vec::new(); 5];
-        for index in (0..operations.len()).filter(needed) {
+        for index in (0..operations.len()).filter(|index| needed[*index]) {
             let (kind, list, given) = match operations[index] {
                 Operation::Constant(value) => {
                     leaves.constants.push(value);
@@ -145,76 +266,80 @@ impl Leaves {
         self.constants.len() + lists.map(Vec::len).iter().sum::<usize>()
     }
 
-    /// Puts them into the first registers.
+    /// Puts them into the first registers: the `fixed` ones, then each `leaf`.
     #[inline(always)]
-    fn fill<N: Number>(&self, registers: &mut [N], given: Given<'_, N>) {
-        let (constants, rest) = registers.split_at_mut(self.constants.len());
-        for (register, value) in constants.iter_mut().zip(&self.constants) {
+    fn fill<N: Number>(&self, registers: &mut [N], fixed: &[f64], leaf: impl Fn(Leaf) -> N) {
+        let (places, rest) = registers.split_at_mut(fixed.len());
+        for (register, value) in places.iter_mut().zip(fixed) {
             *register = N::constant(*value);
         }
-        let (parameters, mut rest) = rest.split_at_mut(self.parameters.len());
-        for (register, i) in parameters.iter_mut().zip(&self.parameters) {
-            *register = N::constant(given.parameters[*i]);
+        let (states, rest) = rest.split_at_mut(self.states.len());
+        for (register, i) in states.iter_mut().zip(&self.states) {
+            *register = leaf(Leaf::State(*i));
         }
-        for (list, values) in [
-            (&self.states, given.x),
-            (&self.inputs, given.u),
-            (&self.scheduling, given.s),
-        ] {
-            let (places, others) = rest.split_at_mut(list.len());
-            for (register, i) in places.iter_mut().zip(list) {
-                *register = values[*i];
-            }
-            rest = others;
+        let (inputs, rest) = rest.split_at_mut(self.inputs.len());
+        for (register, i) in inputs.iter_mut().zip(&self.inputs) {
+            *register = leaf(Leaf::Input(*i));
+        }
+        for (register, i) in rest.iter_mut().zip(&self.scheduling) {
+            *register = leaf(Leaf::Scheduling(*i));
         }
     }
-}
-
-/// The earlier results that the operation of this index needs, given what it becomes.
-fn needs(operations: &[Operation], index: usize) -> impl Iterator<Item = usize> + use<> {
-    let count = match function_of(operations, index) {
-        Some(Function::Binary(_)) => 2,
-        Some(Function::Unary(_) | Function::Whole(_) | Function::SinCos) => 1,
-        None => 0,
-    };
-    operations[index].arguments().take(count)
 }
 
 impl Code {
     /// What the `results` of the program need; every operation refers to earlier ones only.
     pub fn new(operations: &[Operation], results: &[usize]) -> Self {
+        let (steps, needed) = steps(operations, results);
+        Self::of_steps(operations, &steps, &needed, results)
+    }
+
+    /// The same with products and sums in one instruction, where that is possible: the same numbers in less time.
+    pub fn joined(operations: &[Operation], results: &[usize]) -> Self {
+        let (mut steps, needed) = steps(operations, results);
+        join_products(&mut steps, results);
+        Self::of_steps(operations, &steps, &needed, results)
+    }
+
+    fn of_steps(
+        operations: &[Operation],
+        steps: &[Option<Step>],
+        needed: &[bool],
+        results: &[usize],
+    ) -> Self {
         // When a result is read last: the index of that operation, or never again.
-        let mut last_read = vec![None; operations.len()];
-        for result in results {
-            last_read[*result] = Some(usize::MAX);
+        let mut last_read = vec![0; operations.len()];
+        for (index, step) in steps.iter().enumerate() {
+            let sources = step.iter().flat_map(|step| &step.sources);
+            sources.for_each(|source| last_read[*source] = index);
         }
-        for index in (0..operations.len()).rev() {
-            if last_read[index].is_some() {
-                for argument in needs(operations, index) {
-                    last_read[argument] = last_read[argument].max(Some(index));
-                }
-            }
-        }
-        let needed = |index: &usize| last_read[*index].is_some();
+        results
+            .iter()
+            .for_each(|result| last_read[*result] = usize::MAX);
         let (leaves, mut register) = Leaves::new(operations, needed);
         let given = leaves.count();
-        let partners = sines_and_cosines(operations, needed);
+        let partners = sines_and_cosines(steps);
         let mut free: Vec<u32> = Vec::new();
         let mut registers = given;
         let mut instructions = Vec::new();
-        for index in (0..operations.len()).filter(needed) {
-            let Some(function) = function_of(operations, index) else {
+        for (index, step) in steps.iter().enumerate() {
+            let Some(Step { function, sources }) = step else {
                 continue;
             };
-            let mut arguments: Vec<usize> = needs(operations, index).collect();
-            let at = |k: usize| arguments.get(k).map_or(0, |argument| register[*argument]);
-            let (first, second) = (at(0), at(1));
+            let mut instruction = Instruction {
+                function: *function,
+                sources: [0; MOST_SOURCES],
+                target: 0,
+            };
+            for (place, source) in instruction.sources.iter_mut().zip(sources) {
+                *place = register[*source];
+            }
             // What is read for the last time makes room for the value itself.
-            arguments.dedup();
-            for argument in arguments {
-                let worked_out = register[argument] as usize >= given;
-                if last_read[argument] == Some(index) && worked_out {
-                    free.push(register[argument]);
+            for (k, source) in sources.iter().enumerate() {
+                let worked_out = register[*source] as usize >= given;
+                let again = sources[..k].contains(source);
+                if last_read[*source] == index && worked_out && !again {
+                    free.push(register[*source]);
                 }
             }
             let mut place = || {
@@ -228,25 +353,21 @@ impl Code {
                 // It is there already.
                 continue;
             }
-            let target = place();
-            register[index] = target;
-            let mut instruction = Instruction {
-                function,
-                first,
-                second,
-                target,
-            };
+            instruction.target = place();
+            register[index] = instruction.target;
             if let Some(partner) = partner {
                 register[partner] = place();
                 instruction.function = Function::SinCos;
-                instruction.second = register[partner];
-                if function == COS {
-                    std::mem::swap(&mut instruction.second, &mut instruction.target);
+                instruction.sources[1] = register[partner];
+                if *function == COS {
+                    std::mem::swap(&mut instruction.sources[1], &mut instruction.target);
                 }
             }
             instructions.push(instruction);
         }
+        let short = instructions.iter().filter(|_| registers <= FEW).map(short);
         Self {
+            short: short.collect(),
             leaves,
             instructions,
             results: results.iter().map(|result| register[*result]).collect(),
@@ -254,27 +375,64 @@ impl Code {
         }
     }
 
-    /// Works the results out; `result` takes them by their place. No heap is needed for up to 256
-    /// registers.
+    /// The numbers that come first: constants, and of these `parameters` those that it needs.
+    pub fn fixed(&self, parameters: &[f64]) -> Vec<f64> {
+        let needed = self.leaves.parameters.iter().map(|i| parameters[*i]);
+        self.leaves
+            .constants
+            .iter()
+            .copied()
+            .chain(needed)
+            .collect()
+    }
+
+    /// Works the results out from the [`fixed`](Self::fixed) numbers and each `leaf`; `result` takes them by their place.
+    /// No heap is needed for up to 256 registers.
     #[inline(always)]
-    pub fn evaluate<N: Number>(&self, given: Given<'_, N>, result: impl FnMut(usize, N)) {
+    pub fn evaluate<N: Number>(
+        &self,
+        fixed: &[f64],
+        leaf: impl Fn(Leaf) -> N,
+        result: impl FnMut(usize, N),
+    ) {
         let zero = N::constant(0.0);
         match self.registers {
-            0..=32 => self.evaluate_on(&mut [zero; 32], given, result),
-            33..=64 => self.evaluate_on(&mut [zero; 64], given, result),
-            65..=256 => self.evaluate_on(&mut [zero; 256], given, result),
-            count => self.evaluate_on(&mut vec![zero; count], given, result),
+            0..=32 => self.evaluate_on(&mut [zero; 32], fixed, leaf, result),
+            33..=64 => self.evaluate_on(&mut [zero; 64], fixed, leaf, result),
+            65..=256 => self.evaluate_on(&mut [zero; 256], fixed, leaf, result),
+            count => self.evaluate_on(&mut vec![zero; count], fixed, leaf, result),
         }
+    }
+
+    /// The same for a kind of number with registers that are kept, and in less time.
+    #[inline(always)]
+    pub fn evaluate_fast<N: Kept>(
+        &self,
+        fixed: &[f64],
+        leaf: impl Fn(Leaf) -> N,
+        mut result: impl FnMut(usize, N),
+    ) {
+        if self.registers > FEW {
+            return self.evaluate(fixed, leaf, result);
+        }
+        N::with(|registers| {
+            self.leaves.fill(registers, fixed, leaf);
+            run_short(&self.short, registers);
+            for (place, register) in self.results.iter().enumerate() {
+                result(place, registers[*register as u8 as usize]);
+            }
+        });
     }
 
     #[inline(always)]
     fn evaluate_on<N: Number>(
         &self,
         registers: &mut [N],
-        given: Given<'_, N>,
+        fixed: &[f64],
+        leaf: impl Fn(Leaf) -> N,
         mut result: impl FnMut(usize, N),
     ) {
-        self.leaves.fill(registers, given);
+        self.leaves.fill(registers, fixed, leaf);
         run(&self.instructions, registers);
         for (place, register) in self.results.iter().enumerate() {
             result(place, registers[*register as usize]);
@@ -282,40 +440,99 @@ impl Code {
     }
 }
 
+/// So many registers are kept: any `u8` is one of them, and need not be checked.
+pub(crate) const FEW: usize = 256;
+
+fn short(instruction: &Instruction) -> ShortInstruction {
+    ShortInstruction {
+        function: instruction.function,
+        sources: instruction.sources.map(|source| source as u8),
+        target: instruction.target as u8,
+    }
+}
+
+/// A kind of number with registers that are kept from one evaluation to the next: to clear them would take longer than
+/// many a code.
+pub(crate) trait Kept: Number {
+    /// Calls `run` with registers that hold anything.
+    fn with(run: impl FnOnce(&mut [Self; FEW]));
+}
+
+thread_local! {
+    static FLOATS: RefCell<[f64; FEW]> = const { RefCell::new([0.0; FEW]) };
+}
+
+impl Kept for f64 {
+    #[inline(always)]
+    fn with(run: impl FnOnce(&mut [Self; FEW])) {
+        FLOATS.with_borrow_mut(run);
+    }
+}
+
+/// Works the instructions out on the registers that `at` and `set` reach.
+macro_rules! work {
+    ($instructions:expr, $at:ident, $set:ident) => {
+        for instruction in $instructions {
+            let [x, y, z, w] = instruction.sources;
+            let target = instruction.target;
+            // Each stores its own value: a common place for all values would be copied once more.
+            match instruction.function {
+                Function::Add => $set!(target, $at!(x) + $at!(y)),
+                Function::Subtract => $set!(target, $at!(x) - $at!(y)),
+                Function::Multiply => $set!(target, $at!(x) * $at!(y)),
+                Function::Divide => $set!(target, $at!(x) / $at!(y)),
+                Function::Negative => $set!(target, -$at!(x)),
+                Function::Square => $set!(target, $at!(x) * $at!(x)),
+                Function::MultiplyAdd => $set!(target, $at!(x) * $at!(y) + $at!(z)),
+                Function::MultiplySubtract => $set!(target, $at!(x) * $at!(y) - $at!(z)),
+                Function::SubtractProduct => $set!(target, $at!(z) - $at!(x) * $at!(y)),
+                Function::AddProducts => $set!(target, $at!(x) * $at!(y) + $at!(z) * $at!(w)),
+                Function::SubtractProducts => {
+                    $set!(target, $at!(x) * $at!(y) - $at!(z) * $at!(w))
+                }
+                Function::SinCos => {
+                    let (sin, cos) = $at!(x).sin_cos();
+                    $set!(target, sin);
+                    $set!(y, cos);
+                }
+                Function::Whole(exponent) => $set!(target, $at!(x).powi(exponent.into())),
+                Function::Unary(function) => $set!(target, function.of($at!(x))),
+                Function::Bivariate(function) => {
+                    $set!(target, $at!(x).bivariate($at!(y), function))
+                }
+            }
+        }
+    };
+}
+
 /// Once in the machine code for each kind of number.
 #[inline(never)]
 fn run<N: Number>(instructions: &[Instruction], registers: &mut [N]) {
-    for instruction in instructions {
-        let [first, second, target] =
-            [instruction.first, instruction.second, instruction.target].map(|i| i as usize);
-        // Each stores its own value: a common place for all values would be copied once more.
-        match instruction.function {
-            Function::Binary(Binary::Add) => {
-                registers[target] = registers[first] + registers[second];
-            }
-            Function::Binary(Binary::Subtract) => {
-                registers[target] = registers[first] - registers[second];
-            }
-            Function::Binary(Binary::Multiply) => {
-                registers[target] = registers[first] * registers[second];
-            }
-            Function::Binary(Binary::Divide) => {
-                registers[target] = registers[first] / registers[second];
-            }
-            Function::Unary(Unary::Negative) => registers[target] = -registers[first],
-            Function::Unary(Unary::Square) => {
-                registers[target] = registers[first] * registers[first];
-            }
-            Function::SinCos => {
-                let (sin, cos) = registers[first].sin_cos();
-                registers[target] = sin;
-                registers[second] = cos;
-            }
-            Function::Unary(function) => registers[target] = function.of(registers[first]),
-            Function::Binary(function) => {
-                registers[target] = function.of(registers[first], registers[second]);
-            }
-            Function::Whole(exponent) => registers[target] = registers[first].powi(exponent),
-        }
+    macro_rules! at {
+        ($register:expr) => {
+            registers[$register as usize]
+        };
     }
+    macro_rules! set {
+        ($register:expr, $value:expr) => {
+            registers[$register as usize] = $value
+        };
+    }
+    work!(instructions, at, set);
+}
+
+/// The same on few registers.
+#[inline(never)]
+fn run_short<N: Number>(instructions: &[ShortInstruction], registers: &mut [N; FEW]) {
+    macro_rules! at {
+        ($register:expr) => {
+            registers[usize::from($register)]
+        };
+    }
+    macro_rules! set {
+        ($register:expr, $value:expr) => {
+            registers[usize::from($register)] = $value
+        };
+    }
+    work!(instructions, at, set);
 }

@@ -23,7 +23,7 @@ pub enum Operation {
 }
 
 /// Functions of one number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Unary {
     /// -x.
     Negative,
@@ -38,7 +38,7 @@ pub enum Unary {
 }
 
 /// Functions of two numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Binary {
     /// x + y.
     Add,

@@ -1,51 +1,73 @@
 //! A plant that was checked and made ready for evaluation.
 
 use crate::check::check;
-use crate::code::{Code, Given};
 use crate::data::PlantData;
 use crate::error::PlantError;
+use crate::prepared::{Fixed, Prepared};
+use crate::tangent::TangentCode;
 use crate::{claims, file, source};
 use lpvmpc::Number;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A plant from a file: its formulas, checked, and the values of its parameters.
 ///
 /// Its sizes are known at run time. A controller takes it as a [`SizedPlant`](crate::SizedPlant) or
 /// [`SizedEmbedding`](crate::SizedEmbedding).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Plant {
     formulas: Arc<Formulas>,
-    parameters: Vec<f64>,
+    values: Arc<Values>,
+}
+
+impl PartialEq for Plant {
+    /// The same formulas with the same parameters.
+    fn eq(&self, other: &Self) -> bool {
+        self.data() == other.data() && self.parameters() == other.parameters()
+    }
 }
 
 /// What does not change while a program runs.
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 pub(crate) struct Formulas {
     data: PlantData,
     /// f, or F of a plant in discrete time.
-    pub motion: Code,
-    pub output: Code,
+    pub motion: Prepared,
+    pub output: Prepared,
     pub embedding: Option<EmbeddingCode>,
+    /// Made when it is first asked for, since it takes longer than all else.
+    tangent: OnceLock<Option<TangentCode>>,
+    embedded: OnceLock<Option<TangentCode>>,
 }
 
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 pub(crate) struct EmbeddingCode {
-    pub scheduling: Code,
+    pub scheduling: Prepared,
     /// A by rows, then B by rows.
-    pub matrices: Code,
-    pub offset: Option<Code>,
+    pub matrices: Prepared,
+    pub offset: Option<Prepared>,
 }
 
-impl Plant {
-    /// The plant of these data.
-    ///
-    /// # Errors
-    /// The data make no sense, with the place of the first thing that is wrong: a list of a wrong
-    /// length, a reference forward, a name that is there twice, an equilibrium that is none, an embedding that is not f.
-    pub fn new(data: PlantData) -> Result<Self, PlantError> {
-        check(&data)?;
-        let code = |results: &[usize]| Code::new(&data.operations, results);
+/// Parameters, and what follows from them.
+#[derive(Debug, Clone)]
+pub(crate) struct Values {
+    parameters: Vec<f64>,
+    pub motion: Fixed,
+    pub output: Fixed,
+    pub embedding: Option<EmbeddingValues>,
+}
+
+/// The same of an embedding.
+#[derive(Debug, Clone)]
+pub(crate) struct EmbeddingValues {
+    pub scheduling: Fixed,
+    pub matrices: Fixed,
+    pub offset: Option<Fixed>,
+}
+
+impl Formulas {
+    fn new(data: PlantData) -> Self {
+        let code = |results: &[usize]| Prepared::new(&data.operations, results);
         let embedding = data.embedding.as_ref().map(|embedding| {
             let entries: Vec<usize> = { embedding.a.iter().chain(&embedding.b) }
                 .flatten()
@@ -57,14 +79,59 @@ impl Plant {
                 offset: embedding.c.as_ref().map(|c| code(c)),
             }
         });
+        Self {
+            motion: code(data.motion()),
+            output: code(&data.output),
+            embedding,
+            tangent: OnceLock::new(),
+            embedded: OnceLock::new(),
+            data,
+        }
+    }
+
+    fn values(&self, parameters: Vec<f64>) -> Values {
+        let embedding = self.embedding.as_ref().map(|code| EmbeddingValues {
+            scheduling: code.scheduling.fixed(&parameters),
+            matrices: code.matrices.fixed(&parameters),
+            offset: { code.offset.as_ref() }.map(|offset| offset.fixed(&parameters)),
+        });
+        Values {
+            motion: self.motion.fixed(&parameters),
+            output: self.output.fixed(&parameters),
+            embedding,
+            parameters,
+        }
+    }
+
+    /// f with its derivatives as one code; `None` where that would be longer than dual numbers take.
+    pub fn tangent(&self) -> Option<&TangentCode> {
+        let made = { &self.tangent }
+            .get_or_init(|| TangentCode::of_derivatives(&self.data, self.motion.length()));
+        made.as_ref()
+    }
+
+    /// f with A(s) and B(s) as one code; `None` without an embedding, or where it would be too long.
+    pub fn embedded(&self) -> Option<&TangentCode> {
+        let made = self
+            .embedded
+            .get_or_init(|| TangentCode::of_embedding(&self.data, self.data.embedding.as_ref()?));
+        made.as_ref()
+    }
+}
+
+impl Plant {
+    /// The plant of these data.
+    ///
+    /// # Errors
+    /// The data make no sense, with the place of the first thing that is wrong: a list of a wrong
+    /// length, a reference forward, a name that is there twice, an equilibrium that is none, an embedding that is not f.
+    pub fn new(data: PlantData) -> Result<Self, PlantError> {
+        check(&data)?;
+        let parameters = data.parameters.iter().map(|p| p.value).collect();
+        let formulas = Formulas::new(data);
         let plant = Self {
-            parameters: data.parameters.iter().map(|p| p.value).collect(),
-            formulas: Arc::new(Formulas {
-                motion: code(data.motion()),
-                output: code(&data.output),
-                embedding,
-                data,
-            }),
+            values: Arc::new(formulas.values(parameters)),
+            formulas: Arc::new(formulas),
         };
         claims::check(&plant)?;
         Ok(plant)
@@ -122,7 +189,7 @@ impl Plant {
 
     /// The values of the parameters, in the order of [`PlantData::parameters`].
     pub fn parameters(&self) -> &[f64] {
-        &self.parameters
+        &self.values.parameters
     }
 
     /// From now on the parameter `name` has this `value`, in its unit.
@@ -146,7 +213,9 @@ impl Plant {
             let fault = format!("{value} is not finite");
             return Err(PlantError::new(format!("parameter {name:?}"), fault));
         }
-        self.parameters[i] = value;
+        let mut parameters = self.values.parameters.clone();
+        parameters[i] = value;
+        self.values = Arc::new(self.formulas.values(parameters));
         Ok(())
     }
 
@@ -182,7 +251,9 @@ impl Plant {
     /// f, or F of a plant in discrete time.
     pub(crate) fn motion<N: Number>(&self, x: &[N], u: &[N]) -> Result<Vec<N>, PlantError> {
         self.check_sizes(x.len(), u.len())?;
-        Ok(self.values(&self.formulas.motion, (x, u), &[]))
+        let mut rates = Vec::with_capacity(x.len());
+        self.evaluate_motion((x, u), |_, rate| rates.push(rate));
+        Ok(rates)
     }
 
     /// y = g(x, u), in the units of the outputs.
@@ -191,7 +262,9 @@ impl Plant {
     /// `x` or `u` has not as many components as the plant has states or inputs.
     pub fn output<N: Number>(&self, x: &[N], u: &[N]) -> Result<Vec<N>, PlantError> {
         self.check_sizes(x.len(), u.len())?;
-        Ok(self.values(&self.formulas.output, (x, u), &[]))
+        let mut outputs = Vec::with_capacity(self.data().outputs.len());
+        self.evaluate_output((x, u), |_, output| outputs.push(output));
+        Ok(outputs)
     }
 
     fn check_sizes(&self, x: usize, u: usize) -> Result<(), PlantError> {
@@ -208,13 +281,6 @@ impl Plant {
         Ok(())
     }
 
-    /// The results of a code of this plant.
-    pub(crate) fn values<N: Number>(&self, code: &Code, motion: (&[N], &[N]), s: &[N]) -> Vec<N> {
-        let mut values = Vec::with_capacity(code.results.len());
-        self.evaluate(code, motion, s, |_, value| values.push(value));
-        values
-    }
-
     /// f, or F of a plant in discrete time.
     #[inline(always)]
     pub(crate) fn evaluate_motion<N: Number>(
@@ -222,7 +288,8 @@ impl Plant {
         motion: (&[N], &[N]),
         result: impl FnMut(usize, N),
     ) {
-        self.evaluate(&self.formulas.motion, motion, &[], result);
+        let (code, fixed) = (&self.formulas.motion, &self.values.motion);
+        code.evaluate(fixed, motion, &[], result);
     }
 
     /// g.
@@ -232,25 +299,43 @@ impl Plant {
         motion: (&[N], &[N]),
         result: impl FnMut(usize, N),
     ) {
-        self.evaluate(&self.formulas.output, motion, &[], result);
+        let (code, fixed) = (&self.formulas.output, &self.values.output);
+        code.evaluate(fixed, motion, &[], result);
     }
 
-    /// The results of a code of this plant at a state, an input and a scheduling of at least its sizes.
+    /// sigma of the embedding; nothing without one.
     #[inline(always)]
-    pub(crate) fn evaluate<N: Number>(
+    pub(crate) fn evaluate_scheduling<N: Number>(
         &self,
-        code: &Code,
-        (x, u): (&[N], &[N]),
-        s: &[N],
+        motion: (&[N], &[N]),
         result: impl FnMut(usize, N),
     ) {
-        let given = Given {
-            parameters: &self.parameters,
-            x,
-            u,
-            s,
-        };
-        code.evaluate(given, result);
+        if let (Some(code), Some(values)) = (&self.formulas.embedding, &self.values.embedding) {
+            code.scheduling
+                .evaluate(&values.scheduling, motion, &[], result);
+        }
+    }
+
+    /// The embedding's A by rows, then B by rows; nothing without one.
+    #[inline(always)]
+    pub(crate) fn evaluate_matrices<N: Number>(&self, s: &[N], result: impl FnMut(usize, N)) {
+        if let (Some(code), Some(values)) = (&self.formulas.embedding, &self.values.embedding) {
+            code.matrices
+                .evaluate(&values.matrices, (&[], &[]), s, result);
+        }
+    }
+
+    /// The embedding's c. `None` where there is none.
+    #[inline(always)]
+    pub(crate) fn evaluate_offset<N: Number>(
+        &self,
+        s: &[N],
+        result: impl FnMut(usize, N),
+    ) -> Option<()> {
+        let code = self.formulas.embedding.as_ref()?.offset.as_ref()?;
+        let fixed = self.values.embedding.as_ref()?.offset.as_ref()?;
+        code.evaluate(fixed, (&[], &[]), s, result);
+        Some(())
     }
 
     /// The first operation of which no proof can be had, since it has a kink or jumps, with its index; `None` where all

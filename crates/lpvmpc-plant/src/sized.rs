@@ -2,7 +2,8 @@
 
 use crate::error::PlantError;
 use crate::plant::Plant;
-use lpvmpc::{Bounds, Dynamics, Embedding, Number};
+use crate::prepared::Fixed;
+use lpvmpc::{Bounds, Dual, Dynamics, Embedding, Number, Scalar, Tangent};
 use nalgebra::{SMatrix, SVector};
 
 /// A [`Plant`] in the places of `NX` states and `NU` inputs, of which it may need fewer: what is left over has the
@@ -12,6 +13,8 @@ use nalgebra::{SMatrix, SVector};
 #[derive(Debug, Clone, PartialEq)]
 pub struct SizedPlant<const NX: usize, const NU: usize> {
     plant: Plant,
+    /// What the code of f with its derivatives has of the parameters; `None` without such a code.
+    tangent: Option<Fixed>,
 }
 
 impl<const NX: usize, const NU: usize> SizedPlant<NX, NU> {
@@ -30,7 +33,9 @@ impl<const NX: usize, const NU: usize> SizedPlant<NX, NU> {
                 return Err(PlantError::new(place, fault));
             }
         }
-        Ok(Self { plant })
+        let code = plant.formulas().tangent();
+        let tangent = code.map(|code| code.fixed(plant.parameters()));
+        Ok(Self { plant, tangent })
     }
 
     /// The plant.
@@ -43,7 +48,10 @@ impl<const NX: usize, const NU: usize> SizedPlant<NX, NU> {
     /// # Errors
     /// There is no such parameter, or the value is not finite.
     pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), PlantError> {
-        self.plant.set_parameter(name, value)
+        self.plant.set_parameter(name, value)?;
+        let code = self.plant.formulas().tangent();
+        self.tangent = code.map(|code| code.fixed(self.plant.parameters()));
+        Ok(())
     }
 
     /// y = g(x, u), in the units of the outputs, in `NY` places: zero in those that are left over.
@@ -111,6 +119,18 @@ impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for SizedPlant<NX, NU> {
             .evaluate_motion((x.as_slice(), u.as_slice()), |i, value| rate[i] = value);
         rate
     }
+
+    const TOGETHER: bool = true;
+
+    /// By formulas of their own, unless these would take longer than dual numbers.
+    fn tangent_each<T: Scalar + Number, const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
+        let code = self.plant.formulas().tangent()?;
+        Some(code.evaluate_each(self.tangent.as_ref()?, x, u))
+    }
 }
 
 /// A [`Plant`] with its own embedding in the places of `NX` states, `NU` inputs and `NS` scheduling parameters, of
@@ -118,6 +138,8 @@ impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for SizedPlant<NX, NU> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SizedEmbedding<const NX: usize, const NU: usize, const NS: usize> {
     plant: SizedPlant<NX, NU>,
+    /// What the code of f with A(s) and B(s) has of the parameters; `None` without such a code.
+    embedded: Option<Fixed>,
 }
 
 impl<const NX: usize, const NU: usize, const NS: usize> SizedEmbedding<NX, NU, NS> {
@@ -135,8 +157,10 @@ impl<const NX: usize, const NU: usize, const NS: usize> SizedEmbedding<NX, NU, N
             let fault = format!("there are {count}, and places for {NS}");
             return Err(PlantError::new("embedding.scheduling", fault));
         }
+        let plant = SizedPlant::new(plant)?;
         Ok(Self {
-            plant: SizedPlant::new(plant)?,
+            embedded: embedded(&plant.plant),
+            plant,
         })
     }
 
@@ -150,8 +174,15 @@ impl<const NX: usize, const NU: usize, const NS: usize> SizedEmbedding<NX, NU, N
     /// # Errors
     /// There is no such parameter, or the value is not finite.
     pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), PlantError> {
-        self.plant.set_parameter(name, value)
+        self.plant.set_parameter(name, value)?;
+        self.embedded = embedded(&self.plant.plant);
+        Ok(())
     }
+}
+
+fn embedded(plant: &Plant) -> Option<Fixed> {
+    let code = plant.formulas().embedded()?;
+    Some(code.fixed(plant.parameters()))
 }
 
 impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
@@ -164,10 +195,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
     fn scheduling<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NS> {
         let mut s = SVector::repeat(N::constant(0.0));
         let plant = &self.plant.plant;
-        if let Some(code) = &plant.formulas().embedding {
-            let motion = (x.as_slice(), u.as_slice());
-            plant.evaluate(&code.scheduling, motion, &[], |i, value| s[i] = value);
-        }
+        plant.evaluate_scheduling((x.as_slice(), u.as_slice()), |i, value| s[i] = value);
         s
     }
 
@@ -179,31 +207,61 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         let (mut a, mut b) = (SMatrix::repeat(zero), SMatrix::repeat(zero));
         let plant = &self.plant.plant;
         let (states, inputs) = (plant.data().states.len(), plant.data().inputs.len());
-        if let Some(code) = &plant.formulas().embedding {
-            plant.evaluate(
-                &code.matrices,
-                (&[], &[]),
-                scheduling.as_slice(),
-                |i, value| match i.checked_sub(states * states) {
-                    None => a[(i / states, i % states)] = value,
-                    Some(i) => b[(i / inputs, i % inputs)] = value,
-                },
-            );
-        }
+        plant.evaluate_matrices(scheduling.as_slice(), |i, value| {
+            match i.checked_sub(states * states) {
+                None => a[(i / states, i % states)] = value,
+                Some(i) => b[(i / inputs, i % inputs)] = value,
+            }
+        });
         (a, b)
     }
 
     fn offset<N: Number>(&self, scheduling: &SVector<N, NS>) -> Option<SVector<N, NX>> {
         let plant = &self.plant.plant;
-        let code = plant.formulas().embedding.as_ref()?.offset.as_ref()?;
         let mut c = SVector::repeat(N::constant(0.0));
-        plant.evaluate(code, (&[], &[]), scheduling.as_slice(), |i, value| {
-            c[i] = value
-        });
+        plant.evaluate_offset(scheduling.as_slice(), |i, value| c[i] = value)?;
         Some(c)
     }
 
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
         self.plant.f(x, u)
+    }
+
+    fn tangent<T: Scalar + Number>(
+        &self,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+    ) -> Tangent<T, NX, NU> {
+        let [tangent] = Embedding::tangent_each(self, &[*x], &[*u]);
+        tangent
+    }
+
+    const TOGETHER: bool = true;
+
+    fn tangent_each<T: Scalar + Number, const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS] {
+        let by_duals = |i: usize| {
+            lpvmpc::tangent_by_duals(
+                &x[i],
+                &u[i],
+                |x: &SVector<Dual<T, NX>, NX>, u| self.plant.f(x, u),
+                |x, u| self.plant.f(x, u),
+            )
+        };
+        let tangents = Dynamics::tangent_each(&self.plant, x, u);
+        tangents.unwrap_or_else(|| std::array::from_fn(by_duals))
+    }
+
+    /// By formulas of their own, without the products with what is always zero.
+    fn embedded_each<T: Scalar + Number, const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
+        let code = self.plant.plant.formulas().embedded()?;
+        Some(code.evaluate_each(self.embedded.as_ref()?, x, u))
     }
 }

@@ -3,7 +3,7 @@
 mod names;
 
 use crate::code::{Code, Function};
-use crate::operation::{Binary, Unary};
+use crate::operation::Unary;
 use crate::plant::Plant;
 use names::Names;
 pub(crate) use names::{text, type_name};
@@ -96,7 +96,7 @@ pub(crate) fn print(plant: &Plant) -> String {
             line!(out, "impl Dynamics<{states}, {inputs}> for {name} {{");
         }
         Some(embedding) => {
-            let schedulings = embedding.scheduling.results.len();
+            let schedulings = embedding.scheduling.code.results.len();
             line!(
                 out,
                 "impl Embedding<{states}, {inputs}, {schedulings}> for {name} {{"
@@ -105,13 +105,13 @@ pub(crate) fn print(plant: &Plant) -> String {
                 out,
                 "    fn scheduling<N: Number>({motion}) -> SVector<N, {schedulings}> {{"
             );
-            printer.vector(&mut out, &embedding.scheduling, schedulings);
+            printer.vector(&mut out, &embedding.scheduling.code, schedulings);
             let s = format!("&self, scheduling: &SVector<N, {schedulings}>");
             line!(
                 out,
                 "    fn matrices<N: Number>({s}) -> (SMatrix<N, {states}, {states}>, SMatrix<N, {states}, {inputs}>) {{"
             );
-            let values = printer.body(&mut out, &embedding.matrices);
+            let values = printer.body(&mut out, &embedding.matrices.code);
             let (a, b) = values.split_at(states * states);
             line!(out, "        (");
             for (entries, columns) in [(a, states), (b, inputs)] {
@@ -131,7 +131,7 @@ pub(crate) fn print(plant: &Plant) -> String {
                     out,
                     "    fn offset<N: Number>({s}) -> Option<SVector<N, {states}>> {{"
                 );
-                let values = printer.body(&mut out, offset).join(", ");
+                let values = printer.body(&mut out, &offset.code).join(", ");
                 line!(
                     out,
                     "        Some(SVector::<N, {states}>::from([{values}]))\n    }}\n"
@@ -147,7 +147,7 @@ pub(crate) fn print(plant: &Plant) -> String {
         out,
         "    fn f<N: Number>({motion}) -> SVector<N, {states}> {{"
     );
-    printer.vector(&mut out, &plant.formulas().motion, states);
+    printer.vector(&mut out, &plant.formulas().motion.code, states);
     let end = out.trim_end().len();
     out.truncate(end);
     line!(out, "\n}}");
@@ -160,7 +160,7 @@ pub(crate) fn print(plant: &Plant) -> String {
             out,
             "    pub fn output<N: Number>({motion}) -> SVector<N, {outputs}> {{"
         );
-        printer.vector(&mut out, &plant.formulas().output, outputs);
+        printer.vector(&mut out, &plant.formulas().output.code, outputs);
         let end = out.trim_end().len();
         out.truncate(end);
         line!(out, "\n}}");
@@ -203,18 +203,32 @@ impl Printer {
         }
         registers.resize(code.registers, String::new());
         for (k, instruction) in code.instructions.iter().enumerate() {
-            let x = registers[instruction.first as usize].clone();
-            let second = instruction.second as usize;
+            let [x, y, z, w] = instruction
+                .sources
+                .map(|source| &registers[source as usize]);
             let value = match instruction.function {
                 Function::SinCos => {
                     line!(out, "        let (v{k}, w{k}) = {x}.sin_cos();");
-                    registers[second] = format!("w{k}");
+                    registers[instruction.sources[1] as usize] = format!("w{k}");
                     registers[instruction.target as usize] = format!("v{k}");
                     continue;
                 }
-                Function::Unary(function) => unary(function, &x),
-                Function::Binary(function) => binary(function, &x, &registers[second]),
+                Function::Add => format!("{x} + {y}"),
+                Function::Subtract => format!("{x} - {y}"),
+                Function::Multiply => format!("{x} * {y}"),
+                Function::Divide => format!("{x} / {y}"),
+                Function::Negative => format!("-{x}"),
+                Function::Square => format!("{x} * {x}"),
+                Function::MultiplyAdd => format!("{x} * {y} + {z}"),
+                Function::MultiplySubtract => format!("{x} * {y} - {z}"),
+                Function::SubtractProduct => format!("{z} - {x} * {y}"),
+                Function::AddProducts => format!("{x} * {y} + {z} * {w}"),
+                Function::SubtractProducts => format!("{x} * {y} - {z} * {w}"),
                 Function::Whole(exponent) => format!("{x}.powi({exponent})"),
+                Function::Unary(function) => unary(function, x),
+                Function::Bivariate(function) => {
+                    format!("{x}.bivariate({y}, Bivariate::{function:?})")
+                }
             };
             line!(out, "        let v{k} = {value};");
             registers[instruction.target as usize] = format!("v{k}");
@@ -234,17 +248,4 @@ fn unary(function: Unary, x: &str) -> String {
         Unary::Tan => format!("{x}.tan()"),
         Unary::Elementary(function) => format!("{x}.elementary(Elementary::{function:?})"),
     }
-}
-
-fn binary(function: Binary, x: &str, y: &str) -> String {
-    let operator = match function {
-        Binary::Add => "+",
-        Binary::Subtract => "-",
-        Binary::Multiply => "*",
-        Binary::Divide => "/",
-        Binary::Bivariate(function) => {
-            return format!("{x}.bivariate({y}, Bivariate::{function:?})");
-        }
-    };
-    format!("{x} {operator} {y}")
 }

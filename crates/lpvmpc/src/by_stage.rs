@@ -6,11 +6,14 @@
 use crate::at_stage::AtStage;
 use crate::controller::next_state;
 use crate::descent::Along;
+use crate::embedding::Tangent;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Bounds, GeneralRow, SoftBounds};
 use crate::outputs::Outputs;
+use crate::predictor::Predictor;
 use crate::preview::Preview;
 use crate::settings::{ControllerSettings, Scheduling, TerminalIngredient, Weights};
+use crate::small_matrix::product;
 use crate::steady_state::{SteadyState, SteadyStateProblem};
 use nalgebra::{SMatrix, SVector};
 
@@ -64,6 +67,10 @@ pub(crate) trait CostByStage<T: Scalar, const NX: usize, const NU: usize>: Copy 
     }
 }
 
+/// A, B and c of a sample.
+pub(crate) type Sample<T, const NX: usize, const NU: usize> =
+    (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>, SVector<T, NX>);
+
 /// The plant over the sample `i` of the horizon.
 pub(crate) trait PlantByStage<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize>:
     CostByStage<T, NX, NU>
@@ -88,6 +95,15 @@ pub(crate) trait PlantByStage<P, T: Scalar, const NX: usize, const NU: usize, co
         along: Along,
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>);
 
+    /// The same of several samples, with the states in which they end; `None` where the plant is not the same in all.
+    fn sample_matrices_each<const POINTS: usize>(
+        &self,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        at: (&[SVector<T, NX>; POINTS], &[SVector<T, NU>; POINTS]),
+        along: Along,
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]>;
+
     /// A, B and c of the predictor, for a sample that is expected to begin at `x` with `u`.
     fn predict(
         &self,
@@ -97,6 +113,15 @@ pub(crate) trait PlantByStage<P, T: Scalar, const NX: usize, const NU: usize, co
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>, SVector<T, NX>);
+
+    /// The same for several samples; `None` where the plant is not the same in all, or the predictor does not follow
+    /// the scheduling.
+    fn predict_each<const POINTS: usize>(
+        &self,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        motion: (&[SVector<T, NX>; POINTS], &[SVector<T, NU>; POINTS]),
+    ) -> Option<[Sample<T, NX, NU>; POINTS]>;
 
     /// The steady state of the plant as it is in the last sample of the horizon; `None` where that is
     /// the one that the settings have.
@@ -142,6 +167,27 @@ where
     }
 
     #[inline(always)]
+    fn sample_matrices_each<const POINTS: usize>(
+        &self,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        at: (&[SVector<T, NX>; POINTS], &[SVector<T, NU>; POINTS]),
+        along: Along,
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
+        Some(along.matrices_each(plant, settings, at))
+    }
+
+    #[inline(always)]
+    fn predict_each<const POINTS: usize>(
+        &self,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        motion: (&[SVector<T, NX>; POINTS], &[SVector<T, NU>; POINTS]),
+    ) -> Option<[Sample<T, NX, NU>; POINTS]> {
+        predicted_each(plant, settings, motion)
+    }
+
+    #[inline(always)]
     fn predict(
         &self,
         _: usize,
@@ -181,6 +227,34 @@ where
     let c = predictor.offset_along(plant, held, (x, u), *t_s, &pair);
     let (a, b) = pair;
     (a, b, c.unwrap_or_else(SVector::zeros))
+}
+
+/// The same of several samples, of a predictor that follows the scheduling.
+#[inline(always)]
+fn predicted_each<P, T, const NX: usize, const NU: usize, const NS: usize, const POINTS: usize>(
+    plant: &P,
+    settings: &ControllerSettings<T, NX, NU, NS>,
+    (x, u): (&[SVector<T, NX>; POINTS], &[SVector<T, NU>; POINTS]),
+) -> Option<[Sample<T, NX, NU>; POINTS]>
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS>,
+{
+    let (Predictor::StageConsistent(rk4), None) = (settings.predictor, settings.scheduling.held())
+    else {
+        return None;
+    };
+    let reached = rk4.linearize_each(plant, x, u, settings.t_s);
+    let has_offset = plant.has_offset();
+    Some(core::array::from_fn(|i| {
+        let (next, a, b) = &reached[i];
+        let c = if has_offset {
+            next - product(a, &x[i]) - product(b, &u[i])
+        } else {
+            SVector::zeros()
+        };
+        (*a, *b, c)
+    }))
 }
 
 impl<T: Scalar, const NS: usize> Scheduling<T, NS> {
@@ -285,6 +359,17 @@ where
             beside: self.beside,
         }
     }
+
+    /// The plant as it is in all samples, if it is the same in all.
+    fn everywhere(&self, plant: &'a P) -> Option<AtStage<'a, P, T, NX, NU, NS>> {
+        let preview = self.preview;
+        let same = [
+            preview.models.len(),
+            preview.scheduling.len(),
+            preview.disturbance.len(),
+        ];
+        { same.iter().all(|length| *length <= 1) }.then(|| self.plant(0, plant))
+    }
 }
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize> PlantByStage<P, T, NX, NU, NS>
@@ -313,6 +398,26 @@ where
         along: Along,
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
         along.matrices(&self.plant(i, plant), settings, at)
+    }
+
+    fn sample_matrices_each<const POINTS: usize>(
+        &self,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        at: (&[SVector<T, NX>; POINTS], &[SVector<T, NU>; POINTS]),
+        along: Along,
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
+        let plant = self.everywhere(plant)?;
+        Some(along.matrices_each(&plant, settings, at))
+    }
+
+    fn predict_each<const POINTS: usize>(
+        &self,
+        plant: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        motion: (&[SVector<T, NX>; POINTS], &[SVector<T, NU>; POINTS]),
+    ) -> Option<[Sample<T, NX, NU>; POINTS]> {
+        predicted_each(&self.everywhere(plant)?, settings, motion)
     }
 
     fn predict(

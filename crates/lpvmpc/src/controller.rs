@@ -1,11 +1,11 @@
 //! The LPVMPC controller: Algorithm 2 of the paper for any LPV model.
 
-use crate::by_stage::{CostByStage, PlantByStage};
+use crate::by_stage::{CostByStage, PlantByStage, Sample};
 use crate::changes::FixedRows;
 use crate::list::List;
 use crate::memory::ControllerMemory;
 use crate::model::{LpvModel, Scalar};
-use crate::ocp::Ocp;
+use crate::ocp::{Ocp, Stage};
 use crate::outputs;
 use crate::plan::{Aim, Policy, at};
 #[cfg(feature = "alloc")]
@@ -21,6 +21,7 @@ use crate::steady_state::{SteadyState, SteadyStateProblem};
 
 use crate::two_parts::Answered;
 use crate::workspace::Workspace;
+use core::array::from_fn;
 use nalgebra::{SMatrix, SVector, convert};
 
 /// The state reference along the horizon, in state units.
@@ -47,6 +48,13 @@ impl<T: Scalar, const NX: usize> Reference<'_, T, NX> {
         self.stages.get(i).unwrap_or(&self.terminal)
     }
 }
+
+/// So many stages are linearised together where that takes less time.
+const GROUP: usize = 4;
+
+/// States and inputs of such a group.
+type Group<'a, T, const NX: usize, const NU: usize> =
+    (&'a [SVector<T, NX>; GROUP], &'a [SVector<T, NU>; GROUP]);
 
 /// The LPVMPC controller of one plant.
 ///
@@ -372,12 +380,19 @@ where
         ocp: &mut Ocp<T, NX, NU>,
     ) {
         let horizon = self.settings.horizon;
+        let done = if P::TOGETHER {
+            self.in_groups(x, inputs, first, ocp.stages.iter_mut(), |motion| {
+                own.predict_each(&self.model, &self.settings, motion)
+            })
+        } else {
+            0
+        };
         let states = core::iter::once(x).chain(self.rollout.iter()).skip(first);
         let inputs = inputs.iter().take(horizon);
         let window = states.zip(inputs.clone().skip(first).chain(inputs.last()));
         let samples = ocp.stages.iter_mut().zip(window).take(horizon);
         if D::SOME {
-            for (i, (stage, (x, u))) in samples.enumerate() {
+            for (i, (stage, (x, u))) in samples.enumerate().skip(done) {
                 (stage.a, stage.b, stage.c) = own.predict(i, &self.model, &self.settings, x, u);
             }
             return;
@@ -385,12 +400,45 @@ where
         // The same again, for its registers: 2 % of the step's instructions.
         let ControllerSettings { t_s, predictor, .. } = &self.settings;
         let held = self.settings.scheduling.held();
-        for (stage, (x, u)) in samples {
+        for (stage, (x, u)) in samples.skip(done) {
             let pair = predictor.linearize_along(&self.model, held, x, u, *t_s);
             let c = predictor.offset_along(&self.model, held, (x, u), *t_s, &pair);
             stage.c = c.unwrap_or_else(SVector::zeros);
             (stage.a, stage.b) = pair;
         }
+    }
+
+    /// Writes what `samples` makes of states and inputs into the `stages`, in groups, until there is no whole group left or
+    /// it makes nothing of them. The states are those of the rollout from `x`, the `first` of them for the first stage.
+    /// Returns how many stages were written.
+    pub(crate) fn in_groups<'a>(
+        &self,
+        x: &SVector<T, NX>,
+        inputs: &[SVector<T, NU>],
+        first: usize,
+        mut stages: impl Iterator<Item = &'a mut Stage<T, NX, NU>>,
+        samples: impl Fn(Group<'_, T, NX, NU>) -> Option<[Sample<T, NX, NU>; GROUP]>,
+    ) -> usize {
+        let mut done = 0;
+        // A plant in discrete time has nothing to integrate.
+        let horizon = match self.model.period() {
+            None => self.settings.horizon,
+            Some(_) => 0,
+        };
+        while done + GROUP <= horizon {
+            let before = |k: usize| (first + done + k).checked_sub(1);
+            let states = from_fn(|k| before(k).map_or(*x, |before| at(&self.rollout, before)));
+            let inputs = from_fn(|k| at(inputs, first + done + k));
+            let Some(made) = samples((&states, &inputs)) else {
+                break;
+            };
+            // In this order: a zip that ends has taken one more of its first part.
+            for (made, stage) in made.into_iter().zip(&mut stages) {
+                (stage.a, stage.b, stage.c) = made;
+            }
+            done += GROUP;
+        }
+        done
     }
 
     /// The further quadratic programs of the sample, each along the plan of the one before.

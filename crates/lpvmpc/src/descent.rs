@@ -16,6 +16,7 @@
 
 use crate::by_stage::{CostByStage, PlantByStage};
 use crate::controller::Controller;
+use crate::embedding::Tangent;
 use crate::model::{LpvModel, Scalar};
 use crate::plan::{Aim, Merit, Prices, Trial, at};
 use crate::policy::input_at;
@@ -194,17 +195,27 @@ where
         let linear_u = -product(&settings.weights.r, &aim.u_ref);
         ocp.horizon = settings.horizon;
         ocp.x0 = *x;
-        let states = core::iter::once(x).chain(&self.rollout);
-        let samples = states.zip(&self.policy.u).zip(&self.rollout);
         let damping = match along {
             Along::Scheduling => T::zero(),
             Along::Jacobian => self.policy.damping,
         };
         ocp.common.r = settings.weights.r + SMatrix::identity() * damping;
+        let own = &aim.own;
+        let done = if P::TOGETHER {
+            self.in_groups(x, &self.policy.u, 0, ocp.stages.iter_mut(), |motion| {
+                let samples = own.sample_matrices_each(&self.model, settings, motion, along)?;
+                Some(samples.map(|(_, a, b)| (a, b, SVector::zeros())))
+            })
+        } else {
+            0
+        };
+        let states = core::iter::once(x).chain(&self.rollout);
+        let samples = states.zip(&self.policy.u).zip(&self.rollout);
         let stages = ocp.stages.iter_mut().zip(samples).enumerate();
         for (i, (stage, ((x, u), next))) in stages.take(settings.horizon) {
-            let own = &aim.own;
-            (stage.a, stage.b) = own.sample_matrices(i, &self.model, settings, (x, u), along);
+            if i >= done {
+                (stage.a, stage.b) = own.sample_matrices(i, &self.model, settings, (x, u), along);
+            }
             stage.c = next - stage.a * x - stage.b * u;
             stage.linear_u = linear_u - u * damping;
             if D::SOME {
@@ -486,6 +497,31 @@ impl Along {
         match self {
             Self::Scheduling => rk4.linearize(model, x, u, settings.t_s),
             Self::Jacobian => rk4.differentiate(model, x, u, settings.t_s),
+        }
+    }
+
+    /// The same of several samples, with the states in which they end.
+    pub(crate) fn matrices_each<
+        P,
+        T,
+        const NX: usize,
+        const NU: usize,
+        const NS: usize,
+        const POINTS: usize,
+    >(
+        self,
+        model: &P,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        (x, u): (&[SVector<T, NX>; POINTS], &[SVector<T, NU>; POINTS]),
+    ) -> [Tangent<T, NX, NU>; POINTS]
+    where
+        T: Scalar,
+        P: LpvModel<T, NX, NU, NS>,
+    {
+        let rk4 = settings.predictor.rk4();
+        match self {
+            Self::Scheduling => rk4.linearize_each(model, x, u, settings.t_s),
+            Self::Jacobian => rk4.differentiate_each(model, x, u, settings.t_s),
         }
     }
 

@@ -1,6 +1,6 @@
 //! A plant written once, for every kind of number.
 
-use crate::model::{LpvModel, Scalar};
+use crate::model::{LpvModel, Scalar, embedded_by_products};
 use crate::number::{Dual, Number};
 use crate::small_matrix::product;
 use crate::steady_state::{self, SteadyState, SteadyStateProblem};
@@ -74,12 +74,37 @@ pub trait Embedding<const NX: usize, const NU: usize, const NS: usize> {
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
     ) -> Tangent<T, NX, NU> {
-        tangent(
+        tangent_by_duals(
             x,
             u,
             |x: &SVector<Dual<T, NX>, NX>, u| self.f(x, u),
             |x, u| self.f(x, u),
         )
+    }
+
+    /// See [`LpvModel::TOGETHER`].
+    const TOGETHER: bool = false;
+
+    /// [`tangent`](Self::tangent) at several points.
+    #[inline(always)]
+    fn tangent_each<T: Scalar + Number, const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS] {
+        core::array::from_fn(|i| self.tangent(&x[i], &u[i]))
+    }
+
+    /// f with the matrices that it is made of, (f, A(s), B(s)), at several points, of a plant that has them cheaper
+    /// together than one by one; the same numbers, to rounding.
+    #[inline(always)]
+    fn embedded_each<T: Scalar + Number, const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
+        let _ = (x, u);
+        None
     }
 
     /// See [`LpvModel::a_times`].
@@ -158,6 +183,37 @@ where
         Embedding::tangent(self, x, u)
     }
 
+    #[inline(always)]
+    fn embedded(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> Tangent<T, NX, NU> {
+        match Embedding::embedded_each(self, &[*x], &[*u]) {
+            Some([embedded]) => embedded,
+            None => embedded_by_products(self, x, u),
+        }
+    }
+
+    const TOGETHER: bool = P::TOGETHER;
+
+    #[inline(always)]
+    fn embedded_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS] {
+        match Embedding::embedded_each(self, x, u) {
+            Some(embedded) => embedded,
+            None => core::array::from_fn(|i| embedded_by_products(self, &x[i], &u[i])),
+        }
+    }
+
+    #[inline(always)]
+    fn tangent_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS] {
+        Embedding::tangent_each(self, x, u)
+    }
+
     fn steady_state(
         &self,
         problem: &SteadyStateProblem<T, NX, NU>,
@@ -178,6 +234,21 @@ pub trait Dynamics<const NX: usize, const NU: usize> {
 
     /// x_dot = f(x, u), in state units per second; with a [`period`](Self::period) x+ = F(x, u), in state units.
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX>;
+
+    /// See [`LpvModel::TOGETHER`].
+    const TOGETHER: bool = false;
+
+    /// f with its derivatives at several points, of a plant that has them cheaper than by dual numbers; the same
+    /// numbers, to rounding.
+    #[inline(always)]
+    fn tangent_each<T: Scalar + Number, const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
+        let _ = (x, u);
+        None
+    }
 }
 
 impl<P: Dynamics<NX, NU>, const NX: usize, const NU: usize> Dynamics<NX, NU> for &P {
@@ -190,11 +261,23 @@ impl<P: Dynamics<NX, NU>, const NX: usize, const NU: usize> Dynamics<NX, NU> for
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
         P::f(self, x, u)
     }
+
+    const TOGETHER: bool = P::TOGETHER;
+
+    #[inline(always)]
+    fn tangent_each<T: Scalar + Number, const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
+        P::tangent_each(self, x, u)
+    }
 }
 
-/// (f, df/dx, df/du) by two passes of dual numbers: one for the states, one for the inputs.
+/// (f, df/dx, df/du) at `x` and `u` by two passes of dual numbers: one for the states, one for the inputs. `by_x` and
+/// `by_u` are f of these.
 #[inline(always)]
-fn tangent<T: Scalar + Number, const NX: usize, const NU: usize>(
+pub fn tangent_by_duals<T: Scalar + Number, const NX: usize, const NU: usize>(
     x: &SVector<T, NX>,
     u: &SVector<T, NU>,
     by_x: impl Fn(&SVector<Dual<T, NX>, NX>, &SVector<Dual<T, NX>, NU>) -> SVector<Dual<T, NX>, NX>,

@@ -39,7 +39,7 @@ fn parted<T: Scalar, const NX: usize, const NU: usize, const NS: usize>(
     )
 }
 
-/// (f, df/dx, df/du) by one pass of dual numbers with `NS` = `NX` + `NU` slopes.
+/// (f, df/dx, df/du) as the plant has them, or by one pass of dual numbers with `NS` = `NX` + `NU` slopes.
 fn tangent<T, P, const NX: usize, const NU: usize, const NS: usize>(
     plant: &P,
     x: &SVector<T, NX>,
@@ -55,6 +55,9 @@ where
             "the scheduling is x and u: NS must be NX + NU"
         )
     };
+    if let Some([tangent]) = plant.tangent_each(&[*x], &[*u]) {
+        return tangent;
+    }
     let variable = |value: T, place: usize| {
         let mut variable = Dual::<T, NS>::fixed(value);
         if let Some(slope) = variable.slopes.get_mut(place) {
@@ -74,4 +77,19 @@ where
         SMatrix::from_fn(slope),
         SMatrix::from_fn(|i, j| slope(i, NX + j)),
     )
+}
+
+/// [`tangent`] at several points.
+fn tangent_each<T, P, const NX: usize, const NU: usize, const NS: usize, const POINTS: usize>(
+    plant: &P,
+    x: &[SVector<T, NX>; POINTS],
+    u: &[SVector<T, NU>; POINTS],
+) -> [Tangent<T, NX, NU>; POINTS]
+where
+    T: Scalar + Number,
+    P: Dynamics<NX, NU>,
+{
+    let together = plant.tangent_each(x, u);
+    let one_by_one = || core::array::from_fn(|i| tangent::<_, _, NX, NU, NS>(plant, &x[i], &u[i]));
+    together.unwrap_or_else(one_by_one)
 }

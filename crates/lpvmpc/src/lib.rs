@@ -105,7 +105,7 @@ mod workspace;
 pub use clock::{Clock, Tick};
 pub use controller::{Controller, Reference};
 pub use delay::DelayLine;
-pub use embedding::{Dynamics, Embedding, Tangent};
+pub use embedding::{Dynamics, Embedding, Tangent, tangent_by_duals};
 pub use estimator::{
     Covariance, Estimator, EstimatorArrays, EstimatorError, EstimatorMemory, EstimatorSettings,
     Gate, Observation, Reading, Restart, Verdict,
@@ -125,7 +125,7 @@ pub use memory::{
     WorkspaceArrays, WorkspaceMemory,
 };
 pub use model::{LpvModel, Scalar};
-pub use number::{Bivariate, Dual, Elementary, Number};
+pub use number::{Bivariate, Dual, Elementary, Number, SincSlope};
 pub use ocp::{Bounds, Common, GeneralRow, Ocp, Penalty, SoftBounds, Stage, Terminal};
 pub use outputs::{OutputGoal, Outputs};
 pub use predictor::{Predictor, Rk4};

@@ -119,15 +119,35 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
     ) -> (SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-        // The embedding is exact, so its product is f.
-        let scheduling = self.scheduling(x, u);
-        let (a, b) = self.matrices(&scheduling);
-        let mut rate = self.a_times(&a, x);
-        add_product(&mut rate, &b, u);
-        if let Some(c) = self.offset(&scheduling) {
-            rate += c;
-        }
-        (rate, a, b)
+        embedded_by_products(self, x, u)
+    }
+
+    /// Whether [`embedded_each`](Self::embedded_each) and [`tangent_each`](Self::tangent_each) take less time than one
+    /// point after the other.
+    const TOGETHER: bool = false;
+
+    /// [`embedded`](Self::embedded) at several points.
+    fn embedded_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [(SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>); POINTS] {
+        core::array::from_fn(|i| self.embedded(&x[i], &u[i]))
+    }
+
+    /// [`tangent`](Self::tangent) at several points.
+    fn tangent_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [(SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>); POINTS] {
+        core::array::from_fn(|i| self.tangent(&x[i], &u[i]))
+    }
+
+    /// Whether there is an [`offset`](Self::offset).
+    #[inline(always)]
+    fn has_offset(&self) -> bool {
+        self.offset(&SVector::zeros()).is_some()
     }
 
     /// What the sensor `i` of an [`Estimator`](crate::Estimator) measures at the state `x`, and its derivatives,
@@ -150,6 +170,28 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
     ) -> Option<SteadyState<T, NX, NU>> {
         steady_state::nearest(self, problem)
     }
+}
+
+/// (f, A(s), B(s)), f as the sum of products that it is.
+#[inline(always)]
+pub(crate) fn embedded_by_products<P, T, const NX: usize, const NU: usize, const NS: usize>(
+    model: &P,
+    x: &SVector<T, NX>,
+    u: &SVector<T, NU>,
+) -> (SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>)
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS> + ?Sized,
+{
+    // The embedding is exact, so its product is f.
+    let scheduling = model.scheduling(x, u);
+    let (a, b) = model.matrices(&scheduling);
+    let mut rate = model.a_times(&a, x);
+    add_product(&mut rate, &b, u);
+    if let Some(c) = model.offset(&scheduling) {
+        rate += c;
+    }
+    (rate, a, b)
 }
 
 /// The derivatives of `g` at `at`, by central differences.

@@ -3,7 +3,7 @@
 mod dual;
 mod trigonometry;
 
-pub use dual::Dual;
+pub use dual::{Dual, SincSlope};
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use nalgebra::{ComplexField, RealField};
@@ -135,7 +135,7 @@ pub trait Number:
 }
 
 /// Functions beyond the four operations that every [`Number`] has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Elementary {
     /// sin x.
     Sin,
@@ -180,7 +180,7 @@ pub enum Elementary {
 }
 
 /// Functions of two numbers, x and y, that every [`Number`] has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Bivariate {
     /// The angle of the point (y, x), whose first coordinate is y, in rad: arctan(x/y) for y > 0.
     Atan2,

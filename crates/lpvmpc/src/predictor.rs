@@ -5,6 +5,7 @@
 //! matrices (lines 2 to 8 of Algorithm 1); with the scheduling read off the state it is the
 //! nonlinear map of the rollout (eq. (5), step 4 of Algorithm 2).
 
+use crate::embedding::Tangent;
 use crate::model::{LpvModel, Scalar};
 use crate::small_matrix::{add_scaled, extend, product, scale};
 use nalgebra::{SMatrix, SVector, convert};
@@ -110,12 +111,13 @@ impl Predictor {
         T: Scalar,
         P: LpvModel<T, NX, NU, NS>,
     {
-        let scheduling = held.copied().unwrap_or_else(|| model.scheduling(x, u));
-        let c = model.offset(&scheduling)?;
         if let (Self::StageConsistent(rk4), None) = (self, held) {
             // The pair is exact at the sample's own beginning.
-            return Some(rk4.advance(model, x, u, t_s) - product(a_d, x) - product(b_d, u));
+            let exact = || rk4.advance(model, x, u, t_s) - product(a_d, x) - product(b_d, u);
+            return model.has_offset().then(exact);
         }
+        let scheduling = held.copied().unwrap_or_else(|| model.scheduling(x, u));
+        let c = model.offset(&scheduling)?;
         // It acts as an input of 1 does.
         let (a, _) = model.matrices(&scheduling);
         if let Some(period) = model.period() {
@@ -143,7 +145,7 @@ impl Predictor {
 /// f and the continuous-time pair (A, B) at a state.
 #[cfg(target_os = "none")]
 type TangentAt<'a, T, const NX: usize, const NU: usize> =
-    dyn Fn(&SVector<T, NX>) -> (SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) + 'a;
+    dyn Fn(&[SVector<T, NX>; 1]) -> [Tangent<T, NX, NU>; 1] + 'a;
 
 /// Classical Runge-Kutta method of order four with `substeps` equal steps per sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -219,13 +221,60 @@ impl Rk4 {
         T: Scalar,
         P: LpvModel<T, NX, NU, NS>,
     {
-        let embedding = |x: &SVector<T, NX>| model.embedded(x, u);
         if let Some(period) = model.period() {
-            return follow_periods(x, periods(period, t_s), embedding);
+            return follow_periods(x, periods(period, t_s), |x| model.embedded(x, u));
         }
+        let embedding = |x: &[SVector<T, NX>; 1]| [model.embedded(&x[0], u)];
         #[cfg(target_os = "none")]
         let embedding: &TangentAt<'_, T, NX, NU> = &embedding;
-        self.compose(model, x, t_s, embedding)
+        let [(_, a_d, b_d)] = self.compose(model, &[*x], t_s, embedding);
+        (a_d, b_d)
+    }
+
+    /// The state after a sample from each `x` under its `u`, with the matrices of [`Rk4::linearize`].
+    #[inline(never)]
+    pub(crate) fn linearize_each<
+        T,
+        P,
+        const NX: usize,
+        const NU: usize,
+        const NS: usize,
+        const POINTS: usize,
+    >(
+        self,
+        model: &P,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+        t_s: T,
+    ) -> [Tangent<T, NX, NU>; POINTS]
+    where
+        T: Scalar,
+        P: LpvModel<T, NX, NU, NS>,
+    {
+        self.compose(model, x, t_s, |x| model.embedded_each(x, u))
+    }
+
+    /// The state after a sample from each `x` under its `u`, with the derivatives of [`Rk4::differentiate`].
+    #[inline(never)]
+    pub(crate) fn differentiate_each<
+        T,
+        P,
+        const NX: usize,
+        const NU: usize,
+        const NS: usize,
+        const POINTS: usize,
+    >(
+        self,
+        model: &P,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+        t_s: T,
+    ) -> [Tangent<T, NX, NU>; POINTS]
+    where
+        T: Scalar,
+        P: LpvModel<T, NX, NU, NS>,
+    {
+        self.compose(model, x, t_s, |x| model.tangent_each(x, u))
     }
 
     /// The derivatives of [`Rk4::advance`] with respect to `x` and `u`: the same recursion with the
@@ -243,16 +292,18 @@ impl Rk4 {
         T: Scalar,
         P: LpvModel<T, NX, NU, NS>,
     {
-        let tangent = |x: &SVector<T, NX>| model.tangent(x, u);
         if let Some(period) = model.period() {
-            return follow_periods(x, periods(period, t_s), tangent);
+            return follow_periods(x, periods(period, t_s), |x| model.tangent(x, u));
         }
+        let tangent = |x: &[SVector<T, NX>; 1]| [model.tangent(&x[0], u)];
         #[cfg(target_os = "none")]
         let tangent: &TangentAt<'_, T, NX, NU> = &tangent;
-        self.compose(model, x, t_s, tangent)
+        let [(_, a_d, b_d)] = self.compose(model, &[*x], t_s, tangent);
+        (a_d, b_d)
     }
 
-    /// The steps' matrices from f and the continuous-time pairs `at` each Runge-Kutta stage.
+    /// The state after the steps from each `x`, and the steps' matrices, from f and the continuous-time pairs `at` each
+    /// Runge-Kutta stage.
     ///
     /// With A_j, B_j at stage j, the stages' slopes are K_j x + L_j u (up to a constant where the
     /// pairs are Jacobians): K_1 = A_1, L_1 = B_1, K_2 = A_2 (I + h/2 K_1),
@@ -260,13 +311,13 @@ impl Rk4 {
     // On a microcontroller, where flash is scarce, both kinds of pairs share its machine code.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    fn compose<T, P, const NX: usize, const NU: usize, const NS: usize>(
+    fn compose<T, P, const NX: usize, const NU: usize, const NS: usize, const POINTS: usize>(
         self,
         model: &P,
-        x: &SVector<T, NX>,
+        x: &[SVector<T, NX>; POINTS],
         t_s: T,
-        at: impl Fn(&SVector<T, NX>) -> (SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>),
-    ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>)
+        at: impl Fn(&[SVector<T, NX>; POINTS]) -> [Tangent<T, NX, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS]
     where
         T: Scalar,
         P: LpvModel<T, NX, NU, NS>,
@@ -274,27 +325,39 @@ impl Rk4 {
         let h = self.step_length(t_s);
         let [half, third, sixth] =
             [0.5, 1.0 / 3.0, 1.0 / 6.0].map(|part| h * convert::<f64, T>(part));
-        let (mut a_d, mut b_d) = (SMatrix::identity(), SMatrix::zeros());
-        let mut x = *x;
+        let start = (SVector::zeros(), SMatrix::identity(), SMatrix::zeros());
+        let mut reached = [start; POINTS];
+        for (reached, x) in reached.iter_mut().zip(x) {
+            reached.0 = *x;
+        }
         for _ in 0..self.substeps {
-            let (mut next, mut a_next, mut b_next) = (x, a_d, b_d);
-            let (mut rate, mut k, mut l) = (SVector::zeros(), SMatrix::zeros(), SMatrix::zeros());
+            let mut next = reached;
+            let mut rates = [SVector::zeros(); POINTS];
+            let mut slopes = [(SMatrix::zeros(), SMatrix::zeros()); POINTS];
             let stages = [(T::zero(), sixth), (half, third), (half, third), (h, sixth)];
             for (reach, weight) in stages {
-                // In place, since copies cost as much as the products where nothing is unrolled.
-                extend(&mut rate, &x, reach);
-                extend(&mut k, &a_d, reach);
-                extend(&mut l, &b_d, reach);
-                let (there, a, b) = at(&rate);
-                (rate, k, l) = (there, model.a_times(&a, &k), model.a_times(&a, &l));
-                add_scaled(&mut l, &b, T::one());
-                add_scaled(&mut next, &rate, weight);
-                add_scaled(&mut a_next, &k, weight);
-                add_scaled(&mut b_next, &l, weight);
+                for (rate, (x, ..)) in rates.iter_mut().zip(&reached) {
+                    extend(rate, x, reach);
+                }
+                let there = at(&rates);
+                for i in 0..POINTS {
+                    // In place, since copies cost as much as the products where nothing is unrolled.
+                    let ((k, l), (_, a_d, b_d)) = (&mut slopes[i], &reached[i]);
+                    extend(k, a_d, reach);
+                    extend(l, b_d, reach);
+                    let (rate, a, b) = &there[i];
+                    rates[i] = *rate;
+                    (*k, *l) = (model.a_times(a, k), model.a_times(a, l));
+                    add_scaled(l, b, T::one());
+                    let (x_next, a_next, b_next) = &mut next[i];
+                    add_scaled(x_next, rate, weight);
+                    add_scaled(a_next, k, weight);
+                    add_scaled(b_next, l, weight);
+                }
             }
-            (x, a_d, b_d) = (next, a_next, b_next);
+            reached = next;
         }
-        (a_d, b_d)
+        reached
     }
 
     /// The state `t_s` seconds after `x` under the constant input `u`, of the nonlinear plant.

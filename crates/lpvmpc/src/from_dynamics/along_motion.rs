@@ -1,6 +1,6 @@
 //! Linear models along the motion.
 
-use super::{joined, parted, tangent};
+use super::{joined, parted, tangent, tangent_each};
 use crate::embedding::{Dynamics, Tangent};
 use crate::model::{LpvModel, Scalar};
 use crate::number::Number;
@@ -61,5 +61,27 @@ where
 
     fn tangent(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> Tangent<T, NX, NU> {
         tangent::<_, _, NX, NU, NS>(&self.0, x, u)
+    }
+
+    const TOGETHER: bool = P::TOGETHER;
+
+    fn embedded_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS] {
+        self.tangent_each(x, u)
+    }
+
+    fn tangent_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS] {
+        tangent_each::<_, _, NX, NU, NS, POINTS>(&self.0, x, u)
+    }
+
+    fn has_offset(&self) -> bool {
+        true
     }
 }

@@ -1,6 +1,6 @@
 //! Linear models about a steady state, by the fundamental theorem of calculus.
 
-use super::{GaussLegendre, joined, parted, tangent};
+use super::{GaussLegendre, joined, parted, tangent, tangent_each};
 use crate::embedding::{Dynamics, Tangent};
 use crate::model::{LpvModel, Scalar};
 use crate::number::Number;
@@ -46,16 +46,28 @@ where
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-        let (mut a, mut b) = (SMatrix::zeros(), SMatrix::zeros());
+        let [mean] = self.mean_each(&[*x], &[*u]);
+        mean
+    }
+
+    /// The same for rays to several points.
+    fn mean_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [(SMatrix<T, NX, NX>, SMatrix<T, NX, NU>); POINTS] {
+        let mut means = [(SMatrix::zeros(), SMatrix::zeros()); POINTS];
         for (place, weight) in self.nodes.iter() {
             let (place, weight): (T, T) = (convert(place), convert(weight));
-            let x = self.x + (x - self.x) * place;
-            let u = self.u + (u - self.u) * place;
-            let (_, by_x, by_u) = tangent::<_, _, NX, NU, NS>(&self.plant, &x, &u);
-            a += by_x * weight;
-            b += by_u * weight;
+            let x = x.map(|x| self.x + (x - self.x) * place);
+            let u = u.map(|u| self.u + (u - self.u) * place);
+            let tangents = tangent_each::<_, _, NX, NU, NS, POINTS>(&self.plant, &x, &u);
+            for ((a, b), (_, by_x, by_u)) in means.iter_mut().zip(tangents) {
+                *a += by_x * weight;
+                *b += by_u * weight;
+            }
         }
-        (a, b)
+        means
     }
 }
 
@@ -106,5 +118,31 @@ where
 
     fn tangent(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> Tangent<T, NX, NU> {
         tangent::<_, _, NX, NU, NS>(&self.plant, x, u)
+    }
+
+    const TOGETHER: bool = P::TOGETHER;
+
+    fn embedded_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS] {
+        let means = self.mean_each(x, u);
+        core::array::from_fn(|i| {
+            let (a, b) = means[i];
+            (self.plant.f(&x[i], &u[i]), a, b)
+        })
+    }
+
+    fn tangent_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<T, NX>; POINTS],
+        u: &[SVector<T, NU>; POINTS],
+    ) -> [Tangent<T, NX, NU>; POINTS] {
+        tangent_each::<_, _, NX, NU, NS, POINTS>(&self.plant, x, u)
+    }
+
+    fn has_offset(&self) -> bool {
+        true
     }
 }

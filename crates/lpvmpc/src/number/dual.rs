@@ -190,12 +190,17 @@ fn one_minus_square<T: Scalar>(x: T) -> T {
     (T::one() - x) * (T::one() + x)
 }
 
-/// d/dx sin(x)/x at `x`, where sin(x)/x is `sinc`: (cos x - sinc x)/x, and by its series where that
-/// difference would lose its digits.
-fn sinc_slope<T: Scalar + Number>(x: T, sinc: T) -> T {
-    const SMALL: f64 = 0.3;
-    // (-1)^k 2k / (2k+1)!, the last first; what is left out is below 1e-17 of the slope.
-    const SERIES: [f64; 7] = [
+/// How d/dx sin(x)/x is worked out: (cos x - sinc x)/x, and by its series where that difference would lose its
+/// digits.
+#[derive(Clone, Copy, Debug)]
+pub struct SincSlope;
+
+impl SincSlope {
+    /// Up to this |x|, in rad, the series is used.
+    pub const SMALL: f64 = 0.3;
+    /// (-1)^k 2k / (2k+1)!, the last first: the factors of powers of x^2 in the slope over x. What is left out is below
+    /// 1e-17 of the slope.
+    pub const SERIES: [f64; 7] = [
         -1.0 / 93_405_312_000.0,
         1.0 / 518_918_400.0,
         -1.0 / 3_991_680.0,
@@ -204,11 +209,15 @@ fn sinc_slope<T: Scalar + Number>(x: T, sinc: T) -> T {
         1.0 / 30.0,
         -1.0 / 3.0,
     ];
-    if x.abs() > convert(SMALL) {
+}
+
+/// d/dx sin(x)/x at `x`, where sin(x)/x is `sinc`.
+fn sinc_slope<T: Scalar + Number>(x: T, sinc: T) -> T {
+    if x.abs() > convert(SincSlope::SMALL) {
         return (x.elementary(Elementary::Cos) - sinc) / x;
     }
     let square = x * x;
-    let sum = SERIES.iter().fold(T::zero(), |sum, coefficient| {
+    let sum = { SincSlope::SERIES.iter() }.fold(T::zero(), |sum, coefficient| {
         sum * square + convert(*coefficient)
     });
     sum * x
