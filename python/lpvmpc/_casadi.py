@@ -122,8 +122,7 @@ def _operation(
         return tape.add("eq", of[0], tape.constant(0.0))
     if code == ca.OP_NE:
         return tape.add("eq", tape.add("eq", *of), tape.constant(0.0))
-    # Of truth values: what is not 0 is true.
-    truth = [tape.add("eq", tape.add("eq", a, tape.constant(0.0)), tape.constant(0.0)) for a in of]
+    truth = [_truth(tape, a) for a in of]
     if code == ca.OP_AND:
         return tape.add("mul", *truth)
     if code == ca.OP_OR:
@@ -139,6 +138,13 @@ def _operation(
     raise PlantError(
         f"formulas: the operation number {code} of CasADi has no counterpart here; there are {known}"
     )
+
+
+def _truth(tape: Tape, place: int) -> int:
+    """1 where a result is not 0, else 0; what is one of them already stays."""
+    if tape.operations[place][0] in ("lt", "le", "eq"):
+        return place
+    return tape.add("eq", tape.add("eq", place, tape.constant(0.0)), tape.constant(0.0))
 
 
 def _last_line(error: Exception) -> str:

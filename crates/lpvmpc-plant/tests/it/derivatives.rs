@@ -1,7 +1,7 @@
 //! Derivatives by formulas are those by dual numbers.
 
 use crate::reference::{plant, points};
-use lpvmpc::{Dual, Dynamics, LpvModel};
+use lpvmpc::LpvModel;
 use lpvmpc_plant::SizedEmbedding;
 use nalgebra::SVector;
 
