@@ -28,8 +28,16 @@
 //! # }
 //! ```
 //!
-//! A [`World`] moves such a plant, with sensors, actuators, delay and pushes, for a controller to be
-//! tried on.
+//! | for | use |
+//! |---|---|
+//! | weights, bounds, prices, rows, horizon | [`MpcSettings`] |
+//! | costs and bounds of outputs y = g(x, u): nonlinear costs and constraints | [`MpcSettings::q_y`], [`MpcSettings::y_bounds`] |
+//! | costs and bounds of what the inputs change | [`MpcSettings::r_du`], [`MpcSettings::du_bounds`], [`Mpc::set_last_input`] |
+//! | what is known ahead, stage by stage | [`Preview`]: references, weights, bounds, rows, disturbances, parameters, [matrices](StageMatrices), scheduling |
+//! | readings, disturbances and a delay | [`EstimatorSettings`], [`Mpc::observe`], [`Mpc::decide`] |
+//! | another value of a parameter, other settings | [`Mpc::set_parameter`], [`Mpc::set_settings`] |
+//! | a simulated plant with sensors, actuators, delay and pushes | [`World`] |
+//! | where a plant can stand | [`steady_state`] |
 //!
 //! It is the controller of `lpvmpc`, compiled for a few sizes. A plant that is smaller than the
 //! size that serves it leaves places over; what stands there stays zero, and nothing depends on it.

@@ -90,6 +90,11 @@ impl Mpc {
         if places(self.sized.plant(), settings).0 <= self.sized.places() {
             return self.sized.set_settings(settings);
         }
+        let before = self.sized.settings();
+        if (settings.horizon, settings.t_s) != (before.horizon, before.t_s) {
+            let error = lpvmpc::ControllerError::Another;
+            return Err(MpcError::new("settings", error.to_string()));
+        }
         // The last inputs need more places: the next step is as the first.
         let mut larger = sized(self.sized.plant(), settings)?;
         larger.set_last_input(&self.sized.last_input())?;

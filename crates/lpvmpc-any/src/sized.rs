@@ -31,6 +31,8 @@ pub(crate) trait AnySize: Send + Sync {
     fn plant(&self) -> &Plant;
     /// The input that was applied last.
     fn last_input(&self) -> Vec<f64>;
+    /// The settings as they are now.
+    fn settings(&self) -> &MpcSettings;
     /// The places for states.
     fn places(&self) -> usize;
     /// See [`crate::Mpc::set_estimator`].
@@ -270,6 +272,10 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
 
     fn last_input(&self) -> Vec<f64> {
         self.applied.as_slice()[..self.names.inputs.len()].to_vec()
+    }
+
+    fn settings(&self) -> &MpcSettings {
+        &self.settings
     }
 
     fn places(&self) -> usize {

@@ -2,7 +2,7 @@
 
 use crate::settings::Limits;
 use crate::stage_lists::held;
-use lpvmpc::{Dual, OutputGoal, Outputs, Penalty};
+use lpvmpc::{Dual, OutputGoal, Outputs, Penalty, VisitTangent};
 use lpvmpc_plant::{Operation, Plant, PlantData};
 use nalgebra::{DMatrix, DVector, SVector};
 
@@ -241,7 +241,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Outputs<f64, NX, NU> for
         i: usize,
         x: &SVector<f64, NX>,
         u: &SVector<f64, NU>,
-        visit: &mut dyn FnMut(usize, f64, &SVector<f64, NX>, &SVector<f64, NU>),
+        visit: &mut VisitTangent<'_, f64, NX, NU>,
     ) {
         let y = if self.has_outputs() {
             self.point(i, x, u).y

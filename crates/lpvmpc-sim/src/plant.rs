@@ -78,7 +78,7 @@ pub trait Plant<const NX: usize, const NU: usize, const NL: usize> {
     ) -> SVector<f64, NX>;
 }
 
-/// An LPV model as a plant that takes no load.
+/// An LPV model in continuous time as a plant that takes no load.
 #[derive(Clone, Copy, Debug)]
 pub struct Unloaded<'a, P, const NS: usize>(pub &'a P);
 

@@ -64,7 +64,8 @@ where
         Ok(())
     }
 
-    /// Another model of the plant from the next step on; the last plan stays its start.
+    /// Another model of the plant from the next step on; the last plan stays its start. It is one in the same kind of
+    /// time: with the same period, or with none.
     pub fn set_model(&mut self, model: P) {
         self.model = model;
         (self.prepared, self.aimed_at) = (None, None);

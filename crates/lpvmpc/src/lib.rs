@@ -127,7 +127,7 @@ pub use memory::{
 pub use model::{LpvModel, Scalar};
 pub use number::{Bivariate, Dual, Elementary, Number, SincSlope};
 pub use ocp::{Bounds, Common, GeneralRow, Ocp, Penalty, SoftBounds, Stage, Terminal};
-pub use outputs::{OutputGoal, Outputs};
+pub use outputs::{OutputGoal, Outputs, VisitTangent};
 pub use predictor::{Predictor, Rk4};
 pub use preview::{Preview, PreviewError, PreviewMistake, PreviewPart};
 pub use ramp::RampedInput;

@@ -47,9 +47,13 @@ pub trait Outputs<T, const NX: usize, const NU: usize>: fmt::Debug {
         i: usize,
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
-        visit: &mut dyn FnMut(usize, T, &SVector<T, NX>, &SVector<T, NU>),
+        visit: &mut VisitTangent<'_, T, NX, NU>,
     );
 }
+
+/// Takes the number of an output, its value, and its derivatives with respect to state and input.
+pub type VisitTangent<'a, T, const NX: usize, const NU: usize> =
+    dyn FnMut(usize, T, &SVector<T, NX>, &SVector<T, NU>) + 'a;
 
 /// What an output is to do at a stage.
 #[derive(Clone, Copy, Debug, PartialEq)]

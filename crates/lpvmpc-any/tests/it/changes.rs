@@ -193,6 +193,16 @@ fn they_may_begin_and_cease_to_count() {
     let first = mpc.step(&x, &Preview::default()).unwrap();
     let u = first.u[(0, 0)];
     assert!(u.abs() > 0.5);
+    // With a place more, too, horizon and sampling time stay.
+    let longer = MpcSettings {
+        horizon: 30,
+        ..with.clone()
+    };
+    let said = mpc.set_settings(&longer).unwrap_err().to_string();
+    assert!(
+        said.contains("cannot change while a controller runs"),
+        "{said}"
+    );
     mpc.set_settings(&with).unwrap();
     // The last input is known still.
     let plan = mpc

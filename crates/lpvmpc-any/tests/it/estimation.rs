@@ -55,7 +55,7 @@ fn position(with_changes: bool, disturbances: Vec<Disturbance>, delay: usize) ->
     let mut x = dvector![0.0, 0.05, 0.0, 0.0];
     let mut sent = vec![0.0; delay];
     let (mut sum, mut last) = (0.0, 0.0_f64);
-    const SAMPLES: usize = 400;
+    const SAMPLES: usize = 300;
     for k in 0..SAMPLES {
         let y = real.output(x.as_slice(), &[0.0]).unwrap();
         let verdicts = mpc

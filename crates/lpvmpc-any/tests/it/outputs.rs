@@ -92,12 +92,12 @@ fn plans_of_a_linear_plant_are_those_of_clarabel() {
         let plan = linear(&settings).step(&x0, &preview).unwrap();
         assert!(plan.is_solved(), "{}", plan.status);
         let mut cost = plan.cost;
-        for k in 0..HORIZON {
+        for (k, u) in u.iter().enumerate().take(HORIZON) {
             assert!(
-                (plan.u[(k, 0)] - u[k]).abs() < 2e-4,
+                (plan.u[(k, 0)] - u).abs() < 2e-4,
                 "{k}: {} {}",
                 plan.u[(k, 0)],
-                u[k]
+                u
             );
             let y = plan.x.row(k) * dmatrix![-0.2; 1.0] + plan.u.row(k) * 0.3;
             cost += price * (y[0].abs() - 0.35).max(0.0);

@@ -224,6 +224,7 @@ impl Case {
             disturbance: &self.disturbance,
             scheduling: &self.scheduling,
             models: &self.models,
+            outputs: None,
         }
     }
 }

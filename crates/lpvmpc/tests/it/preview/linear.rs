@@ -328,6 +328,7 @@ fn single_precision_is_close_to_the_optimum() {
                 disturbance: &singles(&case.disturbance),
                 scheduling: &singles(&case.scheduling),
                 models: &case.models.iter().map(plant).collect::<Vec<_>>(),
+                outputs: None,
             };
             let mut workspace = Workspace::allocate(room);
             let plan = controller.step_with(&single(&case.x0), &preview, &mut workspace);

@@ -1,4 +1,4 @@
-//! What a controller may be told ahead: references, weights, bounds, rows, disturbances, scheduling and
+//! What a controller may be told ahead: references, weights, bounds, rows, outputs, disturbances, scheduling and
 //! models by stage, against problems that are written out anew here.
 
 mod case;
@@ -7,6 +7,7 @@ mod closed_loop;
 mod dense;
 mod linear;
 mod nonlinear;
+mod outputs;
 mod parts;
 mod plants;
 mod refused;
