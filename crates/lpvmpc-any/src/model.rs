@@ -27,10 +27,11 @@ impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for Filled<SizedPlant<NX
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
-        let mut tangents = Dynamics::tangent_each(&self.plant, x, u)?;
-        fill(&mut tangents, x, self.states);
-        Some(tangents)
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) -> bool {
+        let there = Dynamics::tangent_each(&self.plant, x, u, tangents);
+        fill(tangents, x, self.states);
+        there
     }
 }
 
@@ -90,7 +91,9 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
     ) -> Tangent<T, NX, NU> {
-        let [tangent] = Embedding::tangent_each(self, &[*x], &[*u]);
+        let mut tangents = [(SVector::zeros(), SMatrix::zeros(), SMatrix::zeros())];
+        Embedding::tangent_each(self, &[*x], &[*u], &mut tangents);
+        let [tangent] = tangents;
         tangent
     }
 
@@ -100,20 +103,21 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [Tangent<T, NX, NU>; POINTS] {
-        let mut tangents = Embedding::tangent_each(&self.plant, x, u);
-        fill(&mut tangents, x, self.states);
-        tangents
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
+        Embedding::tangent_each(&self.plant, x, u, tangents);
+        fill(tangents, x, self.states);
     }
 
     fn embedded_each<T: Scalar + Number, const POINTS: usize>(
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
-        let mut embedded = Embedding::embedded_each(&self.plant, x, u)?;
-        fill(&mut embedded, x, self.states);
-        Some(embedded)
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) -> bool {
+        let there = Embedding::embedded_each(&self.plant, x, u, tangents);
+        fill(tangents, x, self.states);
+        there
     }
 }
 
@@ -228,16 +232,18 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
         &self,
         x: &[SVector<f64, NX>; POINTS],
         u: &[SVector<f64, NU>; POINTS],
-    ) -> [Tangent<f64, NX, NU>; POINTS] {
-        whichever!(self, model => LpvModel::embedded_each(model, x, u))
+        tangents: &mut [Tangent<f64, NX, NU>; POINTS],
+    ) {
+        whichever!(self, model => LpvModel::embedded_each(model, x, u, tangents));
     }
 
     fn tangent_each<const POINTS: usize>(
         &self,
         x: &[SVector<f64, NX>; POINTS],
         u: &[SVector<f64, NU>; POINTS],
-    ) -> [Tangent<f64, NX, NU>; POINTS] {
-        whichever!(self, model => LpvModel::tangent_each(model, x, u))
+        tangents: &mut [Tangent<f64, NX, NU>; POINTS],
+    ) {
+        whichever!(self, model => LpvModel::tangent_each(model, x, u, tangents));
     }
 
     fn has_offset(&self) -> bool {

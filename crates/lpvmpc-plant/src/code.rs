@@ -136,7 +136,8 @@ fn steps(operations: &[Operation], results: &[usize]) -> (Vec<Option<Step>>, Vec
         if needed[index] {
             steps[index] = step(operations, index);
             let step = steps[index].iter();
-            step.flat_map(|step| &step.sources).for_each(|source| needed[*source] = true);
+            step.flat_map(|step| &step.sources)
+                .for_each(|source| needed[*source] = true);
         }
     }
     (steps, needed)
@@ -175,7 +176,10 @@ fn sines_and_cosines(steps: &[Option<Step>]) -> HashMap<usize, usize> {
 /// Products that are read but once, by a sum or a difference, become parts of it.
 fn join_products(steps: &mut [Option<Step>], results: &[usize]) {
     let mut reads = vec![0_usize; steps.len()];
-    for read in { steps.iter().flatten() }.flat_map(|step| &step.sources).chain(results) {
+    for read in { steps.iter().flatten() }
+        .flat_map(|step| &step.sources)
+        .chain(results)
+    {
         reads[*read] += 1;
     }
     for index in 0..steps.len() {
@@ -215,7 +219,10 @@ fn join_products(steps: &mut [Option<Step>], results: &[usize]) {
         };
         let inside = [x, y].map(|source| product(source).map(|_| source));
         let (function, sources) = joined;
-        inside.into_iter().flatten().for_each(|source| steps[source] = None);
+        inside
+            .into_iter()
+            .flatten()
+            .for_each(|source| steps[source] = None);
         steps[index] = Some(Step { function, sources });
     }
 }
@@ -306,7 +313,9 @@ impl Code {
             let sources = step.iter().flat_map(|step| &step.sources);
             sources.for_each(|source| last_read[*source] = index);
         }
-        results.iter().for_each(|result| last_read[*result] = usize::MAX);
+        results
+            .iter()
+            .for_each(|result| last_read[*result] = usize::MAX);
         let (leaves, mut register) = Leaves::new(operations, needed);
         let given = leaves.count();
         let partners = sines_and_cosines(steps);
@@ -369,7 +378,12 @@ impl Code {
     /// The numbers that come first: constants, and of these `parameters` those that it needs.
     pub fn fixed(&self, parameters: &[f64]) -> Vec<f64> {
         let needed = self.leaves.parameters.iter().map(|i| parameters[*i]);
-        self.leaves.constants.iter().copied().chain(needed).collect()
+        self.leaves
+            .constants
+            .iter()
+            .copied()
+            .chain(needed)
+            .collect()
     }
 
     /// Works the results out from the [`fixed`](Self::fixed) numbers and each `leaf`; `result` takes them by their place.

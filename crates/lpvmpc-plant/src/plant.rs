@@ -111,9 +111,9 @@ impl Formulas {
 
     /// f with A(s) and B(s) as one code; `None` without an embedding, or where it would be too long.
     pub fn embedded(&self) -> Option<&TangentCode> {
-        let made = self.embedded.get_or_init(|| {
-            TangentCode::of_embedding(&self.data, self.data.embedding.as_ref()?)
-        });
+        let made = self
+            .embedded
+            .get_or_init(|| TangentCode::of_embedding(&self.data, self.data.embedding.as_ref()?));
         made.as_ref()
     }
 }
@@ -284,7 +284,8 @@ impl Plant {
         result: impl FnMut(usize, N),
     ) {
         if let (Some(code), Some(values)) = (&self.formulas.embedding, &self.values.embedding) {
-            code.scheduling.evaluate(&values.scheduling, motion, &[], result);
+            code.scheduling
+                .evaluate(&values.scheduling, motion, &[], result);
         }
     }
 
@@ -292,7 +293,8 @@ impl Plant {
     #[inline(always)]
     pub(crate) fn evaluate_matrices<N: Number>(&self, s: &[N], result: impl FnMut(usize, N)) {
         if let (Some(code), Some(values)) = (&self.formulas.embedding, &self.values.embedding) {
-            code.matrices.evaluate(&values.matrices, (&[], &[]), s, result);
+            code.matrices
+                .evaluate(&values.matrices, (&[], &[]), s, result);
         }
     }
 

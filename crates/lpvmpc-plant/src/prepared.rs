@@ -103,12 +103,7 @@ impl Prepared {
 
     /// The results at several states and inputs of at least the plant's sizes: in `f64` at once.
     #[inline(always)]
-    pub fn evaluate_each<
-        N: Number,
-        const NX: usize,
-        const NU: usize,
-        const POINTS: usize,
-    >(
+    pub fn evaluate_each<N: Number, const NX: usize, const NU: usize, const POINTS: usize>(
         &self,
         fixed: &Fixed,
         x: &[SVector<N, NX>; POINTS],
@@ -122,8 +117,7 @@ impl Prepared {
                 Leaf::Input(i) => Lanes(std::array::from_fn(|k| float(u[k][i]))),
                 Leaf::Scheduling(_) => Lanes([f64::NAN; POINTS]),
             };
-            let result =
-                |place, values: Lanes<POINTS>| result(place, values.0.map(N::constant));
+            let result = |place, values: Lanes<POINTS>| result(place, values.0.map(N::constant));
             return self.moving.evaluate_fast(&fixed.moving, leaf, result);
         }
         if POINTS == 1 {

@@ -199,7 +199,9 @@ impl Printer {
         }
         registers.resize(code.registers, String::new());
         for (k, instruction) in code.instructions.iter().enumerate() {
-            let [x, y, z, w] = instruction.sources.map(|source| &registers[source as usize]);
+            let [x, y, z, w] = instruction
+                .sources
+                .map(|source| &registers[source as usize]);
             let value = match instruction.function {
                 Function::SinCos => {
                     line!(out, "        let (v{k}, w{k}) = {x}.sin_cos();");

@@ -81,7 +81,11 @@ impl TangentCode {
         for i in 0..states {
             let mut rate = program.constant(0.0)?;
             let parts = [
-                (&a[i * states..][..states], Operation::State as fn(usize) -> Operation, &mut by_x),
+                (
+                    &a[i * states..][..states],
+                    Operation::State as fn(usize) -> Operation,
+                    &mut by_x,
+                ),
                 (&b[i * inputs..][..inputs], Operation::Input, &mut by_u),
             ];
             for (row, leaf, entries) in parts {
@@ -119,8 +123,11 @@ impl TangentCode {
         fixed: &Fixed,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [Tangent<T, NX, NU>; POINTS] {
-        let mut tangents = [(SVector::zeros(), SMatrix::zeros(), SMatrix::zeros()); POINTS];
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
+        for (rate, a, b) in tangents.iter_mut() {
+            (*rate, *a, *b) = (SVector::zeros(), SMatrix::zeros(), SMatrix::zeros());
+        }
         self.code.evaluate_each(fixed, x, u, |place, values| {
             let places = tangents.iter_mut().zip(values);
             match place.checked_sub(self.rates) {
@@ -131,7 +138,6 @@ impl TangentCode {
                 },
             }
         });
-        tangents
     }
 }
 

@@ -236,8 +236,7 @@ where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
-    let (Predictor::StageConsistent(rk4), None) =
-        (settings.predictor, settings.scheduling.held())
+    let (Predictor::StageConsistent(rk4), None) = (settings.predictor, settings.scheduling.held())
     else {
         return None;
     };
