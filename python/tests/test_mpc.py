@@ -310,3 +310,31 @@ def test_the_largest_plant_that_fits():
     with pytest.raises(lpvmpc.SettingError, match="17 states"):
         big = lpvmpc.Plant.from_matrices(np.zeros((17, 17)), np.ones((17, 1)))
         lpvmpc.Mpc(big, 0.1, 5, np.ones(17), [1])
+
+
+def test_multipliers_are_slopes_of_the_cost():
+    """What a bound costs is what the cost falls by if it is moved."""
+
+    def plan(limit):
+        mpc = lpvmpc.Mpc(
+            double_integrator(), 0.1, 20, [1, 0.1], [0.1], x_bounds={"speed": (-limit, limit)},
+            state_bounds="hard", max_programs=40, tolerance=1e-13,
+        )  # fmt: skip
+        return mpc.step([0, 0], [3, 0])
+
+    step = 1e-4
+    slope = (plan(0.5 + step).cost - plan(0.5 - step).cost) / (2 * step)
+    found = sum(one.multiplier for one in plan(0.5).active)
+    assert found == pytest.approx(-slope, rel=1e-4)
+
+
+def test_a_plan_is_found_where_the_regulator_leads_to_nothing_finite():
+    """Far from its equilibrium the regulator asks for inputs under which the motion overflows."""
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    stiffening = lpvmpc.Plant.from_casadi(
+        x, u, ca.vertcat(x[1], 4 * ca.sin(x[0]) + u * (1 + x[0] ** 4))
+    )
+    mpc = lpvmpc.Mpc(stiffening, 0.05, 30, [10, 1], [1e-4])
+    plan = mpc.step([3.0, 0.0])
+    assert plan.is_solved and np.isfinite(plan.x).all()
+    assert np.abs(plan.x[-1]).max() < 0.1

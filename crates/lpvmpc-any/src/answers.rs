@@ -54,7 +54,8 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             .map(|row| ActiveBound {
                 stage: row.bound.stage,
                 bound: bounded.words(row.bound),
-                multiplier: row.multiplier,
+                // The solver's cost is half of the plan's.
+                multiplier: 2.0 * row.multiplier,
                 exceeded: row.exceeded,
             })
             .collect();

@@ -44,10 +44,11 @@ impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for Filled<SizedPlant<NX
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
-        let mut tangents = Dynamics::tangent_each(&self.plant, x, u)?;
-        fill(&mut tangents, x, self.first_decaying(NX, self.period()));
-        Some(tangents)
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) -> bool {
+        let there = Dynamics::tangent_each(&self.plant, x, u, tangents);
+        fill(tangents, x, self.first_decaying(NX, self.period()));
+        there
     }
 }
 
@@ -112,7 +113,9 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
     ) -> Tangent<T, NX, NU> {
-        let [tangent] = Embedding::tangent_each(self, &[*x], &[*u]);
+        let mut tangents = [(SVector::zeros(), SMatrix::zeros(), SMatrix::zeros())];
+        Embedding::tangent_each(self, &[*x], &[*u], &mut tangents);
+        let [tangent] = tangents;
         tangent
     }
 
@@ -122,28 +125,29 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [Tangent<T, NX, NU>; POINTS] {
-        let mut tangents = Embedding::tangent_each(&self.plant, x, u);
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
+        Embedding::tangent_each(&self.plant, x, u, tangents);
         fill(
-            &mut tangents,
+            tangents,
             x,
             self.first_decaying(NX, Embedding::period(self)),
         );
-        tangents
     }
 
     fn embedded_each<T: Scalar + Number, const POINTS: usize>(
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
-        let mut embedded = Embedding::embedded_each(&self.plant, x, u)?;
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) -> bool {
+        let there = Embedding::embedded_each(&self.plant, x, u, tangents);
         fill(
-            &mut embedded,
+            tangents,
             x,
             self.first_decaying(NX, Embedding::period(self)),
         );
-        Some(embedded)
+        there
     }
 }
 
@@ -267,16 +271,18 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
         &self,
         x: &[SVector<f64, NX>; POINTS],
         u: &[SVector<f64, NU>; POINTS],
-    ) -> [Tangent<f64, NX, NU>; POINTS] {
-        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::embedded_each(model, x, u))
+        tangents: &mut [Tangent<f64, NX, NU>; POINTS],
+    ) {
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::embedded_each(model, x, u, tangents));
     }
 
     fn tangent_each<const POINTS: usize>(
         &self,
         x: &[SVector<f64, NX>; POINTS],
         u: &[SVector<f64, NU>; POINTS],
-    ) -> [Tangent<f64, NX, NU>; POINTS] {
-        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::tangent_each(model, x, u))
+        tangents: &mut [Tangent<f64, NX, NU>; POINTS],
+    ) {
+        whichever!(self, model => LpvModel::<f64, NX, NU, NS>::tangent_each(model, x, u, tangents));
     }
 
     fn has_offset(&self) -> bool {

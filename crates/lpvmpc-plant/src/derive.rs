@@ -119,37 +119,30 @@ impl Program {
 
     fn derived_unary(&mut self, function: Unary, x: &Varying) -> Option<Varying> {
         let value = self.unary(function, x.value)?;
-        if matches!(
-            function,
-            Unary::Elementary(Elementary::Sign | Elementary::Floor)
-        ) {
-            return Some(Varying {
+        match function {
+            Unary::Negative => self.through(value, x, |program| program.constant(-1.0)),
+            Unary::Square => self.through(value, x, |program| program.add(x.value, x.value)),
+            Unary::Inverse => {
+                let one = Varying {
+                    value: self.constant(1.0)?,
+                    slopes: Vec::new(),
+                };
+                self.derived_quotient(value, value, (&one, x))
+            }
+            Unary::Tan => self.through(value, x, |program| program.one_plus_square(value)),
+            Unary::Elementary(Elementary::Sign | Elementary::Floor) => Some(Varying {
                 value,
                 slopes: Vec::new(),
-            });
+            }),
+            Unary::Elementary(function) => {
+                self.through(value, x, |program| program.slope(function, x.value, value))
+            }
         }
-        let argument = x.value;
-        self.through(value, x, |program| {
-            program.slope_of_unary(function, argument, value)
-        })
     }
 
     /// The derivative of a function at `x`, where its value is `value`.
-    fn slope_of_unary(&mut self, function: Unary, x: usize, value: usize) -> Option<usize> {
+    fn slope(&mut self, function: Elementary, x: usize, value: usize) -> Option<usize> {
         let one = self.constant(1.0)?;
-        let function = match function {
-            Unary::Negative => return self.constant(-1.0),
-            Unary::Square => return self.add(x, x),
-            Unary::Inverse => {
-                let square = self.multiply(value, value)?;
-                return self.negative(square);
-            }
-            Unary::Tan => {
-                let square = self.multiply(value, value)?;
-                return self.add(one, square);
-            }
-            Unary::Elementary(function) => function,
-        };
         let below = match function {
             Elementary::Sin => return self.elementary(Elementary::Cos, x),
             Elementary::Cos => {
@@ -295,17 +288,27 @@ impl Program {
             }),
             Binary::Divide => {
                 let inverse = self.inverse(y.value)?;
-                self.combined(value, both, |program, a, b| {
-                    let numerator = match (a, program.part(b, value)?) {
-                        (Some(a), Some(b)) => program.subtract(a, b)?,
-                        (None, Some(b)) => program.negative(b)?,
-                        (a, None) => program.sum(a, None)?,
-                    };
-                    program.multiply(numerator, inverse)
-                })
+                self.derived_quotient(value, inverse, both)
             }
             Binary::Bivariate(function) => self.derived_bivariate(function, value, both),
         }
+    }
+
+    /// Of the quotient of both, whose second part has this `inverse`.
+    fn derived_quotient(
+        &mut self,
+        value: usize,
+        inverse: usize,
+        both: (&Varying, &Varying),
+    ) -> Option<Varying> {
+        self.combined(value, both, |program, a, b| {
+            let numerator = match (a, program.part(b, value)?) {
+                (Some(a), Some(b)) => program.subtract(a, b)?,
+                (None, Some(b)) => program.negative(b)?,
+                (a, None) => program.sum(a, None)?,
+            };
+            program.multiply(numerator, inverse)
+        })
     }
 
     fn derived_bivariate(
@@ -341,8 +344,9 @@ impl Program {
                 })
             }
             Bivariate::Power => match self.number(y.value) {
+                Some(0.0) => Some(fixed),
                 Some(0.5) => self.through(value, x, |program| {
-                    program.slope_of_unary(Unary::Elementary(Elementary::Sqrt), x.value, value)
+                    program.slope(Elementary::Sqrt, x.value, value)
                 }),
                 Some(exponent) if exponent == exponent.trunc() => {
                     self.through(value, x, |program| program.slope_of_power(x.value, y.value))

@@ -127,9 +127,13 @@ impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for SizedPlant<NX, NU> {
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
-        let code = self.plant.formulas().tangent()?;
-        Some(code.evaluate_each(self.tangent.as_ref()?, x, u))
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) -> bool {
+        let (Some(code), Some(fixed)) = (self.plant.formulas().tangent(), &self.tangent) else {
+            return false;
+        };
+        code.evaluate_each(fixed, x, u, tangents);
+        true
     }
 }
 
@@ -232,7 +236,9 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
     ) -> Tangent<T, NX, NU> {
-        let [tangent] = Embedding::tangent_each(self, &[*x], &[*u]);
+        let mut tangents = [(SVector::zeros(), SMatrix::zeros(), SMatrix::zeros())];
+        Embedding::tangent_each(self, &[*x], &[*u], &mut tangents);
+        let [tangent] = tangents;
         tangent
     }
 
@@ -242,17 +248,18 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [Tangent<T, NX, NU>; POINTS] {
-        let by_duals = |i: usize| {
-            lpvmpc::tangent_by_duals(
-                &x[i],
-                &u[i],
-                |x: &SVector<Dual<T, NX>, NX>, u| self.plant.f(x, u),
-                |x, u| self.plant.f(x, u),
-            )
-        };
-        let tangents = Dynamics::tangent_each(&self.plant, x, u);
-        tangents.unwrap_or_else(|| std::array::from_fn(by_duals))
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
+        if !Dynamics::tangent_each(&self.plant, x, u, tangents) {
+            for (i, tangent) in tangents.iter_mut().enumerate() {
+                *tangent = lpvmpc::tangent_by_duals(
+                    &x[i],
+                    &u[i],
+                    |x: &SVector<Dual<T, NX>, NX>, u| self.plant.f(x, u),
+                    |x, u| self.plant.f(x, u),
+                );
+            }
+        }
     }
 
     /// By formulas of their own, without the products with what is always zero.
@@ -260,8 +267,13 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
-        let code = self.plant.plant.formulas().embedded()?;
-        Some(code.evaluate_each(self.embedded.as_ref()?, x, u))
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) -> bool {
+        let code = self.plant.plant.formulas().embedded();
+        let (Some(code), Some(fixed)) = (code, &self.embedded) else {
+            return false;
+        };
+        code.evaluate_each(fixed, x, u, tangents);
+        true
     }
 }

@@ -123,8 +123,11 @@ impl TangentCode {
         fixed: &Fixed,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [Tangent<T, NX, NU>; POINTS] {
-        let mut tangents = [(SVector::zeros(), SMatrix::zeros(), SMatrix::zeros()); POINTS];
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
+        for (rate, a, b) in tangents.iter_mut() {
+            (*rate, *a, *b) = (SVector::zeros(), SMatrix::zeros(), SMatrix::zeros());
+        }
         self.code.evaluate_each(fixed, x, u, |place, values| {
             let places = tangents.iter_mut().zip(values);
             match place.checked_sub(self.rates) {
@@ -135,7 +138,6 @@ impl TangentCode {
                 },
             }
         });
-        tangents
     }
 }
 

@@ -131,30 +131,28 @@ where
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [Tangent<T, NX, NU>; POINTS] {
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
         if self.is_the_plant() {
-            return self.plant.embedded_each(x, u);
+            return self.plant.embedded_each(x, u, tangents);
         }
-        if self.scheduling.is_some() {
-            return core::array::from_fn(|i| self.embedded(&x[i], &u[i]));
+        for (i, tangent) in tangents.iter_mut().enumerate() {
+            *tangent = self.embedded(&x[i], &u[i]);
         }
-        let embedded = self.plant.embedded_each(x, &u.map(|u| self.input(&u)));
-        embedded.map(|(rate, a, b)| (self.disturbed(rate), a, b))
     }
 
     fn tangent_each<const POINTS: usize>(
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [Tangent<T, NX, NU>; POINTS] {
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
         if self.is_the_plant() {
-            return self.plant.tangent_each(x, u);
+            return self.plant.tangent_each(x, u, tangents);
         }
-        if self.scheduling.is_some() {
-            return core::array::from_fn(|i| self.tangent(&x[i], &u[i]));
+        for (i, tangent) in tangents.iter_mut().enumerate() {
+            *tangent = self.tangent(&x[i], &u[i]);
         }
-        let tangents = self.plant.tangent_each(x, &u.map(|u| self.input(&u)));
-        tangents.map(|(rate, a, b)| (self.disturbed(rate), a, b))
     }
 
     fn has_offset(&self) -> bool {

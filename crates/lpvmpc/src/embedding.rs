@@ -85,26 +85,30 @@ pub trait Embedding<const NX: usize, const NU: usize, const NS: usize> {
     /// See [`LpvModel::TOGETHER`].
     const TOGETHER: bool = false;
 
-    /// [`tangent`](Self::tangent) at several points.
+    /// [`tangent`](Self::tangent) at several points, into places of theirs.
     #[inline(always)]
     fn tangent_each<T: Scalar + Number, const POINTS: usize>(
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [Tangent<T, NX, NU>; POINTS] {
-        core::array::from_fn(|i| self.tangent(&x[i], &u[i]))
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
+        for (i, tangent) in tangents.iter_mut().enumerate() {
+            *tangent = self.tangent(&x[i], &u[i]);
+        }
     }
 
-    /// f with the matrices that it is made of, (f, A(s), B(s)), at several points, of a plant that has them cheaper
-    /// together than one by one; the same numbers, to rounding.
+    /// f with the matrices that it is made of, (f, A(s), B(s)), at several points, into places of theirs, of a plant that
+    /// has them cheaper together than one by one; the same numbers, to rounding. `false` of any other plant.
     #[inline(always)]
     fn embedded_each<T: Scalar + Number, const POINTS: usize>(
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
-        let _ = (x, u);
-        None
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) -> bool {
+        let _ = (x, u, tangents);
+        false
     }
 
     /// See [`LpvModel::a_times`].
@@ -185,10 +189,12 @@ where
 
     #[inline(always)]
     fn embedded(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> Tangent<T, NX, NU> {
-        match Embedding::embedded_each(self, &[*x], &[*u]) {
-            Some([embedded]) => embedded,
-            None => embedded_by_products(self, x, u),
+        let mut embedded = [(SVector::zeros(), SMatrix::zeros(), SMatrix::zeros())];
+        if Embedding::embedded_each(self, &[*x], &[*u], &mut embedded) {
+            let [embedded] = embedded;
+            return embedded;
         }
+        embedded_by_products(self, x, u)
     }
 
     const TOGETHER: bool = P::TOGETHER;
@@ -198,10 +204,12 @@ where
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [Tangent<T, NX, NU>; POINTS] {
-        match Embedding::embedded_each(self, x, u) {
-            Some(embedded) => embedded,
-            None => core::array::from_fn(|i| embedded_by_products(self, &x[i], &u[i])),
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
+        if !Embedding::embedded_each(self, x, u, tangents) {
+            for (i, tangent) in tangents.iter_mut().enumerate() {
+                *tangent = embedded_by_products(self, &x[i], &u[i]);
+            }
         }
     }
 
@@ -210,8 +218,9 @@ where
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [Tangent<T, NX, NU>; POINTS] {
-        Embedding::tangent_each(self, x, u)
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
+        Embedding::tangent_each(self, x, u, tangents);
     }
 
     fn steady_state(
@@ -238,16 +247,17 @@ pub trait Dynamics<const NX: usize, const NU: usize> {
     /// See [`LpvModel::TOGETHER`].
     const TOGETHER: bool = false;
 
-    /// f with its derivatives at several points, of a plant that has them cheaper than by dual numbers; the same
-    /// numbers, to rounding.
+    /// f with its derivatives at several points, into places of theirs, of a plant that has them cheaper than by dual
+    /// numbers; the same numbers, to rounding. `false` of any other plant.
     #[inline(always)]
     fn tangent_each<T: Scalar + Number, const POINTS: usize>(
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
-        let _ = (x, u);
-        None
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) -> bool {
+        let _ = (x, u, tangents);
+        false
     }
 }
 
@@ -269,8 +279,9 @@ impl<P: Dynamics<NX, NU>, const NX: usize, const NU: usize> Dynamics<NX, NU> for
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
-        P::tangent_each(self, x, u)
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) -> bool {
+        P::tangent_each(self, x, u, tangents)
     }
 }
 

@@ -54,7 +54,8 @@ where
 
     /// The regulator's closed loops towards the set point and towards points on the way to it, from the
     /// farthest on, until they become dearer again. The plan becomes the cheapest of them, if it is
-    /// cheaper than `best`; returns what it costs then.
+    /// cheaper than `best`; returns what it costs then. Where none of them is finite, it is the input of the
+    /// reference, held.
     #[inline(never)]
     fn regulate<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
@@ -63,12 +64,13 @@ where
         mut best: Option<T>,
         workspace: &mut Workspace<T, NX, NU>,
     ) -> Option<T> {
-        let (feedback, indifferent) = self.regulator(aim, &workspace.ocp);
-        let away = (x - aim.end()).component_mul(&indifferent);
+        let (mut feedback, indifferent) = self.regulator(aim, &workspace.ocp);
+        let mut away = (x - aim.end()).component_mul(&indifferent);
         let merit = self.merit(aim, Prices::none());
         let mut found_one = false;
-        for part in PARTS {
-            let x_aim = aim.end() + away * (T::one() - convert::<f64, T>(part));
+        let mut parts = PARTS.iter();
+        while let Some(part) = parts.next() {
+            let x_aim = aim.end() + away * (T::one() - convert::<f64, T>(*part));
             let most = best.unwrap_or(convert(f64::INFINITY));
             let cost = self.roll_out_plan(x, &merit, most, &mut workspace.trial, &|i, x| {
                 let bounds = aim.own.u(i, &self.settings.u);
@@ -86,8 +88,13 @@ where
             } else if found_one {
                 break;
             }
-            if away.amax() == T::zero() {
-                break;
+            if away.amax() == T::zero() || parts.len() == 0 {
+                if best.is_some() || feedback == SMatrix::zeros() {
+                    break;
+                }
+                // The regulator leads to nothing finite: last, the input of the reference, held.
+                (feedback, away) = (SMatrix::zeros(), SVector::zeros());
+                parts = PARTS[..1].iter();
             }
         }
         best

@@ -55,7 +55,9 @@ where
             "the scheduling is x and u: NS must be NX + NU"
         )
     };
-    if let Some([tangent]) = plant.tangent_each(&[*x], &[*u]) {
+    let mut tangents = [(SVector::zeros(), SMatrix::zeros(), SMatrix::zeros())];
+    if plant.tangent_each(&[*x], &[*u], &mut tangents) {
+        let [tangent] = tangents;
         return tangent;
     }
     let variable = |value: T, place: usize| {
@@ -79,17 +81,19 @@ where
     )
 }
 
-/// [`tangent`] at several points.
+/// [`tangent`] at several points, into places of theirs.
 fn tangent_each<T, P, const NX: usize, const NU: usize, const NS: usize, const POINTS: usize>(
     plant: &P,
     x: &[SVector<T, NX>; POINTS],
     u: &[SVector<T, NU>; POINTS],
-) -> [Tangent<T, NX, NU>; POINTS]
-where
+    tangents: &mut [Tangent<T, NX, NU>; POINTS],
+) where
     T: Scalar + Number,
     P: Dynamics<NX, NU>,
 {
-    let together = plant.tangent_each(x, u);
-    let one_by_one = || core::array::from_fn(|i| tangent::<_, _, NX, NU, NS>(plant, &x[i], &u[i]));
-    together.unwrap_or_else(one_by_one)
+    if !plant.tangent_each(x, u, tangents) {
+        for (i, place) in tangents.iter_mut().enumerate() {
+            *place = tangent::<_, _, NX, NU, NS>(plant, &x[i], &u[i]);
+        }
+    }
 }

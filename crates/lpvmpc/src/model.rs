@@ -1,5 +1,6 @@
 //! What a plant must offer: a linear model whose matrices depend on a scheduling vector.
 
+use crate::embedding::Tangent;
 use crate::small_matrix::{add_product, product};
 use crate::steady_state::{self, SteadyState, SteadyStateProblem};
 use nalgebra::{RealField, SMatrix, SVector, convert};
@@ -126,22 +127,28 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
     /// point after the other.
     const TOGETHER: bool = false;
 
-    /// [`embedded`](Self::embedded) at several points.
+    /// [`embedded`](Self::embedded) at several points, into places of theirs.
     fn embedded_each<const POINTS: usize>(
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [(SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>); POINTS] {
-        core::array::from_fn(|i| self.embedded(&x[i], &u[i]))
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
+        for (i, tangent) in tangents.iter_mut().enumerate() {
+            *tangent = self.embedded(&x[i], &u[i]);
+        }
     }
 
-    /// [`tangent`](Self::tangent) at several points.
+    /// [`tangent`](Self::tangent) at several points, into places of theirs.
     fn tangent_each<const POINTS: usize>(
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [(SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>); POINTS] {
-        core::array::from_fn(|i| self.tangent(&x[i], &u[i]))
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
+        for (i, tangent) in tangents.iter_mut().enumerate() {
+            *tangent = self.tangent(&x[i], &u[i]);
+        }
     }
 
     /// Whether there is an [`offset`](Self::offset).

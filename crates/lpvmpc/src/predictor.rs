@@ -145,7 +145,7 @@ impl Predictor {
 /// f and the continuous-time pair (A, B) at a state.
 #[cfg(target_os = "none")]
 type TangentAt<'a, T, const NX: usize, const NU: usize> =
-    dyn Fn(&[SVector<T, NX>; 1]) -> [Tangent<T, NX, NU>; 1] + 'a;
+    dyn Fn(&[SVector<T, NX>; 1], &mut [Tangent<T, NX, NU>; 1]) + 'a;
 
 /// Classical Runge-Kutta method of order four with `substeps` equal steps per sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -224,7 +224,9 @@ impl Rk4 {
         if let Some(period) = model.period() {
             return follow_periods(x, periods(period, t_s), |x| model.embedded(x, u));
         }
-        let embedding = |x: &[SVector<T, NX>; 1]| [model.embedded(&x[0], u)];
+        let embedding = |x: &[SVector<T, NX>; 1], tangents: &mut [Tangent<T, NX, NU>; 1]| {
+            *tangents = [model.embedded(&x[0], u)];
+        };
         #[cfg(target_os = "none")]
         let embedding: &TangentAt<'_, T, NX, NU> = &embedding;
         let [(_, a_d, b_d)] = self.compose(model, &[*x], t_s, embedding);
@@ -251,7 +253,8 @@ impl Rk4 {
         T: Scalar,
         P: LpvModel<T, NX, NU, NS>,
     {
-        self.compose(model, x, t_s, |x| model.embedded_each(x, u))
+        let at = |x: &_, tangents: &mut _| model.embedded_each(x, u, tangents);
+        self.compose(model, x, t_s, at)
     }
 
     /// The state after a sample from each `x` under its `u`, with the derivatives of [`Rk4::differentiate`].
@@ -274,7 +277,8 @@ impl Rk4 {
         T: Scalar,
         P: LpvModel<T, NX, NU, NS>,
     {
-        self.compose(model, x, t_s, |x| model.tangent_each(x, u))
+        let at = |x: &_, tangents: &mut _| model.tangent_each(x, u, tangents);
+        self.compose(model, x, t_s, at)
     }
 
     /// The derivatives of [`Rk4::advance`] with respect to `x` and `u`: the same recursion with the
@@ -295,7 +299,9 @@ impl Rk4 {
         if let Some(period) = model.period() {
             return follow_periods(x, periods(period, t_s), |x| model.tangent(x, u));
         }
-        let tangent = |x: &[SVector<T, NX>; 1]| [model.tangent(&x[0], u)];
+        let tangent = |x: &[SVector<T, NX>; 1], tangents: &mut [Tangent<T, NX, NU>; 1]| {
+            *tangents = [model.tangent(&x[0], u)];
+        };
         #[cfg(target_os = "none")]
         let tangent: &TangentAt<'_, T, NX, NU> = &tangent;
         let [(_, a_d, b_d)] = self.compose(model, &[*x], t_s, tangent);
@@ -316,7 +322,7 @@ impl Rk4 {
         model: &P,
         x: &[SVector<T, NX>; POINTS],
         t_s: T,
-        at: impl Fn(&[SVector<T, NX>; POINTS]) -> [Tangent<T, NX, NU>; POINTS],
+        at: impl Fn(&[SVector<T, NX>; POINTS], &mut [Tangent<T, NX, NU>; POINTS]),
     ) -> [Tangent<T, NX, NU>; POINTS]
     where
         T: Scalar,
@@ -330,6 +336,7 @@ impl Rk4 {
         for (reached, x) in reached.iter_mut().zip(x) {
             reached.0 = *x;
         }
+        let mut there = reached;
         for _ in 0..self.substeps {
             let mut next = reached;
             let mut rates = [SVector::zeros(); POINTS];
@@ -339,7 +346,7 @@ impl Rk4 {
                 for (rate, (x, ..)) in rates.iter_mut().zip(&reached) {
                     extend(rate, x, reach);
                 }
-                let there = at(&rates);
+                at(&rates, &mut there);
                 for i in 0..POINTS {
                     // In place, since copies cost as much as the products where nothing is unrolled.
                     let ((k, l), (_, a_d, b_d)) = (&mut slopes[i], &reached[i]);

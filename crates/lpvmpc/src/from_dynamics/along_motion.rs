@@ -69,16 +69,18 @@ where
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [Tangent<T, NX, NU>; POINTS] {
-        self.tangent_each(x, u)
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
+        self.tangent_each(x, u, tangents);
     }
 
     fn tangent_each<const POINTS: usize>(
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [Tangent<T, NX, NU>; POINTS] {
-        tangent_each::<_, _, NX, NU, NS, POINTS>(&self.0, x, u)
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
+        tangent_each::<_, _, NX, NU, NS, POINTS>(&self.0, x, u, tangents);
     }
 
     fn has_offset(&self) -> bool {

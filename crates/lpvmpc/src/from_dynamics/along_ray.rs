@@ -4,7 +4,7 @@ use super::{GaussLegendre, joined, parted, tangent, tangent_each};
 use crate::embedding::{Dynamics, Tangent};
 use crate::model::{LpvModel, Scalar};
 use crate::number::Number;
-use crate::small_matrix::product;
+use crate::small_matrix::{add_scaled, product};
 use nalgebra::{SMatrix, SVector, convert};
 
 /// The linear models of a plant about a point (x_r, u_r), such as a steady state: the mean
@@ -46,28 +46,33 @@ where
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-        let [mean] = self.mean_each(&[*x], &[*u]);
-        mean
+        let mut means = [(*x, SMatrix::zeros(), SMatrix::zeros())];
+        self.mean_each(&[*x], &[*u], &mut means);
+        let [(_, a, b)] = means;
+        (a, b)
     }
 
-    /// The same for rays to several points.
+    /// The same for rays to several points, into the matrices of `means`.
     fn mean_each<const POINTS: usize>(
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [(SMatrix<T, NX, NX>, SMatrix<T, NX, NU>); POINTS] {
-        let mut means = [(SMatrix::zeros(), SMatrix::zeros()); POINTS];
+        means: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
+        for (_, a, b) in means.iter_mut() {
+            (*a, *b) = (SMatrix::zeros(), SMatrix::zeros());
+        }
+        let mut tangents = *means;
         for (place, weight) in self.nodes.iter() {
             let (place, weight): (T, T) = (convert(place), convert(weight));
             let x = x.map(|x| self.x + (x - self.x) * place);
             let u = u.map(|u| self.u + (u - self.u) * place);
-            let tangents = tangent_each::<_, _, NX, NU, NS, POINTS>(&self.plant, &x, &u);
-            for ((a, b), (_, by_x, by_u)) in means.iter_mut().zip(tangents) {
-                *a += by_x * weight;
-                *b += by_u * weight;
+            tangent_each::<_, _, NX, NU, NS, POINTS>(&self.plant, &x, &u, &mut tangents);
+            for ((_, a, b), (_, by_x, by_u)) in means.iter_mut().zip(&tangents) {
+                add_scaled(a, by_x, weight);
+                add_scaled(b, by_u, weight);
             }
         }
-        means
     }
 }
 
@@ -126,20 +131,21 @@ where
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [Tangent<T, NX, NU>; POINTS] {
-        let means = self.mean_each(x, u);
-        core::array::from_fn(|i| {
-            let (a, b) = means[i];
-            (self.plant.f(&x[i], &u[i]), a, b)
-        })
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
+        self.mean_each(x, u, tangents);
+        for (i, (rate, ..)) in tangents.iter_mut().enumerate() {
+            *rate = self.plant.f(&x[i], &u[i]);
+        }
     }
 
     fn tangent_each<const POINTS: usize>(
         &self,
         x: &[SVector<T, NX>; POINTS],
         u: &[SVector<T, NU>; POINTS],
-    ) -> [Tangent<T, NX, NU>; POINTS] {
-        tangent_each::<_, _, NX, NU, NS, POINTS>(&self.plant, x, u)
+        tangents: &mut [Tangent<T, NX, NU>; POINTS],
+    ) {
+        tangent_each::<_, _, NX, NU, NS, POINTS>(&self.plant, x, u, tangents);
     }
 
     fn has_offset(&self) -> bool {
