@@ -96,10 +96,8 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             );
             return Err(MpcError::new(place, fault));
         }
-        for (name, value) in known.iter().zip(values) {
-            let set = plant.set_parameter(name, *value);
-            set.map_err(|error| MpcError::new(place, error.to_string()))?;
-        }
+        let set = plant.set_parameters(values);
+        set.map_err(|error| MpcError::new(place, error.to_string()))?;
         Model::new(&plant, self.settings.linear_models, self.rest)
     }
 
