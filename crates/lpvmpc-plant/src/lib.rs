@@ -48,6 +48,17 @@
 //! | a program for a microcontroller | [`Plant::to_firmware`] |
 //! | is a proof to be had of it? | [`Plant::first_not_smooth`] |
 //!
+//! # Derivatives, and time
+//!
+//! [`SizedPlant`] and [`SizedEmbedding`] have their derivatives as formulas, made of the plant's own when the first of
+//! them is built: what is always zero, one or of parameters alone costs nothing at an evaluation. Wherever dual numbers
+//! ([`Dual`](lpvmpc::Dual)) have a value it is the same, to rounding, at kinks and ends, too; where they have none, next to
+//! an infinite derivative, one that is always zero stays zero. Where the formulas would be longer than
+//! 2 + (states + inputs)/2 times those of f, or longer than 30 000 operations, dual numbers are used instead.
+//!
+//! An operation takes some 20 machine instructions, and in a group of four points, as a controller linearises its
+//! stages, a third of that for each.
+//!
 //! # The format
 //!
 //! | key | holds |

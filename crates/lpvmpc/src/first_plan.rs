@@ -89,7 +89,7 @@ where
                 break;
             }
             if away.amax() == T::zero() || parts.len() == 0 {
-                if best.is_some() || feedback == SMatrix::zeros() {
+                if best.is_some() || feedback.amax() == T::zero() {
                     break;
                 }
                 // The regulator leads to nothing finite: last, the input of the reference, held.
