@@ -39,7 +39,7 @@ def example() -> Example:
     # Four Runge-Kutta steps per sample: the motor's fastest motion takes 4 ms.
     metre = 1 / RADIUS  # rad
     starts = [
-        Start("1 m", [0, 0, 0, 0], 4, [metre, 0, 0, 0]),
+        Start("1 m", [0, 0, 0, 0], 8, [metre, 0, 0, 0]),
         Start("0.1 m", [0, 0, 0, 0], 4, [0.1 * metre, 0, 0, 0]),
         Start("2 m at 0.4 m/s", [0, 0, 0, 0], 7, lambda t: [min(0.4 * t, 2) * metre, 0, 0, 0]),
         Start("leaning by 0.3 rad", [0, 0.3, 0, 0], 4),

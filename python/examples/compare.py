@@ -48,9 +48,10 @@ class Row:
     """Quadratic programs per sample, mean."""
 
 
-def our_run(example: Example, start: Start, duration: float) -> lpvmpc.Run:
-    """The closed loop of the example's controller."""
+def our_run(example: Example, start: Start, duration: float | None = None) -> lpvmpc.Run:
+    """The closed loop of the example's controller; the duration is the start's without another."""
     mpc, plant = example.mpc, example.mpc.plant
+    duration = start.duration if duration is None else duration
     x0, u_ref = np.asarray(start.x0, dtype=float), start.u_ref
     if start.x_bounds is None and (u_ref is None or np.ndim(u_ref) < 2):
         return lpvmpc.simulate(plant, mpc, x0, duration, start.x_ref, u_ref=u_ref)

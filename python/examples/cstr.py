@@ -62,9 +62,9 @@ def example() -> Example:
     x0 = [0.8, 0.5, 134.14, 130.0]
     there = {c_b: steady(c_b, temperature) for c_b, temperature in ((0.6, 134), (0.8, 134), (0.7, 139))}
     starts = [
-        Start("c_b to 0.6", x0, 1800, *there[0.6]),
-        Start("c_b to 0.8", x0, 1800, *there[0.8]),
-        Start("c_b to 0.7 at 139 C", x0, 1800, *there[0.7]),
+        Start("c_b to 0.6", x0, 600, *there[0.6]),
+        Start("c_b to 0.8", x0, 600, *there[0.8]),
+        Start("c_b to 0.7 at 139 C", x0, 600, *there[0.7]),
         Start("cold", [0.8, 0.3, 90, 90], 1800, *there[0.6]),
         Start("too hot", [1.5, 0.5, 145, 120], 1800, *there[0.6]),
         Start("rich", [1.9, 1.2, 110, 135], 1800, *there[0.8]),

@@ -39,8 +39,8 @@ def example() -> Example:
     mpc = lpvmpc.Mpc(plant, t_s=5, horizon=30, q=[1, 1, 0.01, 0.01], r=[0.1, 0.1])
     x0 = steady([12.4, 12.7])[0]
     starts = [
-        Start("up and down", x0, 400, *steady([16, 11])),
-        Start("up", x0, 400, *steady([16, 16])),
+        Start("up and down", x0, 150, *steady([16, 11])),
+        Start("up", x0, 150, *steady([16, 16])),
         Start("nearly empty", [1, 1, 1, 1], 600, *steady([12.4, 12.7])),
         Start("nearly full", [19.5, 19.5, 10, 10], 600, *steady([10, 9])),
         Start("far apart", [19, 1, 1, 15], 600, *steady([10, 13])),

@@ -12,18 +12,18 @@ import numpy as np
 from problem import Example, Start
 
 MASS, ARM, INERTIA, G = 0.486, 0.25, 0.00383, 9.81  # kg, m, kg m^2, m/s^2
-WALL, GAP, T_S = (1.6, 2.0), (0.9, 1.3), 0.05  # m, m, s
-ENTER, LEAVE = 30, 40  # samples
+WALL, GAP, MARGIN, T_S = (1.6, 2.0), (0.8, 1.4), 0.1, 0.05  # m, m, m, s
+ENTER, LEAVE = 20, 28  # samples
 HOVER = [MASS * G / 2] * 2
 LIMITS = np.array([[-1, -0.5, -1.2, -5, -5, -10], [6, 3, 1.2, 5, 5, 10]])
 
 
 def corridor() -> tuple[np.ndarray, np.ndarray]:
     """Bounds by sample: in front of the wall, in the gap, behind the wall."""
-    lower, upper = (np.tile(one, (LEAVE + 1, 1)) for one in LIMITS.astype(float))
-    upper[:ENTER, 0] = WALL[0]
-    lower[ENTER:LEAVE, 1], upper[ENTER:LEAVE, 1] = GAP
-    lower[LEAVE:, 0] = WALL[1]
+    lower, upper = (np.tile(one, (LEAVE + 2, 1)) for one in LIMITS.astype(float))
+    upper[:ENTER, 0] = WALL[0] - MARGIN
+    lower[ENTER - 1 : LEAVE + 1, 1], upper[ENTER - 1 : LEAVE + 1, 1] = GAP[0] + MARGIN, GAP[1] - MARGIN
+    lower[LEAVE:, 0] = WALL[1] + MARGIN
     return lower, upper
 
 
@@ -32,10 +32,10 @@ def draw(axes, run) -> None:
     for low, high in ((-0.5, GAP[0]), (GAP[1], 3.0)):
         axes.fill_between(WALL, low, high, color="#7f7f7f", alpha=0.45, lw=0)
     axes.plot(run["x"], run["z"], color="#0072B2", lw=1.4)
-    for x, z, pitch in run.x[::5, :3]:
+    for x, z, pitch in run.x[::3, :3]:
         dx, dz = 0.5 * ARM * np.cos(pitch), 0.5 * ARM * np.sin(pitch)
         axes.plot([x - dx, x + dx], [z - dz, z + dz], color="#D55E00", lw=2, solid_capstyle="round")
-    axes.set(xlabel="x [m]", ylabel="z [m]", ylim=(-0.2, 2.0), xlim=(-0.3, 4.4))
+    axes.set(xlabel="x [m]", ylabel="z [m]", ylim=(-0.2, 2.0), xlim=(-0.3, 4.4), aspect="equal")
 
 
 def example() -> Example:

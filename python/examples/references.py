@@ -67,10 +67,13 @@ class Converged:
             self.times.append(perf_counter() - start)
             solved = self.solver.stats()["success"]
             if best is None or (solved, -float(answer["f"])) > best[:2]:
-                best = (solved, -float(answer["f"]), np.array(answer["x"]).ravel())
+                best = (solved, -float(answer["f"]), answer["x"].full().ravel())
         assert best is not None
         self.failures += not best[0]
-        self.cost, self.plan = -best[1], best[2]
+        self.plan = best[2]
+        # IPOPT relaxes bounds by 1e-8: a slack below zero would pay.
+        spared = np.minimum(0, self.plan[len(self.plan) - len(slacks) :]).reshape(horizon, -1).sum(0)
+        self.cost = -best[1] - float(spared @ problem.prices[soft])
         return self.plan
 
     def _guesses(self, x: Array, x_ref: Array, u_ref: Array) -> list[Array]:
