@@ -17,7 +17,7 @@ RANGES = {
     "furuta": ([1.8, 0.8, 4, 4], [1.8, 0, 0, 0]),
     "balancer": ([10, 0.4, 8, 3], [10, 0, 0, 0]),
     "arm_pendulum": ([1.5, 0.5, 4, 4], [0, 0, 0, 0]),
-    "quadrotor": ([1, 1, 1, 3, 3, 6], [2, 1, 0, 0, 0, 0]),
+    "quadrotor": ([0.8, 0.4, 1, 2, 2, 6], [0.9, 0.4, 0, 0, 0, 0]),
 }
 """States are drawn within +- the first vector, set points within +- the second."""
 
@@ -37,7 +37,7 @@ def ratios(example: Example, count: int, max_programs: int, seed: int = 0) -> li
     for _ in range(count):
         x0, target = (random.uniform(-1, 1, problem.n) * one for one in RANGES[example.name])
         mpc.reset()
-        plan = mpc.step(x0, target)
+        plan = mpc.step(x0, target, u_ref=u_ref)
         converged.plan = None
         rows = by_sample(target, 0, problem.horizon + 1, mpc.t_s)
         converged.solve(x0, rows, by_sample(u_ref, 0, problem.horizon, mpc.t_s))

@@ -17,11 +17,13 @@ INFLOW[0, 0], INFLOW[3, 0] = SPLIT[0] * PUMPS[0], (1 - SPLIT[0]) * PUMPS[0]
 INFLOW[1, 1], INFLOW[2, 1] = SPLIT[1] * PUMPS[1], (1 - SPLIT[1]) * PUMPS[1]
 
 
-def steady(lower: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Levels and voltages at rest with these levels of the lower tanks."""
+def steady(lower, disturbance=(0, 0, 0, 0)) -> tuple[np.ndarray, np.ndarray]:
+    """Levels and voltages at rest with these levels of the lower tanks, and so much added to f, cm/s."""
+    extra = AREA * disturbance
     flow = OUTLET[:2] * np.sqrt(2 * G * np.asarray(lower))
-    u = np.linalg.solve(INFLOW[:2] + INFLOW[2:], flow)
-    return np.concatenate([lower, (INFLOW[2:] @ u / OUTLET[2:]) ** 2 / (2 * G)]), u
+    u = np.linalg.solve(INFLOW[:2] + INFLOW[2:], flow - extra[:2] - extra[2:])
+    upper = INFLOW[2:] @ u + extra[2:]
+    return np.concatenate([lower, (upper / OUTLET[2:]) ** 2 / (2 * G)]), u
 
 
 def example() -> Example:

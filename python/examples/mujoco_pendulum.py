@@ -37,7 +37,7 @@ def example() -> Example:
     starts = [
         Start("end to end", [-0.85, 0, 0, 0], 3, [0.85, 0, 0, 0]),
         Start("leaning by 0.5 rad", [0.3, 0.5, 0, 0], 3, [0, 0, 0, 0]),
-        Start("leaning by 0.8 rad", [-0.6, 0.8, 0, 0], 3, [0, 0, 0, 0]),
+        Start("leaning by 0.8 rad", [-0.85, 0.8, 0, 0], 4, [0, 0, 0, 0]),
         Start("hit", [0, 0, -0.5, 5], 3, [0.5, 0, 0, 0]),
     ]
     return Example(

@@ -106,3 +106,10 @@ def test_mujoco_pendulum_gets_from_end_to_end():
     start = example.starts[0]
     x, _ = module.in_mujoco(environment, start, lambda t, x: example.mpc.step(x, start.x_ref).u0)
     assert abs(x[-1, 0] - start.x_ref[0]) < 0.02 and np.abs(x[:, 0]).max() < 0.91
+
+
+def test_the_tanks_are_tracked_without_offset():
+    offset_free = importlib.import_module("offset_free")
+    off = {one: offset_free.run(one, 290).x[-1, :2] - offset_free.LEVELS for one in (False, True)}
+    assert np.abs(off[False]).max() > 0.1
+    assert np.abs(off[True]).max() < 1e-3
