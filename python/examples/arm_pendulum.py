@@ -1,8 +1,8 @@
 """An inverted pendulum on a driven arm.
 
 Model, numbers, weights, start: C. Hespe, H. Werner, Convergence properties of fast quasi-LPV model predictive
-control, IEEE Conference on Decision and Control 2021. There Euler's method samples it, and the torque has no bound; here Runge-Kutta
-steps do, and it has one.
+control, IEEE Conference on Decision and Control 2021. There Euler's method samples it, and the torque has no
+bound; here Runge-Kutta steps do, and it has one.
 """
 
 import casadi as ca
