@@ -74,7 +74,7 @@ fn fill<T: Scalar, const R: usize, const K: usize, const L: usize>(
 ) {
     let mut row = from;
     // The taller a block, the fewer instructions; but 12 and 4 rows are slower than twice 8.
-    if R % 8 != 0 {
+    if !R.is_multiple_of(8) {
         while row + 12 <= R {
             fill_block::<T, 12, R, K, L>(out, row, s, ab, cd);
             row += 12;
