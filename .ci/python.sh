@@ -23,5 +23,5 @@ assert not heavy, f"import lpvmpc imports {heavy}"'
 "${pip[@]}" install casadi matplotlib mypy pandas pytest scipy sympy tqdm
 cd python
 "$python/venv/bin/python" -m mypy
-# Of the installed package, not of this folder.
-"$python/venv/bin/python" -m pytest --quiet -p no:cacheprovider tests
+# Not `python -m pytest`, which would take the package of this folder instead of the installed one.
+"$python/venv/bin/pytest" --quiet -p no:cacheprovider tests

@@ -156,6 +156,18 @@ class Mpc:
         the reference.
     rows
         Linear constraints that hold at every stage.
+    q_y
+        Q_y of (y - y_ref)'Q_y (y - y_ref) on top, for the plant's outputs: (k,) or (k, k).
+    y_bounds
+        Bounds of the outputs, as of the states; those of the plant without. A constraint h(x, u) <= 0 is an
+        output with the upper bound 0.
+    output_bounds
+        What becomes of a plan that cannot keep them, as `state_bounds`.
+    r_du
+        R_du of (u_i - u_{i-1})'R_du (u_i - u_{i-1}) on top: (m,) or (m, m).
+    du_bounds
+        Bounds of the change of the inputs from sample to sample, hard. The input before the first is the
+        last one that the controller gave, or what `set_last_input` says.
     linear_models
         Which linear models the programs have: ``"own"`` (the plant's own embedding where it has one,
         else as ``"ray"``), ``"motion"`` (derivatives along the expected motion), or ``"ray"`` (mean
@@ -203,6 +215,11 @@ class Mpc:
         state_bounds: Literal["soft", "hard"] | Mapping[str, Penalty] = "soft",
         u_ref: ArrayLike | None = None,
         rows: Sequence[Row] = (),
+        q_y: ArrayLike | None = None,
+        y_bounds: Limits | None = None,
+        output_bounds: Literal["soft", "hard"] | Mapping[str, Penalty] = "soft",
+        r_du: ArrayLike | None = None,
+        du_bounds: Limits | None = None,
         linear_models: Literal["own", "motion", "ray"] = "own",
         nodes: int = 2,
         substeps: int = 1,
@@ -216,11 +233,12 @@ class Mpc:
         self._settings: dict[str, Any] = {
             "t_s": t_s, "horizon": horizon, "q": q, "r": r, "terminal": terminal,
             "x_bounds": x_bounds, "u_bounds": u_bounds, "state_bounds": state_bounds,
-            "u_ref": u_ref, "rows": tuple(rows), "linear_models": linear_models, "nodes": nodes,
+            "u_ref": u_ref, "rows": tuple(rows), "q_y": q_y, "y_bounds": y_bounds,
+            "output_bounds": output_bounds, "r_du": r_du, "du_bounds": du_bounds, "linear_models": linear_models, "nodes": nodes,
             "substeps": substeps, "method": method, "max_programs": max_programs,
             "tolerance": tolerance,
         }  # fmt: skip
-        self._n, self._m = len(plant.states), len(plant.inputs)
+        self._n, self._m, self._k = len(plant.states), len(plant.inputs), len(plant.outputs)
         self._native = _lpvmpc.Mpc(plant._native, _to_native(plant, self._settings))
 
     @property
@@ -245,9 +263,12 @@ class Mpc:
 
     @property
     def bounds(self) -> dict[str, tuple[float, float]]:
-        """The bounds of states and inputs that it keeps to, by name; infinite where there are none."""
+        """The bounds of states, inputs and outputs that it keeps to, by name; infinite where there are none."""
         found: dict[str, tuple[float, float]] = {}
-        for name, signals in (("x_bounds", self._plant.states), ("u_bounds", self._plant.inputs)):
+        plant = self._plant
+        for name, signals in (
+            ("x_bounds", plant.states), ("u_bounds", plant.inputs), ("y_bounds", plant.outputs),
+        ):  # fmt: skip
             lower, upper = _limits(name, self._settings[name] or {}, signals) or ([], [])
             found |= {one.name: (a, b) for one, a, b in zip(signals, lower, upper, strict=True)}
         return found
@@ -268,6 +289,13 @@ class Mpc:
         rows: Sequence[Sequence[Row]] | None = None,
         disturbance: ArrayLike | None = None,
         parameters: ArrayLike | None = None,
+        y_ref: ArrayLike | None = None,
+        q_y: ArrayLike | None = None,
+        y_bounds: tuple[ArrayLike, ArrayLike] | None = None,
+        r_du: ArrayLike | None = None,
+        du_bounds: tuple[ArrayLike, ArrayLike] | None = None,
+        matrices: tuple[ArrayLike, ...] | None = None,
+        scheduling: ArrayLike | None = None,
     ) -> Plan:
         """One sample: from the measured state and what is known ahead to the plan.
 
@@ -297,6 +325,18 @@ class Mpc:
             What is added to f, in state units per second: (n,) or (stages, n).
         parameters
             The plant's parameters in their order, (k,) or (stages, k).
+        y_ref
+            The reference of the outputs, (k,) or (stages, k). Without `x_ref`, that is where the plant stands
+            nearest to it.
+        q_y, r_du
+            Other weights, where the settings have any: (k,), (k, k) or (stages, k, k), and so on.
+        y_bounds, du_bounds
+            (lower, upper) of outputs and of changes, each (k,) or (stages, k), and (m,) or (stages, m).
+        matrices
+            (A, B) or (A, B, c) of x+ = A x + B u + c over the samples, in place of the plant: (n, n) or
+            (stages, n, n), and so on.
+        scheduling
+            The scheduling of the plant's own embedding, whatever the state: (s,) or (stages, s).
 
         Returns
         -------
@@ -308,23 +348,31 @@ class Mpc:
         SettingError
             An array has not the shape that it must have, or an entry that makes no sense.
         """
-        n, m = self._n, self._m
+        n, m, k = self._n, self._m, self._k
         known: dict[str, Any] = {"x_ref": None}
         for name, given, size in (
             ("x_ref", x_ref, n), ("u_ref", u_ref, m), ("linear_x", linear_x, n),
             ("linear_u", linear_u, m), ("disturbance", disturbance, n),
             ("parameters", parameters, len(self._plant.parameters) if parameters is not None else 0),
+            ("y_ref", y_ref, k),
         ):  # fmt: skip
             if given is not None:
                 known[name] = by_stage(name, given, size)
-        for name, given, shape in (("q", q, (n, n)), ("r", r, (m, m)), ("cross", cross, (m, n))):
+        if scheduling is not None:
+            known["scheduling"] = by_stage("scheduling", scheduling, np.shape(scheduling)[-1])
+        for name, given, shape in (
+            ("q", q, (n, n)), ("r", r, (m, m)), ("cross", cross, (m, n)), ("q_y", q_y, (k, k)),
+            ("r_du", r_du, (m, m)),
+        ):  # fmt: skip
             if given is not None:
                 known[name] = matrices_by_stage(name, given, shape)
         if (q is None) != (r is None):
             raise SettingError("q, r: give both or neither")
         if q is not None:
             known["q"], known["r"] = _equally_long(known["q"], known["r"])
-        for name, bounds, size in (("x", x_bounds, n), ("u", u_bounds, m)):
+        for name, bounds, size in (
+            ("x", x_bounds, n), ("u", u_bounds, m), ("y", y_bounds, k), ("du", du_bounds, m),
+        ):  # fmt: skip
             if bounds is not None:
                 lower, upper = _pair(f"{name}_bounds", bounds)
                 known[f"{name}_lower"], known[f"{name}_upper"] = _equally_long(
@@ -333,6 +381,8 @@ class Mpc:
                 )
         if rows is not None:
             known["rows"] = [[_row(self._plant, row) for row in stage] for stage in rows]
+        if matrices is not None:
+            known |= _models(matrices, n, m)
         fields = self._native.step(column("x", x, n), known)
         return Plan(*fields)
 
@@ -370,6 +420,16 @@ class Mpc:
         self._native.set_parameters({name: float(value) for name, value in values.items()})
         self._plant = plant
 
+    def set_last_input(self, u: ArrayLike) -> None:
+        """What was applied last, shape (m,), if it is not what the last step gave: changes count from there.
+
+        Raises
+        ------
+        SettingError
+            It is not of shape (m,), or not finite.
+        """
+        self._native.set_last_input(column("u", u, self._m))
+
     def reset(self) -> None:
         """Forgets the last plan: the next step is as the first."""
         self._native.reset()
@@ -401,9 +461,17 @@ def _to_native(plant: Plant, given: Mapping[str, Any]) -> dict[str, Any]:
     settings["x_bounds"] = _limits("x_bounds", given["x_bounds"], states)
     settings["u_bounds"] = _limits("u_bounds", given["u_bounds"], inputs)
     if isinstance(given["state_bounds"], Mapping):
-        settings["state_bounds"] = _prices(given["state_bounds"], states)
+        settings["state_bounds"] = _prices("state_bounds", given["state_bounds"], states)
     if given["u_ref"] is not None:
         settings["u_ref"] = column("u_ref", given["u_ref"], m)
+    outputs = plant.outputs
+    for name, size in (("q_y", len(outputs)), ("r_du", m)):
+        if given[name] is not None:
+            settings[name] = weight(name, given[name], size)
+    settings["y_bounds"] = _limits("y_bounds", given["y_bounds"], outputs)
+    settings["du_bounds"] = _limits("du_bounds", given["du_bounds"], [Signal(i.name) for i in inputs])
+    if isinstance(given["output_bounds"], Mapping):
+        settings["output_bounds"] = _prices("output_bounds", given["output_bounds"], outputs)
     settings["rows"] = [_row(plant, row) for row in given["rows"]]
     return settings
 
@@ -469,15 +537,27 @@ def _price(place: str, price: Any) -> tuple[float, float]:
 
 
 def _prices(
-    given: Mapping[str, Penalty], states: list[Signal]
+    place: str, given: Mapping[str, Penalty], signals: list[Signal]
 ) -> list[tuple[float, float] | None]:
-    names = [signal.name for signal in states]
+    names = [signal.name for signal in signals]
     for name in given:
         if name not in names:
-            raise SettingError(f"state_bounds: there is no {name!r}; there are {', '.join(names)}")
-    return [
-        _price(f"state_bounds, {name}", given[name]) if name in given else None for name in names
-    ]
+            raise SettingError(f"{place}: there is no {name!r}; there are {', '.join(names)}")
+    return [_price(f"{place}, {name}", given[name]) if name in given else None for name in names]
+
+
+def _models(given: tuple[ArrayLike, ...], n: int, m: int) -> dict[str, Array]:
+    """(A, B) or (A, B, c) by stage."""
+    if not isinstance(given, (tuple, list)) or len(given) not in (2, 3):
+        raise SettingError("matrices: they must be (A, B) or (A, B, c)")
+    a, b = _equally_long(
+        matrices_by_stage("matrices, A", given[0], (n, n)),
+        matrices_by_stage("matrices, B", given[1], (n, m)),
+    )
+    found = {"a": a, "b": b}
+    if len(given) == 3:
+        found["c"] = by_stage("matrices, c", given[2], n)
+    return found
 
 
 def _row(plant: Plant, row: Row) -> tuple[Any, ...]:

@@ -143,7 +143,7 @@ class Plant:
         units
             Units by name, for messages and figures.
         bounds
-            (lower, upper) by name of a state or an input, in its unit; None where there is none.
+            (lower, upper) by name of a state, an input or an output, in its unit; None where there is none.
         equilibrium
             A steady state (x, u), f(x, u) = 0.
         embedding
@@ -448,8 +448,8 @@ class Plant:
                 if unknown not in known:
                     raise PlantError(f"{place}: there is no {unknown!r}; there are {', '.join(known)}")
         for bounded in bounds:
-            if bounded in parameters or bounded in called:
-                raise PlantError(f"bounds: {bounded!r} is neither a state nor an input")
+            if bounded in parameters:
+                raise PlantError(f"bounds: {bounded!r} is a parameter, and has none")
 
         def signal(one: str) -> dict[str, Any]:
             entry: dict[str, Any] = {"name": str(one), "unit": str(units.get(one, ""))}
@@ -581,7 +581,7 @@ class Plant:
             The reference, shape (n,).
         weights
             What a distance in each state counts, shape (n,); one without. A state of weight zero is
-            wherever the others want it.
+            wherever the others want it (it counts a millionth of the dearest).
 
         Raises
         ------

@@ -5,7 +5,8 @@ use crate::errors::{of_setting, setting};
 use crate::plan::{PlanTuple, fields};
 use crate::plant::Plant;
 use lpvmpc_any::{
-    Iterations, Limits, LinearModels, MpcSettings, Penalty, Preview, Row, StateBounds, Terminal,
+    Iterations, Limits, LinearModels, MpcSettings, Penalty, Preview, Row, StageMatrices,
+    StateBounds, Terminal,
 };
 use nalgebra::{DMatrix, DVector};
 use pyo3::prelude::*;
@@ -40,6 +41,25 @@ enum StateBoundsArgument {
     Prices(Vec<Option<(f64, f64)>>),
 }
 
+impl StateBoundsArgument {
+    fn build(self, place: &str) -> PyResult<StateBounds> {
+        Ok(match self {
+            Self::Prices(prices) => {
+                let prices = prices.into_iter();
+                StateBounds::Priced(prices.map(|price| price.map(penalty)).collect())
+            }
+            Self::Word(word) => match word.as_str() {
+                "soft" => StateBounds::Soft,
+                "hard" => StateBounds::Hard,
+                _ => {
+                    let right = "\"soft\", \"hard\" or prices by name";
+                    return Err(one_of(place, &word, right));
+                }
+            },
+        })
+    }
+}
+
 /// A terminal ingredient, as Python hands it over.
 #[derive(FromPyObject)]
 enum TerminalArgument<'py> {
@@ -62,6 +82,11 @@ struct Settings<'py> {
     state_bounds: StateBoundsArgument,
     u_ref: Option<Vector<'py>>,
     rows: Vec<RowTuple>,
+    q_y: Option<Matrix<'py>>,
+    y_bounds: Option<(Vec<f64>, Vec<f64>)>,
+    output_bounds: StateBoundsArgument,
+    r_du: Option<Matrix<'py>>,
+    du_bounds: Option<(Vec<f64>, Vec<f64>)>,
     linear_models: String,
     nodes: usize,
     method: String,
@@ -93,22 +118,14 @@ impl Settings<'_> {
             },
             x_bounds: self.x_bounds.map(limits),
             u_bounds: self.u_bounds.map(limits),
-            state_bounds: match self.state_bounds {
-                StateBoundsArgument::Prices(prices) => {
-                    let prices = prices.into_iter();
-                    StateBounds::Priced(prices.map(|price| price.map(penalty)).collect())
-                }
-                StateBoundsArgument::Word(word) => match word.as_str() {
-                    "soft" => StateBounds::Soft,
-                    "hard" => StateBounds::Hard,
-                    _ => {
-                        let right = "\"soft\", \"hard\" or a price for each state";
-                        return Err(one_of("state_bounds", &word, right));
-                    }
-                },
-            },
+            state_bounds: self.state_bounds.build("state_bounds")?,
             u_ref: self.u_ref.map(|u_ref| DVector::from_vec(entries(&u_ref))),
             rows: self.rows.into_iter().map(row).collect(),
+            q_y: self.q_y.as_ref().map(matrix),
+            y_bounds: self.y_bounds.map(limits),
+            output_bounds: self.output_bounds.build("output_bounds")?,
+            r_du: self.r_du.as_ref().map(matrix),
+            du_bounds: self.du_bounds.map(limits),
             linear_models: match self.linear_models.as_str() {
                 "own" => LinearModels::Own,
                 "motion" => LinearModels::AlongMotion,
@@ -168,6 +185,28 @@ struct Known<'py> {
     disturbance: Option<Matrix<'py>>,
     #[pyo3(default)]
     parameters: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    y_ref: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    q_y: Option<Matrices<'py>>,
+    #[pyo3(default)]
+    y_lower: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    y_upper: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    r_du: Option<Matrices<'py>>,
+    #[pyo3(default)]
+    du_lower: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    du_upper: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    a: Option<Matrices<'py>>,
+    #[pyo3(default)]
+    b: Option<Matrices<'py>>,
+    #[pyo3(default)]
+    c: Option<Matrix<'py>>,
+    #[pyo3(default)]
+    scheduling: Option<Matrix<'py>>,
 }
 
 fn bounds(
@@ -190,7 +229,22 @@ impl Known<'_> {
         let weights: Vec<(DMatrix<f64>, DMatrix<f64>)> =
             pairs("weights", stack(self.q.as_ref()), stack(self.r.as_ref()))?;
         let parameters = rows(self.parameters.as_ref());
+        let pairs_of_stages = pairs("a, b", stack(self.a.as_ref()), stack(self.b.as_ref()))?;
+        let affine = rows(self.c.as_ref());
+        let matrices = pairs_of_stages.into_iter().enumerate();
+        let matrices = matrices.map(|(stage, (a, b))| StageMatrices {
+            a,
+            b,
+            affine: affine.get(stage).or(affine.last()).cloned(),
+        });
         Ok(Preview {
+            y_ref: rows(self.y_ref.as_ref()),
+            q_y: stack(self.q_y.as_ref()),
+            y_bounds: bounds("y_bounds", self.y_lower.as_ref(), self.y_upper.as_ref())?,
+            r_du: stack(self.r_du.as_ref()),
+            du_bounds: bounds("du_bounds", self.du_lower.as_ref(), self.du_upper.as_ref())?,
+            matrices: matrices.collect(),
+            scheduling: rows(self.scheduling.as_ref()),
             x_ref: rows(self.x_ref.as_ref()),
             u_ref: rows(self.u_ref.as_ref()),
             weights,
@@ -263,6 +317,10 @@ impl Mpc {
                 .map_err(of_setting)?;
         }
         Ok(())
+    }
+
+    fn set_last_input(&mut self, u: Vec<f64>) -> PyResult<()> {
+        self.inner.set_last_input(&u).map_err(of_setting)
     }
 
     fn reset(&mut self) {

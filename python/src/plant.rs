@@ -131,7 +131,10 @@ impl Plant {
         ))
     }
 
-    #[expect(clippy::type_complexity, reason = "x, u, and whether x is the reference")]
+    #[expect(
+        clippy::type_complexity,
+        reason = "x, u, and whether x is the reference"
+    )]
     fn steady_state<'py>(
         &self,
         py: Python<'py>,

@@ -338,3 +338,50 @@ def test_a_plan_is_found_where_the_regulator_leads_to_nothing_finite():
     plan = mpc.step([3.0, 0.0])
     assert plan.is_solved and np.isfinite(plan.x).all()
     assert np.abs(plan.x[-1]).max() < 0.1
+
+
+def test_changes_of_the_input_are_bounded_and_cost():
+    mpc = lpvmpc.Mpc(double_integrator(), 0.1, 20, [1, 0.1], [0.01], du_bounds=([-0.3], [0.2]))
+    mpc.set_last_input([0.5])
+    plan = mpc.step([0, 0], [2, 0])
+    changes = np.diff(np.concatenate([[0.5], plan.u[:, 0]]))
+    assert (changes <= 0.2 + 1e-9).all() and (changes >= -0.3 - 1e-9).all()
+    assert plan.u0[0] == pytest.approx(0.7)
+    assert "change of force <= 0.2" in plan.active_bounds
+    after = mpc.step(plan.x[1], [2, 0])
+    assert after.u0[0] == pytest.approx(0.9)  # from what it gave
+    swift = lpvmpc.Mpc(double_integrator(), 0.1, 20, [1, 0.1], [0.01]).step([0, 0], [2, 0])
+    smooth = lpvmpc.Mpc(double_integrator(), 0.1, 20, [1, 0.1], [0.01], r_du=[1.0]).step([0, 0], [2, 0])
+    assert np.abs(np.diff(smooth.u[:, 0])).max() < 0.5 * np.abs(np.diff(swift.u[:, 0])).max()
+
+
+def test_outputs_are_tracked_and_bounded():
+    """The height of a pole's tip, a nonlinear output, is kept; its position follows a reference."""
+    settings = {"q_y": [20.0, 0.0], "y_bounds": ([None, 0.97], [None, None])}
+    mpc = lpvmpc.Mpc(cart_pole(), T_S, 40, [0.01, 0.01, 0.2, 0.2], R, **settings)
+    free = lpvmpc.Mpc(cart_pole(), T_S, 40, [0.01, 0.01, 0.2, 0.2], R, q_y=[20.0, 0.0])
+    heights = []
+    for one in (mpc, free):
+        x = np.zeros(4)
+        lowest = 1.0
+        for _ in range(120):
+            plan = one.step(x, y_ref=[1.0, 1.0])
+            assert plan.is_solved
+            x = plan.x[1]
+            lowest = min(lowest, np.cos(x[1]))
+        assert abs(x[0] + np.sin(x[1]) - 1.0) < 0.01
+        heights.append(lowest)
+    assert heights[0] > 0.969 > heights[1]
+
+
+def test_matrices_by_stage_take_the_place_of_the_plant():
+    mpc = lpvmpc.Mpc(double_integrator(), 0.1, 10, [1, 0.1], [0.5])
+    a, b = np.array([[1, 0.1], [0, 1]]), np.array([[0.005], [0.1]])
+    same = mpc.step([1, 0], matrices=(a, b))
+    np.testing.assert_allclose(same.u, mpc.step([1, 0]).u, atol=1e-9)
+    drift = mpc.step([1, 0], matrices=(a, np.tile(b, (10, 1, 1)), [0.0, 0.05]))
+    np.testing.assert_allclose(drift.x[1], a @ [1, 0] + b[:, 0] * drift.u[0] + [0.0, 0.05], atol=1e-12)
+    with pytest.raises(lpvmpc.SettingError, match="matrices, A: its shape"):
+        mpc.step([1, 0], matrices=(np.eye(3), b))
+    with pytest.raises(lpvmpc.SettingError, match=r"\(A, B\) or \(A, B, c\)"):
+        mpc.step([1, 0], matrices=(a,))
