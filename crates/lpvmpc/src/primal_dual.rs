@@ -14,7 +14,7 @@ use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::riccati::{BadPivot, CostToGo, StageFactor};
 use crate::rows;
-use crate::small_matrix::{product, transposed_product};
+use crate::small_matrix::{add_product, product, transposed_product};
 use crate::solution::{Side, Solution, Status};
 use crate::solver::{Solver, SolverSettings, WarmStart, trajectory};
 use crate::working_set::{copy, first};
@@ -91,14 +91,12 @@ impl<T: Scalar, const NX: usize, const NU: usize> PrimalDual<T, NX, NU> {
         let cap = solver.dual.changes_left();
         solver.dual.reset(solver.dual.tolerance, cap / SHARE);
         core::mem::swap(&mut self.factors, &mut solver.factors);
-        let closed = core::mem::take(&mut solver.closed);
         let solved = self.find(solver, ocp, solution, spent) && {
             let otherwise = Status::MaxChanges;
             let found = solver.exchange_held_inputs(ocp, settings, solution, otherwise, spent);
             found.is_ok()
         };
         core::mem::swap(&mut self.factors, &mut solver.factors);
-        solver.closed = closed;
         solver.held.release_all();
         if !solved {
             solution.active.clear();
@@ -229,7 +227,10 @@ fn hold_clipped<T: Scalar, const NX: usize, const NU: usize>(
         solver
             .held
             .exchange(i, bounds, &u, T::zero(), SVector::zeros);
-        x = stage.next(&x, &bounds.project(&u));
+        let mut next = stage.c;
+        add_product(&mut next, &stage.a, &x);
+        add_product(&mut next, &stage.b, &bounds.project(&u));
+        x = next;
     }
 }
 

@@ -8,8 +8,8 @@
 
 use crate::model::Scalar;
 use crate::ocp::{Common, Stage};
-use crate::small_matrix::{add_product, plus_product, product, symmetric_sum, transposed_product};
-use nalgebra::{SMatrix, SVector};
+use crate::small_matrix::{add_product, product, transposed_product};
+use nalgebra::{SMatrix, SVector, convert};
 
 /// Cost-to-go x'Px/2 + p'x.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,9 +30,8 @@ impl<T: Scalar, const NX: usize> CostToGo<T, NX> {
     }
 }
 
-/// What a stage's minimisation leaves behind: the policy u = K x + k + L^-T v and, once
-/// [`close_loop`](Self::close_loop) has been called, the dynamics under it,
-/// x+ = (A + BK) x + B L^-T v + (c + B k).
+/// What a stage's minimisation leaves behind: the policy u = K x + k + L^-T v and the dynamics
+/// under it, x+ = (A + BK) x + B L^-T v + (c + B k).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StageFactor<T, const NX: usize, const NU: usize> {
     /// Feedback K, `NU` x `NX`, with the sign of u = K x; gains are for u = -K x throughout.
@@ -67,7 +66,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     }
 
     /// One backward step: takes the cost-to-go behind `stage`, whose bounds do not matter here, to the
-    /// one in front of it, and leaves the stage's policy in `self`.
+    /// one in front of it, and leaves the stage's factor in `self`.
     ///
     /// # Errors
     /// [`BadPivot`] if R + B'PB is not numerically positive definite.
@@ -80,54 +79,35 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     ) -> Result<(), BadPivot<T>> {
         let Stage { a, b, c, .. } = stage;
         let CostToGo { quadratic, linear } = cost_to_go;
-
-        // H u = -(G x + g) is the condition for the stage's minimum.
-        let b_t = b.transpose();
+        let p_a = product(quadratic, a);
         let p_b = product(quadratic, b);
-        let hessian = plus_product(&weights.r, &b_t, &p_b);
+        let p_next = *linear + product(quadratic, c);
+
+        // H u = -(G x + g) is the condition for the stage's minimum. P is symmetric, so
+        // B'P = (P B)'.
+        let hessian = weights.r + transposed_product(b, &p_b);
+        let g_x = weights.s + transposed_product(&p_b, a);
+        let g = stage.linear_u + transposed_product(b, &p_next);
         let UnitFactor { inverse, pivots } = UnitFactor::new(&hessian)?;
         let reciprocals = pivots.map(|pivot| T::one() / pivot);
-
-        let a_t = a.transpose();
-        let p_a = product(quadratic, a);
-        let p_next = plus_product(linear, quadratic, c);
-        // P is symmetric, so G' = S' + A'P B.
-        let g_x_t = plus_product(&weights.s.transpose(), &a_t, &p_b);
-        let g = plus_product(&stage.linear_u, &b_t, &p_next);
-
-        // (L^-1 G)' and -(D^-1 L^-1 G)', whose columns are as long as a state.
-        let l_g_x_t = times_transposed_lower(&g_x_t, &inverse);
-        let scaled_g_x_t = scaled_columns(&l_g_x_t, &-reciprocals);
-        let scaled_g = -scaled_rows(&product(&inverse, &g), &reciprocals);
-        self.feedback = times_lower(&scaled_g_x_t, &inverse).transpose();
-        self.feedforward = transposed_product(&inverse, &scaled_g);
+        let l_g_x = product(&inverse, &g_x);
+        let scaled_g_x = scaled_rows(&l_g_x, &reciprocals);
+        let scaled_g = scaled_rows(&product(&inverse, &g), &reciprocals);
+        self.feedback = -transposed_product(&inverse, &scaled_g_x);
+        self.feedforward = -transposed_product(&inverse, &scaled_g);
 
         // A'P(A + BK) + Q + S'K, and the same for the linear part.
-        let scaled_g_x = scaled_g_x_t.transpose();
-        symmetric_sum(quadratic, &weights.q, (&a_t, &p_a), (&l_g_x_t, &scaled_g_x));
-        let front = plus_product(&stage.linear_x, &a_t, &p_next);
-        *linear = plus_product(&front, &l_g_x_t, &scaled_g);
+        *quadratic = symmetric(
+            &(weights.q + transposed_product(a, &p_a) - transposed_product(&l_g_x, &scaled_g_x)),
+        );
+        *linear =
+            stage.linear_x + transposed_product(a, &p_next) - transposed_product(&l_g_x, &scaled_g);
 
         self.inverse_factor = scaled_rows(&inverse, &reciprocals.map(|d| d.sqrt()));
+        self.closed_loop = a + product(b, &self.feedback);
+        self.input = product(b, &self.inverse_factor.transpose());
+        self.drift = c + product(b, &self.feedforward);
         Ok(())
-    }
-
-    /// Leaves the dynamics under the policy that [`eliminate`](Self::eliminate) has found for `stage` in
-    /// `self`. Only rows of bounds need them, and with many states they are a good part of the work.
-    #[inline(never)]
-    pub fn close_loop(&mut self, stage: &Stage<T, NX, NU>) {
-        self.closed_loop = plus_product(&stage.a, &stage.b, &self.feedback);
-        self.input = times_transposed_lower(&stage.b, &self.inverse_factor);
-        self.drift = plus_product(&stage.c, &stage.b, &self.feedforward);
-    }
-
-    /// The next state under the policy, by the closed loop.
-    #[inline(always)]
-    pub fn next(&self, x: &SVector<T, NX>, v: &SVector<T, NU>) -> SVector<T, NX> {
-        let mut next = self.drift;
-        add_product(&mut next, &self.input, v);
-        add_product(&mut next, &self.closed_loop, x);
-        next
     }
 
     /// The input at the state `x` with the normalised deviation `v`.
@@ -138,67 +118,25 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         u += transposed_product(&self.inverse_factor, v);
         u
     }
-}
 
-/// `m` L' with the lower triangular matrix `l`.
-#[inline(always)]
-fn times_transposed_lower<T: Scalar, const R: usize, const K: usize>(
-    m: &SMatrix<T, R, K>,
-    l: &SMatrix<T, K, K>,
-) -> SMatrix<T, R, K> {
-    let mut out = SMatrix::<T, R, K>::zeros();
-    for (i, out) in out.data.0.iter_mut().enumerate() {
-        let mut column = m.data.0[i].map(|entry| entry * l[(i, i)]);
-        for k in 0..i {
-            add_scaled(&mut column, &m.data.0[k], l[(i, k)]);
-        }
-        *out = column;
-    }
-    out
-}
-
-/// `m` L with the lower triangular matrix `l`.
-#[inline(always)]
-fn times_lower<T: Scalar, const R: usize, const K: usize>(
-    m: &SMatrix<T, R, K>,
-    l: &SMatrix<T, K, K>,
-) -> SMatrix<T, R, K> {
-    let mut out = SMatrix::<T, R, K>::zeros();
-    for (j, out) in out.data.0.iter_mut().enumerate() {
-        let mut column = m.data.0[j].map(|entry| entry * l[(j, j)]);
-        for k in j + 1..K {
-            add_scaled(&mut column, &m.data.0[k], l[(k, j)]);
-        }
-        *out = column;
-    }
-    out
-}
-
-/// sum += `column` factor
-#[inline(always)]
-fn add_scaled<T: Scalar, const R: usize>(sum: &mut [T; R], column: &[T; R], factor: T) {
-    for (sum, entry) in sum.iter_mut().zip(column) {
-        *sum += *entry * factor;
+    /// The next state under the policy.
+    #[inline(always)]
+    pub fn next(&self, x: &SVector<T, NX>, v: &SVector<T, NU>) -> SVector<T, NX> {
+        let mut next = self.drift;
+        add_product(&mut next, &self.input, v);
+        add_product(&mut next, &self.closed_loop, x);
+        next
     }
 }
 
-/// `m` diag(`factors`)
 #[inline(always)]
-fn scaled_columns<T: Scalar, const R: usize, const C: usize>(
-    m: &SMatrix<T, R, C>,
-    factors: &SVector<T, C>,
-) -> SMatrix<T, R, C> {
-    let mut out = *m;
-    for (column, factor) in out.data.0.iter_mut().zip(&factors.data.0[0]) {
-        for entry in column {
-            *entry *= *factor;
-        }
-    }
-    out
+/// The mean of `m` and its transpose: rounding would make the cost-to-go drift apart.
+fn symmetric<T: Scalar, const K: usize>(m: &SMatrix<T, K, K>) -> SMatrix<T, K, K> {
+    (m + m.transpose()) * convert::<f64, T>(0.5)
 }
 
+#[inline(always)]
 /// diag(`factors`) `m`
-#[inline(always)]
 fn scaled_rows<T: Scalar, const R: usize, const C: usize>(
     m: &SMatrix<T, R, C>,
     factors: &SVector<T, R>,

@@ -13,7 +13,7 @@ use crate::ocp::{Bounds, Common, Ocp, SoftBounds};
 use crate::primal_dual::PrimalDual;
 use crate::riccati::{CostToGo, StageFactor};
 use crate::rows::Trajectory;
-use crate::small_matrix::product;
+use crate::small_matrix::{add_product, product};
 use crate::solution::{ActiveRow, ActiveSet, Quantity, Solution, Status};
 use crate::working_set::first;
 use nalgebra::{SVector, convert};
@@ -78,8 +78,6 @@ impl<T: Scalar> Default for SolverSettings<T> {
 #[cfg_attr(feature = "alloc", derive(Clone))]
 pub struct Solver<T: 'static, const NX: usize, const NU: usize> {
     pub(crate) factors: List<StageFactor<T, NX, NU>>,
-    /// Whether the factors have their closed loops.
-    pub(crate) closed: bool,
     pub(crate) dual: DualActiveSet<T, NU>,
     /// None but within [`Solver::search_with_held_inputs`].
     pub(crate) held: HeldInputs<NU>,
@@ -96,7 +94,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         Self {
             stages,
             factors: memory.factors,
-            closed: false,
             dual: DualActiveSet::new(memory.dual),
             held: HeldInputs::none(memory.held),
             primal_dual: memory.primal_dual,
@@ -249,7 +246,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
         if ocp.terminal.equality.is_some() {
-            self.close_loops(ocp);
             let x_n = terminal_state(ocp, solution);
             self.dual
                 .impose_terminal_equality(ocp, &self.factors, &x_n)?;
@@ -260,10 +256,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         loop {
             let trajectory = trajectory(solution);
             match self.dual.most_violated(ocp, &trajectory) {
-                Some(violated) => {
-                    self.close_loops(ocp);
-                    self.dual.satisfy(ocp, &self.factors, &violated)?;
-                }
+                Some(violated) => self.dual.satisfy(ocp, &self.factors, &violated)?,
                 None if self.dual.refine(ocp, &self.factors, &trajectory)? => {}
                 None => break,
             }
@@ -292,7 +285,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             quadratic: ocp.terminal.p,
             linear: ocp.terminal.linear_x,
         };
-        self.closed = false;
         let stages = ocp.stages.iter().zip(self.factors.iter_mut());
         for (stage, (data, factor)) in stages.enumerate().take(ocp.length()).rev() {
             let weights = ocp.common_at(stage);
@@ -305,17 +297,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         Ok(())
     }
 
-    /// The closed loops, which rows are formed by, of the factors that [`Solver::factorize`] left.
-    fn close_loops(&mut self, ocp: &Ocp<T, NX, NU>) {
-        if !self.closed {
-            let stages = ocp.stages.iter().zip(self.factors.iter_mut());
-            for (data, factor) in stages.take(ocp.length()) {
-                factor.close_loop(data);
-            }
-            self.closed = true;
-        }
-    }
-
     /// Forward: the trajectory of the current normalised deviations.
     pub(crate) fn roll_out(
         &self,
@@ -326,15 +307,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         let n = ocp.length();
         let policy = first(&self.factors, n).iter().zip(first(&self.dual.v, n));
         let places = solution.u.iter_mut().zip(solution.x.iter_mut());
-        let stages = ocp.stages.iter().zip(policy);
-        for ((stage, (factor, v)), (u, x_next)) in stages.zip(places) {
+        for ((factor, v), (u, x_next)) in policy.zip(places) {
             *u = factor.policy(&x, v);
-            // Once there are rows, they and the trajectory are of the same matrices.
-            x = if self.closed {
-                factor.next(&x, v)
-            } else {
-                stage.next(&x, u)
-            };
+            x = factor.next(&x, v);
             *x_next = x;
         }
         // A number that is not finite anywhere spreads to the last state or its input.
@@ -365,7 +340,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 .most_violated(ocp, &trajectory(solution))
                 .is_some();
         if needed {
-            self.close_loops(ocp);
             let trajectory = trajectory(solution);
             self.dual
                 .warm_start(ocp, &self.factors, &trajectory, &solution.active, shift)?;
@@ -413,7 +387,10 @@ fn fall_back<T: Scalar, const NX: usize, const NU: usize>(
     let mut x = ocp.x0;
     let places = solution.u.iter().zip(solution.x.iter_mut());
     for (stage, (u, x_next)) in ocp.stages.iter().zip(places).take(ocp.length()) {
-        x = stage.next(&x, u);
+        let mut next = stage.c;
+        add_product(&mut next, &stage.a, &x);
+        add_product(&mut next, &stage.b, u);
+        x = next;
         *x_next = x;
     }
     solution.cost = cost(ocp, solution);

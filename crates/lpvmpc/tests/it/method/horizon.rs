@@ -159,20 +159,6 @@ fn the_horizon_without_bounds_is_the_dense_solution() {
     matches_the_dense_solution::<6, 2>(&mut rng, 12, 12);
 }
 
-/// Every way in which the kernel's blocks divide the rows of a matrix.
-#[test]
-fn so_it_is_for_all_sizes() {
-    let mut rng = Rng::new(23);
-    matches_the_dense_solution::<2, 1>(&mut rng, 8, 8);
-    matches_the_dense_solution::<3, 2>(&mut rng, 8, 8);
-    matches_the_dense_solution::<5, 3>(&mut rng, 6, 6);
-    matches_the_dense_solution::<7, 1>(&mut rng, 6, 6);
-    matches_the_dense_solution::<8, 2>(&mut rng, 6, 6);
-    matches_the_dense_solution::<12, 4>(&mut rng, 4, 4);
-    matches_the_dense_solution::<13, 5>(&mut rng, 3, 3);
-    matches_the_dense_solution::<16, 6>(&mut rng, 3, 3);
-}
-
 #[test]
 fn so_is_a_horizon_shorter_than_the_memory() {
     let mut rng = Rng::new(22);

@@ -178,8 +178,7 @@ fn policy_and_next_agree_with_the_stage() {
     let mut rng = Rng::new(14);
     for _ in 0..200 {
         let problem = Problem::<5, 2>::random(&mut rng);
-        let (mut factor, _) = problem.eliminate();
-        factor.close_loop(&problem.stage);
+        let (factor, _) = problem.eliminate();
         let (x, v) = (rng.matrix(), rng.matrix());
         let law = factor.feedback * x + factor.feedforward;
         let policy = factor.policy(&x, &SVector::zeros());
