@@ -380,19 +380,23 @@ where
         ocp: &mut Ocp<T, NX, NU>,
     ) {
         let horizon = self.settings.horizon;
-        let done = if P::TOGETHER {
-            self.in_groups(x, inputs, first, ocp.stages.iter_mut(), |motion| {
+        if P::TOGETHER {
+            let done = self.in_groups(x, inputs, first, ocp.stages.iter_mut(), |motion| {
                 own.predict_each(&self.model, &self.settings, motion)
-            })
-        } else {
-            0
-        };
+            });
+            let rest = ocp.stages.iter_mut().enumerate().take(horizon);
+            for (i, stage) in rest.skip(done) {
+                let (x, u) = self.expected(x, inputs, first + i);
+                (stage.a, stage.b, stage.c) = own.predict(i, &self.model, &self.settings, &x, &u);
+            }
+            return;
+        }
         let states = core::iter::once(x).chain(self.rollout.iter()).skip(first);
         let inputs = inputs.iter().take(horizon);
         let window = states.zip(inputs.clone().skip(first).chain(inputs.last()));
         let samples = ocp.stages.iter_mut().zip(window).take(horizon);
         if D::SOME {
-            for (i, (stage, (x, u))) in samples.enumerate().skip(done) {
+            for (i, (stage, (x, u))) in samples.enumerate() {
                 (stage.a, stage.b, stage.c) = own.predict(i, &self.model, &self.settings, x, u);
             }
             return;
@@ -400,12 +404,26 @@ where
         // The same again, for its registers: 2 % of the step's instructions.
         let ControllerSettings { t_s, predictor, .. } = &self.settings;
         let held = self.settings.scheduling.held();
-        for (stage, (x, u)) in samples.skip(done) {
+        for (stage, (x, u)) in samples {
             let pair = predictor.linearize_along(&self.model, held, x, u, *t_s);
             let c = predictor.offset_along(&self.model, held, (x, u), *t_s, &pair);
             stage.c = c.unwrap_or_else(SVector::zeros);
             (stage.a, stage.b) = pair;
         }
+    }
+
+    /// State and input that are expected `i` samples from `x` on, along the last rollout and these `inputs`; beyond the
+    /// last, the last.
+    fn expected(
+        &self,
+        x: &SVector<T, NX>,
+        inputs: &[SVector<T, NU>],
+        i: usize,
+    ) -> (SVector<T, NX>, SVector<T, NU>) {
+        let state = i
+            .checked_sub(1)
+            .map_or(*x, |before| at(&self.rollout, before));
+        (state, at(inputs, i))
     }
 
     /// Writes what `samples` makes of states and inputs into the `stages`, in groups, until there is no whole group left or
@@ -426,9 +444,8 @@ where
             Some(_) => 0,
         };
         while done + GROUP <= horizon {
-            let before = |k: usize| (first + done + k).checked_sub(1);
-            let states = from_fn(|k| before(k).map_or(*x, |before| at(&self.rollout, before)));
-            let inputs = from_fn(|k| at(inputs, first + done + k));
+            let expected: [_; GROUP] = from_fn(|k| self.expected(x, inputs, first + done + k));
+            let (states, inputs) = (expected.map(|(x, _)| x), expected.map(|(_, u)| u));
             let Some(made) = samples((&states, &inputs)) else {
                 break;
             };

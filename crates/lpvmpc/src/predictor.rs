@@ -111,10 +111,12 @@ impl Predictor {
         T: Scalar,
         P: LpvModel<T, NX, NU, NS>,
     {
+        if !model.has_offset() {
+            return None;
+        }
         if let (Self::StageConsistent(rk4), None) = (self, held) {
             // The pair is exact at the sample's own beginning.
-            let exact = || rk4.advance(model, x, u, t_s) - product(a_d, x) - product(b_d, u);
-            return model.has_offset().then(exact);
+            return Some(rk4.advance(model, x, u, t_s) - product(a_d, x) - product(b_d, u));
         }
         let scheduling = held.copied().unwrap_or_else(|| model.scheduling(x, u));
         let c = model.offset(&scheduling)?;

@@ -45,3 +45,29 @@ fn an_operation_of_which_there_is_no_proof_has_a_name() {
     assert_eq!(name, plant("functions").data().operations[index].name());
     assert!(["abs", "sign", "min", "max", "floor", "lt", "le", "eq"].contains(&name));
 }
+
+#[test]
+fn parameters_are_set_all_at_once_or_not_at_all() {
+    let mut cart_pole = plant("cart-pole");
+    let before = cart_pole.parameters().to_vec();
+    let error = cart_pole.set_parameters(&before[1..]).unwrap_err();
+    assert_eq!(error.to_string(), "parameters: 4 values for 5");
+    let mut values = before.clone();
+    values[1] = f64::NAN;
+    let error = cart_pole.set_parameters(&values).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "parameter \"pole_mass\": NaN is not finite"
+    );
+    assert_eq!(cart_pole.parameters(), before);
+    values[1] = 0.4;
+    cart_pole.set_parameters(&values).unwrap();
+    let mut other = plant("cart-pole");
+    other.set_parameter("pole_mass", 0.4).unwrap();
+    assert_eq!(cart_pole, other);
+    let point = ([0.1, 0.4, -0.3, 1.2], [2.0]);
+    assert_eq!(
+        cart_pole.derivative(&point.0, &point.1).unwrap(),
+        other.derivative(&point.0, &point.1).unwrap()
+    );
+}
