@@ -76,4 +76,4 @@ pub use plan::{ActiveBound, Plan, Target};
 pub use preview::{Preview, StageMatrices};
 pub use settings::{Limits, LinearModels, MpcSettings, Row, StateBounds, Terminal};
 pub use steady_state::{SteadyState, steady_state};
-pub use world::{Push, Sensor, World, WorldSettings};
+pub use world::{Push, Quantity, Sensor, World, WorldSettings};

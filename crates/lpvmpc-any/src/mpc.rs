@@ -112,7 +112,8 @@ impl Mpc {
     }
 
     /// The input that was really applied last, where that is another than the last plan's first one; before the first
-    /// step it is that of the plant's steady state. Changes of the input count from it.
+    /// step it is that of the plant's steady state. Changes of the input count from it, and an estimator predicts
+    /// with it; before the first step an estimator without it takes the input for zero.
     ///
     /// # Errors
     /// It has not the plant's sizes, or is not finite.
@@ -156,7 +157,7 @@ impl Mpc {
         self.sized.estimate()
     }
 
-    /// Forgets the last plan and the last input: the next step is as the first.
+    /// Forgets the last plan, the last input and what was estimated: the next step is as the first.
     pub fn reset(&mut self) {
         self.sized.reset();
     }
