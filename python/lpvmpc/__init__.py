@@ -18,6 +18,7 @@ from .errors import (
     SettingError,
     SimulationError,
 )
+from .estimator import Disturbance, Estimate, Estimator, Gate
 from .mpc import ActiveBound, Mpc, Penalty, Plan, Row
 from .plant import Embedding, Plant, Signal, SteadyState
 from .simulation import Actuator, Jump, Load, Run, Sensor, simulate
@@ -25,7 +26,11 @@ from .simulation import Actuator, Jump, Load, Run, Sensor, simulate
 __all__ = [
     "ActiveBound",
     "Actuator",
+    "Disturbance",
     "Embedding",
+    "Estimate",
+    "Estimator",
+    "Gate",
     "Jump",
     "Load",
     "Lqr",

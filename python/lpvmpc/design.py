@@ -47,7 +47,7 @@ def lqr(
     plant
         The plant.
     t_s
-        Sampling time, s.
+        Sampling time, s; of a plant in discrete time its period.
     q, r
         The weights: diagonals, (n,) and (m,), or whole.
     x, u

@@ -366,8 +366,14 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sensed<NX, NU, NS> {
                 .map_or(f64::NAN, |(_, slopes)| slopes[(k, j)]),
         });
         let c_d = DMatrix::zeros(c.nrows(), b_d.ncols());
-        check_offset_free(&a, &b_d, &c, &c_d)
-            .map_err(|error| MpcError::new("estimator, disturbances", error.to_string()))
+        check_offset_free(&a, &b_d, &c, &c_d).map_err(|error| {
+            if settings.disturbances.is_empty() {
+                let fault = "steady states of the plant cannot be told from each other by what is \
+                             measured: measure more";
+                return MpcError::new("estimator, measured", fault);
+            }
+            MpcError::new("estimator, disturbances", error.to_string())
+        })
     }
 }
 

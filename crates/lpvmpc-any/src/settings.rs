@@ -52,10 +52,14 @@ pub struct MpcSettings {
     pub iterations: Iterations<f64>,
 }
 
+/// Quadratic programs of a sample without a plan from the one before, at most, where no number is given: at a start nobody
+/// knows how far the regulator's own closed loop is from a good plan.
+pub const FIRST_PROGRAMS: usize = 50;
+
 impl MpcSettings {
     /// What a controller must be told, with the diagonals of Q and R; the rest serves as a rule: one Runge-Kutta step
     /// per sample, the cost of the linear-quadratic regulator at the end, the bounds of the plant,
-    /// those of states soft, and a descent of at most eight programs per sample.
+    /// those of states soft, and a descent of at most eight programs per sample, fifty where it has no plan to begin with.
     pub fn new(t_s: f64, horizon: usize, q: &[f64], r: &[f64]) -> Self {
         let diagonal = |entries: &[f64]| DMatrix::from_diagonal(&DVector::from_row_slice(entries));
         Self {
@@ -76,7 +80,11 @@ impl MpcSettings {
             r_du: None,
             du_bounds: None,
             linear_models: LinearModels::default(),
-            iterations: Iterations::default(),
+            iterations: Iterations::Descent {
+                tolerance: Iterations::<f64>::TOLERANCE,
+                most: Iterations::<f64>::MOST,
+                first: FIRST_PROGRAMS,
+            },
         }
     }
 }
