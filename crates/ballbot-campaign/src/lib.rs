@@ -27,7 +27,7 @@ pub use campaign::{Campaign, Clock, Drawn, Replay, Source};
 pub use cell::{Cell, Column, Kind, Row};
 pub use error::CampaignError;
 pub use file::{CampaignFile, Design, LimitsTable, RareTable, StopTable};
-pub use intervals::Interval;
+pub use intervals::{Interval, share};
 pub use measure::{Ending, Measure};
 pub use results::{RowFile, RowWriter};
 pub use sensitivity::{Sensitivity, sensitivity};

@@ -56,6 +56,11 @@ impl Shard {
         self.index
     }
 
+    /// Into how many parts the campaign is divided.
+    pub fn of(self) -> u32 {
+        self.of
+    }
+
     /// Its file's name.
     pub fn file_name(self) -> String {
         format!("shard-{:05}-of-{:05}.parquet", self.index, self.of)

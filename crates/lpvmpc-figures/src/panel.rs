@@ -146,6 +146,22 @@ impl Placed<'_> {
             Style::Line(dash) | Style::MarkedLine(dash) => lines(&points, dash),
             Style::Steps(dash) => lines(&held(&points), dash),
             Style::Markers => {}
+            Style::Tiles { columns, rows } => {
+                let width = self.area.width / f64::from(columns.max(1));
+                let height = self.area.height / f64::from(rows.max(1));
+                for (x, y) in points.iter().filter(|point| self.area.contains(**point)) {
+                    let left = (x - width / 2.0).max(self.area.left);
+                    let top = (y - height / 2.0).max(self.area.top);
+                    let tile = Rect {
+                        left,
+                        top,
+                        width: (x + width / 2.0).min(self.area.right()) - left,
+                        height: (y + height / 2.0).min(self.area.bottom()) - top,
+                    };
+                    scene.rect(tile, fill);
+                }
+                return;
+            }
         }
         let has_discs = matches!(series.style, Style::Markers | Style::MarkedLine(_));
         for (index, center) in points.iter().enumerate() {
