@@ -170,11 +170,26 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
         };
         check_success(file, &campaign.measures)?;
         check_goal(file, &campaign.inputs)?;
-        // A key that is none is wrong in all runs.
-        let drawn = campaign.draw(0);
-        let first = campaign.scenario(&drawn).map(|_| ());
-        first.map_err(|error| campaign.refused(&drawn, error))?;
+        campaign.check_first()?;
         Ok(campaign)
+    }
+
+    /// A key that is none is wrong in all runs: where the first one is no scenario, the campaign
+    /// ends, or another one must be.
+    fn check_first(&self) -> Result<(), CampaignError> {
+        let attempts = match self.source.file.refused {
+            OnRefused::Stop => 1,
+            OnRefused::Count => self.runs.min(ATTEMPTS),
+        };
+        let mut first = None;
+        for run in 0..attempts {
+            let drawn = self.draw(run);
+            match self.scenario(&drawn) {
+                Ok(_) => return Ok(()),
+                Err(error) => first = first.or_else(|| Some(self.refused(&drawn, error))),
+            }
+        }
+        first.map_or(Ok(()), Err)
     }
 
     /// What it was read from.
@@ -403,6 +418,8 @@ fn runs_of(file: &CampaignFile) -> Option<u64> {
         .or(file.rare.map(|rare| u64::from(rare.level_runs)))
 }
 
+/// One of so many runs must be a scenario.
+const ATTEMPTS: u64 = 100;
 /// Runs that are in memory at a time.
 const PART: u64 = 4096;
 

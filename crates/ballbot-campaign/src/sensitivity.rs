@@ -21,6 +21,8 @@ pub struct Sensitivity {
 /// Classes of an input with more values, of as many runs each. What an output does within a class is
 /// not seen, so the index of a wavy one comes out a little low.
 const CLASSES: usize = 20;
+/// Fewer runs of a class say little of it.
+const LEAST_RUNS: usize = 10;
 
 /// What an input's `values` say of the `output` of the same runs; `None` where one of them is always
 /// the same.
@@ -60,12 +62,13 @@ fn numbers(values: &[Cell]) -> Option<Vec<f64>> {
 
 /// The class of each value: of its own where there are few values, of its rank otherwise.
 fn classes(values: &[Cell]) -> Vec<usize> {
+    let most = (values.len() / LEAST_RUNS).clamp(2, CLASSES);
     let mut texts: Vec<String> = Vec::new();
     let own = values.iter().map(|value| {
         let text = value.text();
         match texts.iter().position(|known| *known == text) {
             Some(class) => Some(class),
-            None if texts.len() < CLASSES => {
+            None if texts.len() < most => {
                 texts.push(text);
                 Some(texts.len() - 1)
             }
@@ -80,7 +83,7 @@ fn classes(values: &[Cell]) -> Vec<usize> {
     };
     let n = numbers.len();
     let ranks = ranks(&numbers);
-    let class = |rank: f64| ((rank / n as f64 * CLASSES as f64) as usize).min(CLASSES - 1);
+    let class = |rank: f64| ((rank / n as f64 * most as f64) as usize).min(most - 1);
     ranks.into_iter().map(class).collect()
 }
 

@@ -25,8 +25,10 @@ struct Input {
 const RUNS: usize = 100_000;
 /// Inputs with a panel or an axis of their own: the most important ones.
 const INPUTS: usize = 6;
-/// Runs of the figure of bands, and of each kind in the parallel scatter.
+/// Runs of the figure of bands.
 const DRAWN: u64 = 200;
+/// Runs of each kind in the parallel scatter; more cover each other.
+const LINES: usize = 60;
 
 /// All figures that the results give. Those of failures need some, and runs that do not fail.
 ///
@@ -269,7 +271,7 @@ fn parallel(title: &str, inputs: &[Input], failed: &[bool]) -> Figure {
             .iter()
             .enumerate()
             .filter(|(_, failed)| **failed == wanted);
-        for (run, _) in runs.take(DRAWN as usize) {
+        for (run, _) in runs.take(LINES) {
             for (axis, (input, (low, high))) in inputs.iter().zip(&ranges).enumerate() {
                 x.push(axis as f64 + 1.0);
                 y.push((input.values[run] - low) / (high - low));
