@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Campaigns on real HyperQueue processes, on loopback: a worker and the server are killed in the
-# middle, and the merged result is bit for bit that of one process. HyperQueue comes from PyPI as a
-# Python module, whose server and workers are one process; where there is the program `hq` (in the
-# PATH, or named by HQ), --cluster is shown, too, with workers of their own and a server that comes
-# back from its journal.
+# Campaigns on real HyperQueue processes, on loopback: a worker and the server are killed (kill -9) in
+# the middle, and the merged result is bit for bit that of one process. HyperQueue comes from PyPI,
+# which has it as a Python module without the program `hq`, and without a journal. Where `hq` is there
+# (in the PATH, or named by HQ), --cluster is shown, too, with a server that comes back from its
+# journal.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 target=${CARGO_TARGET_DIR:-$PWD/target}
@@ -51,43 +51,50 @@ echo "== HyperQueue from PyPI"
 python3 -m venv "$work/venv"
 "$work/venv/bin/pip" --quiet --disable-pip-version-check install hyperqueue
 python=("$work/venv/bin/python" .ci/campaign.py)
-start cluster.txt "${python[@]}" cluster "$work/server"
-cluster=$!
-"${python[@]}" run "$work/server" "$ballbot" "$campaign" "$parts" "$work/python" \
-    >"$work/client.txt" 2>&1 & client=$!
+run=("${python[@]}" run "$work/server" "$ballbot" "$campaign" "$parts" "$work/python")
+start server.txt "${python[@]}" server "$work/server"
+server=$!
+start worker.txt "${python[@]}" worker "$work/server"
+worker=$!
+start client.txt "${run[@]}"
 await_shards "$work/python" 3
-kill -9 "$cluster"
-kill -9 "$client" 2>/dev/null || true
-sleep 1 # for what the workers had begun
+kill -9 "$worker"
+await_shards "$work/python" 8
+kill -9 "$server"
+sleep 1 # for what the worker had begun
 left=$(shards "$work/python")
-[ "$left" -lt "$parts" ] || { echo "it was over before the kill" >&2; exit 1; }
+[ "$left" -lt "$parts" ] || { echo "it was over before the server was killed" >&2; exit 1; }
 if "$ballbot" campaign merge "$work/python" 2>"$work/missing.txt"; then
     echo "a campaign with missing shards was merged" >&2
     exit 1
 fi
 grep -q "are missing" "$work/missing.txt"
 rm -rf "$work/server"
-start cluster2.txt "${python[@]}" cluster "$work/server"
-"${python[@]}" run "$work/server" "$ballbot" "$campaign" "$parts" "$work/python"
+start server2.txt "${python[@]}" server "$work/server"
+start worker2.txt "${python[@]}" worker "$work/server"
+"${run[@]}" 2>/dev/null
 "$ballbot" --quiet campaign merge "$work/python"
-same "$work/python" "server and workers killed after $left shards"
+same "$work/python" "a worker killed, then the server after $left shards"
 
 hq=${HQ:-$(command -v hq || true)}
 if [ -n "$hq" ]; then
     echo "== --cluster hyperqueue, with $("$hq" --version)"
     export HQ=$hq HQ_SERVER_DIR=$work/hq
     server=("$hq" server start --host localhost --journal "$work/journal")
-    start server.txt "${server[@]}"
+    start hq-server.txt "${server[@]}"
     first_server=$!
     sleep 1
-    for name in worker1 worker2; do start "$name.txt" "$hq" worker start --cpus 1; done
+    for name in worker1 worker2; do start "hq-$name.txt" "$hq" worker start --cpus 1; done
+    worker=$!
     "$ballbot" --quiet campaign "$campaign" --shards "$parts" --cluster hyperqueue \
         --server-dir "$HQ_SERVER_DIR" --out "$work/hq-results" & follower=$!
     await_shards "$work/hq-results" 3
-    kill -9 "${started[-1]}" "$first_server"
-    start server2.txt "${server[@]}"
+    kill -9 "$worker"
+    await_shards "$work/hq-results" 8
+    kill -9 "$first_server"
+    start hq-server2.txt "${server[@]}"
     sleep 1
-    start worker3.txt "$hq" worker start --cpus 1
+    start hq-worker3.txt "$hq" worker start --cpus 1
     wait "$follower"
     same "$work/hq-results" "a worker and the server killed"
 fi

@@ -365,6 +365,7 @@ fn bands<F: Files + Copy + Sync>(
         for plane in 0..planes {
             let runs: Vec<&Columns> = runs.iter().filter_map(|run| run.get(plane)).collect();
             let mut panel = Panel::new("t [s]", label, quantiles(&runs, end, signal));
+            panel.x_range = Some((0.0, end));
             if planes == 2 && label.starts_with('φ') {
                 panel.title = ["x plane", "y plane"][plane.min(1)].to_owned();
             }

@@ -15,6 +15,8 @@ pub(super) const TICK_GAP: f64 = 8.0;
 /// From the middle of a text to its baseline, as part of its size.
 pub(super) const MIDDLE: f64 = 0.36;
 const TICK_LENGTH: f64 = 4.0;
+/// Tiles reach so far over the next ones, in pixels, that no background shows between them.
+const OVERLAP: f64 = 0.5;
 /// Deviations below this, in pixels, are not drawn.
 const RESOLUTION: f64 = 0.1;
 
@@ -155,8 +157,8 @@ impl Placed<'_> {
                     let tile = Rect {
                         left,
                         top,
-                        width: (x + width / 2.0).min(self.area.right()) - left,
-                        height: (y + height / 2.0).min(self.area.bottom()) - top,
+                        width: (x + width / 2.0 + OVERLAP).min(self.area.right()) - left,
+                        height: (y + height / 2.0 + OVERLAP).min(self.area.bottom()) - top,
                     };
                     scene.rect(tile, fill);
                 }
