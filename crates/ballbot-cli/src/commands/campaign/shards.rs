@@ -265,7 +265,21 @@ pub(super) fn put_together(
     writer.finish()?;
     drop(count);
     drop(progress);
-    report::all(campaign, rows, &results, (true, json))
+    let text = report::all(campaign, rows, &results, (true, json))?;
+    sweep(&folder(out));
+    Ok(text)
+}
+
+/// Removes what processes that were killed have left of shards: all shards are there.
+fn sweep(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with(".shard-") && name.ends_with(".part") {
+            // One that stays harms nobody.
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// Says which shards are done.

@@ -156,7 +156,10 @@ fn shards_are_merged_and_resumed() {
     assert!(written_again >= written);
     assert_says(&succeed(here, &with(&["--shard", "2/3"])), &["is done"]);
 
+    let killed = here.join("parts/shards/.shard-00001-of-00003.parquet.7.part");
+    fs::write(&killed, "half").unwrap();
     succeed(here, &with(&["--shards", "3"]));
+    assert!(!killed.exists());
     assert_eq!(
         fs::metadata(&shard).unwrap().modified().unwrap(),
         written_again
