@@ -88,6 +88,7 @@ fn a_campaign_writes_rows_that_can_be_repeated() {
     let replayed: Value = serde_json::from_str(&replayed).unwrap();
     for (name, cell) in rows[0].iter().zip(&rows[18]) {
         let again = match &replayed[*name] {
+            Value::Null => String::new(),
             Value::String(text) => text.clone(),
             Value::Number(number) if number.is_f64() => format!("{:?}", number.as_f64().unwrap()),
             other => other.to_string(),
