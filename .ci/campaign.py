@@ -49,10 +49,14 @@ def run(server_dir: str, ballbot: str, campaign: str, parts: str, results: str) 
     access(server_dir)
     client = Client(server_dir)
     job = Job()
+    folder = Path(results, "shards").absolute()
+    folder.mkdir(parents=True, exist_ok=True)
+    said = str(folder / "task-%{TASK_ID}.txt")
     for part in range(1, int(parts) + 1):
         # A part that is done says so and ends.
         shard = ["--shard", f"{part}/{parts}", "--out", results, "--threads", "1"]
-        job.program([ballbot, "--quiet", "campaign", campaign, *shard])
+        command = [ballbot, "--quiet", "campaign", campaign, *shard]
+        job.program(command, stdout=None, stderr=said)
     client.wait_for_jobs([client.submit(job)])
 
 
