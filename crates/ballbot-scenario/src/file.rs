@@ -6,4 +6,5 @@ pub(crate) mod heading_table;
 mod load;
 pub(crate) mod parameters;
 pub(crate) mod schema;
+pub(crate) mod template;
 pub(crate) mod world_table;

@@ -42,6 +42,7 @@ pub use file::schema::{
     LinearModelTable, LissajousTable, ModelKind, PointTable, PredictorTable, ReferenceTable,
     Scenario, SineTable, StateBounds, StateTable, TerminalTable,
 };
+pub use file::template::Template;
 pub use file::world_table::{
     ActuatorTable, AngleSensorTable, DelayTable, DeviationsTable, FloorTable, PlaneName, PushTable,
     RateSensorTable, SensorsTable, WorldTable,
