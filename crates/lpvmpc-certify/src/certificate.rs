@@ -1,8 +1,10 @@
 //! A certificate as it stands in a file.
 
 use crate::error::CertifyError;
+use lpvmpc_any::TerminalSet;
 use lpvmpc_certificate::{check_document_digest, document_content, document_text};
 use lpvmpc_plant::Plant;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::path::Path;
@@ -52,7 +54,7 @@ pub struct Certificate {
 pub struct PlantName {
     /// Its name.
     pub name: String,
-    /// SHA-256 of its file with the parameters as they were, 64 hexadecimal digits.
+    /// SHA-256 of its data as compact JSON, with the parameters as they were: 64 hexadecimal digits.
     pub sha256: String,
 }
 
@@ -127,12 +129,41 @@ impl Certificate {
         self.value(x) <= self.level
     }
 
+    /// The terminal set of a controller for `plant`: [`lpvmpc_any::Terminal::Certified`]. **Nothing is proved**: a
+    /// certificate from elsewhere is for [`verify`](crate::verify) first.
+    ///
+    /// # Errors
+    /// It is a certificate of another plant, or its matrices are none.
+    pub fn terminal_set(&self, plant: &Plant) -> Result<TerminalSet, CertifyError> {
+        self.check_plant(plant)?;
+        let (n, m) = (plant.data().states.len(), plant.data().inputs.len());
+        let matrix = |rows: &[Vec<f64>], shape| matrix(rows, shape, "certificate");
+        let limits = |limits: &[Option<f64>]| -> Vec<f64> {
+            limits
+                .iter()
+                .map(|limit| limit.unwrap_or(f64::INFINITY))
+                .collect()
+        };
+        Ok(TerminalSet {
+            x: DVector::from_row_slice(&self.equilibrium.x),
+            u: DVector::from_row_slice(&self.equilibrium.u),
+            k: matrix(&self.k, (m, n))?,
+            p: matrix(&self.p, (n, n))?,
+            level: self.level,
+            t_s: self.t_s,
+            q: matrix(&self.q, (n, n))?,
+            r: matrix(&self.r, (m, m))?,
+            state_limits: limits(&self.state_limits),
+            input_limits: limits(&self.input_limits),
+        })
+    }
+
     /// Whether it speaks of this plant with its parameters as they are now.
     ///
     /// # Errors
     /// It is a certificate of another one.
     pub fn check_plant(&self, plant: &Plant) -> Result<(), CertifyError> {
-        let found = plant_hash(plant);
+        let found = plant_hash(plant)?;
         if found == self.plant.sha256 {
             return Ok(());
         }
@@ -144,12 +175,26 @@ impl Certificate {
     }
 }
 
-/// SHA-256 of a plant's file, with its parameters as they are now.
-pub(crate) fn plant_hash(plant: &Plant) -> String {
-    let mut hash = Sha256::new();
-    hash.update(plant.to_json());
-    for value in plant.parameters() {
-        hash.update(value.to_bits().to_le_bytes());
+/// SHA-256 of a plant's data with its parameters as they are now.
+pub(crate) fn plant_hash(plant: &Plant) -> Result<String, CertifyError> {
+    let mut data = plant.data().clone();
+    for (parameter, value) in data.parameters.iter_mut().zip(plant.parameters()) {
+        parameter.value = *value;
     }
-    format!("{:x}", hash.finalize())
+    let text =
+        serde_json::to_string(&data).map_err(|error| CertifyError::setting("plant", error))?;
+    Ok(format!("{:x}", Sha256::digest(text)))
+}
+
+/// A matrix of so many rows and columns.
+pub(crate) fn matrix(
+    rows: &[Vec<f64>],
+    (n, m): (usize, usize),
+    place: &str,
+) -> Result<DMatrix<f64>, CertifyError> {
+    if rows.len() != n || rows.iter().any(|row| row.len() != m) {
+        let fault = format!("it must have {n} rows of {m} numbers");
+        return Err(CertifyError::setting(place, fault));
+    }
+    Ok(DMatrix::from_fn(n, m, |i, j| rows[i][j]))
 }

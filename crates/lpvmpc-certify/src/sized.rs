@@ -1,6 +1,6 @@
 //! Certificates in a size that was compiled.
 
-use crate::certificate::{Certificate, EquilibriumClaim, PlantName, Record, plant_hash};
+use crate::certificate::{Certificate, EquilibriumClaim, PlantName, Record, matrix, plant_hash};
 use crate::design::Design;
 use crate::equilibrium::{enclosed, refined, refuted};
 use crate::error::CertifyError;
@@ -17,6 +17,8 @@ const CLAIMED_SHARE: f64 = 0.01;
 const INSIDE: f64 = 1.0 - 1e-6;
 /// Sizes of sets that are tried: the bounds, and halves of them.
 const MOST_HALVINGS: i32 = 8;
+/// What an equilibrium that is not exact is claimed to be known to, at best.
+const NEARLY: f64 = 1e-15;
 /// A level that is higher by less is not worth a proof.
 const WORTH_IT: f64 = 1.05;
 
@@ -104,8 +106,10 @@ pub(crate) fn certify<const NX: usize, const NU: usize, const NS: usize>(
     let (claim, proof) = best?;
     let within = ends.iter().zip(&at).map(|((lower, upper), value)| {
         let distance = (upper - value).max(value - lower);
+        // A figure for people, and not less than a number of this size is known to.
+        let rounding = NEARLY * (1.0 + value.abs());
         if distance > 0.0 {
-            distance.next_up()
+            distance.next_up().max(rounding)
         } else {
             0.0
         }
@@ -116,7 +120,7 @@ pub(crate) fn certify<const NX: usize, const NU: usize, const NS: usize>(
         written_by: settings.written_by.clone(),
         plant: PlantName {
             name: data.name.clone(),
-            sha256: plant_hash(plant),
+            sha256: plant_hash(plant)?,
         },
         t_s: claim.t_s,
         equilibrium: EquilibriumClaim {
@@ -345,18 +349,6 @@ fn check_length(place: &str, found: usize, count: usize) -> Result<(), CertifyEr
     }
     let fault = format!("it has {found} entries; there must be {count}");
     Err(CertifyError::setting(place, fault))
-}
-
-fn matrix(
-    rows: &[Vec<f64>],
-    (n, m): (usize, usize),
-    place: &str,
-) -> Result<DMatrix<f64>, CertifyError> {
-    if rows.len() != n || rows.iter().any(|row| row.len() != m) {
-        let fault = format!("it must have {n} rows of {m} numbers");
-        return Err(CertifyError::setting(place, fault));
-    }
-    Ok(DMatrix::from_fn(n, m, |i, j| rows[i][j]))
 }
 
 /// A square matrix of `count` rows in more places, zero in those left over.
