@@ -41,6 +41,9 @@ struct Factored {
     row: Vec<(usize, usize)>,
 }
 
+/// Columns with the places of their entries.
+type Entries = [(usize, usize)];
+
 impl Factored {
     fn is_fixed(&self) -> bool {
         self.row.is_empty()
@@ -123,7 +126,7 @@ impl Program {
         self.multiply(half, way)
     }
 
-    fn times_row(&mut self, row: &[(usize, usize)], factor: usize) -> Option<Vec<(usize, usize)>> {
+    fn times_row(&mut self, row: &Entries, factor: usize) -> Option<Vec<(usize, usize)>> {
         let entries = row.iter();
         let product = |(column, entry): &(usize, usize)| {
             let product = self.multiply(*entry, factor)?;
@@ -135,7 +138,7 @@ impl Program {
     /// The sum of two rows, the second one with its sign changed if it is to be subtracted.
     fn rows_together(
         &mut self,
-        (x, y): (&[(usize, usize)], &[(usize, usize)]),
+        (x, y): (&Entries, &Entries),
         function: Binary,
     ) -> Option<Vec<(usize, usize)>> {
         let zero = self.constant(0.0)?;
