@@ -10,8 +10,11 @@ line, and steps in microseconds:
 [-1.0]
 """
 
-from .design import Lqr, lqr
+from .certificate import Certificate
+from .design import Lqr, Verified, certify, lqr, verify
 from .errors import (
+    CertificateError,
+    FalseClaimError,
     LpvmpcError,
     MissingPackageError,
     PlantError,
@@ -26,10 +29,13 @@ from .simulation import Actuator, Jump, Load, Run, Sensor, simulate
 __all__ = [
     "ActiveBound",
     "Actuator",
+    "Certificate",
+    "CertificateError",
     "Disturbance",
     "Embedding",
     "Estimate",
     "Estimator",
+    "FalseClaimError",
     "Gate",
     "Jump",
     "Load",
@@ -48,8 +54,11 @@ __all__ = [
     "Signal",
     "SimulationError",
     "SteadyState",
+    "Verified",
+    "certify",
     "lqr",
     "simulate",
+    "verify",
 ]
 
 __version__ = "0.1.0"

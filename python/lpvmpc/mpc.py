@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _lpvmpc
 from ._arrays import by_stage, column, matrices_by_stage, number, weight
+from .certificate import Certificate
 from .errors import SettingError
 from .estimator import Estimate, Estimator
 from .estimator import to_native as estimator_to_native
@@ -102,6 +103,17 @@ class Plan:
     active_bounds: str
     """The bounds that hold with equality or are exceeded, in words: ``"force >= -10 N at stages 0
     to 6"``, or ``"no active bound"``."""
+    decision: str | None = None
+    """With a certificate, what the first input is backed by: ``"new plan"``, ``"candidate"`` (the rest of the last
+    plan), ``"terminal law"``; and where no plan is known that keeps the bounds and ends in the certified set,
+    ``"soft bounds"`` or ``"saturated LQR"``."""
+
+    @property
+    def is_guaranteed(self) -> bool:
+        """Whether, with a certificate, there will be a plan at every later sample: states at the samples and inputs
+        keep their bounds, and the plan's cost falls by the stage cost, while the plant is the model, up to the error of
+        its Runge-Kutta steps, for which a thousandth of the bounds is kept."""
+        return self.decision in ("new plan", "candidate", "terminal law")
 
     @property
     def u0(self) -> Array:
@@ -145,7 +157,9 @@ class Mpc:
         R, positive definite: the diagonal, shape (m,), or whole, (m, m).
     terminal
         P: ``"lqr"``, the cost of the linear-quadratic regulator about the plant's equilibrium (about zero
-        without one) from there on; a matrix (n, n) or its diagonal; or ``"equality"``, x_N = x_ref.
+        without one) from there on; a matrix (n, n) or its diagonal; ``"equality"``, x_N = x_ref; or a
+        `Certificate` of this plant, with its cost and its set: the loop to its equilibrium is then guaranteed as
+        `Plan.decision` says, and takes no references.
     x_bounds, u_bounds
         Bounds of x_1 to x_N and of the inputs: (lower, upper), or by name,
         ``{"position": (-1, 1)}``; a state or input that is not named has those of the plant.
@@ -603,7 +617,9 @@ def _to_native(plant: Plant, given: Mapping[str, Any]) -> dict[str, Any]:
     for name in ("t_s", "tolerance"):
         settings[name] = number(name, given[name])
     settings["q"], settings["r"] = weight("q", given["q"], n), weight("r", given["r"], m)
-    if not isinstance(given["terminal"], str):
+    if isinstance(given["terminal"], Certificate):
+        settings["terminal"] = (given["terminal"].to_json(),)
+    elif not isinstance(given["terminal"], str):
         settings["terminal"] = weight("terminal", given["terminal"], n)
     settings["x_bounds"] = _limits("x_bounds", given["x_bounds"], states)
     settings["u_bounds"] = _limits("u_bounds", given["u_bounds"], inputs)

@@ -3,6 +3,7 @@
 //! shapes checked for form only, and the libraries check what they mean.
 
 mod arrays;
+mod certify;
 mod design;
 mod errors;
 mod mpc;
@@ -14,6 +15,8 @@ use pyo3::prelude::*;
 
 #[pymodule]
 mod _lpvmpc {
+    #[pymodule_export]
+    use super::certify::{certify, check_certificate, verify};
     #[pymodule_export]
     use super::design::lqr;
     #[pymodule_export]

@@ -1,13 +1,14 @@
 //! Controllers.
 
 use crate::arrays::{Matrices, Matrix, Vector, entries, matrix, pairs, rows, stack};
-use crate::errors::{of_setting, setting};
+use crate::errors::{of_certificate, of_setting, setting};
 use crate::plan::{PlanTuple, fields};
 use crate::plant::Plant;
 use lpvmpc_any::{
     Disturbance, EstimatorSettings, Gate, Iterations, Limits, LinearModels, MpcSettings, Penalty,
     Preview, Row, StageMatrices, StateBounds, Terminal, Verdict,
 };
+use lpvmpc_certify::Certificate;
 use nalgebra::{DMatrix, DVector};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -64,6 +65,8 @@ impl StateBoundsArgument {
 #[derive(FromPyObject)]
 enum TerminalArgument<'py> {
     Word(String),
+    /// The text of a certificate, in a tuple.
+    Certificate((String,)),
     Cost(Matrix<'py>),
 }
 
@@ -96,7 +99,7 @@ struct Settings<'py> {
 }
 
 impl Settings<'_> {
-    fn build(self) -> PyResult<MpcSettings> {
+    fn build(self, plant: &lpvmpc_plant::Plant) -> PyResult<MpcSettings> {
         Ok(MpcSettings {
             t_s: self.t_s,
             horizon: self.horizon,
@@ -105,6 +108,11 @@ impl Settings<'_> {
             r: matrix(&self.r),
             terminal: match self.terminal {
                 TerminalArgument::Cost(p) => Terminal::Cost(matrix(&p)),
+                TerminalArgument::Certificate((text,)) => {
+                    let certificate = Certificate::from_json(&text).map_err(of_certificate)?;
+                    let set = certificate.terminal_set(plant).map_err(of_certificate)?;
+                    Terminal::Certified(Box::new(set))
+                }
                 TerminalArgument::Word(word) => match word.as_str() {
                     "lqr" => Terminal::Lqr,
                     "equality" => Terminal::Equality,
@@ -112,7 +120,7 @@ impl Settings<'_> {
                         return Err(one_of(
                             "terminal",
                             &word,
-                            "\"lqr\", \"equality\" or a matrix P",
+                            "\"lqr\", \"equality\", a matrix P or a Certificate",
                         ));
                     }
                 },
@@ -335,7 +343,7 @@ pub struct Mpc {
 impl Mpc {
     #[new]
     fn new(py: Python<'_>, plant: &Plant, settings: Settings<'_>) -> PyResult<Self> {
-        let settings = settings.build()?;
+        let settings = settings.build(&plant.inner)?;
         let inner = py.detach(|| lpvmpc_any::Mpc::new(&plant.inner, &settings));
         Ok(Self {
             inner: inner.map_err(of_setting)?,
@@ -385,7 +393,7 @@ impl Mpc {
     }
 
     fn set_settings(&mut self, settings: Settings<'_>) -> PyResult<()> {
-        let settings = settings.build()?;
+        let settings = settings.build(self.inner.plant())?;
         self.inner.set_settings(&settings).map_err(of_setting)
     }
 

@@ -68,6 +68,10 @@ pub(crate) fn controller_settings<const NX: usize, const NU: usize, const NS: us
     let weights = names.weights("settings", &settings.q, &settings.r)?;
     let terminal = match &settings.terminal {
         Terminal::Equality => TerminalIngredient::Equality,
+        Terminal::Certified(set) => {
+            let axes = (Axis::States, Axis::States);
+            TerminalIngredient::Cost(names.matrix(axes, "terminal cost", &set.p, 0.0)?)
+        }
         Terminal::Cost(p) => {
             let axes = (Axis::States, Axis::States);
             TerminalIngredient::Cost(names.matrix(axes, "terminal cost", p, 0.0)?)

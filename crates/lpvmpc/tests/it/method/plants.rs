@@ -116,6 +116,7 @@ fn dual_numbers_differentiate_every_function() {
         Elementary::Sin,
         Elementary::Cos,
         Elementary::Sinc,
+        Elementary::Sinhc,
         Elementary::Atan,
         Elementary::Exp,
         Elementary::Ln,
@@ -274,6 +275,7 @@ fn single_precision_functions_are_those_of_double_precision() {
         let x = 0.05 * f64::from(i);
         for function in [
             Elementary::Sinc,
+            Elementary::Sinhc,
             Elementary::Atan,
             Elementary::Exp,
             Elementary::Tanh,
