@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import Any, Literal, Union
 
 import numpy as np
@@ -587,6 +588,46 @@ class Mpc:
     def reset(self) -> None:
         """Forgets the last plan and what was estimated: the next step is as the first."""
         self._native.reset()
+
+    def save_firmware(
+        self,
+        folder: str | PathLike[str],
+        *,
+        lpvmpc: str | PathLike[str],
+        x0: ArrayLike,
+        x_ref: ArrayLike | None = None,
+        samples: int = 100,
+    ) -> None:
+        """Writes a program for a Cortex-M4F that runs this controller in single precision, without heap: a whole crate of
+        Rust for ``cargo build`` and, on an emulated board, ``cargo run``.
+
+        It runs a descent of at most eight programs per sample with one Runge-Kutta step, keeps the bounds of inputs and,
+        softly, of states, and has the plant itself as a stand-in for a robot.
+
+        Parameters
+        ----------
+        folder
+            Where to; it must not be there yet.
+        lpvmpc
+            Where the crate ``lpvmpc`` is, as its Cargo.toml is to say: ``crates/lpvmpc`` of a checkout, as an absolute
+            path.
+        x0
+            Where the stand-in begins, shape (n,).
+        x_ref
+            Where it is to go, shape (n,); the plant's equilibrium, or zero, without.
+        samples
+            How many samples it runs.
+
+        Raises
+        ------
+        SettingError
+            The controller has a setting that the program has none of; the message names it.
+        PlantError
+            A number has no place in single precision, or the folder cannot be written.
+        """
+        from ._firmware import save_firmware
+
+        save_firmware(self, folder, lpvmpc, x0, x_ref, _whole("samples", samples))
 
     def __getstate__(self) -> tuple[Plant, dict[str, Any]]:
         return self._plant, self._settings
