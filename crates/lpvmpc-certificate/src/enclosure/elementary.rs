@@ -21,6 +21,11 @@ pub trait Arithmetic: Number {
     /// 1/x; without bound where x may be zero.
     fn reciprocal(self) -> Self;
 
+    /// Self + a b.
+    fn plus_product(self, a: &Self, b: &Self) -> Self {
+        self + *a * *b
+    }
+
     /// f^(n)(x) / n! for n = 0 to `count` - 1; what follows is zero.
     fn taylor_coefficients(self, function: Elementary, count: usize) -> Coefficients<Self>;
 }

@@ -310,7 +310,11 @@ pub(crate) fn product<T: Arithmetic, const R: usize, const N: usize, const C: us
     a: &[[T; N]; R],
     b: &[[T; C]; N],
 ) -> [[T; C]; R] {
-    matrix(|i, j| (0..N).fold(T::constant(0.0), |sum, k| sum + a[i][k] * b[k][j]))
+    matrix(|i, j| {
+        (0..N).fold(T::constant(0.0), |sum, k| {
+            sum.plus_product(&a[i][k], &b[k][j])
+        })
+    })
 }
 
 fn ranges<const D: usize, const N: usize>(
@@ -356,11 +360,11 @@ where
                 let mut sum = T::constant(0.0);
                 for (j, y) in known.iter().rev().enumerate() {
                     for m in 0..NX {
-                        sum = sum + a[(i, m)].coefficient(j) * y[column][m];
+                        sum = sum.plus_product(a[(i, m)].coefficient(j), &y[column][m]);
                     }
                 }
                 for m in 0..NU {
-                    sum = sum + b[(i, m)].coefficient(k) * inputs[column][m];
+                    sum = sum.plus_product(b[(i, m)].coefficient(k), &inputs[column][m]);
                 }
                 sum * share
             })

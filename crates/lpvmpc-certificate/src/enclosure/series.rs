@@ -6,7 +6,7 @@ use lpvmpc::{Bivariate, Elementary, Number};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Coefficients that a [`Series`] can hold: more is not needed in one step.
-pub(super) const CAPACITY: usize = 9;
+pub(super) const CAPACITY: usize = 7;
 
 /// The first coefficients of a power series in time, c_0 + c_1 t + c_2 t^2 + ... (Taylor
 /// arithmetic; Moore, Methods and Applications of Interval Analysis, 1979).
@@ -42,8 +42,8 @@ impl<T: Arithmetic> Series<T> {
         }
     }
 
-    pub fn coefficient(&self, k: usize) -> T {
-        self.coefficients[k]
+    pub fn coefficient(&self, k: usize) -> &T {
+        &self.coefficients[k]
     }
 
     fn build(known: usize, length: usize, mut coefficient: impl FnMut(&Self, usize) -> T) -> Self {
@@ -98,7 +98,7 @@ impl<T: Arithmetic> Mul for Series<T> {
             let first = (k + 1).saturating_sub(other.length);
             let last = (k + 1).min(self.length);
             (first..last).fold(T::constant(0.0), |sum, j| {
-                sum + self.coefficients[j] * other.coefficients[k - j]
+                sum.plus_product(&self.coefficients[j], &other.coefficients[k - j])
             })
         })
     }
@@ -126,7 +126,7 @@ impl<T: Arithmetic> Number for Series<T> {
     }
 
     fn elementary(self, function: Elementary) -> Self {
-        self.taylor_coefficients(function, 1)[0]
+        self.expansion(&self.at_the_beginning(function, 1), 0)
     }
 
     fn bivariate(self, other: Self, function: Bivariate) -> Self {
@@ -153,39 +153,56 @@ impl<T: Arithmetic> Arithmetic for Series<T> {
             }
             let last = (k + 1).min(self.length);
             let sum = (1..last).fold(T::constant(0.0), |sum, j| {
-                sum + self.coefficients[j] * r.coefficients[k - j]
+                sum.plus_product(&self.coefficients[j], &r.coefficients[k - j])
             });
             -(inverse * sum)
         })
     }
 
-    /// Taylor's formula at the first coefficient, by Horner's rule in what follows it.
     fn taylor_coefficients(self, function: Elementary, count: usize) -> Coefficients<Self> {
-        let orders = if self.length == 1 { 1 } else { self.known };
-        let at = self.coefficients[0].taylor_coefficients(function, count + orders - 1);
-        let mut rest = self;
-        rest.coefficients[0] = T::constant(0.0);
-        let expansion = |n: usize| {
-            (0..orders).rev().fold(Self::constant(0.0), |sum, m| {
-                // (f^(n)/n!)^(m)/m! = binomial(n+m, n) f^(n+m)/(n+m)!.
-                let binomial = (1..=m).fold(1, |product, i| product * (n + i) / i);
-                let mut next = sum * rest;
-                let term = if binomial == 1 {
-                    at[n + m]
-                } else {
-                    T::constant(binomial as f64) * at[n + m]
-                };
-                next.coefficients[0] = next.coefficients[0] + term;
-                next.length = next.length.max(1);
-                next
-            })
-        };
-        std::array::from_fn(|n| {
-            if n < count {
-                expansion(n)
-            } else {
-                Self::constant(0.0)
-            }
+        let at = self.at_the_beginning(function, count);
+        std::array::from_fn(|n| match n < count {
+            true => self.expansion(&at, n),
+            false => Self::constant(0.0),
         })
+    }
+}
+
+impl<T: Arithmetic> Series<T> {
+    /// Orders of a function of the series that are not zero.
+    fn orders(&self) -> usize {
+        if self.length == 1 { 1 } else { self.known }
+    }
+
+    /// f^(n)(c_0) / n! as far as the first `count` functions f^(n)/n! of the series need them.
+    fn at_the_beginning(&self, function: Elementary, count: usize) -> Coefficients<T> {
+        self.coefficients[0].taylor_coefficients(function, count + self.orders() - 1)
+    }
+
+    /// f^(n)/n! of the series: Taylor's formula at its first coefficient, by Horner's rule in what
+    /// follows it.
+    fn expansion(&self, at: &Coefficients<T>, n: usize) -> Self {
+        let orders = self.orders();
+        let mut sum = Self::constant(0.0);
+        sum.known = self.known;
+        sum.length = orders;
+        for m in (0..orders).rev() {
+            // What follows the first coefficient begins with t: of the sum, which is still to be
+            // multiplied m times by it, no later coefficients count. From the last to the first, since
+            // each needs the earlier ones as they were.
+            for k in (1..orders - m).rev() {
+                let first = (k + 1).saturating_sub(self.length);
+                sum.coefficients[k] = (first..k).fold(T::constant(0.0), |total, j| {
+                    total.plus_product(&sum.coefficients[j], &self.coefficients[k - j])
+                });
+            }
+            // (f^(n)/n!)^(m)/m! = binomial(n+m, n) f^(n+m)/(n+m)!.
+            let binomial = (1..=m).fold(1, |product, i| product * (n + i) / i);
+            sum.coefficients[0] = match binomial {
+                1 => at[n + m],
+                _ => T::constant(binomial as f64) * at[n + m],
+            };
+        }
+        sum
     }
 }

@@ -28,6 +28,8 @@ const UNIT: f64 = f64::EPSILON / 2.0;
 const TINY: f64 = 1e-290;
 /// Makes a sum of a few dozen positive terms an upper bound in spite of its own rounding.
 const UPWARDS: f64 = 1.0 + 64.0 * f64::EPSILON;
+/// Coefficients are finite, with room for their rounding, where their sizes are below it.
+const LARGEST: f64 = 1e300;
 /// No coefficient of a sum or product takes more roundings.
 const ROUNDINGS: f64 = 16.0 * UNIT;
 
@@ -68,12 +70,18 @@ impl<const D: usize> TaylorModel<D> {
     }
 
     fn sizes(&self) -> Sizes {
-        let squares = (0..D).flat_map(|i| self.squares[i][i..].iter());
-        Sizes {
+        let mut sizes = Sizes {
             middle: self.middle.abs(),
-            slopes: self.slopes.iter().map(|slope| slope.abs()).sum(),
-            squares: squares.map(|square| square.abs()).sum(),
+            slopes: 0.0,
+            squares: 0.0,
+        };
+        for i in 0..D {
+            sizes.slopes += self.slopes[i].abs();
+            for square in &self.squares[i][i..] {
+                sizes.squares += square.abs();
+            }
         }
+        sizes
     }
 
     fn is_zero(&self) -> bool {
@@ -99,17 +107,13 @@ impl<const D: usize> TaylorModel<D> {
         model
     }
 
-    /// With the errors `terms`, themselves rounded.
-    fn within(self, terms: f64) -> Self {
+    /// With the errors `terms`, themselves rounded. No sum of absolute coefficients is above `size`.
+    fn within(mut self, terms: f64, size: f64) -> Self {
         let error = terms * UPWARDS + TINY;
-        let squares = self.squares.iter().flatten();
-        let mut coefficients = self.slopes.iter().chain(squares).chain([&self.middle]);
-        // A NaN anywhere is an unknown, and so is what has overflowed.
-        let unknown = error.is_nan() || !coefficients.all(|entry| entry.is_finite());
-        Self {
-            error: if unknown { f64::INFINITY } else { error },
-            ..self
-        }
+        // A NaN anywhere is an unknown, and so is what has overflowed, or nearly: then `size` is one.
+        let known = size < LARGEST && !error.is_nan();
+        self.error = if known { error } else { f64::INFINITY };
+        self
     }
 }
 
@@ -143,7 +147,8 @@ impl<const D: usize> Add for TaylorModel<D> {
             |i| self.slopes[i] + other.slopes[i],
             |i, j| self.squares[i][j] + other.squares[i][j],
         );
-        sum.within(self.error + other.error + ROUNDINGS * sum.sizes().sum())
+        let size = sum.sizes().sum();
+        sum.within(self.error + other.error + ROUNDINGS * size, size)
     }
 }
 
@@ -200,7 +205,8 @@ impl<const D: usize> Mul for TaylorModel<D> {
         // Of order three and four.
         let beyond = a.slopes * b.squares + a.squares * b.slopes + a.squares * b.squares;
         let errors = self.error * (b.sum() + other.error) + other.error * a.sum();
-        product.within(beyond + errors + ROUNDINGS * a.sum() * b.sum())
+        let size = a.sum() * b.sum();
+        product.within(beyond + errors + ROUNDINGS * size, size)
     }
 }
 
@@ -246,6 +252,15 @@ impl<const D: usize> Arithmetic for TaylorModel<D> {
 
     fn range(self) -> Interval {
         self.range()
+    }
+
+    /// Most entries of a plant's matrices are zero.
+    fn plus_product(self, a: &Self, b: &Self) -> Self {
+        let nothing = |zero: &Self, other: &Self| zero.is_zero() && other.error.is_finite();
+        if nothing(a, b) || nothing(b, a) {
+            return self;
+        }
+        self + *a * *b
     }
 
     /// 1/x = 1/c - (x - c)/c^2 + (x - c)^2/c^3 - (x - c)^3/(c^3 x).
