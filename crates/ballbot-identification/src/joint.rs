@@ -8,7 +8,9 @@ use crate::parameter::{Parameter, Values};
 use crate::residuals::repetition;
 use crate::segments::{Stretch, segments, spread};
 use crate::variables::Variables;
-use lpvmpc_design::{Prior, ShootingError, ShootingFit, ShootingModel, ShootingSettings, Unknown};
+use lpvmpc_design::{
+    LinearizedOutputs, Prior, ShootingError, ShootingFit, ShootingModel, ShootingSettings, Unknown,
+};
 use nalgebra::{DMatrix, Vector3, Vector4};
 
 /// Times that the noise is found anew from the residuals, at most.
@@ -359,17 +361,23 @@ impl ShootingModel<4, 3> for SegmentedPlanes<'_> {
         self.planes[plane].simulate(segment, &parameters, initial, outputs);
     }
 
-    fn simulate_each(
+    fn linearized(
         &self,
         segment: usize,
-        starts: &[(Vec<f64>, Vector4<f64>)],
-    ) -> Vec<Vec<Vector3<f64>>> {
+        parameters: &[f64],
+        initial: &Vector4<f64>,
+        indices: &[usize],
+    ) -> Option<LinearizedOutputs<3>> {
         let (plane, segment) = self.locate(segment);
-        let starts = starts.iter();
-        let starts: Vec<(Vec<f64>, Vector4<f64>)> = starts
-            .map(|(parameters, initial)| (self.parameters(plane, parameters).to_vec(), *initial))
-            .collect();
-        self.planes[plane].simulate_each(segment, &starts)
+        let own = self.parameters(plane, parameters);
+        let places = self.variables.places(plane);
+        // What is another plane's own has no effect here.
+        let of_plane = indices.iter().map(|index| {
+            let mut parameters = Parameter::ALL.into_iter();
+            parameters.find(|parameter| places[*parameter] == *index)
+        });
+        let of_plane: Vec<Option<Parameter>> = of_plane.collect();
+        Some(self.planes[plane].derivatives(segment, &own, initial, &of_plane))
     }
 }
 

@@ -65,6 +65,7 @@ mod structures;
 mod suspects;
 mod validation;
 mod variables;
+mod varied;
 mod verdict;
 mod wheel_check;
 mod words;

@@ -12,8 +12,8 @@ mod table;
 pub use columns::{BallAngle, Channel, Columns, SecondPlane, Unit, WheelEncoders, WheelPlane};
 pub use error::{LogError, Problem, Suspicion};
 pub use finding::Finding;
-pub(crate) use run::quantile;
 pub use run::{Run, Torque};
+pub(crate) use run::{TorqueReader, quantile};
 
 use std::path::Path;
 

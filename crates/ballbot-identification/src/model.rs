@@ -2,12 +2,13 @@
 
 use crate::coordinates::Coordinates;
 use crate::line::Line;
-use crate::log::{BallAngle, Run};
+use crate::log::{BallAngle, Run, TorqueReader};
 use crate::parameter::{Parameter, Values};
+use crate::varied::Varied;
 use ballbot::{Ballbot, DriveFriction, Geometry};
 use lpvmpc::Rk4;
-use lpvmpc_design::ShootingModel;
-use nalgebra::{Vector1, Vector3, Vector4};
+use lpvmpc_design::{LinearizedOutputs, ShootingModel};
+use nalgebra::{DMatrix, Vector1, Vector3, Vector4};
 
 /// The longest step of the integration, s. The fastest mode of a robot whose body weighs more than
 /// its ball is slower than 1 kHz: one step is well within the stability limit, and for the 50 1/s
@@ -60,38 +61,7 @@ impl Robot {
     /// The state `duration` seconds later under a constant torque: one Runge-Kutta step of order 4.
     #[inline(always)]
     pub fn step(&self, x: &Vector4<f64>, torque: f64, duration: f64) -> Vector4<f64> {
-        let [next] = Self::step_each([self], &[*x], [torque], duration);
-        next
-    }
-
-    /// [`Robot::step`] of several robots.
-    #[inline(always)]
-    fn step_each<const LANES: usize>(
-        robots: [&Self; LANES],
-        x: &[Vector4<f64>; LANES],
-        torque: [f64; LANES],
-        duration: f64,
-    ) -> [Vector4<f64>; LANES] {
-        let mut next = *x;
-        let mut driving = [Vector1::zeros(); LANES];
-        // A loop: the closures of array::from_fn are not inlined.
-        for i in 0..LANES {
-            driving[i] = robots[i].driving(torque[i]);
-        }
-        let plants = robots.map(|robot| &robot.plant);
-        Rk4::step_each(plants, &mut next, driving.each_ref(), duration);
-        next
-    }
-
-    /// Whether the two differ at most in their sensors.
-    fn moves_like(&self, other: &Self) -> bool {
-        let acting = [
-            Parameter::TorqueGain,
-            Parameter::Delay,
-            Parameter::TorqueBias,
-        ];
-        let alike = |parameter| self.values[parameter] == other.values[parameter];
-        self.plant == other.plant && acting.into_iter().all(alike)
+        Rk4::step(&self.plant, x, &self.driving(torque), duration)
     }
 
     /// What the sensors show: ball angle, tilt, tilt rate.
@@ -213,58 +183,23 @@ impl ShootingModel<4, 3> for SegmentedRuns<'_> {
         outputs: &mut Vec<Vector3<f64>>,
     ) {
         let robot = self.robot(parameters);
-        let [states] = self.states(segment, [&robot], [*initial]);
+        let states = self.states(segment, &robot, *initial);
         let rows = states.iter().map(|x| robot.outputs(x, self.ball_angle));
         outputs.extend(rows);
     }
 
-    fn simulate_each(
+    fn linearized(
         &self,
         segment: usize,
-        starts: &[(Vec<f64>, Vector4<f64>)],
-    ) -> Vec<Vec<Vector3<f64>>> {
-        let Some((parameters, first)) = starts.first() else {
-            return Vec::new();
-        };
-        let leader = self.robot(parameters);
-        // What only the sensors have moves as the first does; so does one that stands elsewhere:
-        // nothing depends on phi.
-        let follows = |robot: &Robot, initial: &Vector4<f64>| {
-            robot.moves_like(&leader) && initial.fixed_rows::<3>(1) == first.fixed_rows::<3>(1)
-        };
-        let robots: Vec<Robot> = starts.iter().map(|(one, _)| self.robot(one)).collect();
-        let pairs = || robots.iter().zip(starts.iter().map(|(_, initial)| initial));
-        let others: Vec<(&Robot, Vector4<f64>)> = std::iter::once((&leader, *first))
-            .chain(pairs().filter_map(|(robot, x)| (!follows(robot, x)).then_some((robot, *x))))
+        parameters: &[f64],
+        initial: &Vector4<f64>,
+        indices: &[usize],
+    ) -> Option<LinearizedOutputs<3>> {
+        let indices: Vec<Option<Parameter>> = indices
+            .iter()
+            .map(|index| Parameter::ALL.get(*index).copied())
             .collect();
-        let mut motions = Vec::with_capacity(others.len());
-        // More of them side by side do not fit into the processor's window.
-        for some in others.chunks(4) {
-            if let [(robot, initial)] = some {
-                motions.extend(self.states(segment, [robot], [*initial]));
-                continue;
-            }
-            // The last once more in the place of each that is missing: side by side, none waits for the
-            // operations of another.
-            let [a, b, c, d] = [0, 1, 2, 3].map(|lane| some[lane.min(some.len() - 1)]);
-            let each = self.states(segment, [a.0, b.0, c.0, d.0], [a.1, b.1, c.1, d.1]);
-            motions.extend(each.into_iter().take(some.len()));
-        }
-        let mut next = 0;
-        pairs()
-            .map(|(robot, initial)| {
-                let (motion, shift) = if follows(robot, initial) {
-                    (0, Vector4::new(initial[0] - first[0], 0.0, 0.0, 0.0))
-                } else {
-                    next += 1;
-                    (next, Vector4::zeros())
-                };
-                let states = motions[motion].iter();
-                states
-                    .map(|x| robot.outputs(&(x + shift), self.ball_angle))
-                    .collect()
-            })
-            .collect()
+        Some(self.derivatives(segment, parameters, initial, &indices))
     }
 }
 
@@ -274,50 +209,236 @@ impl SegmentedRuns<'_> {
         Robot::new(values, self.coordinates.geometry)
     }
 
-    /// The states at a segment's rows of several robots side by side, of each as far as it is a
-    /// robot's.
-    fn states<const LANES: usize>(
-        &self,
-        segment: usize,
-        robots: [&Robot; LANES],
-        initial: [Vector4<f64>; LANES],
-    ) -> [Vec<Vector4<f64>>; LANES] {
-        let Segment { run, first, end } = self.segments[segment];
-        let run = &self.runs[run];
-        let delays = robots.map(|robot| robot.values[Parameter::Delay]);
-        let mut torques = delays.map(|delay| run.torque_from(run.time[first] - delay));
-        let one_delay = delays.iter().all(|delay| *delay == delays[0]);
+    /// The states at a segment's rows, as far as they are a robot's.
+    fn states(&self, segment: usize, robot: &Robot, initial: Vector4<f64>) -> Vec<Vector4<f64>> {
+        let mut torque = self.torque(segment, robot.values[Parameter::Delay]);
         let mut x = initial;
-        let mut states = initial.map(|initial| {
-            let mut states = Vec::with_capacity(end - first);
-            states.push(initial);
-            states
-        });
-        for row in first + 1..end {
-            let interval = run.time[row] - run.time[row - 1];
-            let steps = steps(interval);
-            let duration = interval / steps;
-            for _ in 0..steps as usize {
-                // The mean over the step is continuous in the delay.
-                let torque = if one_delay {
-                    [torques[0].mean_over(duration); LANES]
-                } else {
-                    torques.each_mut().map(|torque| torque.mean_over(duration))
-                };
-                x = Robot::step_each(robots, &x, torque, duration);
+        let mut states = Vec::with_capacity(self.measured(segment).len());
+        states.push(initial);
+        for (steps, duration) in self.intervals(segment) {
+            for _ in 0..steps {
+                x = robot.step(&x, torque.mean_over(duration), duration);
             }
-            let mut all_left = true;
-            for (states, x) in states.iter_mut().zip(&x) {
-                let stays = x[2].abs() < 1e6 && x[3].abs() < 1e6;
-                if stays && states.len() == row - first {
-                    states.push(*x);
-                    all_left = false;
-                }
-            }
-            if all_left {
+            if !is_robots(&x) {
                 break;
             }
+            states.push(x);
         }
         states
+    }
+
+    /// From each row of a segment to the next: how many steps of the integration, and how long, s.
+    fn intervals(&self, segment: usize) -> impl Iterator<Item = (usize, f64)> {
+        let Segment { run, first, end } = self.segments[segment];
+        let time = &self.runs[run].time[first..end];
+        time.windows(2).map(|pair| {
+            let interval = pair[1] - pair[0];
+            let steps = steps(interval);
+            (steps as usize, interval / steps)
+        })
+    }
+
+    /// The torque that acts from the first row of a segment on, after a delay in s.
+    fn torque(&self, segment: usize, delay: f64) -> TorqueReader<'_> {
+        let Segment { run, first, .. } = self.segments[segment];
+        let run = &self.runs[run];
+        run.torque_from(run.time[first] - delay)
+    }
+
+    /// The outputs of a segment with their derivatives by the initial state and by the coordinates
+    /// of the parameters `by`; `None` for what has no effect on them.
+    pub(crate) fn derivatives(
+        &self,
+        segment: usize,
+        parameters: &[f64],
+        initial: &Vector4<f64>,
+        by: &[Option<Parameter>],
+    ) -> LinearizedOutputs<3> {
+        let robot = self.robot(parameters);
+        let rows = self.measured(segment).len();
+        let jacobian = self.coordinates.jacobian();
+        // The parameters that a coordinate moves, and by how much.
+        let moved: Vec<Vec<(Parameter, f64)>> = by
+            .iter()
+            .map(|coordinate| match coordinate {
+                None => Vec::new(),
+                Some(coordinate) => Parameter::ALL
+                    .into_iter()
+                    .map(|one| (one, jacobian[(one.index(), coordinate.index())]))
+                    .filter(|(_, share)| *share != 0.0)
+                    .collect(),
+            })
+            .collect();
+        let mut outputs = Vec::with_capacity(rows);
+        let mut slopes = DMatrix::zeros(3 * rows, 4 + by.len());
+        let mut record = |varied: &Varied| {
+            let first = 3 * outputs.len();
+            outputs.push(robot.outputs(&varied.x, self.ball_angle));
+            for (output, shown) in varied.outputs(&robot, self.ball_angle).iter().enumerate() {
+                for state in 0..4 {
+                    slopes[(first + output, state)] = shown.by_state[state];
+                }
+                for (column, moved) in moved.iter().enumerate() {
+                    let terms = moved.iter();
+                    slopes[(first + output, 4 + column)] = terms
+                        .map(|(parameter, share)| shown.by_parameter[*parameter] * share)
+                        .sum();
+                }
+            }
+        };
+        let delay = robot.values[Parameter::Delay];
+        let mut torque = self.torque(segment, delay);
+        let mut delayed = self.torque(segment, delay + DELAY_DIFFERENCE);
+        let mut varied = Varied::start(*initial);
+        record(&varied);
+        for (steps, duration) in self.intervals(segment) {
+            for _ in 0..steps {
+                let torque = torque.mean_over(duration);
+                // The mean over a step is continuous in the delay.
+                let by_delay = (delayed.mean_over(duration) - torque) / DELAY_DIFFERENCE;
+                varied.step(&robot, torque, by_delay, duration);
+            }
+            if !is_robots(&varied.x) || !varied.is_bounded() {
+                break;
+            }
+            record(&varied);
+        }
+        LinearizedOutputs { outputs, slopes }
+    }
+}
+
+/// Over which the torque is differentiated by the delay, s: far above the rounding of times, and far
+/// below the time between two rows.
+const DELAY_DIFFERENCE: f64 = 1e-8;
+
+/// Whether a robot can have these rates: beyond them the simulation of a wrong model is at its end.
+fn is_robots(x: &Vector4<f64>) -> bool {
+    x[2].abs() < 1e6 && x[3].abs() < 1e6
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::Torque;
+
+    /// A swaying torque over 0.6 s, with a row that came late.
+    fn run() -> Run {
+        let time: Vec<f64> = (0..120)
+            .map(|row| 5e-3 * f64::from(row) + if row == 70 { 2e-3 } else { 0.0 })
+            .collect();
+        Run {
+            name: "swaying".to_owned(),
+            outputs: vec![Vector3::zeros(); time.len()],
+            torque: time.iter().map(|t| (25.0 * t).sin() + 0.3).collect(),
+            stretches: std::iter::once(0..time.len()).collect(),
+            torque_kind: Torque::Applied,
+            time,
+        }
+    }
+
+    #[test]
+    fn derivatives_are_those_of_differences() {
+        for (ball_angle, coulomb) in [
+            (BallAngle::Inertial, 0.0),
+            (BallAngle::RelativeToBody, 0.05),
+        ] {
+            let runs = [run()];
+            let segments = vec![Segment {
+                run: 0,
+                first: 20,
+                end: 120,
+            }];
+            let coordinates = Coordinates::new(&Values::usual(), Geometry::paper(), true);
+            let model = SegmentedRuns {
+                runs: &runs,
+                segments,
+                coordinates,
+                ball_angle,
+                noise: Vector3::repeat(1.0),
+            };
+            let mut values = Values([0.01; Parameter::ALL.len()]);
+            values[Parameter::B1] = 0.04;
+            values[Parameter::B3] = 0.15;
+            values[Parameter::DriveCoulomb] = coulomb;
+            values[Parameter::TorqueGain] = 0.1;
+            // Between the rows: where a step begins at one of them, the torque's mean has a kink.
+            values[Parameter::Delay] = 0.0123;
+            let parameters = coordinates.of(&values);
+            let initial = Vector4::new(0.3, 0.05, -0.4, 0.2);
+            let indices: Vec<usize> = (0..Parameter::ALL.len()).collect();
+            let found = model
+                .linearized(0, &parameters, &initial, &indices)
+                .unwrap();
+            let outputs = |parameters: &[f64], initial: &Vector4<f64>| {
+                let mut outputs = Vec::new();
+                model.simulate(0, parameters, initial, &mut outputs);
+                outputs
+            };
+            assert_eq!(found.outputs.len(), 100);
+            let scales = coordinates.scales();
+            for column in 0..4 + indices.len() {
+                let by = 1e-5
+                    * if column < 4 {
+                        1.0
+                    } else {
+                        scales.0[column - 4]
+                    };
+                let at = |by: f64| {
+                    let (mut parameters, mut initial) = (parameters.clone(), initial);
+                    match column {
+                        0..4 => initial[column] += by,
+                        _ => parameters[column - 4] += by,
+                    }
+                    outputs(&parameters, &initial)
+                };
+                let (above, below) = (at(by), at(-by));
+                let differences = above.iter().zip(&below);
+                let differences: Vec<Vector3<f64>> = differences
+                    .map(|(above, below)| (above - below) / (2.0 * by))
+                    .collect();
+                let largest = differences.iter().map(Vector3::amax).fold(0.0, f64::max);
+                assert!(largest > 0.0, "column {column} moves nothing");
+                for (row, difference) in differences.iter().enumerate() {
+                    for output in 0..3 {
+                        let slope = found.slopes[(3 * row + output, column)];
+                        assert!(
+                            (slope - difference[output]).abs() <= 1e-5 * largest,
+                            "column {column}, row {row}, output {output}: {slope} for {}",
+                            difference[output]
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_simulation_that_is_left_has_no_derivatives_afterwards() {
+        let runs = [run()];
+        let coordinates = Coordinates::new(&Values::usual(), Geometry::paper(), true);
+        let model = SegmentedRuns {
+            runs: &runs,
+            segments: vec![Segment {
+                run: 0,
+                first: 20,
+                end: 120,
+            }],
+            coordinates,
+            ball_angle: BallAngle::Inertial,
+            noise: Vector3::repeat(1.0),
+        };
+        let mut values = Values([0.01; Parameter::ALL.len()]);
+        // Friction that gives energy, much of it.
+        values[Parameter::RollingFriction] = -30.0;
+        values[Parameter::TorqueGain] = 0.1;
+        let parameters = coordinates.of(&values);
+        let initial = Vector4::new(0.3, 0.05, -0.4, 0.2);
+        let found = model
+            .linearized(0, &parameters, &initial, &[0, 1, 3])
+            .unwrap();
+        assert!(found.outputs.len() < 100);
+        assert!(found.slopes.iter().all(|slope| slope.is_finite()));
+        let rest = found.slopes.rows_range(3 * found.outputs.len()..);
+        assert!(rest.iter().all(|slope| *slope == 0.0));
     }
 }

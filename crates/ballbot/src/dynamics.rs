@@ -16,6 +16,20 @@ pub(crate) struct Attitude<T> {
     pub cos_normal: T,
 }
 
+/// Accelerations (phi_ddot, theta_ddot) in rad/s^2, and what they change by per theta, phi_dot,
+/// theta_dot and torque.
+pub(crate) struct Slopes<T> {
+    pub accelerations: [T; 2],
+    pub by_theta: [T; 2],
+    pub by_phi_dot: [T; 2],
+    pub by_theta_dot: [T; 2],
+    pub by_torque: [T; 2],
+    /// 1/det M, 1/m^4.
+    pub inverse: T,
+    /// What stands in M with a minus sign, m^2.
+    pub coupling: T,
+}
+
 impl<T: Number> Attitude<T> {
     /// At the tilt `theta` (rad) on a level floor.
     #[inline(always)]
@@ -53,18 +67,44 @@ impl<T: Number> Ballbot<T> {
     /// it has the secant F(v)/v in place of the derivative: that is next to zero while the drive moves,
     /// so that a linear model with it has friction push on where the motion turns round, and its plans
     /// chatter.
+    #[inline(always)]
+    pub(crate) fn tangent_of_f(&self, x: &Vector4<T>, torque: T) -> Tangent<T, 4, 1> {
+        let zero = T::constant(0.0);
+        let friction = if self.drive.is_none() {
+            zero
+        } else {
+            self.drive.coefficient(x[2] - x[3])
+        };
+        let slopes = self.slopes(x, torque, friction);
+        let row = |i: usize| {
+            [
+                slopes.by_theta[i],
+                slopes.by_phi_dot[i],
+                slopes.by_theta_dot[i],
+            ]
+        };
+        let a = state_matrix(row(0), row(1));
+        let [phi_ddot, theta_ddot] = slopes.accelerations;
+        let f = Vector4::new(x[2], x[3], phi_ddot, theta_ddot);
+        (
+            f,
+            a,
+            Vector4::new(zero, zero, slopes.by_torque[0], slopes.by_torque[1]),
+        )
+    }
+
+    /// The accelerations and their slopes, with `friction` for the slope of the drive's friction, m^2/s.
     ///
     /// From M q_ddot = force: M dq_ddot = dforce - dM q_ddot, which is half the work of dual numbers.
     #[inline(always)]
-    pub(crate) fn tangent_of_f(&self, x: &Vector4<T>, torque: T) -> Tangent<T, 4, 1> {
+    pub(crate) fn slopes(&self, x: &Vector4<T>, torque: T, friction: T) -> Slopes<T> {
         let (phi_dot, theta_dot) = (x[2], x[3]);
         let attitude = Attitude::level(x[1]);
         let (sin_theta, cos_theta) = (attitude.sin_normal, attitude.cos_normal);
-        let (zero, one) = (T::constant(0.0), T::constant(1.0));
         let coupling = self.coupling(cos_theta);
         let speed = phi_dot - theta_dot;
         let swing = self.arm() * theta_dot;
-        let inverse = one / self.determinant(coupling);
+        let inverse = T::constant(1.0) / self.determinant(coupling);
         let accelerate = |force_phi, force_theta| {
             self.accelerate_with(inverse, coupling, force_phi, force_theta)
         };
@@ -73,22 +113,18 @@ impl<T: Number> Ballbot<T> {
         let [phi_ddot, theta_ddot] = accelerate(force_phi, force_theta);
         // The coupling stands in M with a minus sign, and moves by arm sin(theta) per theta.
         let shift = self.arm() * sin_theta;
-        let by_theta = accelerate(
-            swing * theta_dot * cos_theta + shift * theta_ddot,
-            self.pull() * cos_theta + shift * phi_ddot,
-        );
-        let friction = if self.drive.is_none() {
-            zero
-        } else {
-            self.drive.coefficient(speed)
-        };
-        let by_phi_dot = accelerate(-self.b4 - friction, friction);
-        let by_theta_dot = accelerate(swing * (sin_theta + sin_theta) + friction, -friction);
-        let by_torque = accelerate(self.gear(), -self.gear());
-        let row = |i: usize| [by_theta[i], by_phi_dot[i], by_theta_dot[i]];
-        let a = state_matrix(row(0), row(1));
-        let f = Vector4::new(phi_dot, theta_dot, phi_ddot, theta_ddot);
-        (f, a, Vector4::new(zero, zero, by_torque[0], by_torque[1]))
+        Slopes {
+            accelerations: [phi_ddot, theta_ddot],
+            by_theta: accelerate(
+                swing * theta_dot * cos_theta + shift * theta_ddot,
+                self.pull() * cos_theta + shift * phi_ddot,
+            ),
+            by_phi_dot: accelerate(-self.b4 - friction, friction),
+            by_theta_dot: accelerate(swing * (sin_theta + sin_theta) + friction, -friction),
+            by_torque: accelerate(self.gear(), -self.gear()),
+            inverse,
+            coupling,
+        }
     }
 
     /// B~ tau - C - D - G: the generalised forces on ball and body, m^2/s^2, where the drive acts with

@@ -50,7 +50,24 @@ impl<T: Number> DriveFriction<T> {
         if self.coulomb == T::constant(0.0) {
             return self.viscous;
         }
+        self.viscous + self.coulomb / Self::rounded(speed)
+    }
+
+    /// sqrt(v^2 + creep^2): the speed without its sign, its kink at rest rounded off, rad/s.
+    #[inline(always)]
+    pub(crate) fn rounded(speed: T) -> T {
         let creep = T::constant(CREEP_SPEED);
-        self.viscous + self.coulomb / (speed * speed + creep * creep).sqrt()
+        (speed * speed + creep * creep).sqrt()
+    }
+
+    /// dF/dv at the speed `speed` in rad/s: m^2/s.
+    #[inline(always)]
+    pub(crate) fn slope(&self, speed: T) -> T {
+        if self.coulomb == T::constant(0.0) {
+            return self.viscous;
+        }
+        // d/dv of v / sqrt(v^2 + c^2) is c^2 / sqrt(v^2 + c^2)^3.
+        let (root, creep) = (Self::rounded(speed), T::constant(CREEP_SPEED));
+        self.viscous + self.coulomb * creep * creep / (root * root * root)
     }
 }

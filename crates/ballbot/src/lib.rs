@@ -54,6 +54,7 @@ mod plane_regulator;
 mod regulator;
 mod regulator_error;
 mod robot_regulator;
+mod sensitivity;
 mod shares;
 mod wheels;
 
@@ -71,5 +72,6 @@ pub use regulator::{
 };
 pub use regulator_error::RegulatorError;
 pub use robot_regulator::{HEADING, MotorLimits, RobotRegulator, RobotState, YawLaw, plane_of};
+pub use sensitivity::Sensitivity;
 pub use shares::PlaneTorques;
 pub use wheels::{AZIMUTHS_OF_PAPER_DEG, BadWheels, Wheel, Wheels};

@@ -85,8 +85,8 @@ pub use ray_nodes::{RayNodes, nodes_along_ray};
 pub use residual_tests::{Correlation, NORMAL_95, autocorrelation, cross_correlation};
 pub use riccati::{LqProblem, RiccatiError, RiccatiSolution, solve_care, solve_dare};
 pub use shooting::{
-    Prior, Reduced, ShootingError, ShootingFit, ShootingModel, ShootingProblem, ShootingSettings,
-    ShootingTermination, Unknown,
+    LinearizedOutputs, Prior, Reduced, ShootingError, ShootingFit, ShootingModel, ShootingProblem,
+    ShootingSettings, ShootingTermination, Unknown,
 };
 pub use stability::{
     FrozenError, FrozenStability, MOST_RK4_SUBSTEPS, Rk4Step, Rk4StepError, SchedulingGrid,

@@ -46,23 +46,29 @@ pub trait ShootingModel<const NX: usize, const NY: usize>: Sync {
         outputs: &mut Vec<SVector<f64, NY>>,
     );
 
-    /// The outputs of [`ShootingModel::simulate`] from several (parameters, initial state) of one
-    /// segment. A model may simulate them side by side, which takes a processor less time than one
-    /// after the other.
-    fn simulate_each(
+    /// The outputs of [`ShootingModel::simulate`] with their derivatives by the initial state and by
+    /// the parameters `indices`. `None` of a model that has no derivatives: they are forward
+    /// differences of whole simulations then.
+    fn linearized(
         &self,
         segment: usize,
-        starts: &[(Vec<f64>, SVector<f64, NX>)],
-    ) -> Vec<Vec<SVector<f64, NY>>> {
-        let starts = starts.iter();
-        starts
-            .map(|(parameters, initial)| {
-                let mut outputs = Vec::new();
-                self.simulate(segment, parameters, initial, &mut outputs);
-                outputs
-            })
-            .collect()
+        parameters: &[f64],
+        initial: &SVector<f64, NX>,
+        indices: &[usize],
+    ) -> Option<LinearizedOutputs<NY>> {
+        let _ = (segment, parameters, initial, indices);
+        None
     }
+}
+
+/// Simulated outputs of a segment, and how they change.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearizedOutputs<const NY: usize> {
+    /// The outputs, one per row; fewer than there are rows when the simulation leaves all bounds.
+    pub outputs: Vec<SVector<f64, NY>>,
+    /// Their derivatives: NY rows for each row of the segment, a column for each component of the
+    /// initial state, then for each parameter. Zero where there is none.
+    pub slopes: DMatrix<f64>,
 }
 
 /// A fit to be made: the model with its data, and the unknown parameters.
@@ -74,7 +80,8 @@ pub struct ShootingProblem<'a, M, const NX: usize, const NY: usize> {
     pub unknowns: &'a [Unknown],
     /// What is known of them beforehand.
     pub priors: &'a [Prior],
-    /// What a state is measured in: differences are taken over a millionth of it, positive.
+    /// What a state is measured in: differences, where there are any, are taken over a millionth of
+    /// it, positive.
     pub state_scale: SVector<f64, NX>,
 }
 

@@ -386,46 +386,29 @@ impl Rk4 {
             return (0..periods).fold(*x, |x, _| model.derivative(&x, u));
         }
         let h = self.step_length(t_s);
-        let mut x = [*x];
-        for _ in 0..self.substeps {
-            Self::step_each([model], &mut x, [u], h);
-        }
-        let [x] = x;
-        x
+        (0..self.substeps).fold(*x, |x, _| Self::step(model, &x, u, h))
     }
 
-    /// One step of `h` seconds of several plants at once, from the states `x` under the inputs `u`.
-    ///
-    /// A plant by itself waits for its own results most of the time; stage by stage the processor
-    /// works on the others meanwhile.
+    /// The state `h` seconds after `x` under the input `u`, by one step.
     #[inline(always)]
-    pub fn step_each<T, M, const NX: usize, const NU: usize, const NS: usize, const LANES: usize>(
-        models: [&M; LANES],
-        x: &mut [SVector<T, NX>; LANES],
-        u: [&SVector<T, NU>; LANES],
+    pub fn step<T, M, const NX: usize, const NU: usize, const NS: usize>(
+        model: &M,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
         h: T,
-    ) where
+    ) -> SVector<T, NX>
+    where
         T: Scalar,
         M: LpvModel<T, NX, NU, NS>,
     {
         let half: T = h * convert::<f64, T>(0.5);
         let sixth: T = h * convert::<f64, T>(1.0 / 6.0);
         let two: T = convert(2.0);
-        let [mut k1, mut k2, mut k3] = [[SVector::zeros(); LANES]; 3];
-        // Loops: the closures of array::from_fn are not inlined.
-        for i in 0..LANES {
-            k1[i] = models[i].derivative(&x[i], u[i]);
-        }
-        for i in 0..LANES {
-            k2[i] = models[i].derivative(&(x[i] + k1[i] * half), u[i]);
-        }
-        for i in 0..LANES {
-            k3[i] = models[i].derivative(&(x[i] + k2[i] * half), u[i]);
-        }
-        for i in 0..LANES {
-            let k4 = models[i].derivative(&(x[i] + k3[i] * h), u[i]);
-            x[i] += (k1[i] + (k2[i] + k3[i]) * two + k4) * sixth;
-        }
+        let k1 = model.derivative(x, u);
+        let k2 = model.derivative(&(x + k1 * half), u);
+        let k3 = model.derivative(&(x + k2 * half), u);
+        let k4 = model.derivative(&(x + k3 * h), u);
+        x + (k1 + (k2 + k3) * two + k4) * sixth
     }
 
     fn step_length<T: Scalar>(self, t_s: T) -> T {

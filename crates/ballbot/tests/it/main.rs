@@ -13,5 +13,6 @@ mod equations;
 mod friction;
 mod linear;
 mod robots;
+mod sensitivity;
 mod single_precision;
 mod wheels;

@@ -2,11 +2,58 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use super::{ShootingModel, ShootingProblem};
+use super::{LinearizedOutputs, ShootingModel, ShootingProblem};
 
 /// Differences are taken over this part of a scale: the truncation, about this part of the slope,
 /// and the rounding, 1e-16 / 1e-6 of the value, are then both far below the noise of any data.
 const DIFFERENCE: f64 = 1e-6;
+
+/// Outputs with derivatives by forward differences of whole simulations.
+fn differences<M, const NX: usize, const NY: usize>(
+    problem: &ShootingProblem<'_, M, NX, NY>,
+    segment: usize,
+    parameters: &[f64],
+    initial: &SVector<f64, NX>,
+    indices: &[usize],
+) -> LinearizedOutputs<NY>
+where
+    M: ShootingModel<NX, NY>,
+{
+    let simulated = |parameters: &[f64], initial: &SVector<f64, NX>| {
+        let mut outputs = Vec::new();
+        let model = problem.model;
+        model.simulate(segment, parameters, initial, &mut outputs);
+        outputs
+    };
+    let outputs = simulated(parameters, initial);
+    let rows = problem.model.measured(segment).len();
+    let mut slopes = DMatrix::zeros(rows * NY, NX + indices.len());
+    let mut fill = |column: usize, moved: Vec<SVector<f64, NY>>, step: f64| {
+        for (row, (moved, base)) in moved.iter().zip(&outputs).enumerate() {
+            let slope = (moved - base) / step;
+            slopes
+                .view_mut((row * NY, column), (NY, 1))
+                .copy_from(&slope);
+        }
+    };
+    for state in 0..NX {
+        let mut moved = *initial;
+        moved[state] += DIFFERENCE * problem.state_scale[state];
+        let step = moved[state] - initial[state];
+        fill(state, simulated(parameters, &moved), step);
+    }
+    for (place, &index) in indices.iter().enumerate() {
+        let unknown = &problem.unknowns[index];
+        // Away from an upper bound, so that no bound is left.
+        let wanted = DIFFERENCE * unknown.scale;
+        let up = parameters[index] + wanted <= unknown.upper;
+        let mut moved = parameters.to_vec();
+        moved[index] += if up { wanted } else { -wanted };
+        let step = moved[index] - parameters[index];
+        fill(NX + place, simulated(&moved, initial), step);
+    }
+    LinearizedOutputs { outputs, slopes }
+}
 
 /// A' A, each product of two columns taken once.
 fn square(a: &DMatrix<f64>) -> DMatrix<f64> {
@@ -32,7 +79,7 @@ pub(super) struct Block<const NX: usize> {
 }
 
 impl<const NX: usize> Block<NX> {
-    /// Sensitivities by forward differences of whole simulations.
+    /// From the outputs at these parameters and this initial state, with their derivatives.
     pub(super) fn new<M, const NY: usize>(
         problem: &ShootingProblem<'_, M, NX, NY>,
         segment: usize,
@@ -45,50 +92,30 @@ impl<const NX: usize> Block<NX> {
     {
         let measured = problem.model.measured(segment);
         let noise = problem.model.noise(segment);
-        let rows = measured.len();
-        // The iterate, then with each of the unknowns moved by a step.
-        let mut starts = vec![(parameters.to_vec(), *initial)];
-        let mut steps = Vec::new();
-        for state in 0..NX {
-            let mut moved = *initial;
-            moved[state] += DIFFERENCE * problem.state_scale[state];
-            steps.push(moved[state] - initial[state]);
-            starts.push((parameters.to_vec(), moved));
-        }
-        for &index in indices {
-            let unknown = &problem.unknowns[index];
-            // Away from an upper bound, so that no bound is left.
-            let wanted = DIFFERENCE * unknown.scale;
-            let up = parameters[index] + wanted <= unknown.upper;
-            let mut moved = parameters.to_vec();
-            moved[index] += if up { wanted } else { -wanted };
-            steps.push(moved[index] - parameters[index]);
-            starts.push((moved, *initial));
-        }
-        let simulated = problem.model.simulate_each(segment, &starts);
-        let (base, moved) = simulated.split_first().map_or_else(
-            || (&[][..], &[][..]),
-            |(base, moved)| (base.as_slice(), moved),
-        );
-        let columns = NX + indices.len();
+        let LinearizedOutputs { outputs, slopes } = problem
+            .model
+            .linearized(segment, parameters, initial, indices)
+            .unwrap_or_else(|| differences(problem, segment, parameters, initial, indices));
         // The last column is the residual.
-        let mut jacobian = DMatrix::zeros(rows * NY, columns + 1);
-        let mut fill = |column: usize, moved: &[SVector<f64, NY>], step: f64| {
-            let mut target = jacobian.column_mut(column);
-            for (row, (moved, base)) in moved.iter().zip(base).enumerate() {
-                for output in 0..NY {
-                    if !measured[row][output].is_nan() {
-                        target[row * NY + output] =
-                            (moved[output] - base[output]) / (step * noise[output]);
-                    }
-                }
+        let columns = NX + indices.len();
+        let mut jacobian = slopes.insert_column(columns, 0.0);
+        let rows = outputs.iter().zip(measured).enumerate();
+        for (row, (output, measured)) in rows {
+            for place in 0..NY {
+                jacobian[(row * NY + place, columns)] = output[place] - measured[place];
             }
-        };
-        for (column, (moved, step)) in moved.iter().zip(&steps).enumerate() {
-            fill(column, moved, *step);
         }
-        // (simulated + 1) - simulated, with the measured value as what it is moved to.
-        fill(columns, measured, -1.0);
+        // What was not measured has no weight.
+        let weights: Vec<f64> = measured
+            .iter()
+            .flat_map(|row| (0..NY).map(|output| (row[output], noise[output])))
+            .map(|(value, noise)| if value.is_nan() { 0.0 } else { 1.0 / noise })
+            .collect();
+        for mut column in jacobian.column_iter_mut() {
+            for (entry, weight) in column.iter_mut().zip(&weights) {
+                *entry = if *weight > 0.0 { *entry * weight } else { 0.0 };
+            }
+        }
         Self::from_normal_equations(&square(&jacobian), indices.len())
     }
 
