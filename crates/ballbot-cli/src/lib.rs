@@ -29,8 +29,6 @@ pub mod json;
 pub mod optimality_figure;
 pub mod output;
 pub mod progress;
-pub mod proofs;
-pub mod recording;
 pub mod refinement_file;
 pub mod reproduction;
 pub mod results;

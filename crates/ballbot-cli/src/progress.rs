@@ -19,6 +19,9 @@ pub fn silence() {
     QUIET.store(true, Ordering::Relaxed);
 }
 
+/// Steps of a bar that is told parts from 0 to 1.
+const PARTS: f64 = 1000.0;
+
 /// Progress of some work on standard error. Nothing is drawn when that is no terminal, when the
 /// work is done within a second, or after it is dropped.
 #[derive(Debug)]
@@ -50,6 +53,16 @@ impl Progress {
             (sender, thread::spawn(raise))
         });
         Self { bar, curtain }
+    }
+
+    /// Work called `what` that is told by the part of it that is done.
+    pub fn of_parts(what: impl Into<String>) -> Self {
+        Self::new(what, PARTS as usize)
+    }
+
+    /// This part is done, of work that is told so.
+    pub fn set_part(&self, done: f64) {
+        self.set((done * PARTS) as usize);
     }
 
     /// So many steps are done.

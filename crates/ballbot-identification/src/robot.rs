@@ -337,6 +337,14 @@ impl IdentifiedRobot {
         })
     }
 
+    /// A verdict in words, with the plane that it is of.
+    pub fn told(&self, (plane, verdict): &OfPlane) -> String {
+        match plane.and_then(|plane| self.plane_name(plane)) {
+            Some(name) => format!("plane {name}: {verdict}"),
+            None => verdict.to_string(),
+        }
+    }
+
     /// Why this is no result; empty if it is one.
     pub fn refusals(&self) -> Vec<OfPlane> {
         let mut verdicts = self.verdicts();

@@ -32,6 +32,7 @@ pub mod words;
 
 pub use error::ScenarioError;
 pub use file::certificate::{RobotTable, TerminalCertificate, ViscousBallbot, read_certificate};
+pub use file::document::Document;
 pub use file::feedback_table::{
     DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
 };
@@ -53,6 +54,7 @@ pub use prepare::known_robot::KnownRobot;
 pub use prepare::parameters::read_robot;
 pub use prepare::plausible;
 pub use prepare::prepared::{Plane, Prepared, Problem};
+pub use prepare::proofs;
 pub use prepare::reference::PhiReference;
 pub use prepare::standing::Standing;
 pub use prepare::three_motors::ThreeMotors;

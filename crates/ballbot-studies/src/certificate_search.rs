@@ -6,6 +6,7 @@ use lpvmpc_certificate::{
     CertificateProblem, CertifyError, Effort, Proof, TerminalProblem, certify_terminal, raise_level,
 };
 use nalgebra::{SVector, Vector2, Vector4};
+use serde::Serialize;
 
 /// Sizes that the search looks at: multiples of a thirty-second of the bounds.
 const SIZES: usize = 32;
@@ -61,6 +62,17 @@ pub enum Searching {
 }
 
 impl CertificateSearch<'_> {
+    /// A level that is usual.
+    pub const LEVEL: f64 = 2000.0;
+    /// A contraction that makes the proof short and P not too large.
+    pub const CONTRACTION: f64 = 0.15;
+    /// Boxes that are enough for the built-in robots.
+    pub const BOXES: usize = 40_000;
+    /// Trials after which a level hardly rises.
+    pub const TRIALS: usize = 3;
+    /// More trials than this bring nothing.
+    pub const MOST_TRIALS: usize = 20;
+
     /// Designs and proves. `progress` is told what it is at.
     ///
     /// # Errors
@@ -179,4 +191,51 @@ impl CertificateSearch<'_> {
 /// The limit of |value| that the bounds leave on both sides.
 fn symmetric<const N: usize>(bounds: &Bounds<f64, N>) -> SVector<f64, N> {
     SVector::from_fn(|i, _| bounds.upper[i].min(-bounds.lower[i]))
+}
+
+/// What was proved of a set, in numbers.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ProvedSet {
+    /// Sampling time, s.
+    pub t_s: f64,
+    /// K, for u = **-K** x, N m per rad and per rad/s.
+    pub k: [f64; 4],
+    /// P, by rows.
+    pub p: [[f64; 4]; 4],
+    /// The set is x'Px <= level.
+    pub level: f64,
+    /// What x'Px decreases by beyond the stage cost, as a part of itself.
+    pub contraction: f64,
+    /// Rate of quadratic stability in continuous time, 1/s.
+    pub rate_1_s: f64,
+    /// Largest |theta| and |theta_dot| of that, rad and rad/s.
+    pub scheduling_limits: [f64; 2],
+    /// The largest |x_i| in the set, rad and rad/s.
+    pub largest_states_at_samples: [f64; 4],
+    /// What no |x_i| reaches between samples, rad and rad/s.
+    pub largest_states_between_samples: [f64; 4],
+    /// Boxes of states in the proof.
+    pub boxes: usize,
+    /// Boxes of schedulings in the proof.
+    pub scheduling_boxes: usize,
+}
+
+impl ProvedSet {
+    /// The set of a certificate that this proof is of.
+    pub fn new(certificate: &TerminalCertificate, proof: &Proof<4>) -> Self {
+        let terminal = &certificate.terminal;
+        Self {
+            t_s: certificate.t_s,
+            k: std::array::from_fn(|i| terminal.k[i]),
+            p: std::array::from_fn(|i| std::array::from_fn(|j| terminal.p[(i, j)])),
+            level: terminal.level,
+            contraction: terminal.contraction,
+            rate_1_s: certificate.continuous.rate_1_s,
+            scheduling_limits: certificate.scheduling_limits.into(),
+            largest_states_at_samples: terminal.largest_states().into(),
+            largest_states_between_samples: proof.reach.into(),
+            boxes: proof.boxes,
+            scheduling_boxes: proof.scheduling_boxes,
+        }
+    }
 }

@@ -1,4 +1,8 @@
-//! A recorded run as arrays, and what it amounts to.
+//! A recorded run as arrays and as text, and what it amounts to.
+
+mod csv;
+
+pub use csv::{COLUMNS, log_csv, motors_csv, time, trajectory_csv};
 
 use ballbot_scenario::{Plane, Prepared};
 use lpvmpc::Guarantee;

@@ -1,10 +1,12 @@
 //! Which robot, and which scenario: the options that all commands with one have.
 
 use super::CommandError;
-use crate::proofs::ProvedFiles;
+use crate::progress::Progress;
 use ballbot::Ballbot;
+use ballbot_scenario::proofs::ProvedFiles;
 use ballbot_scenario::{Parameters, Prepared, Scenario, read_robot};
 use clap::Args;
+use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 
 /// The robot.
@@ -59,7 +61,14 @@ impl ScenarioOptions {
     /// The scenario or the robot's file cannot be read or makes no sense.
     pub fn prepare(&self, scenario: &str) -> Result<Prepared, CommandError> {
         let (loaded, folder) = self.load(scenario)?;
-        let files = ProvedFiles { folder: &folder };
+        let bar = OnceCell::new();
+        let files = ProvedFiles {
+            folder: &folder,
+            progress: &|done| {
+                let bar = bar.get_or_init(|| Progress::of_parts("proving the certificate"));
+                bar.set_part(done);
+            },
+        };
         Ok(loaded.prepare(files)?)
     }
 

@@ -5,12 +5,11 @@ use super::robot::ScenarioOptions;
 use crate::json;
 use crate::output::{self, FileError};
 use crate::progress::Progress;
-use crate::recording;
 use crate::results::ResultFolder;
 use crate::run_figures::{self, Shown};
 use crate::table::Table;
 use ballbot_scenario::{MotorSample, Prepared, Record, RunHooks, words};
-use ballbot_studies::recorded::{Columns, Metrics};
+use ballbot_studies::recorded::{self, Columns, Metrics};
 use clap::Args;
 use lpvmpc_figures::{Figure, Role};
 use lpvmpc_sim::{LogRow, Termination, Trajectory};
@@ -107,7 +106,7 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
         .into_iter()
         .map(|recording| (recording.trajectory, recording.log))
         .unzip();
-    let motors = motors.unwrap_or_else(|| motors_of_planes(&prepared, &trajectories));
+    let motors = motors.unwrap_or_else(|| prepared.motors_of_planes(&trajectories));
     write(&folder, &prepared, &trajectories, &motors)?;
     write_logs(&logs, &rows)?;
 
@@ -144,7 +143,7 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
             log: rows
                 .first()
                 .filter(|_| arguments.logs_to_standard_output())
-                .map(|log| recording::log_csv(log)),
+                .map(|log| recorded::log_csv(log)),
         }),
         Some((what, run)) => Err(CommandError::EndedEarly {
             what,
@@ -167,20 +166,6 @@ pub fn record(prepared: &Prepared) -> Result<Record, CommandError> {
         progress: &|done| progress.set(done),
     };
     Ok(prepared.record(&hooks)?)
-}
-
-/// The motors of two planes that were run one after the other, at a heading of zero; none for
-/// one plane.
-fn motors_of_planes(prepared: &Prepared, trajectories: &[Trajectory<4, 1>]) -> Vec<MotorSample> {
-    let samples = trajectories.iter().take(1).flat_map(|run| &run.samples);
-    let torques = prepared.motor_torques(trajectories);
-    let samples = samples.zip(torques).map(|(sample, torques)| MotorSample {
-        t: sample.t,
-        heading: 0.0,
-        target: 0.0,
-        torques,
-    });
-    samples.collect()
 }
 
 /// What was wrong with the readings of each plane, in a line each.
@@ -228,7 +213,7 @@ fn log_paths(path: &Path, planes: usize) -> Vec<PathBuf> {
 
 /// Writes one log per plane to each of the paths.
 fn write_logs(paths: &[PathBuf], logs: &[Vec<LogRow<4, 1>>]) -> Result<(), FileError> {
-    let texts: Vec<String> = logs.iter().map(|log| recording::log_csv(log)).collect();
+    let texts: Vec<String> = logs.iter().map(|log| recorded::log_csv(log)).collect();
     let files: Vec<(&Path, &[u8])> = paths
         .iter()
         .zip(&texts)
@@ -267,12 +252,12 @@ fn write(
         .iter()
         .zip(trajectories)
         .map(|(name, run)| {
-            let text = recording::trajectory_csv(run);
+            let text = recorded::trajectory_csv(run);
             ((*name).to_owned(), text.into_bytes())
         })
         .collect();
     if trajectories.len() == 2 {
-        let text = recording::motors_csv(motors);
+        let text = recorded::motors_csv(motors);
         files.push(("motors.csv".to_owned(), text.into_bytes()));
     }
     for (name, figure) in figures(prepared, trajectories, motors) {
@@ -405,7 +390,7 @@ fn summary(prepared: &Prepared, metrics: &[Metrics], folder: &Path) -> String {
         prepared.title,
         prepared.samples,
         prepared.settings.t_s,
-        recording::time(prepared.samples as f64 * prepared.settings.t_s),
+        recorded::time(prepared.samples as f64 * prepared.settings.t_s),
         folder.display()
     )
 }
