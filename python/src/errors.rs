@@ -1,5 +1,6 @@
 //! Errors of the libraries as Python's exceptions.
 
+use ballbot_scenario::ScenarioError;
 use lpvmpc_any::MpcError;
 use lpvmpc_plant::PlantError;
 use pyo3::PyErr;
@@ -7,7 +8,10 @@ use pyo3::PyErr;
 mod python {
     use pyo3::import_exception;
 
+    import_exception!(lpvmpc.errors, CertificateError);
+    import_exception!(lpvmpc.errors, IdentificationError);
     import_exception!(lpvmpc.errors, PlantError);
+    import_exception!(lpvmpc.errors, ScenarioError);
     import_exception!(lpvmpc.errors, SettingError);
     import_exception!(lpvmpc.errors, SimulationError);
 }
@@ -30,4 +34,33 @@ pub fn setting(place: &str, fault: &str) -> PyErr {
 /// `lpvmpc.SimulationError`.
 pub fn of_simulation(error: impl ToString) -> PyErr {
     python::SimulationError::new_err(error.to_string())
+}
+
+/// `lpvmpc.ScenarioError`.
+pub fn of_scenario(error: ScenarioError) -> PyErr {
+    python::ScenarioError::new_err(error.to_string())
+}
+
+/// `lpvmpc.ScenarioError` about a value that no scenario can have.
+pub fn scenario_value(key: &str, value: &str, expected: &str) -> PyErr {
+    of_scenario(ScenarioError::Value {
+        key: key.to_owned(),
+        value: value.to_owned(),
+        expected: expected.to_owned(),
+    })
+}
+
+/// `lpvmpc.ScenarioError`: a study cannot be made of a scenario.
+pub fn study(error: impl ToString) -> PyErr {
+    python::ScenarioError::new_err(error.to_string())
+}
+
+/// `lpvmpc.IdentificationError`.
+pub fn identification(message: &str) -> PyErr {
+    python::IdentificationError::new_err(message.to_owned())
+}
+
+/// `lpvmpc.CertificateError`.
+pub fn certificate(error: impl ToString) -> PyErr {
+    python::CertificateError::new_err(error.to_string())
 }

@@ -349,6 +349,13 @@ impl ExcitationTask {
             nyquist,
             format!("from the lowest one to half of the rate, {nyquist} Hz"),
         )?;
+        within(
+            "the number of harmonics",
+            self.harmonics as f64,
+            1.0,
+            1e4,
+            "from 1 to 10000".to_owned(),
+        )?;
         within("the torque", self.amplitude, 1e-6, 1e6, positive())?;
         within(
             "the tilt limit",

@@ -86,7 +86,7 @@ pub use published::{LinearRegression, regression};
 pub use residuals::{
     Difference, OUTPUTS, OutputResidual, ScoreTest, Scores, SegmentResidual, score_tests,
 };
-pub use robot::{IdentifiedRobot, OfPlane, identify};
+pub use robot::{IdentifiedRobot, OfPlane, USUAL_STEPS, identify};
 pub use segments::{Split, Stretch, segments};
 pub use structures::{Compared, Structure, best, compare};
 pub use summary::{

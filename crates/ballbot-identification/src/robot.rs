@@ -37,6 +37,10 @@ pub struct IdentifiedRobot {
 /// A verdict with the plane it is of, where it is not of the whole robot.
 pub type OfPlane = (Option<usize>, Verdict);
 
+/// How often a usual identification tells its progress: coarse fits of three starts, the fit with its
+/// noise, four structures.
+pub const USUAL_STEPS: usize = 60;
+
 /// Identifies one robot from all recordings: those planes together that the configuration names.
 ///
 /// # Errors

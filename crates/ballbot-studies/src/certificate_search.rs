@@ -3,8 +3,10 @@
 use ballbot_scenario::{Prepared, RobotTable, ScenarioError, TerminalCertificate};
 use lpvmpc::Bounds;
 use lpvmpc_certificate::{
-    CertificateProblem, CertifyError, Effort, Proof, TerminalProblem, certify_terminal, raise_level,
+    CertificateProblem, CertifyError, Effort, MOST_BOXES, Proof, TerminalProblem, certify_terminal,
+    raise_level,
 };
+use lpvmpc_design::number_text;
 use nalgebra::{SVector, Vector2, Vector4};
 use serde::Serialize;
 
@@ -40,6 +42,16 @@ pub enum SearchError {
     /// The robot has what certificates do not know.
     #[error(transparent)]
     Robot(#[from] ScenarioError),
+    /// What is asked makes no sense.
+    #[error("{what} is {value}: it must be {expected}", value = number_text(*value))]
+    Value {
+        /// What it is.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
     /// No set could be proved.
     #[error("no certificate: {0}")]
     Certify(#[from] CertifyError),
@@ -78,12 +90,59 @@ impl CertificateSearch<'_> {
     /// # Errors
     /// The robot has what certificates do not know; or no set could be proved.
     pub fn run(&self, progress: &(dyn Fn(Searching) + Sync)) -> Result<Certified, SearchError> {
+        self.check()?;
         let robot = RobotTable::try_from(&self.prepared.ballbot)?;
         let (size, certified) = match self.size {
             Some(size) => (size, self.certify(robot, size, progress)?),
             None => self.search(robot, progress)?,
         };
         Ok(self.raise(size, certified, progress))
+    }
+
+    fn check(&self) -> Result<(), SearchError> {
+        let share = "a share, above 0 and at most 1";
+        let right = |value: f64| value > 0.0 && value <= 1.0;
+        let boxes = (1..=MOST_BOXES).contains(&self.boxes);
+        let asked = [
+            (
+                "the size",
+                self.size.unwrap_or(1.0),
+                share,
+                self.size.is_none_or(right),
+            ),
+            (
+                "the contraction",
+                self.contraction,
+                share,
+                right(self.contraction),
+            ),
+            (
+                "the level",
+                self.level,
+                "a positive number",
+                self.level > 0.0 && self.level.is_finite(),
+            ),
+            (
+                "the number of boxes",
+                self.boxes as f64,
+                "from 1 to 100000",
+                boxes,
+            ),
+            (
+                "the number of trials",
+                self.trials as f64,
+                "from 0 to 20",
+                self.trials <= Self::MOST_TRIALS,
+            ),
+        ];
+        match asked.into_iter().find(|(.., right)| !right) {
+            None => Ok(()),
+            Some((what, value, expected, _)) => Err(SearchError::Value {
+                what,
+                value,
+                expected,
+            }),
+        }
     }
 
     /// A larger box of tilts allows a larger set, up to where the law has to cope with so many plants

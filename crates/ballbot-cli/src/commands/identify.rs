@@ -10,7 +10,7 @@ use crate::output::FileError;
 use crate::progress::Progress;
 use crate::results::ResultFolder;
 use ballbot_identification::log::{self, LeftOut, Recording};
-use ballbot_identification::{Config, ConfigError, IdentifiedRobot, identify};
+use ballbot_identification::{Config, ConfigError, IdentifiedRobot, USUAL_STEPS, identify};
 use ballbot_scenario::words;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -73,11 +73,11 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, CommandError> {
             path: arguments.config.clone().unwrap_or_default(),
             source: error,
         })?;
-    let progress = Progress::new("fitting", EXPECTED_STEPS);
+    let progress = Progress::new("fitting", USUAL_STEPS);
     let step = std::cell::Cell::new(0);
     let robot = identify(recordings, &config, choices, &|_| {
         step.set(step.get() + 1);
-        progress.set(step.get().min(EXPECTED_STEPS - 1));
+        progress.set(step.get().min(USUAL_STEPS - 1));
     })?;
     drop(progress);
     let parameters = robot.parameter_files();
@@ -177,10 +177,6 @@ fn read(arguments: &IdentifyArguments, config: &Config) -> Result<Vec<Recording>
         &report,
     )?)
 }
-
-/// Steps of a usual identification: coarse fits of three starts, the fit with its noise, four
-/// structures.
-const EXPECTED_STEPS: usize = 60;
 
 /// The configuration in a file; the defaults without one.
 ///

@@ -340,9 +340,6 @@ fn figures(
 /// Pixels of a PNG per unit of the figure's size.
 pub const PNG_SCALE: f64 = 2.0;
 
-/// A line of the summary: its name, and the metric as text.
-type Line = (&'static str, fn(&Metrics) -> String);
-
 fn summary(prepared: &Prepared, metrics: &[Metrics], folder: &Path) -> String {
     let planes: &[&str] = if metrics.len() == 1 {
         &["value"]
@@ -350,36 +347,10 @@ fn summary(prepared: &Prepared, metrics: &[Metrics], folder: &Path) -> String {
         &["x plane", "y plane"]
     };
     let mut table = Table::new(std::iter::once("").chain(planes.iter().copied()));
-    let rows: [Line; 10] = [
-        ("largest tilt [rad]", |m| {
-            format!("{:.4}", m.largest_tilt_rad)
-        }),
-        ("largest torque [N m]", |m| {
-            format!("{:.4}", m.largest_torque_nm)
-        }),
-        ("tracking error, rms [rad]", |m| {
-            format!("{:.4}", m.rms_error_rad)
-        }),
-        ("tracking error, largest [rad]", |m| {
-            format!("{:.4}", m.largest_error_rad)
-        }),
-        ("closed-loop cost", |m| format!("{:.1}", m.closed_loop_cost)),
-        ("samples outside the bounds", |m| m.violations.to_string()),
-        ("samples not backed by a guarantee", |m| {
-            let none = || "no guarantee".to_owned();
-            m.not_guaranteed
-                .map_or_else(none, |count| count.to_string())
-        }),
-        ("most active bounds", |m| m.most_active_bounds.to_string()),
-        ("time per step, mean [us]", |m| {
-            format!("{:.1}", m.mean_step_us)
-        }),
-        ("time per step, longest [us]", |m| {
-            format!("{:.1}", m.longest_step_us)
-        }),
-    ];
-    for (name, value) in rows {
-        table.row(std::iter::once(name.to_owned()).chain(metrics.iter().map(value)));
+    let lines: Vec<_> = metrics.iter().map(Metrics::lines).collect();
+    for row in 0..lines.first().map_or(0, |lines| lines.len()) {
+        let cells = lines.iter().map(|lines| lines[row].1.clone());
+        table.row(std::iter::once(lines[0][row].0.to_owned()).chain(cells));
     }
     let certificate = prepared.certificate.map_or(String::new(), |standing| {
         format!("terminal certificate: {standing}\n")

@@ -140,6 +140,18 @@ impl Document {
         Ok(())
     }
 
+    /// The text of a TOML file with the keys that are given and no others, in any order: what
+    /// [`parse`](Self::parse) makes an equal document of.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Syntax`]; none should occur.
+    pub fn to_parse(&self) -> Result<String, ScenarioError> {
+        match &self.text {
+            Some(text) => Ok(text.clone()),
+            None => toml::to_string(&self.tree).map_err(|error| syntax(&self.origin, &error)),
+        }
+    }
+
     /// The text of a TOML file: as it was read, or, where something was changed since, with every
     /// default written out and without comments.
     ///
