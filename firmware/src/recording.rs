@@ -107,7 +107,7 @@ impl Recording {
                     quadratic: 0.0,
                 })
             }),
-            iterations: Iterations::Descent { tolerance, most },
+            iterations: Iterations::descent(tolerance, most),
             ..self.settings()
         }
     }

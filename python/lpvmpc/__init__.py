@@ -10,14 +10,18 @@ line, and steps in microseconds:
 [-1.0]
 """
 
-from .design import Lqr, lqr
+from .certificate import Certificate
+from .design import Lqr, Verified, certify, lqr, verify
 from .errors import (
+    CertificateError,
+    FalseClaimError,
     LpvmpcError,
     MissingPackageError,
     PlantError,
     SettingError,
     SimulationError,
 )
+from .estimator import Disturbance, Estimate, Estimator, Gate
 from .mpc import ActiveBound, Mpc, Penalty, Plan, Row
 from .plant import Embedding, Plant, Signal, SteadyState
 from .simulation import Actuator, Jump, Load, Run, Sensor, simulate
@@ -25,7 +29,14 @@ from .simulation import Actuator, Jump, Load, Run, Sensor, simulate
 __all__ = [
     "ActiveBound",
     "Actuator",
+    "Certificate",
+    "CertificateError",
+    "Disturbance",
     "Embedding",
+    "Estimate",
+    "Estimator",
+    "FalseClaimError",
+    "Gate",
     "Jump",
     "Load",
     "Lqr",
@@ -43,8 +54,11 @@ __all__ = [
     "Signal",
     "SimulationError",
     "SteadyState",
+    "Verified",
+    "certify",
     "lqr",
     "simulate",
+    "verify",
 ]
 
 __version__ = "0.1.0"

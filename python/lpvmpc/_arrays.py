@@ -23,6 +23,14 @@ def numbers(place: str, given: ArrayLike, error: type[Exception] = SettingError)
         raise error(f"{place}: {_short(given)} is no array of real numbers") from None
 
 
+def number(place: str, given: Any, error: type[Exception] = SettingError) -> float:
+    """A number."""
+    try:
+        return float(given)
+    except (TypeError, ValueError):
+        raise error(f"{place}: it is {given!r}; it must be a number") from None
+
+
 def column(
     place: str, given: ArrayLike, size: int, error: type[Exception] = SettingError
 ) -> Array:

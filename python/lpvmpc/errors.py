@@ -13,6 +13,15 @@ class SettingError(LpvmpcError, ValueError):
     """A setting, a state or a reference makes no sense: the message names it and says what would be right."""
 
 
+class CertificateError(LpvmpcError, ValueError):
+    """There is no certificate, or one is refused: it is none, was changed, is of another plant, or claims what could not
+    be shown, and may be true."""
+
+
+class FalseClaimError(CertificateError):
+    """A certificate claims what is false: the message names the claim and a state that shows it."""
+
+
 class SimulationError(LpvmpcError, RuntimeError):
     """The plant's motion cannot be integrated."""
 

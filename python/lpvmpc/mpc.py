@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import Any, Literal, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _lpvmpc
-from ._arrays import by_stage, column, matrices_by_stage, weight
+from ._arrays import by_stage, column, matrices_by_stage, number, weight
+from .certificate import Certificate
 from .errors import SettingError
+from .estimator import Estimate, Estimator
+from .estimator import to_native as estimator_to_native
 from .plant import Plant, Signal
 
 Array = NDArray[np.float64]
@@ -100,6 +104,17 @@ class Plan:
     active_bounds: str
     """The bounds that hold with equality or are exceeded, in words: ``"force >= -10 N at stages 0
     to 6"``, or ``"no active bound"``."""
+    decision: str | None = None
+    """With a certificate, what the first input is backed by: ``"new plan"``, ``"candidate"`` (the rest of the last
+    plan), ``"terminal law"``; and where no plan is known that keeps the bounds and ends in the certified set,
+    ``"soft bounds"`` or ``"saturated LQR"``."""
+
+    @property
+    def is_guaranteed(self) -> bool:
+        """Whether, with a certificate, there will be a plan at every later sample: states at the samples and inputs
+        keep their bounds, and the plan's cost falls by the stage cost, while the plant is the model, up to the error of
+        its Runge-Kutta steps, for which a thousandth of the bounds is kept."""
+        return self.decision in ("new plan", "candidate", "terminal law")
 
     @property
     def u0(self) -> Array:
@@ -143,7 +158,9 @@ class Mpc:
         R, positive definite: the diagonal, shape (m,), or whole, (m, m).
     terminal
         P: ``"lqr"``, the cost of the linear-quadratic regulator about the plant's equilibrium (about zero
-        without one) from there on; a matrix (n, n) or its diagonal; or ``"equality"``, x_N = x_ref.
+        without one) from there on; a matrix (n, n) or its diagonal; ``"equality"``, x_N = x_ref; or a
+        `Certificate` of this plant, with its cost and its set: the loop to its equilibrium is then guaranteed as
+        `Plan.decision` says, and takes no references.
     x_bounds, u_bounds
         Bounds of x_1 to x_N and of the inputs: (lower, upper), or by name,
         ``{"position": (-1, 1)}``; a state or input that is not named has those of the plant.
@@ -181,8 +198,13 @@ class Mpc:
         ``"fixed"``: exactly `max_programs`, each answer taken as it is (the paper: one).
     max_programs
         Quadratic programs per sample, at most (descent) or exactly (fixed).
+    first_programs
+        Quadratic programs, at most, in a sample without a plan from the one before: in the first, after a reset or
+        after a plan that was none (descent).
     tolerance
         A descent ends when the cost falls by less than this part of it.
+    estimator
+        How the state is found from readings; then `observe` and `decide` take the place of `step`.
 
     Raises
     ------
@@ -225,7 +247,9 @@ class Mpc:
         substeps: int = 1,
         method: Literal["descent", "fixed"] = "descent",
         max_programs: int = 8,
+        first_programs: int = 50,
         tolerance: float = 1e-5,
+        estimator: Estimator | None = None,
     ) -> None:
         if not isinstance(plant, Plant):
             raise SettingError(f"plant: {type(plant).__name__} is no lpvmpc.Plant")
@@ -235,11 +259,12 @@ class Mpc:
             "x_bounds": x_bounds, "u_bounds": u_bounds, "state_bounds": state_bounds,
             "u_ref": u_ref, "rows": tuple(rows), "q_y": q_y, "y_bounds": y_bounds,
             "output_bounds": output_bounds, "r_du": r_du, "du_bounds": du_bounds, "linear_models": linear_models, "nodes": nodes,
-            "substeps": substeps, "method": method, "max_programs": max_programs,
-            "tolerance": tolerance,
+            "substeps": substeps, "method": method, "max_programs": max_programs, "first_programs": first_programs,
+            "tolerance": tolerance, "estimator": estimator,
         }  # fmt: skip
         self._n, self._m, self._k = len(plant.states), len(plant.inputs), len(plant.outputs)
         self._native = _lpvmpc.Mpc(plant._native, _to_native(plant, self._settings))
+        self._set_estimator(estimator)
 
     @property
     def plant(self) -> Plant:
@@ -348,6 +373,127 @@ class Mpc:
         SettingError
             An array has not the shape that it must have, or an entry that makes no sense.
         """
+        known = self._known(
+            x_ref, u_ref=u_ref, q=q, r=r, cross=cross, linear_x=linear_x, linear_u=linear_u,
+            x_bounds=x_bounds, u_bounds=u_bounds, rows=rows, disturbance=disturbance,
+            parameters=parameters, y_ref=y_ref, q_y=q_y, y_bounds=y_bounds, r_du=r_du,
+            du_bounds=du_bounds, matrices=matrices, scheduling=scheduling,
+        )  # fmt: skip
+        return Plan(*self._native.step(column("x", x, self._n), known))
+
+    def observe(self, t: float, readings: Mapping[str, float | None] | ArrayLike) -> dict[str, str]:
+        """Takes in readings of the time `t`; may be called more often than once a sample.
+
+        Parameters
+        ----------
+        t
+            When they were taken, s, on any clock.
+        readings
+            By name, or in the order of ``estimator.measured``; one that is missing is left out, None or NaN.
+
+        Returns
+        -------
+        dict
+            What became of each reading: ``"used"``, ``"used after a blow"`` (after outliers in a row, or the first
+            one of a sensor), ``"missing"``, ``"stale"``, ``"repeated"``, ``"outlier"``, ``"not finite"``.
+
+        Raises
+        ------
+        SettingError
+            The controller has no estimator, or there are not as many readings.
+        """
+        names = self._measured()
+        if isinstance(readings, Mapping):
+            for name in readings:
+                if name not in names:
+                    raise SettingError(
+                        f"readings: {name!r} is not measured; what is, is {', '.join(names)}"
+                    )
+            given = [readings.get(name) for name in names]
+        else:
+            given = list(readings)  # type: ignore[arg-type]
+        values = [None if one is None else number("readings", one) for one in given]
+        missing = [None if one is None or np.isnan(one) else one for one in values]
+        verdicts = self._native.observe(number("t", t), missing)
+        return dict(zip(names, verdicts, strict=True))
+
+    def decide(self, x_ref: ArrayLike | None = None, **ahead: Any) -> Plan:
+        """One sample from the last readings: `step` from the estimated state when the input will act, under the
+        estimated disturbances.
+
+        Its first input must be applied (or `set_last_input` say what was): the estimator counts on it. Stage 0 is when it
+        acts, the delay after the last readings. While there is no estimate, the plan's status says so, and its inputs
+        are those nearest to zero within the bounds.
+
+        Parameters
+        ----------
+        x_ref
+            The reference, (n,) or (stages, n), as of `step`.
+        ahead
+            What else `step` may be told, by its names.
+
+        Raises
+        ------
+        SettingError
+            The controller has no estimator; or as `step`.
+        """
+        for name in ahead:
+            if name not in _AHEAD:
+                raise SettingError(f"{name}: a step takes no such thing; there are {', '.join(_AHEAD)}")
+        self._measured()
+        return Plan(*self._native.decide(self._known(x_ref, **dict.fromkeys(_AHEAD) | ahead)))
+
+    @property
+    def estimator(self) -> Estimator | None:
+        """How the state is found from readings; None where it is measured."""
+        found: Estimator | None = self._settings["estimator"]
+        return found
+
+    @property
+    def estimate(self) -> Estimate | None:
+        """The estimate at the last readings; None without an estimator."""
+        found = self._native.estimate
+        if found is None:
+            return None
+        x, disturbances = found
+        names = self._settings["estimator"].disturbances
+        return Estimate(np.array(x), dict(zip(names, disturbances, strict=True)))
+
+    def _measured(self) -> list[str]:
+        """The names of the readings."""
+        estimator = self._settings["estimator"]
+        if estimator is None:
+            raise SettingError("estimator: the controller has none; give it one, or call step")
+        return list(estimator.measured)
+
+    def _set_estimator(self, estimator: Estimator | None) -> None:
+        found = None if estimator is None else estimator_to_native(self._plant, estimator)
+        self._native.set_estimator(found)
+
+    def _known(
+        self,
+        x_ref: ArrayLike | None,
+        *,
+        u_ref: ArrayLike | None,
+        q: ArrayLike | None,
+        r: ArrayLike | None,
+        cross: ArrayLike | None,
+        linear_x: ArrayLike | None,
+        linear_u: ArrayLike | None,
+        x_bounds: tuple[ArrayLike, ArrayLike] | None,
+        u_bounds: tuple[ArrayLike, ArrayLike] | None,
+        rows: Sequence[Sequence[Row]] | None,
+        disturbance: ArrayLike | None,
+        parameters: ArrayLike | None,
+        y_ref: ArrayLike | None,
+        q_y: ArrayLike | None,
+        y_bounds: tuple[ArrayLike, ArrayLike] | None,
+        r_du: ArrayLike | None,
+        du_bounds: tuple[ArrayLike, ArrayLike] | None,
+        matrices: tuple[ArrayLike, ...] | None,
+        scheduling: ArrayLike | None,
+    ) -> dict[str, Any]:
+        """What a step is told, as the native half takes it."""
         n, m, k = self._n, self._m, self._k
         known: dict[str, Any] = {"x_ref": None}
         for name, given, size in (
@@ -383,8 +529,7 @@ class Mpc:
             known["rows"] = [[_row(self._plant, row) for row in stage] for stage in rows]
         if matrices is not None:
             known |= _models(matrices, n, m)
-        fields = self._native.step(column("x", x, n), known)
-        return Plan(*fields)
+        return known
 
     def set(self, **changes: Any) -> None:
         """Other settings from the next step on, by the names of the arguments of `Mpc`.
@@ -405,7 +550,14 @@ class Mpc:
         for name in ("t_s", "horizon"):
             if new[name] != self._settings[name]:
                 raise SettingError(f"{name}: it stays; make another controller")
-        self._native.set_settings(_to_native(self._plant, new))
+        native = _to_native(self._plant, new)
+        if "estimator" in changes:
+            self._set_estimator(changes["estimator"])
+        try:
+            self._native.set_settings(native)
+        except SettingError:
+            self._set_estimator(self._settings["estimator"])
+            raise
         self._settings = new
 
     def set_parameters(self, **values: float) -> None:
@@ -421,7 +573,10 @@ class Mpc:
         self._plant = plant
 
     def set_last_input(self, u: ArrayLike) -> None:
-        """What was applied last, shape (m,), if it is not what the last step gave: changes count from there.
+        """What was applied last, shape (m,), if it is not what the last step gave: changes count from there, and an
+        estimator predicts with it.
+
+        Before the first step it is what acts already; an estimator without it takes that for zero.
 
         Raises
         ------
@@ -431,8 +586,48 @@ class Mpc:
         self._native.set_last_input(column("u", u, self._m))
 
     def reset(self) -> None:
-        """Forgets the last plan: the next step is as the first."""
+        """Forgets the last plan and what was estimated: the next step is as the first."""
         self._native.reset()
+
+    def save_firmware(
+        self,
+        folder: str | PathLike[str],
+        *,
+        lpvmpc: str | PathLike[str],
+        x0: ArrayLike,
+        x_ref: ArrayLike | None = None,
+        samples: int = 100,
+    ) -> None:
+        """Writes a program for a Cortex-M4F that runs this controller in single precision, without heap: a whole crate of
+        Rust for ``cargo build`` and, on an emulated board, ``cargo run``.
+
+        It runs a descent of at most eight programs per sample with one Runge-Kutta step, keeps the bounds of inputs and,
+        softly, of states, and has the plant itself as a stand-in for a robot.
+
+        Parameters
+        ----------
+        folder
+            Where to; it must not be there yet.
+        lpvmpc
+            Where the crate ``lpvmpc`` is, as its Cargo.toml is to say: ``crates/lpvmpc`` of a checkout, as an absolute
+            path.
+        x0
+            Where the stand-in begins, shape (n,).
+        x_ref
+            Where it is to go, shape (n,); the plant's equilibrium, or zero, without.
+        samples
+            How many samples it runs.
+
+        Raises
+        ------
+        SettingError
+            The controller has a setting that the program has none of; the message names it.
+        PlantError
+            A number has no place in single precision, or the folder cannot be written.
+        """
+        from ._firmware import save_firmware
+
+        save_firmware(self, folder, lpvmpc, x0, x_ref, _whole("samples", samples))
 
     def __getstate__(self) -> tuple[Plant, dict[str, Any]]:
         return self._plant, self._settings
@@ -446,17 +641,26 @@ class Mpc:
         return f"<Mpc of {self._plant.name!r}: {self.horizon} samples of {self.t_s} s>"
 
 
+_AHEAD = (
+    "u_ref", "q", "r", "cross", "linear_x", "linear_u", "x_bounds", "u_bounds", "rows", "disturbance",
+    "parameters", "y_ref", "q_y", "y_bounds", "r_du", "du_bounds", "matrices", "scheduling",
+)  # fmt: skip
+"""What a step may be told besides the reference."""
+
+
 def _to_native(plant: Plant, given: Mapping[str, Any]) -> dict[str, Any]:
     """Settings as the native half takes them."""
     states, inputs = plant.states, plant.inputs
     n, m = len(states), len(inputs)
     settings = dict(given)
-    for name in ("horizon", "nodes", "substeps", "max_programs"):
+    for name in ("horizon", "nodes", "substeps", "max_programs", "first_programs"):
         settings[name] = _whole(name, given[name])
     for name in ("t_s", "tolerance"):
-        settings[name] = _number(name, given[name])
+        settings[name] = number(name, given[name])
     settings["q"], settings["r"] = weight("q", given["q"], n), weight("r", given["r"], m)
-    if not isinstance(given["terminal"], str):
+    if isinstance(given["terminal"], Certificate):
+        settings["terminal"] = (given["terminal"].to_json(),)
+    elif not isinstance(given["terminal"], str):
         settings["terminal"] = weight("terminal", given["terminal"], n)
     settings["x_bounds"] = _limits("x_bounds", given["x_bounds"], states)
     settings["u_bounds"] = _limits("u_bounds", given["u_bounds"], inputs)
@@ -473,6 +677,7 @@ def _to_native(plant: Plant, given: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(given["output_bounds"], Mapping):
         settings["output_bounds"] = _prices("output_bounds", given["output_bounds"], outputs)
     settings["rows"] = [_row(plant, row) for row in given["rows"]]
+    del settings["estimator"]
     return settings
 
 
@@ -480,13 +685,6 @@ def _whole(name: str, given: Any) -> int:
     if isinstance(given, (int, np.integer)) and not isinstance(given, bool) and given >= 0:
         return int(given)
     raise SettingError(f"{name}: it is {given!r}; it must be a whole number from 1 on")
-
-
-def _number(name: str, given: Any) -> float:
-    try:
-        return float(given)
-    except (TypeError, ValueError):
-        raise SettingError(f"{name}: it is {given!r}; it must be a number") from None
 
 
 def _pair(place: str, given: Any) -> tuple[Any, Any]:
@@ -533,7 +731,7 @@ def _limits(
 def _price(place: str, price: Any) -> tuple[float, float]:
     if not isinstance(price, Penalty):
         raise SettingError(f"{place}: {price!r} is no Penalty(linear, quadratic)")
-    return _number(place, price.linear), _number(place, price.quadratic)
+    return number(place, price.linear), number(place, price.quadratic)
 
 
 def _prices(
@@ -568,8 +766,8 @@ def _row(plant: Plant, row: Row) -> tuple[Any, ...]:
         str(row.name),
         _coefficients(f"{place}, x", row.x, plant.states),
         _coefficients(f"{place}, u", row.u, plant.inputs),
-        -np.inf if row.lower is None else _number(f"{place}, lower", row.lower),
-        np.inf if row.upper is None else _number(f"{place}, upper", row.upper),
+        -np.inf if row.lower is None else number(f"{place}, lower", row.lower),
+        np.inf if row.upper is None else number(f"{place}, upper", row.upper),
         None if row.soft is None else _price(f"{place}, soft", row.soft),
     )
 
@@ -582,7 +780,7 @@ def _coefficients(place: str, given: Any, signals: list[Signal]) -> list[float]:
         for name in given:
             if name not in names:
                 raise SettingError(f"{place}: there is no {name!r}; there are {', '.join(names)}")
-        return [_number(place, given.get(name, 0.0)) for name in names]
+        return [number(place, given.get(name, 0.0)) for name in names]
     found: list[float] = column(place, given, len(signals)).tolist()
     return found
 

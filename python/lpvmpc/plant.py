@@ -1,4 +1,4 @@
-"""Plants: x_dot = f(x, u, p), with names, units, bounds and parameters."""
+"""Plants: x_dot = f(x, u, p), or x+ = f(x, u, p), with names, units, bounds and parameters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _casadi, _lpvmpc, _sympy
-from ._arrays import column, table
+from ._arrays import column, number, table
 from ._tape import Tape
 from .errors import PlantError
 
@@ -56,7 +56,7 @@ class Embedding:
 
 @dataclass(frozen=True)
 class SteadyState:
-    """Where a plant stands, f(x, u) = 0."""
+    """Where a plant stands: f(x, u) = 0, or in discrete time f(x, u) = x."""
 
     x: Array
     """The state, shape (n,)."""
@@ -68,7 +68,7 @@ class SteadyState:
 
 
 class Plant:
-    """A plant x_dot = f(x, u, p), perhaps with outputs y = g(x, u, p).
+    """A plant x_dot = f(x, u, p), or in discrete time x+ = f(x, u, p), perhaps with outputs y = g(x, u, p).
 
     Make one by `from_casadi`, `from_do_mpc`, `from_acados`, `from_sympy`, `from_matrices`, `load` or
     `from_json`. A plant does not change: `with_parameters` makes another one. It can be pickled.
@@ -121,6 +121,7 @@ class Plant:
         bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
         equilibrium: tuple[ArrayLike, ArrayLike] | None = None,
         embedding: Embedding | None = None,
+        period: float | None = None,
     ) -> Plant:
         """A plant from CasADi expressions.
 
@@ -129,7 +130,8 @@ class Plant:
         x, u
             The states and inputs, ``SX`` or ``MX`` symbols: a column, or a list of symbols.
         xdot
-            f(x, u, p), the derivatives of the states in state units per second: a column, or a list.
+            f(x, u, p), the derivatives of the states in state units per second, or with a `period` the
+            states one period later: a column, or a list.
         p
             The parameters, symbols as `x`.
         y
@@ -145,9 +147,11 @@ class Plant:
         bounds
             (lower, upper) by name of a state, an input or an output, in its unit; None where there is none.
         equilibrium
-            A steady state (x, u), f(x, u) = 0.
+            A steady state (x, u), f(x, u) = 0, or with a `period` f(x, u) = x.
         embedding
             The plant's own linear parameter-varying form, if it has one.
+        period
+            The period of a plant in discrete time, s; none in continuous time.
 
         Raises
         ------
@@ -191,6 +195,7 @@ class Plant:
             bounds=bounds,
             equilibrium=equilibrium,
             embedding=None if embedding is None else _embedding(tape, embedding, groups, sizes),
+            period=period,
         )
 
     @classmethod
@@ -202,6 +207,7 @@ class Plant:
         units: Mapping[str, str] | None = None,
         bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
         equilibrium: tuple[ArrayLike, ArrayLike] | None = None,
+        period: float | None = None,
     ) -> Plant:
         """The plant of a do-mpc ``Model`` after its ``setup()``.
 
@@ -210,11 +216,13 @@ class Plant:
         Parameters
         ----------
         model
-            A ``do_mpc.model.Model`` in continuous time, without algebraic states.
+            A ``do_mpc.model.Model`` without algebraic states.
         parameters
             The values of its parameters, by name or in its order.
         units, bounds, equilibrium
             As of `from_casadi`.
+        period
+            The period of a discrete model, s.
 
         Raises
         ------
@@ -223,8 +231,10 @@ class Plant:
         """
         if not getattr(model, "flags", {}).get("setup", False):
             raise PlantError("model: call its setup() first")
-        if model.model_type != "continuous":
-            raise PlantError(f"model: it is {model.model_type}; it must be continuous")
+        if model.model_type != "continuous" and period is None:
+            raise PlantError(f"period: the model is {model.model_type}, so it needs one, in s")
+        if model.model_type == "continuous" and period is not None:
+            raise PlantError("period: the model is continuous, and has none")
         if model.n_z:
             raise PlantError(
                 f"model: it has {model.n_z} algebraic states; solve for them and put them in"
@@ -241,6 +251,7 @@ class Plant:
             units=units,
             bounds=bounds,
             equilibrium=equilibrium,
+            period=period,
         )
 
     @classmethod
@@ -252,8 +263,10 @@ class Plant:
         units: Mapping[str, str] | None = None,
         bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
         equilibrium: tuple[ArrayLike, ArrayLike] | None = None,
+        period: float | None = None,
     ) -> Plant:
-        """The plant of an ``AcadosModel``, or of any object with `x`, `u`, `p` and ``f_expl_expr``.
+        """The plant of an ``AcadosModel``, or of any object with `x`, `u`, `p` and ``f_expl_expr``, or with a
+        `period` ``disc_dyn_expr``.
 
         Parameters
         ----------
@@ -263,15 +276,19 @@ class Plant:
             The values of ``p``, by name in its order or as a list.
         units, bounds, equilibrium
             As of `from_casadi`.
+        period
+            The period of discrete dynamics, s.
 
         Raises
         ------
         PlantError
             The model has no explicit dynamics, or makes no plant.
         """
-        explicit = getattr(model, "f_expl_expr", None)
+        formula = "f_expl_expr" if period is None else "disc_dyn_expr"
+        explicit = getattr(model, formula, None)
         if explicit is None or (hasattr(explicit, "numel") and explicit.numel() == 0):
-            raise PlantError("model: it has no f_expl_expr; explicit dynamics are needed")
+            kind = "explicit" if period is None else "discrete"
+            raise PlantError(f"model: it has no {formula}; {kind} dynamics are needed")
         z = getattr(model, "z", None)
         if z is not None and hasattr(z, "numel") and z.numel():
             raise PlantError("model: it has algebraic variables z; solve for them and put them in")
@@ -288,6 +305,7 @@ class Plant:
             units=units,
             bounds=bounds,
             equilibrium=equilibrium,
+            period=period,
         )
 
     @classmethod
@@ -306,6 +324,7 @@ class Plant:
         units: Mapping[str, str] | None = None,
         bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
         equilibrium: tuple[ArrayLike, ArrayLike] | None = None,
+        period: float | None = None,
     ) -> Plant:
         """A plant from SymPy expressions.
 
@@ -319,7 +338,7 @@ class Plant:
             g(x, u, p), the outputs: a list or a column ``Matrix``.
         parameters
             The values of all other symbols, ``{m: 0.3}``.
-        name, states, inputs, outputs, units, bounds, equilibrium
+        name, states, inputs, outputs, units, bounds, equilibrium, period
             As of `from_casadi`.
 
         Raises
@@ -350,6 +369,7 @@ class Plant:
             units=units,
             bounds=bounds,
             equilibrium=equilibrium,
+            period=period,
         )
 
     @classmethod
@@ -368,8 +388,10 @@ class Plant:
         units: Mapping[str, str] | None = None,
         bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
         equilibrium: tuple[ArrayLike, ArrayLike] | None = None,
+        period: float | None = None,
     ) -> Plant:
-        """A linear plant x_dot = A x + B u + offset, y = C x + D u, in continuous time.
+        """A linear plant x_dot = A x + B u + offset, or with a `period` x+ = A x + B u + offset, and
+        y = C x + D u.
 
         Parameters
         ----------
@@ -378,8 +400,8 @@ class Plant:
         c, d
             Shapes (k, n) and (k, m).
         offset
-            Shape (n,), in state units per second.
-        name, states, inputs, outputs, units, bounds, equilibrium
+            Shape (n,), in state units per second, or per period.
+        name, states, inputs, outputs, units, bounds, equilibrium, period
             As of `from_casadi`.
 
         Raises
@@ -421,6 +443,7 @@ class Plant:
             units=units,
             bounds=bounds,
             equilibrium=equilibrium,
+            period=period,
         )
 
     @classmethod
@@ -438,6 +461,7 @@ class Plant:
         units: Mapping[str, str] | None,
         bounds: Mapping[str, tuple[float | None, float | None]] | None,
         equilibrium: tuple[ArrayLike, ArrayLike] | None,
+        period: float | None,
         embedding: dict[str, Any] | None = None,
     ) -> Plant:
         called = _named("outputs", outputs, [f"y_{i}" for i in range(len(output))])
@@ -477,8 +501,11 @@ class Plant:
             ],
             "outputs": [signal(one) for one in called],
             "operations": tape.operations,
-            "derivative": derivative,
         }
+        if period is None:
+            data["derivative"] = derivative
+        else:
+            data |= {"period": number("period", period, PlantError), "next": derivative}
         if output:
             data["output"] = output
         if equilibrium is not None:
@@ -530,6 +557,11 @@ class Plant:
         found = self._native.equilibrium
         return None if found is None else (np.array(found[0]), np.array(found[1]))
 
+    @property
+    def period(self) -> float | None:
+        """The period of a plant in discrete time, s; None in continuous time."""
+        return self._native.period
+
     def with_parameters(self, **values: float) -> Plant:
         """This plant with other values of some parameters.
 
@@ -543,7 +575,7 @@ class Plant:
     # What it does.
 
     def f(self, x: ArrayLike, u: ArrayLike) -> Array:
-        """x_dot = f(x, u), shape (n,), in state units per second.
+        """f(x, u), shape (n,): x_dot in state units per second, or in discrete time the state one period later.
 
         Raises
         ------

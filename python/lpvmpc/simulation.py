@@ -13,6 +13,7 @@ from . import _lpvmpc
 from ._arrays import column, numbers
 from ._progress import samples_of
 from .errors import MissingPackageError, SettingError, SimulationError
+from .estimator import Estimator
 from .mpc import Mpc, Plan
 from .plant import Plant, Signal
 
@@ -28,7 +29,7 @@ function of time."""
 
 @dataclass(frozen=True)
 class Sensor:
-    """A measured state, and what is wrong with the reading. All in the state's unit."""
+    """A measured state or output, and what is wrong with the reading. All in its unit."""
 
     noise: float = 0.0
     """Standard deviation of white Gaussian noise."""
@@ -37,7 +38,7 @@ class Sensor:
     resolution: float = 0.0
     """Step between two readings; 0 for a continuous one."""
     dropout: float = 0.0
-    """Probability that a sample is missing: the controller then has the last one."""
+    """Probability that a sample is missing. A controller without an estimator then has the last one."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class Load:
     end: float
     """Until when, s; infinite for ever."""
     load: ArrayLike
-    """In state units per second, shape (n,)."""
+    """In state units per second (per period, in discrete time), shape (n,)."""
 
 
 @dataclass(frozen=True)
@@ -88,10 +89,15 @@ class Run:
     """The commanded inputs, shape (K, m)."""
     y: Array
     """The outputs at the samples, under the input there, shape (K, k)."""
+    readings: Array
+    """What the sensors delivered, NaN where nothing arrived: shape (K, sensors). They are those of the states, or what
+    the controller's estimator measures."""
     x_measured: Array
-    """What the controller was given, shape (K, n)."""
+    """What the controller took for the state at the sample, shape (K, n): measured, or estimated."""
     x_ref: Array | None
     """The reference at the samples, shape (K, n); None where there was none."""
+    disturbances: dict[str, Array] = field(default_factory=dict)
+    """The disturbances that the controller's estimator found, by name: shape (K,) each."""
     plans: list[Plan] = field(default_factory=list)
     """The plans, where the controller is an `Mpc`."""
     step_times: Array = field(default_factory=lambda: np.zeros(0))
@@ -218,7 +224,9 @@ def simulate(
     absolute_tolerance: float = 1e-9,
     progress: bool = False,
 ) -> Run:
-    """A controller on a simulated plant, which moves in continuous time.
+    """A controller on a simulated plant, which moves in continuous time, or in steps of its own period.
+
+    A controller with an estimator gets the readings of what it measures, the others the whole state.
 
     Parameters
     ----------
@@ -231,17 +239,19 @@ def simulate(
     duration
         How long, s; a whole number of samples, rounded up.
     x_ref
-        The reference: constant, by sample, or a function of time. An `Mpc` sees it ahead over its horizon.
+        The reference: constant, by sample, or a function of time. An `Mpc` sees it ahead over its horizon, from when
+        its input acts.
     u_ref
         The input that costs nothing, for an `Mpc`, shape (m,).
     t_s
         The sampling time, s, of a controller that is a function.
     sensors
-        What is wrong with the measured states, by name; the others are measured perfectly.
+        What is wrong with what is measured, by name of a state, or of an output that an estimator measures; the
+        others are measured perfectly.
     actuators
         What is wrong with the inputs, by name.
     delay
-        Time from a command to its arrival at the plant, s.
+        Time from a command to its arrival at the plant, s. Before the first arrives the input is zero.
     disturbances
         Loads and jumps.
     seed
@@ -296,13 +306,16 @@ def simulate(
         raise SettingError(f"duration: it is {duration} s; it must be a positive number of seconds")
     count = int(np.ceil(duration / period - 1e-9))
     horizon = mpc.horizon if mpc is not None else 0
-    reference = _reference(x_ref, n, count + horizon + 1, period)
+    reference = _reference(x_ref, n, count, period)
+    estimator = None if mpc is None else mpc.estimator
+    acts = 0.0 if estimator is None else float(estimator.delay)
+    ahead = None if mpc is None else _reference(x_ref, n, count + horizon + 1, period, acts)
     world = _lpvmpc.World(
         plant._native,
         column("x0", x0, n),
         {
             "period": period,
-            "sensors": _sensors(sensors, states),
+            "sensors": _sensors(sensors, plant, estimator),
             "actuators": _actuators(actuators, inputs),
             "delay": _seconds("delay", delay),
             "pushes": [_push(i, push, n) for i, push in enumerate(disturbances)],
@@ -313,7 +326,19 @@ def simulate(
     )
     if mpc is not None:
         mpc.reset()
-    return _run(plant, controller, mpc, world, count, period, reference, u_ref, progress)
+    known = _Known(reference, ahead, u_ref)
+    return _run(plant, controller, mpc, world, count, period, known, progress)
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What a controller is told besides the readings."""
+
+    reference: Array | None
+    """The reference at the samples, for the result."""
+    ahead: Array | None
+    """The reference from when the input of the first sample acts, beyond the last sample by a horizon."""
+    u_ref: ArrayLike | None
 
 
 def _run(
@@ -323,27 +348,39 @@ def _run(
     world: _lpvmpc.World,
     count: int,
     period: float,
-    reference: Array | None,
-    u_ref: ArrayLike | None,
+    known: _Known,
     progress: bool,
 ) -> Run:
     from time import perf_counter
 
     n, m, k = len(plant.states), len(plant.inputs), len(plant.outputs)
     x, u, y = np.empty((count + 1, n)), np.empty((count, m)), np.empty((count, k))
+    readings = np.empty((count, len(world.readings)))
     measured, step_times = np.empty((count, n)), np.empty(count)
+    estimator = None if mpc is None else mpc.estimator
+    found = {name: np.empty(count) for name in (estimator.disturbances if estimator else ())}
     plans: list[Plan] = []
     seen = world.x  # where a reading is missing, the last one holds
     x[0] = seen
     for i in samples_of(count, progress):
-        for j, reading in enumerate(world.readings):
-            if reading is not None:
-                seen[j] = reading[0]
-        measured[i] = seen
+        readings[i] = [np.nan if reading is None else reading[0] for reading in world.readings]
         start = perf_counter()
+        if mpc is not None and estimator is not None:
+            mpc.observe(world.time, readings[i])
+            estimate = mpc.estimate
+            assert estimate is not None
+            seen = estimate.x
+            for name, one in estimate.disturbances.items():
+                found[name][i] = one
+        else:
+            seen = np.where(np.isnan(readings[i]), seen, readings[i])
+        measured[i] = seen
         if mpc is not None:
-            ahead = None if reference is None else reference[i : i + mpc.horizon + 1]
-            plan = mpc.step(seen, ahead, u_ref=u_ref)
+            ahead = None if known.ahead is None else known.ahead[i : i + mpc.horizon + 1]
+            if estimator is None:
+                plan = mpc.step(seen, ahead, u_ref=known.u_ref)
+            else:
+                plan = mpc.decide(ahead, u_ref=known.u_ref)
             plans.append(plan)
             u[i] = plan.u0
         else:
@@ -367,26 +404,32 @@ def _run(
         x=x,
         u=u,
         y=y,
+        readings=readings,
         x_measured=measured,
-        x_ref=None if reference is None else reference[:count],
+        x_ref=known.reference,
+        disturbances=found,
         plans=plans,
         step_times=step_times,
         bounds={} if mpc is None else mpc.bounds,
     )
 
 
-def _reference(given: Reference, n: int, stages: int, period: float) -> Array | None:
-    """The reference at each sample and over the last horizon."""
+def _reference(
+    given: Reference, n: int, stages: int, period: float, start: float = 0.0
+) -> Array | None:
+    """The reference at so many samples from the time `start` on."""
     if given is None:
         return None
     if callable(given):
-        return np.array([column(f"x_ref at {i * period:g} s", given(i * period), n) for i in range(stages)])
+        times = start + np.arange(stages) * period
+        return np.array([column(f"x_ref at {t:g} s", given(float(t)), n) for t in times])
+    first = int(np.floor(start / period + 1e-9))
     array = numbers("x_ref", given)
     if array.shape == (n,) or (array.ndim == 0 and n == 1):
         return np.tile(array.reshape(1, n), (stages, 1))
     if array.ndim == 2 and array.shape[1] == n and len(array):
-        held = np.repeat(array[-1:], max(0, stages - len(array)), axis=0)
-        return np.concatenate([array, held])[:stages]
+        held = np.repeat(array[-1:], max(0, first + stages - len(array)), axis=0)
+        return np.concatenate([array, held])[first : first + stages]
     raise SettingError(
         f"x_ref: its shape is {array.shape}; it must be ({n},), (samples, {n}) or a function of time"
     )
@@ -402,16 +445,25 @@ def _by_name(place: str, given: Mapping[str, Any] | None, signals: list[Signal],
 
 
 def _sensors(
-    given: Mapping[str, Sensor] | None, states: list[Signal]
+    given: Mapping[str, Sensor] | None, plant: Plant, estimator: Estimator | None
 ) -> list[tuple[Any, ...]] | None:
-    _by_name("sensors", given, states, Sensor)
-    if not given:
+    states = plant.states
+    measured = states
+    if estimator is not None:
+        known = {signal.name: signal for signal in (*plant.outputs, *states)}
+        for name in estimator.measured:
+            if name not in known:
+                raise SettingError(f"plant: it has no {name!r}, which the controller measures")
+        measured = [known[name] for name in estimator.measured]
+    _by_name("sensors", given, measured, Sensor)
+    if not given and estimator is None:
         return None
     found = []
-    for i, state in enumerate(states):
-        one = given.get(state.name, Sensor())
-        row = [1.0 if j == i else 0.0 for j in range(len(states))]
-        found.append((row, one.noise, one.bias, one.resolution, one.dropout, 1, 0))
+    for signal in measured:
+        one = (given or {}).get(signal.name, Sensor())
+        row = [1.0 if state.name == signal.name else 0.0 for state in states]
+        of = row if any(row) else signal.name
+        found.append((of, one.noise, one.bias, one.resolution, one.dropout, 1, 0))
     return found
 
 

@@ -1,5 +1,7 @@
-//! The ballbot: scenarios, identification, certificates, studies, as the program `ballbot` has them.
+//! The ballbot: scenarios, identification, certificates, campaigns and studies, as the program `ballbot`
+//! has them.
 
+mod campaign;
 mod certificate;
 mod identification;
 mod run;
@@ -7,7 +9,8 @@ mod scenario;
 mod studies;
 mod values;
 
-pub use certificate::{certify, verify};
+pub use campaign::{campaign_example, run_campaign};
+pub use certificate::{certify_scenario, verify_certificate};
 pub use identification::{excite, identification_example, identify};
 pub use scenario::Scenario;
-pub use studies::{bench, campaign, reproduce, timed_scenarios};
+pub use studies::{bench, count_guarantee, reproduce, timed_scenarios};

@@ -25,10 +25,19 @@ pub fn lqr<'py>(
             &format!("it is {t_s} s; it must be a positive number of seconds"),
         ));
     }
+    if let Some(period) = plant.inner.period()
+        && t_s != period
+    {
+        let fault = format!("it is {t_s} s; the plant is in discrete time, with {period} s");
+        return Err(setting("t_s", &fault));
+    }
     let (x, u) = (entries(&x), entries(&u));
     let (a, b) = jacobian(&plant.inner, &x, &u).map_err(of_plant)?;
     let refused = |error: &dyn std::fmt::Display| setting("lqr", &error.to_string());
-    let (a_d, b_d) = zero_order_hold(&a, &b, t_s).map_err(|error| refused(&error))?;
+    let (a_d, b_d) = match plant.inner.period() {
+        None => zero_order_hold(&a, &b, t_s).map_err(|error| refused(&error))?,
+        Some(_) => (a, b),
+    };
     let lqr =
         lqr_discrete(&a_d, &b_d, &matrix(&q), &matrix(&r)).map_err(|error| refused(&error))?;
     Ok((to_numpy(py, &lqr.k), to_numpy(py, &lqr.p)))

@@ -2,6 +2,7 @@
 
 use ballbot_scenario::ScenarioError;
 use lpvmpc_any::MpcError;
+use lpvmpc_certify::CertifyError;
 use lpvmpc_plant::PlantError;
 use pyo3::PyErr;
 
@@ -10,6 +11,7 @@ mod python {
 
     import_exception!(lpvmpc.errors, CertificateError);
     import_exception!(lpvmpc.errors, IdentificationError);
+    import_exception!(lpvmpc.errors, FalseClaimError);
     import_exception!(lpvmpc.errors, PlantError);
     import_exception!(lpvmpc.errors, ScenarioError);
     import_exception!(lpvmpc.errors, SettingError);
@@ -24,6 +26,17 @@ pub fn of_plant(error: PlantError) -> PyErr {
 /// `lpvmpc.SettingError`.
 pub fn of_setting(error: MpcError) -> PyErr {
     python::SettingError::new_err(error.to_string())
+}
+
+/// `lpvmpc.CertificateError`, or what it is of a setting or of a claim that is false.
+pub fn of_certificate(error: CertifyError) -> PyErr {
+    let text = error.to_string();
+    match error {
+        _ if error.is_false() => python::FalseClaimError::new_err(text),
+        CertifyError::Setting { .. } => python::SettingError::new_err(text),
+        CertifyError::Plant(_) => python::PlantError::new_err(text),
+        _ => python::CertificateError::new_err(text),
+    }
 }
 
 /// `lpvmpc.SettingError` about `place`.

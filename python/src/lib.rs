@@ -1,9 +1,10 @@
 //! The native half of the Python package `lpvmpc`: plants, controllers and simulated worlds of any
-//! size, and what the program `ballbot` does. What people call is in `lpvmpc/`, with its documentation; numbers arrive here with their
-//! shapes checked for form only, and the libraries check what they mean.
+//! size, and what the program `ballbot` does. What people call is in `lpvmpc/`, with its documentation;
+//! numbers arrive here with their shapes checked for form only, and the libraries check what they mean.
 
 mod arrays;
 mod ballbot;
+mod certify;
 mod design;
 mod errors;
 mod mpc;
@@ -18,9 +19,12 @@ use pyo3::prelude::*;
 mod _lpvmpc {
     #[pymodule_export]
     use super::ballbot::{
-        Scenario, bench, campaign, certify, excite, identification_example, identify, reproduce,
-        timed_scenarios, verify,
+        Scenario, bench, campaign_example, certify_scenario, count_guarantee, excite,
+        identification_example, identify, reproduce, run_campaign, timed_scenarios,
+        verify_certificate,
     };
+    #[pymodule_export]
+    use super::certify::{certify, check_certificate, verify};
     #[pymodule_export]
     use super::design::lqr;
     #[pymodule_export]

@@ -1,13 +1,14 @@
 //! Controllers.
 
 use crate::arrays::{Matrices, Matrix, Vector, entries, matrix, pairs, rows, stack};
-use crate::errors::{of_setting, setting};
+use crate::errors::{of_certificate, of_setting, setting};
 use crate::plan::{PlanTuple, fields};
 use crate::plant::Plant;
 use lpvmpc_any::{
-    Iterations, Limits, LinearModels, MpcSettings, Penalty, Preview, Row, StageMatrices,
-    StateBounds, Terminal,
+    Disturbance, EstimatorSettings, Gate, Iterations, Limits, LinearModels, MpcSettings, Penalty,
+    Preview, Row, StageMatrices, StateBounds, Terminal, Verdict,
 };
+use lpvmpc_certify::Certificate;
 use nalgebra::{DMatrix, DVector};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -64,6 +65,8 @@ impl StateBoundsArgument {
 #[derive(FromPyObject)]
 enum TerminalArgument<'py> {
     Word(String),
+    /// The text of a certificate, in a tuple.
+    Certificate((String,)),
     Cost(Matrix<'py>),
 }
 
@@ -91,11 +94,12 @@ struct Settings<'py> {
     nodes: usize,
     method: String,
     max_programs: usize,
+    first_programs: usize,
     tolerance: f64,
 }
 
 impl Settings<'_> {
-    fn build(self) -> PyResult<MpcSettings> {
+    fn build(self, plant: &lpvmpc_plant::Plant) -> PyResult<MpcSettings> {
         Ok(MpcSettings {
             t_s: self.t_s,
             horizon: self.horizon,
@@ -104,6 +108,11 @@ impl Settings<'_> {
             r: matrix(&self.r),
             terminal: match self.terminal {
                 TerminalArgument::Cost(p) => Terminal::Cost(matrix(&p)),
+                TerminalArgument::Certificate((text,)) => {
+                    let certificate = Certificate::from_json(&text).map_err(of_certificate)?;
+                    let set = certificate.terminal_set(plant).map_err(of_certificate)?;
+                    Terminal::Certified(Box::new(set))
+                }
                 TerminalArgument::Word(word) => match word.as_str() {
                     "lqr" => Terminal::Lqr,
                     "equality" => Terminal::Equality,
@@ -111,7 +120,7 @@ impl Settings<'_> {
                         return Err(one_of(
                             "terminal",
                             &word,
-                            "\"lqr\", \"equality\" or a matrix P",
+                            "\"lqr\", \"equality\", a matrix P or a Certificate",
                         ));
                     }
                 },
@@ -142,6 +151,7 @@ impl Settings<'_> {
                 "descent" => Iterations::Descent {
                     tolerance: self.tolerance,
                     most: self.max_programs,
+                    first: self.first_programs,
                 },
                 "fixed" => Iterations::Fixed(self.max_programs),
                 other => return Err(one_of("method", other, "\"descent\" or \"fixed\"")),
@@ -271,6 +281,58 @@ impl Known<'_> {
     }
 }
 
+/// An estimator, as Python hands it over: all keys are there.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Estimator {
+    measured: Vec<String>,
+    measurement_noise: Vec<f64>,
+    state_noise: Vec<f64>,
+    start: Option<Vec<f64>>,
+    initial_state: Vec<f64>,
+    /// Where each acts, its noise and its variance at the start.
+    disturbances: Vec<(String, f64, f64)>,
+    delay: f64,
+    /// Deviations, patience, oldest reading, longest gap.
+    gate: (f64, usize, f64, f64),
+}
+
+impl From<Estimator> for EstimatorSettings {
+    fn from(given: Estimator) -> Self {
+        let disturbance = |(on, noise, initial)| Disturbance { on, noise, initial };
+        let (deviations, patience, oldest, longest_gap) = given.gate;
+        Self {
+            measured: given.measured,
+            measurement_noise: given.measurement_noise,
+            state_noise: given.state_noise,
+            start: given.start,
+            initial_state: given.initial_state,
+            disturbances: given.disturbances.into_iter().map(disturbance).collect(),
+            delay: given.delay,
+            gate: Gate {
+                deviations,
+                patience,
+                oldest,
+                longest_gap,
+            },
+        }
+    }
+}
+
+/// The word for what became of a reading.
+fn verdict(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Used => "used",
+        Verdict::UsedAfterBlow => "used after a blow",
+        Verdict::Missing => "missing",
+        Verdict::NotNeeded => "not needed",
+        Verdict::NotFinite => "not finite",
+        Verdict::Stale => "stale",
+        Verdict::Repeated => "repeated",
+        Verdict::Outlier => "outlier",
+    }
+}
+
 /// The controller of a plant.
 #[pyclass(module = "lpvmpc._lpvmpc")]
 pub struct Mpc {
@@ -281,7 +343,7 @@ pub struct Mpc {
 impl Mpc {
     #[new]
     fn new(py: Python<'_>, plant: &Plant, settings: Settings<'_>) -> PyResult<Self> {
-        let settings = settings.build()?;
+        let settings = settings.build(&plant.inner)?;
         let inner = py.detach(|| lpvmpc_any::Mpc::new(&plant.inner, &settings));
         Ok(Self {
             inner: inner.map_err(of_setting)?,
@@ -304,8 +366,34 @@ impl Mpc {
         Ok(fields(py, plan.map_err(of_setting)?))
     }
 
+    fn set_estimator(&mut self, settings: Option<Estimator>) -> PyResult<()> {
+        let settings = settings.map(EstimatorSettings::from);
+        self.inner
+            .set_estimator(settings.as_ref())
+            .map_err(of_setting)
+    }
+
+    fn observe(&mut self, t: f64, readings: Vec<Option<f64>>) -> PyResult<Vec<&'static str>> {
+        let verdicts = self.inner.observe(t, &readings).map_err(of_setting)?;
+        Ok(verdicts.into_iter().map(verdict).collect())
+    }
+
+    fn decide<'py>(&mut self, py: Python<'py>, known: Known<'py>) -> PyResult<PlanTuple<'py>> {
+        let preview = known.build()?;
+        let inner = &mut self.inner;
+        let plan = py.detach(|| inner.decide(&preview));
+        Ok(fields(py, plan.map_err(of_setting)?))
+    }
+
+    /// State and disturbances.
+    #[getter]
+    fn estimate(&self) -> Option<(Vec<f64>, Vec<f64>)> {
+        let estimate = self.inner.estimate()?;
+        Some((estimate.x, estimate.disturbances))
+    }
+
     fn set_settings(&mut self, settings: Settings<'_>) -> PyResult<()> {
-        let settings = settings.build()?;
+        let settings = settings.build(self.inner.plant())?;
         self.inner.set_settings(&settings).map_err(of_setting)
     }
 

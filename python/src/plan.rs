@@ -26,7 +26,8 @@ fn word(status: &Status<f64>) -> &'static str {
 /// Stage, bound in words, multiplier, whether it is exceeded.
 type Active = (usize, String, f64, bool);
 
-/// u, x, status, message, whether it is solved, cost, programs, active bounds and they in words.
+/// u, x, status, message, whether it is solved, cost, programs, active bounds and they in words, and what it is backed
+/// by.
 pub type PlanTuple<'py> = (
     Bound<'py, PyArray2<f64>>,
     Bound<'py, PyArray2<f64>>,
@@ -37,6 +38,7 @@ pub type PlanTuple<'py> = (
     usize,
     Vec<Active>,
     String,
+    Option<String>,
 );
 
 /// The fields of a plan.
@@ -56,5 +58,6 @@ pub fn fields<'py>(py: Python<'py>, plan: Plan) -> PlanTuple<'py> {
             .map(|one| (one.stage, one.bound, one.multiplier, one.exceeded))
             .collect(),
         in_words,
+        plan.decision.map(|decision| decision.to_string()),
     )
 }

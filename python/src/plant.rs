@@ -3,7 +3,7 @@
 use crate::errors::{of_plant, of_setting};
 use lpvmpc::{AlongMotion, LpvModel};
 use lpvmpc_any::{MOST_INPUTS, MOST_STATES};
-use lpvmpc_plant::{FirmwareSettings, PlantData, Signal, SizedPlant};
+use lpvmpc_plant::{FirmwareSettings, PlantData, PlantError, Signal, SizedPlant};
 use nalgebra::{DMatrix, SVector};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -28,6 +28,14 @@ fn columns(signals: &[Signal]) -> Vec<Column> {
 impl Plant {
     fn data(&self) -> &PlantData {
         self.inner.data()
+    }
+
+    /// f(x, u): the derivative, or the state one period later.
+    fn motion(&self, x: &[f64], u: &[f64]) -> Result<Vec<f64>, PlantError> {
+        match self.inner.period() {
+            None => self.inner.derivative(x, u),
+            Some(_) => self.inner.next(x, u),
+        }
     }
 }
 
@@ -101,8 +109,8 @@ impl Plant {
         x: Vec<f64>,
         u: Vec<f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let rate = self.inner.derivative(&x, &u).map_err(of_plant)?;
-        Ok(PyArray1::from_vec(py, rate))
+        let f = self.motion(&x, &u).map_err(of_plant)?;
+        Ok(PyArray1::from_vec(py, f))
     }
 
     fn g<'py>(
@@ -123,7 +131,7 @@ impl Plant {
         u: Vec<f64>,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
         // For its checks of the sizes.
-        self.inner.derivative(&x, &u).map_err(of_plant)?;
+        self.motion(&x, &u).map_err(of_plant)?;
         let (a, b) = jacobian(&self.inner, &x, &u).map_err(of_plant)?;
         Ok((
             crate::arrays::to_numpy(py, &a),
@@ -186,6 +194,11 @@ impl Plant {
     }
 
     #[getter]
+    fn period(&self) -> Option<f64> {
+        self.inner.period()
+    }
+
+    #[getter]
     fn has_embedding(&self) -> bool {
         self.data().embedding.is_some()
     }
@@ -205,7 +218,7 @@ pub fn jacobian(
     plant: &lpvmpc_plant::Plant,
     x: &[f64],
     u: &[f64],
-) -> Result<(DMatrix<f64>, DMatrix<f64>), lpvmpc_plant::PlantError> {
+) -> Result<(DMatrix<f64>, DMatrix<f64>), PlantError> {
     const BOTH: usize = MOST_STATES + MOST_INPUTS;
     let placed = SizedPlant::<MOST_STATES, MOST_INPUTS>::new(plant.clone())?;
     let filled = |values: &[f64], i: usize| values.get(i).copied().unwrap_or(0.0);

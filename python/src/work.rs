@@ -6,6 +6,7 @@
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use std::any::Any;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
@@ -71,7 +72,8 @@ impl Watch {
 /// Does `task` on a thread of its own.
 ///
 /// # Errors
-/// `KeyboardInterrupt`, what `report` raises, or that there is no thread; the task has then ended.
+/// `KeyboardInterrupt`, what `report` raises, or `RuntimeError`: there is no thread, or the task panicked.
+/// The task has then ended.
 pub fn work<T: Send>(
     py: Python<'_>,
     report: &Report<'_>,
@@ -104,9 +106,19 @@ pub fn work<T: Send>(
         ended?;
         match found {
             Ok(found) => tell(&watch, report).map(|()| found),
-            Err(panic) => resume_unwind(panic),
+            Err(panic) => Err(fault(panic.as_ref())),
         }
     })
+}
+
+/// What should never be: a fault of this package, told as an error like any other.
+fn fault(panic: &(dyn Any + Send)) -> PyErr {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+    PyRuntimeError::new_err(format!(
+        "a fault in lpvmpc, please report it: {}",
+        text.unwrap_or("(nothing is known of it)")
+    ))
 }
 
 fn tell(watch: &Watch, report: &Report<'_>) -> PyResult<()> {

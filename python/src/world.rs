@@ -2,12 +2,19 @@
 
 use crate::errors::{of_setting, of_simulation};
 use crate::plant::Plant;
-use lpvmpc_any::{Actuator, Push, Sensor, Tolerances, WorldSettings};
+use lpvmpc_any::{Actuator, Push, Quantity, Sensor, Tolerances, WorldSettings};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
-/// A sensor: row, noise, bias, resolution, dropout, every, late.
-type SensorTuple = (Vec<f64>, f64, f64, f64, f64, usize, usize);
+/// What a sensor measures: a row of the states, or an output by its name.
+#[derive(FromPyObject)]
+enum QuantityArgument {
+    Output(String),
+    Row(Vec<f64>),
+}
+
+/// A sensor: what it measures, noise, bias, resolution, dropout, every, late.
+type SensorTuple = (QuantityArgument, f64, f64, f64, f64, usize, usize);
 /// An actuator: limit, dead zone, lag.
 type ActuatorTuple = (f64, f64, f64);
 
@@ -43,8 +50,11 @@ struct Settings {
 
 impl From<Settings> for WorldSettings {
     fn from(settings: Settings) -> Self {
-        let sensor = |(row, noise, bias, resolution, dropout, every, late): SensorTuple| Sensor {
-            row,
+        let sensor = |(of, noise, bias, resolution, dropout, every, late): SensorTuple| Sensor {
+            of: match of {
+                QuantityArgument::Output(name) => Quantity::Output(name),
+                QuantityArgument::Row(row) => Quantity::Row(row),
+            },
             noise,
             bias,
             resolution,

@@ -19,6 +19,7 @@
 
 pub mod arguments;
 pub mod campaign_figure;
+pub mod campaign_figures;
 pub mod certificate_page;
 pub mod commands;
 pub mod html;
@@ -28,6 +29,7 @@ pub mod interrupt;
 pub mod json;
 pub mod optimality_figure;
 pub mod output;
+pub mod program;
 pub mod progress;
 pub mod refinement_file;
 pub mod reproduction;

@@ -32,6 +32,7 @@ impl FileError {
 /// after.
 static WRITES: Mutex<Writes> = Mutex::new(Writes {
     temporary: Vec::new(),
+    drafts: Vec::new(),
     folders: Vec::new(),
     done: Vec::new(),
 });
@@ -39,6 +40,8 @@ static WRITES: Mutex<Writes> = Mutex::new(Writes {
 struct Writes {
     /// Files under temporary names.
     temporary: Vec<PathBuf>,
+    /// Drafts under temporary names.
+    drafts: Vec<PathBuf>,
     /// Folders made for them, the outer ones first.
     folders: Vec<PathBuf>,
     /// Files that are in their places.
@@ -78,11 +81,81 @@ impl Writes {
 /// that were written.
 pub fn abandon() -> Vec<PathBuf> {
     let mut writes = Writes::lock();
+    let drafts = std::mem::take(&mut writes.drafts);
+    writes.temporary.extend(drafts);
     writes.take_back();
     let done = std::mem::take(&mut writes.done);
     // Nothing is written from here on.
     std::mem::forget(writes);
     done
+}
+
+/// A file that is written bit by bit, and takes its place when it is whole. One that is dropped before
+/// leaves nothing behind.
+#[derive(Debug)]
+pub struct Draft {
+    path: PathBuf,
+    /// Where it is until then.
+    temporary: PathBuf,
+    file: fs::File,
+}
+
+impl Draft {
+    /// A draft of the file at `path`. Directories that are missing are made.
+    ///
+    /// # Errors
+    /// Nothing can be written there, or a directory is in its place.
+    pub fn create(path: &Path) -> Result<Self, FileError> {
+        let (file, temporary) = match Place::of(path)? {
+            Place::File { file, temporary } => (file, temporary),
+            Place::Special => {
+                let problem = "it is no file, and what stands there cannot be replaced";
+                return Err(FileError::at(path)(io::Error::other(problem)));
+            }
+        };
+        let mut writes = Writes::lock();
+        if let Some(folder) = file.parent() {
+            fs::create_dir_all(folder).map_err(FileError::at(path))?;
+        }
+        let opened = fs::File::create(&temporary).map_err(FileError::at(path))?;
+        writes.drafts.push(temporary.clone());
+        Ok(Self {
+            path: file,
+            temporary,
+            file: opened,
+        })
+    }
+
+    /// What is written into.
+    pub fn file(&self) -> &fs::File {
+        &self.file
+    }
+
+    /// Where it is until it takes its place.
+    pub fn temporary(&self) -> &Path {
+        &self.temporary
+    }
+
+    /// Puts it into its place, on the disk.
+    ///
+    /// # Errors
+    /// The file system refuses.
+    pub fn commit(self) -> Result<(), FileError> {
+        self.file.sync_all().map_err(FileError::at(&self.path))?;
+        let mut writes = Writes::lock();
+        fs::rename(&self.temporary, &self.path).map_err(FileError::at(&self.path))?;
+        writes.done.push(self.path.clone());
+        Ok(())
+    }
+}
+
+impl Drop for Draft {
+    fn drop(&mut self) {
+        let mut writes = Writes::lock();
+        writes.drafts.retain(|draft| *draft != self.temporary);
+        // Of one that has taken its place there is none.
+        let _ = fs::remove_file(&self.temporary);
+    }
 }
 
 /// Writes every file under a temporary name beside its place, then renames them all. When one
@@ -329,6 +402,23 @@ mod tests {
         assert_eq!(fs::read_to_string(&file).unwrap(), "mine");
         assert!(check_writable(&file.join("below.csv")).is_err());
         assert!(check_writable(folder.path()).is_err());
+    }
+
+    #[test]
+    fn a_draft_takes_its_place_when_it_is_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new").join("rows");
+        let draft = Draft::create(&path).unwrap();
+        (&mut draft.file()).write_all(b"half").unwrap();
+        assert!(!path.exists());
+        drop(draft);
+        assert_eq!(fs::read_dir(folder.path().join("new")).unwrap().count(), 0);
+        let draft = Draft::create(&path).unwrap();
+        (&mut draft.file()).write_all(b"whole").unwrap();
+        draft.commit().unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "whole");
+        assert!(Draft::create(folder.path()).is_err());
+        assert!(Draft::create(Path::new("/dev/null")).is_err());
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::sync::{Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -21,6 +22,23 @@ pub fn silence() {
 
 /// Steps of a bar that is told parts from 0 to 1.
 const PARTS: f64 = 1000.0;
+
+/// The bar of proofs of certificates: there while one is made.
+#[derive(Debug, Default)]
+pub struct ProofProgress(Mutex<Option<Progress>>);
+
+impl ProofProgress {
+    /// This part of a proof is done.
+    pub fn set_part(&self, done: f64) {
+        let mut bar = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match done < 1.0 {
+            true => bar
+                .get_or_insert_with(|| Progress::of_parts("proving the certificate"))
+                .set_part(done),
+            false => *bar = None,
+        }
+    }
+}
 
 /// Progress of some work on standard error. Nothing is drawn when that is no terminal, when the
 /// work is done within a second, or after it is dropped.

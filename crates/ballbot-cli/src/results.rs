@@ -1,7 +1,7 @@
 //! The folder that a command writes its results to. A list in it says which files are this program's;
 //! others are never touched.
 
-use crate::output::{self, FileError};
+use crate::output::{self, Draft, FileError};
 use std::collections::BTreeSet;
 use std::fs;
 use std::io;
@@ -74,10 +74,27 @@ impl ResultFolder {
     /// # Errors
     /// A file that is not this program's is in the way, or cannot be written or removed.
     pub fn write(&self, files: &[(String, Vec<u8>)], stale: &[&str]) -> Result<(), FileError> {
-        for (name, _) in files {
+        self.write_with(Vec::new(), files, stale)
+    }
+
+    /// [`write`](Self::write), after drafts of files in the folder have taken their places.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn write_with(
+        &self,
+        drafts: Vec<(&str, Draft)>,
+        files: &[(String, Vec<u8>)],
+        stale: &[&str],
+    ) -> Result<(), FileError> {
+        let names = files.iter().map(|(name, _)| name.as_str());
+        let written: BTreeSet<&str> = names.chain(drafts.iter().map(|(name, _)| *name)).collect();
+        for name in &written {
             self.check(name)?;
         }
-        let written: BTreeSet<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+        for (_, draft) in drafts {
+            draft.commit()?;
+        }
         let is_stale = |name: &str| stale.contains(&name) && !written.contains(name);
         let kept = self.ours.iter().map(String::as_str);
         let kept = kept

@@ -175,7 +175,10 @@ fn whole_robot(
     writeln!(text, "    zenith_angle: {},", literal(zenith_angle))?;
     write_settings(&mut text, prepared)?;
     writeln!(text, "    planes: &[],\n}},")?;
-    let Iterations::Descent { tolerance, most } = prepared.settings.iterations else {
+    let Iterations::Descent {
+        tolerance, most, ..
+    } = prepared.settings.iterations
+    else {
         return Err("the firmware's whole robot takes a descent".into());
     };
     let prices = prepared.settings.soft_x.map(|price| match price {

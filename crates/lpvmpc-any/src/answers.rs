@@ -72,6 +72,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             active,
             problems: self.controller.problems(),
             target,
+            decision: None,
         }
     }
 

@@ -44,6 +44,24 @@ impl Names {
         }
     }
 
+    /// Which output is called `name`: one that a sensor can measure, so none `of_input`.
+    pub fn measurable_output(
+        &self,
+        place: &str,
+        name: &str,
+        of_input: &[bool],
+    ) -> Result<usize, MpcError> {
+        let fault = match self.outputs.iter().position(|known| known == name) {
+            Some(k) if !of_input[k] => return Ok(k),
+            Some(_) => format!("{name:?} depends on the input, which a sensor must not"),
+            None => {
+                let known = [&self.states[..], &self.outputs[..]].concat().join(", ");
+                format!("{name:?} is no state or output; there are {known}")
+            }
+        };
+        Err(MpcError::new(place, fault))
+    }
+
     /// "4 (position, angle, ...)", as a message says what was expected.
     fn expected(&self, axis: Axis) -> String {
         let names = self.of(axis);

@@ -4,6 +4,7 @@ use crate::check::{Axis, Names, check_price};
 use crate::error::MpcError;
 use crate::last_input::LastInput;
 use crate::model::Model;
+use crate::sampling::check_substeps;
 use crate::settings::{Limits, MpcSettings, StateBounds, Terminal};
 use crate::target::output_tangent;
 use lpvmpc::{
@@ -58,9 +59,19 @@ pub(crate) fn controller_settings<const NX: usize, const NU: usize, const NS: us
         x: names.bounds(Axis::States, "x_bounds", &x)?,
         u: names.bounds(Axis::Inputs, "u_bounds", &u)?,
     };
+    if plant.period().is_none() {
+        let (n, (x, u)) = (data.states.len(), rest);
+        let (a, _) = model.jacobian(&x, &u);
+        let a = DMatrix::from_fn(n, n, |i, j| a[(i, j)]);
+        check_substeps(&a, t_s, settings.substeps)?;
+    }
     let weights = names.weights("settings", &settings.q, &settings.r)?;
     let terminal = match &settings.terminal {
         Terminal::Equality => TerminalIngredient::Equality,
+        Terminal::Certified(set) => {
+            let axes = (Axis::States, Axis::States);
+            TerminalIngredient::Cost(names.matrix(axes, "terminal cost", &set.p, 0.0)?)
+        }
         Terminal::Cost(p) => {
             let axes = (Axis::States, Axis::States);
             TerminalIngredient::Cost(names.matrix(axes, "terminal cost", p, 0.0)?)

@@ -23,7 +23,9 @@ pub struct EstimatorSettings {
     pub measurement_noise: Vec<f64>,
     /// Variances that the states gain per second, in squared units per s: what the plant does not know.
     pub state_noise: Vec<f64>,
-    /// Variances of the states about zero before the first reading.
+    /// Where the plant is believed to be before the first reading; without, at its equilibrium, or zero.
+    pub start: Option<Vec<f64>>,
+    /// Variances of the states about that.
     pub initial_state: Vec<f64>,
     /// What acts on the plant besides its inputs, constant or slow; no more than readings.
     pub disturbances: Vec<Disturbance>,
@@ -52,6 +54,7 @@ impl EstimatorSettings {
             measured: measured.iter().map(|name| (*name).to_owned()).collect(),
             measurement_noise: measurement_noise.to_vec(),
             state_noise: state_noise.to_vec(),
+            start: None,
             initial_state: vec![1.0; state_noise.len()],
             disturbances: Vec::new(),
             delay: 0.0,
@@ -141,11 +144,22 @@ fn push<const NX: usize, const NS: usize>(w: &SVector<f64, NS>) -> SVector<f64, 
     SVector::from_fn(|i, _| w[NS - NX + i])
 }
 
+fn joint<const NX: usize, const NU: usize, const NS: usize>(
+    u: &SVector<f64, NU>,
+    push: &SVector<f64, NX>,
+) -> SVector<f64, NS> {
+    SVector::from_fn(|i, _| match i.checked_sub(NU) {
+        None => u[i],
+        Some(i) => push[i],
+    })
+}
+
 /// A filter and the inputs on their way.
 pub(crate) struct Filter<const NX: usize, const NU: usize, const NS: usize> {
     pub settings: EstimatorSettings,
     estimator: Estimator<Sensed<NX, NU, NS>, f64, NX, NS, NS, NX, NX>,
     line: DelayLine<f64, NS>,
+    start: SVector<f64, NX>,
 }
 
 impl<const NX: usize, const NU: usize, const NS: usize> Filter<NX, NU, NS> {
@@ -241,14 +255,25 @@ impl<const NX: usize, const NU: usize, const NS: usize> Filter<NX, NU, NS> {
             initial_disturbance: of_disturbances(&|one| one.initial),
             gate: settings.gate,
         };
-        let estimator = Estimator::allocate(sensed, of_estimator, SVector::zeros(), 1)
+        let start = match &settings.start {
+            Some(start) => names.finite(Axis::States, "estimator, start", start)?,
+            None => rest.0,
+        };
+        let estimator = Estimator::allocate(sensed, of_estimator, start, 1)
             .map_err(|error| MpcError::new("estimator", error.to_string()))?;
         let commands = (delay / mpc.t_s).ceil() as usize + 3;
         Ok(Self {
             settings: settings.clone(),
             estimator,
             line: DelayLine::allocate(commands),
+            start,
         })
+    }
+
+    /// Starts again, without a reading and without inputs on their way.
+    pub fn reset(&mut self) {
+        self.estimator.begin_at(None, self.start);
+        self.line.clear();
     }
 
     /// Goes on from where `previous` stands.
@@ -298,11 +323,13 @@ impl<const NX: usize, const NU: usize, const NS: usize> Filter<NX, NU, NS> {
 
     /// The input `u` was sent, and the disturbance `d` is known to act with it.
     pub fn send(&mut self, u: &SVector<f64, NU>, d: &SVector<f64, NX>) {
-        let w = SVector::from_fn(|i, _| match i.checked_sub(NU) {
-            None => u[i],
-            Some(i) => d[i],
-        });
-        self.line.command(w, self.settings.delay);
+        self.line.command(joint(u, d), self.settings.delay);
+    }
+
+    /// The input `u` was sent in place of the last one; before the first one it acts already.
+    pub fn correct(&mut self, u: &SVector<f64, NU>) {
+        let unpushed = SVector::<f64, NX>::zeros();
+        self.line.correct(joint(u, &unpushed));
     }
 
     pub fn estimate(&self, states: usize) -> Estimate {
@@ -339,8 +366,14 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sensed<NX, NU, NS> {
                 .map_or(f64::NAN, |(_, slopes)| slopes[(k, j)]),
         });
         let c_d = DMatrix::zeros(c.nrows(), b_d.ncols());
-        check_offset_free(&a, &b_d, &c, &c_d)
-            .map_err(|error| MpcError::new("estimator, disturbances", error.to_string()))
+        check_offset_free(&a, &b_d, &c, &c_d).map_err(|error| {
+            if settings.disturbances.is_empty() {
+                let fault = "steady states of the plant cannot be told from each other by what is \
+                             measured: measure more";
+                return MpcError::new("estimator, measured", fault);
+            }
+            MpcError::new("estimator, disturbances", error.to_string())
+        })
     }
 }
 
@@ -360,23 +393,11 @@ fn sources(
         return Err(MpcError::new(place, fault));
     }
     let of_input = crate::tasks::outputs_of_input(plant.data());
-    let source = |name: &String| {
-        let of = |axis: Axis| names.of(axis).iter().position(|known| known == name);
-        match (of(Axis::States), of(Axis::Outputs)) {
-            (Some(i), _) => Ok(Source::State(i)),
-            (None, Some(k)) if of_input[k] => {
-                let fault = format!("{name:?} depends on the input, which a sensor must not");
-                Err(MpcError::new(place, fault))
-            }
-            (None, Some(k)) => Ok(Source::Output(k)),
-            (None, None) => {
-                let known = [names.of(Axis::States), names.of(Axis::Outputs)].concat();
-                let fault = format!(
-                    "{name:?} is no state or output; there are {}",
-                    known.join(", ")
-                );
-                Err(MpcError::new(place, fault))
-            }
+    let source = |name: &String| match names.states.iter().position(|known| known == name) {
+        Some(i) => Ok(Source::State(i)),
+        None => {
+            let output = names.measurable_output(place, name, &of_input)?;
+            Ok(Source::Output(output))
         }
     };
     settings.measured.iter().map(source).collect()

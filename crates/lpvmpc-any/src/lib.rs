@@ -36,6 +36,7 @@
 //! | what is known ahead, stage by stage | [`Preview`]: references, weights, bounds, rows, disturbances, parameters, [matrices](StageMatrices), scheduling |
 //! | readings, disturbances and a delay | [`EstimatorSettings`], [`Mpc::observe`], [`Mpc::decide`] |
 //! | another value of a parameter, other settings | [`Mpc::set_parameter`], [`Mpc::set_settings`] |
+//! | a guaranteed loop to an equilibrium | [`Terminal::Certified`] |
 //! | a simulated plant with sensors, actuators, delay and pushes | [`World`] |
 //! | where a plant can stand | [`steady_state`] |
 //!
@@ -51,6 +52,7 @@ mod check;
 mod controller_settings;
 mod error;
 mod estimator;
+mod guaranteed;
 mod horizon;
 mod last_input;
 mod linear_model;
@@ -58,6 +60,7 @@ mod model;
 mod mpc;
 mod plan;
 mod preview;
+mod sampling;
 mod settings;
 mod sized;
 mod stage_lists;
@@ -69,11 +72,13 @@ mod world;
 
 pub use error::MpcError;
 pub use estimator::{Disturbance, Estimate, EstimatorSettings};
-pub use lpvmpc::{Gate, Iterations, Penalty, Reading, Verdict};
+pub use lpvmpc::{Decision, Gate, Iterations, Penalty, Reading, Verdict};
 pub use lpvmpc_sim::{Actuator, Tolerances};
 pub use mpc::{MOST_INPUTS, MOST_STATES, Mpc};
 pub use plan::{ActiveBound, Plan, Target};
 pub use preview::{Preview, StageMatrices};
-pub use settings::{Limits, LinearModels, MpcSettings, Row, StateBounds, Terminal};
+pub use settings::{
+    FIRST_PROGRAMS, Limits, LinearModels, MpcSettings, Row, StateBounds, Terminal, TerminalSet,
+};
 pub use steady_state::{SteadyState, steady_state};
-pub use world::{Push, Sensor, World, WorldSettings};
+pub use world::{Push, Quantity, Sensor, World, WorldSettings};

@@ -2,6 +2,7 @@
 
 use crate::error::MpcError;
 use crate::estimator::{Estimate, EstimatorSettings};
+use crate::guaranteed::Guarantee;
 use crate::plan::Plan;
 use crate::preview::Preview;
 use crate::settings::MpcSettings;
@@ -18,6 +19,8 @@ pub const MOST_INPUTS: usize = 6;
 pub struct Mpc {
     sized: Box<dyn AnySize>,
     states: usize,
+    /// With a certified terminal set.
+    guarantee: Option<Guarantee>,
 }
 
 /// The first of these sizes, smallest first, in which a plant has room.
@@ -64,9 +67,11 @@ impl Mpc {
         if plant.data().inputs.is_empty() {
             return Err(MpcError::new("plant", "it has no input to control it with"));
         }
+        let guarantee = Guarantee::new(plant, settings)?;
         Ok(Self {
             sized: sized(plant, settings)?,
             states: plant.data().states.len(),
+            guarantee,
         })
     }
 
@@ -78,7 +83,10 @@ impl Mpc {
     /// # Errors
     /// A list of the preview that has not the plant's sizes, or has a number that makes no sense.
     pub fn step(&mut self, x: &[f64], preview: &Preview) -> Result<Plan, MpcError> {
-        self.sized.step(x, preview)
+        match &mut self.guarantee {
+            Some(guarantee) => guarantee.step(self.sized.as_mut(), x, preview),
+            None => self.sized.step(x, preview),
+        }
     }
 
     /// Other settings from the next step on. Horizon and sampling time stay. Where changes of the input begin or
@@ -87,8 +95,14 @@ impl Mpc {
     /// # Errors
     /// As [`new`](Self::new); the controller is as it was then.
     pub fn set_settings(&mut self, settings: &MpcSettings) -> Result<(), MpcError> {
+        let guarantee = Guarantee::new(self.sized.plant(), settings)?;
+        if guarantee.is_some() && self.sized.estimator().is_some() {
+            return Err(not_exact());
+        }
         if places(self.sized.plant(), settings).0 <= self.sized.places() {
-            return self.sized.set_settings(settings);
+            self.sized.set_settings(settings)?;
+            self.guarantee = guarantee;
+            return Ok(());
         }
         let before = self.sized.settings();
         if (settings.horizon, settings.t_s) != (before.horizon, before.t_s) {
@@ -100,6 +114,7 @@ impl Mpc {
         larger.set_last_input(&self.sized.last_input())?;
         larger.set_estimator(self.sized.estimator())?;
         self.sized = larger;
+        self.guarantee = guarantee;
         Ok(())
     }
 
@@ -108,11 +123,16 @@ impl Mpc {
     /// # Errors
     /// There is no such parameter, or the value is not finite.
     pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), MpcError> {
+        if self.guarantee.is_some() {
+            let fault = "the certificate of the terminal set is for the parameters as they are";
+            return Err(MpcError::new(name, fault));
+        }
         self.sized.set_parameter(name, value)
     }
 
     /// The input that was really applied last, where that is another than the last plan's first one; before the first
-    /// step it is that of the plant's steady state. Changes of the input count from it.
+    /// step it is that of the plant's steady state. Changes of the input count from it, and an estimator predicts
+    /// with it; before the first step an estimator without it takes the input for zero.
     ///
     /// # Errors
     /// It has not the plant's sizes, or is not finite.
@@ -126,6 +146,9 @@ impl Mpc {
     /// # Errors
     /// The setting that makes no sense; a disturbance that the readings cannot tell. All is as it was then.
     pub fn set_estimator(&mut self, settings: Option<&EstimatorSettings>) -> Result<(), MpcError> {
+        if self.guarantee.is_some() && settings.is_some() {
+            return Err(not_exact());
+        }
         self.sized.set_estimator(settings)
     }
 
@@ -156,13 +179,26 @@ impl Mpc {
         self.sized.estimate()
     }
 
-    /// Forgets the last plan and the last input: the next step is as the first.
+    /// Forgets the last plan, the last input and what was estimated: the next step is as the first.
     pub fn reset(&mut self) {
         self.sized.reset();
+        if let Some(guarantee) = &mut self.guarantee {
+            guarantee.reset();
+        }
+    }
+
+    /// The plant, with its parameters as they are now.
+    pub fn plant(&self) -> &Plant {
+        self.sized.plant()
     }
 
     /// How many states the plant has.
     pub fn states(&self) -> usize {
         self.states
     }
+}
+
+fn not_exact() -> MpcError {
+    let fault = "what a certified terminal set guarantees is for the exact state, without delay";
+    MpcError::new("estimator", fault)
 }

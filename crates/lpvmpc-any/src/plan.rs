@@ -1,6 +1,6 @@
 //! What a step answers.
 
-use lpvmpc::Status;
+use lpvmpc::{Decision, Status};
 use nalgebra::DMatrix;
 
 /// The plan of a sample.
@@ -27,6 +27,9 @@ pub struct Plan {
     /// The steady state that it heads for: the nearest to the end of the references. `None` with an input
     /// reference that was given, and where none was found.
     pub target: Option<Target>,
+    /// What the first input is backed by, of a controller with a certified terminal set
+    /// ([`crate::TerminalSet`]); `None` of any other.
+    pub decision: Option<Decision>,
 }
 
 /// A steady state.

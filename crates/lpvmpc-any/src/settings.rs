@@ -52,10 +52,14 @@ pub struct MpcSettings {
     pub iterations: Iterations<f64>,
 }
 
+/// Quadratic programs of a sample without a plan from the one before, at most, where no number is given: at a start nobody
+/// knows how far the regulator's own closed loop is from a good plan.
+pub const FIRST_PROGRAMS: usize = 50;
+
 impl MpcSettings {
     /// What a controller must be told, with the diagonals of Q and R; the rest serves as a rule: one Runge-Kutta step
     /// per sample, the cost of the linear-quadratic regulator at the end, the bounds of the plant,
-    /// those of states soft, and a descent of at most eight programs per sample.
+    /// those of states soft, and a descent of at most eight programs per sample, fifty where it has no plan to begin with.
     pub fn new(t_s: f64, horizon: usize, q: &[f64], r: &[f64]) -> Self {
         let diagonal = |entries: &[f64]| DMatrix::from_diagonal(&DVector::from_row_slice(entries));
         Self {
@@ -76,7 +80,11 @@ impl MpcSettings {
             r_du: None,
             du_bounds: None,
             linear_models: LinearModels::default(),
-            iterations: Iterations::default(),
+            iterations: Iterations::Descent {
+                tolerance: Iterations::<f64>::TOLERANCE,
+                most: Iterations::<f64>::MOST,
+                first: FIRST_PROGRAMS,
+            },
         }
     }
 }
@@ -91,6 +99,42 @@ pub enum Terminal {
     Cost(DMatrix<f64>),
     /// x_N = x_ref.
     Equality,
+    /// Cost and set of a certificate, with which the loop to its equilibrium is guaranteed: see [`TerminalSet`].
+    Certified(Box<TerminalSet>),
+}
+
+/// A terminal law, cost and set about an equilibrium, as `lpvmpc-certify` proves them, and what they were proved for: for
+/// every state with (x - x_eq)'P (x - x_eq) <= level, u = u_eq - K (x - x_eq), held, stays within the limits, leads into the
+/// set again, and lowers that cost by at least the stage cost. The controller takes it at its word.
+///
+/// It goes to this equilibrium only, and applies no plan that a rollout of the nonlinear plant does not confirm
+/// ([`crate::Plan::decision`]). Once there is a plan, there is one at every later sample, states at the samples and
+/// inputs keep their bounds, and the plan's cost falls by at least the stage cost, for the plant as its rollouts
+/// have it, with the measured state exact, no delay and no disturbance. Rollouts are by Runge-Kutta steps, four for each
+/// of `substeps`; their error is not enclosed, and a thousandth of the distance to each bound is kept for it. Between
+/// the samples the bounds hold in the terminal set only.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TerminalSet {
+    /// x_eq.
+    pub x: DVector<f64>,
+    /// u_eq.
+    pub u: DVector<f64>,
+    /// K, m x n.
+    pub k: DMatrix<f64>,
+    /// P, n x n, symmetric positive definite.
+    pub p: DMatrix<f64>,
+    /// Largest (x - x_eq)'P (x - x_eq) in the set.
+    pub level: f64,
+    /// The sampling time that it was proved for, s.
+    pub t_s: f64,
+    /// The Q that it was proved for.
+    pub q: DMatrix<f64>,
+    /// The R that it was proved for.
+    pub r: DMatrix<f64>,
+    /// |x - x_eq| in the set, at most.
+    pub state_limits: Vec<f64>,
+    /// |u - u_eq| in the set, at most.
+    pub input_limits: Vec<f64>,
 }
 
 /// A lower and an upper bound for each component; infinite where there is none.

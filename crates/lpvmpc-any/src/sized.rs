@@ -253,17 +253,25 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
         self.controller
             .set_model(Sampled::new(model, self.last_input));
         self.plant = plant;
-        Ok(())
+        // The filter predicts with the same plant.
+        let settings = self.estimator().cloned();
+        self.set_estimator(settings.as_ref())
     }
 
     fn set_last_input(&mut self, u: &[f64]) -> Result<(), MpcError> {
         self.applied = self.names.finite(Axis::Inputs, "last input", u)?;
+        if let Some(filter) = &mut self.filter {
+            filter.correct(&self.applied);
+        }
         Ok(())
     }
 
     fn reset(&mut self) {
         self.controller.reset();
         self.applied = self.rest.1;
+        if let Some(filter) = &mut self.filter {
+            filter.reset();
+        }
     }
 
     fn plant(&self) -> &Plant {

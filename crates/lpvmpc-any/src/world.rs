@@ -3,6 +3,7 @@
 use crate::check::{Axis, Names};
 use crate::error::MpcError;
 use crate::mpc::{MOST_INPUTS, MOST_STATES};
+use crate::tasks::outputs_of_input;
 use lpvmpc::{Dynamics, Reading};
 use lpvmpc_plant::{Plant, SizedPlant};
 use lpvmpc_sim::{Actuator, PlantError, Tolerances};
@@ -45,12 +46,20 @@ impl WorldSettings {
     }
 }
 
-/// One measured quantity: a linear combination of the states, and what is wrong with it. Its numbers
-/// are those of [`lpvmpc_sim::Sensor`].
+/// What a sensor measures.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Quantity {
+    /// A linear combination of the states: these coefficients times x, n entries.
+    Row(Vec<f64>),
+    /// The output of this name, which must not depend on the input.
+    Output(String),
+}
+
+/// One measured quantity, and what is wrong with it. Its numbers are those of [`lpvmpc_sim::Sensor`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensor {
-    /// The measured quantity is `row`' x, n entries.
-    pub row: Vec<f64>,
+    /// What it measures.
+    pub of: Quantity,
     /// Standard deviation of the white Gaussian noise of a sample, in the quantity's unit.
     pub noise: f64,
     /// Constant error that is added, in the quantity's unit.
@@ -66,10 +75,10 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// A perfect sensor of `row`' x.
-    pub fn ideal(row: Vec<f64>) -> Self {
+    /// A perfect sensor.
+    pub fn ideal(of: Quantity) -> Self {
         Self {
-            row,
+            of,
             noise: 0.0,
             bias: 0.0,
             resolution: 0.0,
@@ -101,9 +110,13 @@ pub enum Push {
     },
 }
 
-/// A plant whose load is added to its derivative.
+/// A plant whose load is added to its derivative, or its next state, and whose outputs are measured.
 #[derive(Debug, Clone)]
-struct Loaded(SizedPlant<MOST_STATES, MOST_INPUTS>);
+struct Loaded {
+    plant: SizedPlant<MOST_STATES, MOST_INPUTS>,
+    /// The output that each sensor measures, where it does.
+    measured: Vec<Option<usize>>,
+}
 
 impl lpvmpc_sim::Plant<MOST_STATES, MOST_INPUTS, MOST_STATES> for Loaded {
     fn derivative(
@@ -112,7 +125,20 @@ impl lpvmpc_sim::Plant<MOST_STATES, MOST_INPUTS, MOST_STATES> for Loaded {
         u: &SVector<f64, MOST_INPUTS>,
         load: &SVector<f64, MOST_STATES>,
     ) -> SVector<f64, MOST_STATES> {
-        self.0.f(x, u) + load
+        self.plant.f(x, u) + load
+    }
+
+    fn period(&self) -> Option<f64> {
+        self.plant.plant().period()
+    }
+
+    fn measured(&self, i: usize, x: &SVector<f64, MOST_STATES>) -> Option<f64> {
+        let output = (*self.measured.get(i)?)?;
+        let plant = self.plant.plant();
+        let x = &x.as_slice()[..plant.data().states.len()];
+        let u = [0.0; MOST_INPUTS];
+        let y = plant.output(x, &u[..plant.data().inputs.len()]).ok()?;
+        y.get(output).copied()
     }
 }
 
@@ -120,7 +146,7 @@ type Inner = lpvmpc_sim::World<Loaded, MOST_STATES, MOST_INPUTS, MOST_STATES, MO
 
 /// A plant behind sensors, actuators and a delay, stepped from outside: [`readings`](Self::readings),
 /// [`command`](Self::command), [`advance`](Self::advance). The plant moves in continuous time,
-/// integrated adaptively from event to event.
+/// integrated adaptively from event to event, or in steps of its own period.
 #[derive(Debug, Clone)]
 pub struct World {
     names: Names,
@@ -138,11 +164,11 @@ impl World {
         let names = Names::new(plant);
         let place = |error: lpvmpc_plant::PlantError| MpcError::new(error.place, error.fault);
         let x = names.finite(Axis::States, "x", x)?;
-        if plant.data().period.is_some() {
-            let fault = "it is in discrete time; a world moves plants in continuous time";
-            return Err(MpcError::new("plant", fault));
-        }
-        let (sensors, count) = sensors(&names, settings)?;
+        let (sensors, measured) = sensors(plant, &names, settings)?;
+        let count = settings
+            .sensors
+            .as_ref()
+            .map_or(names.states.len(), Vec::len);
         let actuators = actuators(&names, settings)?;
         let pushes = settings.pushes.iter().enumerate();
         let pushes: Result<Vec<_>, _> = pushes
@@ -156,7 +182,10 @@ impl World {
             .check()
             .map_err(|error| MpcError::new("tolerances", error.to_string()))?;
         let inner = Inner::new(
-            Loaded(SizedPlant::new(plant.clone()).map_err(place)?),
+            Loaded {
+                plant: SizedPlant::new(plant.clone()).map_err(place)?,
+                measured,
+            },
             x,
             lpvmpc_sim::WorldSettings {
                 period: settings.period,
@@ -228,14 +257,18 @@ impl World {
 
 type Sensors = [lpvmpc_sim::Sensor<MOST_STATES>; MOST_STATES];
 
-/// The sensors in places that were compiled, and how many they are. Those left over read zero.
-fn sensors(names: &Names, settings: &WorldSettings) -> Result<(Sensors, usize), MpcError> {
+/// The sensors in places that were compiled, and which output each measures, if it does. Those left over read zero.
+fn sensors(
+    plant: &Plant,
+    names: &Names,
+    settings: &WorldSettings,
+) -> Result<(Sensors, Vec<Option<usize>>), MpcError> {
     let mut places = [lpvmpc_sim::Sensor::ideal(SVector::zeros()); MOST_STATES];
     let Some(sensors) = &settings.sensors else {
         let ideal = lpvmpc_sim::Sensor::ideal_states();
         let count = names.states.len();
         places[..count].copy_from_slice(&ideal[..count]);
-        return Ok((places, count));
+        return Ok((places, Vec::new()));
     };
     if sensors.len() > MOST_STATES {
         let fault = format!(
@@ -244,9 +277,23 @@ fn sensors(names: &Names, settings: &WorldSettings) -> Result<(Sensors, usize), 
         );
         return Err(MpcError::new("sensors", fault));
     }
+    let of_input = outputs_of_input(plant.data());
+    let mut measured = Vec::with_capacity(sensors.len());
     for (i, (place, sensor)) in places.iter_mut().zip(sensors).enumerate() {
+        let (row, output) = match &sensor.of {
+            Quantity::Row(row) => {
+                let row = names.finite(Axis::States, &format!("sensors[{i}], row"), row)?;
+                (row, None)
+            }
+            Quantity::Output(name) => {
+                let place = format!("sensors[{i}]");
+                let output = names.measurable_output(&place, name, &of_input)?;
+                (SVector::zeros(), Some(output))
+            }
+        };
+        measured.push(output);
         *place = lpvmpc_sim::Sensor {
-            row: names.finite(Axis::States, &format!("sensors[{i}], row"), &sensor.row)?,
+            row,
             noise: sensor.noise,
             bias: sensor.bias,
             resolution: sensor.resolution,
@@ -256,7 +303,7 @@ fn sensors(names: &Names, settings: &WorldSettings) -> Result<(Sensors, usize), 
             stale: 0.0,
         };
     }
-    Ok((places, sensors.len()))
+    Ok((places, measured))
 }
 
 /// The actuators in places that were compiled.

@@ -32,7 +32,8 @@ pub use enclosure::{
 };
 pub use terminal::{
     Certificate, CertificateProblem, CertifyError, ClaimError, DocumentError, Effort, MOST_BOXES,
-    MOST_BYTES, PROOF_REVISION, Proof, QuadraticClaim, Record, SynthesisError, TerminalClaim,
-    TerminalIngredients, TerminalProblem, certify_terminal, is_at_most, raise_level,
-    synthesize_terminal,
+    MOST_BYTES, PROOF_REVISION, Proof, QuadraticClaim, Record, SampledClaim, SynthesisError,
+    TerminalClaim, TerminalIngredients, TerminalProblem, certify_terminal, check_document_digest,
+    document_content, document_text, is_at_most, raise_level, synthesize_terminal,
+    synthesize_terminal_at,
 };

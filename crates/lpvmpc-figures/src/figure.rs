@@ -69,6 +69,14 @@ pub enum Style {
     Markers,
     /// Discs joined by straight lines.
     MarkedLine(Dash),
+    /// Filled rectangles around the points, at the back: the view is divided into so many columns
+    /// and rows of them.
+    Tiles {
+        /// Rectangles side by side.
+        columns: u32,
+        /// Rectangles one above the other.
+        rows: u32,
+    },
 }
 
 /// Pattern of a line.
@@ -98,6 +106,8 @@ pub enum Role {
     RungeKutta,
     /// One of several alike, such as a motor: purple, orange, sky blue, in turn.
     Member(usize),
+    /// A share in percent, of failures, say: from pale blue at none to dark red at all.
+    Share(u8),
 }
 
 /// An allowed range; an infinite side is no bound.

@@ -75,6 +75,15 @@ impl Entry {
                     };
                     scene.line(vec![(left, y), (right, y)], stroke);
                 }
+                if let Style::Tiles { .. } = style {
+                    let sample = Rect {
+                        left,
+                        top: y - 6.0,
+                        width: SAMPLE,
+                        height: 12.0,
+                    };
+                    scene.rect(sample, color);
+                }
                 if let Style::Markers | Style::MarkedLine(_) = style {
                     let center = (left + SAMPLE / 2.0, y);
                     scene.shapes.push(Shape::Disc {

@@ -15,6 +15,8 @@ pub(super) const TICK_GAP: f64 = 8.0;
 /// From the middle of a text to its baseline, as part of its size.
 pub(super) const MIDDLE: f64 = 0.36;
 const TICK_LENGTH: f64 = 4.0;
+/// Tiles reach so far over the next ones, in pixels, that no background shows between them.
+const OVERLAP: f64 = 0.5;
 /// Deviations below this, in pixels, are not drawn.
 const RESOLUTION: f64 = 0.1;
 
@@ -146,6 +148,22 @@ impl Placed<'_> {
             Style::Line(dash) | Style::MarkedLine(dash) => lines(&points, dash),
             Style::Steps(dash) => lines(&held(&points), dash),
             Style::Markers => {}
+            Style::Tiles { columns, rows } => {
+                let width = self.area.width / f64::from(columns.max(1));
+                let height = self.area.height / f64::from(rows.max(1));
+                for (x, y) in points.iter().filter(|point| self.area.contains(**point)) {
+                    let left = (x - width / 2.0).max(self.area.left);
+                    let top = (y - height / 2.0).max(self.area.top);
+                    let tile = Rect {
+                        left,
+                        top,
+                        width: (x + width / 2.0 + OVERLAP).min(self.area.right()) - left,
+                        height: (y + height / 2.0 + OVERLAP).min(self.area.bottom()) - top,
+                    };
+                    scene.rect(tile, fill);
+                }
+                return;
+            }
         }
         let has_discs = matches!(series.style, Style::Markers | Style::MarkedLine(_));
         for (index, center) in points.iter().enumerate() {

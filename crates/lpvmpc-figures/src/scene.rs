@@ -97,7 +97,29 @@ impl Color {
                 1 => Self(0xe6, 0x9f, 0x00),
                 _ => Self(0x56, 0xb4, 0xe9),
             },
+            Role::Share(percent) => Self::of_share(percent),
         }
+    }
+}
+
+impl Color {
+    /// Ever darker, so that it can be read without colours.
+    fn of_share(percent: u8) -> Self {
+        const COLORS: [[f64; 3]; 5] = [
+            [232.0, 242.0, 250.0],
+            [255.0, 220.0, 150.0],
+            [240.0, 140.0, 60.0],
+            [200.0, 50.0, 20.0],
+            [90.0, 0.0, 20.0],
+        ];
+        let place = f64::from(percent.min(100)) / 25.0;
+        let below = (place as usize).min(COLORS.len() - 2);
+        let part = place - below as f64;
+        let channel = |i: usize| {
+            let [from, to] = [COLORS[below][i], COLORS[below + 1][i]];
+            (from + part * (to - from)).round() as u8
+        };
+        Self(channel(0), channel(1), channel(2))
     }
 }
 

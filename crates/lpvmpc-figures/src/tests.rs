@@ -237,6 +237,39 @@ fn what_lies_beyond_a_bound_is_shaded() {
     text_at(&document, "outside the bounds");
 }
 
+/// A view of 2 x 2 tiles: each fills its quarter, and the darker, the larger its share.
+#[test]
+fn tiles_fill_their_parts_of_the_view() {
+    let style = Style::Tiles {
+        columns: 2,
+        rows: 2,
+    };
+    let tile =
+        |x: f64, y: f64, percent: u8| Series::new("", &[x], &[y], style, Role::Share(percent));
+    let mut panel = Panel::new("x", "y", vec![tile(0.5, 0.5, 0), tile(1.5, 1.5, 100)]);
+    (panel.x_range, panel.y_range) = (Some((0.0, 2.0)), Some((0.0, 2.0)));
+    let svg = figure(vec![panel]).svg().unwrap();
+    let document = Document::parse(&svg).unwrap();
+    let filled = |color: &str| {
+        let rects = document
+            .descendants()
+            .filter(|node| node.has_tag_name("rect"));
+        let mut rects = rects.filter(|node| node.attribute("fill") == Some(color));
+        let rect = rects.next().unwrap();
+        ["x", "y", "width", "height"].map(|name| attribute(rect, name))
+    };
+    let (pale, dark) = (filled("#e8f2fa"), filled("#5a0014"));
+    assert!(
+        (pale[0] + pale[2] - dark[0]).abs() < 1.0,
+        "{pale:?} {dark:?}"
+    );
+    assert!(
+        (dark[1] + dark[3] - pale[1]).abs() < 1.0,
+        "{pale:?} {dark:?}"
+    );
+    assert!((pale[2] - dark[2]).abs() < 1.0 && pale[2] > 100.0);
+}
+
 #[test]
 fn values_that_are_not_numbers_leave_gaps() {
     let y = [0.0, 1.0, f64::NAN, 1.0, 2.0, f64::INFINITY, 3.0];

@@ -396,6 +396,10 @@ impl Code {
         result: impl FnMut(usize, N),
     ) {
         let zero = N::constant(0.0);
+        // Numbers that are sets may be large, and stacks of threads small.
+        if size_of::<N>() > LARGE {
+            return self.evaluate_on(&mut vec![zero; self.registers], fixed, leaf, result);
+        }
         match self.registers {
             0..=32 => self.evaluate_on(&mut [zero; 32], fixed, leaf, result),
             33..=64 => self.evaluate_on(&mut [zero; 64], fixed, leaf, result),
@@ -439,6 +443,9 @@ impl Code {
         }
     }
 }
+
+/// Registers of kinds of numbers with more bytes are not on the stack.
+const LARGE: usize = 256;
 
 /// So many registers are kept: any `u8` is one of them, and need not be checked.
 pub(crate) const FEW: usize = 256;

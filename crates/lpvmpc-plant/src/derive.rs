@@ -74,7 +74,7 @@ pub(crate) fn derive(
 }
 
 /// The slopes of two numbers side by side: variable, slope of the first, slope of the second.
-fn beside<'a>(
+pub(crate) fn beside<'a>(
     mut first: &'a [(usize, usize)],
     mut second: &'a [(usize, usize)],
 ) -> impl Iterator<Item = (usize, Option<usize>, Option<usize>)> + 'a {
@@ -149,7 +149,8 @@ impl Program {
                 let sin = self.elementary(Elementary::Sin, x)?;
                 return self.negative(sin);
             }
-            Elementary::Sinc => return self.slope_of_sinc(x, value),
+            Elementary::Sinc => return self.slope_of_sinc(x, value, Elementary::Cos),
+            Elementary::Sinhc => return self.slope_of_sinc(x, value, Elementary::Cosh),
             Elementary::Exp => return Some(value),
             Elementary::Tanh => {
                 let square = self.multiply(value, value)?;
@@ -209,9 +210,13 @@ impl Program {
     }
 
     /// See [`SincSlope`].
-    fn slope_of_sinc(&mut self, x: usize, sinc: usize) -> Option<usize> {
+    fn slope_of_sinc(&mut self, x: usize, sinc: usize, cos: Elementary) -> Option<usize> {
         let square = self.multiply(x, x)?;
-        let (first, rest) = SincSlope::SERIES.split_first()?;
+        let series = match cos {
+            Elementary::Cosh => SincSlope::SERIES.map(f64::abs),
+            _ => SincSlope::SERIES,
+        };
+        let (first, rest) = series.split_first()?;
         let mut sum = self.constant(*first)?;
         for coefficient in rest {
             let coefficient = self.constant(*coefficient)?;
@@ -219,7 +224,7 @@ impl Program {
             sum = self.add(product, coefficient)?;
         }
         let by_series = self.multiply(sum, x)?;
-        let cos = self.elementary(Elementary::Cos, x)?;
+        let cos = self.elementary(cos, x)?;
         let difference = self.subtract(cos, sinc)?;
         let by_difference = self.divide(difference, x)?;
         let size = self.elementary(Elementary::Abs, x)?;

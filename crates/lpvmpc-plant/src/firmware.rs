@@ -158,7 +158,7 @@ impl Plant {
             ),
             (
                 "memory.x",
-                include_str!("../../../firmware/memory.x").to_owned(),
+                include_str!("../../../firmware/board/memory.x").to_owned(),
             ),
             ("src/main.rs", fill(include_str!("firmware/main.rs.txt"))),
             (

@@ -46,6 +46,7 @@
 //! | a controller, estimator or simulation | [`SizedPlant`] by f alone, [`SizedEmbedding`] by its own A(s), B(s) |
 //! | the plant as Rust | [`Plant::to_rust`] |
 //! | a program for a microcontroller | [`Plant::to_firmware`] |
+//! | a proof about a steady state | [`AboutEquilibrium`]: f as A(s) x + B(s) u, exactly, of its formulas alone |
 //! | is a proof to be had of it? | [`Plant::first_not_smooth`] |
 //!
 //! # Derivatives, and time
@@ -85,7 +86,7 @@
 //! | `["pow", i, j]` | i to the power of j: by multiplication where j is a whole constant, for i > 0 else |
 //! | `["atan2", i, j]` | the angle of the point (j, i) |
 //! | `["neg", i]` and `sq`, `inv`, `sqrt`, `exp`, `log`, `expm1`, `log1p` | -x, x^2, 1/x, ... |
-//! | `["sin", i]` and `cos`, `tan`, `asin`, `acos`, `atan`, `sinh`, `cosh`, `tanh`, `asinh`, `acosh`, `atanh`, `sinc` | sinc is sin(x)/x |
+//! | `["sin", i]` and `cos`, `tan`, `asin`, `acos`, `atan`, `sinh`, `cosh`, `tanh`, `asinh`, `acosh`, `atanh`, `sinc`, `sinhc` | sinc is sin(x)/x, sinhc is sinh(x)/x |
 //! | `["abs", i]` and `sign`, `floor`; `["min", i, j]` and `max` | have kinks or jump: no proof |
 //! | `["lt", i, j]` and `le`, `eq` | 1 or 0; no proof |
 //! | `["if_else_zero", i, j]` | j where i is not 0, else 0; no proof |
@@ -94,12 +95,14 @@
     reason = "a comparison with NaN must take the failing branch"
 )]
 
+mod about;
 mod check;
 mod claims;
 mod code;
 mod data;
 mod derive;
 mod error;
+mod factorise;
 mod file;
 mod firmware;
 mod lanes;
@@ -113,6 +116,7 @@ mod sized;
 mod source;
 mod tangent;
 
+pub use about::AboutEquilibrium;
 pub use data::{EmbeddingData, Equilibrium, Parameter, PlantData, Signal};
 pub use error::PlantError;
 pub use file::Schema;

@@ -53,7 +53,7 @@ pub enum Binary {
 }
 
 /// The names of the functions of one number in a file.
-pub(crate) const UNARY: [(&str, Unary); 24] = [
+pub(crate) const UNARY: [(&str, Unary); 25] = [
     ("neg", Unary::Negative),
     ("sq", Unary::Square),
     ("inv", Unary::Inverse),
@@ -62,6 +62,7 @@ pub(crate) const UNARY: [(&str, Unary); 24] = [
     ("cos", Unary::Elementary(Elementary::Cos)),
     ("tan", Unary::Tan),
     ("sinc", Unary::Elementary(Elementary::Sinc)),
+    ("sinhc", Unary::Elementary(Elementary::Sinhc)),
     ("asin", Unary::Elementary(Elementary::Asin)),
     ("acos", Unary::Elementary(Elementary::Acos)),
     ("atan", Unary::Elementary(Elementary::Atan)),

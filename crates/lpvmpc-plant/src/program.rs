@@ -7,11 +7,13 @@ use std::collections::HashMap;
 /// A program under construction.
 ///
 /// It leaves out what changes no number: x + 0, 1 x, -(-x) and so on, by which a zero may change its sign. Where
-/// numbers alone meet, their result is worked out at once, in `f64`.
+/// numbers alone meet, their result is worked out at once, in `f64`, unless the program is an exact one.
 pub(crate) struct Program {
     operations: Vec<Operation>,
     known: HashMap<Key, usize>,
     longest: usize,
+    /// Numbers that meet stay as they are: their result would be rounded.
+    exact: bool,
 }
 
 /// An operation that can be looked up.
@@ -49,7 +51,21 @@ impl Program {
             operations: Vec::new(),
             known: HashMap::new(),
             longest,
+            exact: false,
         }
+    }
+
+    /// One for proofs: nothing in it is rounded.
+    pub fn exact(longest: usize) -> Self {
+        Self {
+            exact: true,
+            ..Self::new(longest)
+        }
+    }
+
+    /// Whether nothing more can be put into it.
+    pub fn is_full(&self) -> bool {
+        self.operations.len() >= self.longest
     }
 
     /// What it has come to.
@@ -145,7 +161,9 @@ impl Program {
 
     /// A function of x.
     pub fn unary(&mut self, function: Unary, x: usize) -> Option<usize> {
-        if let Some(value) = self.number(x) {
+        if let Some(value) = self.number(x)
+            && (!self.exact || function == Unary::Negative)
+        {
             return self.constant(function.of(value));
         }
         match (function, self.negated(x)) {
@@ -157,7 +175,9 @@ impl Program {
 
     /// A function of x and y.
     pub fn binary(&mut self, function: Binary, x: usize, y: usize) -> Option<usize> {
-        if let (Some(x), Some(y)) = (self.number(x), self.number(y)) {
+        if let (Some(x), Some(y)) = (self.number(x), self.number(y))
+            && !self.exact
+        {
             return self.constant(function.of(x, y));
         }
         let operation = Operation::Binary(function, x, y);

@@ -69,13 +69,23 @@ impl Tolerances {
 /// `NX` states, `NU` inputs, `NL` components of the load. What a load is, is the plant's to
 /// say: a force, a torque, an unwanted inflow. x_dot must be affine in it.
 pub trait Plant<const NX: usize, const NU: usize, const NL: usize> {
-    /// x_dot = f(x, u, load), in state units per second.
+    /// x_dot = f(x, u, load), in state units per second; the state one period later of a plant in discrete time.
     fn derivative(
         &self,
         x: &SVector<f64, NX>,
         u: &SVector<f64, NU>,
         load: &SVector<f64, NL>,
     ) -> SVector<f64, NX>;
+
+    /// The period of a plant in discrete time, s; `None` in continuous time.
+    fn period(&self) -> Option<f64> {
+        None
+    }
+
+    /// What sensor `i` measures at the state `x`, in its unit, where that is not its row of the states.
+    fn measured(&self, _i: usize, _x: &SVector<f64, NX>) -> Option<f64> {
+        None
+    }
 }
 
 /// An LPV model in continuous time as a plant that takes no load.

@@ -4,6 +4,9 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use rand_xoshiro::{SplitMix64, Xoshiro256PlusPlus};
 use std::f64::consts::TAU;
 
+/// What the counter of SplitMix64 goes up by: 2^64 over the golden ratio (Steele, Lea and Flood 2014).
+const SPLIT_MIX_STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+
 /// A stream of random numbers: the same seed and stream give the same numbers everywhere, to
 /// rounding.
 ///
@@ -15,9 +18,9 @@ pub struct Random(Xoshiro256PlusPlus);
 impl Random {
     /// The stream with number `stream` of those of a `seed`.
     pub fn new(seed: u64, stream: usize) -> Self {
-        let mut seeds = SplitMix64::seed_from_u64(seed);
-        let first = seeds.next_u64();
-        let own = (0..stream).fold(first, |_, _| seeds.next_u64());
+        // SplitMix64 is a counter behind a hash, so any of its numbers is had at once.
+        let counter = seed.wrapping_add((stream as u64).wrapping_mul(SPLIT_MIX_STEP));
+        let own = SplitMix64::seed_from_u64(counter).next_u64();
         Self(Xoshiro256PlusPlus::seed_from_u64(own))
     }
 
@@ -87,6 +90,15 @@ mod tests {
         }
         for found in tenths {
             assert_share(found, 0.1, "a tenth");
+        }
+    }
+
+    #[test]
+    fn a_stream_is_seeded_by_the_split_mix_number_of_its_place() {
+        let mut seeds = SplitMix64::seed_from_u64(9);
+        for stream in 0..100 {
+            let expected = Xoshiro256PlusPlus::seed_from_u64(seeds.next_u64());
+            assert_eq!(Random::new(9, stream).0, expected);
         }
     }
 

@@ -50,9 +50,9 @@ impl<const NX: usize> Sensor<NX> {
         })
     }
 
-    /// Its reading of the state `x`, with a standard normal `noise`.
-    fn reading(&self, x: &SVector<f64, NX>, noise: f64) -> f64 {
-        let value = self.row.dot(x) + self.bias + self.noise * noise;
+    /// Its reading of a `quantity`, with a standard normal `noise`.
+    fn reading(&self, quantity: f64, noise: f64) -> f64 {
+        let value = quantity + self.bias + self.noise * noise;
         if self.resolution > 0.0 {
             (value / self.resolution).round() * self.resolution
         } else {
@@ -123,9 +123,14 @@ impl<const NX: usize> Channel<NX> {
         }
     }
 
-    /// What is delivered at the world's sample `k`, when the state is `x`: a reading and its age
-    /// in samples.
-    pub(crate) fn read(&mut self, x: &SVector<f64, NX>, k: u64) -> Option<(f64, u64)> {
+    /// What is delivered at the world's sample `k`, when the state is `x` and what is measured `other` than the row of
+    /// it, if it is: a reading and its age in samples.
+    pub(crate) fn read(
+        &mut self,
+        x: &SVector<f64, NX>,
+        other: Option<f64>,
+        k: u64,
+    ) -> Option<(f64, u64)> {
         // Drawn in any case, so that a run with dropouts has the noise of the run without.
         let noise = self.random.normal();
         let chance = self.random.uniform();
@@ -137,8 +142,9 @@ impl<const NX: usize> Channel<NX> {
             ..
         } = self.sensor;
         let measures = chance >= dropout && k.is_multiple_of(every as u64);
+        let quantity = other.unwrap_or_else(|| self.sensor.row.dot(x));
         self.travelling
-            .push_back(measures.then(|| self.sensor.reading(x, noise)));
+            .push_back(measures.then(|| self.sensor.reading(quantity, noise)));
         let arrived = if self.travelling.len() > late {
             self.travelling.pop_front().flatten()
         } else {

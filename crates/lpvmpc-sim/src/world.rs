@@ -43,6 +43,17 @@ pub enum WorldError {
         /// What would be right.
         expected: &'static str,
     },
+    /// The plant moves in steps that do not fill the time between two samples.
+    #[error(
+        "the period of the sensors is {period} s; it must be a whole number of the plant's periods \
+         of {of_plant} s"
+    )]
+    Steps {
+        /// Period of the sensors, s.
+        period: f64,
+        /// Period of the plant, s.
+        of_plant: f64,
+    },
     /// A disturbance with numbers that make no sense: its place in the list, from 0.
     #[error("disturbance {0}: its times must be in order, and all its numbers finite")]
     Disturbance(usize),
@@ -140,7 +151,8 @@ impl<const NX: usize, const NU: usize, const NY: usize, const NL: usize>
 /// [`measurement`](Self::measurement), [`command`](Self::command), [`advance`](Self::advance).
 ///
 /// Time moves by one period of the sensors per [`advance`](Self::advance). The plant's motion
-/// is integrated from event to event (a command arrives, a push begins), never across one.
+/// is integrated from event to event (a command arrives, a push begins), never across one. A plant in
+/// discrete time moves in steps of its period; what happens within one counts from the next on.
 #[derive(Clone, Debug)]
 pub struct World<P, const NX: usize, const NU: usize, const NY: usize, const NL: usize> {
     plant: P,
@@ -181,6 +193,13 @@ where
         settings: WorldSettings<NX, NU, NY, NL>,
     ) -> Result<Self, WorldError> {
         settings.check()?;
+        if let Some(of_plant) = plant.period() {
+            let period = settings.period;
+            let steps = (period / of_plant).round();
+            if !(steps >= 1.0 && (steps * of_plant - period).abs() <= SAME_TIME * period.max(1.0)) {
+                return Err(WorldError::Steps { period, of_plant });
+            }
+        }
         Ok(Self::unchecked(plant, x, settings))
     }
 
@@ -334,7 +353,10 @@ where
         let mut integral = SVector::zeros();
         while since < self.period {
             let load = self.take_effect(start + since);
-            let next = self.next_event(start + since) - start;
+            let next = match self.plant.period() {
+                None => self.next_event(start + since) - start,
+                Some(step) => since + step,
+            };
             let end = if next < self.period - SAME_TIME {
                 next
             } else {
@@ -352,7 +374,8 @@ where
     fn measure(&mut self) {
         self.measurement.t = self.time();
         for (i, channel) in self.channels.iter_mut().enumerate() {
-            let reading = channel.read(&self.x, self.steps);
+            let other = self.plant.measured(i, &self.x);
+            let reading = channel.read(&self.x, other, self.steps);
             self.measurement.readings[i] = reading.map(|(value, age)| Reading {
                 value,
                 age: age as f64 * self.period,
@@ -418,11 +441,26 @@ where
         let at = |after: f64| {
             SVector::<f64, NU>::from_fn(|i, _| actuators[i].output(output[i], target[i], after))
         };
-        let motion = |after: f64, x: &SVector<f64, NX>| plant.derivative(x, &at(after), load);
-        self.x = integrate(motion, &self.x, duration, self.tolerances, duration)?;
         let end = at(duration);
         let integral =
             SVector::from_fn(|i, _| actuators[i].integral(output[i], target[i], duration));
+        self.x = match plant.period() {
+            None => {
+                let motion =
+                    |after: f64, x: &SVector<f64, NX>| plant.derivative(x, &at(after), load);
+                integrate(motion, &self.x, duration, self.tolerances, duration)?
+            }
+            Some(_) => {
+                let next = plant.derivative(&self.x, &(integral / duration), load);
+                if !next.iter().all(|entry| entry.is_finite()) {
+                    return Err(PlantError::Diverged {
+                        after: duration,
+                        reason: "the next state is not finite".to_owned(),
+                    });
+                }
+                next
+            }
+        };
         self.output = end;
         Ok(integral)
     }

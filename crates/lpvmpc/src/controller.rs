@@ -74,7 +74,7 @@ pub struct Controller<P, T: 'static, const NX: usize, const NU: usize, const NS:
     pub(crate) gap: SVector<T, NX>,
     pub(crate) initialised: bool,
     /// Quadratic programs that the last step solved.
-    pub(crate) problems: usize,
+    pub(crate) problems: u16,
     /// The end of the reference for which `target` was worked out.
     pub(crate) aimed_at: Option<SVector<T, NX>>,
     pub(crate) target: Option<SteadyState<T, NX, NU>>,
@@ -280,7 +280,7 @@ where
 
     /// How many quadratic programs the last step solved.
     pub fn problems(&self) -> usize {
-        self.problems
+        usize::from(self.problems)
     }
 
     /// Rolled-out minus predicted state at the end of the last plan's horizon, in state units:
@@ -473,7 +473,7 @@ where
             warm_start: WarmStart::Same,
             ..self.settings.solver
         };
-        while self.problems < self.settings.iterations.most()
+        while self.problems() < self.settings.iterations.most()
             && self.initialised
             && self.solution.status.is_solved()
         {

@@ -52,6 +52,23 @@ impl<T: Scalar, const NU: usize> DelayLine<T, NU> {
         }
     }
 
+    /// The last input that was commanded is `u` in truth; where none was, `u` acts already.
+    pub fn correct(&mut self, u: SVector<T, NU>) {
+        match self.length.checked_sub(1) {
+            Some(last) => {
+                if let Some((_, input)) = self.inputs.get_mut(last) {
+                    *input = u;
+                }
+            }
+            None => self.command(u, T::zero()),
+        }
+    }
+
+    /// Forgets all inputs: as new.
+    pub fn clear(&mut self) {
+        self.length = 0;
+    }
+
     /// Time goes on by `duration` s.
     pub fn elapse(&mut self, duration: T) {
         for (time, _) in self.inputs.iter_mut().take(self.length) {

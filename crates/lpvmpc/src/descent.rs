@@ -94,10 +94,11 @@ where
     ) {
         self.problems = 0;
         self.track(aim, &mut workspace.ocp);
-        let mut along = if self.initialised {
-            Along::Jacobian
+        let iterations = &self.settings.iterations;
+        let (mut along, most) = if self.initialised {
+            (Along::Jacobian, iterations.most())
         } else {
-            Along::Scheduling
+            (Along::Scheduling, iterations.first())
         };
         if !self.first_plan(x, aim, workspace) {
             return self.give_up(Status::NotFinite);
@@ -108,7 +109,7 @@ where
         let mut failures = 0;
         // The longest step that is tried along the embedding. It has no damping to shorten its answers.
         let mut longest_step = T::one();
-        while self.problems < self.settings.iterations.most() {
+        while self.problems() < most {
             self.linearize_plan(x, aim, along, workspace);
             self.solve_program(workspace);
             let damped = self.policy.damping > T::zero();

@@ -25,6 +25,13 @@ pub trait Number:
     /// The number `value`, as exactly as this kind of number has it.
     fn constant(value: f64) -> Self;
 
+    /// A number of which no more is known than that it lies from `lower` to `upper`. Numbers that are no sets take
+    /// the middle.
+    #[inline(always)]
+    fn between(lower: f64, upper: f64) -> Self {
+        Self::constant(0.5 * lower + 0.5 * upper)
+    }
+
     /// The value of an elementary function; not a number where the function has none.
     fn elementary(self, function: Elementary) -> Self;
 
@@ -143,6 +150,8 @@ pub enum Elementary {
     Cos,
     /// sin(x)/x, 1 at 0.
     Sinc,
+    /// sinh(x)/x, 1 at 0.
+    Sinhc,
     /// arctan x.
     Atan,
     /// e^x.
@@ -213,7 +222,8 @@ macro_rules! impl_number {
                 match function {
                     Elementary::Sin => sin_cos(self).0,
                     Elementary::Cos => sin_cos(self).1,
-                    Elementary::Sinc => sinc(self, sin_cos(self).0),
+                    Elementary::Sinc => over_itself(self, sin_cos(self).0),
+                    Elementary::Sinhc => over_itself(self, ComplexField::sinh(self)),
                     Elementary::Atan => ComplexField::atan(self),
                     Elementary::Exp => ComplexField::exp(self),
                     Elementary::Ln => ComplexField::ln(self),
@@ -256,7 +266,7 @@ macro_rules! impl_number {
             #[inline(always)]
             fn sin_cos_sinc(self) -> (Self, Self, Self) {
                 let (sin, cos) = sin_cos(self);
-                (sin, cos, sinc(self, sin))
+                (sin, cos, over_itself(self, sin))
             }
         }
     };
@@ -314,8 +324,8 @@ fn sign<T: crate::Scalar>(x: T) -> T {
     }
 }
 
-/// sin(x)/x, 1 at x = 0.
+/// `value`/x of sin x or sinh x, 1 at x = 0.
 #[inline(always)]
-fn sinc<T: crate::Scalar>(x: T, sin_x: T) -> T {
-    if x == T::zero() { T::one() } else { sin_x / x }
+fn over_itself<T: crate::Scalar>(x: T, value: T) -> T {
+    if x == T::zero() { T::one() } else { value / x }
 }

@@ -66,18 +66,21 @@ pub enum Iterations<T> {
         tolerance: T,
         /// At most so many, at least 1.
         most: usize,
+        /// At most so many in a sample without a plan from the one before: in the first, after a reset, after a plan
+        /// that was none. At least 1.
+        first: usize,
     },
 }
 
 impl<T: Scalar> Default for Iterations<T> {
     /// A descent of at most eight programs to a hundred-thousandth of the cost.
     fn default() -> Self {
-        Self::Descent {
-            tolerance: convert(Self::TOLERANCE),
-            most: Self::MOST,
-        }
+        Self::descent(convert(Self::TOLERANCE), Self::MOST)
     }
 }
+
+/// More programs than these are not counted.
+const LARGEST: usize = u16::MAX as usize;
 
 impl<T: Scalar> Iterations<T> {
     /// The tolerance of a descent where none is given.
@@ -85,10 +88,26 @@ impl<T: Scalar> Iterations<T> {
     /// Quadratic programs of a descent, at most, where no number is given.
     pub const MOST: usize = 8;
 
-    /// The largest number.
+    /// A descent with so many programs in every sample, at most.
+    pub const fn descent(tolerance: T, most: usize) -> Self {
+        Self::Descent {
+            tolerance,
+            most,
+            first: most,
+        }
+    }
+
+    /// The largest number in a sample that has a plan from the one before.
     pub fn most(&self) -> usize {
         match self {
             Self::Fixed(most) | Self::Descent { most, .. } => *most,
+        }
+    }
+
+    /// The largest number in a sample that has none.
+    pub fn first(&self) -> usize {
+        match self {
+            Self::Fixed(first) | Self::Descent { first, .. } => *first,
         }
     }
 
@@ -97,7 +116,9 @@ impl<T: Scalar> Iterations<T> {
             Self::Fixed(_) => T::one(),
             Self::Descent { tolerance, .. } => *tolerance,
         };
-        self.most() > 0 && tolerance > T::zero() && tolerance.is_finite()
+        let counts = [self.most(), self.first()];
+        let counted = counts.iter().all(|most| (1..=LARGEST).contains(most));
+        counted && tolerance > T::zero() && tolerance.is_finite()
     }
 }
 

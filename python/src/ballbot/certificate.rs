@@ -22,7 +22,7 @@ pub struct Asked {
 
 /// The largest set that can be proved: its numbers, and the text of its certificate.
 #[pyfunction]
-pub fn certify<'py>(
+pub fn certify_scenario<'py>(
     py: Python<'py>,
     scenario: &Scenario,
     asked: Asked,
@@ -57,7 +57,7 @@ pub fn certify<'py>(
 
 /// Proves the certificate in a file again: its numbers, and its text.
 #[pyfunction]
-pub fn verify<'py>(
+pub fn verify_certificate<'py>(
     py: Python<'py>,
     path: PathBuf,
     report: Report<'py>,

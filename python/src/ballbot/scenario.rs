@@ -80,16 +80,16 @@ impl Scenario {
         &self.folder
     }
 
-    /// What is given at a key; `None` where nothing is.
+    /// What stands at a key, or its default; `None` where there is neither.
     fn value<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
         let value = self.document.value(key);
-        value.map(|value| of_toml(py, value)).transpose()
+        value.map(|value| of_toml(py, &value)).transpose()
     }
 
     fn set(&mut self, changes: Vec<(String, Bound<'_, PyAny>)>) -> PyResult<()> {
-        let changes = changes.into_iter().map(|(key, value)| {
-            let value = to_toml(&key, &value)?;
-            Ok((key, value))
+        let changes = changes.iter().map(|(key, value)| {
+            let value = to_toml(key, value)?;
+            Ok((key.as_str(), value))
         });
         let changes: Vec<_> = changes.collect::<PyResult<_>>()?;
         self.document.set(&changes).map_err(of_scenario)
@@ -99,13 +99,10 @@ impl Scenario {
         self.document.remove(key).map_err(of_scenario)
     }
 
-    fn to_toml(&self) -> PyResult<String> {
-        self.document.to_toml().map_err(of_scenario)
-    }
-
-    /// What `parse` makes an equal one of.
-    fn to_parse(&self) -> PyResult<String> {
-        self.document.to_parse().map_err(of_scenario)
+    /// The text of its file.
+    #[getter]
+    fn text(&self) -> &str {
+        self.document.text()
     }
 
     fn check(&self, py: Python<'_>, report: Report<'_>) -> PyResult<()> {

@@ -1,4 +1,4 @@
-//! Studies: campaigns, times of a step, the paper.
+//! Studies: what is guaranteed, times of a step, the paper.
 
 use super::scenario::{Scenario, prepare};
 use super::values::plain;
@@ -53,7 +53,7 @@ pub fn bench<'py>(
 /// Many closed loops of a guaranteed scenario: of each variant its name, whether its plant is the
 /// model, its runs together and one by one.
 #[pyfunction]
-pub fn campaign<'py>(
+pub fn count_guarantee<'py>(
     py: Python<'py>,
     scenario: &Scenario,
     runs: usize,

@@ -64,9 +64,15 @@ pub enum CommandError {
     /// A figure that cannot be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),
-    /// A campaign that cannot be run.
+    /// The built-in campaign cannot be run.
     #[error(transparent)]
-    Campaign(#[from] CampaignError),
+    BuiltInCampaign(#[from] CampaignError),
+    /// A campaign of one's own that has no result.
+    #[error(transparent)]
+    Campaign(#[from] ballbot_campaign::CampaignError),
+    /// The cluster.
+    #[error("{0}")]
+    Cluster(String),
     /// A study that has no result.
     #[error(transparent)]
     Study(#[from] StudyError),

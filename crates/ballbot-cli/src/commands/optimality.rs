@@ -55,13 +55,9 @@ const RESULTS: [&str; 5] = [
 /// A file cannot be written.
 pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
     let results = ResultFolder::open(&arguments.out, &RESULTS)?;
-    let iterations =
-        arguments
-            .programs
-            .map_or_else(Iterations::default, |most| Iterations::Descent {
-                tolerance: Iterations::<f64>::TOLERANCE,
-                most: most as usize,
-            });
+    let iterations = arguments.programs.map_or_else(Iterations::default, |most| {
+        Iterations::descent(Iterations::<f64>::TOLERANCE, most as usize)
+    });
     let sets = [
         ("from rest", distances()?),
         ("random starts", random_starts()?),

@@ -1,12 +1,11 @@
 //! Which robot, and which scenario: the options that all commands with one have.
 
 use super::CommandError;
-use crate::progress::Progress;
+use crate::progress::ProofProgress;
 use ballbot::Ballbot;
 use ballbot_scenario::proofs::ProvedFiles;
 use ballbot_scenario::{Parameters, Prepared, Scenario, read_robot};
 use clap::Args;
-use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 
 /// The robot.
@@ -61,13 +60,10 @@ impl ScenarioOptions {
     /// The scenario or the robot's file cannot be read or makes no sense.
     pub fn prepare(&self, scenario: &str) -> Result<Prepared, CommandError> {
         let (loaded, folder) = self.load(scenario)?;
-        let bar = OnceCell::new();
+        let proof = ProofProgress::default();
         let files = ProvedFiles {
             folder: &folder,
-            progress: &|done| {
-                let bar = bar.get_or_init(|| Progress::of_parts("proving the certificate"));
-                bar.set_part(done);
-            },
+            progress: &|done| proof.set_part(done),
         };
         Ok(loaded.prepare(files)?)
     }

@@ -242,6 +242,22 @@ fn file_names(planes: usize) -> &'static [&'static str] {
     }
 }
 
+/// Writes trajectories and figures of a record, as [`run`] does.
+///
+/// # Errors
+/// A file cannot be written.
+pub(super) fn write_record(
+    folder: &ResultFolder,
+    prepared: &Prepared,
+    record: &Record,
+) -> Result<(), CommandError> {
+    let planes = record.planes.iter();
+    let trajectories: Vec<_> = planes.map(|plane| plane.trajectory.clone()).collect();
+    let motors = record.motors.clone();
+    let motors = motors.unwrap_or_else(|| prepared.motors_of_planes(&trajectories));
+    write(folder, prepared, &trajectories, &motors)
+}
+
 fn write(
     folder: &ResultFolder,
     prepared: &Prepared,
@@ -268,7 +284,7 @@ fn write(
 }
 
 /// All files that a run can leave in its folder.
-const RESULTS: [&str; 16] = [
+pub(super) const RESULTS: [&str; 16] = [
     "trajectory.csv",
     "trajectory_x.csv",
     "trajectory_y.csv",

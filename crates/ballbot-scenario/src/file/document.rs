@@ -4,18 +4,19 @@ use crate::builtin;
 use crate::error::ScenarioError;
 use crate::file::schema::Scenario;
 use crate::words;
+use serde::Deserialize;
 use std::path::Path;
 use toml::{Table, Value};
 
 /// A scenario as it is written, with the keys that were changed since. Every change is checked for its
 /// form at once; what a value means is checked by [`Scenario::prepare`].
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Document {
     scenario: Scenario,
     /// The keys that are given.
     tree: Value,
-    /// As it was written, with its comments, while nothing is changed.
-    text: Option<String>,
+    /// As it was written, with its comments; anew after a change.
+    text: String,
     /// What messages call it.
     origin: String,
 }
@@ -39,7 +40,7 @@ impl Document {
         Ok(Self {
             scenario,
             tree: Value::Table(table),
-            text: Some(text),
+            text,
             origin: origin.to_owned(),
         })
     }
@@ -54,49 +55,56 @@ impl Document {
         &self.origin
     }
 
-    /// What is given at `key`, with its tables and places in lists, separated by dots
-    /// (`controller.t_s`, `bounds.torque_nm.1`); everything at the empty key. `None` where nothing is
-    /// given, be there a default or not.
-    pub fn value(&self, key: &str) -> Option<&Value> {
-        let parts = key.split('.').filter(|part| !part.is_empty());
-        let mut place = &self.tree;
-        for part in parts {
-            place = match place {
-                Value::Table(table) => table.get(part)?,
-                Value::Array(list) => list.get(part.parse::<usize>().ok()?)?,
-                _ => return None,
-            };
+    /// The text of its TOML file: as it was read, or, where something was changed since, with every
+    /// default written out and without comments.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// What is given, without defaults.
+    pub fn root(&self) -> &Value {
+        &self.tree
+    }
+
+    /// What stands at `key`, with its tables and places in lists, separated by dots
+    /// (`controller.t_s`, `bounds.torque_nm.1`), or its default; everything, with every default, at the
+    /// empty key. `None` where there is neither.
+    pub fn value(&self, key: &str) -> Option<Value> {
+        let given = match key {
+            "" => None,
+            key => entry(&self.tree, key).cloned(),
+        };
+        given.or_else(|| {
+            let all = Value::try_from(&self.scenario).ok()?;
+            entry(&all, key).cloned()
+        })
+    }
+
+    /// The scenario with values at keys replaced or added: what many runs that differ in a few values
+    /// start from.
+    ///
+    /// # Errors
+    /// As [`set`](Self::set).
+    pub fn with(&self, changes: &[(&str, Value)]) -> Result<Scenario, ScenarioError> {
+        let mut tree = self.tree.clone();
+        for (key, value) in changes {
+            set(&mut tree, key, value.clone())?;
         }
-        Some(place)
+        let said: Vec<String> = changes.iter().map(|(k, v)| format!("{k}={v}")).collect();
+        self.read(&tree, &format!("with {}", said.join(", ")))
     }
 
     /// Replaces or adds values at keys. On an error nothing is changed.
     ///
     /// # Errors
-    /// A key that leads into a value, or [`ScenarioError::Syntax`]: what results is no scenario.
-    pub fn set(&mut self, changes: &[(String, Value)]) -> Result<(), ScenarioError> {
-        let said = |(key, value): &(String, Value)| match value {
-            Value::String(text) => format!("{key}={text}"),
-            value => format!("{key}={value}"),
-        };
-        let said: Vec<String> = changes.iter().map(said).collect();
-        self.change(changes, &said)
-    }
-
-    /// [`set`](Self::set), with what a message says of each change.
-    pub(crate) fn change(
-        &mut self,
-        changes: &[(String, Value)],
-        said: &[String],
-    ) -> Result<(), ScenarioError> {
-        if changes.is_empty() {
-            return Ok(());
-        }
-        let mut tree = self.tree.clone();
+    /// A key that leads into a value, or [`ScenarioError::Syntax`]: what results is no scenario, since
+    /// a key is none, or its value has the wrong type.
+    pub fn set(&mut self, changes: &[(&str, Value)]) -> Result<(), ScenarioError> {
+        let scenario = self.with(changes)?;
         for (key, value) in changes {
-            set(&mut tree, key, value.clone())?;
+            set(&mut self.tree, key, value.clone())?;
         }
-        self.replace(tree, &format!("with {}", said.join(", ")))
+        self.replace(scenario)
     }
 
     /// Takes away what is given at `key`, so that its default holds. On an error nothing is changed.
@@ -129,40 +137,36 @@ impl Document {
                 "there is nothing to remove",
             ));
         }
-        self.replace(tree, &format!("without {key}"))
+        let scenario = self.read(&tree, &format!("without {key}"))?;
+        self.tree = tree;
+        self.replace(scenario)
     }
 
-    fn replace(&mut self, tree: Value, change: &str) -> Result<(), ScenarioError> {
+    fn read(&self, tree: &Value, change: &str) -> Result<Scenario, ScenarioError> {
+        if let Ok(scenario) = Scenario::deserialize(tree.clone()) {
+            return Ok(scenario);
+        }
+        // Once more as a text, whose messages have lines.
         let origin = format!("{} {change}", self.origin);
-        let text = toml::to_string(&tree).map_err(|error| syntax(&origin, &error))?;
-        self.scenario = Scenario::parse(&text, &origin)?;
-        (self.tree, self.text) = (tree, None);
+        let text = toml::to_string(tree).map_err(|error| syntax(&origin, &error))?;
+        Scenario::parse(&text, &origin)
+    }
+
+    fn replace(&mut self, scenario: Scenario) -> Result<(), ScenarioError> {
+        self.text = toml::to_string(&scenario).map_err(|error| syntax(&self.origin, &error))?;
+        self.scenario = scenario;
         Ok(())
     }
+}
 
-    /// The text of a TOML file with the keys that are given and no others, in any order: what
-    /// [`parse`](Self::parse) makes an equal document of.
-    ///
-    /// # Errors
-    /// [`ScenarioError::Syntax`]; none should occur.
-    pub fn to_parse(&self) -> Result<String, ScenarioError> {
-        match &self.text {
-            Some(text) => Ok(text.clone()),
-            None => toml::to_string(&self.tree).map_err(|error| syntax(&self.origin, &error)),
-        }
-    }
-
-    /// The text of a TOML file: as it was read, or, where something was changed since, with every
-    /// default written out and without comments.
-    ///
-    /// # Errors
-    /// [`ScenarioError::Syntax`]; none should occur.
-    pub fn to_toml(&self) -> Result<String, ScenarioError> {
-        match &self.text {
-            Some(text) => Ok(text.clone()),
-            None => toml::to_string(&self.scenario).map_err(|error| syntax(&self.origin, &error)),
-        }
-    }
+/// What stands at `key` below `root`.
+fn entry<'a>(root: &'a Value, key: &str) -> Option<&'a Value> {
+    let mut parts = key.split('.').filter(|part| !part.is_empty());
+    parts.try_fold(root, |place, part| match place {
+        Value::Table(table) => table.get(part),
+        Value::Array(list) => list.get(part.parse::<usize>().ok()?),
+        _ => None,
+    })
 }
 
 fn syntax(origin: &str, error: &dyn std::fmt::Display) -> ScenarioError {

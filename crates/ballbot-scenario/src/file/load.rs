@@ -15,7 +15,7 @@ impl Scenario {
         Ok(Document::load(name_or_path)?.scenario().clone())
     }
 
-    /// [`load`](Self::load), with values at keys replaced or added, as by [`Document::set`]: a key, and
+    /// [`load`](Self::load), with values at keys replaced or added, as by [`Document::with`]: a key, and
     /// what would stand behind `=` in the file. What is no TOML value is taken as text.
     ///
     /// # Errors
@@ -24,14 +24,13 @@ impl Scenario {
         name_or_path: &str,
         changes: &[(String, String)],
     ) -> Result<Self, ScenarioError> {
-        let mut document = Document::load(name_or_path)?;
-        let said: Vec<String> = changes.iter().map(|(k, v)| format!("{k}={v}")).collect();
-        let changes = changes.iter();
-        let changes: Vec<(String, Value)> = changes
-            .map(|(key, value)| (key.clone(), parsed(value)))
-            .collect();
-        document.change(&changes, &said)?;
-        Ok(document.scenario().clone())
+        if changes.is_empty() {
+            return Self::load(name_or_path);
+        }
+        let changes = changes
+            .iter()
+            .map(|(key, value)| (key.as_str(), parsed(value)));
+        Document::load(name_or_path)?.with(&changes.collect::<Vec<_>>())
     }
 
     /// A scenario from the text of a TOML file; `origin` names it in messages.

@@ -141,6 +141,9 @@ pub enum IterationsTable {
         /// At most so many.
         #[serde(default = "descent_programs")]
         most: usize,
+        /// At most so many in a sample without a plan from the one before. As `most` when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        first: Option<usize>,
     },
 }
 
@@ -150,6 +153,7 @@ impl Default for IterationsTable {
         Self::Descent {
             tolerance: descent_tolerance(),
             most: descent_programs(),
+            first: None,
         }
     }
 }

@@ -149,9 +149,21 @@ impl ControllerTable {
         let (iterations, key, most) = match self.iterations.unwrap_or(usual) {
             IterationsTable::Fixed(most) => (Iterations::Fixed(most), "fixed", most),
             IterationsTable::Descent { .. } if linear => return Ok(Iterations::Fixed(1)),
-            IterationsTable::Descent { tolerance, most } => {
-                let iterations = Iterations::Descent { tolerance, most };
-                (iterations, "descent.most", most)
+            IterationsTable::Descent {
+                tolerance,
+                most,
+                first,
+            } => {
+                let first = first.unwrap_or(most);
+                let iterations = Iterations::Descent {
+                    tolerance,
+                    most,
+                    first,
+                };
+                match first > most {
+                    true => (iterations, "descent.first", first),
+                    false => (iterations, "descent.most", most),
+                }
             }
         };
         if most > MOST_PROGRAMS {

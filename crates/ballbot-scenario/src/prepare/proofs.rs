@@ -26,7 +26,7 @@ pub struct ProvedFiles<'a> {
     /// The folder that paths are relative to.
     pub folder: &'a Path,
     /// Called with the part of a proof that is done, where one is made.
-    pub progress: &'a dyn Fn(f64),
+    pub progress: &'a (dyn Fn(f64) + Sync),
 }
 
 impl Files for ProvedFiles<'_> {

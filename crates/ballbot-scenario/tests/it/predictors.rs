@@ -66,7 +66,7 @@ fn the_frozen_predictor_keeps_its_gap() {
 /// A descent with the stage-consistent predictor, until nothing is left to gain.
 fn converging(most: usize) -> ControllerSettings<f64> {
     let tolerance = 1e-5;
-    let descent = Iterations::Descent { tolerance, most };
+    let descent = Iterations::descent(tolerance, most);
     settings(Predictor::StageConsistent(FINE), descent)
 }
 

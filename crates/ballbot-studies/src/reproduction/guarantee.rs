@@ -53,6 +53,7 @@ impl Guarantee {
         let converged = IterationsTable::Descent {
             tolerance: 1e-6,
             most: 100,
+            first: None,
         };
         let mut fine = Scenario::load("two-setpoints")?;
         fine.controller.predictor = Some(FINE);

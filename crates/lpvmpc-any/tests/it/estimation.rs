@@ -1,7 +1,7 @@
 //! Behind an estimator and a delay.
 
 use crate::plants::limits;
-use lpvmpc_any::{Disturbance, EstimatorSettings, Mpc, MpcSettings, Preview, Verdict};
+use lpvmpc_any::{Disturbance, EstimatorSettings, Mpc, MpcSettings, Preview, Terminal, Verdict};
 use lpvmpc_plant::{Matrices, Plant, PlantData};
 use nalgebra::{DMatrix, DVector, dmatrix, dvector};
 
@@ -98,6 +98,72 @@ fn a_loop_tracks_without_offset_behind_a_delay() {
     }
     let without = position(false, Vec::new(), 2);
     assert!((without - 0.4).abs() > 0.02, "{without}");
+}
+
+/// A loop that was reset is the same loop once more, with another parameter, too; a filter that begins elsewhere, or
+/// that knows what was sent in place of a plan's input, finds the state from there.
+#[test]
+fn a_reset_forgets_and_a_start_is_where_it_begins() {
+    // The regulator's cost would be another for another plant.
+    let settings = MpcSettings {
+        terminal: Terminal::Cost(DMatrix::identity(4, 4) * 100.0),
+        ..settings(false)
+    };
+    let mut mpc = Mpc::new(&cart_pole(), &settings).unwrap();
+    let run = |mpc: &mut Mpc| -> Vec<f64> {
+        (0..5)
+            .map(|k| {
+                let readings = [Some(0.3), Some(0.05)];
+                mpc.observe(10.0 + 0.04 * f64::from(k), &readings).unwrap();
+                let plan = mpc.decide(&Preview::to(&[0.4, 0.0, 0.0, 0.0])).unwrap();
+                plan.first_input()[0]
+            })
+            .collect()
+    };
+    mpc.set_estimator(Some(&estimator(0.08, force()))).unwrap();
+    let first = run(&mut mpc);
+    mpc.reset();
+    assert_eq!(run(&mut mpc), first);
+    mpc.reset();
+    mpc.set_parameter("pole_mass", 0.36).unwrap();
+    let heavier = run(&mut mpc);
+    assert_ne!(heavier, first);
+    let mut plant = cart_pole();
+    plant.set_parameter("pole_mass", 0.36).unwrap();
+    let mut other = Mpc::new(&plant, &settings).unwrap();
+    other
+        .set_estimator(Some(&estimator(0.08, force())))
+        .unwrap();
+    assert_eq!(run(&mut other), heavier);
+
+    let start = vec![0.2, 0.1, -0.3, 0.4];
+    let begun = EstimatorSettings {
+        start: Some(start.clone()),
+        ..estimator(0.0, Vec::new())
+    };
+    mpc.set_estimator(None).unwrap();
+    mpc.set_estimator(Some(&begun)).unwrap();
+    assert_eq!(mpc.estimate().unwrap().x, start);
+    mpc.reset();
+    assert_eq!(mpc.estimate().unwrap().x, start);
+
+    // What was sent moves the estimate: half a newton for a sample, into the speed of the cart.
+    let speed = |mpc: &mut Mpc, sent: f64| {
+        mpc.reset();
+        mpc.observe(0.0, &[Some(0.0), Some(0.0)]).unwrap();
+        mpc.decide(&Preview::default()).unwrap();
+        mpc.set_last_input(&[sent]).unwrap();
+        mpc.observe(0.04, &[None, None]).unwrap();
+        mpc.estimate().unwrap().x[2]
+    };
+    mpc.set_estimator(Some(&estimator(0.0, Vec::new())))
+        .unwrap();
+    let (without, with) = (speed(&mut mpc, 0.0), speed(&mut mpc, 0.5));
+    let expected = moved(&plant, &DVector::zeros(4), 0.5, 0.04)[2];
+    assert!(
+        (with - without - expected).abs() < 0.05 * expected.abs(),
+        "{with} - {without}, {expected}"
+    );
 }
 
 /// Disturbances of a state and beside an input in discrete time, and one that is known: found to the last digits, and

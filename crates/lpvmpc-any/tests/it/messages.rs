@@ -4,8 +4,8 @@ use crate::plants::{cart_pole, chain};
 use lpvmpc_any::{
     Limits, LinearModels, Mpc, MpcSettings, Penalty, Preview, Row, StateBounds, Terminal,
 };
-use lpvmpc_plant::Plant;
-use nalgebra::{DMatrix, DVector};
+use lpvmpc_plant::{Matrices, Plant, PlantData};
+use nalgebra::{DMatrix, DVector, dmatrix};
 
 fn settings() -> MpcSettings {
     MpcSettings {
@@ -281,4 +281,30 @@ fn settings_that_are_refused_change_nothing() {
     assert!(mpc.set_settings(&longer).is_err());
     mpc.reset();
     assert_eq!(mpc.step(&x, &Preview::default()).unwrap(), before);
+}
+
+/// x_dot = -30 x + u: Runge-Kutta's steps of order four are stable up to 2.785 / 30 s, and the plan of a controller that is
+/// allowed to is the plant's.
+#[test]
+fn steps_too_long_for_a_plant_are_refused_with_the_number_needed() {
+    let matrices = Matrices {
+        a: dmatrix![-30.0, 0.0; 0.0, 0.2],
+        b: dmatrix![1.0; 1.0],
+        ..Matrices::default()
+    };
+    let plant = Plant::new(PlantData::of_matrices("stiff", &matrices).unwrap()).unwrap();
+    let made = |t_s: f64, substeps: usize| {
+        let settings = MpcSettings {
+            substeps,
+            ..MpcSettings::new(t_s, 10, &[1.0, 1.0], &[1.0])
+        };
+        Mpc::new(&plant, &settings).map(|_| ())
+    };
+    assert!(made(0.0928, 1).is_ok());
+    assert_eq!(
+        made(0.4, 1).unwrap_err().to_string(),
+        "substeps: with 1 in 0.4 s the prediction of what decays in 3.33e-2 s would grow without bound; at least 5 substeps are needed, and more for accuracy"
+    );
+    assert!(made(0.0929, 1).is_err());
+    assert!(made(0.4, 4).is_err() && made(0.4, 5).is_ok());
 }

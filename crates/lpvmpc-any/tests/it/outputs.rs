@@ -157,10 +157,7 @@ fn car_settings(weight: f64) -> MpcSettings {
         r_du: Some(DMatrix::from_diagonal(&dvector![0.5, 0.3])),
         du_bounds: limits(&[0.6, 0.5]),
         linear_models: LinearModels::AlongMotion,
-        iterations: Iterations::Descent {
-            tolerance: 1e-8,
-            most: 200,
-        },
+        iterations: Iterations::descent(1e-8, 200),
         ..MpcSettings::new(0.1, 20, &[1.0, 1.0, 0.1, 0.2], &[0.1, 0.2])
     }
 }

@@ -77,10 +77,7 @@ fn the_linear_models_do_not_decide_where_a_descent_ends() {
     .map(|linear_models| {
         let settings = MpcSettings {
             linear_models,
-            iterations: lpvmpc_any::Iterations::Descent {
-                tolerance: 1e-10,
-                most: 100,
-            },
+            iterations: lpvmpc_any::Iterations::descent(1e-10, 100),
             ..settings()
         };
         let mut mpc = Mpc::new(&cart_pole(), &settings).unwrap();

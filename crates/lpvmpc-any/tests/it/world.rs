@@ -2,8 +2,9 @@
 
 use crate::plants::{CartPole, cart_pole};
 use lpvmpc::AlongMotion;
-use lpvmpc_any::{Push, Sensor, Tolerances, World, WorldSettings, steady_state};
-use nalgebra::{Vector1, Vector4};
+use lpvmpc_any::{Push, Quantity, Sensor, Tolerances, World, WorldSettings, steady_state};
+use lpvmpc_plant::{Matrices, Plant, PlantData};
+use nalgebra::{Vector1, Vector4, dmatrix, dvector};
 
 #[test]
 fn a_plant_moves_as_one_of_its_own_size() {
@@ -61,7 +62,7 @@ fn a_load_moves_a_state_by_its_integral() {
 fn a_sensor_reads_what_it_is_told_to() {
     let sensor = Sensor {
         bias: 0.25,
-        ..Sensor::ideal(vec![1.0, 2.0, 0.0, 0.0])
+        ..Sensor::ideal(Quantity::Row(vec![1.0, 2.0, 0.0, 0.0]))
     };
     let settings = WorldSettings {
         sensors: Some(vec![sensor]),
@@ -79,7 +80,7 @@ fn what_is_no_world_is_refused_by_its_place() {
         refused.unwrap_err().to_string()
     };
     let ideal = || WorldSettings::ideal(0.05);
-    let sensors = Some(vec![Sensor::ideal(vec![1.0])]);
+    let sensors = Some(vec![Sensor::ideal(Quantity::Row(vec![1.0]))]);
     let said_of_sensors = said(WorldSettings { sensors, ..ideal() });
     assert!(
         said_of_sensors.starts_with("sensors[0], row: it has 1 entries"),
@@ -95,7 +96,7 @@ fn what_is_no_world_is_refused_by_its_place() {
         })
         .contains("0 for 1 inputs")
     );
-    let many = Some(vec![Sensor::ideal(vec![0.0; 4]); 17]);
+    let many = Some(vec![Sensor::ideal(Quantity::Row(vec![0.0; 4])); 17]);
     assert!(
         said(WorldSettings {
             sensors: many,
@@ -119,4 +120,67 @@ fn a_cart_stands_where_it_is_told_to_and_its_pole_upright() {
             .to_string()
             .starts_with("weights: angle is -1")
     );
+}
+
+/// A plant in discrete time, two of whose steps are one sample, whose output is not linear and whose input comes late and
+/// through an actuator: as by hand.
+#[test]
+fn a_plant_in_discrete_time_moves_in_its_own_steps() {
+    let matrices = Matrices {
+        a: dmatrix![1.0, 0.1; -0.2, 0.9],
+        b: dmatrix![0.0; 0.1],
+        c: Some(dmatrix![2.0, -1.0]),
+        period: Some(0.1),
+        ..Matrices::default()
+    };
+    let plant = Plant::new(PlantData::of_matrices("linear", &matrices).unwrap()).unwrap();
+    let settings = WorldSettings {
+        delay: 0.1,
+        pushes: vec![Push::Load {
+            from: 0.25,
+            until: 0.55,
+            load: vec![0.0, 0.3],
+        }],
+        sensors: Some(vec![Sensor {
+            bias: 0.5,
+            ..Sensor::ideal(Quantity::Output("y0".to_owned()))
+        }]),
+        ..WorldSettings::ideal(0.2)
+    };
+    let mut world = World::new(&plant, &[1.0, 0.0], &settings).unwrap();
+    let (mut x, mut acting) = (dvector![1.0, 0.0], 0.0);
+    for k in 0..6 {
+        let u = f64::from(k) - 2.0;
+        world.command(&[u]).unwrap();
+        for step in [2 * k, 2 * k + 1] {
+            // It arrives with the second step; the load acts on the steps at 0.3, 0.4 and 0.5 s.
+            acting = if step % 2 == 1 { u } else { acting };
+            let load = f64::from(u8::from((3..=5).contains(&step))) * dvector![0.0, 0.3];
+            x = &matrices.a * &x + matrices.b.column(0) * acting + load;
+        }
+        world.advance().unwrap();
+        for (one, other) in world.state().iter().zip(&x) {
+            assert!((one - other).abs() < 1e-14, "{k}: {one} {other}");
+        }
+        let reading = world.readings()[0].unwrap().value;
+        assert!((reading - (2.0 * x[0] - x[1] + 0.5)).abs() < 1e-13);
+    }
+    let uneven = World::new(&plant, &[1.0, 0.0], &WorldSettings::ideal(0.25));
+    assert_eq!(
+        uneven.unwrap_err().to_string(),
+        "world: the period of the sensors is 0.25 s; it must be a whole number of the plant's periods of 0.1 s"
+    );
+}
+
+#[test]
+fn a_sensor_of_an_output_is_refused_where_there_is_none() {
+    let said = |name: &str| {
+        let settings = WorldSettings {
+            sensors: Some(vec![Sensor::ideal(Quantity::Output(name.to_owned()))]),
+            ..WorldSettings::ideal(0.05)
+        };
+        let refused = World::new(&cart_pole(), &[0.0; 4], &settings);
+        refused.unwrap_err().to_string()
+    };
+    assert!(said("tip").starts_with("sensors[0]: \"tip\" is no state or output; there are "));
 }

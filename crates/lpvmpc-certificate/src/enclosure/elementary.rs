@@ -85,6 +85,7 @@ pub(super) fn taylor_coefficients(
             }
         }
         Elementary::Sinc => places.for_each(|(n, place)| *place = sinc_coefficient(n, x)),
+        Elementary::Sinhc => places.for_each(|(n, place)| *place = sinhc_coefficient(n, x)),
         Elementary::Exp => {
             let value = rising(x, f64::exp).common(Interval::new(0.0, f64::INFINITY));
             places.for_each(|(n, place)| *place = value * TABLES.reciprocal_factorials[n]);
@@ -399,6 +400,24 @@ fn sinc_series(n: usize) -> [Interval; POWERS] {
         }
         coefficient
     })
+}
+
+/// sinhc^(n)(x) / n!: the series of sinc without its signs. The j-th derivative of sinhc, the integral of
+/// s^j cosh^(j)(s x) over s from 0 to 1, is at most cosh x in size, which bounds the terms left out.
+fn sinhc_coefficient(n: usize, x: Interval) -> Interval {
+    let square = x.square();
+    let size = |c: &Interval| if c.upper < 0.0 { -*c } else { *c };
+    let even = TABLES.sinc[n]
+        .iter()
+        .rev()
+        .fold(Interval::point(0.0), |sum, coefficient| {
+            sum * square + size(coefficient)
+        });
+    let sum = if n.is_multiple_of(2) { even } else { even * x };
+    let largest = Interval::point(x.magnitude());
+    let power = (0..=highest(n)).fold(Interval::point(1.0), |power, _| power * largest);
+    let rest = (power * TABLES.rest[n] * hyperbolic(largest).1).upper;
+    sum + Interval::new(-rest, rest)
 }
 
 /// sinc^(n)(x) / n!. The j-th derivative of sinc, the integral of s^j cos^(j)(s x) over s from 0

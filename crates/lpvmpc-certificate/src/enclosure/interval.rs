@@ -176,6 +176,10 @@ impl Number for Interval {
         Self::point(value)
     }
 
+    fn between(lower: f64, upper: f64) -> Self {
+        Self::new(lower, upper)
+    }
+
     fn elementary(self, function: Elementary) -> Self {
         self.taylor_coefficients(function, 1)[0]
     }

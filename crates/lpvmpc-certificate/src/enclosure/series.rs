@@ -121,6 +121,10 @@ impl<T: Arithmetic> Number for Series<T> {
         Self::fixed(T::constant(value))
     }
 
+    fn between(lower: f64, upper: f64) -> Self {
+        Self::fixed(T::between(lower, upper))
+    }
+
     fn elementary(self, function: Elementary) -> Self {
         self.taylor_coefficients(function, 1)[0]
     }

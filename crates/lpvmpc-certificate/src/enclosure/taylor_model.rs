@@ -226,6 +226,10 @@ impl<const D: usize> Number for TaylorModel<D> {
         }
     }
 
+    fn between(lower: f64, upper: f64) -> Self {
+        Self::from(Interval::new(lower, upper))
+    }
+
     fn elementary(self, function: Elementary) -> Self {
         self.taylor_coefficients(function, 1)[0]
     }

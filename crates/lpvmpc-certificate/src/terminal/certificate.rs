@@ -143,12 +143,7 @@ where
     /// # Errors
     /// The plant cannot be written as JSON.
     pub fn to_json(&self) -> Result<String, DocumentError> {
-        let document = Document {
-            certificate: self,
-            digest: self.digest()?,
-        };
-        let text = serde_json::to_string_pretty(&document).map_err(DocumentError::syntax)?;
-        Ok(text + "\n")
+        document_text(self)
     }
 
     /// The certificate in a file's text, **without** a look at its digest: see
@@ -157,7 +152,7 @@ where
     /// # Errors
     /// [`DocumentError::TooLong`] or [`DocumentError::Syntax`].
     pub fn from_json(text: &str) -> Result<Self, DocumentError> {
-        Ok(Self::document(text)?.certificate)
+        document_content(text)
     }
 
     /// Whether the text is as it was written. The digest has no key: it finds a slip or a patched
@@ -166,33 +161,64 @@ where
     /// # Errors
     /// [`DocumentError`].
     pub fn check_digest(text: &str) -> Result<(), DocumentError> {
-        let document = Self::document(text)?;
-        let computed = document.certificate.digest()?;
-        if computed == document.digest {
-            Ok(())
-        } else {
-            Err(DocumentError::Digest {
-                written: document.digest,
-                computed,
-            })
-        }
+        check_document_digest::<Self>(text)
     }
+}
 
-    fn document(text: &str) -> Result<Document<Self>, DocumentError> {
-        if text.len() > MOST_BYTES {
-            return Err(DocumentError::TooLong);
-        }
-        serde_json::from_str(text).map_err(DocumentError::syntax)
-    }
+/// The text of a file with this content and its digest.
+///
+/// # Errors
+/// The content cannot be written as JSON.
+pub fn document_text<C: Serialize>(content: &C) -> Result<String, DocumentError> {
+    let document = Document {
+        certificate: content,
+        digest: digest(content)?,
+    };
+    let text = serde_json::to_string_pretty(&document).map_err(DocumentError::syntax)?;
+    Ok(text + "\n")
+}
 
-    /// FNV-1a (Fowler, Noll, Vo), 64 bits, of the compact JSON text of the content.
-    fn digest(&self) -> Result<String, DocumentError> {
-        let text = serde_json::to_string(self).map_err(DocumentError::syntax)?;
-        let hash = text.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        });
-        Ok(format!("{hash:016x}"))
+/// The content of such a text, **without** a look at its digest.
+///
+/// # Errors
+/// [`DocumentError::TooLong`] or [`DocumentError::Syntax`].
+pub fn document_content<C: DeserializeOwned>(text: &str) -> Result<C, DocumentError> {
+    Ok(document::<C>(text)?.certificate)
+}
+
+/// Whether the text is as it was written; see [`Certificate::check_digest`].
+///
+/// # Errors
+/// [`DocumentError`].
+pub fn check_document_digest<C: Serialize + DeserializeOwned>(
+    text: &str,
+) -> Result<(), DocumentError> {
+    let document = document::<C>(text)?;
+    let computed = digest(&document.certificate)?;
+    if computed == document.digest {
+        Ok(())
+    } else {
+        Err(DocumentError::Digest {
+            written: document.digest,
+            computed,
+        })
     }
+}
+
+fn document<C: DeserializeOwned>(text: &str) -> Result<Document<C>, DocumentError> {
+    if text.len() > MOST_BYTES {
+        return Err(DocumentError::TooLong);
+    }
+    serde_json::from_str(text).map_err(DocumentError::syntax)
+}
+
+/// FNV-1a (Fowler, Noll, Vo), 64 bits, of the compact JSON text of the content.
+fn digest<C: Serialize>(content: &C) -> Result<String, DocumentError> {
+    let text = serde_json::to_string(content).map_err(DocumentError::syntax)?;
+    let hash = text.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    });
+    Ok(format!("{hash:016x}"))
 }
 
 impl DocumentError {

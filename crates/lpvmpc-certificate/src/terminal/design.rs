@@ -4,6 +4,7 @@ use super::certificate::{Certificate, QuadraticClaim, Record, TerminalClaim};
 use super::claim::ClaimError;
 use super::proof::Proof;
 use super::quadratic;
+use super::sampled::SampledClaim;
 use super::synthesis::{SynthesisError, TerminalIngredients, TerminalProblem, synthesize_terminal};
 
 use lpvmpc::{Embedding, LpvModel};
@@ -179,7 +180,10 @@ where
         ..proved.0.clone()
     };
     let mut best = proved;
-    let (mut low, mut high) = (1.0, base.highest_factor(&best.1));
+    let (mut low, mut high) = (
+        1.0,
+        base.sampled().highest_factor(&base.plant, &best.1.reach),
+    );
     for trial in 0..effort.trials {
         if high < low * WORTH_IT {
             break;
@@ -204,14 +208,15 @@ const MOST_FACTOR: f64 = 1e3;
 /// Levels that samples are looked at for, before any proof.
 const SAMPLED_LEVELS: usize = 10;
 
-impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant, NX, NU, NS>
-where
-    Plant: Embedding<NX, NU, NS> + Clone + Sync,
-{
-    /// The factor of the level from which on there is no proof: a limit is in the way, or the matrix
-    /// inequality is violated at a sampled state. Where the states go grows with the root.
-    fn highest_factor(&self, proof: &Proof<NX>) -> f64 {
-        let states = self.state_limits.iter().zip(proof.reach.iter());
+impl<const NX: usize, const NU: usize> SampledClaim<NX, NU> {
+    /// The factor of the level from which on there is no proof for `model`: a limit is in the way, or the matrix
+    /// inequality is violated at a sampled state. Where the states go grows with the root; `reach` is where they go
+    /// at the level.
+    pub fn highest_factor<M, const NS: usize>(&self, model: &M, reach: &SVector<f64, NX>) -> f64
+    where
+        M: Embedding<NX, NU, NS> + Sync,
+    {
+        let states = self.state_limits.iter().zip(reach.iter());
         let states = states.map(|(limit, reach)| (limit / reach).powi(2));
         let inputs = self.input_reach();
         let inputs = self.input_limits.iter().zip(inputs.iter());
@@ -219,7 +224,8 @@ where
         let limited = states.chain(inputs).fold(MOST_FACTOR, f64::min);
         let holds = |factor: f64| {
             let level = self.terminal.level * factor;
-            self.tightest_at(level).is_some_and(|excess| excess < 0.0)
+            self.tightest_at(model, level)
+                .is_some_and(|excess| excess < 0.0)
         };
         if holds(limited) {
             return limited;
@@ -235,7 +241,12 @@ where
         }
         high
     }
+}
 
+impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant, NX, NU, NS>
+where
+    Plant: Embedding<NX, NU, NS> + Clone + Sync,
+{
     /// The same claims with a level that is `factor` times as high, in the limits of the schedulings
     /// that this takes; proved.
     fn raised(

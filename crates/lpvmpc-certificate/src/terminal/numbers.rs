@@ -3,6 +3,7 @@
 use super::certificate::Certificate;
 use super::claim::ClaimError;
 use super::normalised::{Normaliser, Square, from_fn};
+use super::sampled::SampledClaim;
 use crate::enclosure::{Interval, is_positive_definite};
 use nalgebra::SMatrix;
 use std::ops::RangeInclusive;
@@ -20,67 +21,85 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
     /// # Errors
     /// The first number or matrix that cannot be.
     pub fn check_numbers(&self) -> Result<(), ClaimError> {
+        self.sampled().check_numbers()?;
+        let limits = self.scheduling_limits.iter().enumerate();
+        let limits = limits.map(|(i, limit)| (format!("scheduling_limits[{i}]"), *limit));
+        let rate = ("continuous.rate_1_s".to_owned(), self.continuous.rate_1_s);
+        check_positive(std::iter::once(rate).chain(limits))?;
+        let p = &self.continuous.p;
+        check_sizes("continuous.p", p)?;
+        check_symmetric("continuous.p", p)?;
+        check_definite("continuous.p", Normaliser::of(p).is_some())
+    }
+}
+
+impl<const NX: usize, const NU: usize> SampledClaim<NX, NU> {
+    /// As [`Certificate::check_numbers`], for what it has of a certificate's numbers.
+    ///
+    /// # Errors
+    /// The first number or matrix that cannot be.
+    pub fn check_numbers(&self) -> Result<(), ClaimError> {
         self.check_scalars()?;
         let terminal = &self.terminal;
         check_sizes("q", &self.q)?;
         check_sizes("r", &self.r)?;
         check_sizes("terminal.k", &terminal.k)?;
         check_sizes("terminal.p", &terminal.p)?;
-        check_sizes("continuous.p", &self.continuous.p)?;
         check_symmetric("q", &self.q)?;
         check_symmetric("r", &self.r)?;
         check_symmetric("terminal.p", &terminal.p)?;
-        check_symmetric("continuous.p", &self.continuous.p)?;
         if !is_at_most(&SMatrix::zeros(), &self.q) {
             return Err(ClaimError::NotSemidefinite { name: "q" });
         }
-        let positive =
-            |name, shown: bool| shown.then_some(()).ok_or(ClaimError::NotPositive { name });
-        positive("r", Normaliser::of(&self.r).is_some())?;
-        positive("terminal.p", Normaliser::of(&terminal.p).is_some())?;
-        positive("continuous.p", Normaliser::of(&self.continuous.p).is_some())
+        check_definite("r", Normaliser::of(&self.r).is_some())?;
+        check_definite("terminal.p", Normaliser::of(&terminal.p).is_some())
     }
 
     fn check_scalars(&self) -> Result<(), ClaimError> {
-        let value = |name: String, value: f64, expected| {
-            Err(ClaimError::Value {
-                name,
-                value,
-                expected,
-            })
-        };
-        let numbers = [
+        check_positive([
             ("t_s".to_owned(), self.t_s),
             ("terminal.level".to_owned(), self.terminal.level),
-            ("continuous.rate_1_s".to_owned(), self.continuous.rate_1_s),
-        ];
-        let limits = self.scheduling_limits.iter().enumerate();
-        let limits = limits.map(|(i, limit)| (format!("scheduling_limits[{i}]"), *limit));
-        for (name, number) in numbers.into_iter().chain(limits) {
-            if !SIZES.contains(&number) {
-                return value(name, number, "positive, from 1e-30 to 1e30");
-            }
-        }
+        ])?;
         let states = self.state_limits.iter().enumerate();
         let states = states.map(|(i, limit)| (format!("state_limits[{i}]"), *limit));
         let inputs = self.input_limits.iter().enumerate();
         let inputs = inputs.map(|(i, limit)| (format!("input_limits[{i}]"), *limit));
-        for (name, limit) in states.chain(inputs) {
-            if !(limit == f64::INFINITY || SIZES.contains(&limit)) {
-                return value(
+        for (name, value) in states.chain(inputs) {
+            if !(value == f64::INFINITY || SIZES.contains(&value)) {
+                return Err(ClaimError::Value {
                     name,
-                    limit,
-                    "positive, from 1e-30 to 1e30, or null for none",
-                );
+                    value,
+                    expected: "positive, from 1e-30 to 1e30, or null for none",
+                });
             }
         }
-        let contraction = self.terminal.contraction;
-        if !(contraction == 0.0 || (1e-30..1.0).contains(&contraction)) {
-            let name = "terminal.contraction".to_owned();
-            return value(name, contraction, "0, or from 1e-30 to below 1");
+        let value = self.terminal.contraction;
+        if !(value == 0.0 || (1e-30..1.0).contains(&value)) {
+            return Err(ClaimError::Value {
+                name: "terminal.contraction".to_owned(),
+                value,
+                expected: "0, or from 1e-30 to below 1",
+            });
         }
         Ok(())
     }
+}
+
+fn check_positive(numbers: impl IntoIterator<Item = (String, f64)>) -> Result<(), ClaimError> {
+    for (name, value) in numbers {
+        if !SIZES.contains(&value) {
+            return Err(ClaimError::Value {
+                name,
+                value,
+                expected: "positive, from 1e-30 to 1e30",
+            });
+        }
+    }
+    Ok(())
+}
+
+fn check_definite(name: &'static str, shown: bool) -> Result<(), ClaimError> {
+    shown.then_some(()).ok_or(ClaimError::NotPositive { name })
 }
 
 /// Whether `larger` - `smaller` is positive semidefinite: shown in interval arithmetic, so that

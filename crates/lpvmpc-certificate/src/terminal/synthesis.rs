@@ -121,16 +121,30 @@ pub fn synthesize_terminal<M, const NX: usize, const NU: usize, const NS: usize>
 where
     M: LpvModel<f64, NX, NU, NS>,
 {
+    let points: Vec<_> = grid.points().collect();
+    synthesize_terminal_at(model, &grid.middle(), &points, problem)
+}
+
+/// As [`synthesize_terminal`], at any `points` of the scheduling; the regulator at `middle` scales the unknowns.
+///
+/// # Errors
+/// Numbers out of range, a model that cannot be sampled, or no solution.
+pub fn synthesize_terminal_at<M, const NX: usize, const NU: usize, const NS: usize>(
+    model: &M,
+    middle: &SVector<f64, NS>,
+    points: &[SVector<f64, NS>],
+    problem: &TerminalProblem<NX, NU>,
+) -> Result<TerminalIngredients<NX, NU>, SynthesisError>
+where
+    M: LpvModel<f64, NX, NU, NS>,
+{
     problem.check()?;
     let sampled = |scheduling: &SVector<f64, NS>| {
         let (a, b) = model.matrices(scheduling);
         zero_order_hold(&dynamic(&a), &dynamic(&b), problem.t_s)
     };
-    let pairs = grid
-        .points()
-        .map(|point| sampled(&point))
-        .collect::<Result<Vec<_>, _>>()?;
-    let scaling = problem.scaling(&sampled(&grid.middle())?)?;
+    let pairs = points.iter().map(sampled).collect::<Result<Vec<_>, _>>()?;
+    let scaling = problem.scaling(&sampled(middle)?)?;
     let blocks = problem.blocks(&scaling, &pairs);
     let maximum = maximise_log_det(&blocks, unknowns(NX, NU)).map_err(|failure| match failure {
         LmiFailure::Infeasible { missing } => SynthesisError::Infeasible {

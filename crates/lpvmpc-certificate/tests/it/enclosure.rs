@@ -218,6 +218,10 @@ fn strong_law() -> (SampledLaw<2, 1>, Frame<2>) {
     (law, frame)
 }
 
+fn sinhc(x: f64) -> f64 {
+    if x == 0.0 { 1.0 } else { x.sinh() / x }
+}
+
 /// One function at a time, so that the recursion of each one's coefficients is seen.
 #[test]
 fn every_function_is_enclosed_with_its_curvature() {
@@ -227,6 +231,9 @@ fn every_function_is_enclosed_with_its_curvature() {
         (Elementary::Acos, f64::acos, 0.6),
         (Elementary::Sinh, f64::sinh, -0.5),
         (Elementary::Cosh, f64::cosh, 0.1),
+        (Elementary::Sinhc, sinhc, 0.005),
+        (Elementary::Sinhc, sinhc, -0.7),
+        (Elementary::Sinhc, sinhc, 3.0),
         (Elementary::Asinh, f64::asinh, -3.0),
         (Elementary::Asinh, f64::asinh, 0.7),
         (Elementary::Acosh, f64::acosh, 1.4),
@@ -297,6 +304,7 @@ fn what_has_no_enclosure_is_everything() {
         Elementary::Tanh,
         Elementary::Atan,
         Elementary::Sinc,
+        Elementary::Sinhc,
     ] {
         let hole = around(0.0).elementary(Elementary::Ln);
         assert_eq!(

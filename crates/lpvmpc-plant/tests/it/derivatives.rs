@@ -17,7 +17,7 @@ const ARGUMENTS: [f64; 17] = [
     40.0,
 ];
 
-const UNARY: [Unary; 24] = [
+const UNARY: [Unary; 25] = [
     Unary::Negative,
     Unary::Square,
     Unary::Inverse,
@@ -25,6 +25,7 @@ const UNARY: [Unary; 24] = [
     Unary::Elementary(Elementary::Sin),
     Unary::Elementary(Elementary::Cos),
     Unary::Elementary(Elementary::Sinc),
+    Unary::Elementary(Elementary::Sinhc),
     Unary::Elementary(Elementary::Atan),
     Unary::Elementary(Elementary::Exp),
     Unary::Elementary(Elementary::Ln),

@@ -4,6 +4,7 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
+mod about;
 mod derivatives;
 mod firmware;
 mod hostile;

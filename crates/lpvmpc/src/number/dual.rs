@@ -119,7 +119,8 @@ impl<T: Scalar + Number, const D: usize> Number for Dual<T, D> {
         let slope = match function {
             Elementary::Sin => x.elementary(Elementary::Cos),
             Elementary::Cos => -x.elementary(Elementary::Sin),
-            Elementary::Sinc => sinc_slope(x, value),
+            Elementary::Sinc => sinc_slope(x, value, Elementary::Cos),
+            Elementary::Sinhc => sinc_slope(x, value, Elementary::Cosh),
             Elementary::Atan => T::one() / (T::one() + x * x),
             Elementary::Exp => value,
             Elementary::Ln => T::one() / x,
@@ -191,7 +192,7 @@ fn one_minus_square<T: Scalar>(x: T) -> T {
 }
 
 /// How d/dx sin(x)/x is worked out: (cos x - sinc x)/x, and by its series where that difference would lose its
-/// digits.
+/// digits. Of sinh(x)/x the same with cosh, and the sizes of the factors.
 #[derive(Clone, Copy, Debug)]
 pub struct SincSlope;
 
@@ -211,14 +212,20 @@ impl SincSlope {
     ];
 }
 
-/// d/dx sin(x)/x at `x`, where sin(x)/x is `sinc`.
-fn sinc_slope<T: Scalar + Number>(x: T, sinc: T) -> T {
+/// d/dx sin(x)/x at `x`, where sin(x)/x is `sinc` and `cos` the cosine; or of sinh(x)/x the same with cosh.
+fn sinc_slope<T: Scalar + Number>(x: T, sinc: T, cos: Elementary) -> T {
     if x.abs() > convert(SincSlope::SMALL) {
-        return (x.elementary(Elementary::Cos) - sinc) / x;
+        return (x.elementary(cos) - sinc) / x;
     }
     let square = x * x;
     let sum = { SincSlope::SERIES.iter() }.fold(T::zero(), |sum, coefficient| {
-        sum * square + convert(*coefficient)
+        let hyperbolic = cos == Elementary::Cosh;
+        let coefficient = if hyperbolic {
+            coefficient.abs()
+        } else {
+            *coefficient
+        };
+        sum * square + convert(coefficient)
     });
     sum * x
 }

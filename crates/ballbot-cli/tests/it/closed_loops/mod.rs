@@ -5,6 +5,7 @@ mod both_planes;
 mod campaign;
 mod failures;
 mod interrupt;
+mod own_campaign;
 mod recorded;
 mod rehearsal;
 mod reproduce;

@@ -229,6 +229,7 @@ fn the_guarantee_is_kept_and_its_price_is_known() {
     scenario.controller.iterations = Some(IterationsTable::Descent {
         tolerance: 1e-6,
         most: 100,
+        first: None,
     });
     let prepared = scenario.prepare(Path::new(".")).unwrap();
     let run = prepared.run(&RunHooks::NONE).unwrap().remove(0);

@@ -116,6 +116,7 @@ fn dual_numbers_differentiate_every_function() {
         Elementary::Sin,
         Elementary::Cos,
         Elementary::Sinc,
+        Elementary::Sinhc,
         Elementary::Atan,
         Elementary::Exp,
         Elementary::Ln,
@@ -274,6 +275,7 @@ fn single_precision_functions_are_those_of_double_precision() {
         let x = 0.05 * f64::from(i);
         for function in [
             Elementary::Sinc,
+            Elementary::Sinhc,
             Elementary::Atan,
             Elementary::Exp,
             Elementary::Tanh,
@@ -400,10 +402,7 @@ fn plants_with_an_affine_term_stand_at_their_set_point() {
 /// bound: central differences of the cost itself, which know nothing of the controller.
 #[test]
 fn a_converged_plan_is_a_stationary_point() {
-    let descent = Iterations::Descent {
-        tolerance: 1e-9,
-        most: 60,
-    };
+    let descent = Iterations::descent(1e-9, 60);
     let mut controller =
         Controller::allocate(AlongMotion::<_, 3>(Windy), settings::<3>(descent)).unwrap();
     let mut workspace = controller.workspace();
@@ -500,15 +499,9 @@ fn single_precision_finds_the_input_of_double_precision() {
         }
     }
     // To the end, so that both have the same plan to find.
-    let wide = settings::<3>(Iterations::Descent {
-        tolerance: 1e-7,
-        most: 30,
-    });
+    let wide = settings::<3>(Iterations::descent(1e-7, 30));
     let narrow = ControllerSettings {
-        iterations: Iterations::Descent {
-            tolerance: 1e-7,
-            most: 30,
-        },
+        iterations: Iterations::descent(1e-7, 30),
         ..ControllerSettings::new(
             T_S as f32,
             wide.horizon,

@@ -58,10 +58,7 @@ fn a_plan_goes_on_under_other_weights_and_another_model() {
     let precise = |r: f64| {
         let mut settings = settings();
         settings.weights.r[0] = r;
-        settings.iterations = Iterations::Descent {
-            tolerance: 1e-9,
-            most: 50,
-        };
+        settings.iterations = Iterations::descent(1e-9, 50);
         settings
     };
     let mut changed = Controller::allocate(PLANT, precise(0.1)).unwrap();

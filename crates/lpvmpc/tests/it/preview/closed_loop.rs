@@ -362,10 +362,7 @@ impl LpvModel<f64, 3, 1, 1> for Pushed {
 fn a_disturbance_is_a_state_that_stands_still() {
     let rk4 = Rk4 { substeps: 2 };
     let given = lpvmpc::InputReference::Given(Vector1::zeros());
-    let precise = Iterations::Descent {
-        tolerance: 1e-8,
-        most: 30,
-    };
+    let precise = Iterations::descent(1e-8, 30);
     for (predictor, iterations, tolerance) in [
         (Predictor::FrozenRk4(rk4), Iterations::Fixed(2), 1e-9),
         (Predictor::FrozenExact(rk4), Iterations::Fixed(1), 1e-9),

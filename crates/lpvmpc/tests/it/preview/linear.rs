@@ -15,10 +15,7 @@ use nalgebra::{SMatrix, SVector};
 /// The paper's loop, also with the frozen predictor, and the descent.
 fn ways() -> [(Iterations<f64>, Predictor); 4] {
     let rk4 = Rk4 { substeps: 1 };
-    let descent = Iterations::Descent {
-        tolerance: 1e-9,
-        most: 30,
-    };
+    let descent = Iterations::descent(1e-9, 30);
     [
         (Iterations::Fixed(1), Predictor::StageConsistent(rk4)),
         (Iterations::Fixed(2), Predictor::FrozenRk4(rk4)),

@@ -166,10 +166,7 @@ fn settings() -> ControllerSettings<f64, 2, 1, 1> {
     };
     ControllerSettings {
         predictor: Predictor::StageConsistent(RK4),
-        iterations: Iterations::Descent {
-            tolerance: 1e-9,
-            most: 200,
-        },
+        iterations: Iterations::descent(1e-9, 200),
         ..ControllerSettings::new(0.05, N, weights, terminal, narrow)
     }
 }

@@ -22,10 +22,7 @@ fn descent(most: usize) -> ControllerSettings<f64, 4, 1, 2> {
     ControllerSettings {
         predictor: Predictor::StageConsistent(RK4),
         soft_x,
-        iterations: Iterations::Descent {
-            tolerance: 1e-3,
-            most,
-        },
+        iterations: Iterations::descent(1e-3, most),
         ..settings(N)
     }
 }
@@ -61,6 +58,32 @@ fn merit(x0: &Vector4<f64>, plan: &[Vector1<f64>], reference: &Reference<'_, f64
     }
     let error = x - reference.terminal;
     total + error.dot(&(p * error)) + 1e4 * (x[0].abs() - 2.4).max(0.0)
+}
+
+/// A sample without a plan from the one before has a budget of its own: the first, and one after a reset.
+#[test]
+fn a_first_sample_has_its_own_budget() {
+    let with_first = |first: usize| ControllerSettings {
+        iterations: Iterations::Descent {
+            tolerance: 1e-9,
+            most: 2,
+            first,
+        },
+        ..descent(1)
+    };
+    let x = Vector4::new(0.0, 0.7, 0.0, 0.0);
+    let mut tried = controller(with_first(9));
+    let mut memory = tried.workspace();
+    for _ in 0..2 {
+        tried.step(&x, &set_point(1.0), &mut memory);
+        assert!((3..=9).contains(&tried.problems()), "{}", tried.problems());
+        let next = tried.solution().x[0];
+        tried.step(&next, &set_point(1.0), &mut memory);
+        assert!(tried.problems() <= 2, "{}", tried.problems());
+        tried.reset();
+    }
+    let none = lpvmpc::Controller::allocate(CartPole::laboratory(), with_first(0));
+    assert!(none.is_err());
 }
 
 /// With more programs the plan costs less or the same, from any state to any set point.
@@ -206,10 +229,7 @@ fn a_terminal_equality_holds_for_the_model() {
     for distance in [0.05, 0.1, 0.3] {
         let mut tried = controller(ControllerSettings {
             terminal: TerminalIngredient::Equality,
-            iterations: Iterations::Descent {
-                tolerance: 1e-6,
-                most: 60,
-            },
+            iterations: Iterations::descent(1e-6, 60),
             ..descent(60)
         });
         let plan = tried.step(&Vector4::zeros(), &set_point(distance), &mut memory);

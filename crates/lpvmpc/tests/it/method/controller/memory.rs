@@ -62,10 +62,7 @@ fn all_settings() -> [Settings; 5] {
             ..settings(N)
         },
         Settings {
-            iterations: Iterations::Descent {
-                tolerance: 1e-3,
-                most: 8,
-            },
+            iterations: Iterations::descent(1e-3, 8),
             ..softened
         },
     ]
@@ -185,10 +182,7 @@ fn controllers_that_share_a_workspace_do_not_see_each_other() {
     };
     let descent = Settings {
         horizon: N - 2,
-        iterations: Iterations::Descent {
-            tolerance: 1e-3,
-            most: 4,
-        },
+        iterations: Iterations::descent(1e-3, 4),
         ..settings(N)
     };
     let mut alone = [settings(N), other, descent].map(controller);

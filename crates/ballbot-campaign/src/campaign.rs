@@ -1,0 +1,504 @@
+//! A campaign that has passed its checks, and its runs.
+
+use crate::cell::{Cell, Column, Kind, Row};
+use crate::error::CampaignError;
+use crate::file::{CampaignFile, LimitsTable, OnRefused};
+use crate::fingerprint;
+use crate::inputs::{Inputs, child, named_seed};
+use crate::measure::{Ending, Measure, Measured};
+use ballbot_scenario::{Document, Files, Prepared, Record, RunHooks, ScenarioError, words};
+use rayon::prelude::*;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use toml::Value;
+
+/// A clock that any thread may read.
+pub type Clock<'a> = &'a (dyn Fn() -> Duration + Sync);
+
+/// A campaign's file with the scenario that it names.
+#[derive(Clone, Debug)]
+pub struct Source {
+    path: PathBuf,
+    text: String,
+    file: CampaignFile,
+    scenario: Document,
+    /// Where files are looked for that the scenario names.
+    folder: PathBuf,
+}
+
+impl Source {
+    /// Reads a campaign, and the scenario it names, which is built in or a file beside it.
+    ///
+    /// # Errors
+    /// A file cannot be read, or is no campaign or no scenario.
+    pub fn load(path: &Path) -> Result<Self, CampaignError> {
+        Self::parse(
+            fs::read_to_string(path).map_err(CampaignError::at(path))?,
+            path,
+        )
+    }
+
+    /// A campaign's text, as if it stood in the file `path`.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn parse(text: String, path: &Path) -> Result<Self, CampaignError> {
+        let file: CampaignFile = toml::from_str(&text).map_err(|error| CampaignError::Syntax {
+            path: path.to_owned(),
+            message: words::toml_message(&error.to_string()),
+        })?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let beside = folder.join(&file.scenario);
+        let named = match beside.is_file() {
+            true => beside.to_string_lossy().into_owned(),
+            false => file.scenario.clone(),
+        };
+        let scenario = Document::load(&named)?;
+        let folder = Path::new(&named).parent().unwrap_or(folder).to_owned();
+        Ok(Self {
+            path: path.to_owned(),
+            text,
+            file,
+            scenario,
+            folder,
+        })
+    }
+
+    /// Where the campaign is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What stands in it.
+    pub fn file(&self) -> &CampaignFile {
+        &self.file
+    }
+
+    /// The folder that the scenario's paths are relative to.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+}
+
+/// A campaign that has passed its checks. Run `i` is a function of the campaign and `i` alone: of no
+/// order, thread or shard.
+#[derive(Clone, Debug)]
+pub struct Campaign<'a, F> {
+    source: &'a Source,
+    files: F,
+    inputs: Inputs,
+    measures: Vec<Measure>,
+    runs: u64,
+    /// Keys that are the same in all runs.
+    fixed: Vec<(&'a str, Value)>,
+    /// Seed of the noise's seeds; none where the noise is the scenario's own.
+    noise: Option<u64>,
+    program: String,
+    /// What it is made of, and by which program.
+    fingerprint: String,
+}
+
+/// What a run draws.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drawn {
+    /// Number of the run, from 0.
+    pub run: u64,
+    /// Seed of its noise; that of the scenario where it is not drawn.
+    pub seed: Option<u64>,
+    /// Values of the inputs, in their order.
+    pub values: Vec<Value>,
+}
+
+/// A run that was repeated.
+#[derive(Clone, Debug)]
+pub struct Replay {
+    /// Its row.
+    pub row: Row,
+    /// What was run.
+    pub prepared: Prepared,
+    /// What happened.
+    pub record: Record,
+}
+
+/// The columns before those of inputs and measures.
+pub(crate) const RUN: &str = "run";
+const SEED: &str = "seed";
+pub(crate) const OUTCOME: &str = "outcome";
+pub(crate) const SUCCESS: &str = "success";
+/// The outcome of a run whose drawn values make no scenario.
+pub(crate) const REFUSED: &str = "refused";
+/// The key of the noise's seed.
+const NOISE: &str = "world.seed";
+
+impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
+    /// Checks a campaign, and that its first run is one. `program` names the program and its build:
+    /// results of different ones are never merged.
+    ///
+    /// # Errors
+    /// A value that makes no sense, with its key.
+    pub fn new(source: &'a Source, files: F, program: &str) -> Result<Self, CampaignError> {
+        let file = &source.file;
+        let (inputs, runs) = Inputs::new(&file.vary, file.design, file.seed, runs_of(file))?;
+        let fixed: Vec<(&str, Value)> = file
+            .set
+            .iter()
+            .map(|(key, value)| (key.as_str(), value.clone()))
+            .collect();
+        let varied = |key: &str| {
+            inputs
+                .all
+                .iter()
+                .any(|input| input.keys.iter().any(|k| k == key))
+        };
+        if let Some((key, value)) = fixed.iter().find(|(key, _)| varied(key)) {
+            let expected = "it varies, too; leave one of them out";
+            return Err(CampaignError::value(
+                format!("set.{key}"),
+                value.to_string(),
+                expected,
+            ));
+        }
+        let has_world = source.scenario.root().get("world").is_some()
+            || fixed.iter().any(|(key, _)| key.starts_with("world."))
+            || inputs
+                .all
+                .iter()
+                .flat_map(|input| &input.keys)
+                .any(|key| key.starts_with("world."));
+        let given = file.same_noise || varied(NOISE) || fixed.iter().any(|(key, _)| *key == NOISE);
+        let campaign = Self {
+            noise: (has_world && !given).then(|| named_seed(file.seed, NOISE)),
+            measures: measures(file)?,
+            fingerprint: fingerprint::of(source, program, &source.text, &source.scenario, &inputs),
+            program: program.to_owned(),
+            source,
+            files,
+            inputs,
+            runs,
+            fixed,
+        };
+        check_success(file, &campaign.measures)?;
+        check_goal(file, &campaign.inputs)?;
+        campaign.check_first()?;
+        Ok(campaign)
+    }
+
+    /// A key that is none is wrong in all runs: where the first one is no scenario, the campaign
+    /// ends, or another one must be.
+    fn check_first(&self) -> Result<(), CampaignError> {
+        let attempts = match self.source.file.refused {
+            OnRefused::Stop => 1,
+            OnRefused::Count => self.runs.min(ATTEMPTS),
+        };
+        let mut first = None;
+        for run in 0..attempts {
+            let drawn = self.draw(run);
+            match self.scenario(&drawn) {
+                Ok(_) => return Ok(()),
+                Err(error) => first = first.or_else(|| Some(self.refused(&drawn, error))),
+            }
+        }
+        first.map_or(Ok(()), Err)
+    }
+
+    /// What it was read from.
+    pub fn source(&self) -> &'a Source {
+        self.source
+    }
+
+    /// How many runs it has.
+    pub fn runs(&self) -> u64 {
+        self.runs
+    }
+
+    /// The program and its build.
+    pub fn program(&self) -> &str {
+        &self.program
+    }
+
+    /// A digest of the campaign, the scenario, the files that these name, and the program.
+    pub fn fingerprint(&self) -> &str {
+        &self.fingerprint
+    }
+
+    /// The names of the inputs' columns, with what these hold.
+    pub fn input_columns(&self) -> Vec<Column> {
+        self.inputs.columns().collect()
+    }
+
+    /// What is measured.
+    pub fn measures(&self) -> &[Measure] {
+        &self.measures
+    }
+
+    /// The seed of the noise that belongs to `own`; none where the noise is the scenario's.
+    pub(crate) fn noise_at(&self, own: u64) -> Option<u64> {
+        self.noise.map(|seed| child(seed, own))
+    }
+
+    pub(crate) fn inputs(&self) -> &Inputs {
+        &self.inputs
+    }
+
+    /// All columns of a row.
+    pub fn columns(&self) -> Vec<Column> {
+        let first = [
+            (RUN, Kind::Whole),
+            (SEED, Kind::Whole),
+            (OUTCOME, Kind::Text),
+            (SUCCESS, Kind::Flag),
+        ];
+        let first = first
+            .into_iter()
+            .map(|(name, kind)| Column::new(name, kind));
+        let measures = self.measures.iter();
+        let measures = measures.map(|measure| Column::new(measure.name(), measure.kind()));
+        first.chain(self.inputs.columns()).chain(measures).collect()
+    }
+
+    /// What a run draws.
+    pub fn draw(&self, run: u64) -> Drawn {
+        Drawn {
+            run,
+            seed: self.noise_at(run),
+            values: self.inputs.values(run),
+        }
+    }
+
+    /// The drawn values, key by key, for people.
+    pub fn words(&self, drawn: &Drawn) -> String {
+        let values = self.inputs.changes(&drawn.values);
+        let mut words: Vec<String> = values
+            .map(|(key, value)| format!("{key} = {value}"))
+            .collect();
+        words.extend(drawn.seed.map(|seed| format!("{NOISE} = {seed}")));
+        words.join(", ")
+    }
+
+    /// The scenario with the drawn values.
+    ///
+    /// # Errors
+    /// It is none.
+    pub fn scenario(&self, drawn: &Drawn) -> Result<Prepared, ScenarioError> {
+        let mut changes = self.fixed.clone();
+        changes.extend(self.inputs.changes(&drawn.values));
+        changes.extend(drawn.seed.map(|seed| (NOISE, Value::Integer(seed as i64))));
+        self.source.scenario.with(&changes)?.prepare(self.files)
+    }
+
+    fn refused(&self, drawn: &Drawn, source: ScenarioError) -> CampaignError {
+        CampaignError::Refused {
+            run: drawn.run,
+            drawn: self.words(drawn),
+            source,
+        }
+    }
+
+    /// Runs the scenario with the drawn values; nothing where it is none and such runs are counted.
+    pub(crate) fn measured(
+        &self,
+        drawn: &Drawn,
+        clock: Clock<'_>,
+    ) -> Result<Option<Measured>, CampaignError> {
+        let hooks = RunHooks {
+            clock,
+            progress: &|_| (),
+        };
+        let ran = self.scenario(drawn).and_then(|prepared| {
+            let trajectories = prepared.run(&hooks)?;
+            Ok(Measured::new(&prepared, &trajectories))
+        });
+        match ran {
+            Ok(measured) => Ok(Some(measured)),
+            Err(_) if self.source.file.refused == OnRefused::Count => Ok(None),
+            Err(error) => Err(self.refused(drawn, error)),
+        }
+    }
+
+    /// The row of a run.
+    ///
+    /// # Errors
+    /// What it draws is no scenario, and the campaign does not count such runs.
+    pub fn run(&self, run: u64, clock: Clock<'_>) -> Result<Row, CampaignError> {
+        let drawn = self.draw(run);
+        let measured = self.measured(&drawn, clock)?;
+        Ok(self.row(&drawn, measured.as_ref()))
+    }
+
+    /// Runs one run again and keeps all of it.
+    ///
+    /// # Errors
+    /// There is no such run, or what it draws is no scenario.
+    pub fn replay(&self, run: u64, clock: Clock<'_>) -> Result<Replay, CampaignError> {
+        if run >= self.runs {
+            let expected = format!("the campaign has the runs 0 to {}", self.runs - 1);
+            return Err(CampaignError::value("run", run.to_string(), expected));
+        }
+        let drawn = self.draw(run);
+        let prepared = self
+            .scenario(&drawn)
+            .map_err(|error| self.refused(&drawn, error))?;
+        let record = prepared.record(&RunHooks {
+            clock,
+            progress: &|_| (),
+        })?;
+        let planes = record.planes.iter().map(|plane| plane.trajectory.clone());
+        let measured = Measured::new(&prepared, &planes.collect::<Vec<_>>());
+        Ok(Replay {
+            row: self.row(&drawn, Some(&measured)),
+            prepared,
+            record,
+        })
+    }
+
+    fn row(&self, drawn: &Drawn, measured: Option<&Measured>) -> Row {
+        let outcome = measured.map_or(REFUSED, |measured| measured.ending.name());
+        let success = measured.map_or(Cell::Missing, |measured| {
+            Cell::Flag(self.succeeds(measured))
+        });
+        let own = self.fixed.iter().find(|(key, _)| *key == NOISE);
+        let seed = match (drawn.seed, own) {
+            (Some(seed), _) => Cell::Whole(seed as i64),
+            (None, Some((_, value))) => Cell::of(value, Kind::Whole),
+            (None, None) => Cell::Missing,
+        };
+        let first = [
+            Cell::Whole(drawn.run as i64),
+            seed,
+            Cell::Text(outcome.to_owned()),
+            success,
+        ];
+        let measures = self
+            .measures
+            .iter()
+            .map(|measure| measured.map_or(Cell::Missing, |measured| measured.cell(*measure)));
+        first
+            .into_iter()
+            .chain(self.inputs.cells(&drawn.values))
+            .chain(measures)
+            .collect()
+    }
+
+    /// Whether a run is a success: it comes to its end and keeps all limits.
+    fn succeeds(&self, measured: &Measured) -> bool {
+        let kept = |(measure, limits): (&Measure, &LimitsTable)| {
+            let number = measured.cell(*measure).number();
+            // A number that there is not keeps nothing.
+            number.is_some_and(|number| {
+                limits.at_least.is_none_or(|least| number >= least)
+                    && limits.at_most.is_none_or(|most| number <= most)
+            })
+        };
+        measured.ending == Ending::Complete && self.source.file.success.iter().all(kept)
+    }
+
+    /// Runs the runs from `from` to before `until` on all threads of the pool it is called in and
+    /// hands their rows over in their order; before each part `wanted` is asked whether to go on. A
+    /// part is what is in memory.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run); what `each` says.
+    pub fn for_each<E: From<CampaignError> + Send>(
+        &self,
+        (from, until): (u64, u64),
+        clock: Clock<'_>,
+        progress: &(dyn Fn() + Sync),
+        mut each: impl FnMut(Row) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut from = from;
+        while from < until {
+            let end = until.min(from + PART);
+            let rows = (from..end).into_par_iter().map(|run| {
+                let row = self.run(run, clock);
+                progress();
+                row
+            });
+            let rows = rows.collect::<Result<Vec<Row>, _>>()?;
+            rows.into_iter().try_for_each(&mut each)?;
+            from = end;
+        }
+        Ok(())
+    }
+}
+
+/// The runs that a file asks for; those of a rare failure have no numbers of their own.
+fn runs_of(file: &CampaignFile) -> Option<u64> {
+    file.runs
+        .or(file.rare.map(|rare| u64::from(rare.level_runs)))
+}
+
+/// One of so many runs must be a scenario.
+const ATTEMPTS: u64 = 100;
+/// Runs that are in memory at a time.
+const PART: u64 = 4096;
+
+fn measures(file: &CampaignFile) -> Result<Vec<Measure>, CampaignError> {
+    let Some(named) = &file.measure else {
+        let all = Measure::ALL.into_iter();
+        return Ok(all.filter(|measure| !measure.is_time()).collect());
+    };
+    let repeated = named
+        .iter()
+        .enumerate()
+        .find(|(i, measure)| named[..*i].contains(measure));
+    match repeated {
+        Some((_, measure)) => Err(CampaignError::value(
+            "measure",
+            measure.name(),
+            "it is there twice",
+        )),
+        None => Ok(named.clone()),
+    }
+}
+
+/// What the campaign is to end with.
+fn check_goal(file: &CampaignFile, inputs: &Inputs) -> Result<(), CampaignError> {
+    if let Some(stop) = &file.stop {
+        stop.check()?;
+    }
+    let Some(rare) = &file.rare else {
+        return Ok(());
+    };
+    rare.check()?;
+    let refused = |value: &str, expected: &str| Err(CampaignError::value("rare", value, expected));
+    if file.stop.is_some() || !file.success.is_empty() || file.runs.is_some() {
+        let expected = "a rare failure has its own numbers; leave runs, [success] and [stop] out";
+        return refused("(given)", expected);
+    }
+    if inputs.grid_points > 1 || inputs.all.is_empty() {
+        let expected = "its inputs need distributions, and a grid is none";
+        return refused("(given)", expected);
+    }
+    Ok(())
+}
+
+fn check_success(file: &CampaignFile, measures: &[Measure]) -> Result<(), CampaignError> {
+    for (measure, limits) in &file.success {
+        let LimitsTable { at_least, at_most } = *limits;
+        let key = format!("success.{measure}");
+        let finite = [at_least, at_most]
+            .into_iter()
+            .flatten()
+            .all(f64::is_finite);
+        let ordered = match (at_least, at_most) {
+            (Some(least), Some(most)) => least <= most,
+            (None, None) => false,
+            _ => true,
+        };
+        if !(finite && ordered) {
+            let value = format!("at_least {at_least:?}, at_most {at_most:?}");
+            let expected = "it needs at_least or at_most or both, finite and in this order";
+            return Err(CampaignError::value(key, value, expected));
+        }
+        if measure.is_time() {
+            let expected = "a time differs from run to run, so no run could be repeated by it";
+            return Err(CampaignError::value(key, "(given)", expected));
+        }
+        if !measures.contains(measure) {
+            let expected = "it must be in `measure`, too, so that the results say why a run failed";
+            return Err(CampaignError::value(key, "(given)", expected));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,410 @@
+//! How an input is distributed: from a uniform number to its value.
+
+use crate::cell::Kind;
+use crate::error::CampaignError;
+use crate::file::{NormalTable, RangeTable, VaryTable};
+use statrs::distribution::{ContinuousCDF, Normal};
+use toml::Value;
+
+/// How an input is distributed.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Distribution {
+    Uniform {
+        from: f64,
+        to: f64,
+    },
+    LogUniform {
+        from: f64,
+        to: f64,
+    },
+    Normal {
+        mean: f64,
+        deviation: f64,
+        below: f64,
+        above: f64,
+    },
+    Integers {
+        from: i64,
+        to: i64,
+    },
+    List(Vec<Value>),
+    /// All values in turn, together with those of the other grids.
+    Grid(Vec<Value>),
+    /// A seed for each run.
+    Seeds,
+}
+
+/// Values of a list or a grid, at most; more are a distribution.
+const MOST_VALUES: usize = 100_000;
+
+impl Distribution {
+    /// The one distribution of the table at `place`.
+    pub fn new(place: &str, table: &VaryTable) -> Result<Self, CampaignError> {
+        let given = [
+            table.uniform.map(|ends| uniform(place, ends)),
+            table.log_uniform.map(|ends| log_uniform(place, ends)),
+            table.normal.map(|normal| truncated(place, &normal)),
+            table.integers.map(|ends| integers(place, ends)),
+            table
+                .list
+                .as_ref()
+                .map(|values| Ok(Self::List(several(place, "list", values)?))),
+            table
+                .grid
+                .as_ref()
+                .map(|values| Ok(Self::Grid(several(place, "grid", values)?))),
+            table.range.map(|ends| range(place, &ends)),
+            table
+                .seeds
+                .filter(|wanted| *wanted)
+                .map(|_| Ok(Self::Seeds)),
+        ];
+        let mut given: Vec<_> = given.into_iter().flatten().collect();
+        match (given.pop(), given.len()) {
+            (Some(only), 0) => only,
+            (_, others) => Err(CampaignError::value(
+                place,
+                if others == 0 {
+                    "(no distribution)"
+                } else {
+                    "(several distributions)"
+                },
+                "an input needs exactly one of uniform, log_uniform, normal, integers, list, grid, \
+                 range and seeds = true",
+            )),
+        }
+    }
+
+    /// The value at a uniform number from 0 to 1, both excluded, rounded to a multiple of `step`.
+    /// A grid's are taken by their places instead.
+    pub fn value(&self, u: f64, step: Option<f64>) -> Value {
+        let number = match self {
+            Self::Uniform { from, to } => from + u * (to - from),
+            Self::LogUniform { from, to } => from * (to / from).powf(u),
+            Self::Normal {
+                mean,
+                deviation,
+                below,
+                above,
+            } => mean + deviation * standard().inverse_cdf(below + u * (above - below)),
+            Self::Integers { from, to } => {
+                let count = (*to as f64 - *from as f64) + 1.0;
+                return Value::Integer(from.saturating_add((u * count) as i64).min(*to));
+            }
+            Self::Seeds => return Value::Integer((u * SEEDS) as i64),
+            Self::List(values) | Self::Grid(values) => {
+                let index = ((u * values.len() as f64) as usize).min(values.len() - 1);
+                return values[index].clone();
+            }
+        };
+        Value::Float(match step {
+            Some(step) => tidy((number / step).round() * step),
+            None => number,
+        })
+    }
+
+    /// Whether its values follow from a uniform number that a sequence can lay out.
+    pub fn is_laid_out(&self) -> bool {
+        !matches!(self, Self::Grid(_) | Self::Seeds)
+    }
+
+    /// Whether a small change of the uniform number is a small change of the value.
+    pub fn is_continuous(&self) -> bool {
+        matches!(
+            self,
+            Self::Uniform { .. } | Self::LogUniform { .. } | Self::Normal { .. }
+        )
+    }
+
+    /// What its column holds.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self::Uniform { .. } | Self::LogUniform { .. } | Self::Normal { .. } => Kind::Real,
+            Self::Integers { .. } | Self::Seeds => Kind::Whole,
+            Self::List(values) | Self::Grid(values) => {
+                let all = |fits: fn(&Value) -> bool| values.iter().all(fits);
+                if all(Value::is_integer) {
+                    Kind::Whole
+                } else if all(|value| value.is_integer() || value.is_float()) {
+                    Kind::Real
+                } else if all(Value::is_bool) {
+                    Kind::Flag
+                } else {
+                    Kind::Text
+                }
+            }
+        }
+    }
+}
+
+/// As many seeds: each is a whole number that an f64 holds exactly.
+const SEEDS: f64 = (1_u64 << 53) as f64;
+
+/// The standard normal distribution.
+pub(crate) fn standard() -> Normal {
+    Normal::standard()
+}
+
+/// 0.3, not 0.30000000000000004.
+fn tidy(number: f64) -> f64 {
+    format!("{number:.12e}").parse().unwrap_or(number)
+}
+
+fn refused<T>(place: &str, name: &str, value: String, expected: &str) -> Result<T, CampaignError> {
+    Err(CampaignError::value(
+        format!("{place}.{name}"),
+        value,
+        expected,
+    ))
+}
+
+/// Two finite ends in their order.
+fn ordered(place: &str, name: &str, [from, to]: [f64; 2]) -> Result<(f64, f64), CampaignError> {
+    let finite = from.is_finite() && to.is_finite() && (to - from).is_finite();
+    if finite && from < to {
+        return Ok((from, to));
+    }
+    let expected =
+        "it needs two finite numbers, the smaller one first; `set` gives a key one value";
+    refused(place, name, format!("[{from:?}, {to:?}]"), expected)
+}
+
+fn uniform(place: &str, ends: [f64; 2]) -> Result<Distribution, CampaignError> {
+    let (from, to) = ordered(place, "uniform", ends)?;
+    Ok(Distribution::Uniform { from, to })
+}
+
+fn log_uniform(place: &str, ends: [f64; 2]) -> Result<Distribution, CampaignError> {
+    let (from, to) = ordered(place, "log_uniform", ends)?;
+    if from > 0.0 {
+        return Ok(Distribution::LogUniform { from, to });
+    }
+    let expected = "both ends must be positive; the logarithm of others is no number";
+    refused(
+        place,
+        "log_uniform",
+        format!("[{from:?}, {to:?}]"),
+        expected,
+    )
+}
+
+fn truncated(place: &str, table: &NormalTable) -> Result<Distribution, CampaignError> {
+    let NormalTable {
+        mean,
+        deviation,
+        lower,
+        upper,
+    } = *table;
+    if !mean.is_finite() {
+        return refused(
+            place,
+            "normal.mean",
+            format!("{mean:?}"),
+            "it must be a finite number",
+        );
+    }
+    if !(deviation > 0.0 && deviation.is_finite()) {
+        let expected = "it must be positive and finite; `set` gives a key one value";
+        return refused(
+            place,
+            "normal.deviation",
+            format!("{deviation:?}"),
+            expected,
+        );
+    }
+    let share = |bound: f64| standard().cdf((bound - mean) / deviation);
+    let below = lower.map_or(0.0, share);
+    let above = upper.map_or(1.0, share);
+    // Less than that is left by bounds that are the wrong way round, too, and by NaN.
+    if above - below > 1e-6 {
+        return Ok(Distribution::Normal {
+            mean,
+            deviation,
+            below,
+            above,
+        });
+    }
+    let text = |bound: Option<f64>| bound.map_or("none".to_owned(), |bound| format!("{bound:?}"));
+    let expected = "lower must be below upper, with more than a millionth of the distribution \
+                    between them";
+    let value = format!("lower {}, upper {}", text(lower), text(upper));
+    refused(place, "normal", value, expected)
+}
+
+fn integers(place: &str, [from, to]: [i64; 2]) -> Result<Distribution, CampaignError> {
+    // Beyond, an f64 does not hold each of them.
+    let few = to.checked_sub(from).is_some_and(|span| span < 1 << 52);
+    if from < to && few {
+        return Ok(Distribution::Integers { from, to });
+    }
+    let expected = "it needs two whole numbers, the smaller one first, at most 2^52 apart";
+    refused(place, "integers", format!("[{from}, {to}]"), expected)
+}
+
+fn several(place: &str, name: &str, values: &[Value]) -> Result<Vec<Value>, CampaignError> {
+    let repeated = values
+        .iter()
+        .enumerate()
+        .any(|(i, value)| values[..i].contains(value));
+    if (1..=MOST_VALUES).contains(&values.len()) && !(name == "grid" && repeated) {
+        return Ok(values.to_vec());
+    }
+    let expected = format!("it needs 1 to {MOST_VALUES} values; a grid's must differ");
+    refused(place, name, format!("({} values)", values.len()), &expected)
+}
+
+fn range(place: &str, table: &RangeTable) -> Result<Distribution, CampaignError> {
+    let RangeTable { from, to, points } = *table;
+    let (from, to) = ordered(place, "range", [from, to])?;
+    if !(2..=MOST_VALUES as u32).contains(&points) {
+        let expected = format!("a grid has 2 to {MOST_VALUES} points");
+        return refused(place, "range.points", points.to_string(), &expected);
+    }
+    let step = (to - from) / f64::from(points - 1);
+    let values = (0..points).map(|i| match i {
+        _ if i == points - 1 => to,
+        _ => tidy(from + f64::from(i) * step),
+    });
+    Ok(Distribution::Grid(values.map(Value::Float).collect()))
+}
+
+/// How the value of an input is rounded.
+pub(crate) fn rounding(
+    place: &str,
+    step: Option<f64>,
+    distribution: &Distribution,
+) -> Result<Option<f64>, CampaignError> {
+    match step {
+        Some(step) if !(step > 0.0 && step.is_finite() && distribution.is_continuous()) => refused(
+            place,
+            "round_to",
+            format!("{step:?}"),
+            "it must be positive, and goes with uniform, log_uniform and normal only",
+        ),
+        step => Ok(step),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(text: &str) -> Result<Distribution, CampaignError> {
+        let table: VaryTable = toml::from_str(&format!("key = \"a\"\n{text}")).unwrap();
+        Distribution::new("vary[0]", &table)
+    }
+
+    fn numbers(text: &str) -> Vec<f64> {
+        let distribution = of(text).unwrap();
+        let at = |i: i32| (f64::from(i) + 0.5) / 10_000.0;
+        let value = |i| distribution.value(at(i), None).as_float().unwrap();
+        (0..10_000).map(value).collect()
+    }
+
+    /// Mean and variance by the midpoint rule, beside those of the textbook.
+    #[test]
+    fn moments_are_those_of_the_distributions() {
+        for (text, mean, variance) in [
+            ("uniform = [1.0, 4.0]", 2.5, 9.0 / 12.0),
+            // (b - a)/ln(b/a) and (b^2 - a^2)/(2 ln(b/a)) - mean^2
+            ("log_uniform = [1.0, 100.0]", 21.497_576, 623.450_0),
+            ("normal = { mean = 2.0, deviation = 3.0 }", 2.0, 9.0),
+            // Half a normal distribution: sqrt(2/pi) and 1 - 2/pi.
+            (
+                "normal = { mean = 0.0, deviation = 1.0, lower = 0.0 }",
+                0.797_885,
+                0.363_380,
+            ),
+        ] {
+            let numbers = numbers(text);
+            let count = numbers.len() as f64;
+            let found = numbers.iter().sum::<f64>() / count;
+            let spread = numbers.iter().map(|x| (x - found).powi(2)).sum::<f64>() / count;
+            assert!((found / mean - 1.0).abs() < 1e-3, "{text}: mean {found}");
+            assert!(
+                (spread / variance - 1.0).abs() < 5e-3,
+                "{text}: variance {spread}"
+            );
+        }
+    }
+
+    #[test]
+    fn discrete_values_are_all_as_likely() {
+        for (text, count) in [("integers = [-2, 5]", 8), ("list = [1, 5, \"a\", true]", 4)] {
+            let distribution = of(text).unwrap();
+            let mut found = std::collections::BTreeMap::new();
+            for i in 0..800 {
+                let value = distribution.value((f64::from(i) + 0.5) / 800.0, None);
+                *found.entry(value.to_string()).or_insert(0) += 1;
+            }
+            assert!(
+                found.len() == count && found.values().all(|n| *n == 800 / count),
+                "{found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_ends_stay_inside() {
+        let smallest = f64::EPSILON / 4.0;
+        for u in [smallest, 1.0 - f64::EPSILON / 2.0] {
+            for text in [
+                "uniform = [1.0, 2.0]",
+                "log_uniform = [1.0, 2.0]",
+                "integers = [1, 2]",
+            ] {
+                let value = of(text).unwrap().value(u, None);
+                let number = value
+                    .as_float()
+                    .or(value.as_integer().map(|n| n as f64))
+                    .unwrap();
+                assert!((1.0..=2.0).contains(&number), "{text}: {number}");
+            }
+            let normal = of("normal = { mean = 0.0, deviation = 1.0 }").unwrap();
+            assert!(normal.value(u, None).as_float().unwrap().is_finite());
+        }
+    }
+
+    #[test]
+    fn rounding_gives_tidy_multiples() {
+        let distribution = of("uniform = [0.0, 1.0]").unwrap();
+        assert_eq!(distribution.value(0.31, Some(0.1)), Value::Float(0.3));
+        assert_eq!(distribution.value(0.0349, Some(0.005)), Value::Float(0.035));
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_refused_with_its_place() {
+        for (text, part) in [
+            ("uniform = [2.0, 1.0]", "vary[0].uniform = [2.0, 1.0]"),
+            ("uniform = [0.0, nan]", "finite"),
+            ("uniform = [0.0, inf]", "finite"),
+            ("uniform = [-1e308, 1e308]", "finite"),
+            ("log_uniform = [0.0, 1.0]", "positive"),
+            (
+                "normal = { mean = 0.0, deviation = -1.0 }",
+                "vary[0].normal.deviation = -1.0",
+            ),
+            (
+                "normal = { mean = nan, deviation = 1.0 }",
+                "vary[0].normal.mean",
+            ),
+            (
+                "normal = { mean = 0.0, deviation = 1.0, lower = 2.0, upper = 1.0 }",
+                "lower 2.0",
+            ),
+            (
+                "normal = { mean = 0.0, deviation = 1.0, lower = 90.0 }",
+                "millionth",
+            ),
+            ("integers = [5, 5]", "[5, 5]"),
+            ("list = []", "(0 values)"),
+            ("grid = [1, 1]", "differ"),
+            ("range = { from = 0.0, to = 1.0, points = 1 }", "2 to"),
+            ("seeds = false", "exactly one"),
+            ("uniform = [0.0, 1.0]\nlist = [1]", "several"),
+        ] {
+            let message = of(text).unwrap_err().to_string();
+            assert!(message.contains(part), "{text}: {message}");
+        }
+    }
+}

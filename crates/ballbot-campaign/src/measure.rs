@@ -1,0 +1,241 @@
+//! What is measured of a run.
+
+use crate::cell::{Cell, Kind};
+use ballbot_scenario::{Plane, Prepared};
+use ballbot_studies::recorded::Metrics;
+use lpvmpc_sim::{Termination, Trajectory};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// A measure, by its name in files. Over two planes a largest value is that of the worse plane, a
+/// count or a cost the sum, and an rms or final error its length on the floor, in rad of the ball.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Measure {
+    /// When the run ended, s.
+    EndS,
+    /// Samples without a plan that keeps all bounds.
+    Infeasible,
+    /// Samples at which the state was outside its bounds.
+    Violations,
+    /// Samples whose torque was not backed by a guarantee, where the loop has one.
+    NotGuaranteed,
+    /// Largest |theta|, rad.
+    LargestTiltRad,
+    /// Largest |phi_dot|, rad/s.
+    LargestPhiDotRadS,
+    /// Largest |theta_dot|, rad/s.
+    LargestThetaDotRadS,
+    /// Largest |torque|, N m.
+    LargestTorqueNm,
+    /// Root mean square of phi - phi_ref, rad.
+    RmsErrorRad,
+    /// Largest |phi - phi_ref|, rad.
+    LargestErrorRad,
+    /// |phi - phi_ref| at the end, rad.
+    FinalErrorRad,
+    /// Closed-loop cost: the sum of ||x - x_ref||_Q^2 + ||u||_R^2.
+    ClosedLoopCost,
+    /// Effort: the integral of the squared torque, (N m)^2 s.
+    EffortN2m2S,
+    /// Mean time per step, us; differs from machine to machine and run to run.
+    MeanStepUs,
+    /// Longest step, us; differs from machine to machine and run to run.
+    LongestStepUs,
+}
+
+impl Measure {
+    /// All of them.
+    pub const ALL: [Self; 15] = [
+        Self::EndS,
+        Self::Infeasible,
+        Self::Violations,
+        Self::NotGuaranteed,
+        Self::LargestTiltRad,
+        Self::LargestPhiDotRadS,
+        Self::LargestThetaDotRadS,
+        Self::LargestTorqueNm,
+        Self::RmsErrorRad,
+        Self::LargestErrorRad,
+        Self::FinalErrorRad,
+        Self::ClosedLoopCost,
+        Self::EffortN2m2S,
+        Self::MeanStepUs,
+        Self::LongestStepUs,
+    ];
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::EndS => "end_s",
+            Self::Infeasible => "infeasible",
+            Self::Violations => "violations",
+            Self::NotGuaranteed => "not_guaranteed",
+            Self::LargestTiltRad => "largest_tilt_rad",
+            Self::LargestPhiDotRadS => "largest_phi_dot_rad_s",
+            Self::LargestThetaDotRadS => "largest_theta_dot_rad_s",
+            Self::LargestTorqueNm => "largest_torque_nm",
+            Self::RmsErrorRad => "rms_error_rad",
+            Self::LargestErrorRad => "largest_error_rad",
+            Self::FinalErrorRad => "final_error_rad",
+            Self::ClosedLoopCost => "closed_loop_cost",
+            Self::EffortN2m2S => "effort_n2m2_s",
+            Self::MeanStepUs => "mean_step_us",
+            Self::LongestStepUs => "longest_step_us",
+        }
+    }
+
+    /// Whether it is a time of this machine, which no other run repeats.
+    pub fn is_time(self) -> bool {
+        matches!(self, Self::MeanStepUs | Self::LongestStepUs)
+    }
+
+    /// What its column holds.
+    pub fn kind(self) -> Kind {
+        match self {
+            Self::Infeasible | Self::Violations | Self::NotGuaranteed => Kind::Whole,
+            _ => Kind::Real,
+        }
+    }
+}
+
+impl fmt::Display for Measure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// After all samples.
+    Complete,
+    /// The robot fell, or its motion could not be followed any more.
+    Fell,
+    /// The controller had no plan, and the scenario asks for the end then.
+    NoPlan,
+}
+
+impl Ending {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Complete => "complete",
+            Self::Fell => "fell",
+            Self::NoPlan => "no_plan",
+        }
+    }
+}
+
+/// What all measures of a run are taken from.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// How it ended.
+    pub ending: Ending,
+    planes: Vec<OfPlane>,
+}
+
+/// What is measured of one plane.
+#[derive(Clone, Debug)]
+struct OfPlane {
+    metrics: Metrics,
+    end: f64,
+    infeasible: usize,
+    final_error: f64,
+    effort: f64,
+}
+
+impl Measured {
+    /// Of the recorded planes of a run.
+    pub fn new(prepared: &Prepared, trajectories: &[Trajectory<4, 1>]) -> Self {
+        let planes = prepared.planes.iter().zip(trajectories);
+        let endings = trajectories.iter().map(|run| match run.termination {
+            Termination::Complete => Ending::Complete,
+            Termination::NoPlan { .. } => Ending::NoPlan,
+            Termination::OutOfRange { .. } | Termination::PlantFailed { .. } => Ending::Fell,
+        });
+        Self {
+            ending: endings.fold(Ending::Complete, worse),
+            planes: planes
+                .map(|(plane, run)| OfPlane::new(prepared, plane, run))
+                .collect(),
+        }
+    }
+
+    /// The measure in its column.
+    pub fn cell(&self, measure: Measure) -> Cell {
+        match measure.kind() {
+            Kind::Whole => self
+                .count(measure)
+                .map_or(Cell::Missing, |count| Cell::Whole(count as i64)),
+            _ => Cell::real(self.number(measure)),
+        }
+    }
+
+    fn count(&self, measure: Measure) -> Option<usize> {
+        let planes = self.planes.iter();
+        match measure {
+            Measure::Infeasible => Some(planes.map(|plane| plane.infeasible).sum()),
+            Measure::Violations => Some(planes.map(|plane| plane.metrics.violations).sum()),
+            _ => planes.map(|plane| plane.metrics.not_guaranteed).sum(),
+        }
+    }
+
+    /// The measure as a number.
+    fn number(&self, measure: Measure) -> f64 {
+        let largest = |of: fn(&OfPlane) -> f64| self.planes.iter().map(of).fold(0.0, f64::max);
+        let sum = |of: fn(&OfPlane) -> f64| self.planes.iter().map(of).sum::<f64>();
+        let length = |of: fn(&OfPlane) -> f64| {
+            let squares = self.planes.iter().map(|plane| of(plane).powi(2));
+            squares.sum::<f64>().sqrt()
+        };
+        match measure {
+            Measure::EndS => self
+                .planes
+                .iter()
+                .map(|plane| plane.end)
+                .fold(f64::INFINITY, f64::min),
+            Measure::LargestTiltRad => largest(|plane| plane.metrics.largest_tilt_rad),
+            Measure::LargestPhiDotRadS => largest(|plane| plane.metrics.largest_phi_dot_rad_s),
+            Measure::LargestThetaDotRadS => largest(|plane| plane.metrics.largest_theta_dot_rad_s),
+            Measure::LargestTorqueNm => largest(|plane| plane.metrics.largest_torque_nm),
+            Measure::RmsErrorRad => length(|plane| plane.metrics.rms_error_rad),
+            Measure::LargestErrorRad => largest(|plane| plane.metrics.largest_error_rad),
+            Measure::FinalErrorRad => length(|plane| plane.final_error),
+            Measure::ClosedLoopCost => sum(|plane| plane.metrics.closed_loop_cost),
+            Measure::EffortN2m2S => sum(|plane| plane.effort),
+            Measure::MeanStepUs => sum(|plane| plane.metrics.mean_step_us),
+            Measure::LongestStepUs => largest(|plane| plane.metrics.longest_step_us),
+            Measure::Infeasible | Measure::Violations | Measure::NotGuaranteed => {
+                self.count(measure).map_or(f64::NAN, |count| count as f64)
+            }
+        }
+    }
+}
+
+impl OfPlane {
+    fn new(prepared: &Prepared, plane: &Plane, run: &Trajectory<4, 1>) -> Self {
+        let without_plan = run
+            .samples
+            .iter()
+            .filter(|sample| !sample.status.is_solved());
+        let ended = matches!(run.termination, Termination::NoPlan { .. });
+        let squares = run.samples.iter().map(|sample| sample.u[0] * sample.u[0]);
+        Self {
+            metrics: Metrics::new(prepared, plane, run),
+            end: run.final_time,
+            infeasible: without_plan.count() + usize::from(ended),
+            final_error: (run.final_state[0] - run.final_reference[0]).abs(),
+            effort: squares.sum::<f64>() * prepared.settings.t_s,
+        }
+    }
+}
+
+/// A fall is the worst.
+fn worse(one: Ending, other: Ending) -> Ending {
+    match (one, other) {
+        (Ending::Fell, _) | (_, Ending::Fell) => Ending::Fell,
+        (Ending::NoPlan, _) | (_, Ending::NoPlan) => Ending::NoPlan,
+        _ => Ending::Complete,
+    }
+}

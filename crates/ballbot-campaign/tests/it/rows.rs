@@ -1,0 +1,112 @@
+//! A run is a function of the campaign and its number.
+
+use crate::{NO_CLOCK, NOISY, column, numbers, read, rows, with, write_whole};
+use ballbot_campaign::{Cell, Summary};
+use ballbot_scenario::{RunHooks, Scenario};
+use std::path::Path;
+
+/// Whatever the threads and the order, and of every run alone.
+#[test]
+fn rows_depend_on_seed_and_number_alone() {
+    with(NOISY, |campaign| {
+        let one_by_one = rows(campaign);
+        let backwards = (0..campaign.runs())
+            .rev()
+            .map(|run| campaign.run(run, NO_CLOCK).unwrap());
+        let mut backwards: Vec<_> = backwards.collect();
+        backwards.reverse();
+        assert_eq!(backwards, one_by_one);
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            let mut together = Vec::new();
+            let each = |row| -> Result<(), ballbot_campaign::CampaignError> {
+                together.push(row);
+                Ok(())
+            };
+            pool.install(|| campaign.run_all(NO_CLOCK, &|| (), each))
+                .unwrap();
+            assert_eq!(together, one_by_one, "{threads} threads");
+        }
+        assert_eq!(campaign.replay(7, NO_CLOCK).unwrap().row, one_by_one[7]);
+        let seeds = numbers(campaign, &one_by_one, "seed");
+        assert!(seeds.windows(2).all(|pair| pair[0] != pair[1]), "{seeds:?}");
+    });
+    let first = with(NOISY, |campaign| campaign.run(0, NO_CLOCK).unwrap());
+    let other = NOISY.replace("seed = 3", "seed = 4");
+    assert_ne!(
+        with(&other, |campaign| campaign.run(0, NO_CLOCK).unwrap()),
+        first
+    );
+}
+
+/// Another input, or more runs, leave the draws of the others as they are.
+#[test]
+fn what_is_added_changes_no_draws() {
+    let more = NOISY.replace("runs = 24", "runs = 48")
+        + "[[vary]]\nkey = \"world.floor.slope_x_deg\"\nuniform = [0.0, 1.0]\n";
+    let [few, many] = [NOISY, more.as_str()].map(|text| with(text, |campaign| campaign.draw(5)));
+    assert_eq!((few.seed, &few.values[..]), (many.seed, &many.values[..4]));
+}
+
+/// Beside a scenario that was written and run by hand.
+#[test]
+fn a_row_is_what_its_scenario_gives() {
+    with(NOISY, |campaign| {
+        let drawn = campaign.draw(2);
+        let row = [campaign.run(2, NO_CLOCK).unwrap()];
+        let mut changes: Vec<(String, String)> = [
+            ("duration_s", "1.0".to_owned()),
+            ("world.sensors.theta.noise_rad", "0.001".to_owned()),
+            ("world.seed", drawn.seed.unwrap().to_string()),
+        ]
+        .map(|(key, value)| (key.to_owned(), value))
+        .into();
+        for (column, value) in campaign.input_columns().iter().zip(&drawn.values) {
+            changes.push((column.name.clone(), value.to_string()));
+        }
+        let scenario = Scenario::load_with("single-setpoint", &changes).unwrap();
+        let prepared = scenario.prepare(Path::new(".")).unwrap();
+        let run = &prepared.run(&RunHooks::NONE).unwrap()[0];
+        let tilt = run.states().map(|x| x[1].abs()).fold(0.0, f64::max);
+        assert_eq!(numbers(campaign, &row, "largest_tilt_rad"), [tilt]);
+        let effort: f64 = run.samples.iter().map(|s| s.u[0] * s.u[0]).sum::<f64>() * 0.05;
+        assert_eq!(numbers(campaign, &row, "effort_n2m2_s"), [effort]);
+        assert_eq!(numbers(campaign, &row, "end_s"), [run.final_time]);
+        let success = Cell::Flag(tilt <= 0.5);
+        assert_eq!(column(campaign, &row, "success"), [success]);
+    });
+}
+
+/// What cannot be is counted apart, where that is asked for.
+#[test]
+fn draws_that_make_no_scenario_are_counted_apart() {
+    // A horizon of 0 samples is none.
+    let text = NOISY
+        .replace("integers = [10, 30]", "list = [0, 20]")
+        .replace("seed = 3", "seed = 3\nrefused = \"count\"");
+    with(&text, |campaign| {
+        let rows = rows(campaign);
+        let horizons = numbers(campaign, &rows, "controller.horizon");
+        let outcomes = column(campaign, &rows, "outcome");
+        let refused = |cell: &Cell| *cell == Cell::Text("refused".to_owned());
+        let both = horizons.iter().zip(&outcomes);
+        assert!(
+            both.clone()
+                .all(|(horizon, outcome)| (*horizon == 0.0) == refused(outcome))
+        );
+        let count = outcomes.iter().filter(|cell| refused(cell)).count();
+        assert!((1..24).contains(&count), "{count}");
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("runs.parquet");
+        write_whole(campaign, &path);
+        assert_eq!(read(&path), rows);
+        let file = ballbot_campaign::RowFile::open(&path).unwrap();
+        let summary = Summary::of(campaign, &file).unwrap();
+        assert_eq!((summary.runs, summary.refused), (24, count as u64));
+        let ran = 24.0 - count as f64;
+        assert_eq!(summary.failure_share.value, summary.failures as f64 / ran);
+    });
+}

@@ -1,0 +1,146 @@
+"""Certificates, against SciPy's integration of the plants."""
+
+import json
+import pickle
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import lpvmpc
+from plants import cart_pole, double_integrator
+
+T_S = 0.05
+
+
+def tanks():
+    """Four tanks of Johansson, cm and V; they stand where no number is round."""
+    h, v = ca.SX.sym("h", 4), ca.SX.sym("v", 2)
+    areas, holes = (28, 32, 28, 32), (0.071, 0.057, 0.071, 0.057)
+    out = [hole * ca.sqrt(2 * 981 * h[i]) for i, hole in enumerate(holes)]
+    pumps = (0.7 * 3.33 * v[0], 0.6 * 3.35 * v[1], 0.4 * 3.35 * v[1], 0.3 * 3.33 * v[0])
+    into = (out[2], out[3], 0, 0)
+    rates = [(pumps[i] + into[i] - out[i]) / areas[i] for i in range(4)]
+    return lpvmpc.Plant.from_casadi(
+        h, v, ca.vertcat(*rates), name="tanks",
+        bounds={**{f"h_{i}": (0.2, 20) for i in range(4)}, "v_0": (0, 10), "v_1": (0, 10)},
+        equilibrium=([12.26296752, 12.7831584, 1.63394113, 1.4090447], [3, 3]),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def certified():
+    plant = cart_pole()
+    return plant, lpvmpc.certify(plant, T_S, [2, 5, 0.1, 0.1], [0.01], x_bounds={"tilt": (-0.4, 0.4)}, trials=0)
+
+
+def edge(certificate, generator, count):
+    """States on the edge of the set."""
+    root = np.linalg.inv(np.linalg.cholesky(certificate.p).T)
+    directions = generator.normal(size=(count, len(certificate.x)))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    return certificate.x + np.sqrt(certificate.level) * (1 - 1e-12) * directions @ root.T
+
+
+def check(plant, certificate, count):
+    generator = np.random.default_rng(5)
+    states = edge(certificate, generator, count)
+    assert certificate.contains(states).all()
+    lower = [-np.inf if one.lower is None else one.lower for one in plant.inputs]
+    upper = [np.inf if one.upper is None else one.upper for one in plant.inputs]
+    for x in np.concatenate([states, certificate.x + 0.3 * (states - certificate.x)]):
+        u = certificate(0.0, x)
+        assert (u >= lower).all() and (u <= upper).all()
+        motion = solve_ivp(
+            lambda t, x: plant.f(x, u), (0, certificate.t_s), x, "DOP853",
+            rtol=1e-12, atol=1e-13, t_eval=np.linspace(0, certificate.t_s, 9),
+        ).y.T  # fmt: skip
+        assert (abs(motion - certificate.x) <= certificate.state_limits).all()
+        e, v = x - certificate.x, u - certificate.u
+        before, after = certificate.value(x), certificate.value(motion[-1])
+        stage = e @ certificate.q @ e + v @ certificate.r @ v
+        assert after <= (1 - certificate.contraction) * before - stage + 1e-10 * before
+
+
+def test_from_the_edge_of_the_set_the_cost_falls(certified):
+    plant, certificate = certified
+    check(plant, certificate, 150)
+    assert certificate.state_limits[1] > np.radians(12)
+
+
+def test_an_equilibrium_of_rounded_numbers_is_made_exact():
+    plant = tanks()
+    certificate = lpvmpc.certify(plant, 5.0, [1, 1, 0.1, 0.1], [0.1, 0.1], trials=0)
+    check(plant, certificate, 60)
+    assert abs(plant.f(certificate.x, certificate.u)).max() < 1e-14
+    assert 0 < certificate.within.max() < 1e-11
+    assert lpvmpc.verify(certificate, plant).boxes == certificate.boxes
+
+
+def test_a_file_is_the_certificate(certified, tmp_path):
+    plant, certificate = certified
+    certificate.save(tmp_path / "certificate.json")
+    loaded = lpvmpc.Certificate.load(tmp_path / "certificate.json")
+    assert loaded == certificate == pickle.loads(pickle.dumps(certificate))
+    verified = lpvmpc.verify(loaded, plant)
+    assert (verified.reach <= loaded.state_limits).all()
+    assert repr(loaded).startswith("<Certificate of 'cart-pole', 0.05 s: level ")
+    assert loaded.k.shape == (1, 4) and loaded.u.shape == (1,) and not loaded.contains([0, 2, 0, 0])
+    with pytest.raises(lpvmpc.SettingError, match="x: its shape"):
+        loaded.contains([0, 0])
+    with pytest.raises(lpvmpc.CertificateError, match="another plant"):
+        lpvmpc.verify(loaded, plant.with_parameters(pole_mass=0.31))
+
+
+def forged(certificate, change):
+    """With its digest made anew, as a forger would."""
+    content = json.loads(certificate.to_json())["certificate"]
+    change(content)
+    digest = 0xCBF29CE484222325
+    for byte in json.dumps(content, separators=(",", ":"), ensure_ascii=False).encode():
+        digest = (digest ^ byte) * 0x100000001B3 % 2**64
+    return json.dumps({"certificate": content, "digest": f"{digest:016x}"})
+
+
+def test_false_claims_are_refuted(certified):
+    plant, certificate = certified
+    with pytest.raises(lpvmpc.CertificateError, match="changed after it was written"):
+        lpvmpc.Certificate(certificate.to_json().replace("0.05", "0.06"))
+    for change, message in [
+        (lambda c: c.update(level=c["level"] * 50), "the set reaches"),
+        (lambda c: c.update(contraction=0.9), "decrease of x'Px is false"),
+        (lambda c: c.update(k=[[0.0] * 4]), "decrease of x'Px is false"),
+        (lambda c: c["equilibrium"].update(x=[0.0, 0.1, 0.0, 0.0]), "it is none"),
+    ]:
+        with pytest.raises(lpvmpc.FalseClaimError, match=message):
+            lpvmpc.verify(lpvmpc.Certificate(forged(certificate, change)), plant)
+
+
+def test_a_guaranteed_loop_reaches_its_equilibrium(certified):
+    plant, certificate = certified
+    mpc = lpvmpc.Mpc(plant, T_S, 20, [2, 5, 0.1, 0.1], [0.01], terminal=certificate)
+    x0 = [0.5, 0.3, 0.0, 0.0]
+    assert not certificate.contains(x0)
+    run = lpvmpc.simulate(plant, mpc, x0=x0, duration=6.0)
+    assert all(plan.is_guaranteed and plan.is_solved for plan in run.plans)
+    assert abs(run.x[-1]).max() < 5e-3 and abs(run.u).max() <= 15
+    with pytest.raises(lpvmpc.SettingError, match="larger than the certificate's"):
+        mpc.set(q=[20, 5, 0.1, 0.1])
+    with pytest.raises(lpvmpc.SettingError, match="goes to its equilibrium"):
+        mpc.step(x0, x_ref=[0.1, 0, 0, 0])
+    assert pickle.loads(pickle.dumps(mpc)).step(x0).decision == "new plan"
+    other = lpvmpc.Plant.from_matrices(np.zeros((4, 4)), np.ones((4, 1)))
+    with pytest.raises(lpvmpc.CertificateError, match="another plant"):
+        lpvmpc.Mpc(other, T_S, 20, [2, 5, 0.1, 0.1], [0.01], terminal=certificate)
+
+
+def test_what_has_no_proof_is_refused():
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    kinked = lpvmpc.Plant.from_casadi(x, u, ca.fabs(x) + u)
+    with pytest.raises(lpvmpc.PlantError, match="no proof can be had of `abs`"):
+        lpvmpc.certify(kinked, 0.1, [1], [1])
+    with pytest.raises(lpvmpc.SettingError, match="t_s: it is -1 s"):
+        lpvmpc.certify(double_integrator(), -1, [1, 1], [1])
+    with pytest.raises(lpvmpc.SettingError, match="must lie between"):
+        lpvmpc.certify(double_integrator(), 0.1, [1, 1], [1], x_bounds={"speed": (0, 1)})

@@ -1,0 +1,55 @@
+"""Controllers as programs for a microcontroller."""
+
+import re
+
+import numpy as np
+import pytest
+from plants import cart_pole
+
+import lpvmpc
+
+
+def controller(**others):
+    settings = {"u_bounds": {"force": (-12, 12)}, "x_bounds": {"position": (-0.75, None)}}
+    return lpvmpc.Mpc(cart_pole(), 0.05, 25, [10, 10, 0.1, 0.1], [0.01], **(settings | others))
+
+
+def saved(mpc, folder, **others):
+    mpc.save_firmware(folder, lpvmpc="/where/lpvmpc/is", x0=[0, 0.3, 0, 0], **others)
+    return (folder / "src" / "main.rs").read_text()
+
+
+def test_a_program_has_the_controllers_numbers(tmp_path):
+    mpc = controller()
+    mpc.set_parameters(pole_mass=0.375)
+    text = saved(mpc, tmp_path / "robot", x_ref=[0.5, 0, 0, 0], samples=40)
+    p = lpvmpc.lqr(mpc.plant, 0.05, [10, 10, 0.1, 0.1], [0.01]).p
+    rows = re.search(r"Cost\(SMatrix::from\(\[(.*?)\]\)\)", text, re.S).group(1)
+    found = np.array(re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", rows), dtype=float)
+    np.testing.assert_allclose(found.reshape(4, 4), p, rtol=1e-6)
+    for part in ("[12.0]", "[-12.0]", "-0.75", "usize = 25", "usize = 40", "[0.5, 0.0, 0.0, 0.0]"):
+        assert part in text, part
+    assert "/where/lpvmpc/is" in (tmp_path / "robot" / "Cargo.toml").read_text()
+    assert "0.375" in (tmp_path / "robot" / "src" / "plant.rs").read_text()
+    with pytest.raises(lpvmpc.PlantError, match="robot"):
+        saved(mpc, tmp_path / "robot")  # nothing is overwritten
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"substeps": 2}, "substeps: it is 2; on a microcontroller it must be 1"),
+        ({"method": "fixed"}, "method"),
+        ({"state_bounds": "hard"}, "state_bounds"),
+        ({"q": np.ones((4, 4)) + 20 * np.eye(4)}, "q: it must be diagonal"),
+        ({"terminal": "equality"}, "terminal"),
+        ({"rows": [lpvmpc.Row("sum", x={"tilt": 1.0}, upper=1.0)]}, "rows"),
+        ({"estimator": lpvmpc.Estimator({"position": 1e-6, "tilt": 1e-6}, 1e-3)}, "estimator"),
+    ],
+)
+def test_what_a_program_has_not_is_refused(tmp_path, change, said):
+    mpc = controller()
+    mpc.set(**change)
+    with pytest.raises(lpvmpc.SettingError, match=said):
+        saved(mpc, tmp_path / "robot")
+    assert not (tmp_path / "robot").exists()
