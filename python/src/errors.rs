@@ -2,6 +2,7 @@
 
 use ballbot_scenario::ScenarioError;
 use lpvmpc_any::MpcError;
+use lpvmpc_certificate::ClaimError;
 use lpvmpc_certify::CertifyError;
 use lpvmpc_plant::PlantError;
 use pyo3::PyErr;
@@ -76,4 +77,13 @@ pub fn identification(message: &str) -> PyErr {
 /// `lpvmpc.CertificateError`.
 pub fn certificate(error: impl ToString) -> PyErr {
     python::CertificateError::new_err(error.to_string())
+}
+
+/// `lpvmpc.FalseClaimError`, or `lpvmpc.CertificateError` where a claim could not be shown.
+pub fn claim(error: &ClaimError) -> PyErr {
+    let text = format!("the certificate {}: {error}", error.verdict());
+    match error.is_false() {
+        true => python::FalseClaimError::new_err(text),
+        false => python::CertificateError::new_err(text),
+    }
 }

@@ -20,8 +20,8 @@ mod _lpvmpc {
     #[pymodule_export]
     use super::ballbot::{
         Scenario, bench, campaign_example, certify_scenario, count_guarantee, excite,
-        identification_example, identify, reproduce, run_campaign, timed_scenarios,
-        verify_certificate,
+        identification_example, identify, read_certificate, reproduce, run_campaign,
+        timed_scenarios, verify_certificate,
     };
     #[pymodule_export]
     use super::certify::{certify, check_certificate, verify};

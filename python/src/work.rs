@@ -11,7 +11,7 @@ use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How often the calling thread looks for signals and tells of the progress.
 const TICK: Duration = Duration::from_millis(50);
@@ -59,6 +59,15 @@ impl Watch {
     pub fn set_part(&self, what: &str, done: f64) {
         self.begin(what, PARTS as usize);
         self.set((done * PARTS) as usize);
+    }
+
+    /// A clock at which the work ends, too: it is read in the midst of what tells no progress.
+    pub fn clock(&self) -> impl Fn() -> Duration + Sync + '_ {
+        let start = Instant::now();
+        move || {
+            self.look();
+            start.elapsed()
+        }
     }
 
     /// Ends the work here if it is to end.

@@ -1,6 +1,6 @@
 //! Campaigns of one's own.
 
-use super::values::{column, plain, to_toml};
+use super::values::{column, plain, toml_text};
 use crate::errors::study;
 use crate::work::{Report, Watch, work};
 use ballbot_campaign::{
@@ -16,7 +16,6 @@ use serde_json::{Value as Json, json};
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 /// A commented campaign.
 #[pyfunction]
@@ -41,10 +40,7 @@ pub fn run_campaign<'py>(
     rows: PathBuf,
     report: Report<'py>,
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyDict>)> {
-    let text = match campaign.extract() {
-        Ok(text) => text,
-        Err(_) => toml::to_string(&to_toml("campaign", &campaign)?).map_err(study)?,
-    };
+    let text = toml_text("campaign", &campaign)?;
     let found = work(py, &report, |watch| {
         let source = Source::parse(text, &path)?;
         let pool = ThreadPoolBuilder::new().num_threads(threads).build()?;
@@ -81,8 +77,8 @@ fn find_rows(campaign: &Own<'_>, path: &Path, watch: &Watch) -> Result<Found, Ca
     let file = File::create(path).map_err(|error| unwritable(&error))?;
     let mut writer = campaign.writer(BufWriter::new(file), path)?;
     watch.begin("running", campaign.runs() as usize);
-    let start = Instant::now();
-    let (_, known) = campaign.run_all(&|| start.elapsed(), &|| watch.step(), |row| {
+    let clock = watch.clock();
+    let (_, known) = campaign.run_all(&clock, &|| watch.step(), |row| {
         writer.push(row).map_err(|error| unwritable(&error))
     })?;
     writer.finish().map_err(|error| unwritable(&error))?;
@@ -104,8 +100,7 @@ fn find_rare(campaign: &Own<'_>, rare: &RareTable, watch: &Watch) -> Result<Foun
     // As many levels as there are tenths until the least probability.
     let levels = (-rare.least.log10()).ceil() as usize;
     watch.begin("rare failure", levels * rare.level_runs as usize);
-    let start = Instant::now();
-    let found = campaign.rare(rare, &|| start.elapsed(), &|| watch.step())?;
+    let found = campaign.rare(rare, &watch.clock(), &|| watch.step())?;
     let points = found.failures.iter();
     let points: Vec<Vec<Cell>> = points
         .map(|point| campaign.drawn_cells(&campaign.drawn_at(point)))

@@ -2,9 +2,9 @@
 
 use super::scenario::Scenario;
 use super::values::plain;
-use crate::errors::{certificate as refused, of_scenario, setting};
+use crate::errors::{certificate as refused, claim, of_scenario};
 use crate::work::{Report, work};
-use ballbot_scenario::{TerminalCertificate, proofs, read_certificate};
+use ballbot_scenario::{TerminalCertificate, proofs};
 use ballbot_studies::{CertificateSearch, ProvedSet, Searching};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -55,23 +55,25 @@ pub fn certify_scenario<'py>(
     Ok((set, certificate.to_json().map_err(refused)?))
 }
 
-/// Proves the certificate in a file again: its numbers, and its text.
+/// The text of a certificate's file.
+#[pyfunction]
+pub fn read_certificate(path: PathBuf) -> PyResult<String> {
+    Ok(ballbot_scenario::read_certificate(&path)?)
+}
+
+/// Proves the certificate in a text again: its numbers.
 #[pyfunction]
 pub fn verify_certificate<'py>(
     py: Python<'py>,
-    path: PathBuf,
+    text: &str,
     report: Report<'py>,
-) -> PyResult<(Bound<'py, PyAny>, String)> {
-    let text = read_certificate(&path)
-        .map_err(|error| setting(&path.display().to_string(), &error.to_string()))?;
-    let certificate = TerminalCertificate::from_json(&text).map_err(refused)?;
+) -> PyResult<Bound<'py, PyAny>> {
+    let certificate = TerminalCertificate::from_json(text).map_err(refused)?;
     let proof = work(py, &report, |watch| {
         proofs::prove(&certificate, &|done| watch.set_part("verifying", done))
     })?;
-    let proof =
-        proof.map_err(|error| refused(format!("the certificate {}: {error}", error.verdict())))?;
+    let proof = proof.map_err(|error| claim(&error))?;
     // After the proof, so that a false claim is told by what it claims.
-    TerminalCertificate::check_digest(&text).map_err(refused)?;
-    let set = plain(py, &ProvedSet::new(&certificate, &proof))?;
-    Ok((set, text))
+    TerminalCertificate::check_digest(text).map_err(refused)?;
+    plain(py, &ProvedSet::new(&certificate, &proof))
 }

@@ -1,6 +1,6 @@
 //! From logs to a robot, and what to log.
 
-use super::values::{column, plain, rows};
+use super::values::{column, plain, rows, toml_text};
 use crate::arrays::to_numpy;
 use crate::errors::{identification, setting};
 use crate::work::{Report, work};
@@ -28,15 +28,14 @@ pub fn identification_example() -> &'static str {
 pub fn identify<'py>(
     py: Python<'py>,
     logs: Vec<PathBuf>,
-    config: Option<PathBuf>,
+    config: Option<(Bound<'py, PyAny>, String)>,
     left_out: Vec<(Option<usize>, f64, f64)>,
     unphysical: bool,
     report: Report<'py>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let place = config.as_deref();
-    let mut config = configuration(place)?;
+    let (mut config, place) = configuration(config)?;
     config.fit.physical &= !unphysical;
-    let choices = config.choices().map_err(|error| in_file(place, &error))?;
+    let choices = config.choices().map_err(|error| in_file(&place, &error))?;
     let left_out: Vec<LeftOut> = left_out
         .into_iter()
         .map(|(log, from, to)| LeftOut {
@@ -127,23 +126,22 @@ pub struct Asked {
 #[pyfunction]
 pub fn excite<'py>(
     py: Python<'py>,
-    config: Option<PathBuf>,
+    config: Option<(Bound<'py, PyAny>, String)>,
     parameters: Option<PathBuf>,
     asked: Asked,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let place = config.as_deref();
-    let config = configuration(place)?;
+    let (config, place) = configuration(config)?;
     let identified = match &parameters {
         Some(path) => identified_parameters(&text(path)?).map_err(|error| {
             in_file(
-                Some(path),
+                &path.display().to_string(),
                 &ConfigError::Syntax(toml_message(&error.to_string())),
             )
         })?,
         None => Vec::new(),
     };
     let usual = ExcitationTask::of(&config, &identified);
-    let usual = usual.map_err(|error| in_file(place, &error))?;
+    let usual = usual.map_err(|error| in_file(&place, &error))?;
     let limit = asked.tilt_limit_deg.map(f64::to_radians);
     let task = ExcitationTask {
         band: asked.band.unwrap_or(usual.band),
@@ -178,18 +176,19 @@ pub fn excite<'py>(
     Ok(found)
 }
 
-/// The configuration in a file; the defaults without one.
-fn configuration(path: Option<&Path>) -> PyResult<Config> {
-    let Some(path) = path else {
-        return Ok(Config::default());
+/// A configuration, with what messages call it: the defaults without one.
+fn configuration(given: Option<(Bound<'_, PyAny>, String)>) -> PyResult<(Config, String)> {
+    let Some((content, place)) = given else {
+        return Ok((Config::default(), "config".to_owned()));
     };
-    Config::parse(&text(path)?).map_err(|error| {
-        let plain = match error {
-            ConfigError::Syntax(message) => ConfigError::Syntax(toml_message(&message)),
-            other => other,
-        };
-        in_file(Some(path), &plain)
-    })
+    match Config::parse(&toml_text("config", &content)?) {
+        Ok(config) => Ok((config, place)),
+        Err(ConfigError::Syntax(message)) => Err(in_file(
+            &place,
+            &ConfigError::Syntax(toml_message(&message)),
+        )),
+        Err(error) => Err(in_file(&place, &error)),
+    }
 }
 
 fn text(path: &Path) -> PyResult<String> {
@@ -197,8 +196,6 @@ fn text(path: &Path) -> PyResult<String> {
         .map_err(|error| setting(&path.display().to_string(), &error.to_string()))
 }
 
-/// What is wrong in a file.
-fn in_file(path: Option<&Path>, error: &ConfigError) -> PyErr {
-    let path = path.map(|path| path.display().to_string());
-    setting(&path.unwrap_or_default(), &error.to_string())
+fn in_file(place: &str, error: &ConfigError) -> PyErr {
+    setting(place, &error.to_string())
 }

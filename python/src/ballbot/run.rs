@@ -10,14 +10,12 @@ use lpvmpc_sim::{LogRow, Recording, Termination, Trajectory};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use std::time::Instant;
 
 /// Runs the closed loops.
 pub fn record(prepared: &Prepared, watch: &Watch) -> Result<Record, ScenarioError> {
     watch.begin("simulating", prepared.total_samples());
-    let start = Instant::now();
     prepared.record(&RunHooks {
-        clock: &|| start.elapsed(),
+        clock: &watch.clock(),
         progress: &|done| watch.set(done),
     })
 }
@@ -27,7 +25,6 @@ pub fn to_python<'py>(
     py: Python<'py>,
     prepared: &Prepared,
     record: Record,
-    logs: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
     let run = PyDict::new(py);
     let (t_s, geometry) = (prepared.settings.t_s, &prepared.ballbot.geometry);
@@ -58,7 +55,7 @@ pub fn to_python<'py>(
         let seen = log.iter().map(|row| (row.t, row.observation));
         recorded.set_item("readings", words::readings(seen))?;
         recorded.set_item("log", of_log(py, log)?)?;
-        recorded.set_item("log_csv", logs.then(|| log_csv(log)))?;
+        recorded.set_item("log_csv", log_csv(log))?;
         planes.append(recorded)?;
     }
     run.set_item("planes", planes)?;
@@ -107,7 +104,7 @@ fn of_plane<'py>(py: Python<'py>, trajectory: &Trajectory<4, 1>) -> PyResult<Bou
     let gaps = samples.iter().map(|sample| sample.gap.into());
     plane.set_item("gaps", rows(py, gaps))?;
     let guarantees = samples.iter().filter_map(|sample| sample.guarantee);
-    let decisions = guarantees.clone().map(|one| format!("{:?}", one.decision));
+    let decisions = guarantees.clone().map(|one| one.decision.to_string());
     plane.set_item("decisions", decisions.collect::<Vec<_>>())?;
     let set_points = guarantees.map(|guarantee| guarantee.set_point);
     plane.set_item("set_points", column(py, set_points))?;

@@ -1,7 +1,7 @@
 //! Scenarios.
 
 use super::run;
-use super::values::{of_toml, to_toml};
+use super::values::{of_toml, to_toml, toml_text};
 use crate::errors::of_scenario;
 use crate::work::{Report, Watch, work};
 use ballbot_scenario::proofs::ProvedFiles;
@@ -18,6 +18,10 @@ pub struct Scenario {
 }
 
 impl Scenario {
+    fn of(document: Document, folder: PathBuf) -> Self {
+        Self { document, folder }
+    }
+
     /// The document, and where its files are.
     pub fn parts(&self) -> (&Document, &Path) {
         (&self.document, &self.folder)
@@ -50,7 +54,8 @@ impl Scenario {
     fn builtin(name: &str) -> PyResult<Self> {
         let builtin = builtin::find(name).ok_or_else(|| ScenarioError::unknown(name));
         let text = builtin.map_err(of_scenario)?.text;
-        Self::parse(text.to_owned(), name, PathBuf::from("."))
+        let document = Document::parse(text.to_owned(), name);
+        Ok(Self::of(document.map_err(of_scenario)?, PathBuf::from(".")))
     }
 
     /// A built-in one by its name, or a file by its path.
@@ -58,16 +63,21 @@ impl Scenario {
     fn load(name_or_path: &str) -> PyResult<Self> {
         let document = Document::load(name_or_path).map_err(of_scenario)?;
         let folder = Path::new(name_or_path).parent().unwrap_or(Path::new("."));
-        Ok(Self {
-            document,
-            folder: folder.to_owned(),
-        })
+        Ok(Self::of(document, folder.to_owned()))
     }
 
+    /// From the text of a file, or from a dictionary.
     #[staticmethod]
-    fn parse(text: String, origin: &str, folder: PathBuf) -> PyResult<Self> {
-        let document = Document::parse(text, origin).map_err(of_scenario)?;
-        Ok(Self { document, folder })
+    fn parse(content: Bound<'_, PyAny>, origin: &str, folder: PathBuf) -> PyResult<Self> {
+        let text = toml_text("scenario", &content)?;
+        Ok(Self::of(
+            Document::parse(text, origin).map_err(of_scenario)?,
+            folder,
+        ))
+    }
+
+    fn copy(&self) -> Self {
+        Self::of(self.document.clone(), self.folder.clone())
     }
 
     #[getter]
@@ -111,13 +121,8 @@ impl Scenario {
         prepared.map_err(of_scenario).map(drop)
     }
 
-    /// The recorded run; the texts of the planes' logs with it, if they are wanted.
-    fn simulate<'py>(
-        &self,
-        py: Python<'py>,
-        logs: bool,
-        report: Report<'py>,
-    ) -> PyResult<Bound<'py, PyDict>> {
+    /// The recorded run.
+    fn simulate<'py>(&self, py: Python<'py>, report: Report<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (scenario, folder) = (self.document.scenario(), &self.folder);
         let found = work(py, &report, |watch| {
             let prepared = prepare(scenario, folder, watch)?;
@@ -125,6 +130,6 @@ impl Scenario {
             Ok((prepared, record))
         })?;
         let (prepared, record) = found.map_err(of_scenario)?;
-        run::to_python(py, &prepared, record, logs)
+        run::to_python(py, &prepared, record)
     }
 }

@@ -10,7 +10,6 @@ use ballbot_studies::{Campaign, Outcome, Scenarios, StudyError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use serde_json::json;
-use std::time::Instant;
 
 /// The built-in scenarios that are timed.
 #[pyfunction]
@@ -32,11 +31,7 @@ pub fn bench<'py>(
             prepared.push(prepare(document.scenario(), folder, watch)?);
         }
         watch.begin("timing", scenarios.len() + 1);
-        let start = Instant::now();
-        let clock = || {
-            watch.look();
-            start.elapsed()
-        };
+        let clock = watch.clock();
         let mut sequences = Vec::with_capacity(scenarios.len());
         for ((document, _), prepared) in scenarios.iter().zip(&prepared) {
             sequences.push(time(document.origin(), prepared, &clock)?);
@@ -101,11 +96,7 @@ fn of_outcome<'py>(py: Python<'py>, outcome: &Outcome) -> PyResult<Bound<'py, Py
 pub fn reproduce<'py>(py: Python<'py>, report: Report<'py>) -> PyResult<Bound<'py, PyAny>> {
     let claims = work(py, &report, |watch| {
         watch.begin("reproducing", Reproduction::PARTS);
-        let start = Instant::now();
-        let clock = || {
-            watch.look();
-            start.elapsed()
-        };
+        let clock = watch.clock();
         let reproduction = Reproduction::compute(&clock, &|done| watch.set(done));
         reproduction.map(|found| found.claims())
     })?;

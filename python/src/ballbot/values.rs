@@ -105,6 +105,27 @@ pub fn to_toml(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Toml> {
     ))
 }
 
+/// The text of a TOML file: a text as it is, or what a dictionary makes.
+///
+/// # Errors
+/// As [`to_toml`].
+pub fn toml_text(what: &str, content: &Bound<'_, PyAny>) -> PyResult<String> {
+    if let Ok(text) = content.extract() {
+        return Ok(text);
+    }
+    let Ok(table) = content.cast::<PyDict>() else {
+        let expected = "it must be the text of a file, or a dictionary";
+        return Err(scenario_value(what, &content.repr()?.to_string(), expected));
+    };
+    let mut values = toml::Table::new();
+    for (key, value) in table {
+        let key: String = key.str()?.extract()?;
+        let value = to_toml(&key, &value)?;
+        values.insert(key, value);
+    }
+    toml::to_string(&values).map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
 /// A column of numbers.
 pub fn column<'py>(
     py: Python<'py>,
