@@ -31,12 +31,9 @@ def test_keys_are_read_and_changed(scenario: ballbot.Scenario) -> None:
     scenario["bounds"]["torque_nm"] = np.array([-1.0, 0.5])
     scenario.bounds["torque_nm.0"] = -2
     assert scenario["controller.horizon"] == 25 and scenario.bounds.torque_nm == (-2, 0.5)
-    # A default is there to be read, given or not, and comes back.
-    assert "integration" in scenario and scenario.integration.relative_tolerance > 0
-    default = scenario.bounds.theta_rad
-    scenario.bounds.theta_rad = [-0.1, 0.1]
+    # What is taken away has its default, which is there to be read.
     del scenario.bounds.theta_rad
-    assert scenario.bounds.theta_rad != (-0.1, 0.1) and default != (-0.1, 0.1)
+    assert scenario.bounds.theta_rad == (-np.inf, np.inf) and "theta_rad" in scenario.bounds
     points = scenario.reference.set_points.points
     points[0].phi_rad = 1.25
     assert scenario["reference.set_points.points.0.phi_rad"] == 1.25
@@ -168,6 +165,12 @@ def test_a_figure_shows_the_run(scenario: ballbot.Scenario) -> None:
     assert {low, high} <= {float(np.asarray(line.get_ydata())[0]) for line in shown["θ [rad]"].lines[1:]}
     with pytest.raises(lpvmpc.ScenarioError, match="must be one of run, plans"):
         run.plot("path")
+    guaranteed = ballbot.Scenario.builtin("far-setpoints")
+    guaranteed.duration_s = 1.0
+    run = guaranteed.simulate()
+    _, aims, backed = run.plot("plans", matplotlib.figure.Figure()).axes
+    assert np.array_equal(np.asarray(aims.lines[0].get_ydata()), run["set_point"])
+    assert [label.get_text() for label in backed.get_yticklabels()] == ["new plan"]
 
 
 def test_campaigns_are_checked(tmp_path: Path) -> None:

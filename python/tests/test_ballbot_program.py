@@ -205,19 +205,18 @@ def test_an_identification(program: Program) -> None:
         "theta_dot_rad_s": log.readings[:, 3], "torque_commanded_nm": log.commanded,
         "torque_applied_nm": log.applied,
     }  # fmt: skip
-    for recording in ("log.csv", run, columns):
+    different = {"logs", "folder", "files"}
+    for recording in (columns, "log.csv"):
         robot = ballbot.identify([recording])
         assert robot.is_usable
-        different = {"logs", "folder", "files"}
         assert {k: v for k, v in said.items() if k not in different} == {
             k: v for k, v in robot.summary.items() if k not in different
         }
-    robot = ballbot.identify(["log.csv"])
-    text = Path("out/parameters.toml").read_text(encoding="utf-8")
-    assert robot.files == {"parameters.toml": text}
+    assert robot.files == {"parameters.toml": Path("out/parameters.toml").read_text(encoding="utf-8")}
     # What was found is what was simulated, to within its own intervals.
-    truth = scenario["parameters.b1_m2"]
-    assert abs(robot["b1_m2"] - truth) < 4 * robot.covariance[robot.keys.index("b1_m2")][robot.keys.index("b1_m2")] ** 0.5
+    place = robot.keys.index("b1_m2")
+    deviation = robot.covariance[place, place] ** 0.5
+    assert abs(robot["b1_m2"] - scenario["parameters.b1_m2"]) < 4 * deviation
     robot.save("robot")
     with pytest.raises(FileExistsError):
         robot.save("robot")

@@ -100,7 +100,10 @@ def plans(run: Run, figure: Figure | None) -> Figure:
     axes = list(figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0])
     for panel, draw in zip(axes, panels, strict=True):
         draw(panel)
-        panel.legend(loc="best", frameon=False, fontsize="small", ncols=4)
+        if panel.get_legend_handles_labels()[0]:
+            panel.legend(
+                loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.1, frameon=False, fontsize="small", ncols=4
+            )
     return _finished(figure, run.title, axes, axes[-1:], run.t, legend=False)
 
 
