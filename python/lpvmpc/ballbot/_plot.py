@@ -27,7 +27,8 @@ _STATE_NAMES = ("phi", "theta", "phi_dot", "theta_dot")
 _TORQUE = "τ [N m]"
 _TIME = "t [s]"
 
-# As much of a run is its beginning; it gets panels of its own where it needs more than so many times the scale of the rest.
+# As much of a run is its beginning; it gets panels of its own where it needs more than so many times the scale of
+# the rest.
 _BEGINNING, _DOMINATES = 0.02, 2.0
 # What a descent leaves at its tolerance, rad and rad/s.
 _NO_GAP = 1e-4
@@ -95,7 +96,9 @@ def plans(run: Run, figure: Figure | None) -> Figure:
         if plane.decision:
             panels += [_set_points(plane), _decisions(plane)]
     if not panels:
-        raise ScenarioError("kind = 'plans': the plans are rollouts of the model, and there is no guarantee to be shown")
+        raise ScenarioError(
+            "kind = 'plans': the plans are rollouts of the model, and there is no guarantee to be shown"
+        )
     figure = new_figure(figure, (9.0, 0.8 + 2.6 * len(panels)))
     axes = list(figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0])
     for panel, draw in zip(axes, panels, strict=True):

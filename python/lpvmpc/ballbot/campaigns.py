@@ -23,8 +23,8 @@ class CampaignResult:
     """What the runs of a campaign gave."""
 
     summary: dict[str, Any]
-    """What they say together: as ``summary.json`` of ``ballbot campaign``. Of a rare failure its ``probability`` with an
-    interval, and the ``levels`` on the way to it."""
+    """What they say together: as ``summary.json`` of ``ballbot campaign``. Of a rare failure its ``probability`` with
+    an interval, and the ``levels`` on the way to it."""
     columns: dict[str, NDArray[Any]]
     """A column by its name, as in ``runs.csv``: number of the run, seed, outcome, success, inputs and measures. Numbers
     are NaN where there are none; ``success`` is None of a run that makes no scenario. Of a rare failure the points
@@ -102,15 +102,9 @@ def campaign(
         summary, columns = _lpvmpc.run_campaign(content, path, threads, rows, report)
     if "refused" in summary and summary["refused"] == summary["runs"]:
         raise ScenarioError('all runs were refused by the scenario: `refused = "stop"` says why')
-    return CampaignResult(summary, {name: _array(column) for name, column in columns.items()})
+    return CampaignResult(summary, {name: np.array(column) for name, column in columns.items()})
 
 
 def campaign_example() -> str:
     """The text of a campaign's file with comments, to be changed."""
     return _lpvmpc.campaign_example()
-
-
-def _array(column: Any) -> NDArray[Any]:
-    """Words as an array of words, yes and no as one of those."""
-    found = np.array(column)
-    return found

@@ -99,8 +99,8 @@ class PlaneRun:
     """Why the run ended early; None where it came to its end."""
 
     def __getitem__(self, name: str) -> Array:
-        """A column by its name: ``phi``, ``theta``, ``phi_dot``, ``theta_dot``, the same with ``_ref``, ``torque``, ``cost``,
-        ``step_time`` or ``set_point``."""
+        """A column by its name: ``phi``, ``theta``, ``phi_dot``, ``theta_dot``, the same with ``_ref``, ``torque``,
+        ``cost``, ``step_time`` or ``set_point``."""
         columns = self._columns()
         if name not in columns:
             raise KeyError(f"{name!r}: there are {', '.join(columns)}")
@@ -168,7 +168,8 @@ class Run:
 
     @property
     def state(self) -> Array:
-        """phi, theta (rad), phi_dot, theta_dot (rad/s) at these times, shape (K + 1, 4); of two planes (K + 1, 2, 4)."""
+        """phi, theta (rad), phi_dot, theta_dot (rad/s) at these times, shape (K + 1, 4); of two planes
+        (K + 1, 2, 4)."""
         return self._stacked("state", len(self.t))
 
     @property
@@ -249,9 +250,9 @@ class Run:
         Parameters
         ----------
         kind
-            ``"run"``: states, torque and cost over time, with reference and bounds. ``"plans"``: how far the plans were from
-            the model, and what backed each torque. For two planes ``"path"``: the way on the floor, and ``"motors"``.
-            Without, ``"run"``.
+            ``"run"``: states, torque and cost over time, with reference and bounds. ``"plans"``: how far the plans were
+            from the model, and what backed each torque. For two planes ``"path"``: the way on the floor, and
+            ``"motors"``. Without, ``"run"``.
         figure
             A figure of matplotlib to draw in; a new one without.
 

@@ -18,8 +18,8 @@ class Bench:
     """Times of controllers' steps on this machine, microseconds: median, 99th percentile and longest."""
 
     sequences: list[dict[str, Any]]
-    """Of each scenario the quadratic program alone (``qp_us``), the whole step (``step_us``), and the step when other work
-    was in the cache (``step_cold_us``)."""
+    """Of each scenario the quadratic program alone (``qp_us``), the whole step (``step_us``), and the step when other
+    work was in the cache (``step_cold_us``)."""
     guaranteed: dict[str, dict[str, float]]
     """The guaranteed step of ``far-setpoints`` beside plain ones."""
 
@@ -82,8 +82,8 @@ def count_guarantee(
     threads: int = 0,
     progress: bool = False,
 ) -> list[GuaranteeCount]:
-    """Counts in many random closed loops what a guarantee promises, and where it ends: as ``ballbot campaign`` without a
-    campaign of your own, with the same numbers.
+    """Counts in many random closed loops what a guarantee promises, and where it ends: as ``ballbot campaign`` without
+    a campaign of your own, with the same numbers.
 
     Parameters
     ----------
