@@ -21,6 +21,9 @@ heavy = {"casadi", "matplotlib", "pandas", "sympy", "tqdm"} & set(sys.modules)
 assert not heavy, f"import lpvmpc imports {heavy}"'
 
 "${pip[@]}" install casadi matplotlib mypy pandas pytest scipy sympy tqdm
+# The program that was built before says what the package must say, bit for bit.
+export LPVMPC_BALLBOT=$CARGO_TARGET_DIR/release/ballbot
+test -x "$LPVMPC_BALLBOT"
 cd python
 "$python/venv/bin/python" -m mypy
 # Not `python -m pytest`, which would take the package of this folder instead of the installed one.

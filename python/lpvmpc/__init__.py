@@ -10,14 +10,17 @@ line, and steps in microseconds:
 [-1.0]
 """
 
+from . import ballbot
 from .certificate import Certificate
 from .design import Lqr, Verified, certify, lqr, verify
 from .errors import (
     CertificateError,
     FalseClaimError,
+    IdentificationError,
     LpvmpcError,
     MissingPackageError,
     PlantError,
+    ScenarioError,
     SettingError,
     SimulationError,
 )
@@ -37,6 +40,7 @@ __all__ = [
     "Estimator",
     "FalseClaimError",
     "Gate",
+    "IdentificationError",
     "Jump",
     "Load",
     "Lqr",
@@ -49,12 +53,14 @@ __all__ = [
     "PlantError",
     "Row",
     "Run",
+    "ScenarioError",
     "Sensor",
     "SettingError",
     "Signal",
     "SimulationError",
     "SteadyState",
     "Verified",
+    "ballbot",
     "certify",
     "lqr",
     "simulate",

@@ -19,25 +19,31 @@ if TYPE_CHECKING:
 _BLUE, _VERMILION, _GREY = "#0072B2", "#D55E00", "#7f7f7f"
 
 
-def plot_run(run: Run, signals: Sequence[str] | None, figure: Figure | None) -> Figure:
-    """Each state, input and output over time."""
+def new_figure(figure: Figure | None, size: tuple[float, float]) -> Figure:
+    """The figure to draw in: a new one of this size, in inches, where none is given."""
+    if figure is not None:
+        return figure
     try:
         from matplotlib.figure import Figure as NewFigure
     except ImportError as error:
         raise MissingPackageError(
             "this needs matplotlib: pip install matplotlib, or pip install lpvmpc[plot]"
         ) from error
+    try:
+        from matplotlib import pyplot
+
+        return pyplot.figure(figsize=size, layout="constrained")
+    except ImportError:
+        return NewFigure(figsize=size, layout="constrained")
+
+
+def plot_run(run: Run, signals: Sequence[str] | None, figure: Figure | None) -> Figure:
+    """Each state, input and output over time."""
     names = list(run._names() if signals is None else signals)
     for name in names:
         if name not in run._names():
             raise SettingError(f"signals: there is no {name!r}; there are {', '.join(run._names())}")
-    if figure is None:
-        try:
-            from matplotlib import pyplot
-
-            figure = pyplot.figure(figsize=(7.0, 1.0 + 1.35 * len(names)), layout="constrained")
-        except ImportError:
-            figure = NewFigure(figsize=(7.0, 1.0 + 1.35 * len(names)), layout="constrained")
+    figure = new_figure(figure, (7.0, 1.0 + 1.35 * len(names)))
     panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for panel, name in zip(panels, names, strict=True):
         _draw(panel, run, name)

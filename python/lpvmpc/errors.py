@@ -26,5 +26,15 @@ class SimulationError(LpvmpcError, RuntimeError):
     """The plant's motion cannot be integrated."""
 
 
+class ScenarioError(LpvmpcError, ValueError):
+    """A scenario or a campaign makes no sense, or a study cannot be made of it: the message names the key and says what
+    would be right."""
+
+
+class IdentificationError(LpvmpcError, ValueError):
+    """No robot was identified, or no excitation found: the message names the log and the place in it, or what was asked,
+    and says what would be right."""
+
+
 class MissingPackageError(LpvmpcError, ImportError):
     """A function needs a package that is not installed: the message says how to install it."""

@@ -1,20 +1,28 @@
 //! The native half of the Python package `lpvmpc`: plants, controllers and simulated worlds of any
-//! size. What people call is in `lpvmpc/`, with its documentation; numbers arrive here with their
-//! shapes checked for form only, and the libraries check what they mean.
+//! size, and what the program `ballbot` does. What people call is in `lpvmpc/`, with its documentation;
+//! numbers arrive here with their shapes checked for form only, and the libraries check what they mean.
 
 mod arrays;
+mod ballbot;
 mod certify;
 mod design;
 mod errors;
 mod mpc;
 mod plan;
 mod plant;
+mod work;
 mod world;
 
 use pyo3::prelude::*;
 
 #[pymodule]
 mod _lpvmpc {
+    #[pymodule_export]
+    use super::ballbot::{
+        Scenario, bench, campaign_example, certify_scenario, count_guarantee, excite,
+        identification_example, identify, read_certificate, reproduce, run_campaign,
+        timed_scenarios, verify_certificate,
+    };
     #[pymodule_export]
     use super::certify::{certify, check_certificate, verify};
     #[pymodule_export]

@@ -10,18 +10,17 @@ import pytest
 
 import lpvmpc
 
-MODULES = [name for _, name, _ in pkgutil.iter_modules(lpvmpc.__path__) if name != "_lpvmpc"]
+MODULES = [name for _, name, _ in pkgutil.walk_packages(lpvmpc.__path__, "lpvmpc.") if name != "lpvmpc._lpvmpc"]
 
 
-@pytest.mark.parametrize("name", ["__init__", *MODULES])
+@pytest.mark.parametrize("name", ["lpvmpc", *MODULES])
 def test_examples_of_docstrings(name):
-    module = lpvmpc if name == "__init__" else importlib.import_module(f"lpvmpc.{name}")
-    assert doctest.testmod(module).failed == 0
+    assert doctest.testmod(importlib.import_module(name)).failed == 0
 
 
 def test_everything_public_is_described():
-    for name in lpvmpc.__all__:
-        thing = getattr(lpvmpc, name)
+    public = {name: getattr(module, name) for module in (lpvmpc, lpvmpc.ballbot) for name in module.__all__}
+    for name, thing in public.items():
         assert thing.__doc__, name
         for member, value in vars(thing).items() if isinstance(thing, type) else ():
             if not member.startswith("_") and (callable(value) or isinstance(value, property)):

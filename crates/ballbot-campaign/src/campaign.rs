@@ -6,7 +6,7 @@ use crate::file::{CampaignFile, LimitsTable, OnRefused};
 use crate::fingerprint;
 use crate::inputs::{Inputs, child, named_seed};
 use crate::measure::{Ending, Measure, Measured};
-use ballbot_scenario::{Files, Prepared, Record, RunHooks, ScenarioError, Template, words};
+use ballbot_scenario::{Document, Files, Prepared, Record, RunHooks, ScenarioError, words};
 use rayon::prelude::*;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ pub struct Source {
     path: PathBuf,
     text: String,
     file: CampaignFile,
-    template: Template,
+    scenario: Document,
     /// Where files are looked for that the scenario names.
     folder: PathBuf,
 }
@@ -33,7 +33,17 @@ impl Source {
     /// # Errors
     /// A file cannot be read, or is no campaign or no scenario.
     pub fn load(path: &Path) -> Result<Self, CampaignError> {
-        let text = fs::read_to_string(path).map_err(CampaignError::at(path))?;
+        Self::parse(
+            fs::read_to_string(path).map_err(CampaignError::at(path))?,
+            path,
+        )
+    }
+
+    /// A campaign's text, as if it stood in the file `path`.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn parse(text: String, path: &Path) -> Result<Self, CampaignError> {
         let file: CampaignFile = toml::from_str(&text).map_err(|error| CampaignError::Syntax {
             path: path.to_owned(),
             message: words::toml_message(&error.to_string()),
@@ -44,13 +54,13 @@ impl Source {
             true => beside.to_string_lossy().into_owned(),
             false => file.scenario.clone(),
         };
-        let template = Template::load(&named)?;
+        let scenario = Document::load(&named)?;
         let folder = Path::new(&named).parent().unwrap_or(folder).to_owned();
         Ok(Self {
             path: path.to_owned(),
             text,
             file,
-            template,
+            scenario,
             folder,
         })
     }
@@ -149,7 +159,7 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
                 expected,
             ));
         }
-        let has_world = source.template.root().get("world").is_some()
+        let has_world = source.scenario.root().get("world").is_some()
             || fixed.iter().any(|(key, _)| key.starts_with("world."))
             || inputs
                 .all
@@ -160,7 +170,7 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
         let campaign = Self {
             noise: (has_world && !given).then(|| named_seed(file.seed, NOISE)),
             measures: measures(file)?,
-            fingerprint: fingerprint::of(source, program, &source.text, &source.template, &inputs),
+            fingerprint: fingerprint::of(source, program, &source.text, &source.scenario, &inputs),
             program: program.to_owned(),
             source,
             files,
@@ -274,7 +284,7 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
         let mut changes = self.fixed.clone();
         changes.extend(self.inputs.changes(&drawn.values));
         changes.extend(drawn.seed.map(|seed| (NOISE, Value::Integer(seed as i64))));
-        self.source.template.with(&changes)?.prepare(self.files)
+        self.source.scenario.with(&changes)?.prepare(self.files)
     }
 
     fn refused(&self, drawn: &Drawn, source: ScenarioError) -> CampaignError {

@@ -4,7 +4,7 @@ use crate::campaign::Source;
 use crate::distribution::Distribution;
 use crate::inputs::Inputs;
 use crate::results::hexadecimal;
-use ballbot_scenario::Template;
+use ballbot_scenario::Document;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
 use std::fs;
@@ -16,11 +16,11 @@ pub(crate) fn of(
     source: &Source,
     program: &str,
     campaign: &str,
-    template: &Template,
+    scenario: &Document,
     inputs: &Inputs,
 ) -> String {
     let mut names = BTreeSet::new();
-    texts(template.root(), &mut names);
+    texts(scenario.root(), &mut names);
     source
         .file()
         .set
@@ -36,7 +36,7 @@ pub(crate) fn of(
         digest.update((part.len() as u64).to_le_bytes());
         digest.update(part);
     };
-    for part in [program, campaign, template.text()] {
+    for part in [program, campaign, scenario.text()] {
         add(part.as_bytes());
     }
     for name in names {

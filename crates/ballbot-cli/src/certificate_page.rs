@@ -1,6 +1,5 @@
 //! The readable page of a certificate.
 
-use crate::commands::certify::semi_axes;
 use crate::html;
 use ballbot_scenario::TerminalCertificate;
 use lpvmpc_certificate::Proof;
@@ -57,7 +56,7 @@ pub fn html(
     proof: &Proof<4>,
 ) -> Result<String, FigureError> {
     let svg = figure("Phase planes", certificate).svg()?;
-    let axes = semi_axes(certificate);
+    let axes = certificate.terminal.largest_states();
     let bound = |limit: f64| {
         if limit.is_finite() {
             format!("{limit:.4}")

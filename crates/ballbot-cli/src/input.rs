@@ -59,7 +59,18 @@ pub fn read_text(path: &Path) -> Result<String, InputError> {
 /// # Errors
 /// [`InputError::Read`] or [`InputError::Syntax`].
 pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, InputError> {
-    toml::from_str(&read_text(path)?).map_err(|error| InputError::Syntax {
+    parse(path, |text| toml::from_str(text))
+}
+
+/// What `parser` makes of the text of a TOML file.
+///
+/// # Errors
+/// [`InputError::Read`] or [`InputError::Syntax`].
+pub fn parse<T>(
+    path: &Path,
+    parser: impl Fn(&str) -> Result<T, toml::de::Error>,
+) -> Result<T, InputError> {
+    parser(&read_text(path)?).map_err(|error| InputError::Syntax {
         path: path.to_owned(),
         message: words::toml_message(&error.to_string()),
     })

@@ -3,7 +3,8 @@
 use crate::input;
 use ballbot::Ballbot;
 use nalgebra::{Complex, DMatrix};
-use serde_json::{Map, Value, json};
+use serde::Serialize;
+use serde_json::{Map, Value, json, to_value};
 
 /// The rows of a matrix.
 pub fn matrix(matrix: &DMatrix<f64>) -> Value {
@@ -27,6 +28,13 @@ pub fn parameters(ballbot: &Ballbot<f64>) -> Value {
     let entries = input::parameter_entries(ballbot).into_iter();
     let entries = entries.map(|(key, value)| (key.to_owned(), json!(value)));
     Value::Object(entries.collect::<Map<_, _>>())
+}
+
+/// Adds the fields of `more`, a table, to the document.
+pub fn extend(document: &mut Value, more: &impl Serialize) {
+    if let (Some(document), Ok(Value::Object(more))) = (document.as_object_mut(), to_value(more)) {
+        document.extend(more);
+    }
 }
 
 /// The document as text.

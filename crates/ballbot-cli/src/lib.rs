@@ -31,8 +31,6 @@ pub mod optimality_figure;
 pub mod output;
 pub mod program;
 pub mod progress;
-pub mod proofs;
-pub mod recording;
 pub mod refinement_file;
 pub mod reproduction;
 pub mod results;

@@ -3,6 +3,7 @@
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::sync::{Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -17,6 +18,26 @@ static QUIET: AtomicBool = AtomicBool::new(false);
 /// No bar from here on.
 pub fn silence() {
     QUIET.store(true, Ordering::Relaxed);
+}
+
+/// Steps of a bar that is told parts from 0 to 1.
+const PARTS: f64 = 1000.0;
+
+/// The bar of proofs of certificates: there while one is made.
+#[derive(Debug, Default)]
+pub struct ProofProgress(Mutex<Option<Progress>>);
+
+impl ProofProgress {
+    /// This part of a proof is done.
+    pub fn set_part(&self, done: f64) {
+        let mut bar = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match done < 1.0 {
+            true => bar
+                .get_or_insert_with(|| Progress::of_parts("proving the certificate"))
+                .set_part(done),
+            false => *bar = None,
+        }
+    }
 }
 
 /// Progress of some work on standard error. Nothing is drawn when that is no terminal, when the
@@ -50,6 +71,16 @@ impl Progress {
             (sender, thread::spawn(raise))
         });
         Self { bar, curtain }
+    }
+
+    /// Work called `what` that is told by the part of it that is done.
+    pub fn of_parts(what: impl Into<String>) -> Self {
+        Self::new(what, PARTS as usize)
+    }
+
+    /// This part is done, of work that is told so.
+    pub fn set_part(&self, done: f64) {
+        self.set((done * PARTS) as usize);
     }
 
     /// So many steps are done.

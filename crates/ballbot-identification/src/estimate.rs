@@ -88,6 +88,17 @@ pub enum Status {
     AtBound,
 }
 
+impl Status {
+    /// In a word or two.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Held => "held",
+            Self::Found => "found",
+            Self::AtBound => "at its bound",
+        }
+    }
+}
+
 /// Why there is no estimate.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EstimateError {

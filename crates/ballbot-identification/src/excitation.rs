@@ -1,5 +1,6 @@
 //! A torque that identifies the parameters of a stabilised robot, and how well it will identify them.
 
+use crate::config::{Config, ConfigError};
 use crate::covariance::{inverse, of_parameters};
 use crate::estimate::{Task, problem};
 use crate::log::{BallAngle, Run, Torque};
@@ -14,6 +15,7 @@ use lpvmpc_design::number_text;
 use lpvmpc_design::{RiccatiError, lqr_continuous, poles};
 use nalgebra::{DMatrix, DVector, Vector3, Vector4};
 use std::f64::consts::{PI, TAU};
+use std::fmt::Write as _;
 
 /// What is asked of an excitation.
 #[derive(Clone, Debug)]
@@ -67,6 +69,18 @@ pub struct Excitation {
     pub standard_deviations: Values,
     /// The gains that held the robot.
     pub gain: Vector4<f64>,
+}
+
+impl Excitation {
+    /// The text of a CSV file with the torque over time, as scenarios read it.
+    pub fn csv(&self) -> String {
+        let mut text = "t_s,torque_excitation_nm\n".to_owned();
+        for (time, torque) in self.time.iter().zip(&self.torque) {
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "{time},{torque}");
+        }
+        text
+    }
 }
 
 /// Why there is no excitation.
@@ -162,7 +176,61 @@ const LEAST_PRECISE: f64 = 0.5;
 /// Fading in and out, s: no jump of the torque.
 const FADE: f64 = 1.0;
 
+/// The noise of an ordinary inertial unit and encoder, where the configuration does not know it:
+/// ball angle and tilt, rad, and rate, rad/s.
+const ORDINARY_NOISE: [f64; 3] = [1e-3, 1e-3, 5e-3];
+
 impl ExcitationTask {
+    /// A usual band, Hz.
+    pub const BAND: (f64, f64) = (0.2, 6.0);
+    /// A usual number of harmonics.
+    pub const HARMONICS: usize = 15;
+    /// A usual torque, N m.
+    pub const AMPLITUDE: f64 = 1.0;
+    /// A usual length, s.
+    pub const DURATION: f64 = 20.0;
+    /// A usual limit of the tilt, degrees.
+    pub const TILT_LIMIT_DEG: f64 = 10.0;
+    /// A usual rate of loop and log, Hz.
+    pub const RATE: f64 = 200.0;
+
+    /// A usual task for the robot that a configuration expects, but for the parameters that were
+    /// `identified` before, and for a log with the configuration's sensors.
+    ///
+    /// # Errors
+    /// As [`Config::choices`].
+    pub fn of(config: &Config, identified: &[(Parameter, f64)]) -> Result<Self, ConfigError> {
+        let choices = config.choices()?;
+        let geometry = config.geometry();
+        let mut robot = Values::expected(&choices, &geometry);
+        for (parameter, value) in identified {
+            robot[*parameter] = *value;
+        }
+        let noise = config.noise();
+        Ok(Self {
+            robot,
+            geometry,
+            choices,
+            band: Self::BAND,
+            harmonics: Self::HARMONICS,
+            amplitude: Self::AMPLITUDE,
+            duration: Self::DURATION,
+            tilt_limit: Self::TILT_LIMIT_DEG.to_radians(),
+            rate: Self::RATE,
+            noise: Vector3::from_fn(|i, _| noise[i].unwrap_or(ORDINARY_NOISE[i])),
+            gain: None,
+            segment: config.fit.segment_s,
+            gyroscope: !config.log.theta_dot.column.is_empty(),
+        })
+    }
+
+    /// The parameters that the log is to tell.
+    pub fn told(&self) -> impl Iterator<Item = Parameter> {
+        let choices = self.choices();
+        let all = Parameter::ALL.into_iter();
+        all.filter(move |parameter| choices[*parameter].is_free())
+    }
+
     /// Designs the torque, shrinks it until the tilt stays within its limit, and computes the
     /// Fisher information of the log that it will give.
     ///
@@ -280,6 +348,13 @@ impl ExcitationTask {
             self.band.0,
             nyquist,
             format!("from the lowest one to half of the rate, {nyquist} Hz"),
+        )?;
+        within(
+            "the number of harmonics",
+            self.harmonics as f64,
+            1.0,
+            1e4,
+            "from 1 to 10000".to_owned(),
         )?;
         within("the torque", self.amplitude, 1e-6, 1e6, positive())?;
         within(

@@ -62,6 +62,7 @@ mod robot;
 mod segments;
 mod start;
 mod structures;
+mod summary;
 mod suspects;
 mod validation;
 mod variables;
@@ -80,14 +81,19 @@ pub use joint::{Joint, JointEstimate, PLANES};
 pub use miswiring::{Miswiring, WheelColumns};
 pub use model::{LONGEST_STEP, Robot, Segment, SegmentedRuns};
 pub use parameter::{Choice, Parameter, Values};
+pub use parameter_file::identified_parameters;
 pub use poles::{Pole, linear_model, uncertain_poles};
 pub use published::{LinearRegression, regression};
 pub use residuals::{
     Difference, OUTPUTS, OutputResidual, ScoreTest, Scores, SegmentResidual, score_tests,
 };
-pub use robot::{IdentifiedRobot, OfPlane, identify};
+pub use robot::{IdentifiedRobot, OfPlane, USUAL_STEPS, identify};
 pub use segments::{Split, Stretch, segments};
 pub use structures::{Compared, Structure, best, compare};
+pub use summary::{
+    LogSummary, ParameterSummary, PlaneSummary, PoleSummary, ResidualSummary, Summary, Uncertainty,
+    VerdictSummary,
+};
 pub use suspects::{Suspect, Suspects, Tables};
 pub use validation::{HORIZONS, Validation, validate};
 pub use variables::Variables;

@@ -97,6 +97,37 @@ pub fn recording(
     })
 }
 
+/// A part of a log, or of all, that is left out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LeftOut {
+    /// Which log, counted from 1; all of them if `None`.
+    pub log: Option<usize>,
+    /// From when to when, s since the first row.
+    pub time: [f64; 2],
+}
+
+/// Reads all planes of CSV files with a header, but for the parts that are left out beside those of
+/// the `columns`.
+///
+/// # Errors
+/// As [`read`], of any file and plane.
+pub fn recordings(
+    paths: &[impl AsRef<Path>],
+    columns: &Columns,
+    left_out: &[LeftOut],
+    progress: Progress<'_>,
+) -> Result<Vec<Recording>, LogError> {
+    let logs = paths.iter().enumerate().map(|(done, path)| {
+        let report = |part: f64| progress((done as f64 + part) / paths.len() as f64);
+        let mut columns = columns.clone();
+        let of_this = left_out.iter();
+        let of_this = of_this.filter(|part| part.log.is_none_or(|log| log == done + 1));
+        columns.leave_out.extend(of_this.map(|part| part.time));
+        recording(path.as_ref(), &columns, &report)
+    });
+    logs.collect()
+}
+
 /// Reads one plane of a CSV file with a header.
 ///
 /// # Errors

@@ -1,14 +1,44 @@
-//! The result as a TOML file.
+//! The result as a TOML file: written, and read again.
 
-use crate::estimate::Status;
 use crate::joint::PLANES;
 use crate::parameter::Parameter;
 use crate::robot::{IdentifiedRobot, OfPlane};
 use nalgebra::DMatrix;
+use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 /// What stands in a file of parameters: a table's key, the plane it is read from, the parameter.
 type Entry = (String, usize, Parameter);
+
+/// The parameters in the text of a file of parameters.
+///
+/// # Errors
+/// It is not TOML, or has no table `[identification]`.
+pub fn identified_parameters(text: &str) -> Result<Vec<(Parameter, f64)>, toml::de::Error> {
+    let file: IdentifiedFile = toml::from_str(text)?;
+    let entries = file.identification.parameters.into_iter();
+    let known = entries.filter_map(|(key, entry)| Parameter::from_key(&key).zip(entry.value));
+    Ok(known.collect())
+}
+
+/// What of the file is needed.
+#[derive(Deserialize)]
+struct IdentifiedFile {
+    identification: Identified,
+}
+
+#[derive(Deserialize)]
+struct Identified {
+    #[serde(flatten)]
+    parameters: BTreeMap<String, IdentifiedEntry>,
+}
+
+/// A parameter; the covariance has no value.
+#[derive(Deserialize)]
+struct IdentifiedEntry {
+    value: Option<f64>,
+}
 
 impl IdentifiedRobot {
     /// The files of parameters with their names: `parameters.toml`, or, of a body that is not
@@ -82,11 +112,7 @@ impl IdentifiedRobot {
         );
         for (key, plane, parameter) in entries {
             let (identification, parameter) = (&self.planes[*plane], *parameter);
-            let status = match identification.estimate.status[parameter] {
-                Status::Held => "held",
-                Status::Found => "found",
-                Status::AtBound => "at its bound",
-            };
+            let status = identification.estimate.status[parameter].word();
             let _ = write!(
                 text,
                 "\n[identification.{key}] # {}\nvalue = {:?} # {}\nstandard_deviation = {:?}\n\

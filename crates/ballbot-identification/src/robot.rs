@@ -37,6 +37,10 @@ pub struct IdentifiedRobot {
 /// A verdict with the plane it is of, where it is not of the whole robot.
 pub type OfPlane = (Option<usize>, Verdict);
 
+/// How often a usual identification tells its progress: coarse fits of three starts, the fit with its
+/// noise, four structures.
+pub const USUAL_STEPS: usize = 60;
+
 /// Identifies one robot from all recordings: those planes together that the configuration names.
 ///
 /// # Errors
@@ -335,6 +339,14 @@ impl IdentifiedRobot {
                 .partial_cmp(&rank(b))
                 .unwrap_or(std::cmp::Ordering::Equal)
         })
+    }
+
+    /// A verdict in words, with the plane that it is of.
+    pub fn told(&self, (plane, verdict): &OfPlane) -> String {
+        match plane.and_then(|plane| self.plane_name(plane)) {
+            Some(name) => format!("plane {name}: {verdict}"),
+            None => verdict.to_string(),
+        }
     }
 
     /// Why this is no result; empty if it is one.

@@ -25,6 +25,28 @@ pub enum Weight {
     Refusal,
 }
 
+impl Weight {
+    /// In a word or two.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Note => "note",
+            Self::Warning => "warning",
+            Self::Refusal => "no result",
+        }
+    }
+
+    /// How a verdict is introduced.
+    pub fn mark(self) -> &'static str {
+        match self {
+            Self::Good => "good:",
+            Self::Note => "note:",
+            Self::Warning => "WARNING:",
+            Self::Refusal => "NO RESULT:",
+        }
+    }
+}
+
 /// One statement about a fit; its sentence is its `Display`.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum Verdict {

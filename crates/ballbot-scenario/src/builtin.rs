@@ -1,5 +1,7 @@
 //! The built-in scenarios: the paper's, to the letter, and what goes beyond it.
 
+use crate::words;
+
 /// A built-in scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Builtin {
@@ -42,9 +44,5 @@ pub fn find(name: &str) -> Option<Builtin> {
 
 /// The built-in scenario whose name is most like `name`, if any is alike at all.
 pub fn nearest(name: &str) -> Option<&'static str> {
-    ALL.iter()
-        .map(|builtin| (strsim::jaro_winkler(builtin.name, name), builtin.name))
-        .filter(|(likeness, _)| *likeness > 0.7)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, name)| name)
+    words::nearest(name, ALL.iter().map(|builtin| builtin.name))
 }

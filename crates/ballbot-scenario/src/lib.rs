@@ -32,6 +32,7 @@ pub mod words;
 
 pub use error::ScenarioError;
 pub use file::certificate::{RobotTable, TerminalCertificate, ViscousBallbot, read_certificate};
+pub use file::document::Document;
 pub use file::feedback_table::{
     DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
 };
@@ -42,7 +43,6 @@ pub use file::schema::{
     LinearModelTable, LissajousTable, ModelKind, PointTable, PredictorTable, ReferenceTable,
     Scenario, SineTable, StateBounds, StateTable, TerminalTable,
 };
-pub use file::template::Template;
 pub use file::world_table::{
     ActuatorTable, AngleSensorTable, DelayTable, DeviationsTable, FloorTable, PlaneName, PushTable,
     RateSensorTable, SensorsTable, WorldTable,
@@ -54,6 +54,7 @@ pub use prepare::known_robot::KnownRobot;
 pub use prepare::parameters::read_robot;
 pub use prepare::plausible;
 pub use prepare::prepared::{Plane, Prepared, Problem};
+pub use prepare::proofs;
 pub use prepare::reference::PhiReference;
 pub use prepare::standing::Standing;
 pub use prepare::three_motors::ThreeMotors;

@@ -11,6 +11,7 @@ pub(crate) mod parameters;
 pub mod plausible;
 pub(crate) mod prepared;
 mod problem;
+pub mod proofs;
 pub(crate) mod reference;
 mod rollout;
 pub(crate) mod standing;

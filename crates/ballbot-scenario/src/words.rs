@@ -47,7 +47,34 @@ pub fn toml_message(message: &str) -> String {
         .fold(message.trim_end().to_owned(), |text, (from, to)| {
             text.replace(from, to)
         });
-    without_types(&plain)
+    with_nearest(without_types(&plain))
+}
+
+/// The text with the name that is nearest to one that is none, where the text has names to choose from.
+fn with_nearest(text: String) -> String {
+    let last = text.lines().last().unwrap_or_default();
+    let asked = ["unknown field ", "unknown name "]
+        .iter()
+        .find_map(|what| last.split_once(what));
+    let mut names = asked
+        .map_or("", |(_, names)| names)
+        .split('`')
+        .skip(1)
+        .step_by(2);
+    let nearest = names.next().and_then(|unknown| nearest(unknown, names));
+    match nearest {
+        Some(nearest) => format!("{text}; did you mean `{nearest}`?"),
+        None => text,
+    }
+}
+
+/// The name that is most like another, if one is like it.
+pub fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    names
+        .map(|one| (strsim::jaro_winkler(one, name), one))
+        .filter(|(likeness, _)| *likeness > 0.7)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, name)| name)
 }
 
 /// The text with "a table" or "a text" in place of what a program's types are called.

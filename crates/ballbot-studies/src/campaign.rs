@@ -96,7 +96,8 @@ impl Campaign {
         self.runs + (Variant::ALL.len() - 1) * self.other_runs
     }
 
-    /// Runs every variant. `progress` is called with the number of closed loops that are done.
+    /// Runs every variant. `progress` is called before and after each closed loop with the number of
+    /// those that are done.
     ///
     /// # Errors
     /// A controller refuses its settings, or the threads cannot be started.
@@ -121,6 +122,8 @@ impl Campaign {
                 _ => self.other_runs,
             };
             let records = (0..runs).into_par_iter().map(|number| {
+                // Before it, too: who ends the campaign from there does not wait for another loop.
+                progress(done.load(Ordering::Relaxed));
                 let record = variant.run(scenarios, self, number);
                 progress(done.fetch_add(1, Ordering::Relaxed) + 1);
                 record

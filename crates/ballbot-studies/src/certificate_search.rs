@@ -3,9 +3,12 @@
 use ballbot_scenario::{Prepared, RobotTable, ScenarioError, TerminalCertificate};
 use lpvmpc::Bounds;
 use lpvmpc_certificate::{
-    CertificateProblem, CertifyError, Effort, Proof, TerminalProblem, certify_terminal, raise_level,
+    CertificateProblem, CertifyError, Effort, MOST_BOXES, Proof, TerminalProblem, certify_terminal,
+    raise_level,
 };
+use lpvmpc_design::number_text;
 use nalgebra::{SVector, Vector2, Vector4};
+use serde::Serialize;
 
 /// Sizes that the search looks at: multiples of a thirty-second of the bounds.
 const SIZES: usize = 32;
@@ -39,6 +42,16 @@ pub enum SearchError {
     /// The robot has what certificates do not know.
     #[error(transparent)]
     Robot(#[from] ScenarioError),
+    /// What is asked makes no sense.
+    #[error("{what} is {value}: it must be {expected}", value = number_text(*value))]
+    Value {
+        /// What it is.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
     /// No set could be proved.
     #[error("no certificate: {0}")]
     Certify(#[from] CertifyError),
@@ -61,17 +74,75 @@ pub enum Searching {
 }
 
 impl CertificateSearch<'_> {
+    /// A level that is usual.
+    pub const LEVEL: f64 = 2000.0;
+    /// A contraction that makes the proof short and P not too large.
+    pub const CONTRACTION: f64 = 0.15;
+    /// Boxes that are enough for the built-in robots.
+    pub const BOXES: usize = 40_000;
+    /// Trials after which a level hardly rises.
+    pub const TRIALS: usize = 3;
+    /// More trials than this bring nothing.
+    pub const MOST_TRIALS: usize = 20;
+
     /// Designs and proves. `progress` is told what it is at.
     ///
     /// # Errors
     /// The robot has what certificates do not know; or no set could be proved.
     pub fn run(&self, progress: &(dyn Fn(Searching) + Sync)) -> Result<Certified, SearchError> {
+        self.check()?;
         let robot = RobotTable::try_from(&self.prepared.ballbot)?;
         let (size, certified) = match self.size {
             Some(size) => (size, self.certify(robot, size, progress)?),
             None => self.search(robot, progress)?,
         };
         Ok(self.raise(size, certified, progress))
+    }
+
+    fn check(&self) -> Result<(), SearchError> {
+        let share = "a share, above 0 and at most 1";
+        let right = |value: f64| value > 0.0 && value <= 1.0;
+        let boxes = (1..=MOST_BOXES).contains(&self.boxes);
+        let asked = [
+            (
+                "the size",
+                self.size.unwrap_or(1.0),
+                share,
+                self.size.is_none_or(right),
+            ),
+            (
+                "the contraction",
+                self.contraction,
+                share,
+                right(self.contraction),
+            ),
+            (
+                "the level",
+                self.level,
+                "a positive number",
+                self.level > 0.0 && self.level.is_finite(),
+            ),
+            (
+                "the number of boxes",
+                self.boxes as f64,
+                "from 1 to 100000",
+                boxes,
+            ),
+            (
+                "the number of trials",
+                self.trials as f64,
+                "from 0 to 20",
+                self.trials <= Self::MOST_TRIALS,
+            ),
+        ];
+        match asked.into_iter().find(|(.., right)| !right) {
+            None => Ok(()),
+            Some((what, value, expected, _)) => Err(SearchError::Value {
+                what,
+                value,
+                expected,
+            }),
+        }
     }
 
     /// A larger box of tilts allows a larger set, up to where the law has to cope with so many plants
@@ -179,4 +250,51 @@ impl CertificateSearch<'_> {
 /// The limit of |value| that the bounds leave on both sides.
 fn symmetric<const N: usize>(bounds: &Bounds<f64, N>) -> SVector<f64, N> {
     SVector::from_fn(|i, _| bounds.upper[i].min(-bounds.lower[i]))
+}
+
+/// What was proved of a set, in numbers.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ProvedSet {
+    /// Sampling time, s.
+    pub t_s: f64,
+    /// K, for u = **-K** x, N m per rad and per rad/s.
+    pub k: [f64; 4],
+    /// P, by rows.
+    pub p: [[f64; 4]; 4],
+    /// The set is x'Px <= level.
+    pub level: f64,
+    /// What x'Px decreases by beyond the stage cost, as a part of itself.
+    pub contraction: f64,
+    /// Rate of quadratic stability in continuous time, 1/s.
+    pub rate_1_s: f64,
+    /// Largest |theta| and |theta_dot| of that, rad and rad/s.
+    pub scheduling_limits: [f64; 2],
+    /// The largest |x_i| in the set, rad and rad/s.
+    pub largest_states_at_samples: [f64; 4],
+    /// What no |x_i| reaches between samples, rad and rad/s.
+    pub largest_states_between_samples: [f64; 4],
+    /// Boxes of states in the proof.
+    pub boxes: usize,
+    /// Boxes of schedulings in the proof.
+    pub scheduling_boxes: usize,
+}
+
+impl ProvedSet {
+    /// The set of a certificate that this proof is of.
+    pub fn new(certificate: &TerminalCertificate, proof: &Proof<4>) -> Self {
+        let terminal = &certificate.terminal;
+        Self {
+            t_s: certificate.t_s,
+            k: std::array::from_fn(|i| terminal.k[i]),
+            p: std::array::from_fn(|i| std::array::from_fn(|j| terminal.p[(i, j)])),
+            level: terminal.level,
+            contraction: terminal.contraction,
+            rate_1_s: certificate.continuous.rate_1_s,
+            scheduling_limits: certificate.scheduling_limits.into(),
+            largest_states_at_samples: terminal.largest_states().into(),
+            largest_states_between_samples: proof.reach.into(),
+            boxes: proof.boxes,
+            scheduling_boxes: proof.scheduling_boxes,
+        }
+    }
 }

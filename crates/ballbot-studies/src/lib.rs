@@ -56,7 +56,7 @@ pub use campaign::{
     Campaign, CampaignError, ImpossibleSetPoints, Outcome, Record, Scenarios, SetPoints, Tally,
     Variant,
 };
-pub use certificate_search::{CertificateSearch, Certified, SearchError, Searching};
+pub use certificate_search::{CertificateSearch, Certified, ProvedSet, SearchError, Searching};
 pub use error::StudyError;
 pub use linear_model::LinearModel;
 pub use model_comparison::{ModelComparison, ModelError};

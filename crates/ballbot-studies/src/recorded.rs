@@ -1,4 +1,8 @@
-//! A recorded run as arrays, and what it amounts to.
+//! A recorded run as arrays and as text, and what it amounts to.
+
+mod csv;
+
+pub use csv::{COLUMNS, log_csv, motors_csv, time, trajectory_csv};
 
 use ballbot_scenario::{Plane, Prepared};
 use lpvmpc::Guarantee;
@@ -132,6 +136,48 @@ impl Metrics {
             deviation_step_us: deviation,
             longest_step_us: times.into_iter().fold(0.0, f64::max),
         }
+    }
+}
+
+impl Metrics {
+    /// What a person wants to know of a run: names with units, and numbers with as many digits as
+    /// matter.
+    pub fn lines(&self) -> [(&'static str, String); 10] {
+        let guarantee = || "no guarantee".to_owned();
+        let backed = self.not_guaranteed;
+        [
+            (
+                "largest tilt [rad]",
+                format!("{:.4}", self.largest_tilt_rad),
+            ),
+            (
+                "largest torque [N m]",
+                format!("{:.4}", self.largest_torque_nm),
+            ),
+            (
+                "tracking error, rms [rad]",
+                format!("{:.4}", self.rms_error_rad),
+            ),
+            (
+                "tracking error, largest [rad]",
+                format!("{:.4}", self.largest_error_rad),
+            ),
+            ("closed-loop cost", format!("{:.1}", self.closed_loop_cost)),
+            ("samples outside the bounds", self.violations.to_string()),
+            (
+                "samples not backed by a guarantee",
+                backed.map_or_else(guarantee, |count| count.to_string()),
+            ),
+            ("most active bounds", self.most_active_bounds.to_string()),
+            (
+                "time per step, mean [us]",
+                format!("{:.1}", self.mean_step_us),
+            ),
+            (
+                "time per step, longest [us]",
+                format!("{:.1}", self.longest_step_us),
+            ),
+        ]
     }
 }
 

@@ -11,8 +11,9 @@ mod whole;
 use super::CommandError;
 use super::robot::ScenarioOptions;
 use crate::input;
-use crate::proofs::ProvedFiles;
+use crate::progress::ProofProgress;
 use ballbot_campaign::{Campaign, MOST_SHARDS, Shard, Source};
+use ballbot_scenario::proofs::ProvedFiles;
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 
@@ -127,8 +128,10 @@ pub fn run(arguments: &CampaignArguments) -> Result<String, CommandError> {
     }
     arguments.check_own()?;
     let source = Source::load(path)?;
+    let proof = ProofProgress::default();
     let files = ProvedFiles {
         folder: source.folder(),
+        progress: &|done| proof.set_part(done),
     };
     let campaign = Campaign::new(&source, files, &crate::program::name()?)?;
     let out = arguments.out.clone().unwrap_or_else(|| folder(path));

@@ -6,11 +6,10 @@ use crate::arguments::positive;
 use crate::certificate_page;
 use crate::json;
 use crate::progress::Progress;
-use crate::proofs::{self, STEPS};
 use crate::results::ResultFolder;
 use crate::table::{Table, number};
-use ballbot_scenario::{TerminalCertificate, TerminalTable, number as numbers};
-use ballbot_studies::{CertificateSearch, Searching};
+use ballbot_scenario::{TerminalCertificate, number as numbers, proofs};
+use ballbot_studies::{CertificateSearch, ProvedSet, Searching};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use lpvmpc_certificate::{MOST_BOXES, Proof};
@@ -41,19 +40,19 @@ pub struct CertifyArguments {
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub size: Option<f64>,
     /// Level of the designed set x'Px <= LEVEL, in units of the cost
-    #[arg(long, default_value = "2000", value_parser = positive)]
+    #[arg(long, default_value_t = CertificateSearch::LEVEL, value_parser = positive)]
     pub level: f64,
     /// Share of the cost by which the design decreases it beyond the stage cost; more makes the
     /// proof shorter and P larger
-    #[arg(long, default_value = "0.15", value_parser = share)]
+    #[arg(long, default_value_t = CertificateSearch::CONTRACTION, value_parser = share)]
     pub contraction: f64,
     /// Most boxes of states in one proof
-    #[arg(long, default_value = "40000", value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_BOXES as u64))]
+    #[arg(long, default_value_t = CertificateSearch::BOXES, value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_BOXES as u64))]
     pub boxes: usize,
     /// Higher levels that are tried for the same K and P after the design, each a proof; 0 keeps
     /// the level
-    #[arg(long, value_name = "TRIALS", default_value = "3", value_parser = clap::value_parser!(u8).range(0..=20))]
-    pub raise: u8,
+    #[arg(long, value_name = "TRIALS", default_value_t = CertificateSearch::TRIALS, value_parser = RangedU64ValueParser::<usize>::new().range(0..=CertificateSearch::MOST_TRIALS as u64))]
+    pub raise: usize,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
@@ -79,11 +78,9 @@ fn share(text: &str) -> Result<f64, String> {
 /// # Errors
 /// The scenario is not valid, no set could be proved, or a file cannot be written.
 pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
-    let (mut scenario, folder) = arguments.options.load(&arguments.scenario)?;
+    let (scenario, folder) = arguments.options.load(&arguments.scenario)?;
     // Its certificate, where it has one, is about to be replaced.
-    if let TerminalTable::Certified(_) = scenario.controller.terminal {
-        scenario.controller.terminal = TerminalTable::DiscreteRiccati;
-    }
+    let scenario = scenario.uncertified();
     let prepared = scenario.prepare(folder.as_path())?;
     let names = ["certificate.json", "certificate.html"];
     let results = ResultFolder::open(&arguments.out, &names)?;
@@ -93,7 +90,7 @@ pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
         contraction: arguments.contraction,
         level: arguments.level,
         boxes: arguments.boxes,
-        trials: usize::from(arguments.raise),
+        trials: arguments.raise,
         written_by: format!("ballbot {}", env!("CARGO_PKG_VERSION")),
     };
     let bars = Bars(Mutex::default());
@@ -135,10 +132,10 @@ impl Bars {
         if bar.0 != what || bar.1.is_none() {
             // The old one ends before the new one begins.
             bar.1 = None;
-            *bar = (what.clone(), Some(Progress::new(what, STEPS)));
+            *bar = (what.clone(), Some(Progress::of_parts(what)));
         }
         if let Some(progress) = &bar.1 {
-            progress.set((done * STEPS as f64) as usize);
+            progress.set_part(done);
         }
     }
 }
@@ -158,16 +155,15 @@ pub(super) fn summary(certificate: &TerminalCertificate, proof: &Proof<4>) -> St
         "phi_dot [rad/s]",
         "theta_dot [rad/s]",
     ];
-    let semi_axes = semi_axes(certificate);
+    let largest = terminal.largest_states();
     let k = nalgebra::DMatrix::from_row_slice(1, 4, terminal.k.as_slice());
-    let reach =
-        nalgebra::DMatrix::from_fn(
-            2,
-            4,
-            |i, j| {
-                if i == 0 { semi_axes[j] } else { proof.reach[j] }
-            },
-        );
+    let reach = nalgebra::DMatrix::from_fn(
+        2,
+        4,
+        |i, j| {
+            if i == 0 { largest[j] } else { proof.reach[j] }
+        },
+    );
     format!(
         "Proved for the model with exactly the parameters in the file, the exact state and no delay,\n\
          under u = -K x, held over {t_s} s, for every x with x'Px <= {}:\n  \
@@ -196,31 +192,7 @@ pub(super) fn summary(certificate: &TerminalCertificate, proof: &Proof<4>) -> St
 
 /// The same for other programs.
 pub(super) fn document(certificate: &TerminalCertificate, proof: &Proof<4>) -> Value {
-    let terminal = &certificate.terminal;
-    let rows = terminal.p.row_iter();
-    let p: Vec<Vec<f64>> = rows.map(|row| row.iter().copied().collect()).collect();
-    json!({
-        "holds": true,
-        "t_s": certificate.t_s,
-        "k": terminal.k.as_slice(),
-        "p": p,
-        "level": terminal.level,
-        "contraction": terminal.contraction,
-        "rate_1_s": certificate.continuous.rate_1_s,
-        "scheduling_limits": certificate.scheduling_limits.as_slice(),
-        "largest_states_at_samples": semi_axes(certificate),
-        "largest_states_between_samples": proof.reach.as_slice(),
-        "boxes": proof.boxes,
-        "scheduling_boxes": proof.scheduling_boxes,
-    })
-}
-
-/// The largest |x_i| in the set.
-pub fn semi_axes(certificate: &TerminalCertificate) -> [f64; 4] {
-    let inverse = certificate.terminal.p.try_inverse();
-    std::array::from_fn(|i| {
-        inverse.map_or(f64::NAN, |inverse| {
-            (certificate.terminal.level * inverse[(i, i)]).sqrt()
-        })
-    })
+    let mut document = json!({ "holds": true });
+    json::extend(&mut document, &ProvedSet::new(certificate, proof));
+    document
 }

@@ -7,12 +7,10 @@ use crate::input::{self, InputError};
 use crate::json;
 use crate::output;
 use crate::table::{Table, number};
-use ballbot_identification::{Config, Excitation, ExcitationTask, Parameter, Values};
+use ballbot_identification::{Config, Excitation, ExcitationTask, identified_parameters};
 use clap::Args;
-use nalgebra::{Vector3, Vector4};
-use serde::Deserialize;
+use nalgebra::Vector4;
 use serde_json::{Map, Value, json};
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -33,23 +31,23 @@ pub struct ExciteArguments {
     /// Parameters from `ballbot identify`, in place of what the configuration expects
     #[arg(long, value_name = "parameters.toml")]
     pub parameters: Option<PathBuf>,
-    /// Lowest and highest frequency, Hz
-    #[arg(long, value_name = "LOW,HIGH", value_parser = finite_list::<2>, default_value = "0.2,6")]
-    pub band: [f64; 2],
+    /// Lowest and highest frequency, Hz [default: 0.2,6]
+    #[arg(long, value_name = "LOW,HIGH", value_parser = finite_list::<2>)]
+    pub band: Option<[f64; 2]>,
     /// Number of harmonics
-    #[arg(long, default_value_t = 15, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=10_000))]
+    #[arg(long, default_value_t = ExcitationTask::HARMONICS, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=10_000))]
     pub harmonics: usize,
     /// Largest torque of the excitation, N m
-    #[arg(long, value_parser = positive, default_value_t = 1.0)]
+    #[arg(long, value_parser = positive, default_value_t = ExcitationTask::AMPLITUDE)]
     pub amplitude: f64,
     /// Duration, s
-    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 20.0)]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = ExcitationTask::DURATION)]
     pub length: f64,
     /// Largest tilt, degrees; the torque is reduced until it is kept
-    #[arg(long, value_name = "DEGREES", value_parser = positive, default_value_t = 10.0)]
+    #[arg(long, value_name = "DEGREES", value_parser = positive, default_value_t = ExcitationTask::TILT_LIMIT_DEG)]
     pub tilt_limit: f64,
     /// Rows per second of loop and log
-    #[arg(long, value_name = "HZ", value_parser = positive, default_value_t = 200.0)]
+    #[arg(long, value_name = "HZ", value_parser = positive, default_value_t = ExcitationTask::RATE)]
     pub rate: f64,
     /// Gains of your loop, N m per rad and per rad/s
     #[arg(long, value_parser = finite_list::<4>, allow_hyphen_values = true, value_name = "K1,K2,K3,K4")]
@@ -62,10 +60,6 @@ pub struct ExciteArguments {
     pub json: bool,
 }
 
-/// The noise of an ordinary inertial unit and encoder, where the configuration does not know it:
-/// ball angle and tilt, rad, and rate, rad/s.
-const ORDINARY_NOISE: [f64; 3] = [1e-3, 1e-3, 5e-3];
-
 /// Designs, predicts and writes.
 ///
 /// # Errors
@@ -75,7 +69,7 @@ pub fn run(arguments: &ExciteArguments) -> Result<String, CommandError> {
     let task = task(arguments, &config)?;
     output::check_writable(&arguments.out)?;
     let excitation = task.design()?;
-    let csv = csv(&excitation);
+    let csv = excitation.csv();
     output::write_files(&[(&arguments.out, csv.as_bytes())])?;
     Ok(if arguments.json {
         json::text(&document(&task, &excitation, &arguments.out))
@@ -85,65 +79,25 @@ pub fn run(arguments: &ExciteArguments) -> Result<String, CommandError> {
 }
 
 fn task(arguments: &ExciteArguments, config: &Config) -> Result<ExcitationTask, CommandError> {
-    let choices = config
-        .choices()
-        .map_err(|source| InputError::Identification {
-            path: arguments.config.clone().unwrap_or_default(),
-            source,
-        })?;
-    let geometry = config.geometry();
-    let mut robot = Values::expected(&choices, &geometry);
-    if let Some(path) = &arguments.parameters {
-        let file: IdentifiedFile = input::read_toml(path)?;
-        for (key, entry) in file.identification.parameters {
-            if let (Some(parameter), Some(value)) = (Parameter::from_key(&key), entry.value) {
-                robot[parameter] = value;
-            }
-        }
-    }
-    let noise = config.noise();
+    let identified = match &arguments.parameters {
+        Some(path) => input::parse(path, identified_parameters)?,
+        None => Vec::new(),
+    };
+    let usual = ExcitationTask::of(config, &identified);
+    let usual = usual.map_err(|source| InputError::Identification {
+        path: arguments.config.clone().unwrap_or_default(),
+        source,
+    })?;
     Ok(ExcitationTask {
-        robot,
-        geometry,
-        choices,
-        band: arguments.band.into(),
+        band: arguments.band.map_or(usual.band, Into::into),
         harmonics: arguments.harmonics,
         amplitude: arguments.amplitude,
         duration: arguments.length,
         tilt_limit: arguments.tilt_limit.to_radians(),
         rate: arguments.rate,
-        noise: Vector3::from_fn(|i, _| noise[i].unwrap_or(ORDINARY_NOISE[i])),
         gain: arguments.gain.map(Vector4::from),
-        segment: config.fit.segment_s,
-        gyroscope: !config.log.theta_dot.column.is_empty(),
+        ..usual
     })
-}
-
-/// What of `parameters.toml` is needed.
-#[derive(Deserialize)]
-struct IdentifiedFile {
-    identification: Identified,
-}
-
-#[derive(Deserialize)]
-struct Identified {
-    #[serde(flatten)]
-    parameters: BTreeMap<String, Entry>,
-}
-
-/// A parameter; the covariance has no value.
-#[derive(Deserialize)]
-struct Entry {
-    value: Option<f64>,
-}
-
-fn csv(excitation: &Excitation) -> String {
-    let mut text = "t_s,torque_excitation_nm\n".to_owned();
-    for (time, torque) in excitation.time.iter().zip(&excitation.torque) {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "{time},{torque}");
-    }
-    text
 }
 
 fn report(task: &ExcitationTask, excitation: &Excitation, out: &Path) -> String {
@@ -178,7 +132,7 @@ fn report(task: &ExcitationTask, excitation: &Excitation, out: &Path) -> String 
         "relative",
         "unit",
     ]);
-    for parameter in found(task) {
+    for parameter in task.told() {
         let (value, deviation) = (
             task.robot[parameter],
             excitation.standard_deviations[parameter],
@@ -208,15 +162,8 @@ fn report(task: &ExcitationTask, excitation: &Excitation, out: &Path) -> String 
     text
 }
 
-/// The parameters that the log is to tell.
-fn found(task: &ExcitationTask) -> impl Iterator<Item = Parameter> {
-    let choices = task.choices();
-    let all = Parameter::ALL.into_iter();
-    all.filter(move |parameter| choices[*parameter].is_free())
-}
-
 fn document(task: &ExcitationTask, excitation: &Excitation, out: &Path) -> Value {
-    let parameters = found(task).map(|parameter| {
+    let parameters = task.told().map(|parameter| {
         let told = json!({
             "expected_value": task.robot[parameter],
             "expected_standard_deviation": excitation.standard_deviations[parameter],

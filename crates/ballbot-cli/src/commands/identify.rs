@@ -3,14 +3,14 @@
 use super::CommandError;
 use super::simulate::PNG_SCALE;
 use crate::arguments::finite_list;
-use crate::identification::{document, figures, published, report, summary};
+use crate::identification::{figures, published, report, summary};
 use crate::input::{self, InputError};
 use crate::json;
 use crate::output::FileError;
 use crate::progress::Progress;
 use crate::results::ResultFolder;
-use ballbot_identification::log::{self, LogError, Recording};
-use ballbot_identification::{Config, ConfigError, IdentifiedRobot, identify};
+use ballbot_identification::log::{self, LeftOut, Recording};
+use ballbot_identification::{Config, ConfigError, IdentifiedRobot, USUAL_STEPS, identify};
 use ballbot_scenario::words;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -40,7 +40,7 @@ pub struct IdentifyArguments {
     pub out: PathBuf,
     /// Leave out a part of a log, in seconds since its first row; 2:FROM,TO for the second log
     #[arg(long, value_name = "[LOG:]FROM,TO", value_parser = part)]
-    pub leave_out: Vec<Part>,
+    pub leave_out: Vec<LeftOut>,
     /// Do not impose mechanics: see what the data alone say
     #[arg(long)]
     pub unphysical: bool,
@@ -73,18 +73,18 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, CommandError> {
             path: arguments.config.clone().unwrap_or_default(),
             source: error,
         })?;
-    let progress = Progress::new("fitting", EXPECTED_STEPS);
+    let progress = Progress::new("fitting", USUAL_STEPS);
     let step = std::cell::Cell::new(0);
     let robot = identify(recordings, &config, choices, &|_| {
         step.set(step.get() + 1);
-        progress.set(step.get().min(EXPECTED_STEPS - 1));
+        progress.set(step.get().min(USUAL_STEPS - 1));
     })?;
     drop(progress);
     let parameters = robot.parameter_files();
     let files = write(&folder, &robot, parameters.as_deref().ok())?;
     if let Err(reasons) = parameters {
         let reasons = reasons.iter();
-        let reasons = reasons.map(|reason| format!("\n- {}", summary::told(&robot, reason)));
+        let reasons = reasons.map(|reason| format!("\n- {}", robot.told(reason)));
         let mut old = PARAMETERS.into_iter().map(|name| arguments.out.join(name));
         return Err(CommandError::NoRobot {
             reasons: reasons.collect(),
@@ -93,7 +93,8 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, CommandError> {
         });
     }
     Ok(if arguments.json {
-        let mut document = document::document(&robot);
+        let mut document = serde_json::json!({});
+        json::extend(&mut document, &robot.summary());
         document["folder"] = serde_json::json!(folder.path());
         document["files"] = serde_json::json!(files);
         json::text(&document)
@@ -141,17 +142,8 @@ fn chains(robot: &IdentifiedRobot) -> String {
         .collect()
 }
 
-/// A part of a log.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Part {
-    /// Which log, counted from 1; all of them if none is said.
-    log: Option<usize>,
-    /// From when to when, s since the first row.
-    time: [f64; 2],
-}
-
 /// `FROM,TO` or `LOG:FROM,TO`.
-fn part(text: &str) -> Result<Part, String> {
+fn part(text: &str) -> Result<LeftOut, String> {
     let (log, times) = match text.split_once(':') {
         Some((log, times)) => {
             let log = log.parse::<usize>().ok().filter(|log| *log > 0);
@@ -162,7 +154,7 @@ fn part(text: &str) -> Result<Part, String> {
     };
     let time: [f64; 2] = finite_list(times)?;
     if time[0] < time[1] {
-        Ok(Part { log, time })
+        Ok(LeftOut { log, time })
     } else {
         Err(format!("{} s is not after {} s", time[1], time[0]))
     }
@@ -176,24 +168,15 @@ fn read(arguments: &IdentifyArguments, config: &Config) -> Result<Vec<Recording>
         let message = format!("--leave-out {log}:... is of log {log}, and there are {logs}");
         return Err(CommandError::Usage(message));
     }
-    let progress = Progress::new("reading", paths.len() * PARTS);
-    let logs = paths.iter().enumerate().map(|(done, path)| {
-        let report = |part: f64| progress.set(done * PARTS + (part * PARTS as f64) as usize);
-        let mut columns = config.log.clone();
-        let parts = arguments.leave_out.iter();
-        let of_this = parts.filter(|part| part.log.is_none_or(|log| log == done + 1));
-        columns.leave_out.extend(of_this.map(|part| part.time));
-        log::recording(path, &columns, &report)
-    });
-    Ok(logs.collect::<Result<_, LogError>>()?)
+    let progress = Progress::of_parts("reading");
+    let report = |part: f64| progress.set_part(part);
+    Ok(log::recordings(
+        paths,
+        &config.log,
+        &arguments.leave_out,
+        &report,
+    )?)
 }
-
-/// Steps of the progress per file.
-const PARTS: usize = 100;
-
-/// Steps of a usual identification: coarse fits of three starts, the fit with its noise, four
-/// structures.
-const EXPECTED_STEPS: usize = 60;
 
 /// The configuration in a file; the defaults without one.
 ///

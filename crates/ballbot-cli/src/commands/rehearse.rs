@@ -5,10 +5,10 @@ use super::simulate::{self, Simulated};
 use crate::arguments::{Arguments, Command};
 use crate::json;
 use crate::output;
-use crate::recording;
 use crate::table::{Table, number};
 use ballbot::Ballbot;
 use ballbot_scenario::{Parameters, PhiReference, Plane};
+use ballbot_studies::recorded;
 use clap::{Args, Parser};
 use lpvmpc_sim::Trajectory;
 use serde::Serialize;
@@ -224,8 +224,8 @@ fn error_table(errors: &[Error]) -> Table {
             format!("{:.1}", error.rms_distance_mm),
             format!(
                 "{} to {}",
-                recording::time(error.from_s),
-                recording::time(error.until_s)
+                recorded::time(error.from_s),
+                recorded::time(error.until_s)
             ),
             format!("{:.3}", error.largest_tilt_rad),
         ]);

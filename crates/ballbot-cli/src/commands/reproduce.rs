@@ -4,12 +4,11 @@ use super::CommandError;
 use super::simulate::PNG_SCALE;
 use crate::html::CaptionedFigure;
 use crate::progress::Progress;
-use crate::recording;
 use crate::reproduction::tables::{self, Sheet};
 use crate::reproduction::{claims, figures, guarantee, optimum, report};
 use crate::results::ResultFolder;
-use ballbot_studies::StudyError;
 use ballbot_studies::reproduction::{Claim, Reproduction};
+use ballbot_studies::{StudyError, recorded};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -101,7 +100,7 @@ fn write(
         };
         for (plane, trajectory) in planes.iter().zip(&run.trajectories) {
             let name = format!("trajectories/{}{plane}.csv", run.name);
-            let text = recording::trajectory_csv(trajectory);
+            let text = recorded::trajectory_csv(trajectory);
             files.push((name, text.into_bytes()));
         }
     }

@@ -1,8 +1,9 @@
 //! Which robot, and which scenario: the options that all commands with one have.
 
 use super::CommandError;
-use crate::proofs::ProvedFiles;
+use crate::progress::ProofProgress;
 use ballbot::Ballbot;
+use ballbot_scenario::proofs::ProvedFiles;
 use ballbot_scenario::{Parameters, Prepared, Scenario, read_robot};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -59,7 +60,11 @@ impl ScenarioOptions {
     /// The scenario or the robot's file cannot be read or makes no sense.
     pub fn prepare(&self, scenario: &str) -> Result<Prepared, CommandError> {
         let (loaded, folder) = self.load(scenario)?;
-        let files = ProvedFiles { folder: &folder };
+        let proof = ProofProgress::default();
+        let files = ProvedFiles {
+            folder: &folder,
+            progress: &|done| proof.set_part(done),
+        };
         Ok(loaded.prepare(files)?)
     }
 

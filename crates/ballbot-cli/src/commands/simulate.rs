@@ -5,12 +5,11 @@ use super::robot::ScenarioOptions;
 use crate::json;
 use crate::output::{self, FileError};
 use crate::progress::Progress;
-use crate::recording;
 use crate::results::ResultFolder;
 use crate::run_figures::{self, Shown};
 use crate::table::Table;
 use ballbot_scenario::{MotorSample, Prepared, Record, RunHooks, words};
-use ballbot_studies::recorded::{Columns, Metrics};
+use ballbot_studies::recorded::{self, Columns, Metrics};
 use clap::Args;
 use lpvmpc_figures::{Figure, Role};
 use lpvmpc_sim::{LogRow, Termination, Trajectory};
@@ -107,7 +106,7 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
         .into_iter()
         .map(|recording| (recording.trajectory, recording.log))
         .unzip();
-    let motors = motors.unwrap_or_else(|| motors_of_planes(&prepared, &trajectories));
+    let motors = motors.unwrap_or_else(|| prepared.motors_of_planes(&trajectories));
     write(&folder, &prepared, &trajectories, &motors)?;
     write_logs(&logs, &rows)?;
 
@@ -144,7 +143,7 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
             log: rows
                 .first()
                 .filter(|_| arguments.logs_to_standard_output())
-                .map(|log| recording::log_csv(log)),
+                .map(|log| recorded::log_csv(log)),
         }),
         Some((what, run)) => Err(CommandError::EndedEarly {
             what,
@@ -167,20 +166,6 @@ pub fn record(prepared: &Prepared) -> Result<Record, CommandError> {
         progress: &|done| progress.set(done),
     };
     Ok(prepared.record(&hooks)?)
-}
-
-/// The motors of two planes that were run one after the other, at a heading of zero; none for
-/// one plane.
-fn motors_of_planes(prepared: &Prepared, trajectories: &[Trajectory<4, 1>]) -> Vec<MotorSample> {
-    let samples = trajectories.iter().take(1).flat_map(|run| &run.samples);
-    let torques = prepared.motor_torques(trajectories);
-    let samples = samples.zip(torques).map(|(sample, torques)| MotorSample {
-        t: sample.t,
-        heading: 0.0,
-        target: 0.0,
-        torques,
-    });
-    samples.collect()
 }
 
 /// What was wrong with the readings of each plane, in a line each.
@@ -228,7 +213,7 @@ fn log_paths(path: &Path, planes: usize) -> Vec<PathBuf> {
 
 /// Writes one log per plane to each of the paths.
 fn write_logs(paths: &[PathBuf], logs: &[Vec<LogRow<4, 1>>]) -> Result<(), FileError> {
-    let texts: Vec<String> = logs.iter().map(|log| recording::log_csv(log)).collect();
+    let texts: Vec<String> = logs.iter().map(|log| recorded::log_csv(log)).collect();
     let files: Vec<(&Path, &[u8])> = paths
         .iter()
         .zip(&texts)
@@ -269,7 +254,7 @@ pub(super) fn write_record(
     let planes = record.planes.iter();
     let trajectories: Vec<_> = planes.map(|plane| plane.trajectory.clone()).collect();
     let motors = record.motors.clone();
-    let motors = motors.unwrap_or_else(|| motors_of_planes(prepared, &trajectories));
+    let motors = motors.unwrap_or_else(|| prepared.motors_of_planes(&trajectories));
     write(folder, prepared, &trajectories, &motors)
 }
 
@@ -283,12 +268,12 @@ fn write(
         .iter()
         .zip(trajectories)
         .map(|(name, run)| {
-            let text = recording::trajectory_csv(run);
+            let text = recorded::trajectory_csv(run);
             ((*name).to_owned(), text.into_bytes())
         })
         .collect();
     if trajectories.len() == 2 {
-        let text = recording::motors_csv(motors);
+        let text = recorded::motors_csv(motors);
         files.push(("motors.csv".to_owned(), text.into_bytes()));
     }
     for (name, figure) in figures(prepared, trajectories, motors) {
@@ -371,9 +356,6 @@ fn figures(
 /// Pixels of a PNG per unit of the figure's size.
 pub const PNG_SCALE: f64 = 2.0;
 
-/// A line of the summary: its name, and the metric as text.
-type Line = (&'static str, fn(&Metrics) -> String);
-
 fn summary(prepared: &Prepared, metrics: &[Metrics], folder: &Path) -> String {
     let planes: &[&str] = if metrics.len() == 1 {
         &["value"]
@@ -381,36 +363,10 @@ fn summary(prepared: &Prepared, metrics: &[Metrics], folder: &Path) -> String {
         &["x plane", "y plane"]
     };
     let mut table = Table::new(std::iter::once("").chain(planes.iter().copied()));
-    let rows: [Line; 10] = [
-        ("largest tilt [rad]", |m| {
-            format!("{:.4}", m.largest_tilt_rad)
-        }),
-        ("largest torque [N m]", |m| {
-            format!("{:.4}", m.largest_torque_nm)
-        }),
-        ("tracking error, rms [rad]", |m| {
-            format!("{:.4}", m.rms_error_rad)
-        }),
-        ("tracking error, largest [rad]", |m| {
-            format!("{:.4}", m.largest_error_rad)
-        }),
-        ("closed-loop cost", |m| format!("{:.1}", m.closed_loop_cost)),
-        ("samples outside the bounds", |m| m.violations.to_string()),
-        ("samples not backed by a guarantee", |m| {
-            let none = || "no guarantee".to_owned();
-            m.not_guaranteed
-                .map_or_else(none, |count| count.to_string())
-        }),
-        ("most active bounds", |m| m.most_active_bounds.to_string()),
-        ("time per step, mean [us]", |m| {
-            format!("{:.1}", m.mean_step_us)
-        }),
-        ("time per step, longest [us]", |m| {
-            format!("{:.1}", m.longest_step_us)
-        }),
-    ];
-    for (name, value) in rows {
-        table.row(std::iter::once(name.to_owned()).chain(metrics.iter().map(value)));
+    let lines: Vec<_> = metrics.iter().map(Metrics::lines).collect();
+    for row in 0..lines.first().map_or(0, |lines| lines.len()) {
+        let cells = lines.iter().map(|lines| lines[row].1.clone());
+        table.row(std::iter::once(lines[0][row].0.to_owned()).chain(cells));
     }
     let certificate = prepared.certificate.map_or(String::new(), |standing| {
         format!("terminal certificate: {standing}\n")
@@ -421,7 +377,7 @@ fn summary(prepared: &Prepared, metrics: &[Metrics], folder: &Path) -> String {
         prepared.title,
         prepared.samples,
         prepared.settings.t_s,
-        recording::time(prepared.samples as f64 * prepared.settings.t_s),
+        recorded::time(prepared.samples as f64 * prepared.settings.t_s),
         folder.display()
     )
 }

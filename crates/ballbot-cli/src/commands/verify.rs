@@ -4,8 +4,8 @@ use super::CommandError;
 use super::certify::{document, summary};
 use crate::input::InputError;
 use crate::json;
-use crate::proofs;
-use ballbot_scenario::{TerminalCertificate, read_certificate};
+use crate::progress::Progress;
+use ballbot_scenario::{TerminalCertificate, proofs, read_certificate};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -38,7 +38,9 @@ pub fn run(arguments: &VerifyArguments) -> Result<String, CommandError> {
         source,
     })?;
     let certificate = TerminalCertificate::from_json(&text)?;
-    let proof = proofs::prove("verifying", &certificate)?;
+    let bar = Progress::of_parts("verifying");
+    let proof = proofs::prove(&certificate, &|done| bar.set_part(done))?;
+    drop(bar);
     // After the proof, so that a false claim is told by what it claims.
     TerminalCertificate::check_digest(&text)?;
     if arguments.json {

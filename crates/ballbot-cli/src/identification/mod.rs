@@ -1,6 +1,5 @@
 //! What `ballbot identify` shows of an identification: tables, figures, report, words.
 
-pub mod document;
 pub mod figures;
 pub mod published;
 pub mod report;

@@ -1,7 +1,6 @@
 //! The report of an identification: one self-contained HTML file.
 
 use super::published;
-use super::summary::{mark, told};
 use super::tables::{self, Sheet};
 use crate::html::{self, CaptionedFigure, escape};
 use ballbot_identification::{IdentifiedRobot, Weight};
@@ -98,8 +97,8 @@ fn verdicts(robot: &IdentifiedRobot) -> String {
         };
         format!(
             "<li><span class=\"{class}\">{}</span> {}</li>\n",
-            mark(weight),
-            typeset(&told(robot, verdict)).replace('\n', "<br>")
+            weight.mark(),
+            typeset(&robot.told(verdict)).replace('\n', "<br>")
         )
     });
     format!("<ul>\n{}</ul>", items.collect::<String>())

@@ -1,7 +1,7 @@
 //! An identification in words, for the screen.
 
 use super::tables;
-use ballbot_identification::{IdentifiedRobot, OfPlane, Weight};
+use ballbot_identification::IdentifiedRobot;
 use std::fmt::Write as _;
 
 /// Findings, parameters, poles, verdicts.
@@ -43,27 +43,9 @@ pub fn text(robot: &IdentifiedRobot) -> String {
         let _ = writeln!(
             text,
             "{} {}",
-            mark(verdict.1.weight()),
-            told(robot, &verdict)
+            verdict.1.weight().mark(),
+            robot.told(&verdict)
         );
     }
     text
-}
-
-/// A verdict, with the plane that it is of.
-pub fn told(robot: &IdentifiedRobot, (plane, verdict): &OfPlane) -> String {
-    match plane.and_then(|plane| robot.plane_name(plane)) {
-        Some(name) => format!("plane {name}: {verdict}"),
-        None => verdict.to_string(),
-    }
-}
-
-/// How a verdict is introduced.
-pub fn mark(weight: Weight) -> &'static str {
-    match weight {
-        Weight::Good => "good:",
-        Weight::Note => "note:",
-        Weight::Warning => "WARNING:",
-        Weight::Refusal => "NO RESULT:",
-    }
 }

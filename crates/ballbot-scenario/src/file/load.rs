@@ -1,11 +1,9 @@
 //! From a name or a path to a scenario.
 
-use crate::builtin;
 use crate::error::ScenarioError;
+use crate::file::document::Document;
 use crate::file::schema::Scenario;
-use crate::file::template::Template;
 use crate::words;
-use std::path::Path;
 use toml::Value;
 
 impl Scenario {
@@ -14,12 +12,11 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError::Unknown`], `Read` or `Syntax`.
     pub fn load(name_or_path: &str) -> Result<Self, ScenarioError> {
-        Self::parse(&text(name_or_path)?, name_or_path)
+        Ok(Document::load(name_or_path)?.scenario().clone())
     }
 
-    /// [`load`](Self::load), with values at keys replaced or added: a key with its tables and
-    /// places in lists, separated by dots (`controller.t_s`, `bounds.torque_nm.1`), and what would
-    /// stand behind `=` in the file. What is no TOML value is taken as text.
+    /// [`load`](Self::load), with values at keys replaced or added, as by [`Document::with`]: a key, and
+    /// what would stand behind `=` in the file. What is no TOML value is taken as text.
     ///
     /// # Errors
     /// As [`load`](Self::load); or a key that leads into a value.
@@ -33,7 +30,7 @@ impl Scenario {
         let changes = changes
             .iter()
             .map(|(key, value)| (key.as_str(), parsed(value)));
-        Template::load(name_or_path)?.with(&changes.collect::<Vec<_>>())
+        Document::load(name_or_path)?.with(&changes.collect::<Vec<_>>())
     }
 
     /// A scenario from the text of a TOML file; `origin` names it in messages.
@@ -46,22 +43,6 @@ impl Scenario {
             message: words::toml_message(&error.to_string()),
         })
     }
-}
-
-/// The text of a built-in scenario by its name, or of a file.
-pub(super) fn text(name_or_path: &str) -> Result<String, ScenarioError> {
-    if let Some(builtin) = builtin::find(name_or_path) {
-        return Ok(builtin.text.to_owned());
-    }
-    let path = Path::new(name_or_path);
-    let looks_like_a_path = path.extension().is_some() || path.components().count() > 1;
-    if !path.exists() && !looks_like_a_path {
-        return Err(ScenarioError::unknown(name_or_path));
-    }
-    std::fs::read_to_string(path).map_err(|source| ScenarioError::Read {
-        path: path.to_owned(),
-        source,
-    })
 }
 
 /// A TOML value, or the text itself.

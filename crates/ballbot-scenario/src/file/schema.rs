@@ -46,6 +46,17 @@ pub struct Scenario {
     pub world: Option<WorldTable>,
 }
 
+impl Scenario {
+    /// The same without the certified terminal set that it relies on, for whoever is about to certify
+    /// another one.
+    pub fn uncertified(mut self) -> Self {
+        if let TerminalTable::Certified(_) = self.controller.terminal {
+            self.controller.terminal = TerminalTable::default();
+        }
+        self
+    }
+}
+
 /// Linear model p of the robot; see [`ballbot::LinearParameters`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

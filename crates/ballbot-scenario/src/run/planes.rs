@@ -4,6 +4,7 @@ use crate::error::ScenarioError;
 use crate::prepare::prepared::{Plane, Prepared};
 use crate::prepare::world::{PlaneWorld, Robot};
 use crate::run::excited::Excited;
+use crate::run::motor_sample::MotorSample;
 use crate::run::record::{Record, RunHooks};
 use ballbot::PlaneRegulator;
 use lpvmpc::Regulator;
@@ -135,5 +136,19 @@ impl Prepared {
             }
             _ => Vec::new(),
         }
+    }
+
+    /// The motors of two planes that were run one after the other, at a heading of zero; none for
+    /// one plane.
+    pub fn motors_of_planes(&self, trajectories: &[Trajectory<4, 1>]) -> Vec<MotorSample> {
+        let samples = trajectories.iter().take(1).flat_map(|run| &run.samples);
+        let torques = self.motor_torques(trajectories);
+        let samples = samples.zip(torques).map(|(sample, torques)| MotorSample {
+            t: sample.t,
+            heading: 0.0,
+            target: 0.0,
+            torques,
+        });
+        samples.collect()
     }
 }

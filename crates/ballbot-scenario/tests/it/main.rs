@@ -6,6 +6,7 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
+mod document;
 mod forged_certificates;
 mod guarantee;
 mod guaranteed_optimum;

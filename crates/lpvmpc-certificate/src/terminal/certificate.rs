@@ -67,6 +67,16 @@ pub struct TerminalClaim<const NX: usize, const NU: usize> {
     pub contraction: f64,
 }
 
+impl<const NX: usize, const NU: usize> TerminalClaim<NX, NU> {
+    /// The largest |x_i| in the set, state units; NaN if P is singular.
+    pub fn largest_states(&self) -> SVector<f64, NX> {
+        let inverse = self.p.try_inverse();
+        SVector::from_fn(|i, _| {
+            inverse.map_or(f64::NAN, |inverse| (self.level * inverse[(i, i)]).sqrt())
+        })
+    }
+}
+
 /// (A - BK)'P + P(A - BK) <= -2 rate P at every scheduling of the box, with A and B in continuous
 /// time: x'Px decreases under the law without sampling, however the scheduling moves in the box.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -2,10 +2,11 @@
 
 use crate::commands::{CommandError, simulate};
 use crate::json;
-use crate::proofs::ProvedFiles;
+use crate::progress::ProofProgress;
 use crate::results::ResultFolder;
 use crate::table::Table;
 use ballbot_campaign::{Campaign, Cell, Source};
+use ballbot_scenario::proofs::ProvedFiles;
 use clap::Args;
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
@@ -30,8 +31,10 @@ pub struct ReplayArguments {
 /// Runs one run again, and writes what `ballbot simulate` writes.
 pub(super) fn run(arguments: &ReplayArguments) -> Result<String, CommandError> {
     let source = Source::load(&arguments.file)?;
+    let proof = ProofProgress::default();
     let files = ProvedFiles {
         folder: source.folder(),
+        progress: &|done| proof.set_part(done),
     };
     let campaign = Campaign::new(&source, files, &crate::program::name()?)?;
     let out = arguments.out.clone();

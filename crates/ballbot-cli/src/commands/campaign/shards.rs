@@ -5,10 +5,10 @@ use super::{CampaignArguments, Own, report, room};
 use crate::commands::CommandError;
 use crate::json;
 use crate::output::{self, Draft, FileError};
-use crate::progress::Progress;
-use crate::proofs::ProvedFiles;
+use crate::progress::{Progress, ProofProgress};
 use crate::results::ResultFolder;
 use ballbot_campaign::{Campaign, CampaignError, Shard, Source};
+use ballbot_scenario::proofs::ProvedFiles;
 use clap::Args;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -232,8 +232,10 @@ pub(super) fn missing(
 pub(super) fn merge(arguments: &MergeArguments) -> Result<String, CommandError> {
     let plan = Plan::of(&arguments.dir)?;
     let source = Source::load(&plan.campaign)?;
+    let proof = ProofProgress::default();
     let files = ProvedFiles {
         folder: source.folder(),
+        progress: &|done| proof.set_part(done),
     };
     let campaign = Campaign::new(&source, files, &crate::program::name()?)?;
     let out = &arguments.dir;
@@ -287,8 +289,10 @@ pub(super) fn status(arguments: &StatusArguments) -> Result<String, CommandError
     let out = &arguments.dir;
     let plan = Plan::of(out)?;
     let source = Source::load(&plan.campaign)?;
+    let proof = ProofProgress::default();
     let files = ProvedFiles {
         folder: source.folder(),
+        progress: &|done| proof.set_part(done),
     };
     let campaign = Campaign::new(&source, files, &crate::program::name()?)?;
     let mut broken = Vec::new();

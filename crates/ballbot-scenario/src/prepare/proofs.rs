@@ -6,11 +6,13 @@
 //! made; but then he can as well replace the user's files or programs. `ballbot verify` proves
 //! whatever is remembered.
 
-use crate::progress::Progress;
-use ballbot_scenario::{
-    CsvTable, Excitation, Files, KnownRobot, PointTable, ScenarioError, Standing,
-    TerminalCertificate,
-};
+use crate::error::ScenarioError;
+use crate::file::certificate::TerminalCertificate;
+use crate::file::schema::{CsvTable, PointTable};
+use crate::prepare::excitation::Excitation;
+use crate::prepare::files::Files;
+use crate::prepare::known_robot::KnownRobot;
+use crate::prepare::standing::Standing;
 use lpvmpc_certificate::{ClaimError, MOST_BOXES, PROOF_REVISION, Proof};
 use sha2::{Digest, Sha256};
 use std::env;
@@ -19,10 +21,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The files of a folder, with certificates that are proved.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct ProvedFiles<'a> {
     /// The folder that paths are relative to.
     pub folder: &'a Path,
+    /// Called with the part of a proof that is done, where one is made.
+    pub progress: &'a (dyn Fn(f64) + Sync),
 }
 
 impl Files for ProvedFiles<'_> {
@@ -42,7 +46,7 @@ impl Files for ProvedFiles<'_> {
         if is_remembered(certificate) {
             return Ok(Standing::Proved);
         }
-        let proof = prove("proving the certificate", certificate);
+        let proof = prove(certificate, self.progress);
         proof
             .map(|_| Standing::Proved)
             .map_err(|error| ScenarioError::Value {
@@ -61,21 +65,16 @@ impl Files for ProvedFiles<'_> {
     }
 }
 
-/// Steps of the progress bar of a proof.
-pub const STEPS: usize = 1000;
-
-/// Proves a certificate, with a progress bar called `what`, and remembers that it did.
+/// Proves a certificate, which takes minutes on all cores, and remembers that it did. `progress` is
+/// called with the part that is done.
 ///
 /// # Errors
 /// The first claim that is false or could not be shown.
 pub fn prove(
-    what: &'static str,
     certificate: &TerminalCertificate,
+    progress: &dyn Fn(f64),
 ) -> Result<Proof<4>, ClaimError> {
-    let progress = Progress::new(what, STEPS);
-    let proof = certificate.prove(&certificate.plant, MOST_BOXES, &|done| {
-        progress.set((done * STEPS as f64) as usize);
-    })?;
+    let proof = certificate.prove(&certificate.plant, MOST_BOXES, progress)?;
     remember(certificate);
     Ok(proof)
 }

@@ -1,4 +1,4 @@
-//! Recorded runs as files.
+//! Recorded runs as the text of CSV files.
 
 use ballbot_scenario::{MotorSample, words};
 use lpvmpc_sim::{LogRow, Termination, Trajectory};
