@@ -47,7 +47,23 @@ pub fn toml_message(message: &str) -> String {
         .fold(message.trim_end().to_owned(), |text, (from, to)| {
             text.replace(from, to)
         });
-    without_types(&plain)
+    with_nearest(without_types(&plain))
+}
+
+/// The text with the name that an unknown one is most like, if it is like one of those expected.
+fn with_nearest(text: String) -> String {
+    let nearest = || {
+        let (_, rest) = ["unknown field `", "unknown name `"]
+            .iter()
+            .find_map(|start| text.split_once(start))?;
+        let (name, expected) = rest.split_once('`')?;
+        let names = expected.lines().next()?.split('`').skip(1).step_by(2);
+        let likeness = names.map(|other| (strsim::jaro_winkler(other, name), other));
+        let alike = likeness.filter(|(likeness, _)| *likeness > 0.7);
+        let (_, nearest) = alike.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(format!("; did you mean `{nearest}`?"))
+    };
+    nearest().map_or_else(|| text.clone(), |said| text.clone() + &said)
 }
 
 /// The text with "a table" or "a text" in place of what a program's types are called.
@@ -201,6 +217,19 @@ mod tests {
         ] {
             assert_eq!(toml_message(message), plain);
         }
+    }
+
+    #[test]
+    fn a_name_that_is_like_one_of_those_expected_is_asked_for() {
+        let said = toml_message("unknown field `horizn`, expected one of `t_s`, `horizon`");
+        assert!(
+            said.ends_with("`horizon`; did you mean `horizon`?"),
+            "{said}"
+        );
+        let said = toml_message("unknown variant `medain`, expected `median` or `mean`");
+        assert!(said.ends_with("did you mean `median`?"), "{said}");
+        let other = "unknown field `xyz`, expected one of `t_s`, `horizon`";
+        assert_eq!(toml_message(other), other);
     }
 
     #[test]
