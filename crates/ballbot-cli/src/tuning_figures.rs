@@ -121,20 +121,17 @@ impl Drawn<'_> {
         }
         let solid = Style::Line(Dash::Solid);
         let line = match self.judge.goals.len() {
-            2 => front,
+            2 => front.clone(),
             _ => Vec::new(),
         };
         let start = match self.found.outcomes[0].violation > 0.0 {
             true => "start (exceeds a limit)",
             false => "start",
         };
+        let mut others = self.whole(true);
+        others.retain(|case| !front.contains(case));
         let all = [
-            series(
-                "keeps all limits",
-                &self.whole(true),
-                Style::Markers,
-                OTHERS,
-            ),
+            series("keeps all limits", &others, Style::Markers, OTHERS),
             series("Pareto front", &line, solid, FRONT),
             series("some of the Pareto front", &marked, Style::Markers, FRONT),
             series(start, &[0], Style::Markers, START),

@@ -341,8 +341,8 @@ mod tests {
             "title = \"x\"\nscenario = \"x\"\n[parameters]\n\
              [[goal]]\nmeasure = \"rms_error_rad\"\nstatistic = \"median\"\n\
              [[goal]]\nmeasure = \"settling_s\"\nstatistic = { quantile = 0.8 }\nat_most = 0.2\n\
-             [[limit]]\nstatistic = \"failure_share\"\nat_most = 0.1\n\
-             [[limit]]\nmeasure = \"largest_tilt_rad\"\nstatistic = \"worst\"\nat_most = 0.8\n",
+             [[limit]]\nstatistic = \"failure_share\"\nat_most = 0.2\n\
+             [[limit]]\nmeasure = \"largest_tilt_rad\"\nstatistic = \"worst\"\nat_most = 0.97\n",
         )
         .unwrap();
         let judge = Judge::new(&file, 2.0).unwrap();
@@ -350,13 +350,13 @@ mod tests {
         let mut exceeded = 0;
         for _ in 0..300 {
             let ran = |random: &mut Random| {
-                let complete = random.uniform() > 0.1;
+                let complete = random.uniform() > 0.03;
                 let measure = |random: &mut Random| match complete {
                     true => random.uniform(),
                     false => f64::INFINITY,
                 };
                 Ran {
-                    success: complete && random.uniform() > 0.05,
+                    success: complete && random.uniform() > 0.02,
                     lost: if complete { 0.0 } else { random.uniform() },
                     numbers: judge.measures.iter().map(|_| measure(random)).collect(),
                 }
@@ -377,7 +377,7 @@ mod tests {
             }
         }
         assert!(
-            (300..1400).contains(&exceeded),
+            (150..1350).contains(&exceeded),
             "some keep their limits: {exceeded}"
         );
     }
