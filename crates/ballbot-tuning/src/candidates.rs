@@ -43,6 +43,14 @@ struct Running<F> {
     is_over: bool,
 }
 
+/// What became of it.
+struct Ended {
+    state: State,
+    runs: Vec<Ran>,
+    /// Why it is no scenario.
+    refused: Option<String>,
+}
+
 impl<'a, 'b, F: Files + Copy + Sync, E: From<TuningError>> Candidates<'a, 'b, F, E> {
     /// None yet; `done` is what the journal has.
     pub fn new(
@@ -149,7 +157,7 @@ impl<'a, 'b, F: Files + Copy + Sync, E: From<TuningError>> Candidates<'a, 'b, F,
         &self,
         wanted: &[Vec<Value>],
         is_hopeless: &(dyn Fn(&Outcome) -> bool + Sync),
-    ) -> Result<Vec<(State, Vec<Ran>, Option<String>)>, TuningError> {
+    ) -> Result<Vec<Ended>, TuningError> {
         let all = self.worlds.runs();
         let columns = self.worlds.columns();
         let mut running: Vec<Running<Campaign<'a, F>>> = Vec::new();
@@ -201,7 +209,11 @@ impl<'a, 'b, F: Files + Copy + Sync, E: From<TuningError>> Candidates<'a, 'b, F,
                 true => State::Whole,
                 false => State::GivenUp,
             };
-            (state, candidate.runs, candidate.refused)
+            Ended {
+                state,
+                runs: candidate.runs,
+                refused: candidate.refused,
+            }
         });
         Ok(ended.collect())
     }
@@ -293,7 +305,13 @@ impl<F: Files + Copy + Sync, E: From<TuningError>> Problem for Candidates<'_, '_
             }
         }
         let to_run: Vec<Vec<Value>> = wanted.iter().map(|place| values[*place].clone()).collect();
-        for (values, (state, runs, refused)) in to_run.iter().zip(self.run(&to_run, is_hopeless)?) {
+        let ended = self.run(&to_run, is_hopeless)?;
+        for (values, ended) in to_run.iter().zip(ended) {
+            let Ended {
+                state,
+                runs,
+                refused,
+            } = ended;
             let judged = self.judge.judged(&runs, self.worlds.runs() as usize);
             let entry = Entry {
                 refused,

@@ -94,7 +94,9 @@ impl Journal {
         let length = text.rfind('\n').map_or(0, |end| end + 1);
         let mut lines = text[..length].split_inclusive('\n');
         match lines.next() {
-            None => return Ok(Self::default()),
+            // Empty, or its first line was being written.
+            None if first.starts_with(text) => return Ok(Self::default()),
+            None => return refused(1, "it is no journal of a tuning"),
             Some(line) if line == first => journal.length = line.len(),
             Some(line) if line.contains(OF) => {
                 let problem = "it is of another tuning, of another program, or one of the files was \

@@ -63,8 +63,8 @@ pub enum SearchEnd {
     Budget,
     /// Nothing was better for as many generations as its patience.
     NoImprovement,
-    /// The distribution has become as narrow as numbers can tell.
-    Converged,
+    /// The distribution has become too narrow, too wide or too long for numbers.
+    Degenerate,
     /// All targets are reached and all limits kept.
     Reached,
 }
@@ -210,7 +210,7 @@ fn search_one<P: Problem>(
         let outcomes = problem.evaluate(&points, &|outcome| of(outcome) > threshold)?;
         generations += 1;
         let mut values: Vec<f64> = outcomes.iter().map(of).collect();
-        let converged = strategy.tell(&values) != 0;
+        let degenerate = strategy.tell(&values) != 0;
         known.extend(points.into_iter().zip(outcomes));
         values.sort_by(f64::total_cmp);
         threshold = values[(values.len() - 1) / 2];
@@ -219,8 +219,8 @@ fn search_one<P: Problem>(
             idle = 0;
         }
         best = best.min(values[0]);
-        if converged && best > 0.0 {
-            break SearchEnd::Converged;
+        if degenerate && best > 0.0 {
+            break SearchEnd::Degenerate;
         }
     };
     Ok(Searched {

@@ -77,7 +77,6 @@ impl<'a, F: Files + Copy + Sync> Tuning<'a, F> {
     /// A value that makes no sense, with its key.
     pub fn new(source: &'a TuningSource, files: F, program: &str) -> Result<Self, TuningError> {
         let file = source.file();
-        check_search(&file.search)?;
         check_keys(source)?;
         let mut axes = Vec::new();
         let mut start = Vec::new();
@@ -92,7 +91,7 @@ impl<'a, F: Files + Copy + Sync> Tuning<'a, F> {
             axes.push(axis);
         }
         let confidence = file.held_out.confidence;
-        if !(confidence >= 0.5 && confidence <= 0.9999) {
+        if !(0.5..=0.9999).contains(&confidence) {
             let expected = "it must be from 0.5 to 0.9999, such as 0.95";
             return Err(TuningError::value(
                 "held_out.confidence",
@@ -113,8 +112,10 @@ impl<'a, F: Files + Copy + Sync> Tuning<'a, F> {
         }
         let duration = worlds.scenario(&worlds.draw(0))?;
         let duration = duration.samples as f64 * duration.settings.t_s;
+        let judge = Judge::new(file, duration)?;
+        check_search(&file.search, judge.goals.len(), axes.len())?;
         Ok(Self {
-            judge: Judge::new(file, duration)?,
+            judge,
             source,
             axes,
             start,
@@ -199,9 +200,7 @@ impl<'a, F: Files + Copy + Sync> Tuning<'a, F> {
         let plan = Plan {
             weightings: weightings(self.judge.goals.len()),
             evaluations: search.evaluations,
-            population: search
-                .population
-                .unwrap_or_else(|| usual_population(self.axes.len())),
+            population: population(search, self.axes.len()),
             step: search.step,
             patience: search.patience,
             seed: named_seed(self.source.file().seed, "search"),
@@ -287,12 +286,15 @@ impl<'a, F: Files + Copy + Sync> Tuning<'a, F> {
     }
 }
 
+/// Candidates, at most.
+const MOST_EVALUATIONS: u64 = 1_000_000;
 /// Runs of a candidate, at most; what is decided by more is a campaign.
 const MOST_RUNS: u64 = 100_000;
 
-/// The population that is usual (Hansen 2016), at least as many as two cores are glad of.
-fn usual_population(dimensions: usize) -> usize {
-    4 + (3.0 * (dimensions as f64).ln()) as usize
+/// Candidates of a generation; as is usual (Hansen 2016) where the file does not say.
+fn population(search: &SearchTable, dimensions: usize) -> usize {
+    let usual = || 4 + (3.0 * (dimensions as f64).ln()) as usize;
+    search.population.unwrap_or_else(usual)
 }
 
 fn changes(axes: &[Axis], values: &[Value]) -> Vec<(String, Value)> {
@@ -302,14 +304,10 @@ fn changes(axes: &[Axis], values: &[Value]) -> Vec<(String, Value)> {
     all.collect()
 }
 
-fn check_search(search: &SearchTable) -> Result<(), TuningError> {
+fn check_search(search: &SearchTable, goals: usize, dimensions: usize) -> Result<(), TuningError> {
     let refused = |key: &str, value: String, expected: &str| {
         Err(TuningError::value(format!("search.{key}"), value, expected))
     };
-    if !(2..=1_000_000).contains(&search.evaluations) {
-        let expected = "it must be from 2 to 1000000";
-        return refused("evaluations", search.evaluations.to_string(), expected);
-    }
     if let Some(population) = search.population
         && !(4..=10_000).contains(&population)
     {
@@ -322,6 +320,15 @@ fn check_search(search: &SearchTable) -> Result<(), TuningError> {
     if !(search.step > 0.0 && search.step <= 1.0) {
         let expected = "it must be above 0 and at most 1, a share of each range, such as 0.2";
         return refused("step", format!("{:?}", search.step), expected);
+    }
+    let (searches, population) = (weightings(goals).len(), population(search, dimensions));
+    let least = 1 + (searches * population) as u64;
+    if !(least..=MOST_EVALUATIONS).contains(&search.evaluations) {
+        let expected = format!(
+            "it must be from {least}, for the start and a generation of {population} in each of \
+             {searches} searches, to {MOST_EVALUATIONS}"
+        );
+        return refused("evaluations", search.evaluations.to_string(), &expected);
     }
     if search.patience == 0 {
         return refused(

@@ -126,8 +126,8 @@ fn mistakes_are_named() {
         ),
         (
             "evaluations = 60",
-            "evaluations = 1",
-            ["search.evaluations = 1", "from 2"],
+            "evaluations = 35",
+            ["search.evaluations = 35", "from 36, for the start"],
         ),
         (
             "patience = 3",

@@ -65,6 +65,7 @@ fn a_journal_that_was_changed_or_is_of_another_tuning_is_refused() {
         missing.remove(4);
         assert!(refused(&missing.concat()).contains("line 5: it was changed, or lines before"));
         assert!(refused("run,seed\n").contains("line 1: it is no journal"));
+        assert!(refused("mine").contains("line 1: it is no journal"));
         whole
     });
     for (from, to) in [("seed = 5", "seed = 6"), ("runs = 4", "runs = 3")] {

@@ -467,7 +467,7 @@ impl Report<'_> {
             let end = match searched.end {
                 ballbot_tuning::SearchEnd::Budget => "evaluations used up",
                 ballbot_tuning::SearchEnd::NoImprovement => "no improvement",
-                ballbot_tuning::SearchEnd::Converged => "converged",
+                ballbot_tuning::SearchEnd::Degenerate => "distribution degenerate",
                 ballbot_tuning::SearchEnd::Reached => "all targets reached",
             };
             vec![

@@ -29,7 +29,7 @@ key = "initial_state.theta_rad"
 uniform = [0.1, 0.2]
 
 [search]
-evaluations = 24
+evaluations = 40
 "#;
 
 const ALL: [&str; 13] = [
@@ -154,7 +154,7 @@ fn the_example_is_a_tuning() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let text = succeed(here, &["tune", "example"]);
-    let text = edited(&text, "evaluations = 600", "evaluations = 2");
+    let text = edited(&text, "evaluations = 600", "evaluations = 46");
     let text = edited(&text, "at_most = 0.2618", "at_most = 0.0001");
     fs::write(here.join("mine.toml"), text).unwrap();
     let message = fail(here, &["tune", "mine.toml"], 1);
