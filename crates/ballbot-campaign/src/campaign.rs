@@ -224,6 +224,11 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
         changed
     }
 
+    /// Points of the grids together, 1 without: run `i` is at point `i` modulo that.
+    pub fn grid_points(&self) -> u64 {
+        self.inputs.grid_points
+    }
+
     /// Whether run `i` differs from run `j` at all: something is drawn, or there is noise.
     pub fn is_random(&self) -> bool {
         let drawn = |input: &Input| !matches!(input.distribution, Distribution::Grid(_));

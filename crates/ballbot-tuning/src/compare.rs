@@ -39,10 +39,12 @@ impl Comparison {
 const RESAMPLES: usize = 2000;
 
 /// A goal or a limit in the same worlds before and after. The bootstrap draws worlds, each with its
-/// two runs, so that what the worlds have in common cancels in the difference.
+/// two runs, so that what the worlds have in common cancels in the difference; and of each point of a
+/// grid, of which there are `points`, as many as there are, if these are several.
 pub fn compare(
     quantity: &Quantity,
     (before, after): (&[Ran], &[Ran]),
+    points: usize,
     confidence: f64,
     seed: u64,
 ) -> Comparison {
@@ -58,12 +60,17 @@ pub fn compare(
         [before, after, difference(before, after)]
     };
     let found = estimates(&all);
+    // Of one world there is nothing to draw.
+    let points = if n >= 2 * points { points } else { 1 };
+    let repeats = n / points;
     let mut random = Random::new(seed, 0);
     let mut drawn = [const { Vec::new() }; 3];
     for _ in 0..RESAMPLES {
-        let places: Vec<usize> = (0..n)
-            .map(|_| (random.uniform() * n as f64) as usize)
-            .collect();
+        let draw = |place: usize| {
+            let repeat = (random.uniform() * repeats as f64) as usize;
+            place % points + points * repeat
+        };
+        let places: Vec<usize> = (0..n).map(draw).collect();
         for (all, one) in drawn.iter_mut().zip(estimates(&places)) {
             all.push(one);
         }
@@ -136,7 +143,7 @@ mod tests {
             ran(worlds.iter().copied()),
             ran(shifted.collect::<Vec<_>>().into_iter()),
         );
-        let found = compare(&quantity(), (&before, &after), 0.95, 1);
+        let found = compare(&quantity(), (&before, &after), 1, 0.95, 1);
         assert!(found.is_better() && !found.is_worse());
         assert!((found.difference.value + 0.5).abs() < 0.03, "{found:?}");
         let width = found.difference.upper - found.difference.lower;
@@ -144,16 +151,40 @@ mod tests {
         assert!((width / usual - 1.0).abs() < 0.25, "{width} {usual}");
         // Unpaired, nothing could be told.
         assert!(found.before.upper - found.before.lower > 0.6);
-        assert_eq!(compare(&quantity(), (&before, &after), 0.95, 1), found);
+        assert_eq!(compare(&quantity(), (&before, &after), 1, 0.95, 1), found);
+    }
+
+    /// Two points of a grid that differ much: what differs between them is no uncertainty.
+    #[test]
+    fn each_point_of_a_grid_keeps_its_share() {
+        let mut random = Random::new(6, 0);
+        let mut values = |shift: f64| {
+            let noisy = (0..40).map(|i| 10.0 * f64::from(i % 2) + shift + 0.1 * random.normal());
+            ran(noisy.collect::<Vec<_>>().into_iter())
+        };
+        let (before, after) = (values(1.0), values(0.9));
+        let width = |points| {
+            let found = compare(&quantity(), (&before, &after), points, 0.95, 1);
+            found.before.upper - found.before.lower
+        };
+        let usual = 2.0 * 1.96 * 0.1 / 40.0_f64.sqrt();
+        assert!((width(2) / usual - 1.0).abs() < 0.3, "{} {usual}", width(2));
+        assert!(width(1) > 2.0);
     }
 
     #[test]
     fn runs_that_fell_before_and_after_make_no_difference() {
         let fell = ran([f64::INFINITY, 1.0].into_iter());
-        let found = compare(&quantity(), (&fell, &fell), 0.95, 1);
+        let found = compare(&quantity(), (&fell, &fell), 1, 0.95, 1);
         assert_eq!(found.difference.value, 0.0);
         assert!(!found.is_better() && !found.is_worse());
-        let better = compare(&quantity(), (&fell, &ran([1.0, 1.0].into_iter())), 0.95, 1);
+        let better = compare(
+            &quantity(),
+            (&fell, &ran([1.0, 1.0].into_iter())),
+            1,
+            0.95,
+            1,
+        );
         assert_eq!(better.difference.value, f64::NEG_INFINITY);
     }
 }

@@ -259,7 +259,9 @@ impl<'a, F: Files + Copy + Sync> Tuning<'a, F> {
         let file = self.source.file();
         let seed = named_seed(file.seed, "bootstrap");
         let one = |quantity: &Quantity| {
-            compare(quantity, (before, after), file.held_out.confidence, seed)
+            let points = self.held_out.grid_points() as usize;
+            let confidence = file.held_out.confidence;
+            compare(quantity, (before, after), points, confidence, seed)
         };
         let all = self.judge.goals.iter().chain(&self.judge.limits);
         Some(all.map(one).collect())

@@ -79,7 +79,7 @@ fn a_tuning_writes_a_scenario_that_runs() {
     assert_says(
         &text,
         &[
-            "Let go: 2",
+            "Let go: 36 candidates",
             "in 2 worlds each",
             "controller.horizon",
             "out/tuning",
