@@ -1,10 +1,11 @@
 //! A campaign that has passed its checks, and its runs.
 
 use crate::cell::{Cell, Column, Kind, Row};
+use crate::distribution::Distribution;
 use crate::error::CampaignError;
 use crate::file::{CampaignFile, LimitsTable, OnRefused};
 use crate::fingerprint;
-use crate::inputs::{Inputs, child, named_seed};
+use crate::inputs::{Input, Inputs, child, named_seed};
 use crate::measure::{Ending, Measure, Measured};
 use ballbot_scenario::{Document, Files, Prepared, Record, RunHooks, ScenarioError, words};
 use rayon::prelude::*;
@@ -25,6 +26,8 @@ pub struct Source {
     scenario: Document,
     /// Where files are looked for that the scenario names.
     folder: PathBuf,
+    /// Values from elsewhere that may name files.
+    also: Vec<Value>,
 }
 
 impl Source {
@@ -48,6 +51,20 @@ impl Source {
             path: path.to_owned(),
             message: words::toml_message(&error.to_string()),
         })?;
+        Self::of(path, text, file, Vec::new())
+    }
+
+    /// A campaign that stands in a file of another kind at `path`, whose whole text is `text`; `also`
+    /// are values in it that may name files, beside those of the campaign. Reads the scenario.
+    ///
+    /// # Errors
+    /// The scenario cannot be read, or is none.
+    pub fn of(
+        path: &Path,
+        text: String,
+        file: CampaignFile,
+        also: Vec<Value>,
+    ) -> Result<Self, CampaignError> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let beside = folder.join(&file.scenario);
         let named = match beside.is_file() {
@@ -62,6 +79,7 @@ impl Source {
             file,
             scenario,
             folder,
+            also,
         })
     }
 
@@ -73,6 +91,16 @@ impl Source {
     /// What stands in it.
     pub fn file(&self) -> &CampaignFile {
         &self.file
+    }
+
+    /// The scenario.
+    pub fn scenario(&self) -> &Document {
+        &self.scenario
+    }
+
+    /// Values from elsewhere that may name files.
+    pub(crate) fn also(&self) -> &[Value] {
+        &self.also
     }
 
     /// The folder that the scenario's paths are relative to.
@@ -91,7 +119,7 @@ pub struct Campaign<'a, F> {
     measures: Vec<Measure>,
     runs: u64,
     /// Keys that are the same in all runs.
-    fixed: Vec<(&'a str, Value)>,
+    fixed: Vec<(String, Value)>,
     /// Seed of the noise's seeds; none where the noise is the scenario's own.
     noise: Option<u64>,
     program: String,
@@ -140,11 +168,7 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
     pub fn new(source: &'a Source, files: F, program: &str) -> Result<Self, CampaignError> {
         let file = &source.file;
         let (inputs, runs) = Inputs::new(&file.vary, file.design, file.seed, runs_of(file))?;
-        let fixed: Vec<(&str, Value)> = file
-            .set
-            .iter()
-            .map(|(key, value)| (key.as_str(), value.clone()))
-            .collect();
+        let fixed: Vec<(String, Value)> = file.set.clone().into_iter().collect();
         let varied = |key: &str| {
             inputs
                 .all
@@ -166,7 +190,7 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
                 .iter()
                 .flat_map(|input| &input.keys)
                 .any(|key| key.starts_with("world."));
-        let given = file.same_noise || varied(NOISE) || fixed.iter().any(|(key, _)| *key == NOISE);
+        let given = file.same_noise || varied(NOISE) || fixed.iter().any(|(key, _)| key == NOISE);
         let campaign = Self {
             noise: (has_world && !given).then(|| named_seed(file.seed, NOISE)),
             measures: measures(file)?,
@@ -200,6 +224,25 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
             }
         }
         first.map_or(Ok(()), Err)
+    }
+
+    /// The same runs of a scenario in which more keys have values of their own: the worlds, the robots
+    /// and the noise of each run are those of this campaign. Nothing is checked before a run.
+    pub fn with(&self, values: impl IntoIterator<Item = (String, Value)>) -> Self {
+        let mut changed = self.clone();
+        changed.fixed.extend(values);
+        changed
+    }
+
+    /// Points of the grids together, 1 without: run `i` is at point `i` modulo that.
+    pub fn grid_points(&self) -> u64 {
+        self.inputs.grid_points
+    }
+
+    /// Whether run `i` differs from run `j` at all: something is drawn, or there is noise.
+    pub fn is_random(&self) -> bool {
+        let drawn = |input: &Input| !matches!(input.distribution, Distribution::Grid(_));
+        self.noise.is_some() || self.inputs.all.iter().any(drawn)
     }
 
     /// What it was read from.
@@ -281,7 +324,10 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
     /// # Errors
     /// It is none.
     pub fn scenario(&self, drawn: &Drawn) -> Result<Prepared, ScenarioError> {
-        let mut changes = self.fixed.clone();
+        let fixed = self.fixed.iter();
+        let mut changes: Vec<(&str, Value)> = fixed
+            .map(|(key, value)| (key.as_str(), value.clone()))
+            .collect();
         changes.extend(self.inputs.changes(&drawn.values));
         changes.extend(drawn.seed.map(|seed| (NOISE, Value::Integer(seed as i64))));
         self.source.scenario.with(&changes)?.prepare(self.files)
@@ -357,7 +403,7 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
         let success = measured.map_or(Cell::Missing, |measured| {
             Cell::Flag(self.succeeds(measured))
         });
-        let own = self.fixed.iter().find(|(key, _)| *key == NOISE);
+        let own = self.fixed.iter().find(|(key, _)| key == NOISE);
         let seed = match (drawn.seed, own) {
             (Some(seed), _) => Cell::Whole(seed as i64),
             (None, Some((_, value))) => Cell::of(value, Kind::Whole),

@@ -103,6 +103,30 @@ impl Distribution {
         })
     }
 
+    /// The number from 0 to 1 whose value this is, in the middle of those that give it; none where
+    /// nothing does, or the values have no order of their own.
+    pub fn unit(&self, value: &Value) -> Option<f64> {
+        let number = match value {
+            Value::Integer(number) => *number as f64,
+            Value::Float(number) => *number,
+            _ => f64::NAN,
+        };
+        let u = match self {
+            Self::Uniform { from, to } => (number - from) / (to - from),
+            Self::LogUniform { from, to } => (number / from).ln() / (to / from).ln(),
+            Self::Integers { from, to } => {
+                let count = (*to as f64 - *from as f64) + 1.0;
+                (value.as_integer()? as f64 - *from as f64 + 0.5) / count
+            }
+            Self::List(values) => {
+                let place = values.iter().position(|other| other == value)?;
+                (place as f64 + 0.5) / values.len() as f64
+            }
+            Self::Normal { .. } | Self::Grid(_) | Self::Seeds => return None,
+        };
+        (0.0..=1.0).contains(&u).then_some(u)
+    }
+
     /// Whether its values follow from a uniform number that a sequence can lay out.
     pub fn is_laid_out(&self) -> bool {
         !matches!(self, Self::Grid(_) | Self::Seeds)

@@ -26,6 +26,10 @@ pub(crate) fn of(
         .set
         .values()
         .for_each(|value| texts(value, &mut names));
+    source
+        .also()
+        .iter()
+        .for_each(|value| texts(value, &mut names));
     for input in &inputs.all {
         if let Distribution::List(values) | Distribution::Grid(values) = &input.distribution {
             values.iter().for_each(|value| texts(value, &mut names));

@@ -38,7 +38,7 @@ pub(crate) struct Inputs {
 /// Dimensions of the Sobol sequence with direction numbers in the program.
 const MOST_DIMENSIONS: usize = 100;
 /// Runs of a campaign, at most: numbers of runs are exact in an f64.
-pub(crate) const MOST_RUNS: u64 = 1 << 40;
+pub const MOST_RUNS: u64 = 1 << 40;
 
 impl Inputs {
     /// The inputs of a campaign of so many runs, or of one per point of its grids; and the runs.
@@ -139,7 +139,7 @@ impl Inputs {
 }
 
 impl Input {
-    fn new(place: &str, table: &VaryTable, seed: u64) -> Result<Self, CampaignError> {
+    pub fn new(place: &str, table: &VaryTable, seed: u64) -> Result<Self, CampaignError> {
         let keys = match &table.key {
             Keys::One(key) => vec![key.clone()],
             Keys::Several(keys) => keys.clone(),
@@ -197,7 +197,7 @@ pub(crate) fn child(seed: u64, index: u64) -> u64 {
 }
 
 /// The seed of what is called `name`.
-pub(crate) fn named_seed(seed: u64, name: &str) -> u64 {
+pub fn named_seed(seed: u64, name: &str) -> u64 {
     let digest = Sha256::new_with_prefix(seed.to_le_bytes())
         .chain_update(name)
         .finalize();
@@ -205,14 +205,17 @@ pub(crate) fn named_seed(seed: u64, name: &str) -> u64 {
     first.fold(0, |sum, byte| sum << 8 | u64::from(*byte))
 }
 
+/// Whether a key of a scenario is another one or stands in it: `controller.q.0` in `controller.q`.
+pub fn is_within(key: &str, other: &str) -> bool {
+    key.strip_prefix(other)
+        .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+}
+
 fn check_keys(all: &[Input]) -> Result<(), CampaignError> {
     let keys = all.iter().flat_map(|input| &input.keys);
     let keys: Vec<&String> = keys.collect();
     for (i, key) in keys.iter().enumerate() {
-        let inside = |other: &str| {
-            key.strip_prefix(other)
-                .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
-        };
+        let inside = |other: &str| is_within(key, other);
         if let Some(other) = keys
             .iter()
             .enumerate()

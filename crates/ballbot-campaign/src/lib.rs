@@ -9,6 +9,7 @@
 //! | all runs, or as many as are needed | [`Campaign::run_all`] |
 //! | a part, and all parts together | [`Campaign::write_shard`], [`Campaign::shards`] |
 //! | what the rows say | [`RowFile`], [`Summary`] |
+//! | the same runs with other values, along an interval | [`Campaign::with`], [`Axis`] |
 //! | the probability of a rare failure | [`Campaign::rare`], [`Subset`] |
 //!
 //! ```no_run
@@ -30,6 +31,7 @@
     reason = "a comparison with NaN must take the failing branch"
 )]
 
+mod axis;
 mod campaign;
 mod cell;
 mod distribution;
@@ -48,10 +50,14 @@ mod stopping;
 mod subset;
 mod summary;
 
+pub use axis::Axis;
 pub use campaign::{Campaign, Clock, Drawn, Replay, Source};
 pub use cell::{Cell, Column, Kind, Row};
 pub use error::CampaignError;
-pub use file::{CampaignFile, Design, LimitsTable, RareTable, StopTable};
+pub use file::{
+    CampaignFile, Design, Keys, LimitsTable, OnRefused, RareTable, StopTable, VaryTable, confidence,
+};
+pub use inputs::{MOST_RUNS, is_within, named_seed};
 pub use intervals::{Interval, share};
 pub use measure::{Ending, Measure};
 pub use results::{RowFile, RowWriter};

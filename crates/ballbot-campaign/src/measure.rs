@@ -38,6 +38,11 @@ pub enum Measure {
     ClosedLoopCost,
     /// Effort: the integral of the squared torque, (N m)^2 s.
     EffortN2m2S,
+    /// Root mean square of the torque, N m.
+    RmsTorqueNm,
+    /// After the reference's last change: from the largest |phi - phi_ref| until it stays within 2 %
+    /// of that, s. There is none where it never does, or the reference changes until the end.
+    SettlingS,
     /// Mean time per step, us; differs from machine to machine and run to run.
     MeanStepUs,
     /// Longest step, us; differs from machine to machine and run to run.
@@ -46,7 +51,7 @@ pub enum Measure {
 
 impl Measure {
     /// All of them.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 17] = [
         Self::EndS,
         Self::Infeasible,
         Self::Violations,
@@ -60,6 +65,8 @@ impl Measure {
         Self::FinalErrorRad,
         Self::ClosedLoopCost,
         Self::EffortN2m2S,
+        Self::RmsTorqueNm,
+        Self::SettlingS,
         Self::MeanStepUs,
         Self::LongestStepUs,
     ];
@@ -80,6 +87,8 @@ impl Measure {
             Self::FinalErrorRad => "final_error_rad",
             Self::ClosedLoopCost => "closed_loop_cost",
             Self::EffortN2m2S => "effort_n2m2_s",
+            Self::RmsTorqueNm => "rms_torque_nm",
+            Self::SettlingS => "settling_s",
             Self::MeanStepUs => "mean_step_us",
             Self::LongestStepUs => "longest_step_us",
         }
@@ -143,6 +152,8 @@ struct OfPlane {
     infeasible: usize,
     final_error: f64,
     effort: f64,
+    rms_torque: f64,
+    settling: Option<f64>,
 }
 
 impl Measured {
@@ -204,6 +215,13 @@ impl Measured {
             Measure::FinalErrorRad => length(|plane| plane.final_error),
             Measure::ClosedLoopCost => sum(|plane| plane.metrics.closed_loop_cost),
             Measure::EffortN2m2S => sum(|plane| plane.effort),
+            Measure::RmsTorqueNm => largest(|plane| plane.rms_torque),
+            // A plane that does not settle is not left out, as `f64::max` would with NaN.
+            Measure::SettlingS => self
+                .planes
+                .iter()
+                .try_fold(0.0, |most: f64, plane| Some(most.max(plane.settling?)))
+                .unwrap_or(f64::NAN),
             Measure::MeanStepUs => sum(|plane| plane.metrics.mean_step_us),
             Measure::LongestStepUs => largest(|plane| plane.metrics.longest_step_us),
             Measure::Infeasible | Measure::Violations | Measure::NotGuaranteed => {
@@ -221,14 +239,51 @@ impl OfPlane {
             .filter(|sample| !sample.status.is_solved());
         let ended = matches!(run.termination, Termination::NoPlan { .. });
         let squares = run.samples.iter().map(|sample| sample.u[0] * sample.u[0]);
+        let squares = squares.sum::<f64>();
         Self {
             metrics: Metrics::new(prepared, plane, run),
             end: run.final_time,
             infeasible: without_plan.count() + usize::from(ended),
             final_error: (run.final_state[0] - run.final_reference[0]).abs(),
-            effort: squares.sum::<f64>() * prepared.settings.t_s,
+            effort: squares * prepared.settings.t_s,
+            // A run that ends before its first torque has none.
+            rms_torque: (squares / run.samples.len().max(1) as f64).sqrt(),
+            settling: settling(run),
         }
     }
+}
+
+/// The share of the largest error that a settled error stays within, as is usual.
+const SETTLED: f64 = 0.02;
+
+/// [`Measure::SettlingS`] of one plane.
+fn settling(run: &Trajectory<4, 1>) -> Option<f64> {
+    let samples = run.samples.iter();
+    let samples = samples.map(|sample| (sample.t, sample.x_ref[0], sample.x[0]));
+    let end = (run.final_time, run.final_reference[0], run.final_state[0]);
+    let all: Vec<(f64, f64, f64)> = samples.chain([end]).collect();
+    let changed = all.windows(2).rposition(|pair| pair[0].1 != pair[1].1);
+    let resting = &all[changed.map_or(0, |k| k + 1)..];
+    if resting.len() < 2 {
+        return None;
+    }
+    let errors = resting
+        .iter()
+        .map(|(t, reference, phi)| (*t, (phi - reference).abs()));
+    let errors: Vec<(f64, f64)> = errors.collect();
+    let first = errors.iter().fold((0.0, -1.0), |most: (f64, f64), error| {
+        match error.1 > most.1 {
+            true => *error,
+            false => most,
+        }
+    });
+    let band = SETTLED * first.1;
+    let Some(last) = errors.iter().rposition(|(_, error)| *error > band) else {
+        return Some(0.0);
+    };
+    let (&(t, error), &(next, within)) = (errors.get(last)?, errors.get(last + 1)?);
+    // Where the straight line between the samples enters the band.
+    Some(t + (next - t) * (error - band) / (error - within) - first.0)
 }
 
 /// A fall is the worst.

@@ -5,8 +5,8 @@ use crate::commands::{
     completions::CompletionsArguments, excite::ExciteArguments, identify::IdentifyArguments,
     linearize::LinearizeArguments, lqr::LqrArguments, optimality::OptimalityArguments,
     refine::RefineArguments, rehearse::RehearseArguments, reproduce::ReproduceArguments,
-    scenario::ScenarioArguments, simulate::SimulateArguments, verify::VerifyArguments,
-    view::ViewArguments, wheels::WheelsArguments,
+    scenario::ScenarioArguments, simulate::SimulateArguments, tune::TuneArguments,
+    verify::VerifyArguments, view::ViewArguments, wheels::WheelsArguments,
 };
 use ballbot_scenario::number;
 use clap::{Parser, Subcommand};
@@ -47,6 +47,7 @@ impl Command {
             Self::Rehearse(arguments) => !arguments.json,
             Self::Certify(arguments) => !arguments.json,
             Self::Campaign(arguments) => !arguments.json,
+            Self::Tune(arguments) => !arguments.json && arguments.action.is_none(),
             Self::Optimality(arguments) => !arguments.json,
             _ => false,
         }
@@ -86,6 +87,8 @@ pub enum Command {
     View(ViewArguments),
     /// Run many closed loops: where the guarantee holds, and where it ends
     Campaign(CampaignArguments),
+    /// Search for a controller's weights, horizon and other keys, for goals and within limits
+    Tune(TuneArguments),
     /// Compare closed-loop costs with those of nonlinear MPC, converged by IPOPT
     Optimality(OptimalityArguments),
     /// Print the completions for a shell

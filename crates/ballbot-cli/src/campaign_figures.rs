@@ -1,5 +1,6 @@
 //! The figures of a campaign of one's own: where it fails, by which input, and how its runs go.
 
+use crate::parallel_figure::{self, Coordinate, Kind};
 use ballbot_campaign::{Campaign, CampaignError, Cell, RowFile, Summary, share};
 use ballbot_scenario::Files;
 use ballbot_studies::recorded::Columns;
@@ -253,65 +254,27 @@ fn marginals(title: &str, inputs: &[Input], failed: &[bool], confidence: f64) ->
     }
 }
 
-/// Each run a line over its inputs, from the smallest value of each to the largest.
+/// Each run a line over its inputs.
 fn parallel(title: &str, inputs: &[Input], failed: &[bool]) -> Figure {
-    let ranges: Vec<(f64, f64)> = inputs
-        .iter()
-        .map(|input| {
-            let ends = |(low, high): (f64, f64), x: &f64| (low.min(*x), high.max(*x));
-            input
-                .values
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), ends)
-        })
-        .collect();
-    let lines = |wanted: bool| {
-        let (mut x, mut y) = (Vec::new(), Vec::new());
-        let runs = failed
-            .iter()
-            .enumerate()
-            .filter(|(_, failed)| **failed == wanted);
-        for (run, _) in runs.take(LINES) {
-            for (axis, (input, (low, high))) in inputs.iter().zip(&ranges).enumerate() {
-                x.push(axis as f64 + 1.0);
-                y.push((input.values[run] - low) / (high - low));
-            }
-            x.push(inputs.len() as f64);
-            y.push(f64::NAN);
+    let coordinates = inputs.iter().map(|input| Coordinate {
+        name: input.name.clone(),
+        values: input.values.clone(),
+        is_logarithmic: false,
+    });
+    let kind = |label: &str, role, wanted: bool| {
+        let cases = (0..failed.len()).filter(|case| failed[*case] == wanted);
+        Kind {
+            label: label.to_owned(),
+            role,
+            cases: cases.take(LINES).collect(),
         }
-        (x, y)
     };
-    let style = Style::Line(Dash::Solid);
-    let [(good_x, good_y), (bad_x, bad_y)] = [false, true].map(lines);
-    let mut series = vec![
-        Series::new("success", &good_x, &good_y, style, Role::Member(2)),
-        Series::new("failure", &bad_x, &bad_y, style, Role::Linear),
+    let kinds = [
+        kind("success", Role::Member(2), false),
+        kind("failure", Role::Linear, true),
     ];
-    for (axis, (input, (low, high))) in inputs.iter().zip(&ranges).enumerate() {
-        let place = axis as f64 + 1.0;
-        let label = format!("{}: {} from {low:.4} to {high:.4}", axis + 1, input.name);
-        series.push(Series::new(
-            &label,
-            &[place, place],
-            &[0.0, 1.0],
-            style,
-            Role::Reference,
-        ));
-    }
-    let mut panel = Panel::new(
-        "input, numbered as in the legend",
-        "from its smallest value to its largest",
-        series,
-    );
-    panel.x_range = Some((0.8, inputs.len() as f64 + 0.2));
-    panel.y_range = Some((-0.03, 1.03));
-    Figure {
-        title: title.to_owned(),
-        panels: vec![panel],
-        columns: 1,
-        width: 900.0,
-        height: 560.0,
-    }
+    let x_label = "input, numbered as in the legend";
+    parallel_figure::figure(title, x_label, &coordinates.collect::<Vec<_>>(), &kinds)
 }
 
 /// Instants of the figure of bands.

@@ -29,6 +29,7 @@ pub mod interrupt;
 pub mod json;
 pub mod optimality_figure;
 pub mod output;
+pub mod parallel_figure;
 pub mod program;
 pub mod progress;
 pub mod refinement_file;
@@ -36,6 +37,7 @@ pub mod reproduction;
 pub mod results;
 pub mod run_figures;
 pub mod table;
+pub mod tuning_figures;
 
 use arguments::{Arguments, Command};
 use commands::CommandError;
@@ -70,6 +72,7 @@ fn dispatch(command: Command) -> Result<String, CommandError> {
         Command::Verify(arguments) => commands::verify::run(&arguments),
         Command::View(arguments) => commands::view::run(&arguments),
         Command::Campaign(arguments) => commands::campaign::run(&arguments),
+        Command::Tune(arguments) => commands::tune::run(&arguments),
         Command::Optimality(arguments) => commands::optimality::run(&arguments),
         Command::Completions(arguments) => commands::completions::run(&arguments),
     }

@@ -158,6 +158,23 @@ impl Drop for Draft {
     }
 }
 
+/// Adds to the end of a file that grows while a command works, on the disk: an interrupt comes before
+/// or after.
+///
+/// # Errors
+/// The file system refuses.
+pub fn append(path: &Path, mut file: &fs::File, text: &str) -> Result<(), FileError> {
+    let mut writes = Writes::lock();
+    let written = file.write_all(text.as_bytes());
+    written
+        .and_then(|()| file.sync_data())
+        .map_err(FileError::at(path))?;
+    if !writes.done.iter().any(|done| done == path) {
+        writes.done.push(path.to_owned());
+    }
+    Ok(())
+}
+
 /// Writes every file under a temporary name beside its place, then renames them all. When one
 /// cannot be written, none of the old files is touched and no temporary file stays behind.
 /// Directories that are missing are made. A symbolic link stays, and the file that it names is

@@ -231,6 +231,19 @@ mod tests {
     }
 
     #[test]
+    fn a_name_that_is_like_one_of_those_expected_is_asked_for() {
+        let said = toml_message("unknown field `horizn`, expected one of `t_s`, `horizon`");
+        assert!(
+            said.ends_with("`horizon`; did you mean `horizon`?"),
+            "{said}"
+        );
+        let said = toml_message("unknown variant `medain`, expected `median` or `mean`");
+        assert!(said.ends_with("did you mean `median`?"), "{said}");
+        let other = "unknown field `xyz`, expected one of `t_s`, `horizon`";
+        assert_eq!(toml_message(other), other);
+    }
+
+    #[test]
     fn readings_that_are_not_believed_are_told_by_sensor() {
         let seen = |theta, restart| Observation {
             verdicts: [Verdict::Used, theta, Verdict::NotNeeded, Verdict::Missing],

@@ -75,8 +75,43 @@ fn a_row_is_what_its_scenario_gives() {
         let effort: f64 = run.samples.iter().map(|s| s.u[0] * s.u[0]).sum::<f64>() * 0.05;
         assert_eq!(numbers(campaign, &row, "effort_n2m2_s"), [effort]);
         assert_eq!(numbers(campaign, &row, "end_s"), [run.final_time]);
+        let rms = numbers(campaign, &row, "rms_torque_nm")[0];
+        assert!((rms * rms * run.final_time / effort - 1.0).abs() < 1e-12);
         let success = Cell::Flag(tilt <= 0.5);
         assert_eq!(column(campaign, &row, "success"), [success]);
+    });
+}
+
+/// By its definition: outside of the band just before, and inside from then on.
+#[test]
+fn a_run_is_settled_when_it_stays_within_2_percent() {
+    let text = "title = \"x\"\nscenario = \"two-setpoints\"\nruns = 1\n";
+    with(text, |campaign| {
+        let replay = campaign.replay(0, NO_CLOCK).unwrap();
+        let settling = numbers(campaign, &[replay.row], "settling_s")[0];
+        let trajectory = &replay.record.planes[0].trajectory;
+        let times = trajectory.samples.iter().map(|sample| sample.t);
+        let times = times.chain([trajectory.final_time]);
+        // Back at 0 from the jump at 3 s on, where the reference is 0, too.
+        let errors = trajectory.states().map(|x| x[0].abs());
+        let after: Vec<(f64, f64)> = times.zip(errors).filter(|(t, _)| *t > 2.999).collect();
+        let largest = after
+            .iter()
+            .fold((0.0, 0.0), |most, at| match at.1 > most.1 {
+                true => *at,
+                false => most,
+            });
+        assert!(settling > 0.3 && settling < 1.0, "{settling}");
+        let (settled, outside): (Vec<_>, Vec<_>) =
+            after.iter().partition(|(t, _)| *t >= largest.0 + settling);
+        assert!(settled.iter().all(|(_, error)| *error <= 0.02 * largest.1));
+        assert!(outside.last().unwrap().1 > 0.02 * largest.1);
+    });
+    // Nobody settles on a curve.
+    let text = "title = \"x\"\nscenario = \"lissajous\"\nruns = 1\n[set]\nduration_s = 1.0\n";
+    with(text, |campaign| {
+        let row = rows(campaign);
+        assert_eq!(column(campaign, &row, "settling_s"), [Cell::Missing]);
     });
 }
 

@@ -16,6 +16,7 @@ pub mod reproduce;
 pub mod robot;
 pub mod scenario;
 pub mod simulate;
+pub mod tune;
 pub mod verify;
 pub mod view;
 pub mod wheels;
@@ -70,6 +71,9 @@ pub enum CommandError {
     /// A campaign of one's own that has no result.
     #[error(transparent)]
     Campaign(#[from] ballbot_campaign::CampaignError),
+    /// A tuning that has no result.
+    #[error(transparent)]
+    Tuning(#[from] ballbot_tuning::TuningError),
     /// The cluster.
     #[error("{0}")]
     Cluster(String),

@@ -1,5 +1,5 @@
 //! The commands of the program `ballbot` that run closed loops: `simulate`, `scenario`,
-//! `rehearse`, `reproduce`, `campaign`.
+//! `rehearse`, `reproduce`, `campaign`, `tune`.
 
 mod both_planes;
 mod campaign;
@@ -11,6 +11,7 @@ mod rehearsal;
 mod reproduce;
 mod scenario;
 mod simulate;
+mod tuning;
 
 use std::path::Path;
 

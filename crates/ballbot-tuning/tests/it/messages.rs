@@ -1,0 +1,161 @@
+//! What makes no sense is refused with its key, its value and what would be right.
+
+use crate::{PROGRAM, TWO_GOALS};
+use ballbot_tuning::{Tuning, TuningSource};
+use std::fs;
+
+fn message(text: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tuning.toml");
+    fs::write(&path, text).unwrap();
+    let source = match TuningSource::load(&path) {
+        Ok(source) => source,
+        Err(error) => return error.to_string(),
+    };
+    match Tuning::new(&source, source.folder(), PROGRAM) {
+        Ok(_) => panic!("{text} is taken"),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn mistakes_are_named() {
+    for (from, to, parts) in [
+        (
+            "patience = 3",
+            "patiense = 3",
+            ["patiense", "did you mean `patience`?"],
+        ),
+        (
+            "measure = \"rms_error_rad\"",
+            "measure = \"rms_eror_rad\"",
+            ["rms_eror_rad", "did you mean `rms_error_rad`?"],
+        ),
+        (
+            "statistic = \"mean\"",
+            "statistic = \"men\"",
+            ["men", "did you mean `mean`?"],
+        ),
+        (
+            "log_uniform = [20.0",
+            "log_unifrom = [20.0",
+            ["log_unifrom", "did you mean `log_uniform`?"],
+        ),
+        (
+            "\"controller.horizon\" =",
+            "\"controller.horizn\" =",
+            ["controller.horizn", "say one with `start`"],
+        ),
+        (
+            "{ integers = [8, 24] }",
+            "{ integers = [24, 8] }",
+            ["integers = [24, 8]", "the smaller one first"],
+        ),
+        (
+            "{ integers = [8, 24] }",
+            "{ integers = [8, 12] }",
+            [
+                "parameters.\"controller.horizon\" = 20",
+                "not among the values",
+            ],
+        ),
+        (
+            "{ integers = [8, 24] }",
+            "{ uniform = [8.0, 24.0] }",
+            ["horizon", "whole number"],
+        ),
+        (
+            "{ integers = [8, 24] }",
+            "{ }",
+            ["controller.horizon", "exactly one"],
+        ),
+        (
+            "log_uniform = [100.0",
+            "log_uniform = [-100.0",
+            ["controller.r", "positive"],
+        ),
+        (
+            "\"controller.r\" =",
+            "\"controller.q\" =",
+            ["controller.q", "parameters has a value for it already"],
+        ),
+        (
+            "\"controller.r\" =",
+            "\"duration_s\" =",
+            ["duration_s", "worlds.set has a value"],
+        ),
+        (
+            "\"controller.r\" =",
+            "\"initial_state.theta_rad\" =",
+            ["initial_state.theta_rad", "worlds.vary has a value"],
+        ),
+        (
+            "measure = \"rms_error_rad\"\n",
+            "",
+            ["goal[0].measure = (absent)", "needs a measure"],
+        ),
+        (
+            "measure = \"rms_error_rad\"",
+            "measure = \"mean_step_us\"",
+            ["goal[0].measure = mean_step_us", "differs"],
+        ),
+        (
+            "measure = \"rms_error_rad\"",
+            "measure = \"closed_loop_cost\"",
+            ["closed_loop_cost", "own weights"],
+        ),
+        (
+            "statistic = \"worst\"",
+            "statistic = { quantile = 1.5 }",
+            ["goal[1].statistic.quantile = 1.5", "below 1"],
+        ),
+        (
+            "at_most = 0.0\n",
+            "at_most = -1.0\n",
+            ["limit[0].at_most = -1.0", "0 or more"],
+        ),
+        (
+            "[held_out]",
+            "[held_out]\nseed = 1",
+            ["held_out.seed = 1", "differ"],
+        ),
+        (
+            "[held_out]",
+            "[held_out]\nconfidence = 95",
+            ["held_out.confidence = 95.0", "0.95"],
+        ),
+        (
+            "evaluations = 60",
+            "evaluations = 35",
+            ["search.evaluations = 35", "from 36, for the start"],
+        ),
+        (
+            "patience = 3",
+            "step = 0.0",
+            ["search.step = 0.0", "above 0"],
+        ),
+        (
+            "uniform = [-0.1, 0.1]",
+            "uniform = [0.1, -0.1]",
+            ["vary[0]", "the smaller one first"],
+        ),
+        (
+            "single-setpoint-terminal",
+            "single-setpoint-termnal",
+            ["unknown scenario", "did you mean"],
+        ),
+    ] {
+        assert!(TWO_GOALS.contains(from), "{from}");
+        let said = message(&TWO_GOALS.replacen(from, to, 1));
+        for part in parts {
+            assert!(said.contains(part), "{to}: {said}");
+        }
+    }
+    let goals = TWO_GOALS.to_owned()
+        + &"[[goal]]\nmeasure = \"settling_s\"\nstatistic = \"mean\"\n".repeat(2);
+    assert!(
+        message(&goals).contains("goal = (4): 1 to 3 goals"),
+        "{}",
+        message(&goals)
+    );
+}
