@@ -2,6 +2,7 @@
 //! q = (phi, theta), written once, on every kind of number.
 
 use crate::embedding::state_matrix;
+use crate::friction::DriveFriction;
 use crate::parameters::Ballbot;
 use lpvmpc::{Number, Tangent};
 use nalgebra::{Matrix2, Vector4};
@@ -70,12 +71,7 @@ impl<T: Number> Ballbot<T> {
     #[inline(always)]
     pub(crate) fn tangent_of_f(&self, x: &Vector4<T>, torque: T) -> Tangent<T, 4, 1> {
         let zero = T::constant(0.0);
-        let friction = if self.drive.is_none() {
-            zero
-        } else {
-            self.drive.coefficient(x[2] - x[3])
-        };
-        let slopes = self.slopes(x, torque, friction);
+        let slopes = self.slopes(x, torque, DriveFriction::coefficient);
         let row = |i: usize| {
             [
                 slopes.by_theta[i],
@@ -93,11 +89,16 @@ impl<T: Number> Ballbot<T> {
         )
     }
 
-    /// The accelerations and their slopes, with `friction` for the slope of the drive's friction, m^2/s.
+    /// The accelerations and their slopes, with `slope` for that of the drive's friction at a speed, m^2/s.
     ///
     /// From M q_ddot = force: M dq_ddot = dforce - dM q_ddot, which is half the work of dual numbers.
     #[inline(always)]
-    pub(crate) fn slopes(&self, x: &Vector4<T>, torque: T, friction: T) -> Slopes<T> {
+    pub(crate) fn slopes(
+        &self,
+        x: &Vector4<T>,
+        torque: T,
+        slope: impl Fn(DriveFriction<T>, T) -> T,
+    ) -> Slopes<T> {
         let (phi_dot, theta_dot) = (x[2], x[3]);
         let attitude = Attitude::level(x[1]);
         let (sin_theta, cos_theta) = (attitude.sin_normal, attitude.cos_normal);
@@ -113,12 +114,18 @@ impl<T: Number> Ballbot<T> {
         let [phi_ddot, theta_ddot] = accelerate(force_phi, force_theta);
         // The coupling stands in M with a minus sign, and moves by arm sin(theta) per theta.
         let shift = self.arm() * sin_theta;
+        let by_theta = accelerate(
+            swing * theta_dot * cos_theta + shift * theta_ddot,
+            self.pull() * cos_theta + shift * phi_ddot,
+        );
+        let friction = if self.drive.is_none() {
+            T::constant(0.0)
+        } else {
+            slope(self.drive, speed)
+        };
         Slopes {
             accelerations: [phi_ddot, theta_ddot],
-            by_theta: accelerate(
-                swing * theta_dot * cos_theta + shift * theta_ddot,
-                self.pull() * cos_theta + shift * phi_ddot,
-            ),
+            by_theta,
             by_phi_dot: accelerate(-self.b4 - friction, friction),
             by_theta_dot: accelerate(swing * (sin_theta + sin_theta) + friction, -friction),
             by_torque: accelerate(self.gear(), -self.gear()),

@@ -62,7 +62,7 @@ impl<T: Number> DriveFriction<T> {
 
     /// dF/dv at the speed `speed` in rad/s: m^2/s.
     #[inline(always)]
-    pub(crate) fn slope(&self, speed: T) -> T {
+    pub(crate) fn slope(self, speed: T) -> T {
         if self.coulomb == T::constant(0.0) {
             return self.viscous;
         }

@@ -37,7 +37,7 @@ impl<T: Number> Ballbot<T> {
             by_torque,
             inverse,
             coupling,
-        } = self.slopes(x, torque, self.drive.slope(speed));
+        } = self.slopes(x, torque, DriveFriction::slope);
         let [phi_ddot, theta_ddot] = accelerations;
         let accelerate = |force_phi, force_theta| {
             self.accelerate_with(inverse, coupling, force_phi, force_theta)

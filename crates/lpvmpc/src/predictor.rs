@@ -386,7 +386,11 @@ impl Rk4 {
             return (0..periods).fold(*x, |x, _| model.derivative(&x, u));
         }
         let h = self.step_length(t_s);
-        (0..self.substeps).fold(*x, |x, _| Self::step(model, &x, u, h))
+        let mut x = *x;
+        for _ in 0..self.substeps {
+            x = Self::step(model, &x, u, h);
+        }
+        x
     }
 
     /// The state `h` seconds after `x` under the input `u`, by one step.
