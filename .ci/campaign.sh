@@ -1,9 +1,8 @@
 #!/usr/bin/env bash
-# Campaigns on real HyperQueue processes, on loopback: a worker and the server are killed (kill -9) in
-# the middle, and the merged result is bit for bit that of one process. HyperQueue comes from PyPI,
-# which has it as a Python module without the program `hq`, and without a journal. Where `hq` is there
-# (in the PATH, or named by HQ), --cluster is shown, too, with a server that comes back from its
-# journal.
+# Campaigns and a tuning on real HyperQueue processes, on loopback: a worker and the server are killed
+# (kill -9) in the middle, and the result is bit for bit that of one process. HyperQueue comes from
+# PyPI, which has it as a Python module without the program `hq` and without a journal: .ci/hq.py takes
+# its place. With the real one (in the PATH, or named by HQ) the server comes back from its journal.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 target=${CARGO_TARGET_DIR:-$PWD/target}
@@ -18,21 +17,23 @@ stop() { for id in "${started[@]}"; do kill -9 "$id" 2>/dev/null || true; done; 
 trap stop EXIT
 # Starts a process that is ended with the script, its output in the file $1.
 start() { "${@:2}" >"$work/$1" 2>&1 & started+=($!); }
-# Waits up to 60 s until there are $2 shards in the folder $1.
-shards() { find "$1/shards" -name 'shard-*.parquet' 2>/dev/null | wc -l; }
-await_shards() {
+# Waits up to 60 s until the command says yes.
+await() {
     for _ in $(seq 600); do
-        [ "$(shards "$1")" -ge "$2" ] && return
+        "$@" && return
         sleep 0.1
     done
-    echo "no $2 shards in $1 after 60 s" >&2
+    echo "not after 60 s: $*" >&2
     return 1
 }
+shards() { find "$1/shards" -name 'shard-*.parquet' 2>/dev/null | wc -l; }
+has_shards() { [ "$(shards "$1")" -ge "$2" ]; }
+lines() { cat "$1/journal.jsonl" 2>/dev/null | wc -l; }
+has_lines() { [ "$(lines "$1")" -ge "$2" ]; }
 same() {
-    for file in runs.parquet runs.csv map.png; do
-        cmp "$work/whole/$file" "$1/$file"
+    for file in "${@:3}"; do
+        cmp "$1/$file" "$2/$file"
     done
-    echo "$2: $(shards "$1") shards, bit for bit what one process has"
 }
 
 campaign=docs/examples/campaigns/delay-and-slope.toml
@@ -47,54 +48,78 @@ for name in rare-tilt known-share; do
     "$ballbot" campaign "docs/examples/campaigns/$name.toml" --out "$work/$name"
 done
 
-echo "== HyperQueue from PyPI"
-python3 -m venv "$work/venv"
-"$work/venv/bin/pip" --quiet --disable-pip-version-check install hyperqueue
-python=("$work/venv/bin/python" .ci/campaign.py)
-run=("${python[@]}" run "$work/server" "$ballbot" "$campaign" "$parts" "$work/python")
-start server.txt "${python[@]}" server "$work/server"
-server=$!
-start worker.txt "${python[@]}" worker "$work/server"
-worker=$!
-start client.txt "${run[@]}"
-await_shards "$work/python" 3
+HQ=${HQ:-$(command -v hq || true)}
+journal=(--host localhost --journal "$work/journal")
+if [ -z "$HQ" ]; then
+    python3 -m venv "$work/venv"
+    "$work/venv/bin/pip" --quiet --disable-pip-version-check install hyperqueue
+    HQ=$work/hq
+    printf '#!/bin/sh\nexec "%s" "%s" "$@"\n' "$work/venv/bin/python" "$PWD/.ci/hq.py" >"$HQ"
+    chmod +x "$HQ"
+    journal=()
+fi
+export HQ HQ_SERVER_DIR=$work/server
+start_server() {
+    start "$1.txt" "$HQ" server start "${journal[@]}"
+    server=${started[-1]}
+    await test -e "$HQ_SERVER_DIR/hq-current/access.json"
+}
+start_worker() {
+    start "$1.txt" "$HQ" worker start --cpus 1
+    worker=${started[-1]}
+}
+on_cluster=(--cluster hyperqueue --server-dir "$HQ_SERVER_DIR")
+
+echo "== a campaign on HyperQueue"
+start_server server1
+start_worker worker1
+start_worker worker2
+run=("$ballbot" --quiet campaign "$campaign" --shards "$parts" "${on_cluster[@]}" --out "$work/cluster")
+start follower.txt "${run[@]}"
+follower=${started[-1]}
+await has_shards "$work/cluster" 3
 kill -9 "$worker"
-await_shards "$work/python" 8
+await has_shards "$work/cluster" 8
 kill -9 "$server"
 sleep 1 # for what the worker had begun
-left=$(shards "$work/python")
+left=$(shards "$work/cluster")
 [ "$left" -lt "$parts" ] || { echo "it was over before the server was killed" >&2; exit 1; }
-if "$ballbot" campaign merge "$work/python" 2>"$work/missing.txt"; then
+if "$ballbot" campaign merge "$work/cluster" 2>"$work/missing.txt"; then
     echo "a campaign with missing shards was merged" >&2
     exit 1
 fi
 grep -q "are missing" "$work/missing.txt"
-rm -rf "$work/server"
-start server2.txt "${python[@]}" server "$work/server"
-start worker2.txt "${python[@]}" worker "$work/server"
-"${run[@]}" 2>/dev/null
-"$ballbot" --quiet campaign merge "$work/python"
-same "$work/python" "a worker killed, then the server after $left shards"
-
-hq=${HQ:-$(command -v hq || true)}
-if [ -n "$hq" ]; then
-    echo "== --cluster hyperqueue, with $("$hq" --version)"
-    export HQ=$hq HQ_SERVER_DIR=$work/hq
-    server=("$hq" server start --host localhost --journal "$work/journal")
-    start hq-server.txt "${server[@]}"
-    first_server=$!
-    sleep 1
-    for name in worker1 worker2; do start "hq-$name.txt" "$hq" worker start --cpus 1; done
-    worker=$!
-    "$ballbot" --quiet campaign "$campaign" --shards "$parts" --cluster hyperqueue \
-        --server-dir "$HQ_SERVER_DIR" --out "$work/hq-results" & follower=$!
-    await_shards "$work/hq-results" 3
-    kill -9 "$worker"
-    await_shards "$work/hq-results" 8
-    kill -9 "$first_server"
-    start hq-server2.txt "${server[@]}"
-    sleep 1
-    start hq-worker3.txt "$hq" worker start --cpus 1
-    wait "$follower"
-    same "$work/hq-results" "a worker and the server killed"
+if [ "${#journal[@]}" = 0 ]; then
+    # A server without a journal knows of no job: the client is asked anew.
+    kill "$follower"
+    rm -rf "$HQ_SERVER_DIR"
 fi
+start_server server2
+start_worker worker3
+if [ "${#journal[@]}" = 0 ]; then
+    "${run[@]}"
+else
+    wait "$follower"
+fi
+same "$work/whole" "$work/cluster" runs.parquet runs.csv map.png
+echo "a worker killed, then the server after $left shards: bit for bit what one process has"
+
+echo "== a tuning on HyperQueue"
+start_worker worker4
+sed 's/^evaluations = .*/evaluations = 60/; s/^runs = 128$/runs = 32/' \
+    docs/examples/tuning/paper.toml >"$work/tuning.toml"
+tune=("$ballbot" --quiet tune "$work/tuning.toml")
+"${tune[@]}" --out "$work/tuning"
+tune+=(--shards 4 "${on_cluster[@]}" --out "$work/tuning-cluster")
+start tuning.txt "${tune[@]}"
+follower=${started[-1]}
+await has_lines "$work/tuning-cluster" 10
+kill -9 "$worker"
+await has_lines "$work/tuning-cluster" 20
+kill -9 "$follower"
+left=$(lines "$work/tuning-cluster")
+[ "$left" -lt "$(lines "$work/tuning")" ] || { echo "it was over before it was killed" >&2; exit 1; }
+"${tune[@]}"
+same "$work/tuning" "$work/tuning-cluster" journal.jsonl candidates.csv tuned.toml report.html front.png
+[ ! -e "$work/tuning-cluster/batches" ]
+echo "a worker killed, then the client after $left lines: bit for bit what one process has"

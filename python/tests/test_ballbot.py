@@ -278,13 +278,15 @@ def test_the_lock_is_let_go_and_progress_told(
     assert "simulating" in capfd.readouterr().err
 
 
-def test_an_interrupt_ends_the_work() -> None:
+def test_an_interrupt_ends_the_work(tmp_path: Path) -> None:
     code = (
         "from lpvmpc import ballbot; print('on', flush=True)\n"
         "ballbot.campaign({'title': 't', 'scenario': 'two-setpoints', 'runs': 10_000_000})"
     )
+    # In a folder without `lpvmpc`: the installed package is meant, not the sources beside the tests.
+    command = [sys.executable, "-c", code]
     process = subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     assert process.stdout is not None and process.stdout.readline() == "on\n"
     time.sleep(0.5)

@@ -1,22 +1,19 @@
 //! The candidates of a search: run in all worlds, taken from the journal, or known already.
 
+use crate::batch::{Batch, Tried, Worlds};
 use crate::error::TuningError;
 use crate::journal::{Entry, Journal, State};
-use crate::judge::{Judge, Judged, Outcome, Ran};
+use crate::judge::{Judged, Outcome, Ran};
 use crate::search::Problem;
-use crate::tuning::Hooks;
-use ballbot_campaign::{Axis, Campaign, CampaignError, Column};
+use crate::tuning::{Hooks, Tuning};
+use ballbot_campaign::Axis;
 use ballbot_scenario::Files;
-use rayon::prelude::*;
 use std::collections::{HashMap, VecDeque};
-use std::time::Duration;
 use toml::Value;
 
 /// All candidates so far.
 pub struct Candidates<'a, 'b, F, E> {
-    worlds: &'b Campaign<'a, F>,
-    axes: &'b [Axis],
-    judge: &'b Judge,
+    tuning: &'b Tuning<'a, F>,
     hooks: Hooks<'b, E>,
     /// Units of the goals, once the start is known.
     scale: Vec<f64>,
@@ -33,10 +30,8 @@ pub struct Candidates<'a, 'b, F, E> {
 const PARTS: u64 = 8;
 
 /// A candidate on its way.
-struct Running<F> {
-    /// Its place among those that are wanted.
-    place: usize,
-    campaign: F,
+#[derive(Default)]
+struct Running {
     runs: Vec<Ran>,
     /// Why it is no scenario.
     refused: Option<String>,
@@ -53,18 +48,10 @@ struct Ended {
 
 impl<'a, 'b, F: Files + Copy + Sync, E: From<TuningError>> Candidates<'a, 'b, F, E> {
     /// None yet; `done` is what the journal has.
-    pub fn new(
-        worlds: &'b Campaign<'a, F>,
-        axes: &'b [Axis],
-        judge: &'b Judge,
-        mut done: Journal,
-        hooks: Hooks<'b, E>,
-    ) -> Self {
+    pub fn new(tuning: &'b Tuning<'a, F>, mut done: Journal, hooks: Hooks<'b, E>) -> Self {
         let entries = std::mem::take(&mut done.entries);
         Self {
-            worlds,
-            axes,
-            judge,
+            tuning,
             hooks,
             scale: Vec::new(),
             entries: Vec::new(),
@@ -77,17 +64,12 @@ impl<'a, 'b, F: Files + Copy + Sync, E: From<TuningError>> Candidates<'a, 'b, F,
 
     /// Runs the start, whether the journal has it or not.
     pub fn start(&mut self, values: &[Value]) -> Result<Outcome, E> {
-        let all = (0..self.worlds.runs()).into_par_iter();
-        let columns = self.worlds.columns();
-        let ran = all.map(|run| {
-            let row = self.worlds.run(run, &|| Duration::ZERO)?;
-            Ok(self.judge.ran(&columns, &row))
-        });
-        let ran = ran
-            .collect::<Result<Vec<Ran>, CampaignError>>()
-            .map_err(TuningError::from)?;
-        let judged = self.judge.judged(&ran, ran.len());
-        self.scale = self.judge.scale(&judged);
+        let ran = self
+            .tuning
+            .run_all(Worlds::Search, values, &mut *self.hooks.run)?;
+        let judge = self.tuning.judge();
+        let judged = judge.judged(&ran, ran.len());
+        self.scale = judge.scale(&judged);
         let entry = self.entry(values, State::Whole, ran.len() as u64, &judged);
         if let Some(first) = self.done.pop_front() {
             if first != entry {
@@ -113,7 +95,6 @@ impl<'a, 'b, F: Files + Copy + Sync, E: From<TuningError>> Candidates<'a, 'b, F,
     }
 
     fn entry(&self, values: &[Value], state: State, runs: u64, judged: &Judged) -> Entry {
-        let finite = |number: &f64| Some(*number).filter(|number| number.is_finite());
         let json = |value: &Value| serde_json::to_value(value).unwrap_or_default();
         Entry {
             candidate: self.entries.len(),
@@ -121,8 +102,8 @@ impl<'a, 'b, F: Files + Copy + Sync, E: From<TuningError>> Candidates<'a, 'b, F,
             state,
             refused: None,
             runs,
-            goals: judged.goals.iter().map(finite).collect(),
-            limits: judged.limits.iter().map(finite).collect(),
+            goals: judged.goals.clone(),
+            limits: judged.limits.clone(),
             lost: judged.lost,
         }
     }
@@ -139,11 +120,11 @@ impl<'a, 'b, F: Files + Copy + Sync, E: From<TuningError>> Candidates<'a, 'b, F,
     fn keep(&mut self, entry: Entry) -> Outcome {
         let outcome = match entry.state {
             State::Refused => Outcome {
-                goals: vec![f64::INFINITY; self.judge.goals.len()],
+                goals: vec![f64::INFINITY; self.tuning.judge().goals.len()],
                 violation: f64::INFINITY,
                 exact: false,
             },
-            _ => self.judge.outcome(&entry.judged(), &self.scale),
+            _ => self.tuning.judge().outcome(&entry.judged(), &self.scale),
         };
         self.known.insert(name(&entry.values), self.entries.len());
         self.entries.push(entry);
@@ -154,52 +135,39 @@ impl<'a, 'b, F: Files + Copy + Sync, E: From<TuningError>> Candidates<'a, 'b, F,
 
     /// Runs candidates part by part, all of a part at once, until they are whole or given up.
     fn run(
-        &self,
+        &mut self,
         wanted: &[Vec<Value>],
         is_hopeless: &(dyn Fn(&Outcome) -> bool + Sync),
-    ) -> Result<Vec<Ended>, TuningError> {
-        let all = self.worlds.runs();
-        let columns = self.worlds.columns();
-        let mut running: Vec<Running<Campaign<'a, F>>> = Vec::new();
-        for (place, values) in wanted.iter().enumerate() {
-            let changes = self.axes.iter().zip(values);
-            let changes = changes.flat_map(|(axis, value)| {
-                axis.keys().iter().map(|key| (key.clone(), value.clone()))
-            });
-            running.push(Running {
-                place,
-                campaign: self.worlds.with(changes),
-                runs: Vec::new(),
-                refused: None,
-                is_over: false,
-            });
-        }
+    ) -> Result<Vec<Ended>, E> {
+        let all = self.tuning.runs();
+        let judge = self.tuning.judge();
+        let mut running: Vec<Running> = wanted.iter().map(|_| Running::default()).collect();
         let size = all.div_ceil(PARTS);
         let mut from = 0;
         while from < all {
             let until = all.min(from + size);
-            let open = running.iter().filter(|candidate| !candidate.is_over);
-            let pairs: Vec<(usize, u64)> = open
-                .flat_map(|candidate| (from..until).map(move |run| (candidate.place, run)))
-                .collect();
-            let rows = pairs.into_par_iter().map(|(place, run)| {
-                let ran = one(&running[place].campaign, self.judge, &columns, run);
-                (place, ran)
-            });
-            for (place, ran) in rows.collect::<Vec<_>>() {
-                match ran {
-                    Ok(ran) => running[place].runs.push(ran),
-                    Err(CampaignError::Refused { source, .. }) => {
-                        let candidate = &mut running[place];
-                        candidate.refused.get_or_insert_with(|| source.to_string());
+            let open = running.iter_mut().zip(wanted);
+            let mut open: Vec<(&mut Running, &Vec<Value>)> =
+                open.filter(|(candidate, _)| !candidate.is_over).collect();
+            if open.is_empty() {
+                break;
+            }
+            let values: Vec<&[Value]> = open.iter().map(|(_, values)| values.as_slice()).collect();
+            let batch = Batch::of(Worlds::Search, &values, from..until);
+            let tried = (self.hooks.run)(&batch)?;
+            for ((place, _), tried) in batch.loops.iter().zip(tried) {
+                let candidate = &mut open[*place].0;
+                match tried {
+                    Tried::Ran(ran) => candidate.runs.push(ran),
+                    Tried::Refused { problem, .. } => {
+                        candidate.refused.get_or_insert(problem);
                         candidate.is_over = true;
                     }
-                    Err(error) => return Err(error.into()),
                 }
             }
-            for candidate in running.iter_mut().filter(|candidate| !candidate.is_over) {
-                let judged = self.judge.judged(&candidate.runs, all as usize);
-                candidate.is_over = is_hopeless(&self.judge.outcome(&judged, &self.scale));
+            for (candidate, _) in open.iter_mut().filter(|(candidate, _)| !candidate.is_over) {
+                let judged = judge.judged(&candidate.runs, all as usize);
+                candidate.is_over = is_hopeless(&judge.outcome(&judged, &self.scale));
             }
             from = until;
         }
@@ -217,16 +185,6 @@ impl<'a, 'b, F: Files + Copy + Sync, E: From<TuningError>> Candidates<'a, 'b, F,
         });
         Ok(ended.collect())
     }
-}
-
-fn one<F: Files + Copy + Sync>(
-    campaign: &Campaign<'_, F>,
-    judge: &Judge,
-    columns: &[Column],
-    run: u64,
-) -> Result<Ran, CampaignError> {
-    let row = campaign.run(run, &|| Duration::ZERO)?;
-    Ok(judge.ran(columns, &row))
 }
 
 /// An entry that is not what it should be; the journal's first line is before entry 0.
@@ -263,7 +221,7 @@ impl<F: Files + Copy + Sync, E: From<TuningError>> Problem for Candidates<'_, '_
         is_hopeless: &(dyn Fn(&Outcome) -> bool + Sync),
     ) -> Result<Vec<Outcome>, E> {
         let values = points.iter().map(|point| {
-            let all = self.axes.iter().zip(point);
+            let all = self.tuning.axes().iter().zip(point);
             all.map(|(axis, u)| readable(axis, axis.value(*u)))
                 .collect::<Vec<Value>>()
         });
@@ -312,7 +270,10 @@ impl<F: Files + Copy + Sync, E: From<TuningError>> Problem for Candidates<'_, '_
                 runs,
                 refused,
             } = ended;
-            let judged = self.judge.judged(&runs, self.worlds.runs() as usize);
+            let judged = self
+                .tuning
+                .judge()
+                .judged(&runs, self.tuning.runs() as usize);
             let entry = Entry {
                 refused,
                 ..self.entry(values, state, runs.len() as u64, &judged)

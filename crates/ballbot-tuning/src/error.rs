@@ -49,6 +49,21 @@ pub enum TuningError {
         /// What is wrong.
         problem: String,
     },
+    /// A world does not take the start or the result.
+    #[error(
+        "world {world} ({drawn}) takes no such scenario: {problem}; narrow what varies in [worlds]"
+    )]
+    Refused {
+        /// Its number.
+        world: u64,
+        /// What it draws.
+        drawn: String,
+        /// What the scenario says.
+        problem: String,
+    },
+    /// Closed loops for other processes, or what these made of them.
+    #[error("{0}")]
+    Batch(String),
     /// No candidate keeps all limits.
     #[error(
         "no candidate keeps all limits, of {evaluations}; the closest one, {number}, has {closest}"

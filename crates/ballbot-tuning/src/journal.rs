@@ -1,7 +1,7 @@
 //! The journal: what was evaluated, line by line, so that none of it is run again.
 
 use crate::error::TuningError;
-use crate::judge::Judged;
+use crate::judge::{Judged, infinite};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -20,10 +20,12 @@ pub struct Entry {
     pub refused: Option<String>,
     /// The runs that were made.
     pub runs: u64,
-    /// Goals; `null` is infinite.
-    pub goals: Vec<Option<f64>>,
-    /// Limits; `null` is infinite.
-    pub limits: Vec<Option<f64>>,
+    /// Goals.
+    #[serde(with = "infinite")]
+    pub goals: Vec<f64>,
+    /// Limits.
+    #[serde(with = "infinite")]
+    pub limits: Vec<f64>,
     /// The mean share of a run's time that it did not last.
     pub lost: f64,
 }
@@ -43,13 +45,9 @@ pub enum State {
 impl Entry {
     /// Goals and limits; lower bounds where it was given up.
     pub fn judged(&self) -> Judged {
-        let numbers = |all: &[Option<f64>]| {
-            let numbers = all.iter().map(|number| number.unwrap_or(f64::INFINITY));
-            numbers.collect()
-        };
         Judged {
-            goals: numbers(&self.goals),
-            limits: numbers(&self.limits),
+            goals: self.goals.clone(),
+            limits: self.limits.clone(),
             lost: self.lost,
             exact: self.state == State::Whole,
         }

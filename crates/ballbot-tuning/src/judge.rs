@@ -3,17 +3,36 @@
 use crate::error::TuningError;
 use crate::file::{Statistic, TuningFile};
 use ballbot_campaign::{Cell, Column, Ending, Measure, Row};
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// What the goals and limits need of a run.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Ran {
     /// Whether it came to its end and kept what a success must.
     pub success: bool,
     /// The share of its time that it did not last.
     pub lost: f64,
     /// The measures, in the judge's order; infinite where the run did not come to its end, or has none.
+    #[serde(with = "infinite")]
     pub numbers: Vec<f64>,
+}
+
+/// Numbers in JSON, which has no infinite ones: `null`.
+pub(crate) mod infinite {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub fn serialize<S: Serializer>(numbers: &[f64], to: S) -> Result<S::Ok, S::Error> {
+        let finite = |number: &f64| Some(*number).filter(|number| number.is_finite());
+        numbers.iter().map(finite).collect::<Vec<_>>().serialize(to)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+        let numbers = Vec::<Option<f64>>::deserialize(from)?;
+        let number = |number: Option<f64>| number.unwrap_or(f64::INFINITY);
+        Ok(numbers.into_iter().map(number).collect())
+    }
 }
 
 /// A statistic of a measure, with what it must or should not exceed.

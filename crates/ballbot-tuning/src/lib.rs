@@ -4,6 +4,7 @@
 //! | for | use |
 //! |---|---|
 //! | a tuning, read and checked | [`TuningSource`], [`Tuning`] |
+//! | closed loops, run here or by other processes | [`Batch`], [`Tuning::run`], [`Tuning::run_part`] |
 //! | its search, which goes on where a journal ends | [`Tuning::search`], [`Journal`] |
 //! | before and after, in worlds that it has not seen | [`Tuning::held_out`], [`Tuning::compare`] |
 //! | the scenario with what was found | [`Tuning::document`], [`with_files`] |
@@ -13,6 +14,7 @@
     reason = "a comparison with NaN must take the failing branch"
 )]
 
+mod batch;
 mod candidates;
 mod compare;
 mod document;
@@ -21,11 +23,13 @@ mod file;
 mod journal;
 mod judge;
 mod pareto;
+mod part;
 mod search;
 mod source;
 mod statistic;
 mod tuning;
 
+pub use batch::{Batch, Run, Tried, Worlds};
 pub use compare::Comparison;
 pub use document::with_files;
 pub use error::TuningError;
@@ -36,6 +40,7 @@ pub use file::{
 pub use journal::{Entry, Journal, State};
 pub use judge::{Judge, Judged, Outcome, Quantity, Ran};
 pub use pareto::{dominates, front};
+pub use part::digest;
 pub use search::{Plan, Problem, SearchEnd, Searched, search, value, weightings};
 pub use source::TuningSource;
 pub use tuning::{Found, Hooks, Tuning};

@@ -1,5 +1,6 @@
 //! A tuning that has passed its checks, and its search.
 
+use crate::batch::{Run, Worlds, from_json};
 use crate::candidates::Candidates;
 use crate::compare::{Comparison, compare};
 use crate::error::TuningError;
@@ -9,10 +10,8 @@ use crate::judge::{Judge, Outcome, Quantity, Ran};
 use crate::pareto;
 use crate::search::{self, Plan, Searched, value, weightings};
 use crate::source::TuningSource;
-use ballbot_campaign::{Axis, Campaign, CampaignError, Cell, is_within, named_seed};
+use ballbot_campaign::{Axis, Campaign, Cell, is_within, named_seed};
 use ballbot_scenario::{Files, Scenario};
-use rayon::prelude::*;
-use std::time::Duration;
 use toml::Value;
 
 /// A tuning that has passed its checks. What it finds is a function of its file and the scenario alone:
@@ -63,6 +62,8 @@ impl Found {
 
 /// What happens while a tuning runs.
 pub struct Hooks<'a, E> {
+    /// Who runs the closed loops.
+    pub run: Run<'a, E>,
     /// Text that is to be added to the journal; lost when it fails.
     pub append: &'a mut (dyn FnMut(&str) -> Result<(), E> + Send),
     /// How many candidates are done.
@@ -161,11 +162,7 @@ impl<'a, F: Files + Copy + Sync> Tuning<'a, F> {
 
     /// The values of a candidate, in the order of the parameters.
     pub fn values(&self, candidate: &Entry) -> Vec<Value> {
-        let values = candidate.values.iter();
-        // What came from TOML goes back into it.
-        values
-            .filter_map(|value| Value::try_from(value).ok())
-            .collect()
+        from_json(&candidate.values)
     }
 
     /// These values as cells of their columns.
@@ -195,7 +192,7 @@ impl<'a, F: Files + Copy + Sync> Tuning<'a, F> {
         let search = &self.source.file().search;
         let unit = |(axis, value): (&Axis, &Value)| axis.unit(value).unwrap_or(0.5);
         let point: Vec<f64> = self.axes.iter().zip(&self.start).map(unit).collect();
-        let mut candidates = Candidates::new(&self.worlds, &self.axes, &self.judge, done, hooks);
+        let mut candidates = Candidates::new(self, done, hooks);
         let outcome = candidates.start(&self.start)?;
         let plan = Plan {
             weightings: weightings(self.judge.goals.len()),
@@ -237,17 +234,21 @@ impl<'a, F: Files + Copy + Sync> Tuning<'a, F> {
     /// What a candidate does in the worlds that the search does not see.
     ///
     /// # Errors
-    /// One of them is no scenario.
-    pub fn held_out(&self, values: &[Value]) -> Result<Vec<Ran>, TuningError> {
-        let campaign = self.held_out.with(self.changes(values));
-        let columns = campaign.columns();
-        let runs = (0..campaign.runs()).into_par_iter();
-        let runs = runs.map(|run| {
-            let row = campaign.run(run, &|| Duration::ZERO)?;
-            Ok(self.judge.ran(&columns, &row))
-        });
-        let ran = runs.collect::<Result<Vec<Ran>, CampaignError>>();
-        Ok(ran?)
+    /// One of them is no scenario, or what `run` says.
+    pub fn held_out<E: From<TuningError>>(
+        &self,
+        values: &[Value],
+        run: Run<'_, E>,
+    ) -> Result<Vec<Ran>, E> {
+        self.run_all(Worlds::HeldOut, values, run)
+    }
+
+    /// A campaign in these worlds.
+    pub(crate) fn campaign(&self, worlds: Worlds) -> &Campaign<'a, F> {
+        match worlds {
+            Worlds::Search => &self.worlds,
+            Worlds::HeldOut => &self.held_out,
+        }
     }
 
     /// Goals and limits before and after in the worlds that the search does not see; nothing where
@@ -299,7 +300,7 @@ fn population(search: &SearchTable, dimensions: usize) -> usize {
     search.population.unwrap_or_else(usual)
 }
 
-fn changes(axes: &[Axis], values: &[Value]) -> Vec<(String, Value)> {
+pub(crate) fn changes(axes: &[Axis], values: &[Value]) -> Vec<(String, Value)> {
     let all = axes.iter().zip(values);
     let all =
         all.flat_map(|(axis, value)| axis.keys().iter().map(|key| (key.clone(), value.clone())));

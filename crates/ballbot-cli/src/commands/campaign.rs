@@ -9,12 +9,13 @@ mod shards;
 mod whole;
 
 use super::CommandError;
+use super::hyperqueue::{Cluster, ClusterOptions};
 use super::robot::ScenarioOptions;
 use crate::input;
 use crate::progress::ProofProgress;
 use ballbot_campaign::{Campaign, MOST_SHARDS, Shard, Source};
 use ballbot_scenario::proofs::ProvedFiles;
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `ballbot campaign`.
@@ -68,12 +69,9 @@ pub struct CampaignArguments {
     /// Run in N parts, those that are done not again, and merge them
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_SHARDS)))]
     pub shards: Option<u32>,
-    /// Have the parts run by a cluster whose server runs
-    #[arg(long, requires = "shards")]
-    pub cluster: Option<Cluster>,
-    /// Server directory of the cluster [default: that of its client]
-    #[arg(long, value_name = "DIR", requires = "cluster")]
-    pub server_dir: Option<PathBuf>,
+    /// Where the parts are run.
+    #[command(flatten)]
+    pub cluster: ClusterOptions,
     /// Write also what takes more than a gigabyte
     #[arg(long)]
     pub yes: bool,
@@ -99,13 +97,6 @@ pub enum CampaignAction {
     Merge(shards::MergeArguments),
     /// Say which shards are done
     Status(shards::StatusArguments),
-}
-
-/// A cluster.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum Cluster {
-    /// HyperQueue, whose program `hq` must be in the PATH (or named by the variable HQ)
-    Hyperqueue,
 }
 
 /// Runs a campaign and writes its results.
@@ -135,7 +126,7 @@ pub fn run(arguments: &CampaignArguments) -> Result<String, CommandError> {
     };
     let campaign = Campaign::new(&source, files, &crate::program::name()?)?;
     let out = arguments.out.clone().unwrap_or_else(|| folder(path));
-    match (arguments.shard, arguments.shards, arguments.cluster) {
+    match (arguments.shard, arguments.shards, arguments.cluster.cluster) {
         (Some(shard), _, _) => shards::run_one(&campaign, shard, &out, arguments),
         (None, Some(of), Some(Cluster::Hyperqueue)) => cluster::run(&campaign, of, &out, arguments),
         (None, Some(of), None) => shards::run_all(&campaign, of, &out, arguments),

@@ -5,6 +5,7 @@ pub mod campaign;
 pub mod certify;
 pub mod completions;
 pub mod excite;
+pub mod hyperqueue;
 pub mod identify;
 pub mod linearize;
 pub mod lqr;

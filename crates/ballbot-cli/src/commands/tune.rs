@@ -1,16 +1,19 @@
 //! `ballbot tune`.
 
+mod cluster;
 mod journal_file;
 mod moved;
 mod report;
 
 use super::CommandError;
+use super::hyperqueue::ClusterOptions;
 use crate::progress::{Progress, ProofProgress};
 use crate::results::ResultFolder;
 use ballbot_campaign::CampaignError;
 use ballbot_scenario::proofs::ProvedFiles;
-use ballbot_tuning::{Found, Hooks, Ran, State, Tuning, TuningSource};
+use ballbot_tuning::{Batch, Found, Hooks, Ran, State, Tuning, TuningSource};
 use clap::{Args, Subcommand};
+use cluster::{BatchRunner, MOST_TASKS, PartArguments};
 use journal_file::JournalFile;
 use rayon::ThreadPoolBuilder;
 use std::path::{Path, PathBuf};
@@ -25,12 +28,13 @@ Examples:
   ballbot tune my-tuning.toml                searches; results in out/my-tuning
   ballbot tune my-tuning.toml                after an interrupt: goes on where it was
   ballbot tune my-tuning.toml --candidate 71 with another one of the Pareto front
+  ballbot tune my-tuning.toml --shards 16 --cluster hyperqueue    on a cluster
 
 Searches over keys of a scenario (weights, horizon, sampling time, drifts of the estimator) for goals
 and within limits that are measured in the same worlds for every candidate: docs/tuning.md. Writes
 tuned.toml, a scenario with what was found; report.html, with before and after in worlds that the
 search has not seen; candidates.csv, summary.json and figures. The same file gives the same result on
-any number of threads, interrupted or not."
+any number of threads and machines, interrupted or not."
 )]
 pub struct TuneArguments {
     /// What to do; searches when absent.
@@ -42,7 +46,14 @@ pub struct TuneArguments {
     /// Take this candidate instead of the best one under equal weights of the goals
     #[arg(long, value_name = "NUMBER")]
     pub candidate: Option<usize>,
-    /// Threads [default: one per core]; the numbers do not depend on them
+    /// Divide what is run at once into so many tasks of the cluster
+    #[arg(long, value_name = "N", requires = "cluster",
+        value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_TASKS)))]
+    pub shards: Option<u32>,
+    /// Where the parts are run.
+    #[command(flatten)]
+    pub cluster: ClusterOptions,
+    /// Threads [default: one per core; of a cluster's task, one]; the numbers do not depend on them
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Folder for the results [default: out/NAME of the file]
@@ -58,6 +69,8 @@ pub struct TuneArguments {
 pub enum TuneAction {
     /// Print a commented tuning, to be changed
     Example,
+    /// Run a part of a batch of closed loops: what a cluster's tasks do
+    Part(PartArguments),
 }
 
 /// A commented tuning.
@@ -78,12 +91,10 @@ struct HeldOut {
 /// A value makes no sense, the journal is of another tuning, no candidate keeps all limits, or a file
 /// cannot be written.
 pub fn run(arguments: &TuneArguments) -> Result<String, CommandError> {
-    let Some(path) = arguments
-        .file
-        .as_deref()
-        .filter(|_| arguments.action.is_none())
-    else {
-        return Ok(EXAMPLE.to_owned());
+    let (path, threads) = match (&arguments.action, &arguments.file) {
+        (Some(TuneAction::Part(part)), _) => (&part.file, part.threads),
+        (None, Some(path)) => (path, arguments.threads),
+        (Some(TuneAction::Example), _) | (None, None) => return Ok(EXAMPLE.to_owned()),
     };
     let source = TuningSource::load(path)?;
     let proof = ProofProgress::default();
@@ -92,32 +103,51 @@ pub fn run(arguments: &TuneArguments) -> Result<String, CommandError> {
         progress: &|done| proof.set_part(done),
     };
     let tuning = Tuning::new(&source, files, &crate::program::name()?)?;
+    let threads = usize::from(threads.unwrap_or(0));
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(CampaignError::from)?;
+    pool.install(|| match &arguments.action {
+        Some(TuneAction::Part(part)) => cluster::run_part(&tuning, &part.batch, part.shard),
+        _ => tune(&tuning, path, arguments),
+    })
+}
+
+fn tune(tuning: &Own<'_>, path: &Path, arguments: &TuneArguments) -> Result<String, CommandError> {
     // Found out now rather than after the search.
     tuning.document(tuning.start())?;
     let out = arguments.out.clone().unwrap_or_else(|| folder(path));
     let results = ResultFolder::open(&out, &report::RESULTS)?;
-    let threads = usize::from(arguments.threads.unwrap_or(0));
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(CampaignError::from)?;
-
-    let before = pool.install(|| tuning.held_out(tuning.start()))?;
     let (file, journal) = JournalFile::open(&out, tuning.fingerprint())?;
-    let most = source.file().search.evaluations;
+    let cluster = match arguments.shards {
+        Some(shards) => {
+            let size = (shards, arguments.threads.unwrap_or(1));
+            let server_dir = arguments.cluster.server_dir.as_deref();
+            Some(BatchRunner::new(tuning, size, server_dir, &out)?)
+        }
+        None => None,
+    };
+    let mut run = |batch: &Batch| match &cluster {
+        Some(cluster) => cluster.run(batch),
+        None => Ok(tuning.run(batch)?),
+    };
+    let before = tuning.held_out(tuning.start(), &mut run)?;
+    let most = tuning.source().file().search.evaluations;
     let progress = Progress::new("searching", most as usize);
     let hooks = Hooks {
+        run: &mut run,
         append: &mut |text| file.append(text),
         progress: &|done| progress.set(done as usize),
     };
-    let mut found = pool.install(|| tuning.search::<CommandError>(journal, hooks))?;
+    let mut found = tuning.search::<CommandError>(journal, hooks)?;
     drop(progress);
-    choose(&tuning, &mut found, arguments.candidate)?;
+    choose(tuning, &mut found, arguments.candidate)?;
     let values = tuning.values(&found.candidates[found.chosen]);
     let after = match found.chosen {
         0 => before.clone(),
-        _ => pool.install(|| tuning.held_out(&values))?,
+        _ => tuning.held_out(&values, &mut run)?,
     };
     let held_out = HeldOut { before, after };
-    report::write(&tuning, &found, &held_out, &results, arguments.json)
+    report::write(tuning, &found, &held_out, &results, arguments.json)
 }
 
 /// Takes the candidate that is asked for.

@@ -6,10 +6,11 @@
 )]
 
 mod messages;
+mod parts;
 mod searches;
 mod tunings;
 
-use ballbot_tuning::{Found, Hooks, Journal, Tuning, TuningError, TuningSource};
+use ballbot_tuning::{Found, Hooks, Journal, Run, Tuning, TuningError, TuningSource};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
@@ -77,8 +78,18 @@ fn with<T>(text: &str, does: impl FnOnce(&Tuning<'_, &Path>) -> T) -> T {
     does(&Tuning::new(&source, source.folder(), PROGRAM).unwrap())
 }
 
-/// Goes on from a journal's text; what is found, and what was added to the journal.
+/// Goes on from a journal's text, with closed loops run here; what is found, and what was added to the
+/// journal.
 fn search(tuning: &Tuning<'_, &Path>, text: &str) -> Result<(Found, String), TuningError> {
+    search_by(tuning, text, &mut |batch| tuning.run(batch))
+}
+
+/// Goes on from a journal's text, with closed loops run by `run`.
+fn search_by(
+    tuning: &Tuning<'_, &Path>,
+    text: &str,
+    run: Run<'_, TuningError>,
+) -> Result<(Found, String), TuningError> {
     let mut journal = Journal::read(text, tuning.fingerprint())?;
     let mut added = String::new();
     if journal.length == 0 {
@@ -87,6 +98,7 @@ fn search(tuning: &Tuning<'_, &Path>, text: &str) -> Result<(Found, String), Tun
         added += &first;
     }
     let hooks = Hooks {
+        run,
         append: &mut |text| -> Result<(), TuningError> {
             added += text;
             Ok(())

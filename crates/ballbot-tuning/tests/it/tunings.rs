@@ -3,8 +3,9 @@
 use crate::{PROGRAM, TWO_GOALS, search, with, written};
 use ballbot_campaign::{Campaign, Source};
 use ballbot_scenario::Scenario;
-use ballbot_tuning::{State, Tuning};
+use ballbot_tuning::{Batch, Ran, State, Tuning, TuningError};
 use std::fs;
+use std::path::Path;
 use std::time::Duration;
 use toml::Value;
 
@@ -168,8 +169,7 @@ fn what_is_found_is_better_and_its_text_is_that_scenario() {
         );
         assert_eq!(scenario.controller.r, values[2].as_float());
         // Other worlds than those of the search, and the same before and after.
-        let [before, after] =
-            [tuning.start(), &values].map(|values| tuning.held_out(values).unwrap());
+        let [before, after] = [tuning.start(), &values].map(|values| held_out(tuning, values));
         let comparisons = tuning.compare(&before, &after).unwrap();
         assert_eq!(before.len(), 6);
         assert_ne!(comparisons[0].before.value, start.goals[0]);
@@ -217,6 +217,11 @@ fn values_that_make_no_scenario_are_refused_candidates_and_a_start_that_makes_no
     assert!(error.to_string().contains("horizon"), "{error}");
 }
 
+fn held_out(tuning: &Tuning<'_, &Path>, values: &[Value]) -> Vec<Ran> {
+    let mut run = |batch: &Batch| tuning.run(batch);
+    tuning.held_out::<TuningError>(values, &mut run).unwrap()
+}
+
 #[test]
 fn limits_that_nothing_keeps_are_no_result() {
     let text = TWO_GOALS.replace("at_most = 0.6", "at_most = 0.0001");
@@ -241,7 +246,7 @@ fn without_anything_random_there_is_nothing_to_hold_out() {
         .replace("runs = 6\n", "");
     with(&text, |tuning| {
         assert_eq!(tuning.runs(), 1);
-        let ran = tuning.held_out(tuning.start()).unwrap();
+        let ran = held_out(tuning, tuning.start());
         assert_eq!(tuning.compare(&ran, &ran), None);
         assert_eq!(tuning.start()[0], Value::Integer(20));
     });

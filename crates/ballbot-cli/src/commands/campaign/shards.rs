@@ -3,6 +3,7 @@
 use super::whole::{RowFiles, counted, pool};
 use super::{CampaignArguments, Own, report, room};
 use crate::commands::CommandError;
+use crate::commands::hyperqueue::ranges;
 use crate::json;
 use crate::output::{self, Draft, FileError};
 use crate::progress::{Progress, ProofProgress};
@@ -333,26 +334,4 @@ pub(super) fn status(arguments: &StatusArguments) -> Result<String, CommandError
         );
     }
     Ok(text)
-}
-
-/// Rising numbers as ranges: 1,3-5.
-pub(super) fn ranges(numbers: &[u32]) -> String {
-    let groups = numbers.chunk_by(|a, b| a + 1 == *b);
-    let words = groups.map(|group| match group {
-        [first, .., last] => format!("{first}-{last}"),
-        only => only.iter().map(u32::to_string).collect(),
-    });
-    words.collect::<Vec<_>>().join(",")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::ranges;
-
-    #[test]
-    fn numbers_become_ranges() {
-        assert_eq!(ranges(&[1, 3, 4, 5, 9]), "1,3-5,9");
-        assert_eq!(ranges(&[7]), "7");
-        assert_eq!(ranges(&[]), "");
-    }
 }

@@ -193,7 +193,7 @@ case "$*" in
     shift
     for range in $(echo "$array" | tr , ' '); do
         for id in $(seq "${range%-*}" "${range#*-}"); do
-            HQ_TASK_ID=$id "$@" || echo x >> failed
+            [ -f failed ] || HQ_TASK_ID=$id "$@" || echo x >> failed
         done
     done
     echo '{"id": 7}' ;;
