@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _lpvmpc
 from ._arrays import numbers
+from ._files import save
 from .errors import SettingError
 
 Array = NDArray[np.float64]
@@ -45,15 +46,24 @@ class Certificate:
         """
         return cls(Path(path).read_text(encoding="utf-8"))
 
-    def save(self, path: str | PathLike[str]) -> None:
+    def save(self, path: str | PathLike[str], overwrite: bool = False) -> None:
         """Writes its file.
+
+        Parameters
+        ----------
+        path
+            The file.
+        overwrite
+            Whether a file that is there is replaced.
 
         Raises
         ------
+        FileExistsError
+            The file is there and is not to be replaced.
         OSError
             The file cannot be written.
         """
-        Path(path).write_text(self._text, encoding="utf-8")
+        save(self._text, path, overwrite)
 
     def to_json(self) -> str:
         """The text of its file."""

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _lpvmpc
 from ._arrays import column, number, weight
+from ._progress import reported
 from .certificate import Certificate
 from .mpc import Limits, _limits, _whole
 from .plant import Plant
@@ -81,6 +82,7 @@ def certify(
     enlargement: float = 10.0,
     most_boxes: int = 4000,
     trials: int = 4,
+    progress: bool = False,
 ) -> Certificate:
     """A terminal law, cost and set about an equilibrium, proved for the sampled nonlinear plant.
 
@@ -106,6 +108,8 @@ def certify(
         Boxes of states that one proof may look at, 1 to 100 000.
     trials
         Proofs of higher levels for each set.
+    progress
+        Whether to show a progress bar (needs tqdm).
 
     Raises
     ------
@@ -139,7 +143,8 @@ def certify(
         "most_boxes": _whole("most_boxes", most_boxes),
         "trials": _whole("trials", trials),
     }
-    return Certificate(_lpvmpc.certify(plant._native, asked))
+    with reported(progress) as report:
+        return Certificate(_lpvmpc.certify(plant._native, asked, report))
 
 
 @dataclass(frozen=True)
@@ -152,8 +157,17 @@ class Verified:
     """|x - x_eq| from the set on, at and between the samples, at most, shape (n,)."""
 
 
-def verify(certificate: Certificate, plant: Plant) -> Verified:
+def verify(certificate: Certificate, plant: Plant, *, progress: bool = False) -> Verified:
     """Proves every claim of a certificate again, from its numbers and the plant's formulas alone.
+
+    Parameters
+    ----------
+    certificate
+        What is claimed.
+    plant
+        The plant that it is claimed of, with its present parameters.
+    progress
+        Whether to show a progress bar (needs tqdm).
 
     Raises
     ------
@@ -162,5 +176,6 @@ def verify(certificate: Certificate, plant: Plant) -> Verified:
     CertificateError
         A claim could not be shown, and may be true; or the certificate is of another plant.
     """
-    boxes, reach = _lpvmpc.verify(certificate.to_json(), plant._native)
+    with reported(progress) as report:
+        boxes, reach = _lpvmpc.verify(certificate.to_json(), plant._native, report)
     return Verified(boxes=boxes, reach=np.array(reach))

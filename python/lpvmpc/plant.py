@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _casadi, _lpvmpc, _sympy
+from ._files import save
 from ._arrays import column, number, table
 from ._tape import Tape
 from .errors import PlantError
@@ -644,15 +645,24 @@ class Plant:
         which the plant was made."""
         return self._native.to_json()
 
-    def save(self, path: str | PathLike[str]) -> None:
+    def save(self, path: str | PathLike[str], overwrite: bool = False) -> None:
         """Writes its file.
+
+        Parameters
+        ----------
+        path
+            The file.
+        overwrite
+            Whether a file that is there is replaced.
 
         Raises
         ------
+        FileExistsError
+            The file is there and is not to be replaced.
         OSError
             The file cannot be written.
         """
-        Path(path).write_text(self.to_json(), encoding="utf-8")
+        save(self.to_json(), path, overwrite)
 
     def to_rust(self) -> str:
         """The plant as a module of Rust, for `f32` and `f64`, without std and heap, with its parameters as they

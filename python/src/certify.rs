@@ -3,6 +3,7 @@
 use crate::arrays::{Matrix, matrix};
 use crate::errors::of_certificate;
 use crate::plant::Plant;
+use crate::work::{Report, work};
 use lpvmpc_certify::{Certificate, CertifySettings, verify_text};
 use pyo3::prelude::*;
 
@@ -26,7 +27,12 @@ pub struct Asked<'py> {
 
 /// The text of a certificate that was proved.
 #[pyfunction]
-pub fn certify(py: Python<'_>, plant: &Plant, asked: Asked<'_>) -> PyResult<String> {
+pub fn certify(
+    py: Python<'_>,
+    plant: &Plant,
+    asked: Asked<'_>,
+    report: Report<'_>,
+) -> PyResult<String> {
     let settings = CertifySettings {
         q: matrix(&asked.q),
         r: matrix(&asked.r),
@@ -38,15 +44,26 @@ pub fn certify(py: Python<'_>, plant: &Plant, asked: Asked<'_>) -> PyResult<Stri
         trials: asked.trials,
         ..CertifySettings::new(asked.t_s, &[], &[])
     };
-    let found = py.detach(|| lpvmpc_certify::certify(&plant.inner, &settings, &|_| ())?.to_json());
-    found.map_err(of_certificate)
+    let found = work(py, &report, |watch| {
+        let progress = |done| watch.set_part("proving a set", done);
+        lpvmpc_certify::certify(&plant.inner, &settings, &progress)?.to_json()
+    });
+    found?.map_err(of_certificate)
 }
 
 /// Boxes of a proof from the text alone, and where the states are at most.
 #[pyfunction]
-pub fn verify(py: Python<'_>, text: &str, plant: &Plant) -> PyResult<(usize, Vec<f64>)> {
-    let verified = py.detach(|| verify_text(text, &plant.inner, &|_| ()));
-    let (_, verified) = verified.map_err(of_certificate)?;
+pub fn verify(
+    py: Python<'_>,
+    text: &str,
+    plant: &Plant,
+    report: Report<'_>,
+) -> PyResult<(usize, Vec<f64>)> {
+    let verified = work(py, &report, |watch| {
+        let progress = |done| watch.set_part("proving the certificate", done);
+        verify_text(text, &plant.inner, &progress)
+    });
+    let (_, verified) = verified?.map_err(of_certificate)?;
     Ok((verified.boxes, verified.reach))
 }
 

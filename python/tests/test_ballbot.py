@@ -278,11 +278,27 @@ def test_the_lock_is_let_go_and_progress_told(
     assert "simulating" in capfd.readouterr().err
 
 
-def test_an_interrupt_ends_the_work(tmp_path: Path) -> None:
-    code = (
-        "from lpvmpc import ballbot; print('on', flush=True)\n"
-        "ballbot.campaign({'title': 't', 'scenario': 'two-setpoints', 'runs': 10_000_000})"
-    )
+@pytest.mark.parametrize(
+    "long",
+    [
+        "ballbot.campaign({'title': 't', 'scenario': 'two-setpoints', 'runs': 10_000_000})",
+        "ballbot.count_guarantee(runs=1_000_000)",
+        "ballbot.certify(ballbot.Scenario.builtin('far-setpoints'))",
+        "lpvmpc.certify(heavy, t_s=0.02, q=[1] * 8, r=[1] * 4, most_boxes=100_000)",
+    ],
+)
+def test_an_interrupt_ends_the_work(tmp_path: Path, long: str) -> None:
+    code = f"""
+import lpvmpc
+from lpvmpc import ballbot
+a = [[0.0] * 8 for _ in range(8)]
+b = [[0.0] * 4 for _ in range(8)]
+for i in range(4):
+    a[i][4 + i] = b[4 + i][i] = 1.0
+heavy = lpvmpc.Plant.from_matrices(a, b)
+print('on', flush=True)
+{long}
+"""
     # In a folder without `lpvmpc`: the installed package is meant, not the sources beside the tests.
     command = [sys.executable, "-c", code]
     process = subprocess.Popen(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .. import _lpvmpc
 from .._progress import reported
 from ..errors import ScenarioError, SettingError
-from ._files import pandas, plain
+from ._values import pandas, plain
 
 
 @dataclass(frozen=True, repr=False)

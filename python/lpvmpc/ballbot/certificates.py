@@ -12,7 +12,7 @@ from .. import _lpvmpc
 from .._arrays import numbers
 from .._progress import reported
 from ..errors import SettingError
-from ._files import save
+from .._files import save
 from .scenario import Scenario
 
 Array = NDArray[np.float64]

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from .. import _lpvmpc
 from .._progress import reported
 from ..errors import IdentificationError, SettingError
-from ._files import plain, save
+from .._files import save
+from ._values import plain
 from .run import Run, SensorLog
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ScenarioError
-from ._files import pandas
+from ._values import pandas
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,7 +9,8 @@ from typing import Any
 
 from .. import _lpvmpc
 from .._progress import reported
-from ._files import plain, save
+from .._files import save
+from ._values import plain
 from .run import Run
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from .. import _lpvmpc
 from .._progress import reported
 from ..errors import SettingError
-from ._files import pandas
+from ._values import pandas
 from .scenario import Scenario
 
 

@@ -1,10 +1,9 @@
-"""Values and texts on their way into files and back."""
+"""Values on their way to the native half, and tables of results."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from os import PathLike, fspath
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,12 +24,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [plain(entry) for entry in value]
     return value
-
-
-def save(text: str, path: str | PathLike[str], overwrite: bool) -> None:
-    """Writes a text; an error if the file is there and is not to be overwritten."""
-    with Path(path).open("w" if overwrite else "x", encoding="utf-8") as file:
-        file.write(text)
 
 
 def pandas() -> Any:
