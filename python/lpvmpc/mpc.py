@@ -159,8 +159,9 @@ class Mpc:
     terminal
         P: ``"lqr"``, the cost of the linear-quadratic regulator about the plant's equilibrium (about zero
         without one) from there on; a matrix (n, n) or its diagonal; ``"equality"``, x_N = x_ref; or a
-        `Certificate` of this plant, with its cost and its set: the loop to its equilibrium is then guaranteed as
-        `Plan.decision` says, and takes no references.
+        `Certificate` of this plant, with its cost and its set: the loop is then guaranteed as `Plan.decision` says. Its
+        reference is the certificate's equilibrium, but for states that no formula of the plant reads (a cart's
+        position): these may be sent anywhere, at every sample.
     x_bounds, u_bounds
         Bounds of x_1 to x_N and of the inputs: (lower, upper), or by name,
         ``{"position": (-1, 1)}``; a state or input that is not named has those of the plant.

@@ -21,7 +21,7 @@ def cart_pole_formulas():
     return x, u, p, f, {"cart_mass": 1.0, "pole_mass": 0.3, "half_length": 0.5}
 
 
-def cart_pole():
+def cart_pole(bounds=None):
     x, u, p, f, values = cart_pole_formulas()
     return lpvmpc.Plant.from_casadi(
         x,
@@ -35,7 +35,7 @@ def cart_pole():
         outputs=["tip_position", "tip_height"],
         parameters=values,
         units={"position": "m", "tilt": "rad", "speed": "m/s", "rate": "rad/s", "force": "N"},
-        bounds={"force": (-15, 15)},
+        bounds=bounds or {"force": (-15, 15)},
         equilibrium=([0, 0, 0, 0], [0]),
     )
 

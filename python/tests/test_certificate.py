@@ -127,12 +127,75 @@ def test_a_guaranteed_loop_reaches_its_equilibrium(certified):
     assert abs(run.x[-1]).max() < 5e-3 and abs(run.u).max() <= 15
     with pytest.raises(lpvmpc.SettingError, match="larger than the certificate's"):
         mpc.set(q=[20, 5, 0.1, 0.1])
-    with pytest.raises(lpvmpc.SettingError, match="goes to its equilibrium"):
-        mpc.step(x0, x_ref=[0.1, 0, 0, 0])
+    with pytest.raises(lpvmpc.SettingError, match="tilt is 0.1.* reads: position$"):
+        mpc.step(x0, x_ref=[0, 0.1, 0, 0])
+    with pytest.raises(lpvmpc.SettingError, match="nothing else that is ahead"):
+        mpc.step(x0, u_ref=[0.1])
     assert pickle.loads(pickle.dumps(mpc)).step(x0).decision == "new plan"
     other = lpvmpc.Plant.from_matrices(np.zeros((4, 4)), np.ones((4, 1)))
     with pytest.raises(lpvmpc.CertificateError, match="another plant"):
         lpvmpc.Mpc(other, T_S, 20, [2, 5, 0.1, 0.1], [0.01], terminal=certificate)
+
+
+def exact(plant, x, u):
+    """The motion over a sample, at six points."""
+    motion = solve_ivp(
+        lambda t, x: plant.f(x, u), (0, T_S), x, "DOP853", rtol=1e-11, atol=1e-12, t_eval=np.linspace(0, T_S, 6)
+    )
+    return motion.y.T
+
+
+BOUNDS = {"force": (-10, 10), "speed": (-2, 2), "tilt": (-0.5, 0.5), "position": (-30, 30)}
+WEIGHTS = [2, 5, 0.1, 0.1], [0.05]
+
+
+@pytest.fixture(scope="module")
+def on_a_track():
+    plant = cart_pole(BOUNDS)
+    return plant, lpvmpc.certify(plant, T_S, *WEIGHTS, trials=0)
+
+
+@pytest.mark.parametrize("horizon", [8, 25])
+@pytest.mark.parametrize("kind", ["random", "huge", "to and fro", "steps"])
+def test_set_points_may_be_anything(on_a_track, kind, horizon):
+    plant, certificate = on_a_track
+    mpc = lpvmpc.Mpc(plant, T_S, horizon, *WEIGHTS, terminal=certificate)
+    generator = np.random.default_rng(horizon)
+    x = edge(certificate, generator, 1)[0]
+    goal = 0.0
+    for k in range(60):
+        if kind == "random" or (kind == "steps" and k % 20 == 0):
+            goal = generator.uniform(-30, 30)
+        elif kind != "steps":
+            goal = (1e300 if kind == "huge" else 10.0) * (-1) ** k
+        plan = mpc.step(x, [goal, 0, 0, 0])
+        assert plan.is_guaranteed, f"{k}: {plan.status}"
+        motion = exact(plant, x, plan.u[0])
+        for name, values in (("position", motion[:, 0]), ("tilt", motion[:, 1]), ("speed", motion[:, 2])):
+            assert abs(values).max() <= BOUNDS[name][1], f"{name} at {k}"
+        assert abs(plan.u[0]) <= 10
+        x = motion[-1]
+
+
+def test_a_far_set_point_is_reached_as_fast_as_without_a_guarantee(on_a_track):
+    plant, certificate = on_a_track
+
+    def arrives(terminal, goal):
+        mpc = lpvmpc.Mpc(plant, T_S, 30, *WEIGHTS, terminal=terminal)
+        run = lpvmpc.simulate(plant, mpc, x0=[0, 0, 0, 0], duration=15.0, x_ref=[goal, 0, 0, 0])
+        assert abs(run.x[-1, 0] - goal) < 1e-3
+        return np.argmax(abs(run.x[:, 0] - goal) < 0.05 * goal) * T_S
+
+    assert arrives(certificate, 12.0) < 1.1 * arrives("lqr", 12.0)
+
+
+def test_a_plant_that_notices_where_it_stands_has_no_other_set_points():
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    spring = lpvmpc.Plant.from_casadi(x, u, ca.vertcat(x[1], u - x[0]), states=["position", "speed"])
+    certificate = lpvmpc.certify(spring, 0.1, [1, 1], [1], u_bounds=([-1], [1]))
+    mpc = lpvmpc.Mpc(spring, 0.1, 10, [1, 1], [1], u_bounds=([-1], [1]), terminal=certificate)
+    with pytest.raises(lpvmpc.SettingError, match="position is 0.1.* reads: no state"):
+        mpc.step([0, 0], x_ref=[0.1, 0])
 
 
 def test_what_has_no_proof_is_refused():

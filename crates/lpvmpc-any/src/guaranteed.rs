@@ -1,11 +1,16 @@
-//! The loop that keeps its promise, to a fixed equilibrium: no plan is applied that the nonlinear model does not
-//! confirm.
+//! The loop that keeps its promise, to an equilibrium or to one moved along states that the plant does not notice: no
+//! plan is applied that the nonlinear model does not confirm.
 //!
 //! Every sample has a plan that is known to work: the rest of the last one, with the terminal law as feedback towards
 //! its states, ended by the terminal law; or that law alone. The controller's answer takes its place only if its
 //! rollout keeps all bounds, ends in the terminal set and costs no more (suboptimal MPC: Scokaert, Mayne and Rawlings
 //! 1999). Where a plan ended outside the set, the next programs have the tangent plane there as a row at the end of the
 //! horizon.
+//!
+//! Where no formula of the plant reads a state, such as a cart's position, the certificate holds about every
+//! equilibrium that is moved along it. So a set point far away is approached by artificial ones (Limon, Alvarado, Alamo
+//! and Camacho 2008): each plan ends at a target of its own, whose distance from the set point is part of its cost, and
+//! which moves on by strides: each twice as long as the last one that succeeded, or a quarter or a sixteenth of that.
 
 use crate::check::Names;
 use crate::controller_settings::limits;
@@ -28,17 +33,28 @@ const PROGRAM_MARGIN: f64 = 2.0 * MARGIN;
 /// What an end outside of the set costs, in units of what the terminal cost itself rises by there: soft, since a program
 /// that cannot end there from the first plan may lead to one that can.
 const PRICE: f64 = 20.0;
-/// Answers of the controller that are looked at while no plan is known.
-const MOST_LOOKS: usize = 8;
+/// Answers of the controller that are looked at while no plan is known, by the share of the way to the set point at
+/// which their targets are.
+const FIRST_TARGETS: [f64; 8] = [1.0, 1.0, 1.0, 0.5, 0.25, 0.1, 0.0, 0.0];
+/// What a target's distance from the set point costs, in units of the terminal cost of a state there: more than 1, so
+/// that it is worth while to move on.
+const OFFSET_PRICE: f64 = 10.0;
+/// A stride that is shorter than this share of the way is none.
+const SHORTEST_STRIDE: f64 = 1e-3;
+/// Of a set point further away than so many lengths of the set, the direction counts: strides remain of use.
+const FAR: f64 = 1e3;
 
 /// What a rollout gives.
 #[derive(Clone)]
 struct Motion {
+    /// The equilibrium that it is to end at.
+    target: DVector<f64>,
     u: Vec<DVector<f64>>,
     /// x_0 to x_N.
     x: Vec<DVector<f64>>,
+    /// About the target.
     cost: f64,
-    /// e'Pe at the end.
+    /// e'Pe at the end, about the target.
     end: f64,
 }
 
@@ -48,8 +64,15 @@ pub(crate) struct Guarantee {
     u_bounds: Limits,
     horizon: usize,
     substeps: usize,
+    /// Where targets may be: at the equilibrium, and anywhere along states that the plant does not notice, as far as
+    /// the set stays within the bounds.
+    targets: Limits,
+    /// How far the set reaches along each state.
+    lengths: Vec<f64>,
+    /// The share of the way from the last target to the set point that the next one is moved by.
+    stride: f64,
     last: Option<Motion>,
-    /// Where a plan last ended outside the set: P (x_N - x_eq).
+    /// Where a plan last ended outside the set: P (x_N - x_target), of unit length.
     cut: Option<DVector<f64>>,
 }
 
@@ -113,8 +136,34 @@ impl Guarantee {
                 }
             }
         }
+        let is_free = data.is_invariant_along();
+        let target = |bound: &[f64], side: f64| {
+            let along = |i: usize| match is_free[i] {
+                true if bound[i].is_finite() => bound[i] - side * set.state_limits[i],
+                true => bound[i],
+                false => set.x[i],
+            };
+            (0..set.x.len()).map(along).collect::<Vec<f64>>()
+        };
+        // The equilibrium itself is always there, rounding apart.
+        let least = |values: Vec<f64>| pairwise(&values, &set.x, f64::min);
+        let most = |values: Vec<f64>| pairwise(&values, &set.x, f64::max);
+        let targets = Limits {
+            lower: least(target(&x_bounds.lower, -1.0)),
+            upper: most(target(&x_bounds.upper, 1.0)),
+        };
+        let Some(factor) = set.p.clone().cholesky() else {
+            let fault = "the certificate's P is not positive definite";
+            return Err(MpcError::new("terminal", fault));
+        };
+        let inverse = factor.inverse();
+        let lengths = (0..set.x.len()).map(|i| (set.level * inverse[(i, i)]).sqrt());
+        let lengths: Vec<f64> = lengths.collect();
         Ok(Some(Self {
             set: (**set).clone(),
+            targets,
+            lengths,
+            stride: 1.0,
             x_bounds,
             u_bounds,
             horizon: settings.horizon,
@@ -136,45 +185,63 @@ impl Guarantee {
         x: &[f64],
         preview: &Preview,
     ) -> Result<Plan, MpcError> {
-        if *preview != Preview::default() {
-            let fault = "a controller with a certified terminal set goes to its equilibrium, and takes nothing else";
-            return Err(MpcError::new("preview", fault));
-        }
         let names = Names::new(controller.plant());
+        let mut wanted = self.set_point(&names, preview)?;
         let at = DVector::from_row_slice(x);
-        let is_state = x.len() == names.states.len() && x.iter().all(|value| value.is_finite());
-        let known = match is_state {
-            true => self.known(controller.plant(), &at)?,
-            false => None,
+        if x.len() != names.states.len() || x.iter().any(|value| !value.is_finite()) {
+            let mut plan = controller.step(x, &self.told(&wanted))?;
+            self.last = None;
+            plan.decision = Some(Decision::SoftBounds);
+            plan.status = format!("not guaranteed: {}", plan.status);
+            return Ok(plan);
+        }
+        for i in 0..at.len() {
+            let here = self.nearest(&at)[i];
+            let far = FAR * self.lengths[i];
+            wanted[i] = wanted[i].max(here - far).min(here + far);
+        }
+        let known = self.known(controller.plant(), &at, &wanted)?;
+        let from = known
+            .as_ref()
+            .map_or_else(|| self.nearest(&at), |(_, motion)| motion.target.clone());
+        let shares: &[f64] = match &known {
+            Some(_) if from == wanted => &[0.0],
+            Some(_) => &[1.0, 0.25, 0.0625, 0.0].map(|part| part * self.stride),
+            None => &FIRST_TARGETS,
         };
-        let looks = if known.is_none() && is_state {
-            MOST_LOOKS
-        } else {
-            1
-        };
-        let mut plan = controller.step(x, &self.told())?;
-        for look in 1..=looks {
-            if !is_state {
-                break;
+        let limit = known
+            .as_ref()
+            .map_or(f64::INFINITY, |(_, known)| self.worth(known, &wanted));
+        let mut refused = None;
+        for (look, share) in shares.iter().enumerate() {
+            if look > 0 && known.is_none() {
+                controller.reset();
             }
+            let target = &from + (&wanted - &from) * *share;
+            let mut plan = controller.step(x, &self.told(&target))?;
             let inputs = plan.u.row_iter().map(|u| u.transpose()).collect::<Vec<_>>();
-            let motion = self.roll_out(controller.plant(), &at, &|i, _| inputs[i].clone())?;
+            let motion = self.roll_out(controller.plant(), (&at, &target), &|i, _| {
+                inputs[i].clone()
+            })?;
             self.cut_at(&motion);
-            let cheaper = known
-                .as_ref()
-                .is_none_or(|(_, known)| motion.cost <= known.cost);
-            if cheaper && self.keeps(&motion, MARGIN) {
+            if self.worth(&motion, &wanted) <= limit && self.keeps(&motion, MARGIN) {
+                if *share > 0.0 {
+                    self.stride = (2.0 * share).min(1.0);
+                }
                 if !plan.is_solved() {
                     plan.kind = Status::Improved;
                     plan.status = format!("confirmed by the model ({})", plan.status);
                 }
                 return Ok(self.answer(plan, motion, Decision::NewPlan));
             }
-            if look < looks {
-                controller.reset();
-                plan = controller.step(x, &self.told())?;
+            if *share > 0.0 {
+                self.stride = (0.25 * share).max(SHORTEST_STRIDE);
             }
+            refused = Some(plan);
         }
+        let Some(mut plan) = refused else {
+            return controller.step(x, &self.told(&wanted));
+        };
         if let Some((decision, motion)) = known {
             plan.kind = Status::NoImprovement;
             plan.status = format!("{decision}: no better plan was found");
@@ -182,14 +249,15 @@ impl Guarantee {
             return Ok(self.answer(plan, motion, decision));
         }
         self.last = None;
-        if self.cut.take().is_some() && is_state {
+        if self.cut.take().is_some() {
             // What the controller does without a set is better than what it does towards one that it cannot reach.
             controller.reset();
-            plan = controller.step(x, &self.told())?;
+            plan = controller.step(x, &self.told(&wanted))?;
         }
         plan.decision = Some(Decision::SoftBounds);
-        if !plan.is_solved() && is_state {
-            let motion = self.roll_out(controller.plant(), &at, &|_, x| self.law(x))?;
+        if !plan.is_solved() {
+            let law = |_: usize, x: &DVector<f64>| self.law(x, &wanted);
+            let motion = self.roll_out(controller.plant(), (&at, &wanted), &law)?;
             plan.decision = Some(Decision::SaturatedLqr);
             write(&mut plan, &motion);
         }
@@ -201,6 +269,61 @@ impl Guarantee {
         Ok(plan)
     }
 
+    /// Where the plant is to go: the equilibrium, moved along the states that the plant does not notice to where the
+    /// reference is, as far as the bounds have room for the set about it.
+    fn set_point(&self, names: &Names, preview: &Preview) -> Result<DVector<f64>, MpcError> {
+        let refused = |fault: String| Err(MpcError::new("preview", fault));
+        let rest = Preview {
+            x_ref: Vec::new(),
+            ..preview.clone()
+        };
+        if rest != Preview::default() {
+            let fault = "a controller with a certified terminal set takes a set point x_ref, and nothing else that is \
+                         ahead";
+            return refused(fault.to_owned());
+        }
+        let Some(wanted) = preview.x_ref.first() else {
+            return Ok(self.set.x.clone());
+        };
+        let n = self.set.x.len();
+        if wanted.len() != n || wanted.iter().any(|value| !value.is_finite()) {
+            let fault = format!("x_ref: it must be {n} finite numbers");
+            return refused(fault);
+        }
+        let is_fixed = |i: &usize| self.targets.lower[*i] == self.targets.upper[*i];
+        let off =
+            |i: &usize| (wanted[*i] - self.set.x[*i]).abs() > 1e-9 * (1.0 + self.set.x[*i].abs());
+        if let Some(i) = (0..n).filter(is_fixed).find(off) {
+            let free: Vec<&str> = (0..n)
+                .filter(|i| !is_fixed(i))
+                .map(|i| names.states[i].as_str())
+                .collect();
+            let free = match free.as_slice() {
+                [] => "no state".to_owned(),
+                free => free.join(", "),
+            };
+            let fault = format!(
+                "x_ref: {} is {}, and the certificate is about {}; elsewhere may be what no formula of the plant \
+                 reads: {free}",
+                names.states[i], wanted[i], self.set.x[i]
+            );
+            return refused(fault);
+        }
+        Ok(self.nearest(wanted))
+    }
+
+    /// The target that is nearest to a state, coordinate by coordinate.
+    fn nearest(&self, x: &DVector<f64>) -> DVector<f64> {
+        let Limits { lower, upper } = &self.targets;
+        DVector::from_fn(x.len(), |i, _| x[i].max(lower[i]).min(upper[i]))
+    }
+
+    /// The cost of a motion with that of its target's distance from the set point.
+    fn worth(&self, motion: &Motion, wanted: &DVector<f64>) -> f64 {
+        let off = &motion.target - wanted;
+        motion.cost + OFFSET_PRICE * off.dot(&(&self.set.p * &off))
+    }
+
     fn answer(&mut self, mut plan: Plan, motion: Motion, decision: Decision) -> Plan {
         plan.decision = Some(decision);
         write(&mut plan, &motion);
@@ -209,10 +332,10 @@ impl Guarantee {
     }
 
     /// What the controller is told: bounds with room, and the tangent plane at the end.
-    fn told(&self) -> Preview {
+    fn told(&self, target: &DVector<f64>) -> Preview {
         let Self { set, x_bounds, .. } = self;
         let moved = |bounds: &[f64]| -> Vec<f64> {
-            let pairs = bounds.iter().zip(set.x.iter());
+            let pairs = bounds.iter().zip(target.iter());
             pairs
                 .map(|(bound, at)| bound - PROGRAM_MARGIN * finite_or(bound - at, 0.0))
                 .collect()
@@ -223,7 +346,7 @@ impl Guarantee {
             let solved = set.p.clone().cholesky().map(|factor| factor.solve(normal));
             let size = solved.map_or(f64::INFINITY, |along| along.dot(normal).sqrt());
             let reach = set.level.sqrt() * size;
-            let upper = normal.dot(&set.x) + reach * (1.0 - PROGRAM_MARGIN);
+            let upper = normal.dot(target) + reach * (1.0 - PROGRAM_MARGIN);
             // The gradient of e'Pe at e* is 2 sqrt(level) / size long.
             let linear = PRICE * 2.0 * set.level.sqrt() / size;
             rows = vec![Vec::new(); self.horizon + 1];
@@ -240,7 +363,7 @@ impl Guarantee {
             }];
         }
         Preview {
-            x_ref: vec![set.x.clone()],
+            x_ref: vec![target.clone()],
             u_ref: vec![set.u.clone()],
             x_bounds: vec![Limits {
                 lower: moved(&x_bounds.lower),
@@ -256,40 +379,48 @@ impl Guarantee {
             && motion.end > self.set.level * (1.0 - PROGRAM_MARGIN)
             && motion.end.is_finite()
         {
-            let normal = &self.set.p * (end - &self.set.x);
+            let normal = &self.set.p * (end - &motion.target);
             self.cut = Some(&normal / normal.norm());
         }
     }
 
-    /// The rest of the last plan, or the terminal law alone: whichever works, the cheaper one.
+    /// The rest of the last plan, or the terminal law alone, to the last plan's target or where the plant is: whichever
+    /// works, the cheapest one.
     fn known(
         &self,
         plant: &Plant,
         x: &DVector<f64>,
+        wanted: &DVector<f64>,
     ) -> Result<Option<(Decision, Motion)>, MpcError> {
-        let law = self.roll_out(plant, x, &|_, x| self.law(x))?;
-        let law = self
-            .keeps(&law, 0.0)
-            .then_some((Decision::TerminalLaw, law));
-        let Some(last) = &self.last else {
-            return Ok(law);
+        let mut known: Option<(Decision, Motion)> = None;
+        let mut offer = |decision: Decision, motion: Motion| {
+            let worth = |motion: &Motion| self.worth(motion, wanted);
+            let best = known
+                .as_ref()
+                .map_or(f64::INFINITY, |(_, best)| worth(best));
+            if self.keeps(&motion, 0.0) && worth(&motion) < best {
+                known = Some((decision, motion));
+            }
         };
-        let rest = self.roll_out(plant, x, &|i, x| match last.u.get(i + 1) {
-            Some(u) => u - &self.set.k * (x - &last.x[i + 1]),
-            None => self.law(x),
-        })?;
-        let rest = self
-            .keeps(&rest, 0.0)
-            .then_some((Decision::Candidate, rest));
-        Ok(match (rest, law) {
-            (Some(rest), Some(law)) if law.1.cost < rest.1.cost => Some(law),
-            (Some(rest), _) => Some(rest),
-            (None, law) => law,
-        })
+        if let Some(last) = &self.last {
+            let rest =
+                self.roll_out(plant, (x, &last.target), &|i, x| match last.u.get(i + 1) {
+                    Some(u) => u - &self.set.k * (x - &last.x[i + 1]),
+                    None => self.law(x, &last.target),
+                })?;
+            offer(Decision::Candidate, rest);
+        }
+        let here = self.nearest(x);
+        let last = self.last.as_ref().map(|last| &last.target);
+        for target in last.into_iter().chain([wanted, &here]) {
+            let law = self.roll_out(plant, (x, target), &|_, x| self.law(x, target))?;
+            offer(Decision::TerminalLaw, law);
+        }
+        Ok(known)
     }
 
-    fn law(&self, x: &DVector<f64>) -> DVector<f64> {
-        &self.set.u - &self.set.k * (x - &self.set.x)
+    fn law(&self, x: &DVector<f64>, target: &DVector<f64>) -> DVector<f64> {
+        &self.set.u - &self.set.k * (x - target)
     }
 
     /// Whether bounds are kept and the end is in the set, with this share of room.
@@ -297,7 +428,7 @@ impl Guarantee {
         let Self { set, x_bounds, .. } = self;
         let inside = |x: &DVector<f64>| {
             (0..x.len()).all(|i| {
-                let room = |bound: f64| margin * finite_or((bound - set.x[i]).abs(), 0.0);
+                let room = |bound: f64| margin * finite_or((bound - motion.target[i]).abs(), 0.0);
                 let (lower, upper) = (x_bounds.lower[i], x_bounds.upper[i]);
                 x[i] >= lower + room(lower) && x[i] <= upper - room(upper)
             })
@@ -307,15 +438,16 @@ impl Guarantee {
             && motion.x[1..].iter().all(inside)
     }
 
-    /// The motion of the nonlinear plant under inputs that are moved into their bounds.
+    /// The motion of the nonlinear plant from `x` to `target` under inputs that are moved into their bounds.
     fn roll_out(
         &self,
         plant: &Plant,
-        x: &DVector<f64>,
+        (x, target): (&DVector<f64>, &DVector<f64>),
         input: &dyn Fn(usize, &DVector<f64>) -> DVector<f64>,
     ) -> Result<Motion, MpcError> {
         let set = &self.set;
         let mut motion = Motion {
+            target: target.clone(),
             u: Vec::with_capacity(self.horizon),
             x: vec![x.clone()],
             cost: 0.0,
@@ -329,13 +461,13 @@ impl Guarantee {
                     .max(self.u_bounds.lower[j])
                     .min(self.u_bounds.upper[j])
             });
-            let (e, v) = (&x - &set.x, &u - &set.u);
+            let (e, v) = (&x - target, &u - &set.u);
             motion.cost += e.dot(&(&set.q * &e)) + v.dot(&(&set.r * &v));
             x = advance(plant, &x, &u, set.t_s, self.substeps)?;
             motion.u.push(u);
             motion.x.push(x.clone());
         }
-        let e = &x - &set.x;
+        let e = &x - target;
         motion.end = e.dot(&(&set.p * &e));
         motion.cost += motion.end;
         Ok(motion)
@@ -372,6 +504,13 @@ fn write(plan: &mut Plan, motion: &Motion) {
     plan.u = DMatrix::from_fn(horizon, m, |i, j| motion.u[i][j]);
     plan.x = DMatrix::from_fn(horizon + 1, n, |i, j| motion.x[i][j]);
     plan.cost = motion.cost;
+}
+
+fn pairwise(a: &[f64], b: &DVector<f64>, choose: fn(f64, f64) -> f64) -> Vec<f64> {
+    a.iter()
+        .zip(b.iter())
+        .map(|(a, b)| choose(*a, *b))
+        .collect()
 }
 
 fn finite_or(value: f64, otherwise: f64) -> f64 {

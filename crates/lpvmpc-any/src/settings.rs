@@ -99,7 +99,7 @@ pub enum Terminal {
     Cost(DMatrix<f64>),
     /// x_N = x_ref.
     Equality,
-    /// Cost and set of a certificate, with which the loop to its equilibrium is guaranteed: see [`TerminalSet`].
+    /// Cost and set of a certificate, with which the loop is guaranteed: see [`TerminalSet`].
     Certified(Box<TerminalSet>),
 }
 
@@ -107,7 +107,9 @@ pub enum Terminal {
 /// every state with (x - x_eq)'P (x - x_eq) <= level, u = u_eq - K (x - x_eq), held, stays within the limits, leads into the
 /// set again, and lowers that cost by at least the stage cost. The controller takes it at its word.
 ///
-/// It goes to this equilibrium only, and applies no plan that a rollout of the nonlinear plant does not confirm
+/// It goes to this equilibrium, or to one moved along states that no formula of the plant reads
+/// ([`lpvmpc_plant::PlantData::is_invariant_along`]): there the reference may be anything, and what the bounds have no room
+/// for is gone to as far as they have. It applies no plan that a rollout of the nonlinear plant does not confirm
 /// ([`crate::Plan::decision`]). Once there is a plan, there is one at every later sample, states at the samples and
 /// inputs keep their bounds, and the plan's cost falls by at least the stage cost, for the plant as its rollouts
 /// have it, with the measured state exact, no delay and no disturbance. Rollouts are by Runge-Kutta steps, four for each

@@ -57,6 +57,25 @@ impl PlantData {
             Some(_) => &self.next,
         }
     }
+
+    /// For each state whether the motion is the same wherever the plant stands along it: no formula of the motion
+    /// reads it, as that of a cart does not read its position. Of plants in continuous time alone.
+    pub fn is_invariant_along(&self) -> Vec<bool> {
+        let mut is_read = vec![self.period.is_some(); self.states.len()];
+        let mut is_needed = vec![false; self.operations.len()];
+        let mut needed: Vec<usize> = self.motion().to_vec();
+        while let Some(place) = needed.pop() {
+            if std::mem::replace(&mut is_needed[place], true) {
+                continue;
+            }
+            let operation = &self.operations[place];
+            if let Operation::State(i) = operation {
+                is_read[*i] = true;
+            }
+            needed.extend(operation.arguments());
+        }
+        is_read.into_iter().map(|read| !read).collect()
+    }
 }
 
 /// A state, an input or an output.

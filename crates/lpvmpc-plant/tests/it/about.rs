@@ -184,3 +184,23 @@ fn what_has_no_form_is_refused_by_its_place() {
     }
     assert!(AboutEquilibrium::<1, 1, 2>::new(&plant, &[(0.0, 0.0); 3], 1.0).is_err());
 }
+
+#[test]
+fn a_state_that_the_motion_never_reads_can_be_moved() {
+    for (operations, expected) in [
+        (r#"["mul", 1, 2]"#, [true, false]),
+        (r#"["mul", 0, 1]"#, [false, false]),
+        // Read by a formula that the motion does not need.
+        (r#"["mul", 0, 1], ["mul", 2, 3]"#, [true, false]),
+        (
+            r#"["sin", 0], ["mul", 4, 2], ["add", 5, 1]"#,
+            [false, false],
+        ),
+    ] {
+        let plant = plant(operations);
+        assert_eq!(plant.data().is_invariant_along(), expected, "{operations}");
+        // Then the motion is the same wherever it stands.
+        let [here, there] = [0.3, 7.0].map(|a| plant.derivative(&[a, 0.5], &[0.45]).unwrap());
+        assert_eq!(here == there, expected[0], "{operations}");
+    }
+}
