@@ -67,6 +67,8 @@ pub(crate) struct Guarantee {
     /// Where targets may be: at the equilibrium, and anywhere along states that the plant does not notice, as far as
     /// the set stays within the bounds.
     targets: Limits,
+    /// Where the plant is sent while no plan is known: one place, since one that moved with it would never have it stop.
+    refuge: Option<DVector<f64>>,
     /// How far the set reaches along each state.
     lengths: Vec<f64>,
     /// The share of the way from the last target to the set point that the next one is moved by.
@@ -164,6 +166,7 @@ impl Guarantee {
             targets,
             lengths,
             stride: 1.0,
+            refuge: None,
             x_bounds,
             u_bounds,
             horizon: settings.horizon,
@@ -175,6 +178,8 @@ impl Guarantee {
 
     pub fn reset(&mut self) {
         self.last = None;
+        self.refuge = None;
+        self.stride = 1.0;
         self.cut = None;
     }
 
@@ -207,7 +212,9 @@ impl Guarantee {
         let shares: &[f64] = match &known {
             Some(_) if from == wanted => &[0.0],
             Some(_) => &[1.0, 0.25, 0.0625, 0.0].map(|part| part * self.stride),
-            None => &FIRST_TARGETS,
+            None if self.refuge.is_none() => &FIRST_TARGETS,
+            // The controller's own plan, from sample to sample, until one is confirmed.
+            None => &[0.0],
         };
         let limit = known
             .as_ref()
@@ -249,15 +256,17 @@ impl Guarantee {
             return Ok(self.answer(plan, motion, decision));
         }
         self.last = None;
-        if self.cut.take().is_some() {
-            // What the controller does without a set is better than what it does towards one that it cannot reach.
+        let is_first = self.refuge.replace(from.clone()).is_none();
+        if self.cut.take().is_some() && is_first {
+            // What the controller does without a set is better than what it does towards one that it cannot reach; and
+            // where it is now it finds a plan sooner than on a long way.
             controller.reset();
-            plan = controller.step(x, &self.told(&wanted))?;
+            plan = controller.step(x, &self.told(&from))?;
         }
         plan.decision = Some(Decision::SoftBounds);
         if !plan.is_solved() {
-            let law = |_: usize, x: &DVector<f64>| self.law(x, &wanted);
-            let motion = self.roll_out(controller.plant(), (&at, &wanted), &law)?;
+            let law = |_: usize, x: &DVector<f64>| self.law(x, &from);
+            let motion = self.roll_out(controller.plant(), (&at, &from), &law)?;
             plan.decision = Some(Decision::SaturatedLqr);
             write(&mut plan, &motion);
         }
@@ -328,6 +337,7 @@ impl Guarantee {
         plan.decision = Some(decision);
         write(&mut plan, &motion);
         self.last = Some(motion);
+        self.refuge = None;
         plan
     }
 
