@@ -207,3 +207,17 @@ def test_what_has_no_proof_is_refused():
         lpvmpc.certify(double_integrator(), -1, [1, 1], [1])
     with pytest.raises(lpvmpc.SettingError, match="must lie between"):
         lpvmpc.certify(double_integrator(), 0.1, [1, 1], [1], x_bounds={"speed": (0, 1)})
+
+
+def test_a_plant_that_begins_without_a_plan_is_stopped_first(on_a_track):
+    plant, certificate = on_a_track
+    mpc = lpvmpc.Mpc(plant, T_S, 20, *WEIGHTS, terminal=certificate)
+    x = np.array([12.0, -0.48, 0.0, -0.25])
+    decisions = []
+    for _ in range(80):
+        plan = mpc.step(x, [-23.0, 0, 0, 0])
+        decisions.append(plan.is_guaranteed)
+        assert abs(plan.u[0]) <= 10
+        x = exact(plant, x, plan.u[0])[-1]
+    first = decisions.index(True)
+    assert 5 < first < 70 and all(decisions[first:])

@@ -206,9 +206,11 @@ impl Guarantee {
             wanted[i] = wanted[i].max(here - far).min(here + far);
         }
         let known = self.known(controller.plant(), &at, &wanted)?;
-        let from = known
-            .as_ref()
-            .map_or_else(|| self.nearest(&at), |(_, motion)| motion.target.clone());
+        let from = match (&known, &self.refuge) {
+            (Some((_, motion)), _) => motion.target.clone(),
+            (None, Some(refuge)) => refuge.clone(),
+            (None, None) => self.nearest(&at),
+        };
         let shares: &[f64] = match &known {
             Some(_) if from == wanted => &[0.0],
             Some(_) => &[1.0, 0.25, 0.0625, 0.0].map(|part| part * self.stride),
