@@ -95,7 +95,7 @@ pub fn run(arguments: &TuneArguments) -> Result<String, CommandError> {
     // Found out now rather than after the search.
     tuning.document(tuning.start())?;
     let out = arguments.out.clone().unwrap_or_else(|| folder(path));
-    let results = ResultFolder::open(&out, &report::RESULTS)?;
+    let results = ResultFolder::open(crate::PROGRAM, &out, &report::RESULTS)?;
     let threads = usize::from(arguments.threads.unwrap_or(0));
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(CampaignError::from)?;
