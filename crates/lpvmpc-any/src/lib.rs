@@ -72,6 +72,7 @@ mod tasks;
 mod words;
 mod world;
 
+pub use controller_settings::AT_REST;
 pub use error::MpcError;
 pub use estimator::{Disturbance, Estimate, EstimatorSettings};
 pub use linearise::{jacobian, lqr};

@@ -74,7 +74,7 @@ impl Run {
             world.command(&u)?;
             run.u.push(u);
             world.advance().map_err(|error| {
-                CommandError::ClosedLoop(format!("after {t:.6} s, sample {i}: {error}"))
+                CommandError::NoResult(format!("after {t:.6} s, sample {i}: {error}"))
             })?;
             run.x.push(world.state().to_vec());
             bar.set(i + 1);

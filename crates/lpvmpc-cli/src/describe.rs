@@ -2,6 +2,7 @@
 
 use crate::arguments::PlantArguments;
 use crate::error::CommandError;
+use lpvmpc_any::AT_REST;
 use lpvmpc_design::controllability_rank;
 use lpvmpc_plant::{Plant, Signal};
 use lpvmpc_terminal::table::{self, Table, short};
@@ -56,6 +57,24 @@ pub fn named(rows: &[Signal], columns: &[Signal], matrix: &DMatrix<f64>) -> Tabl
     table
 }
 
+/// The largest change of a state at `x` under `u`, in its unit per second, or per period of a plant in discrete time;
+/// NaN where the plant has no value.
+pub fn residual(plant: &Plant, x: &[f64], u: &[f64]) -> Result<f64, CommandError> {
+    let motion: Vec<f64> = match plant.period() {
+        None => plant.derivative(x, u)?,
+        Some(_) => {
+            let next = plant.next(x, u)?;
+            next.iter().zip(x).map(|(next, x)| next - x).collect()
+        }
+    };
+    Ok(match motion.iter().any(|one| one.is_nan()) {
+        true => f64::NAN,
+        false => motion
+            .iter()
+            .fold(0.0, |most: f64, one| most.max(one.abs())),
+    })
+}
+
 /// What is found about a plant where it is linearised.
 struct Linearisation {
     /// The largest entry of f(x, u), or of F(x, u) - x.
@@ -68,18 +87,9 @@ struct Linearisation {
 
 impl Linearisation {
     fn new(plant: &Plant, x: &[f64], u: &[f64]) -> Result<Self, CommandError> {
-        let motion = match plant.period() {
-            None => plant.derivative(x, u)?,
-            Some(_) => {
-                let next = plant.next(x, u)?;
-                next.iter().zip(x).map(|(next, x)| next - x).collect()
-            }
-        };
         let (a, b) = lpvmpc_any::jacobian(plant, x, u)?;
         Ok(Self {
-            residual: motion
-                .iter()
-                .fold(0.0, |most: f64, one| most.max(one.abs())),
+            residual: residual(plant, x, u)?,
             eigenvalues: lpvmpc_design::poles(&a)?,
             controllable: match b.ncols() {
                 0 => 0,
@@ -117,6 +127,7 @@ fn document(plant: &Plant, found: &Linearisation, (x, u): (&[f64], &[f64])) -> V
         "x": x,
         "u": u,
         "residual": found.residual,
+        "is_equilibrium": found.residual <= AT_REST,
         "a": matrix(&found.a),
         "b": matrix(&found.b),
         "eigenvalues": poles(&found.eigenvalues),
@@ -169,6 +180,10 @@ fn report(plant: &Plant, found: &Linearisation, (x, u): (&[f64], &[f64])) -> Str
         Some(_) => "the equilibrium of its file",
         None => "zero, since its file names no equilibrium",
     };
+    let rest = match found.residual <= AT_REST {
+        true => "the plant stands there",
+        false => "the plant does not stand there: this is no equilibrium",
+    };
     let (per, stability) = match data.period {
         None => (
             "per second",
@@ -185,7 +200,7 @@ fn report(plant: &Plant, found: &Linearisation, (x, u): (&[f64], &[f64])) -> Str
         false => "the inputs do not reach every state",
     };
     text += &format!(
-        "Linearised at {at}: x = ({}), u = ({})\n  largest change of a state there: {} {per}\n\n\
+        "Linearised at {at}: x = ({}), u = ({})\n  {rest}; largest change of a state: {} {per}\n\n\
          A\n{}\nB\n{}\nEigenvalues\n  {}\n  {}\n\nControllability rank {} of {n}: {reach}\n",
         list(x),
         list(u),

@@ -42,9 +42,9 @@ pub enum CommandError {
     /// Derivatives of a plant.
     #[error("the linearisation: {0}")]
     Linearisation(#[from] PlantError),
-    /// A closed loop that did not come to its end.
+    /// A closed loop that did not come to its end, or a regulator that there is not.
     #[error("{0}")]
-    ClosedLoop(String),
+    NoResult(String),
     /// A step of the controller, or a command to the world.
     #[error(transparent)]
     Step(#[from] MpcError),

@@ -1,9 +1,10 @@
 //! `lpvmpc lqr`: the regulator of the sampled plant.
 
 use crate::arguments::ExperimentArguments;
-use crate::describe::{about, matrix, named, poles};
+use crate::describe::{about, matrix, named, poles, residual};
 use crate::error::CommandError;
 use crate::experiment::Experiment;
+use lpvmpc_any::AT_REST;
 use lpvmpc_terminal::table;
 use serde_json::json;
 
@@ -12,6 +13,14 @@ pub fn run(arguments: &ExperimentArguments) -> Result<String, CommandError> {
     let experiment = Experiment::load(&arguments.experiment)?;
     let (plant, settings) = (&experiment.plant, &experiment.settings);
     let (x, u) = about(plant);
+    let residual = residual(plant, &x, &u)?;
+    if !(residual <= AT_REST) {
+        return Err(CommandError::NoResult(format!(
+            "{}: a state changes by {residual} at x = {x:?}, u = {u:?}; a regulator needs an equilibrium. Name one in \
+             the plant's file",
+            plant.data().name
+        )));
+    }
     let weights = (&settings.q, &settings.r);
     let lqr = lpvmpc_any::lqr(plant, settings.t_s, weights, (&x, &u))
         .map_err(|error| experiment.refused("controller", &error))?;

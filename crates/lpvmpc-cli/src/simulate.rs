@@ -36,7 +36,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
     let files: Vec<(String, Vec<u8>)> = names.zip(contents).collect();
     folder.write(&files, &FILES)?;
     if let Some((t, status)) = &run.first_unsolved {
-        return Err(CommandError::ClosedLoop(format!(
+        return Err(CommandError::NoResult(format!(
             "from t = {t:.6} s on there was not always a plan; there: {status}. The run is in {}",
             out.display()
         )));

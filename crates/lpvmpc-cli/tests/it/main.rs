@@ -207,6 +207,22 @@ fn what_is_wrong_is_named_and_nothing_is_written() {
 }
 
 #[test]
+fn no_regulator_is_designed_where_the_plant_does_not_stand() {
+    let folder = example();
+    // x_dot = u + 1 without an equilibrium in its file: it does not stand at zero.
+    let plant = r#"{"schema": 1, "name": "pushed", "states": [{"name": "a"}], "inputs": [{"name": "u"}],
+        "operations": [["input", 0], ["constant", 1.0], ["add", 0, 1]], "derivative": [2]}"#;
+    fs::write(folder.path().join("pushed.json"), plant).unwrap();
+    let said = succeed(folder.path(), &["plant", "pushed.json"]);
+    assert!(said.contains("this is no equilibrium"), "{said}");
+    let experiment = "name = \"a\"\nplant = \"pushed.json\"\nx0 = [0]\nduration = 1\n\
+                      [controller]\nt_s = 0.1\nhorizon = 5\nq = [1]\nr = [1]\n";
+    fs::write(folder.path().join("pushed.toml"), experiment).unwrap();
+    let message = fail(folder.path(), &["lqr", "pushed.toml"]);
+    assert!(message.contains("needs an equilibrium"), "{message}");
+}
+
+#[test]
 fn files_of_others_stay() {
     let folder = example();
     let out = folder.path().join("mine");
