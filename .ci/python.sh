@@ -24,6 +24,8 @@ assert not heavy, f"import lpvmpc imports {heavy}"'
 # The program that was built before says what the package must say, bit for bit.
 export LPVMPC_BALLBOT=$CARGO_TARGET_DIR/release/ballbot
 test -x "$LPVMPC_BALLBOT"
+cargo build --locked --release -p lpvmpc-cli
+export LPVMPC_PROGRAM=$CARGO_TARGET_DIR/release/lpvmpc
 cd python
 "$python/venv/bin/python" -m mypy
 # Not `python -m pytest`, which would take the package of this folder instead of the installed one.

@@ -1,10 +1,8 @@
 //! Plants.
 
 use crate::errors::{of_plant, of_setting};
-use lpvmpc::{AlongMotion, LpvModel};
-use lpvmpc_any::{MOST_INPUTS, MOST_STATES};
-use lpvmpc_plant::{FirmwareSettings, PlantData, PlantError, Signal, SizedPlant};
-use nalgebra::{DMatrix, SVector};
+use lpvmpc_any::jacobian;
+use lpvmpc_plant::{FirmwareSettings, PlantData, PlantError, Signal};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -211,24 +209,4 @@ impl Plant {
     fn __eq__(&self, other: &Self) -> bool {
         self.inner == other.inner
     }
-}
-
-/// (df/dx, df/du) at `x` and `u`, of the plant's sizes.
-pub fn jacobian(
-    plant: &lpvmpc_plant::Plant,
-    x: &[f64],
-    u: &[f64],
-) -> Result<(DMatrix<f64>, DMatrix<f64>), PlantError> {
-    const BOTH: usize = MOST_STATES + MOST_INPUTS;
-    let placed = SizedPlant::<MOST_STATES, MOST_INPUTS>::new(plant.clone())?;
-    let filled = |values: &[f64], i: usize| values.get(i).copied().unwrap_or(0.0);
-    let (a, b) = AlongMotion::<_, BOTH>(placed).jacobian(
-        &SVector::from_fn(|i, _| filled(x, i)),
-        &SVector::from_fn(|i, _| filled(u, i)),
-    );
-    let (n, m) = (x.len(), u.len());
-    Ok((
-        DMatrix::from_fn(n, n, |i, j| a[(i, j)]),
-        DMatrix::from_fn(n, m, |i, j| b[(i, j)]),
-    ))
 }

@@ -25,22 +25,21 @@ pub mod commands;
 pub mod html;
 pub mod identification;
 pub mod input;
-pub mod interrupt;
 pub mod json;
 pub mod optimality_figure;
-pub mod output;
 pub mod parallel_figure;
 pub mod program;
-pub mod progress;
 pub mod refinement_file;
 pub mod reproduction;
-pub mod results;
 pub mod run_figures;
-pub mod table;
 pub mod tuning_figures;
 
 use arguments::{Arguments, Command};
 use commands::CommandError;
+pub use lpvmpc_terminal::{interrupt, output, progress, results, table};
+
+/// What the program is called.
+pub const PROGRAM: &str = "ballbot";
 
 /// Does what the command line asks for and returns the text for standard output.
 ///

@@ -1,6 +1,6 @@
 //! The program `ballbot`.
 
-use ballbot_cli::{arguments::Arguments, interrupt, output};
+use ballbot_cli::{arguments::Arguments, commands::CommandError, interrupt, output};
 use clap::{CommandFactory, FromArgMatches};
 use std::process::ExitCode;
 
@@ -12,10 +12,10 @@ fn main() -> ExitCode {
     };
     // A server is ended by an interrupt as a rule.
     if let Some(name) = matches.subcommand_name().filter(|name| *name != "view") {
-        interrupt::watch(name.to_owned());
+        interrupt::watch(format!("{} {name}", ballbot_cli::PROGRAM));
     }
     match ballbot_cli::run(arguments) {
         Ok(text) => output::print(&text),
-        Err(error) => output::fail(&error),
+        Err(error) => output::fail(&error, matches!(error, CommandError::Usage(_))),
     }
 }

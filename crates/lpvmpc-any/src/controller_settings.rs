@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, Matrix1, SMatrix, SVector, Vector1};
 const MOST_SAMPLES: usize = 1000;
 
 /// What stands, up to rounding: the largest change of a state, in its unit per second or per period.
-const AT_REST: f64 = 1e-6;
+pub const AT_REST: f64 = 1e-6;
 
 /// Bounds that hold at every stage.
 #[derive(Clone, Copy)]

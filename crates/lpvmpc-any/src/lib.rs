@@ -39,6 +39,7 @@
 //! | a guaranteed loop to an equilibrium | [`Terminal::Certified`] |
 //! | a simulated plant with sensors, actuators, delay and pushes | [`World`] |
 //! | where a plant can stand | [`steady_state`] |
+//! | its derivatives, and the regulator of these | [`jacobian`], [`lqr`] |
 //!
 //! It is the controller of `lpvmpc`, compiled for a few sizes. A plant that is smaller than the
 //! size that serves it leaves places over; what stands there stays zero, and nothing depends on it.
@@ -56,6 +57,7 @@ mod guaranteed;
 mod horizon;
 mod last_input;
 mod linear_model;
+mod linearise;
 mod model;
 mod mpc;
 mod plan;
@@ -70,8 +72,10 @@ mod tasks;
 mod words;
 mod world;
 
+pub use controller_settings::AT_REST;
 pub use error::MpcError;
 pub use estimator::{Disturbance, Estimate, EstimatorSettings};
+pub use linearise::{jacobian, lqr};
 pub use lpvmpc::{Decision, Gate, Iterations, Penalty, Reading, Verdict};
 pub use lpvmpc_sim::{Actuator, Tolerances};
 pub use mpc::{MOST_INPUTS, MOST_STATES, Mpc};

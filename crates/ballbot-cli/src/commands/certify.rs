@@ -83,7 +83,7 @@ pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
     let scenario = scenario.uncertified();
     let prepared = scenario.prepare(folder.as_path())?;
     let names = ["certificate.json", "certificate.html"];
-    let results = ResultFolder::open(&arguments.out, &names)?;
+    let results = ResultFolder::open(crate::PROGRAM, &arguments.out, &names)?;
     let search = CertificateSearch {
         prepared: &prepared,
         size: arguments.size,

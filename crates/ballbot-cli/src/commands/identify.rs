@@ -220,7 +220,7 @@ fn open(path: &Path) -> Result<ResultFolder, FileError> {
     let figures = all_figure_files();
     let figures = figures.iter().map(String::as_str);
     let names = PARAMETERS.into_iter().chain([REPORT]).chain(figures);
-    ResultFolder::open(path, &names.collect::<Vec<_>>())
+    ResultFolder::open(crate::PROGRAM, path, &names.collect::<Vec<_>>())
 }
 
 /// Writes what there is, parameters only of a robot, and returns the names of the files.

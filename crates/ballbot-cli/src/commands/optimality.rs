@@ -54,7 +54,7 @@ const RESULTS: [&str; 5] = [
 /// # Errors
 /// A file cannot be written.
 pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
-    let results = ResultFolder::open(&arguments.out, &RESULTS)?;
+    let results = ResultFolder::open(crate::PROGRAM, &arguments.out, &RESULTS)?;
     let iterations = arguments.programs.map_or_else(Iterations::default, |most| {
         Iterations::descent(Iterations::<f64>::TOLERANCE, most as usize)
     });

@@ -36,7 +36,11 @@ pub struct ReproduceArguments {
 /// # Errors
 /// A file cannot be written, or a published number does not agree.
 pub fn run(arguments: &ReproduceArguments) -> Result<String, CommandError> {
-    let results = ResultFolder::open(&arguments.out, &["report.html", "summary.json"])?;
+    let results = ResultFolder::open(
+        crate::PROGRAM,
+        &arguments.out,
+        &["report.html", "summary.json"],
+    )?;
     let reproduction = compute()?;
     let claims = reproduction.claims();
     let sheets = tables::sheets(&reproduction, &claims);

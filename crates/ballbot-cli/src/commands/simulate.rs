@@ -90,7 +90,7 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
         Some(folder) => folder.clone(),
         None => Path::new("out").join(name),
     };
-    let folder = ResultFolder::open(&folder, &RESULTS)?;
+    let folder = ResultFolder::open(crate::PROGRAM, &folder, &RESULTS)?;
     let logs = match &arguments.log {
         Some(_) if arguments.logs_to_standard_output() => {
             check_alone(arguments.json, prepared.planes.len())?;

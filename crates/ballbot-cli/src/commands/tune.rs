@@ -116,7 +116,7 @@ fn tune(tuning: &Own<'_>, path: &Path, arguments: &TuneArguments) -> Result<Stri
     // Found out now rather than after the search.
     tuning.document(tuning.start())?;
     let out = arguments.out.clone().unwrap_or_else(|| folder(path));
-    let results = ResultFolder::open(&out, &report::RESULTS)?;
+    let results = ResultFolder::open(crate::PROGRAM, &out, &report::RESULTS)?;
     let (file, journal) = JournalFile::open(&out, tuning.fingerprint())?;
     let cluster = match arguments.shards {
         Some(shards) => {

@@ -41,7 +41,7 @@ pub fn run(arguments: &CampaignArguments) -> Result<String, CommandError> {
         .out
         .as_deref()
         .unwrap_or(Path::new("out/campaign"));
-    let results = ResultFolder::open(out, &RESULTS)?;
+    let results = ResultFolder::open(crate::PROGRAM, out, &RESULTS)?;
     let progress = Progress::new("running", campaign.total_runs());
     let outcomes = campaign.run(&scenarios, &|done| progress.set(done))?;
     drop(progress);

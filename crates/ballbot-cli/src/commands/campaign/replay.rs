@@ -40,7 +40,7 @@ pub(super) fn run(arguments: &ReplayArguments) -> Result<String, CommandError> {
     let out = arguments.out.clone();
     let out = out
         .unwrap_or_else(|| super::folder(&arguments.file).join(format!("run-{}", arguments.run)));
-    let folder = ResultFolder::open(&out, &simulate::RESULTS)?;
+    let folder = ResultFolder::open(crate::PROGRAM, &out, &simulate::RESULTS)?;
     let start = Instant::now();
     let replay = campaign.replay(arguments.run, &|| start.elapsed())?;
     simulate::write_record(&folder, &replay.prepared, &replay.record)?;

@@ -157,7 +157,7 @@ pub(super) fn rare(
     pool: &ThreadPool,
     (out, as_json): (&Path, bool),
 ) -> Result<String, CommandError> {
-    let results = ResultFolder::open(out, &RESULTS)?;
+    let results = ResultFolder::open(crate::PROGRAM, out, &RESULTS)?;
     // As many levels as there are tenths until the least probability.
     let levels = (-rare.least.log10()).ceil() as usize;
     let progress = Progress::new("rare failure", levels * rare.level_runs as usize);

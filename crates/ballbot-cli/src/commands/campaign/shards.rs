@@ -202,7 +202,7 @@ pub(super) fn prepare(
     arguments: &CampaignArguments,
 ) -> Result<Vec<Shard>, CommandError> {
     check_divisible(campaign)?;
-    ResultFolder::open(out, &report::RESULTS)?;
+    ResultFolder::open(crate::PROGRAM, out, &report::RESULTS)?;
     // The shards, and what they are merged into.
     room::check(
         2 * campaign.runs(),
@@ -255,7 +255,7 @@ pub(super) fn put_together(
     out: &Path,
     json: bool,
 ) -> Result<String, CommandError> {
-    let results = ResultFolder::open(out, &report::RESULTS)?;
+    let results = ResultFolder::open(crate::PROGRAM, out, &report::RESULTS)?;
     let shards = campaign.shards(&folder(out))?;
     let rows = RowFiles::create(out)?;
     let progress = Progress::new("merging", campaign.runs() as usize);

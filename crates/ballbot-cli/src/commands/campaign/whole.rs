@@ -40,7 +40,7 @@ pub(super) fn run(
     if let Some(rare) = campaign.source().file().rare {
         return report::rare(campaign, &rare, &pool, (out, arguments.json));
     }
-    let results = ResultFolder::open(out, &report::RESULTS)?;
+    let results = ResultFolder::open(crate::PROGRAM, out, &report::RESULTS)?;
     room::check(
         campaign.runs(),
         &campaign.columns(),

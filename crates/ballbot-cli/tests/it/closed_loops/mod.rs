@@ -35,7 +35,7 @@ fn files(folder: &Path) -> Vec<String> {
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_str().unwrap();
-        if name == ballbot_cli::results::LIST {
+        if name == ".ballbot-files" {
             continue;
         }
         if path.is_dir() {

@@ -7,25 +7,29 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The list, one path per line, relative to the folder.
-pub const LIST: &str = ".ballbot-files";
+/// The list of a program's files, one path per line, relative to the folder.
+fn list_of(program: &str) -> String {
+    format!(".{program}-files")
+}
 
 /// A folder for results.
 #[derive(Clone, Debug)]
 pub struct ResultFolder {
     path: PathBuf,
+    /// The program whose results they are.
+    program: &'static str,
     /// What is in it that this program wrote.
     ours: BTreeSet<String>,
 }
 
 impl ResultFolder {
-    /// The folder at `path`, there or not, for a run that may leave the files `names` in it. Nothing
-    /// is made yet.
+    /// The folder at `path`, there or not, for a run of `program` that may leave the files `names` in it.
+    /// Nothing is made yet.
     ///
     /// # Errors
     /// Nothing can be written there, or one of these files is there and not this program's.
-    pub fn open(path: &Path, names: &[&str]) -> Result<Self, FileError> {
-        let list = path.join(LIST);
+    pub fn open(program: &'static str, path: &Path, names: &[&str]) -> Result<Self, FileError> {
+        let list = path.join(list_of(program));
         let ours = match fs::read_to_string(&list) {
             Ok(text) => text.lines().map(str::to_owned).collect(),
             Err(error) if error.kind() == io::ErrorKind::NotFound => BTreeSet::new(),
@@ -35,6 +39,7 @@ impl ResultFolder {
         };
         let folder = Self {
             path: path.to_owned(),
+            program,
             ours,
         };
         output::check_writable(&list)?;
@@ -62,8 +67,10 @@ impl ResultFolder {
         Err(FileError::at(&path)(io::Error::new(
             io::ErrorKind::AlreadyExists,
             format!(
-                "it is there, and {LIST} beside it does not say that ballbot wrote it. Choose \
-                 another folder with --out, or move the file away"
+                "it is there, and {} beside it does not say that {} wrote it. Choose \
+                 another folder with --out, or move the file away",
+                list_of(self.program),
+                self.program
             ),
         )))
     }
@@ -103,7 +110,7 @@ impl ResultFolder {
         let list: BTreeSet<&str> = kept.collect();
         let list: String = list.iter().map(|name| format!("{name}\n")).collect();
         let mut paths: Vec<PathBuf> = files.iter().map(|(name, _)| self.path.join(name)).collect();
-        paths.push(self.path.join(LIST));
+        paths.push(self.path.join(list_of(self.program)));
         let contents = files.iter().map(|(_, content)| content.as_slice());
         let contents = contents.chain([list.as_bytes()]);
         let all: Vec<(&Path, &[u8])> = paths.iter().map(PathBuf::as_path).zip(contents).collect();
@@ -145,11 +152,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path();
         fs::write(path.join("figure.svg"), "mine").unwrap();
-        let error = ResultFolder::open(path, &["a.csv", "figure.svg"]).unwrap_err();
+        let error = ResultFolder::open("ballbot", path, &["a.csv", "figure.svg"]).unwrap_err();
         assert!(error.to_string().contains("figure.svg"), "{error}");
         assert!(error.to_string().contains("--out"), "{error}");
         // Where its name is not known before the run, it is found out before anything is written.
-        let results = ResultFolder::open(path, &["a.csv"]).unwrap();
+        let results = ResultFolder::open("ballbot", path, &["a.csv"]).unwrap();
         let files = [file("a.csv"), file("figure.svg")];
         assert!(results.write(&files, &[]).is_err());
         assert_eq!(names(path), ["figure.svg"]);
@@ -163,17 +170,17 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("new");
         let all = ["a.csv", "b.csv", "c.csv"];
-        let first = ResultFolder::open(&path, &all).unwrap();
+        let first = ResultFolder::open("ballbot", &path, &all).unwrap();
         assert!(!path.exists());
         first
             .write(&[file("a.csv"), file("b.csv"), file("other.csv")], &all)
             .unwrap();
         fs::write(path.join("c.csv.bak"), "mine").unwrap();
-        let second = ResultFolder::open(&path, &all).unwrap();
+        let second = ResultFolder::open("ballbot", &path, &all).unwrap();
         second.write(&[file("a.csv"), file("c.csv")], &all).unwrap();
-        let expected = [LIST, "a.csv", "c.csv", "c.csv.bak", "other.csv"];
+        let expected = [".ballbot-files", "a.csv", "c.csv", "c.csv.bak", "other.csv"];
         assert_eq!(names(&path), expected);
-        let list = fs::read_to_string(path.join(LIST)).unwrap();
+        let list = fs::read_to_string(path.join(".ballbot-files")).unwrap();
         assert_eq!(list, "a.csv\nc.csv\nother.csv\n");
     }
 }

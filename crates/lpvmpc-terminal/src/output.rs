@@ -1,7 +1,7 @@
 //! What leaves the program: files, standard output, messages.
 
-use crate::commands::CommandError;
 use std::ffi::OsString;
+use std::fmt::Display;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ pub struct FileError {
 
 impl FileError {
     /// For `map_err`, with the path.
-    pub(crate) fn at(path: &Path) -> impl Fn(io::Error) -> Self {
+    pub fn at(path: &Path) -> impl Fn(io::Error) -> Self {
         move |source| Self {
             path: path.to_owned(),
             source,
@@ -307,12 +307,12 @@ pub fn print(text: &str) -> ExitCode {
     }
 }
 
-/// Reports why a command has no result.
-pub fn fail(error: &CommandError) -> ExitCode {
+/// Reports why a command has no result: by exit code 2 where the command line is not understood, else by 1.
+pub fn fail(error: &dyn Display, is_usage: bool) -> ExitCode {
     let code = complain(&error.to_string());
-    match error {
-        CommandError::Usage(_) => ExitCode::from(2),
-        _ => code,
+    match is_usage {
+        true => ExitCode::from(2),
+        false => code,
     }
 }
 

@@ -11,7 +11,7 @@ const INTERRUPTED: i32 = 130;
 /// As many files are named.
 const NAMED: usize = 4;
 
-/// From here on an interrupt ends the program in order. `command` is what the message calls it. Who
+/// From here on an interrupt ends the program in order. `command` is what the message calls it, `ballbot certify`. Who
 /// started the program with interrupts ignored, as a shell does in the background, has them ignored.
 pub fn watch(command: String) {
     // Where there is no handler an interrupt ends the program all the same, without a word.
@@ -31,7 +31,7 @@ pub fn watch(command: String) {
 
 fn message(command: &str, written: &[PathBuf]) -> String {
     if written.is_empty() {
-        return format!("interrupted: `ballbot {command}` was stopped, nothing was written");
+        return format!("interrupted: `{command}` was stopped, nothing was written");
     }
     let named = written.iter().take(NAMED);
     let named: Vec<String> = named.map(|path| path.display().to_string()).collect();
@@ -40,7 +40,7 @@ fn message(command: &str, written: &[PathBuf]) -> String {
         more => format!(" and {more} more"),
     };
     format!(
-        "interrupted: `ballbot {command}` was stopped after it had written {}{more}",
+        "interrupted: `{command}` was stopped after it had written {}{more}",
         named.join(", ")
     )
 }
@@ -52,8 +52,8 @@ mod tests {
     #[test]
     fn what_was_written_is_named() {
         let all: Vec<PathBuf> = ["a", "b", "c", "d", "e", "f"].map(PathBuf::from).into();
-        assert!(message("certify", &[]).ends_with("nothing was written"));
-        assert!(message("rehearse", &all[..2]).ends_with("had written a, b"));
-        assert!(message("rehearse", &all).ends_with("had written a, b, c, d and 2 more"));
+        assert!(message("ballbot certify", &[]).ends_with("nothing was written"));
+        assert!(message("ballbot rehearse", &all[..2]).ends_with("had written a, b"));
+        assert!(message("ballbot rehearse", &all).ends_with("had written a, b, c, d and 2 more"));
     }
 }

@@ -1,0 +1,110 @@
+//! The closed loop of an experiment.
+
+use crate::error::CommandError;
+use crate::experiment::{Experiment, Reference};
+use lpvmpc_any::{Mpc, Preview, World};
+use lpvmpc_terminal::progress::Progress;
+use nalgebra::DVector;
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+/// What happened. One entry per sample, but of `x` one more: the end.
+#[derive(Debug, Default)]
+pub struct Run {
+    /// The true states.
+    pub x: Vec<Vec<f64>>,
+    /// The commands.
+    pub u: Vec<Vec<f64>>,
+    /// The outputs under them.
+    pub y: Vec<Vec<f64>>,
+    /// The references of the states; empty without.
+    pub x_ref: Vec<Vec<f64>>,
+    /// Time of each step of the controller, s.
+    pub step_times: Vec<f64>,
+    /// Cost of each plan.
+    pub costs: Vec<f64>,
+    /// How often each status of a plan came.
+    pub statuses: BTreeMap<String, usize>,
+    /// Time and status of the first plan that was none.
+    pub first_unsolved: Option<(f64, String)>,
+}
+
+impl Run {
+    /// Runs the loop, as the Python package does.
+    ///
+    /// # Errors
+    /// The controller or the world refuses its settings, or the motion cannot be integrated.
+    pub fn new(experiment: &Experiment) -> Result<Self, CommandError> {
+        let Experiment {
+            plant,
+            real,
+            settings,
+            ..
+        } = experiment;
+        let mut mpc =
+            Mpc::new(plant, settings).map_err(|error| experiment.refused("controller", &error))?;
+        let mut world = World::new(real, &experiment.x0, &experiment.world)
+            .map_err(|error| experiment.refused("world", &error))?;
+        let bar = Progress::new("simulating", experiment.samples);
+        let mut run = Self {
+            x: vec![world.state().to_vec()],
+            ..Self::default()
+        };
+        let mut seen = world.state().to_vec();
+        for i in 0..experiment.samples {
+            let t = i as f64 * settings.t_s;
+            // Where a reading is missing, the last one holds.
+            for (seen, reading) in seen.iter_mut().zip(world.readings()) {
+                *seen = reading.map_or(*seen, |reading| reading.value);
+            }
+            let preview = experiment.ahead(i);
+            let start = Instant::now();
+            let plan = mpc.step(&seen, &preview)?;
+            run.step_times.push(start.elapsed().as_secs_f64());
+            let u = plan.first_input();
+            if !plan.is_solved() && run.first_unsolved.is_none() {
+                run.first_unsolved = Some((t, plan.status.clone()));
+            }
+            let word = plan.status.split(':').next().unwrap_or_default();
+            *run.statuses.entry(word.to_owned()).or_default() += 1;
+            run.costs.push(plan.cost);
+            run.y.push(real.output(world.state(), &u)?);
+            run.x_ref
+                .extend(preview.x_ref.first().map(|x| x.as_slice().to_vec()));
+            world.command(&u)?;
+            run.u.push(u);
+            world.advance().map_err(|error| {
+                CommandError::NoResult(format!("after {t:.6} s, sample {i}: {error}"))
+            })?;
+            run.x.push(world.state().to_vec());
+            bar.set(i + 1);
+        }
+        Ok(run)
+    }
+
+    /// A quantile of the times of the steps, s.
+    pub fn step_time(&self, quantile: f64) -> f64 {
+        let mut times = self.step_times.clone();
+        times.sort_by(f64::total_cmp);
+        let last = times.len().saturating_sub(1);
+        let place = (quantile * last as f64).round() as usize;
+        times.get(place).copied().unwrap_or(0.0)
+    }
+}
+
+impl Experiment {
+    /// The references from the sample `i` to the end of its horizon.
+    fn ahead(&self, i: usize) -> Preview {
+        let t_s = self.settings.t_s;
+        let at = |sample: usize| {
+            // A time that is meant to be that of the sample counts as such.
+            let holds = |one: &&Reference| one.time <= (sample as f64 + 1e-9) * t_s;
+            self.references.iter().rev().find(holds)
+        };
+        let stages = (i..=i + self.settings.horizon).map_while(at);
+        Preview {
+            x_ref: stages.map(|one| DVector::from_row_slice(&one.x)).collect(),
+            ..Preview::default()
+        }
+    }
+}

@@ -1,0 +1,481 @@
+//! An experiment: a plant from a file, its controller, and what happens to it.
+
+use crate::arguments::{Example, ExampleArguments};
+use crate::describe::load;
+use crate::error::CommandError;
+use lpvmpc_any::{
+    Iterations, Limits, LinearModels, MpcError, MpcSettings, Push, Quantity, Sensor, StateBounds,
+    Terminal, WorldSettings,
+};
+use lpvmpc_plant::{Plant, Signal};
+use lpvmpc_terminal::table::short;
+use lpvmpc_words::{nearest, toml_message};
+use nalgebra::{DMatrix, DVector};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The files of the example.
+pub fn example(arguments: &ExampleArguments) -> &'static str {
+    match arguments.what {
+        Example::Experiment => include_str!("example.toml"),
+        Example::Plant => include_str!("../../../testdata/plants/cart-pole.json"),
+    }
+}
+
+/// An experiment that was checked.
+#[derive(Debug)]
+pub struct Experiment {
+    /// Its file.
+    path: PathBuf,
+    /// Its name, which is that of the folder of its results.
+    pub name: String,
+    /// The plant that the controller knows.
+    pub plant: Plant,
+    /// The plant as it really is.
+    pub real: Plant,
+    /// The controller.
+    pub settings: MpcSettings,
+    /// The world around the plant.
+    pub world: WorldSettings,
+    /// The state at the start.
+    pub x0: Vec<f64>,
+    /// Samples of the run.
+    pub samples: usize,
+    /// References with the times in s from which on they hold, by time; empty for none.
+    pub references: Vec<Reference>,
+}
+
+/// Where the plant is to be from a time on.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reference {
+    /// From when on, s.
+    pub time: f64,
+    /// The state.
+    pub x: Vec<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    name: String,
+    plant: String,
+    x0: Vec<f64>,
+    duration: f64,
+    controller: Controller,
+    #[serde(default)]
+    reference: Vec<Reference>,
+    #[serde(default)]
+    world: World,
+}
+
+/// Bounds by name.
+type Pairs = BTreeMap<String, [f64; 2]>;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Controller {
+    t_s: f64,
+    horizon: usize,
+    q: Vec<f64>,
+    r: Vec<f64>,
+    #[serde(default)]
+    terminal: TerminalName,
+    x_bounds: Option<Pairs>,
+    u_bounds: Option<Pairs>,
+    y_bounds: Option<Pairs>,
+    du_bounds: Option<Pairs>,
+    state_bounds: Option<Keeping>,
+    output_bounds: Option<Keeping>,
+    u_ref: Option<Vec<f64>>,
+    q_y: Option<Vec<f64>>,
+    r_du: Option<Vec<f64>>,
+    substeps: Option<usize>,
+    linear_models: Option<ModelsName>,
+    nodes: Option<usize>,
+    method: Option<Method>,
+    max_programs: Option<usize>,
+    first_programs: Option<usize>,
+    tolerance: Option<f64>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "lowercase")]
+enum TerminalName {
+    #[default]
+    Lqr,
+    Equality,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Keeping {
+    Soft,
+    Hard,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum ModelsName {
+    Own,
+    Motion,
+    Ray,
+}
+
+#[derive(Deserialize, PartialEq)]
+#[serde(rename_all = "lowercase")]
+enum Method {
+    Descent,
+    Fixed,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct World {
+    parameters: BTreeMap<String, f64>,
+    delay: f64,
+    noise: BTreeMap<String, f64>,
+    seed: u64,
+    jump: Vec<Jump>,
+    load: Vec<Load>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Jump {
+    time: f64,
+    change: Vec<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Load {
+    start: f64,
+    end: f64,
+    load: Vec<f64>,
+}
+
+/// The most samples of a run.
+const MOST_SAMPLES: f64 = 1e6;
+
+impl Experiment {
+    /// Reads and checks the experiment at `path`, and its plant.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no TOML, has a key that is none, or a value that makes no sense.
+    pub fn load(path: &Path) -> Result<Self, CommandError> {
+        let text = fs::read_to_string(path).map_err(|source| CommandError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        let fault = |fault: String| CommandError::Experiment {
+            path: path.to_owned(),
+            fault,
+        };
+        let file: File = toml::from_str(&text).map_err(|error| {
+            fault(format!(
+                "it is no experiment:\n{}",
+                toml_message(&error.to_string())
+            ))
+        })?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let plant = load(&folder.join(&file.plant))?;
+        file.check(path, plant).map_err(fault)
+    }
+}
+
+impl Experiment {
+    /// What its controller or its world refuses, in words that name its file.
+    pub fn refused(&self, part: &str, error: &MpcError) -> CommandError {
+        let MpcError { place, fault } = error;
+        CommandError::Experiment {
+            path: self.path.clone(),
+            fault: match place == part {
+                true => format!("{part}: {fault}"),
+                false => format!("{part}: {place}: {fault}"),
+            },
+        }
+    }
+}
+
+impl File {
+    fn check(self, path: &Path, plant: Plant) -> Result<Experiment, String> {
+        let data = plant.data();
+        let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | ' ' | '.');
+        if !self.name.chars().all(is_plain) || self.name.trim_matches(['.', ' ']).is_empty() {
+            return Err(format!(
+                "name = {:?}: it names a folder; letters, digits, spaces, points, - and _ only",
+                self.name
+            ));
+        }
+        let settings = self.controller.settings(&plant)?;
+        components("x0", &self.x0, &data.states)?;
+        let given = limits("x0", &None, &data.states)?;
+        let bounds = settings.x_bounds.as_ref().unwrap_or(&given);
+        for (i, (state, value)) in data.states.iter().zip(&self.x0).enumerate() {
+            if *value < bounds.lower[i] || *value > bounds.upper[i] {
+                return Err(format!(
+                    "x0: {} = {} is not from {} to {}, its bounds",
+                    state.name,
+                    short(*value),
+                    short(bounds.lower[i]),
+                    short(bounds.upper[i])
+                ));
+            }
+        }
+        let samples = (self.duration / settings.t_s - 1e-9).ceil();
+        if !(self.duration > 0.0 && samples <= MOST_SAMPLES) {
+            return Err(format!(
+                "duration = {}: it must be a positive number of seconds, with at most {MOST_SAMPLES} samples",
+                short(self.duration)
+            ));
+        }
+        let mut before = f64::NEG_INFINITY;
+        for (i, reference) in self.reference.iter().enumerate() {
+            let place = format!("reference {}", i + 1);
+            components(&format!("{place}, x"), &reference.x, &data.states)?;
+            if !(reference.time.is_finite() && reference.time > before) {
+                return Err(format!(
+                    "{place}, time = {}: times must increase from one reference to the next",
+                    short(reference.time)
+                ));
+            }
+            before = reference.time;
+        }
+        if let Some(first) = self.reference.first()
+            && first.time > 0.0
+        {
+            let time = short(first.time);
+            return Err(format!(
+                "reference 1, time = {time}: the first one must hold from 0 on"
+            ));
+        }
+        let mut real = plant.clone();
+        for (name, value) in &self.world.parameters {
+            let known = data.parameters.iter().map(|one| one.name.as_str());
+            check_name("world.parameters", name, known)?;
+            let set = real.set_parameter(name, *value);
+            set.map_err(|error| format!("world.parameters: {error}"))?;
+        }
+        let world = self.world.settings(settings.t_s, &data.states)?;
+        Ok(Experiment {
+            path: path.to_owned(),
+            name: self.name,
+            real,
+            settings,
+            world,
+            x0: self.x0,
+            samples: samples as usize,
+            references: self.reference,
+            plant,
+        })
+    }
+}
+
+impl Controller {
+    fn settings(&self, plant: &Plant) -> Result<MpcSettings, String> {
+        let data = plant.data();
+        let (states, inputs, outputs) = (&data.states, &data.inputs, &data.outputs);
+        let place = |name: &str| format!("controller.{name}");
+        weights(&place("q"), &self.q, states)?;
+        weights(&place("r"), &self.r, inputs)?;
+        let usual = MpcSettings::new(self.t_s, self.horizon, &self.q, &self.r);
+        let diagonal = |name, list: &Option<Vec<f64>>, signals: &[Signal]| match list {
+            None => Ok(None),
+            Some(list) => {
+                weights(&place(name), list, signals)?;
+                let entries = DVector::from_row_slice(list);
+                Ok::<_, String>(Some(DMatrix::from_diagonal(&entries)))
+            }
+        };
+        let bounds = |name, pairs: &Option<Pairs>, signals: &[Signal]| match pairs {
+            None => Ok(None),
+            Some(_) => limits(&place(name), pairs, signals).map(Some),
+        };
+        let keeping = |given: &Option<Keeping>| match given {
+            Some(Keeping::Hard) => StateBounds::Hard,
+            Some(Keeping::Soft) | None => StateBounds::Soft,
+        };
+        let changes: Vec<Signal> = inputs
+            .iter()
+            .map(|one| Signal::new(&one.name, &one.unit))
+            .collect();
+        if let Some(u_ref) = &self.u_ref {
+            components(&place("u_ref"), u_ref, inputs)?;
+        }
+        Ok(MpcSettings {
+            substeps: self.substeps.unwrap_or(usual.substeps),
+            terminal: match self.terminal {
+                TerminalName::Lqr => Terminal::Lqr,
+                TerminalName::Equality => Terminal::Equality,
+            },
+            x_bounds: bounds("x_bounds", &self.x_bounds, states)?,
+            u_bounds: bounds("u_bounds", &self.u_bounds, inputs)?,
+            y_bounds: bounds("y_bounds", &self.y_bounds, outputs)?,
+            du_bounds: bounds("du_bounds", &self.du_bounds, &changes)?,
+            state_bounds: keeping(&self.state_bounds),
+            output_bounds: keeping(&self.output_bounds),
+            u_ref: { self.u_ref.as_ref() }.map(|u_ref| DVector::from_row_slice(u_ref)),
+            q_y: diagonal("q_y", &self.q_y, outputs)?,
+            r_du: diagonal("r_du", &self.r_du, inputs)?,
+            linear_models: self.linear_models()?,
+            iterations: self.iterations(usual.iterations)?,
+            ..usual
+        })
+    }
+
+    fn linear_models(&self) -> Result<LinearModels, String> {
+        let ray = matches!(self.linear_models, Some(ModelsName::Ray));
+        if self.nodes.is_some() && !ray {
+            return Err("controller.nodes: it goes with linear_models = \"ray\" alone".to_owned());
+        }
+        Ok(match self.linear_models {
+            None | Some(ModelsName::Own) => LinearModels::Own,
+            Some(ModelsName::Motion) => LinearModels::AlongMotion,
+            Some(ModelsName::Ray) => LinearModels::AlongRay {
+                nodes: self.nodes.unwrap_or(2),
+            },
+        })
+    }
+
+    fn iterations(&self, usual: Iterations<f64>) -> Result<Iterations<f64>, String> {
+        if self.method == Some(Method::Fixed) {
+            if self.first_programs.is_some() || self.tolerance.is_some() {
+                let fault = "first_programs and tolerance go with method = \"descent\" alone";
+                return Err(format!("controller: {fault}"));
+            }
+            let fault = "controller.max_programs: method = \"fixed\" needs their number";
+            let most = self.max_programs.ok_or(fault)?;
+            return Ok(Iterations::Fixed(most));
+        }
+        Ok(match usual {
+            Iterations::Descent {
+                tolerance,
+                most,
+                first,
+            } => Iterations::Descent {
+                tolerance: self.tolerance.unwrap_or(tolerance),
+                most: self.max_programs.unwrap_or(most),
+                first: self.first_programs.unwrap_or(first),
+            },
+            other => other,
+        })
+    }
+}
+
+impl World {
+    fn settings(self, period: f64, states: &[Signal]) -> Result<WorldSettings, String> {
+        for (i, jump) in self.jump.iter().enumerate() {
+            components(&format!("world.jump {}", i + 1), &jump.change, states)?;
+        }
+        for (i, load) in self.load.iter().enumerate() {
+            components(&format!("world.load {}", i + 1), &load.load, states)?;
+        }
+        for name in self.noise.keys() {
+            check_name("world.noise", name, names(states).into_iter())?;
+        }
+        let sensor = |i: usize| {
+            let row = (0..states.len()).map(|j| if i == j { 1.0 } else { 0.0 });
+            Sensor {
+                noise: self.noise.get(&states[i].name).copied().unwrap_or(0.0),
+                ..Sensor::ideal(Quantity::Row(row.collect()))
+            }
+        };
+        let jumps = self.jump.into_iter().map(|jump| Push::Jump {
+            time: jump.time,
+            change: jump.change,
+        });
+        let loads = self.load.into_iter().map(|load| Push::Load {
+            from: load.start,
+            until: load.end,
+            load: load.load,
+        });
+        Ok(WorldSettings {
+            sensors: (!self.noise.is_empty()).then(|| (0..states.len()).map(sensor).collect()),
+            delay: self.delay,
+            pushes: jumps.chain(loads).collect(),
+            seed: self.seed,
+            ..WorldSettings::ideal(period)
+        })
+    }
+}
+
+fn names(signals: &[Signal]) -> Vec<&str> {
+    signals.iter().map(|one| one.name.as_str()).collect()
+}
+
+/// One finite number for each signal.
+fn components(place: &str, list: &[f64], signals: &[Signal]) -> Result<(), String> {
+    if list.len() != signals.len() {
+        return Err(format!(
+            "{place}: {} numbers; it needs {}, for {}",
+            list.len(),
+            signals.len(),
+            names(signals).join(", ")
+        ));
+    }
+    let mut pairs = signals.iter().zip(list);
+    match pairs.find(|(_, value)| !value.is_finite()) {
+        Some((signal, value)) => Err(format!("{place}: {} = {value} is not finite", signal.name)),
+        None => Ok(()),
+    }
+}
+
+/// The same of weights.
+fn weights(place: &str, list: &[f64], signals: &[Signal]) -> Result<(), String> {
+    components(place, list, signals)?;
+    let mut pairs = signals.iter().zip(list);
+    match pairs.find(|(_, weight)| **weight < 0.0) {
+        Some((signal, weight)) => Err(format!(
+            "{place}: the weight of {} is {}; it must not be negative",
+            signal.name,
+            short(*weight)
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Bounds of each signal: those given by name, else its own.
+fn limits(place: &str, given: &Option<Pairs>, signals: &[Signal]) -> Result<Limits, String> {
+    for (name, [lower, upper]) in given.iter().flatten() {
+        check_name(place, name, names(signals).into_iter())?;
+        if !(lower <= upper) {
+            let (lower, upper) = (short(*lower), short(*upper));
+            return Err(format!(
+                "{place}: {name} = [{lower}, {upper}] has no value between"
+            ));
+        }
+    }
+    let pair = |signal: &Signal| match given.as_ref().and_then(|given| given.get(&signal.name)) {
+        Some(pair) => *pair,
+        None => [
+            signal.lower.unwrap_or(f64::NEG_INFINITY),
+            signal.upper.unwrap_or(f64::INFINITY),
+        ],
+    };
+    let pairs: Vec<[f64; 2]> = signals.iter().map(pair).collect();
+    Ok(Limits {
+        lower: pairs.iter().map(|pair| pair[0]).collect(),
+        upper: pairs.iter().map(|pair| pair[1]).collect(),
+    })
+}
+
+/// Whether it is one of these names.
+fn check_name<'a>(
+    place: &str,
+    name: &str,
+    known: impl Iterator<Item = &'a str>,
+) -> Result<(), String> {
+    let known: Vec<&str> = known.collect();
+    if known.contains(&name) {
+        return Ok(());
+    }
+    let meant = nearest(name, known.iter().copied());
+    Err(format!(
+        "{place}: there is no {name:?}; there are {}{}",
+        known.join(", "),
+        meant.map_or(String::new(), |meant| format!("; did you mean {meant:?}?"))
+    ))
+}

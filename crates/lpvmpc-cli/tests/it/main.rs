@@ -1,0 +1,244 @@
+//! The program `lpvmpc` as its users run it.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on must fail, in its support functions too"
+)]
+
+use nalgebra::{DMatrix, DVector};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+fn lpvmpc(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lpvmpc"))
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+/// Standard output of a run that succeeds.
+fn succeed(folder: &Path, arguments: &[&str]) -> String {
+    let output = lpvmpc(folder, arguments);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {message}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The message of a run that has no result.
+fn fail(folder: &Path, arguments: &[&str]) -> String {
+    let output = lpvmpc(folder, arguments);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {message}");
+    assert!(output.stdout.is_empty(), "{arguments:?} printed a result");
+    assert!(message.starts_with("error: "), "{arguments:?}: {message}");
+    message
+}
+
+/// A folder with the example, shortened to 1 s.
+fn example() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let plant = succeed(folder.path(), &["example", "plant"]);
+    fs::write(folder.path().join("cart-pole.json"), plant).unwrap();
+    let text = succeed(folder.path(), &["example"]);
+    let text = changed(&text, "duration = 6.0", "duration = 1.0");
+    fs::write(folder.path().join("cart-pole.toml"), text).unwrap();
+    folder
+}
+
+fn changed(text: &str, from: &str, to: &str) -> String {
+    assert!(text.contains(from), "`{from}` is not in: {text}");
+    text.replacen(from, to, 1)
+}
+
+fn numbers(rows: &Value) -> DMatrix<f64> {
+    let rows: Vec<Vec<f64>> = serde_json::from_value(rows.clone()).unwrap();
+    DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j])
+}
+
+#[test]
+fn an_experiment_is_recorded_from_end_to_end() {
+    let folder = example();
+    let summary = succeed(folder.path(), &["simulate", "cart-pole.toml", "--json"]);
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    assert_eq!(summary["samples"], 25);
+    assert_eq!(summary["statuses"]["converged"], 25);
+    let out = folder.path().join("out").join("cart-pole");
+    let written = fs::read_to_string(out.join("summary.json")).unwrap();
+    assert_eq!(summary, serde_json::from_str::<Value>(&written).unwrap());
+    let table = fs::read_to_string(out.join("trajectory.csv")).unwrap();
+    let lines: Vec<Vec<&str>> = table
+        .lines()
+        .map(|line| line.split(',').collect())
+        .collect();
+    assert_eq!(lines.len(), 27);
+    assert!(lines.iter().all(|line| line.len() == lines[0].len()));
+    assert_eq!(lines[0][5], "force [N]");
+    let forces = lines[1..26]
+        .iter()
+        .map(|line| line[5].parse::<f64>().unwrap());
+    assert!(forces.into_iter().all(|force| force.abs() <= 15.0));
+    assert!(
+        fs::read(out.join("figure.png"))
+            .unwrap()
+            .starts_with(b"\x89PNG")
+    );
+    // Again, in place of its own files, and the same to the last bit.
+    assert_eq!(
+        succeed(folder.path(), &["-q", "simulate", "cart-pole.toml"]),
+        ""
+    );
+    assert_eq!(
+        fs::read_to_string(out.join("trajectory.csv")).unwrap(),
+        table
+    );
+}
+
+#[test]
+fn the_regulator_is_the_limit_of_the_backward_recursion() {
+    let folder = example();
+    let json = |arguments: &[&str]| -> Value {
+        serde_json::from_str(&succeed(folder.path(), arguments)).unwrap()
+    };
+    let found = json(&["lqr", "cart-pole.toml", "--json"]);
+    let plant = json(&["plant", "cart-pole.json", "--json"]);
+    assert_eq!(plant["controllability_rank"], 4);
+    // exp([A B; 0 0] t_s) by its series.
+    let (a, b) = (numbers(&plant["a"]), numbers(&plant["b"]));
+    let mut joint = DMatrix::zeros(5, 5);
+    joint.view_mut((0, 0), (4, 4)).copy_from(&(a * 0.04));
+    joint.view_mut((0, 4), (4, 1)).copy_from(&(b * 0.04));
+    let mut sum = DMatrix::identity(5, 5);
+    let mut term = DMatrix::identity(5, 5);
+    for k in 1..20 {
+        term = &term * &joint / f64::from(k);
+        sum += &term;
+    }
+    let (a, b) = (
+        sum.view((0, 0), (4, 4)).into_owned(),
+        sum.view((0, 4), (4, 1)).into_owned(),
+    );
+    let q = DMatrix::from_diagonal(&DVector::from_vec(vec![10.0, 10.0, 0.1, 0.1]));
+    let (mut p, mut k) = (q.clone(), DMatrix::zeros(1, 4));
+    for _ in 0..2000 {
+        let r = (b.transpose() * &p * &b)[(0, 0)] + 0.01;
+        k = b.transpose() * &p * &a / r;
+        p = &q + a.transpose() * &p * (&a - &b * &k);
+    }
+    let error = (numbers(&found["k"]) - &k).amax() / k.amax();
+    assert!(error < 1e-9, "{error}");
+    let error = (numbers(&found["p"]) - &p).amax() / p.amax();
+    assert!(error < 1e-9, "{error}");
+}
+
+#[test]
+fn what_is_wrong_is_named_and_nothing_is_written() {
+    let folder = example();
+    let text = fs::read_to_string(folder.path().join("cart-pole.toml")).unwrap();
+    for (from, to, parts) in [
+        (
+            "horizon =",
+            "horizn =",
+            vec!["line 10", "did you mean `horizon`?"],
+        ),
+        (
+            "\"cart-pole.json\"",
+            "\"none.json\"",
+            vec!["cannot read none.json"],
+        ),
+        (
+            "x0 = [0.0",
+            "x0 = [3.0",
+            vec!["x0: position = 3", "-0.2 to 1.2"],
+        ),
+        (
+            "x0 = [0.0",
+            "x0 = [nan",
+            vec!["x0: position = NaN is not finite"],
+        ),
+        ("r = [0.01]", "r = [-1]", vec!["the weight of force is -1"]),
+        (
+            "r = [0.01]",
+            "r = [0]",
+            vec!["controller: ", "positive definite"],
+        ),
+        (
+            "q = [10.0, ",
+            "q = [",
+            vec!["3 numbers", "position, tilt, speed, rate"],
+        ),
+        (
+            "position = [",
+            "positon = [",
+            vec!["did you mean \"position\"?"],
+        ),
+        (
+            "pole_mass =",
+            "pole_mas =",
+            vec!["did you mean \"pole_mass\"?"],
+        ),
+        (
+            "horizon = 40",
+            "horizon = 0",
+            vec!["controller: horizon: it is 0"],
+        ),
+        ("duration = 1.0", "duration = inf", vec!["duration = inf"]),
+        ("time = 0.5", "time = 0.0", vec!["reference 2, time = 0"]),
+        ("\"cart-pole\"", "\"../a\"", vec!["it names a folder"]),
+        (
+            "# delay = 0.04",
+            "delay = -1 #",
+            vec!["world: the delay is -1"],
+        ),
+    ] {
+        fs::write(folder.path().join("bad.toml"), changed(&text, from, to)).unwrap();
+        let message = fail(folder.path(), &["simulate", "bad.toml"]);
+        for part in parts {
+            assert!(message.contains(part), "`{part}` is not in: {message}");
+        }
+    }
+    assert!(!folder.path().join("out").exists());
+    let plant = fs::read_to_string(folder.path().join("cart-pole.json")).unwrap();
+    fs::write(folder.path().join("cut.json"), &plant[..500]).unwrap();
+    let message = fail(folder.path(), &["plant", "cut.json"]);
+    assert!(message.contains("the file ends too early"), "{message}");
+}
+
+#[test]
+fn no_regulator_is_designed_where_the_plant_does_not_stand() {
+    let folder = example();
+    // x_dot = u + 1 without an equilibrium in its file: it does not stand at zero.
+    let plant = r#"{"schema": 1, "name": "pushed", "states": [{"name": "a"}], "inputs": [{"name": "u"}],
+        "operations": [["input", 0], ["constant", 1.0], ["add", 0, 1]], "derivative": [2]}"#;
+    fs::write(folder.path().join("pushed.json"), plant).unwrap();
+    let said = succeed(folder.path(), &["plant", "pushed.json"]);
+    assert!(said.contains("this is no equilibrium"), "{said}");
+    let experiment = "name = \"a\"\nplant = \"pushed.json\"\nx0 = [0]\nduration = 1\n\
+                      [controller]\nt_s = 0.1\nhorizon = 5\nq = [1]\nr = [1]\n";
+    fs::write(folder.path().join("pushed.toml"), experiment).unwrap();
+    let message = fail(folder.path(), &["lqr", "pushed.toml"]);
+    assert!(message.contains("needs an equilibrium"), "{message}");
+}
+
+#[test]
+fn files_of_others_stay() {
+    let folder = example();
+    let out = folder.path().join("mine");
+    fs::create_dir(&out).unwrap();
+    fs::write(out.join("summary.json"), "mine").unwrap();
+    let message = fail(
+        folder.path(),
+        &["simulate", "cart-pole.toml", "--out", "mine"],
+    );
+    assert!(
+        message.contains("does not say that lpvmpc wrote it"),
+        "{message}"
+    );
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 1);
+    assert_eq!(
+        fs::read_to_string(out.join("summary.json")).unwrap(),
+        "mine"
+    );
+}
