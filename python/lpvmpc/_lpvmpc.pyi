@@ -21,14 +21,10 @@ class Plant:
     def save_firmware(
         self,
         folder: str | Path,
+        settings: dict[str, Any],
         lpvmpc: str,
-        t_s: float,
-        horizon: int,
-        q: Sequence[float],
-        r: Sequence[float],
-        p: Sequence[Sequence[float]],
-        target: Sequence[float],
-        start: Sequence[float],
+        start: Sequence[float] | _Array,
+        target: Sequence[float] | _Array | None,
         samples: int,
     ) -> None: ...
     def with_parameters(self, values: Sequence[tuple[str, float]]) -> Plant: ...

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
 from typing import Any, Literal, Union
 
 import numpy as np
@@ -626,9 +627,16 @@ class Mpc:
         PlantError
             A number has no place in single precision, or the folder cannot be written.
         """
-        from ._firmware import save_firmware
-
-        save_firmware(self, folder, lpvmpc, x0, x_ref, _whole("samples", samples))
+        if self._settings["estimator"] is not None:
+            raise SettingError("estimator: on a microcontroller it must be left out")
+        self._plant._native.save_firmware(
+            Path(folder),
+            _to_native(self._plant, self._settings),
+            str(lpvmpc),
+            column("x0", x0, self._n),
+            None if x_ref is None else column("x_ref", x_ref, self._n),
+            _whole("samples", samples),
+        )
 
     def __getstate__(self) -> tuple[Plant, dict[str, Any]]:
         return self._plant, self._settings

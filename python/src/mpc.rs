@@ -73,7 +73,7 @@ enum TerminalArgument<'py> {
 /// Settings, as Python hands them over: all keys are there.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Settings<'py> {
+pub struct Settings<'py> {
     t_s: f64,
     horizon: usize,
     substeps: usize,
@@ -99,7 +99,7 @@ struct Settings<'py> {
 }
 
 impl Settings<'_> {
-    fn build(self, plant: &lpvmpc_plant::Plant) -> PyResult<MpcSettings> {
+    pub fn build(self, plant: &lpvmpc_plant::Plant) -> PyResult<MpcSettings> {
         Ok(MpcSettings {
             t_s: self.t_s,
             horizon: self.horizon,

@@ -1,8 +1,9 @@
 //! Plants.
 
 use crate::errors::{of_plant, of_setting};
-use lpvmpc_any::jacobian;
-use lpvmpc_plant::{FirmwareSettings, PlantData, PlantError, Signal};
+use crate::mpc::Settings;
+use lpvmpc_any::{Demonstration, jacobian};
+use lpvmpc_plant::{PlantData, PlantError, Signal};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -63,34 +64,26 @@ impl Plant {
         self.inner.to_rust()
     }
 
-    #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
+    /// A program that controls it with these settings, from `start` to `target` for so many samples.
     fn save_firmware(
         &self,
         folder: PathBuf,
+        settings: Settings<'_>,
         lpvmpc: String,
-        t_s: f64,
-        horizon: usize,
-        q: Vec<f64>,
-        r: Vec<f64>,
-        p: Vec<Vec<f64>>,
-        target: Vec<f64>,
         start: Vec<f64>,
+        target: Option<Vec<f64>>,
         samples: usize,
     ) -> PyResult<()> {
-        let settings = FirmwareSettings {
+        let settings = settings.build(&self.inner)?;
+        let shown = Demonstration {
             lpvmpc,
-            t_s,
-            horizon,
-            q,
-            r,
-            p,
-            target,
             start,
+            target,
             samples,
         };
-        self.inner
-            .save_firmware(&settings, folder)
-            .map_err(of_plant)
+        let printed = lpvmpc_any::firmware(&self.inner, &settings, &shown);
+        let (plant, printed) = printed.map_err(of_setting)?;
+        plant.save_firmware(&printed, folder).map_err(of_plant)
     }
 
     fn with_parameters(&self, values: Vec<(String, f64)>) -> PyResult<Self> {

@@ -38,10 +38,10 @@ def test_a_program_has_the_controllers_numbers(tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"substeps": 2}, "substeps: it is 2; on a microcontroller it must be 1"),
+        ({"substeps": 2}, "substeps: on a microcontroller it must be 1"),
         ({"method": "fixed"}, "method"),
         ({"state_bounds": "hard"}, "state_bounds"),
-        ({"q": np.ones((4, 4)) + 20 * np.eye(4)}, "q: it must be diagonal"),
+        ({"q": np.ones((4, 4)) + 20 * np.eye(4)}, "q: on a microcontroller it must be diagonal"),
         ({"terminal": "equality"}, "terminal"),
         ({"rows": [lpvmpc.Row("sum", x={"tilt": 1.0}, upper=1.0)]}, "rows"),
         ({"estimator": lpvmpc.Estimator({"position": 1e-6, "tilt": 1e-6}, 1e-3)}, "estimator"),

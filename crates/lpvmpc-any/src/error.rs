@@ -1,5 +1,6 @@
 //! What is wrong with a controller's settings or with what a step is told.
 
+use lpvmpc_plant::PlantError;
 use thiserror::Error;
 
 /// What is wrong, and where.
@@ -18,5 +19,11 @@ impl MpcError {
             place: place.into(),
             fault: fault.into(),
         }
+    }
+}
+
+impl From<PlantError> for MpcError {
+    fn from(PlantError { place, fault }: PlantError) -> Self {
+        Self { place, fault }
     }
 }

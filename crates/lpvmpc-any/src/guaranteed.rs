@@ -496,8 +496,7 @@ fn advance(
 ) -> Result<DVector<f64>, MpcError> {
     let rate = |x: &DVector<f64>| {
         let rates = plant.derivative(x.as_slice(), u.as_slice());
-        let rates = rates.map_err(|error| MpcError::new(error.place, error.fault))?;
-        Ok::<_, MpcError>(DVector::from_vec(rates))
+        Ok::<_, MpcError>(DVector::from_vec(rates?))
     };
     let h = t_s / steps as f64;
     let mut x = x.clone();

@@ -53,8 +53,7 @@ pub fn lqr(
         let fault = format!("it is {t_s} s; the plant is in discrete time, with {period} s");
         return Err(MpcError::new("t_s", fault));
     }
-    let of_plant = |error: PlantError| MpcError::new(error.place, error.fault);
-    let (a, b) = jacobian(plant, x, u).map_err(of_plant)?;
+    let (a, b) = jacobian(plant, x, u)?;
     let refused = |error: &dyn std::fmt::Display| MpcError::new("lqr", error.to_string());
     let (a_d, b_d) = match plant.period() {
         None => zero_order_hold(&a, &b, t_s).map_err(|error| refused(&error))?,

@@ -173,14 +173,13 @@ impl<const NX: usize, const NU: usize, const NS: usize> Model<NX, NU, NS> {
         (x, u): (SVector<f64, NX>, SVector<f64, NU>),
     ) -> Result<Self, MpcError> {
         let states = plant.data().states.len();
-        let place = |error: lpvmpc_plant::PlantError| MpcError::new(error.place, error.fault);
         let filled = || -> Result<_, MpcError> {
-            let plant = SizedPlant::new(plant.clone()).map_err(place)?;
+            let plant = SizedPlant::new(plant.clone())?;
             Ok(Filled { plant, states })
         };
         Ok(match models {
             LinearModels::Own if plant.data().embedding.is_some() => Self::Own(Filled {
-                plant: SizedEmbedding::new(plant.clone()).map_err(place)?,
+                plant: SizedEmbedding::new(plant.clone())?,
                 states,
             }),
             LinearModels::AlongMotion => Self::Motion(AlongMotion(filled()?)),

@@ -109,8 +109,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
     /// A controller for `plant`, which fits into the places.
     pub fn new(plant: &Plant, settings: &MpcSettings) -> Result<Self, MpcError> {
         let names = Names::new(plant);
-        let sized = SizedPlant::<NX, NU>::new(plant.clone());
-        let sized = sized.map_err(|error| MpcError::new(error.place, error.fault))?;
+        let sized = SizedPlant::<NX, NU>::new(plant.clone())?;
         let rest = sized
             .equilibrium()
             .unwrap_or((SVector::zeros(), SVector::zeros()));
@@ -246,9 +245,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
 
     fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), MpcError> {
         let mut plant = self.plant.clone();
-        plant
-            .set_parameter(name, value)
-            .map_err(|error| MpcError::new(error.place, error.fault))?;
+        plant.set_parameter(name, value)?;
         let model = Model::new(&plant, self.settings.linear_models, self.rest)?;
         self.controller
             .set_model(Sampled::new(model, self.last_input));

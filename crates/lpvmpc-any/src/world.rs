@@ -162,7 +162,6 @@ impl World {
     /// The setting that makes no sense, by its name.
     pub fn new(plant: &Plant, x: &[f64], settings: &WorldSettings) -> Result<Self, MpcError> {
         let names = Names::new(plant);
-        let place = |error: lpvmpc_plant::PlantError| MpcError::new(error.place, error.fault);
         let x = names.finite(Axis::States, "x", x)?;
         let (sensors, measured) = sensors(plant, &names, settings)?;
         let count = settings
@@ -183,7 +182,7 @@ impl World {
             .map_err(|error| MpcError::new("tolerances", error.to_string()))?;
         let inner = Inner::new(
             Loaded {
-                plant: SizedPlant::new(plant.clone()).map_err(place)?,
+                plant: SizedPlant::new(plant.clone())?,
                 measured,
             },
             x,

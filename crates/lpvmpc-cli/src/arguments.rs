@@ -45,6 +45,8 @@ pub enum Command {
     Certify(CertifyArguments),
     /// Prove the claims of a certificate again
     Verify(VerifyArguments),
+    /// Print the controller as a program for a microcontroller
+    Firmware(FirmwareArguments),
 }
 
 /// A plant.
@@ -110,6 +112,24 @@ pub struct CertifyArguments {
     /// File of the certificate [default: standard output]
     #[arg(long)]
     pub out: Option<PathBuf>,
+}
+
+/// An experiment, and where its controller's program goes.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "The program is a whole crate of Rust in f32, without heap: `cargo build` makes it for a Cortex-M4F, \
+`cargo run`\non an emulated board brings the plant itself from x0 to the last reference.\n\n\
+Example:\n  lpvmpc firmware cart-pole.toml --lpvmpc crates/lpvmpc --out robot"
+)]
+pub struct FirmwareArguments {
+    /// The experiment, TOML
+    pub experiment: PathBuf,
+    /// The folder of the crate lpvmpc, which the program uses: crates/lpvmpc of a checkout
+    #[arg(long)]
+    pub lpvmpc: PathBuf,
+    /// A new folder for the program
+    #[arg(long)]
+    pub out: PathBuf,
 }
 
 /// A certificate, and what it is of.

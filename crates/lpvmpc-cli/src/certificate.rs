@@ -4,12 +4,15 @@ use crate::arguments::{CertifyArguments, VerifyArguments};
 use crate::describe::load;
 use crate::error::CommandError;
 use crate::experiment::Experiment;
-use lpvmpc_certify::{CertifySettings, verify_text};
+use lpvmpc_any::{MpcSettings, Terminal};
+use lpvmpc_certify::{Certificate, CertifySettings, Verified, verify_text};
+use lpvmpc_plant::Plant;
 use lpvmpc_terminal::output;
 use lpvmpc_terminal::progress::ProofProgress;
 use lpvmpc_terminal::table::short;
 use serde_json::json;
 use std::fs;
+use std::path::Path;
 
 /// Finds and proves a certificate for the controller of an experiment; its text, or where it was written.
 pub fn certify(arguments: &CertifyArguments) -> Result<String, CommandError> {
@@ -46,16 +49,41 @@ pub fn certify(arguments: &CertifyArguments) -> Result<String, CommandError> {
     }
 }
 
-/// Proves a certificate again.
-pub fn verify(arguments: &VerifyArguments) -> Result<String, CommandError> {
-    let plant = load(&arguments.plant)?;
-    let path = &arguments.certificate;
+impl Experiment {
+    /// The settings of its controller. Where it names a certificate, that is proved before it is relied upon.
+    ///
+    /// # Errors
+    /// The file cannot be read, or what it claims is false, could not be shown, or is of another plant.
+    pub fn proved_settings(&self) -> Result<MpcSettings, CommandError> {
+        let mut settings = self.settings.clone();
+        if let Some(path) = &self.certificate {
+            let (certificate, _) = prove(path, &self.plant)?;
+            let set = certificate.terminal_set(&self.plant)?;
+            settings.terminal = Terminal::Certified(Box::new(set));
+        }
+        Ok(settings)
+    }
+}
+
+/// Reads a certificate and proves what it claims.
+fn prove(path: &Path, plant: &Plant) -> Result<(Certificate, Verified), CommandError> {
     let text = fs::read_to_string(path).map_err(|source| CommandError::Read {
-        path: path.clone(),
+        path: path.to_owned(),
         source,
     })?;
     let bar = ProofProgress::default();
-    let (_, verified) = verify_text(&text, &plant, &|done| bar.set_part(done))?;
+    verify_text(&text, plant, &|done| bar.set_part(done)).map_err(|source| {
+        CommandError::Certificate {
+            path: path.to_owned(),
+            source,
+        }
+    })
+}
+
+/// Proves a certificate again.
+pub fn verify(arguments: &VerifyArguments) -> Result<String, CommandError> {
+    let plant = load(&arguments.plant)?;
+    let (_, verified) = prove(&arguments.certificate, &plant)?;
     let states = plant.data().states.iter().zip(&verified.reach);
     if arguments.json {
         let reach = states.map(|(state, reach)| (state.name.clone(), json!(reach)));

@@ -2,7 +2,7 @@
 
 use crate::error::CommandError;
 use crate::experiment::{Experiment, Reference};
-use lpvmpc_any::{Mpc, Preview, World};
+use lpvmpc_any::{Decision, Mpc, Preview, World};
 use lpvmpc_terminal::progress::Progress;
 use nalgebra::DVector;
 use std::collections::BTreeMap;
@@ -41,8 +41,8 @@ impl Run {
             settings,
             ..
         } = experiment;
-        let mut mpc =
-            Mpc::new(plant, settings).map_err(|error| experiment.refused("controller", &error))?;
+        let mut mpc = Mpc::new(plant, &experiment.proved_settings()?)
+            .map_err(|error| experiment.refused("controller", &error))?;
         let mut world = World::new(real, &experiment.x0, &experiment.world)
             .map_err(|error| experiment.refused("world", &error))?;
         let bar = Progress::new("simulating", experiment.samples);
@@ -62,11 +62,13 @@ impl Run {
             let plan = mpc.step(&seen, &preview)?;
             run.step_times.push(start.elapsed().as_secs_f64());
             let u = plan.first_input();
-            if !plan.is_solved() && run.first_unsolved.is_none() {
+            // With a certificate, what is not guaranteed is no plan.
+            let is_plan = (plan.decision).map_or(plan.is_solved(), Decision::is_guaranteed);
+            if !is_plan && run.first_unsolved.is_none() {
                 run.first_unsolved = Some((t, plan.status.clone()));
             }
-            let word = plan.status.split(':').next().unwrap_or_default();
-            *run.statuses.entry(word.to_owned()).or_default() += 1;
+            let word = plan.status.split([':', '(']).next().unwrap_or_default();
+            *run.statuses.entry(word.trim().to_owned()).or_default() += 1;
             run.costs.push(plan.cost);
             run.y.push(real.output(world.state(), &u)?);
             run.x_ref

@@ -22,15 +22,6 @@ pub fn load(path: &Path) -> Result<Plant, CommandError> {
     })
 }
 
-/// The plant's equilibrium; zero where it names none.
-pub fn about(plant: &Plant) -> (Vec<f64>, Vec<f64>) {
-    let data = plant.data();
-    match &data.equilibrium {
-        Some(at) => (at.x.clone(), at.u.clone()),
-        None => (vec![0.0; data.states.len()], vec![0.0; data.inputs.len()]),
-    }
-}
-
 /// The rows of a matrix.
 pub fn matrix(matrix: &DMatrix<f64>) -> Value {
     let rows = matrix.row_iter();
@@ -104,7 +95,7 @@ impl Linearisation {
 /// Says what the plant of a file is.
 pub fn run(arguments: &PlantArguments) -> Result<String, CommandError> {
     let plant = load(&arguments.file)?;
-    let (x, u) = about(&plant);
+    let (x, u) = plant.data().operating_point();
     let found = Linearisation::new(&plant, &x, &u)?;
     Ok(match arguments.json {
         true => format!("{:#}\n", document(&plant, &found, (&x, &u))),

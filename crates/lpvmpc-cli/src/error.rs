@@ -54,7 +54,15 @@ pub enum CommandError {
     /// A figure that cannot be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),
-    /// A certificate.
+    /// A certificate's file that is none, or whose claims were not proved.
+    #[error("{}: {source}", path.display())]
+    Certificate {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong in it.
+        source: CertifyError,
+    },
+    /// A certificate that there is not.
     #[error(transparent)]
     Certify(#[from] CertifyError),
 }

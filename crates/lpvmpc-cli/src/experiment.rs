@@ -35,8 +35,10 @@ pub struct Experiment {
     pub plant: Plant,
     /// The plant as it really is.
     pub real: Plant,
-    /// The controller.
+    /// The controller, without its certificate.
     pub settings: MpcSettings,
+    /// The file of the certificate with which its loop is guaranteed.
+    pub certificate: Option<PathBuf>,
     /// The world around the plant.
     pub world: WorldSettings,
     /// The state at the start.
@@ -81,8 +83,8 @@ struct Controller {
     horizon: usize,
     q: Vec<f64>,
     r: Vec<f64>,
-    #[serde(default)]
-    terminal: TerminalName,
+    terminal: Option<TerminalName>,
+    certificate: Option<PathBuf>,
     x_bounds: Option<Pairs>,
     u_bounds: Option<Pairs>,
     y_bounds: Option<Pairs>,
@@ -101,10 +103,9 @@ struct Controller {
     tolerance: Option<f64>,
 }
 
-#[derive(Deserialize, Default)]
+#[derive(Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum TerminalName {
-    #[default]
     Lqr,
     Equality,
 }
@@ -211,6 +212,8 @@ impl File {
             ));
         }
         let settings = self.controller.settings(&plant)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let certificate = self.controller.certificate.map(|file| folder.join(file));
         components("x0", &self.x0, &data.states)?;
         let given = limits("x0", &None, &data.states)?;
         let bounds = settings.x_bounds.as_ref().unwrap_or(&given);
@@ -265,6 +268,7 @@ impl File {
             name: self.name,
             real,
             settings,
+            certificate,
             world,
             x0: self.x0,
             samples: samples as usize,
@@ -279,6 +283,10 @@ impl Controller {
         let data = plant.data();
         let (states, inputs, outputs) = (&data.states, &data.inputs, &data.outputs);
         let place = |name: &str| format!("controller.{name}");
+        if self.terminal.is_some() && self.certificate.is_some() {
+            let fault = "a certificate stands in place of terminal; leave one of them out";
+            return Err(format!("{}: {fault}", place("certificate")));
+        }
         weights(&place("q"), &self.q, states)?;
         weights(&place("r"), &self.r, inputs)?;
         let usual = MpcSettings::new(self.t_s, self.horizon, &self.q, &self.r);
@@ -308,8 +316,8 @@ impl Controller {
         Ok(MpcSettings {
             substeps: self.substeps.unwrap_or(usual.substeps),
             terminal: match self.terminal {
-                TerminalName::Lqr => Terminal::Lqr,
-                TerminalName::Equality => Terminal::Equality,
+                Some(TerminalName::Lqr) | None => Terminal::Lqr,
+                Some(TerminalName::Equality) => Terminal::Equality,
             },
             x_bounds: bounds("x_bounds", &self.x_bounds, states)?,
             u_bounds: bounds("u_bounds", &self.u_bounds, inputs)?,

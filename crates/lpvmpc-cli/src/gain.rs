@@ -1,7 +1,7 @@
 //! `lpvmpc lqr`: the regulator of the sampled plant.
 
 use crate::arguments::ExperimentArguments;
-use crate::describe::{about, matrix, named, poles, residual};
+use crate::describe::{matrix, named, poles, residual};
 use crate::error::CommandError;
 use crate::experiment::Experiment;
 use lpvmpc_any::AT_REST;
@@ -12,7 +12,7 @@ use serde_json::json;
 pub fn run(arguments: &ExperimentArguments) -> Result<String, CommandError> {
     let experiment = Experiment::load(&arguments.experiment)?;
     let (plant, settings) = (&experiment.plant, &experiment.settings);
-    let (x, u) = about(plant);
+    let (x, u) = plant.data().operating_point();
     let residual = residual(plant, &x, &u)?;
     if !(residual <= AT_REST) {
         return Err(CommandError::NoResult(format!(

@@ -13,6 +13,7 @@ mod describe;
 mod error;
 mod experiment;
 mod figure;
+mod firmware;
 mod gain;
 mod simulate;
 
@@ -57,5 +58,6 @@ fn run(arguments: &Arguments) -> Result<String, CommandError> {
         Command::Lqr(given) => gain::run(given),
         Command::Certify(given) => certificate::certify(given),
         Command::Verify(given) => certificate::verify(given),
+        Command::Firmware(given) => firmware::run(given),
     }
 }

@@ -106,7 +106,7 @@ fn time_table(run: &Run) -> Table {
 
 /// Sum over the samples of (x - x_ref)'Q (x - x_ref), without the inputs; zero references where none are given.
 fn tracking_cost(experiment: &Experiment, run: &Run) -> f64 {
-    let (rest, _) = crate::describe::about(&experiment.plant);
+    let (rest, _) = experiment.plant.data().operating_point();
     let q = experiment.settings.q.diagonal();
     let samples = run.x.iter().take(run.u.len()).enumerate();
     let cost = samples.map(|(k, x)| {

@@ -58,6 +58,14 @@ impl PlantData {
         }
     }
 
+    /// State and input of the equilibrium; zeros where none is named.
+    pub fn operating_point(&self) -> (Vec<f64>, Vec<f64>) {
+        match &self.equilibrium {
+            Some(at) => (at.x.clone(), at.u.clone()),
+            None => (vec![0.0; self.states.len()], vec![0.0; self.inputs.len()]),
+        }
+    }
+
     /// For each state whether the motion is the same wherever the plant stands along it: no formula of the motion
     /// reads it, as that of a cart does not read its position. Of plants in continuous time alone.
     pub fn is_invariant_along(&self) -> Vec<bool> {

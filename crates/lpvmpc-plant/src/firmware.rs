@@ -3,6 +3,7 @@
 use crate::error::PlantError;
 use crate::plant::Plant;
 use crate::source::{text, type_name};
+use std::io::ErrorKind;
 use std::path::Path;
 
 /// What the controller of a printed program is set to. All numbers are in the units of the plant.
@@ -183,7 +184,13 @@ impl Plant {
         let failed = |path: &Path, error: std::io::Error| {
             PlantError::new(path.display().to_string(), error.to_string())
         };
-        std::fs::create_dir(folder).map_err(|error| failed(folder, error))?;
+        std::fs::create_dir(folder).map_err(|error| match error.kind() {
+            ErrorKind::AlreadyExists => {
+                let fault = "it is there already; a program goes into a new folder";
+                PlantError::new(folder.display().to_string(), fault)
+            }
+            _ => failed(folder, error),
+        })?;
         for (path, content) in files {
             let path = folder.join(path);
             if let Some(parent) = path.parent() {

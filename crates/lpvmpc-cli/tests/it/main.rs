@@ -242,3 +242,127 @@ fn files_of_others_stay() {
         "mine"
     );
 }
+
+/// A pendulum held upright by a torque, with its experiment: rate' = 9 sin(tilt) + torque.
+fn pendulum() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let plant = r#"{"schema": 1, "name": "pendulum", "equilibrium": {"x": [0, 0], "u": [0]},
+        "states": [{"name": "tilt", "lower": -0.5, "upper": 0.5}, {"name": "rate", "lower": -3, "upper": 3}],
+        "inputs": [{"name": "torque", "lower": -6, "upper": 6}],
+        "operations": [["state", 0], ["state", 1], ["input", 0], ["sin", 0], ["constant", 9.0], ["mul", 3, 4],
+                       ["add", 5, 2]],
+        "derivative": [1, 6]}"#;
+    fs::write(folder.path().join("pendulum.json"), plant).unwrap();
+    let experiment = "name = \"pendulum\"\nplant = \"pendulum.json\"\nx0 = [0.4, 0]\nduration = 2\n\
+                      [controller]\nt_s = 0.05\nhorizon = 15\nq = [10, 1]\nr = [0.1]\n";
+    fs::write(folder.path().join("pendulum.toml"), experiment).unwrap();
+    folder
+}
+
+#[test]
+fn a_loop_is_guaranteed_by_a_certificate_that_is_proved_first() {
+    let folder = pendulum();
+    let path = folder.path();
+    succeed(path, &["certify", "pendulum.toml", "--out", "c.json"]);
+    let said = succeed(path, &["verify", "c.json", "pendulum.json"]);
+    assert!(said.starts_with("Proved on "), "{said}");
+    let text = fs::read_to_string(path.join("pendulum.toml")).unwrap();
+    let with = changed(&text, "r = [0.1]", "r = [0.1]\ncertificate = \"c.json\"");
+    fs::write(path.join("with.toml"), &with).unwrap();
+    let summary = succeed(path, &["simulate", "with.toml", "--json"]);
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    let tilt = summary["final_state"][0].as_f64().unwrap();
+    assert!(tilt.abs() < 0.02, "{summary}");
+
+    // From where no plan is known, nothing is called good.
+    let far = changed(&with, "[0.4, 0]", "[0.45, 2.9]");
+    fs::write(path.join("far.toml"), far).unwrap();
+    let message = fail(path, &["simulate", "far.toml", "--out", "far"]);
+    assert!(message.contains("not guaranteed"), "{message}");
+
+    // Neither that of another plant nor an altered one is relied upon.
+    let plant = fs::read_to_string(path.join("pendulum.json")).unwrap();
+    let other = changed(&plant, "9.0", "8.0");
+    fs::write(path.join("pendulum.json"), other).unwrap();
+    let of_another = fail(path, &["simulate", "with.toml", "--out", "other"]);
+    fs::write(path.join("pendulum.json"), plant).unwrap();
+    let claimed = fs::read_to_string(path.join("c.json")).unwrap();
+    let mut altered: Value = serde_json::from_str(&claimed).unwrap();
+    altered["certificate"]["contraction"] = 0.9.into();
+    fs::write(path.join("c.json"), altered.to_string()).unwrap();
+    let altered = fail(path, &["simulate", "with.toml", "--out", "other"]);
+    for (message, said) in [
+        (of_another, "c.json: "),
+        (
+            altered,
+            "c.json: terminal: the claimed decrease of x'Px is false",
+        ),
+    ] {
+        assert!(message.contains(said), "`{said}` is not in: {message}");
+    }
+    assert!(!path.join("other").exists());
+
+    let both = changed(&with, "certificate", "terminal = \"lqr\"\ncertificate");
+    fs::write(path.join("both.toml"), both).unwrap();
+    let message = fail(path, &["simulate", "both.toml"]);
+    assert!(message.contains("stands in place of terminal"), "{message}");
+}
+
+#[test]
+fn a_controller_is_printed_as_a_program() {
+    let folder = pendulum();
+    let path = folder.path();
+    let crate_folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../lpvmpc");
+    let print = |experiment: &str, crate_folder: &str| {
+        lpvmpc(
+            path,
+            &[
+                "firmware",
+                experiment,
+                "--lpvmpc",
+                crate_folder,
+                "--out",
+                "robot",
+            ],
+        )
+    };
+    let refuse = |experiment: &str, crate_folder: &str, said: &str| {
+        let output = print(experiment, crate_folder);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert!(message.contains(said), "`{said}` is not in: {message}");
+        assert!(!path.join("robot").exists());
+    };
+    refuse("pendulum.toml", "..", "Cargo.toml");
+    let text = fs::read_to_string(path.join("pendulum.toml")).unwrap();
+    for (added, said) in [
+        (
+            "state_bounds = \"hard\"",
+            "state_bounds: on a microcontroller",
+        ),
+        (
+            "substeps = 2",
+            "substeps: on a microcontroller it must be 1",
+        ),
+        ("terminal = \"equality\"", "terminal: on a microcontroller"),
+        ("r_du = [0.1]", "r_du: on a microcontroller"),
+        ("certificate = \"c.json\"", "there is no guaranteed loop"),
+    ] {
+        let changed = changed(&text, "r = [0.1]", &format!("r = [0.1]\n{added}"));
+        fs::write(path.join("bad.toml"), changed).unwrap();
+        refuse("bad.toml", crate_folder, said);
+    }
+
+    assert!(print("pendulum.toml", crate_folder).status.success());
+    let main = fs::read_to_string(path.join("robot/src/main.rs")).unwrap();
+    // The terminal weight is the regulator's.
+    let regulator = succeed(path, &["lqr", "pendulum.toml", "--json"]);
+    let regulator: Value = serde_json::from_str(&regulator).unwrap();
+    for weight in numbers(&regulator["p"]).iter() {
+        let weight = format!("{}", *weight as f32);
+        assert!(main.contains(&weight), "{weight} is not in {main}");
+    }
+    let again = print("pendulum.toml", crate_folder);
+    let message = String::from_utf8_lossy(&again.stderr);
+    assert!(message.contains("robot: it is there already"), "{message}");
+}
