@@ -20,8 +20,23 @@ impl<const NX: usize, const NU: usize, const NS: usize> Disturbed<NX, NU, NS> {
         self.beside.map_or(*u, |beside| u + beside)
     }
 
+    fn inputs<const POINTS: usize>(
+        &self,
+        u: &[SVector<f64, NU>; POINTS],
+    ) -> [SVector<f64, NU>; POINTS] {
+        u.map(|u| self.input(&u))
+    }
+
     fn disturbed(&self, rate: SVector<f64, NX>) -> SVector<f64, NX> {
         self.disturbance.map_or(rate, |d| rate + d)
+    }
+
+    fn disturb(&self, tangents: &mut [Tangent<f64, NX, NU>]) {
+        if let Some(disturbance) = self.disturbance {
+            tangents
+                .iter_mut()
+                .for_each(|(rate, ..)| *rate += disturbance);
+        }
     }
 }
 
@@ -69,6 +84,32 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
     fn embedded(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> Tangent<f64, NX, NU> {
         let (rate, a, b) = self.plant.embedded(x, &self.input(u));
         (self.disturbed(rate), a, b)
+    }
+
+    const TOGETHER: bool = true;
+
+    fn embedded_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<f64, NX>; POINTS],
+        u: &[SVector<f64, NU>; POINTS],
+        tangents: &mut [Tangent<f64, NX, NU>; POINTS],
+    ) {
+        self.plant.embedded_each(x, &self.inputs(u), tangents);
+        self.disturb(tangents);
+    }
+
+    fn tangent_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<f64, NX>; POINTS],
+        u: &[SVector<f64, NU>; POINTS],
+        tangents: &mut [Tangent<f64, NX, NU>; POINTS],
+    ) {
+        self.plant.tangent_each(x, &self.inputs(u), tangents);
+        self.disturb(tangents);
+    }
+
+    fn has_offset(&self) -> bool {
+        self.disturbance.is_some() || self.beside.is_some() || self.plant.has_offset()
     }
 }
 
@@ -203,6 +244,41 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
         };
         let (a, b) = last.write_rows(last.rk4.linearize(&self.rates, x, u, last.t_s));
         (self.derivative(x, u), a, b)
+    }
+
+    // Asked for only without a last input: a controller has no groups of a model with a period.
+    const TOGETHER: bool = true;
+
+    fn embedded_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<f64, NX>; POINTS],
+        u: &[SVector<f64, NU>; POINTS],
+        tangents: &mut [Tangent<f64, NX, NU>; POINTS],
+    ) {
+        if self.last_input.is_none() {
+            return self.rates.embedded_each(x, u, tangents);
+        }
+        for (i, tangent) in tangents.iter_mut().enumerate() {
+            *tangent = self.embedded(&x[i], &u[i]);
+        }
+    }
+
+    fn tangent_each<const POINTS: usize>(
+        &self,
+        x: &[SVector<f64, NX>; POINTS],
+        u: &[SVector<f64, NU>; POINTS],
+        tangents: &mut [Tangent<f64, NX, NU>; POINTS],
+    ) {
+        if self.last_input.is_none() {
+            return self.rates.tangent_each(x, u, tangents);
+        }
+        for (i, tangent) in tangents.iter_mut().enumerate() {
+            *tangent = self.tangent(&x[i], &u[i]);
+        }
+    }
+
+    fn has_offset(&self) -> bool {
+        self.rates.has_offset()
     }
 
     fn steady_state(
