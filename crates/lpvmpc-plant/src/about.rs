@@ -62,13 +62,17 @@ impl<const NX: usize, const NU: usize, const NS: usize> AboutEquilibrium<NX, NU,
         let factors = factorise(&data.operations, data.motion(), sizes).map_err(|none| {
             let (place, fault) = match none {
                 NoFactors::TooLong => ("operations".to_owned(), "they are too long".to_owned()),
-                NoFactors::Operation(i) => (
-                    format!("operations[{i}]"),
-                    format!(
-                        "no proof can be had of `{}` here",
-                        data.operations[i].name()
-                    ),
-                ),
+                NoFactors::Operation(i) => {
+                    let (operation, place) = (&data.operations[i], format!("operations[{i}]"));
+                    let name = operation.name();
+                    let fault = match operation.is_smooth() {
+                        true => format!(
+                            "no proof can be had of `{name}`: no exact difference of it is known"
+                        ),
+                        false => format!("no proof can be had of `{name}`: it has a kink or jumps"),
+                    };
+                    (place, fault)
+                }
             };
             PlantError::new(place, fault)
         })?;
