@@ -13,7 +13,7 @@ const EXACT: Tolerances = Tolerances {
 };
 
 /// From the edge of the set and from inside, the plant integrated to 1e-12.
-fn check<const N: usize, const NS: usize>(plant: &Plant, certificate: &Certificate) -> f64 {
+pub fn check<const N: usize, const NS: usize>(plant: &Plant, certificate: &Certificate) -> f64 {
     let model = AlongMotion::<_, NS>(SizedPlant::<N, 1>::new(plant.clone()).unwrap());
     let mut random = random();
     let center = SVector::<f64, N>::from_column_slice(&certificate.equilibrium.x);

@@ -9,4 +9,5 @@
 mod claims;
 mod controller;
 mod forgeries;
+mod functions;
 mod plants;
