@@ -151,15 +151,7 @@ fn what_cannot_be_certified_is_refused_with_its_reason() {
         let message = with(&change);
         assert!(message.contains(expected), "{message}");
     }
-    let discrete = Matrices {
-        a: DMatrix::identity(1, 1),
-        b: DMatrix::identity(1, 1),
-        period: Some(0.1),
-        ..Matrices::default()
-    };
-    let discrete = Plant::new(PlantData::of_matrices("discrete", &discrete).unwrap()).unwrap();
     let settings = CertifySettings::new(0.1, &[1.0], &[1.0]);
-    assert!(refused(&discrete, &settings).contains("in discrete time"));
     let none = Matrices {
         a: DMatrix::identity(1, 1),
         b: DMatrix::zeros(1, 1),
