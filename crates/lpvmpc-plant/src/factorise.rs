@@ -67,6 +67,8 @@ pub(crate) fn factorise(
             continue;
         }
         let found = match *operation {
+            // Of numbers alone, too: enclosures have no value of it.
+            _ if !operation.is_smooth() => None,
             Operation::State(i) => program.component(i, states + inputs),
             Operation::Input(j) => program.component(states + j, states + inputs),
             Operation::Unary(function, x) => program.factored_unary(function, &factored[x]),

@@ -255,6 +255,7 @@ fn an_enclosed_steady_state_is_enclosed() {
 fn what_has_no_form_is_refused_by_its_place() {
     for (operation, name) in [
         (r#"["abs", 0]"#, "`abs`: it has a kink or jumps"),
+        (r#"["abs", 3]"#, "`abs`: it has a kink or jumps"),
         (r#"["floor", 0]"#, "`floor`: it has a kink or jumps"),
         (r#"["min", 0, 1]"#, "`min`: it has a kink or jumps"),
         (
