@@ -187,7 +187,7 @@ fn the_guaranteed_loop_of_a_map_keeps_its_promise() {
     };
     let mut random = random();
     let mut outside = 0;
-    for _ in 0..40 {
+    for _ in 0..25 {
         let mut mpc = Mpc::new(plant, &settings).unwrap();
         let mut x = vec![0.79 * random(), 4.0 * random(), 20.0 * random()];
         let is_outside = !certificate.contains(&x);
