@@ -24,7 +24,8 @@ class Certificate:
 
     With e = x - x_eq, v = u - u_eq and V(e) = e'Pe, for every state with V(e) <= level, under the law, held over each sample:
     V(e+) <= (1 - contraction) V(e) - e'Qe - v'Rv, |e| <= state_limits at and between the samples, and |v| <= input_limits. The
-    equilibrium is exact, f(x_eq, u_eq) = 0, and within `within` of the numbers here. The plant is the model, with exactly
+    equilibrium is exact, f(x_eq, u_eq) = 0 (in discrete time x_eq, and there is nothing between the samples), and within
+    `within` of the numbers here. The plant is the model, with exactly
     its parameters; the state is exact, and there is no delay.
     """
 
@@ -101,7 +102,7 @@ class Certificate:
 
     @property
     def t_s(self) -> float:
-        """Sampling time, s."""
+        """Sampling time, s; of a plant in discrete time its period."""
         return float(self._content["t_s"])
 
     @property

@@ -92,9 +92,9 @@ def certify(
     Parameters
     ----------
     plant
-        The plant, in continuous time; its formulas must be smooth.
+        The plant; its formulas must be smooth.
     t_s
-        Sampling time, s.
+        Sampling time, s; of a plant in discrete time its period.
     q, r
         The weights of the stage cost: diagonals, (n,) and (m,), or whole.
     x, u

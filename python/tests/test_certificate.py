@@ -198,6 +198,55 @@ def test_a_plant_that_notices_where_it_stands_has_no_other_set_points():
         mpc.step([0, 0], x_ref=[0.1, 0])
 
 
+def test_tyres_by_arctan_are_certified():
+    # A bicycle at 20 m/s: distance from the line, heading, speed aside, yaw rate; tyres by Pacejka's formula.
+    x, u = ca.SX.sym("x", 4), ca.SX.sym("steering")
+
+    def force(slip):
+        return 9e3 * ca.sin(1.3 * ca.atan(10 * slip))
+
+    front, rear = force(u - ca.atan2(x[2] + 1.2 * x[3], 20)), force(-ca.atan2(x[2] - 1.5 * x[3], 20))
+    turning = (1.2 * front * ca.cos(u) - 1.5 * rear) / 2500
+    xdot = ca.vertcat(20 * ca.sin(x[1]) + x[2] * ca.cos(x[1]), x[3], (front * ca.cos(u) + rear) / 1500 - 20 * x[3], turning)
+    car = lpvmpc.Plant.from_casadi(
+        x, u, xdot, states=["aside", "heading", "slipping", "yaw_rate"],
+        bounds={"slipping": (-0.3, 0.3), "yaw_rate": (-0.12, 0.12), "steering": (-0.1, 0.1)},
+    )  # fmt: skip
+    certificate = lpvmpc.certify(car, T_S, [1, 1, 0.1, 1], [50], trials=0)
+    check(car, certificate, 60)
+    assert certificate.state_limits[2] > 0.1
+
+
+def test_a_plant_in_discrete_time_is_certified_as_it_is():
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    grown = ca.vertcat(5 * x[1] * ca.exp(-0.01 * x[1]), 0.5 * x[0] + 0.6 * x[1] - u)
+    salmon = lpvmpc.Plant.from_casadi(
+        x, u, grown, states=["young", "old"], inputs=["catch"], period=1.0,
+        bounds={"young": (40, 300), "old": (40, 200), "catch": (0, 120)},
+        equilibrium=([183.939720586, 100], [51.969860293]),
+    )  # fmt: skip
+    certificate = lpvmpc.certify(salmon, 1.0, [0.1, 1], [1])
+    assert lpvmpc.verify(certificate, salmon).boxes == certificate.boxes
+    assert certificate.state_limits[1] > 40
+    for x in edge(certificate, np.random.default_rng(5), 200):
+        for _ in range(30):
+            u, e = certificate(0.0, x), x - certificate.x
+            assert 0 <= u[0] <= 120
+            assert (abs(e) <= certificate.state_limits).all()
+            stage = e @ certificate.q @ e + (u - certificate.u) @ certificate.r @ (u - certificate.u)
+            before, x = certificate.value(x), salmon.f(x, u)
+            assert certificate.value(x) <= (1 - certificate.contraction) * before - stage + 1e-9 * (1 + before)
+    mpc = lpvmpc.Mpc(salmon, 1.0, 8, [0.1, 1], [1], terminal=certificate)
+    x, costs = np.array([120.0, 50.0]), []
+    for _ in range(15):
+        plan = mpc.step(x)
+        assert plan.is_guaranteed
+        costs.append(plan.cost)
+        x = salmon.f(x, plan.u[0])
+    assert (np.diff(costs) <= 1e-9).all()
+    assert abs(x - certificate.x).max() < 0.1
+
+
 def test_what_has_no_proof_is_refused():
     x, u = ca.SX.sym("x"), ca.SX.sym("u")
     kinked = lpvmpc.Plant.from_casadi(x, u, ca.fabs(x) + u)

@@ -20,10 +20,10 @@ use crate::preview::Preview;
 use crate::settings::{Limits, MpcSettings, Row, Terminal, TerminalSet};
 use crate::sized::AnySize;
 use lpvmpc::{Decision, Penalty, Status};
-use lpvmpc_plant::Plant;
+use lpvmpc_plant::{Plant, PlantError};
 use nalgebra::{DMatrix, DVector};
 
-/// Rollouts have so many Runge-Kutta steps for each one of the controller's.
+/// Rollouts have so many Runge-Kutta steps for each one of the controller's, in continuous time.
 const FINER: usize = 4;
 /// What a new plan keeps away from bounds and the edge of the set, of their distance from the equilibrium: room for the
 /// integration error of the samples to come.
@@ -91,11 +91,6 @@ impl Guarantee {
         check_sizes(&names, set)?;
         check_settings(settings, set)?;
         let data = plant.data();
-        if data.period.is_some() {
-            let fault =
-                "the plant is in discrete time; a certificate is about one in continuous time";
-            return Err(MpcError::new("terminal", fault));
-        }
         let bounded = data
             .outputs
             .iter()
@@ -486,7 +481,7 @@ impl Guarantee {
     }
 }
 
-/// A sample by the classical Runge-Kutta method.
+/// A sample, in continuous time by the classical Runge-Kutta method.
 fn advance(
     plant: &Plant,
     x: &DVector<f64>,
@@ -494,10 +489,12 @@ fn advance(
     t_s: f64,
     steps: usize,
 ) -> Result<DVector<f64>, MpcError> {
-    let rate = |x: &DVector<f64>| {
-        let rates = plant.derivative(x.as_slice(), u.as_slice());
-        Ok::<_, MpcError>(DVector::from_vec(rates?))
-    };
+    let known =
+        |motion: Result<Vec<f64>, PlantError>| Ok::<_, MpcError>(DVector::from_vec(motion?));
+    if plant.period().is_some() {
+        return known(plant.next(x.as_slice(), u.as_slice()));
+    }
+    let rate = |x: &DVector<f64>| known(plant.derivative(x.as_slice(), u.as_slice()));
     let h = t_s / steps as f64;
     let mut x = x.clone();
     for _ in 0..steps {

@@ -15,8 +15,8 @@ use std::path::Path;
 ///
 /// With e = x - x_eq and V(e) = e'Pe, for every state with V(e) <= level: V(e+) <= (1 - contraction) V(e) - e'Qe - v'Rv
 /// with v = u - u_eq, |e_i| <= `state_limits[i]` at and between the samples, |v_i| <= `input_limits[i]`. The
-/// equilibrium is a state and input at which f is exactly zero; it is at most `equilibrium.within` from the numbers
-/// of the file.
+/// equilibrium is a state and input at which f is exactly zero (in discrete time F(x, u) is exactly x, and there is
+/// nothing between the samples); it is at most `equilibrium.within` from the numbers of the file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Certificate {
@@ -24,7 +24,7 @@ pub struct Certificate {
     pub written_by: String,
     /// The plant.
     pub plant: PlantName,
-    /// Sampling time, s.
+    /// Sampling time, s; of a plant in discrete time its period.
     pub t_s: f64,
     /// The equilibrium.
     pub equilibrium: EquilibriumClaim,
@@ -58,7 +58,7 @@ pub struct PlantName {
     pub sha256: String,
 }
 
-/// A state and input with f(x, u) = 0.
+/// A state and input with f(x, u) = 0, in discrete time F(x, u) = x.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EquilibriumClaim {

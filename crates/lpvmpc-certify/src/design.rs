@@ -1,6 +1,6 @@
 //! Law, cost and set that a proof may succeed for.
 
-use lpvmpc::LpvModel;
+use lpvmpc::{Embedding, LpvModel};
 use lpvmpc_certificate::{
     SynthesisError, TerminalIngredients, TerminalProblem, synthesize_terminal_at,
 };
@@ -42,7 +42,11 @@ impl<'a, const NX: usize, const NU: usize, const NS: usize> Design<'a, NX, NU, N
         let (n, m) = sizes;
         let (a, b) = LpvModel::<f64, NX, NU, NS>::matrices(model, &SVector::zeros());
         let (a, b) = (a.view((0, 0), (n, n)), b.view((0, 0), (n, m)));
-        let (a, b) = zero_order_hold(&a.into_owned(), &b.into_owned(), problem.t_s)?;
+        let (a, b) = (a.into_owned(), b.into_owned());
+        let (a, b) = match Embedding::period(model) {
+            None => zero_order_hold(&a, &b, problem.t_s)?,
+            Some(_) => (a, b),
+        };
         let q = problem.q.view((0, 0), (n, n)).into_owned();
         let r = problem.r.view((0, 0), (m, m)).into_owned();
         let lqr = lqr_discrete(&a, &b, &q, &r)?;

@@ -4,10 +4,10 @@
 //! which it is: n components of (x, u) are unknown, those along which [A B] is farthest from singular, and the others are
 //! as they are written. With C about the inverse of these n columns, the map z - C f(z) takes a box into itself
 //! (Krawczyk's operator, with slopes in place of derivatives), so by Brouwer's theorem it has a fixed point there, and f a
-//! zero.
+//! zero. Of a plant in discrete time f(x, u) is F(x, u) - x here.
 
 use crate::error::CertifyError;
-use lpvmpc::{Embedding, LpvModel};
+use lpvmpc::{Embedding, LpvModel, Number};
 use lpvmpc_certificate::Interval;
 use lpvmpc_plant::{AboutEquilibrium, Plant};
 use nalgebra::{DMatrix, DVector, SVector};
@@ -70,17 +70,33 @@ impl Unknowns {
     }
 }
 
-/// [A B] in the plant's own sizes.
+/// f(x, u), zero at an equilibrium.
+fn rates<N: Number>(plant: &Plant, x: &[N], u: &[N]) -> Result<Vec<N>, CertifyError> {
+    match plant.period() {
+        None => Ok(plant.derivative(x, u)?),
+        Some(_) => {
+            let next = plant.next(x, u)?.into_iter().zip(x);
+            Ok(next.map(|(next, x)| next - *x).collect())
+        }
+    }
+}
+
+/// What the slopes of f by x are less than A: 1 on the diagonal in discrete time, else 0.
+fn unit(plant: &Plant, i: usize, j: usize) -> f64 {
+    f64::from(u8::from(plant.period().is_some() && i == j))
+}
+
+/// The slopes of f by x and u in the plant's own sizes.
 fn slopes<const NX: usize, const NU: usize, const NS: usize>(
     about: &AboutEquilibrium<NX, NU, NS>,
     (n, m): (usize, usize),
 ) -> DMatrix<f64> {
     let (a, b) = LpvModel::<f64, NX, NU, NS>::matrices(about, &SVector::zeros());
-    DMatrix::from_fn(
-        n,
-        n + m,
-        |i, j| if j < n { a[(i, j)] } else { b[(i, j - n)] },
-    )
+    let less = |i: usize, j: usize| unit(about.plant(), i, j);
+    DMatrix::from_fn(n, n + m, |i, j| match j < n {
+        true => a[(i, j)] - less(i, j),
+        false => b[(i, j - n)],
+    })
 }
 
 fn points(at: &[f64]) -> Vec<(f64, f64)> {
@@ -103,7 +119,7 @@ pub(crate) fn refined<const NX: usize, const NU: usize, const NS: usize>(
     let mut about = about;
     for _ in 0..STEPS {
         about = about.about(&points(&found))?;
-        let rates = plant.derivative(&found[..n], &found[n..])?;
+        let rates = rates(plant, &found[..n], &found[n..])?;
         let unknowns = Unknowns::of(&slopes(&about, sizes), &found).ok_or_else(singular)?;
         let step = &unknowns.inverse * DVector::from_vec(rates.clone());
         let size = rates
@@ -133,8 +149,8 @@ pub(crate) fn refined<const NX: usize, const NU: usize, const NS: usize>(
 fn singular() -> CertifyError {
     CertifyError::EquilibriumNotShown {
         within: "near",
-        hint: "the derivatives of f by states and inputs together have not full rank there, so the plant cannot be \
-               stabilised by its linearisation either",
+        hint: "the derivatives of f (in discrete time of F(x, u) - x) by states and inputs together have not full rank \
+               there, so the plant cannot be stabilised by its linearisation either",
     }
 }
 
@@ -180,7 +196,7 @@ pub(crate) fn enclosed<const NX: usize, const NU: usize, const NS: usize>(
         let slope = |i: usize, j: usize| {
             let column = unknowns.columns[j];
             if column < n {
-                a[(i, column)]
+                a[(i, column)] - Interval::point(unit(plant, i, column))
             } else {
                 b[(i, column - n)]
             }
@@ -213,7 +229,7 @@ pub(crate) fn enclosed<const NX: usize, const NU: usize, const NS: usize>(
     }
     Err(CertifyError::EquilibriumNotShown {
         within: "near",
-        hint: "it is too far from one, or f has no value or no derivative there",
+        hint: "it is too far from one, or the formulas have no value or no derivative there",
     })
 }
 
@@ -233,7 +249,7 @@ pub(crate) fn refuted(plant: &Plant, ends: &[(f64, f64)]) -> Result<(), CertifyE
 fn interval_rates(plant: &Plant, ends: &[(f64, f64)]) -> Result<Vec<Interval>, CertifyError> {
     let n = plant.data().states.len();
     let all: Vec<Interval> = ends.iter().map(|(a, b)| Interval::new(*a, *b)).collect();
-    Ok(plant.derivative(&all[..n], &all[n..])?)
+    rates(plant, &all[..n], &all[n..])
 }
 
 fn sum(terms: impl Iterator<Item = Interval>) -> Interval {

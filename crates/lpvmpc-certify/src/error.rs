@@ -21,14 +21,14 @@ pub enum CertifyError {
     Plant(#[from] PlantError),
     /// It is no equilibrium, for certain.
     #[error(
-        "equilibrium: it is none: within the claimed distance of it, the derivative of {state} is never zero"
+        "equilibrium: it is none: within the claimed distance of it, {state} never stands still"
     )]
     NoEquilibrium {
         /// The state.
         state: String,
     },
     /// That there is an equilibrium nearby was not shown.
-    #[error("equilibrium: that f is zero {within} of it could not be shown; {hint}")]
+    #[error("equilibrium: that the plant stands still {within} of it could not be shown; {hint}")]
     EquilibriumNotShown {
         /// Where.
         within: &'static str,

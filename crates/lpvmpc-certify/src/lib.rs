@@ -1,5 +1,5 @@
 //! Certificates of plants that are data: a law u = u_eq - K (x - x_eq), a cost and a set about an equilibrium, proved
-//! for the sampled nonlinear plant itself.
+//! for the sampled nonlinear plant itself, or for a plant in discrete time.
 //!
 //! ```
 //! use lpvmpc_certify::{CertifySettings, certify, verify};
@@ -59,10 +59,6 @@ macro_rules! smallest {
         if m == 0 {
             return Err(CertifyError::setting("plant", "it has no input"));
         }
-        if $plant.period().is_some() {
-            let fault = "it is in discrete time; a certificate needs one in continuous time";
-            return Err(CertifyError::setting("plant", fault));
-        }
         $(if n <= $nx && m <= $nu {
             return on_threads(|| sized::$function::<$nx, $nu, $ns> $arguments);
         })+
@@ -103,6 +99,7 @@ pub fn certify(
         );
         return Err(CertifyError::setting("t_s", fault));
     }
+    check_period(plant, settings.t_s)?;
     if !(settings.enlargement >= 1.0 && settings.enlargement <= 1e6) {
         let fault = format!("it is {}; it must be from 1 to 1e6", settings.enlargement);
         return Err(CertifyError::setting("enlargement", fault));
@@ -120,7 +117,19 @@ pub fn verify(
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<Verified, CertifyError> {
     certificate.check_plant(plant)?;
+    check_period(plant, certificate.t_s)?;
     smallest!(plant, verify(certificate, plant, progress), 2 1 3, 4 2 6, 6 2 8, 8 4 12)
+}
+
+fn check_period(plant: &Plant, t_s: f64) -> Result<(), CertifyError> {
+    match plant.period() {
+        Some(period) if period != t_s => {
+            let fault =
+                format!("it is {t_s} s; the plant is in discrete time with a period of {period} s");
+            Err(CertifyError::setting("t_s", fault))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// As [`verify`], of the text of a file: that it is as it was written is looked at last, so that a false claim is told

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 /// What a certificate is asked for. `n` states, `m` inputs, in the order and in the units of the plant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CertifySettings {
-    /// Sampling time, s.
+    /// Sampling time, s; of a plant in discrete time its period.
     pub t_s: f64,
     /// Q, n x n, symmetric positive semidefinite, of the stage cost e'Qe + v'Rv, e and v the deviations from the
     /// equilibrium.

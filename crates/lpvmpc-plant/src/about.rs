@@ -14,12 +14,12 @@ use std::sync::Arc;
 /// f(x_r + x, u_r + u) = A(s) x + B(s) u,     s = (x, u)
 /// ```
 ///
-/// without remainder, on any kind of number: what intervals and Taylor models enclose is f itself. A and B follow
+/// or in discrete time F(x_r + x, u_r + u) - x_r, without remainder, on any kind of number: what intervals and Taylor models enclose is f itself. A and B follow
 /// from the formulas of f alone, operation by operation (divided differences); the plant needs no embedding of its own.
 /// `NS` is the number of states and inputs together.
 ///
-/// The steady state is known as an enclosure, and the equation holds for that one in it at which f is zero. Places
-/// that are left over decay by themselves, x_dot = -`spare_rate` x, and nothing depends on them.
+/// The steady state is known as an enclosure, and the equation holds for that one in it at which f is zero (F is x_r). Places
+/// that are left over decay by themselves, x_dot = -`spare_rate` x, or are zero a period later, and nothing depends on them.
 #[derive(Debug, Clone)]
 pub struct AboutEquilibrium<const NX: usize, const NU: usize, const NS: usize> {
     plant: Plant,
@@ -62,13 +62,17 @@ impl<const NX: usize, const NU: usize, const NS: usize> AboutEquilibrium<NX, NU,
         let factors = factorise(&data.operations, data.motion(), sizes).map_err(|none| {
             let (place, fault) = match none {
                 NoFactors::TooLong => ("operations".to_owned(), "they are too long".to_owned()),
-                NoFactors::Operation(i) => (
-                    format!("operations[{i}]"),
-                    format!(
-                        "no proof can be had of `{}` here",
-                        data.operations[i].name()
-                    ),
-                ),
+                NoFactors::Operation(i) => {
+                    let (operation, place) = (&data.operations[i], format!("operations[{i}]"));
+                    let name = operation.name();
+                    let fault = match operation.is_smooth() {
+                        true => format!(
+                            "no proof can be had of `{name}`: no exact difference of it is known"
+                        ),
+                        false => format!("no proof can be had of `{name}`: it has a kink or jumps"),
+                    };
+                    (place, fault)
+                }
             };
             PlantError::new(place, fault)
         })?;
@@ -159,7 +163,10 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
                 }
             });
         for i in states..NX {
-            a[(i, i)] = N::constant(-self.spare_rate);
+            a[(i, i)] = match self.period() {
+                None => N::constant(-self.spare_rate),
+                Some(_) => zero,
+            };
         }
         (a, b)
     }

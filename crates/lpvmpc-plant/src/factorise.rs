@@ -3,7 +3,9 @@
 //! Every operation has its value at z and at z_r, and the row that takes z - z_r to their difference: of a sum the
 //! sum of the rows; of a product x y the row of y times the mean of x, and the other way round; of a function g
 //! the row times its divided difference (g(v) - g(v_r))/(v - v_r), in a form that has a value at v = v_r, too, such as
-//! cos((v + v_r)/2) sinc((v - v_r)/2) of sin. Nothing is neglected, so what is proved of S is proved of f.
+//! cos((v + v_r)/2) sinc((v - v_r)/2) of sin. That of an inverse function is one over that of the function itself, at
+//! the values: of arctan, cos a cos a_r / sinc(a - a_r) with a = arctan v. Nothing is neglected, so what is proved of S is
+//! proved of f.
 
 use crate::derive::{beside, needed};
 use crate::operation::{Binary, Operation, Unary};
@@ -12,7 +14,7 @@ use lpvmpc::{Bivariate, Elementary};
 
 /// More operations would take longer than is worth waiting for.
 const LONGEST: usize = 30_000;
-/// The highest power that is multiplied out.
+/// The highest power that is multiplied out; one above is the square of a lower one.
 const HIGHEST_POWER: f64 = 16.0;
 
 /// Entries of the matrix [A B] as results of a program.
@@ -65,6 +67,8 @@ pub(crate) fn factorise(
             continue;
         }
         let found = match *operation {
+            // Of numbers alone, too: enclosures have no value of it.
+            _ if !operation.is_smooth() => None,
             Operation::State(i) => program.component(i, states + inputs),
             Operation::Input(j) => program.component(states + j, states + inputs),
             Operation::Unary(function, x) => program.factored_unary(function, &factored[x]),
@@ -168,7 +172,7 @@ impl Program {
         x: &Factored,
         (at, base): (usize, usize),
     ) -> Option<usize> {
-        use Elementary::{Cos, Cosh, Exp, ExpM1, Sin, Sinc, Sinh, Sinhc, Sqrt, Tanh};
+        use Elementary::{Cos, Cosh, Exp, ExpM1, Sin, Sinc, Sinh, Sinhc, Tanh};
         let function = match function {
             Unary::Negative => return self.constant(-1.0),
             Unary::Square => return self.add(x.at, x.base),
@@ -187,11 +191,13 @@ impl Program {
             Sinh => (Cosh, Sinhc),
             Cosh => (Sinh, Sinhc),
             Tanh => return self.of_tangent((Cosh, Sinhc), x),
-            Sqrt => {
-                let sum = self.add(at, base)?;
-                return self.inverse(sum);
+            _ => {
+                let row = x.row.clone();
+                let values = Factored { at, base, row };
+                let straight = inverted(function)?;
+                let slope = self.divided_difference(straight, &values, (x.at, x.base))?;
+                return self.inverse(slope);
             }
-            _ => return None,
         };
         let (mean, half) = (self.mean(x)?, self.half_way(x)?);
         let (mean, half) = (
@@ -220,8 +226,10 @@ impl Program {
         x: &Factored,
         y: &Factored,
     ) -> Option<Factored> {
-        if let Binary::Bivariate(Bivariate::Power) = function {
-            return self.factored_power(x, y);
+        match function {
+            Binary::Bivariate(Bivariate::Power) => return self.factored_power(x, y),
+            Binary::Bivariate(Bivariate::Atan2) => return self.factored_angle(x, y),
+            _ => {}
         }
         let at = self.binary(function, x.at, y.at)?;
         if x.is_fixed() && y.is_fixed() {
@@ -230,11 +238,7 @@ impl Program {
         let base = self.binary(function, x.base, y.base)?;
         let row = match function {
             Binary::Add | Binary::Subtract => self.rows_together((&x.row, &y.row), function)?,
-            Binary::Multiply => {
-                let (of_x, of_y) = (self.mean(x)?, self.mean(y)?);
-                let (of_x, of_y) = (self.times_row(&y.row, of_x)?, self.times_row(&x.row, of_y)?);
-                self.rows_together((&of_y, &of_x), Binary::Add)?
-            }
+            Binary::Multiply => self.crossed((x, y), Binary::Add)?,
             Binary::Divide => {
                 // x/y - x_r/y_r = (x - x_r - x_r/y_r (y - y_r))/y.
                 let inverse = self.inverse(y.at)?;
@@ -242,47 +246,116 @@ impl Program {
                 let above = self.rows_together((&x.row, &moved), Binary::Subtract)?;
                 self.times_row(&above, inverse)?
             }
-            // What has a kink or jumps, and angles.
+            // What has a kink or jumps.
             Binary::Bivariate(_) => return None,
         };
         Some(Factored { at, base, row })
     }
 
-    /// x^y for a constant y that is whole or 1/2: v^n - v_r^n = (v - v_r) times the sum of
-    /// v^i v_r^(n-1-i).
+    /// The row of x times the mean of y, plus or minus (`function`) the row of y times the mean of x.
+    fn crossed(
+        &mut self,
+        (x, y): (&Factored, &Factored),
+        function: Binary,
+    ) -> Option<Vec<(usize, usize)>> {
+        let (of_x, of_y) = (self.mean(x)?, self.mean(y)?);
+        let (of_x, of_y) = (self.times_row(&y.row, of_x)?, self.times_row(&x.row, of_y)?);
+        self.rows_together((&of_y, &of_x), function)
+    }
+
+    /// The angle a of the point (y, x): with its distance r from the origin, r r_r sin(a - a_r) = x y_r - y x_r, which is
+    /// (x - x_r) times the mean of y less (y - y_r) times the mean of x.
+    fn factored_angle(&mut self, x: &Factored, y: &Factored) -> Option<Factored> {
+        let at = self.bivariate(Bivariate::Atan2, x.at, y.at)?;
+        if x.is_fixed() && y.is_fixed() {
+            return Some(fixed(at, at));
+        }
+        let base = self.bivariate(Bivariate::Atan2, x.base, y.base)?;
+        let way = self.subtract(at, base)?;
+        let sinc = self.elementary(Elementary::Sinc, way)?;
+        let (here, there) = (self.distance(x.at, y.at)?, self.distance(x.base, y.base)?);
+        let distances = self.multiply(here, there)?;
+        let below = self.multiply(distances, sinc)?;
+        let inverse = self.inverse(below)?;
+        let above = self.crossed((x, y), Binary::Subtract)?;
+        let row = self.times_row(&above, inverse)?;
+        Some(Factored { at, base, row })
+    }
+
+    /// The root of x^2 + y^2.
+    fn distance(&mut self, x: usize, y: usize) -> Option<usize> {
+        let (x, y) = (self.multiply(x, x)?, self.multiply(y, y)?);
+        let sum = self.add(x, y)?;
+        self.elementary(Elementary::Sqrt, sum)
+    }
+
+    /// x^y: of a constant y that is whole or half of an odd number by products and roots, for any x that has such a
+    /// power; else exp(y ln x).
     fn factored_power(&mut self, x: &Factored, y: &Factored) -> Option<Factored> {
         let power = Binary::Bivariate(Bivariate::Power);
         if x.is_fixed() && y.is_fixed() {
             let at = self.binary(power, x.at, y.at)?;
             return Some(fixed(at, at));
         }
-        let exponent = self.number(y.at)?;
-        let root = Unary::Elementary(Elementary::Sqrt);
+        let halves = |exponent: &f64| (2.0 * exponent).fract() == 0.0;
+        let Some(exponent) = self.number(y.at).filter(halves) else {
+            let logarithm = self.factored_unary(Unary::Elementary(Elementary::Ln), x)?;
+            let product = self.factored_binary(Binary::Multiply, y, &logarithm)?;
+            return self.factored_unary(Unary::Elementary(Elementary::Exp), &product);
+        };
         if exponent < 0.0 {
-            let size = self.constant(-exponent)?;
-            let power = self.factored_power(x, &fixed(size, size))?;
+            let power = self.constant_power(x, -exponent)?;
             return self.factored_unary(Unary::Inverse, &power);
         }
-        if exponent.fract() == 0.5 {
-            let whole = self.constant(exponent - 0.5)?;
-            let root = self.factored_unary(root, x)?;
-            let whole = self.factored_power(x, &fixed(whole, whole))?;
+        if exponent.fract() != 0.0 {
+            let root = self.factored_unary(Unary::Elementary(Elementary::Sqrt), x)?;
+            let whole = self.constant_power(x, exponent - 0.5)?;
             return self.factored_binary(Binary::Multiply, &whole, &root);
         }
-        if exponent.fract() != 0.0 || exponent > HIGHEST_POWER {
-            return None;
+        if exponent > HIGHEST_POWER {
+            let half = self.constant_power(x, (0.5 * exponent).floor())?;
+            let even = self.factored_unary(Unary::Square, &half)?;
+            return match exponent % 2.0 {
+                0.0 => Some(even),
+                _ => self.factored_binary(Binary::Multiply, &even, x),
+            };
         }
+        self.multiplied_out(x, exponent as usize)
+    }
+
+    fn constant_power(&mut self, x: &Factored, exponent: f64) -> Option<Factored> {
+        let exponent = self.constant(exponent)?;
+        self.factored_power(x, &fixed(exponent, exponent))
+    }
+
+    /// v^n - v_r^n = (v - v_r) times the sum of v^i v_r^(n-1-i).
+    fn multiplied_out(&mut self, x: &Factored, n: usize) -> Option<Factored> {
         let one = self.constant(1.0)?;
         let (mut at, mut base, mut slope) = (one, one, self.constant(0.0)?);
-        for _ in 0..exponent as usize {
+        for _ in 0..n {
             let raised = self.multiply(slope, x.at)?;
             slope = self.add(raised, base)?;
             (at, base) = (self.multiply(at, x.at)?, self.multiply(base, x.base)?);
         }
-        let row = match exponent {
-            0.0 => Vec::new(),
+        let row = match n {
+            0 => Vec::new(),
             _ => self.times_row(&x.row, slope)?,
         };
         Some(Factored { at, base, row })
     }
+}
+
+/// The function whose inverse this one is, up to a constant.
+fn inverted(function: Elementary) -> Option<Unary> {
+    Some(match function {
+        Elementary::Sqrt => Unary::Square,
+        Elementary::Ln | Elementary::Ln1p => Unary::Elementary(Elementary::Exp),
+        Elementary::Atan => Unary::Tan,
+        Elementary::Asin => Unary::Elementary(Elementary::Sin),
+        Elementary::Acos => Unary::Elementary(Elementary::Cos),
+        Elementary::Asinh => Unary::Elementary(Elementary::Sinh),
+        Elementary::Acosh => Unary::Elementary(Elementary::Cosh),
+        Elementary::Atanh => Unary::Elementary(Elementary::Tanh),
+        _ => return None,
+    })
 }

@@ -23,9 +23,14 @@ pub enum FlowError {
     /// A motion with an affine term is not linear in initial state and input.
     #[error("the plant has an affine term: its motion is not linear in initial state and input")]
     AffineTerm,
-    /// The plant is sampled itself.
-    #[error("the plant is in discrete time: there is no motion between its samples")]
-    DiscreteTime,
+    /// The plant is sampled itself, with another period.
+    #[error("t_s = {t_s} s: the plant is in discrete time with a period of {period} s")]
+    Period {
+        /// The sampling time of the law, s.
+        t_s: f64,
+        /// The plant's, s.
+        period: f64,
+    },
 }
 
 /// The law u = **-K** x(0), held over a sample of `t_s` seconds.
@@ -33,9 +38,9 @@ pub enum FlowError {
 pub struct SampledLaw<const NX: usize, const NU: usize> {
     /// K.
     pub k: SMatrix<f64, NU, NX>,
-    /// Sampling time, s.
+    /// Sampling time, s; of a plant in discrete time its period.
     pub t_s: f64,
-    /// log2 of the number of time steps, so that they fill the sample exactly.
+    /// log2 of the number of time steps, so that they fill the sample exactly; a plant in discrete time has none.
     pub halvings: u8,
 }
 
@@ -58,7 +63,7 @@ pub struct SampleEnclosure<const NX: usize> {
     pub error_square: SMatrix<f64, NX, NX>,
     /// How much G depends on each coordinate of the box, in the Frobenius norm.
     pub dependence: [f64; NX],
-    /// Where the states x are during the sample.
+    /// Where the states x are during the sample; of a plant in discrete time at its beginning.
     pub states: [Interval; NX],
 }
 
@@ -72,10 +77,10 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
     /// A step of the motion is linear in its initial state and input, x+ = Phi x + Gamma u, with
     /// Phi and Gamma that depend on where the motion leads the scheduling. They are enclosed as
     /// Taylor models in y, then composed in the coordinates of the frame, from G = I on, with
-    /// u = -K T y(0).
+    /// u = -K T y(0). A plant in discrete time makes one step, whose Phi and Gamma are A(s) and B(s).
     ///
     /// # Errors
-    /// No enclosure was found: the box is too large; or the plant has an affine term.
+    /// No enclosure was found: the box is too large; or the plant has an affine term, or another period.
     pub fn enclose<M, const NS: usize>(
         &self,
         model: &M,
@@ -93,7 +98,14 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
         let minus_k = matrix(|i, j| TaylorModel::constant(-self.k[(i, j)]));
         let gain: [[TaylorModel<NX>; NX]; NU] = product(&minus_k, &t);
         let u = product(&gain, &y);
-        let steps = 1_u32 << self.halvings;
+        let steps = match model.period() {
+            None => 1_u32 << self.halvings,
+            Some(period) if period == self.t_s => 1,
+            Some(period) => {
+                let t_s = self.t_s;
+                return Err(FlowError::Period { t_s, period });
+            }
+        };
         let step = Step {
             model,
             input: std::array::from_fn(|i| u[i][0]),
@@ -101,9 +113,6 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
         };
         let gain = TaylorMap::of(&gain);
         let mut x = product(&t, &y).map(|[x]| x);
-        if model.period().is_some() {
-            return Err(FlowError::DiscreteTime);
-        }
         let scheduling = model.scheduling(&SVector::from(x), &SVector::from(step.input));
         if model.offset(&scheduling).is_some() {
             return Err(FlowError::AffineTerm);
@@ -111,7 +120,10 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
         let mut transition = Composition::identity();
         let mut states: Option<[Interval; NX]> = None;
         for _ in 0..steps {
-            let (end, phi, gamma, during) = step.enclose(&x)?;
+            let (end, phi, gamma, during) = match model.period() {
+                None => step.enclose(&x)?,
+                Some(_) => step.jump(&x),
+            };
             x = end;
             let phi = uncertain(&inverse, &phi, &t);
             let unit = matrix(|i, j| TaylorModel::constant(if i == j { 1.0 } else { 0.0 }));
@@ -171,6 +183,22 @@ impl<M, const NX: usize, const NU: usize> Step<'_, M, NX, NU> {
         let phi = std::array::from_fn(|i| std::array::from_fn(|j| end[1 + j][i]));
         let gamma = std::array::from_fn(|i| std::array::from_fn(|j| end[1 + NX + j][i]));
         Ok((end[0], phi, gamma, during))
+    }
+
+    /// The same of a plant in discrete time, whose state is where it was meanwhile.
+    fn jump<const NS: usize>(&self, x: &[TaylorModel<NX>; NX]) -> StepEnclosure<NX, NU>
+    where
+        M: Embedding<NX, NU, NS>,
+    {
+        let (state, input) = (SVector::from(*x), SVector::from(self.input));
+        let (a, b) = self.model.matrices(&self.model.scheduling(&state, &input));
+        let (phi, gamma) = (matrix(|i, j| a[(i, j)]), matrix(|i, j| b[(i, j)]));
+        let (of_state, of_input) = (
+            product(&phi, &x.map(|one| [one])),
+            product(&gamma, &self.input.map(|one| [one])),
+        );
+        let end = std::array::from_fn(|i| of_state[i][0] + of_input[i][0]);
+        (end, phi, gamma, x.map(TaylorModel::range))
     }
 
     /// The columns a step later, and where the state is during the step.

@@ -13,11 +13,19 @@ pub enum ClaimError {
          only, with the equilibrium at x = 0, u = 0"
     )]
     AffineTerm,
-    /// The plant is sampled itself.
+    /// The plant is sampled itself, and has no quadratic stability in continuous time.
     #[error(
-        "the plant is in discrete time: a terminal set can be certified in continuous time only"
+        "continuous: the plant is in discrete time, and quadratic stability is claimed in continuous time"
     )]
     DiscreteTime,
+    /// The plant is sampled itself, with another period.
+    #[error("t_s = {t_s}: the plant is in discrete time with a period of {period} s")]
+    Period {
+        /// The certificate's sampling time, s.
+        t_s: f64,
+        /// The plant's, s.
+        period: f64,
+    },
     /// A number that cannot be.
     #[error("{name} = {value}: it must be {expected}", value = number_text(*value))]
     Value {
@@ -146,6 +154,7 @@ impl ClaimError {
             | Self::LimitNotShown { .. }
             | Self::AffineTerm
             | Self::DiscreteTime
+            | Self::Period { .. }
             | Self::DecreaseNotShown { .. }
             | Self::QuadraticStabilityNotShown { .. } => false,
         }

@@ -19,7 +19,8 @@ pub struct Proof<const NX: usize> {
     pub smallest_contraction: f64,
     /// Boxes of schedulings on which quadratic stability was proved; 0 without such a claim.
     pub scheduling_boxes: usize,
-    /// Where the states are at and between the samples, at most; state units.
+    /// Where the states are at and between the samples, at most; state units. A plant in discrete time has nothing
+    /// between them.
     pub reach: SVector<f64, NX>,
 }
 
@@ -46,6 +47,9 @@ impl<Plant, const NX: usize, const NU: usize, const NS: usize> Certificate<Plant
         M: Embedding<NX, NU, NS> + Sync,
     {
         self.check_numbers()?;
+        if model.period().is_some() {
+            return Err(ClaimError::DiscreteTime);
+        }
         let sampled = self.sampled();
         let (ellipsoid, normaliser) = sampled.set()?;
         let reach = sampled.check_limits(model, &ellipsoid)?;

@@ -16,7 +16,7 @@ use std::sync::{Mutex, PoisonError};
 /// scheduling: the decrease of x'Px under u = **-K** x, held, and the limits, for every x with x'Px <= level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampledClaim<const NX: usize, const NU: usize> {
-    /// Sampling time, s.
+    /// Sampling time, s; of a plant in discrete time its period.
     pub t_s: f64,
     /// Q of the stage cost x'Qx + u'Ru, symmetric, positive semidefinite.
     pub q: SMatrix<f64, NX, NX>,
@@ -88,11 +88,15 @@ impl<const NX: usize, const NU: usize> SampledClaim<NX, NU> {
                 return Err(not_shown(&decrease, at, cells));
             }
         };
-        let during = decrease
-            .states
-            .into_inner()
-            .unwrap_or_else(PoisonError::into_inner);
-        let reach = SVector::from_fn(|i, _| during[i].magnitude());
+        let reach = match model.period() {
+            None => {
+                let during = decrease.states.into_inner();
+                let during = during.unwrap_or_else(PoisonError::into_inner);
+                SVector::from_fn(|i, _| during[i].magnitude())
+            }
+            // No motion leads out of the set between two samples.
+            Some(_) => SVector::from_fn(|i, _| decrease.ellipsoid.bound(&axis(i))),
+        };
         for i in 0..NX {
             let limit = self.state_limits[i];
             let kept = reach[i] <= limit;
@@ -162,8 +166,11 @@ impl<const NX: usize, const NU: usize> SampledClaim<NX, NU> {
             let reach = check_row(ellipsoid, &row, self.input_limits[i], &name)?;
             *range = symmetric(reach);
         }
-        if model.period().is_some() {
-            return Err(ClaimError::DiscreteTime);
+        if let Some(period) = model.period()
+            && period != self.t_s
+        {
+            let t_s = self.t_s;
+            return Err(ClaimError::Period { t_s, period });
         }
         let scheduling = model.scheduling(&box_of_states, &box_of_inputs);
         if model.offset(&scheduling).is_some() {

@@ -13,7 +13,8 @@ use lpvmpc_design::{
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use thiserror::Error;
 
-/// What terminal ingredients are asked of the plant x_dot = A(s) x + B(s) u, sampled at t_s.
+/// What terminal ingredients are asked of the plant x_dot = A(s) x + B(s) u, sampled at t_s, or in discrete time of
+/// x+ = A(s) x + B(s) u.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TerminalProblem<const NX: usize, const NU: usize> {
     /// Sampling time, s.
@@ -106,7 +107,7 @@ pub enum SynthesisError {
 /// |x_i| <= state_limits_i,  |K_i x| <= input_limits_i          wherever x'Px <= level
 /// ```
 ///
-/// with A_d and B_d sampled exactly at frozen scheduling. In Y = level P^-1 and L = K Y these are
+/// with A_d and B_d sampled exactly at frozen scheduling (A and B themselves of a model with a period). In Y = level P^-1 and L = K Y these are
 /// linear matrix inequalities (Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities
 /// in System and Control Theory, 1994). This is a design, not a proof: neither the values between
 /// the points nor the motion of the scheduling within a sample is looked at.
@@ -141,7 +142,11 @@ where
     problem.check()?;
     let sampled = |scheduling: &SVector<f64, NS>| {
         let (a, b) = model.matrices(scheduling);
-        zero_order_hold(&dynamic(&a), &dynamic(&b), problem.t_s)
+        let (a, b) = (dynamic(&a), dynamic(&b));
+        match model.period() {
+            None => zero_order_hold(&a, &b, problem.t_s),
+            Some(_) => Ok((a, b)),
+        }
     };
     let pairs = points.iter().map(sampled).collect::<Result<Vec<_>, _>>()?;
     let scaling = problem.scaling(&sampled(middle)?)?;

@@ -177,12 +177,18 @@ proptest! {
     }
 }
 
-/// A pendulum whose motor is stronger the more it gives: B depends on the input; with or without wind.
+/// A pendulum whose motor is stronger the more it gives: B depends on the input; with or without wind. The same numbers
+/// are a map, too.
 struct Strong {
     wind: bool,
+    period: Option<f64>,
 }
 
 impl Embedding<2, 1, 2> for Strong {
+    fn period(&self) -> Option<f64> {
+        self.period
+    }
+
     fn scheduling<N: Number>(&self, x: &Vector2<N>, u: &Vector1<N>) -> Vector2<N> {
         Vector2::new(x[0], u[0])
     }
@@ -240,6 +246,11 @@ fn every_function_is_enclosed_with_its_curvature() {
         (Elementary::Atanh, f64::atanh, -0.7),
         (Elementary::ExpM1, f64::exp_m1, 0.01),
         (Elementary::Ln1p, f64::ln_1p, -0.3),
+        (Elementary::Ln, f64::ln, 0.3),
+        (Elementary::Atan, f64::atan, -0.6),
+        (Elementary::Atan, f64::atan, 2.5),
+        (Elementary::Tanh, f64::tanh, 0.4),
+        (Elementary::Sqrt, f64::sqrt, 0.3),
     ] {
         for half_width in [0.1, 0.01, 0.0] {
             let form = TaylorModel::<1>::symbol(middle, half_width, 0).elementary(function);
@@ -318,31 +329,52 @@ fn what_has_no_enclosure_is_everything() {
 #[test]
 fn a_scheduling_that_depends_on_the_input_is_enclosed() {
     let (law, frame) = strong_law();
-    let plant = Strong { wind: false };
     let centre = Vector2::new(0.2, -0.3);
     let half_widths = Vector2::repeat(0.05);
-    let sample = law.enclose(&plant, &frame, &centre, &half_widths).unwrap();
-    for i in -4..=4 {
-        for j in -4..=4 {
-            let z = Vector2::new(f64::from(i), f64::from(j)) / 4.0;
-            let x = centre + z * 0.05;
-            let u = Vector1::from(-law.k * x);
-            let end = Rk4 { substeps: 400 }.advance(&plant, &x, &u, law.t_s);
-            let [by_x, by_rate] = sample.transition.slopes;
-            let g = sample.transition.middle + by_x * z[0] + by_rate * z[1];
-            let error = (g * x - end).norm();
-            let allowed = (sample.error_square * x).dot(&x).sqrt();
-            assert!(error <= allowed + 1e-11, "{error:e} > {allowed:e}");
-            assert!((0..2).all(|k| sample.states[k].contains(Interval::point(end[k]))));
+    for period in [None, Some(law.t_s)] {
+        let wind = false;
+        let plant = Strong { wind, period };
+        let sample = law.enclose(&plant, &frame, &centre, &half_widths).unwrap();
+        for i in -4..=4 {
+            for j in -4..=4 {
+                let z = Vector2::new(f64::from(i), f64::from(j)) / 4.0;
+                let x = centre + z * 0.05;
+                let u = Vector1::from(-law.k * x);
+                let end = Rk4 { substeps: 400 }.advance(&plant, &x, &u, law.t_s);
+                let [by_x, by_rate] = sample.transition.slopes;
+                let g = sample.transition.middle + by_x * z[0] + by_rate * z[1];
+                let error = (g * x - end).norm();
+                let allowed = (sample.error_square * x).dot(&x).sqrt();
+                assert!(error <= allowed + 1e-11, "{error:e} > {allowed:e}");
+                // A map leads through nothing between its beginning and its end.
+                let during = if period.is_none() { end } else { x };
+                assert!((0..2).all(|k| sample.states[k].contains(Interval::point(during[k]))));
+            }
         }
     }
+}
+
+#[test]
+fn a_map_with_another_period_is_refused() {
+    let (law, frame) = strong_law();
+    let (wind, period) = (false, Some(0.1));
+    let small = Vector2::repeat(0.01);
+    let error = law.enclose(&Strong { wind, period }, &frame, &Vector2::zeros(), &small);
+    let expected = FlowError::Period {
+        t_s: 0.05,
+        period: 0.1,
+    };
+    assert_eq!(error.unwrap_err(), expected);
 }
 
 /// Motion with an affine term is not linear in x and u: the enclosure would leave the wind out.
 #[test]
 fn a_plant_with_an_affine_term_is_refused() {
     let (law, frame) = strong_law();
-    let plant = Strong { wind: true };
+    let plant = Strong {
+        wind: true,
+        period: None,
+    };
     let small = Vector2::repeat(0.01);
     let error = law.enclose(&plant, &frame, &Vector2::zeros(), &small);
     assert_eq!(error.unwrap_err(), FlowError::AffineTerm);

@@ -7,7 +7,7 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
-use lpvmpc::{LpvModel, Rk4};
+use lpvmpc::{Embedding, LpvModel, Number, Rk4};
 use lpvmpc_certificate::{
     Certificate, ClaimError, DocumentError, MOST_BOXES, MOST_BYTES, is_at_most,
 };
@@ -23,6 +23,30 @@ fn refused(forged: &PendulumCertificate) -> ClaimError {
     forged
         .prove(&Pendulum, MOST_BOXES, &|_| ())
         .expect_err("a forgery was proved")
+}
+
+/// The pendulum's matrices as those of a map.
+struct Sampled;
+
+impl Embedding<2, 1, 1> for Sampled {
+    fn period(&self) -> Option<f64> {
+        Some(TRUE.t_s)
+    }
+
+    fn scheduling<N: Number>(&self, x: &Vector2<N>, u: &Vector1<N>) -> Vector1<N> {
+        Embedding::scheduling(&Pendulum, x, u)
+    }
+
+    fn matrices<N: Number>(&self, s: &Vector1<N>) -> (Matrix2<N>, Vector2<N>) {
+        Embedding::matrices(&Pendulum, s)
+    }
+}
+
+/// Of a map no stability in continuous time can be claimed.
+#[test]
+fn quadratic_stability_of_a_map_is_refused() {
+    let error = TRUE.prove(&Sampled, MOST_BOXES, &|_| ()).unwrap_err();
+    assert_eq!(error, ClaimError::DiscreteTime);
 }
 
 /// P of A'P + PA = -I for x_dot = (x_2, -a x_1 - b x_2).

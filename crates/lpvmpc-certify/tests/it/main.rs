@@ -8,5 +8,7 @@
 
 mod claims;
 mod controller;
+mod discrete;
 mod forgeries;
+mod functions;
 mod plants;

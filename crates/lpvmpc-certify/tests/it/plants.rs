@@ -37,7 +37,7 @@ impl Dynamics<2, 1> for Reactor {
     }
 }
 
-fn signal(name: &str, unit: &str, bounds: Option<(f64, f64)>) -> Signal {
+pub fn signal(name: &str, unit: &str, bounds: Option<(f64, f64)>) -> Signal {
     Signal {
         lower: bounds.map(|(lower, _)| lower),
         upper: bounds.map(|(_, upper)| upper),

@@ -222,6 +222,32 @@ fn no_regulator_is_designed_where_the_plant_does_not_stand() {
     assert!(message.contains("needs an equilibrium"), "{message}");
 }
 
+/// x+ = 2 ln(1 + x) + u, which is unstable at 0.
+#[test]
+fn a_plant_in_discrete_time_is_certified_and_proved_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let plant = r#"{"schema": 1, "name": "map", "states": [{"name": "a", "lower": -0.4}],
+        "inputs": [{"name": "u", "lower": -1, "upper": 1}], "period": 0.1, "operations": [["state", 0],
+        ["log1p", 0], ["constant", 2], ["mul", 1, 2], ["input", 0], ["add", 3, 4]], "next": [5]}"#;
+    fs::write(folder.path().join("map.json"), plant).unwrap();
+    let experiment = "name = \"a\"\nplant = \"map.json\"\nx0 = [0]\nduration = 1\n\
+                      [controller]\nt_s = 0.1\nhorizon = 5\nq = [1]\nr = [1]\n";
+    fs::write(folder.path().join("map.toml"), experiment).unwrap();
+    let arguments = ["certify", "map.toml", "--out", "certificate.json"];
+    succeed(folder.path(), &arguments);
+    let arguments = ["verify", "certificate.json", "map.json", "--json"];
+    let verified: Value = serde_json::from_str(&succeed(folder.path(), &arguments)).unwrap();
+    let reach = verified["reach"]["a"].as_f64().unwrap();
+    assert!(reach > 0.2 && reach <= 0.4, "{verified}");
+    fs::write(
+        folder.path().join("map.toml"),
+        changed(experiment, "0.1", "0.2"),
+    )
+    .unwrap();
+    let message = fail(folder.path(), &["certify", "map.toml"]);
+    assert!(message.contains("period of 0.1 s"), "{message}");
+}
+
 #[test]
 fn files_of_others_stay() {
     let folder = example();
