@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
-# Counts the instructions of single controller steps on this machine (f64, release build) under
-# valgrind, and fails when a count grows by more than 5 % over .ci/instructions.txt. The counts do
+# Counts the instructions of controller steps on this machine (f64, release build) under valgrind, and fails when a count grows by more than 5 % over .ci/instructions.txt. The counts do
 # not depend on load or clock, but on the compiler: with another one they are shown, not compared.
 # `instructions.sh --write` takes the counts as the new ones.
 set -euo pipefail
@@ -10,6 +9,7 @@ file=.ci/instructions.txt
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}
 # With the program named, its dependencies are those that are built already.
 cargo build --locked --release -p ballbot-cli -p ballbot-scenario --example count_steps
+cargo build --locked --release -p ballbot-cli -p lpvmpc-cli --bin lpvmpc
 directory=$(mktemp -d)
 trap 'rm -rf "$directory"' EXIT
 
@@ -26,18 +26,41 @@ counts() {
     cat "$directory"/out.* | sed -n 's/^totals: //p' | sort -n
 }
 
+# The count of all steps of a closed loop of the program `lpvmpc`, whose plant and sizes are data: a descent 1 m aside.
+any_plant() {
+    local lpvmpc=$CARGO_TARGET_DIR/release/lpvmpc
+    rm -rf "${directory:?}"/*
+    "$lpvmpc" example plant >"$directory/plant.json"
+    cat >"$directory/experiment.toml" <<'END'
+name = "count"
+plant = "plant.json"
+x0 = [0, 0, 0, 0]
+duration = 4
+controller = { t_s = 0.04, horizon = 20, q = [10, 10, 0.1, 0.1], r = [0.01] }
+reference = [{ time = 0, x = [1, 0, 0, 0] }]
+END
+    if ! env -i PATH=/usr/bin:/bin valgrind --tool=callgrind --toggle-collect=lpvmpc_any::mpc::Mpc::step \
+        --callgrind-out-file="$directory/count" "$lpvmpc" simulate "$directory/experiment.toml" \
+        --out "$directory/run" >"$directory/log" 2>&1; then
+        cat "$directory/log" >&2
+        exit 1
+    fi
+    sed -n 's/^totals: //p' "$directory/count"
+}
+
 measure() {
     # Without active bounds all steps but the first are alike: the last one is the most.
     counts lissajous 20 | awk 'END { print "no_active_bound", $1 }'
     counts tight-bounds 80 | awk 'END { print "tight_bounds_worst", $1 }'
+    echo any_plant_100_steps "$(any_plant)"
 }
 
 compiler=$(rustc --version)
 now=$(measure)
 if [[ ${1:-} == --write ]]; then
     {
-        echo "# Instructions of one controller step (f64, one plane, horizon 20) on x86-64, checked by"
-        echo "# instructions.sh; written by instructions.sh --write with"
+        echo "# Instructions of one controller step (f64, one plane, horizon 20), and of 100 of a cart-pole from a"
+        echo "# file (descent, horizon 20), on x86-64, checked by instructions.sh; written by instructions.sh --write with"
         echo "# compiler: $compiler"
         echo "$now"
     } >"$file"
@@ -54,7 +77,7 @@ awk '
     !($1 in last) { print "instructions: no last count of " $1; failed = 1; next }
     {
         change = 100 * ($2 / last[$1] - 1)
-        printf "instructions: %-20s %8d  last time %8d  %+.1f %%\n", $1, $2, last[$1], change
+        printf "instructions: %-20s %9d  last time %9d  %+.1f %%\n", $1, $2, last[$1], change
         if (change > 5) { print "instructions: FAILED, more than 5 % more"; failed = 1 }
         if (change < -5) print "instructions: less; take it over with .ci/instructions.sh --write"
     }

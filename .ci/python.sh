@@ -24,7 +24,8 @@ assert not heavy, f"import lpvmpc imports {heavy}"'
 # The program that was built before says what the package must say, bit for bit.
 export LPVMPC_BALLBOT=$CARGO_TARGET_DIR/release/ballbot
 test -x "$LPVMPC_BALLBOT"
-cargo build --locked --release -p lpvmpc-cli
+# With both named, it shares the dependencies of the other.
+cargo build --locked --release -p ballbot-cli -p lpvmpc-cli --bin lpvmpc
 export LPVMPC_PROGRAM=$CARGO_TARGET_DIR/release/lpvmpc
 cd python
 "$python/venv/bin/python" -m mypy

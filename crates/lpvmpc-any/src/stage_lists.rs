@@ -66,8 +66,11 @@ pub(crate) fn by_stage<V, W>(
     fill: impl Fn(&str, &V) -> Result<W, MpcError>,
 ) -> Result<Vec<W>, MpcError> {
     let list = list.iter().enumerate();
-    list.map(|(stage, entry)| fill(&format!("{name}, stage {stage}"), entry))
-        .collect()
+    // The place is written down where there is something to say of it.
+    list.map(|(stage, entry)| {
+        fill(name, entry).or_else(|_| fill(&format!("{name}, stage {stage}"), entry))
+    })
+    .collect()
 }
 
 impl Names {
