@@ -148,6 +148,19 @@ impl LastInput {
         }
         (a, b)
     }
+
+    /// What the plant does in a sample from each state, with what the last input does.
+    fn complete<const NX: usize, const NU: usize, const POINTS: usize>(
+        &self,
+        u: [SVector<f64, NU>; POINTS],
+        mut tangents: [Tangent<f64, NX, NU>; POINTS],
+    ) -> [Tangent<f64, NX, NU>; POINTS] {
+        for ((next, a, b), u) in tangents.iter_mut().zip(&u) {
+            self.write(next, u);
+            (*a, *b) = self.write_rows((*a, *b));
+        }
+        tangents
+    }
 }
 
 /// What a controller has for a plant.
@@ -231,22 +244,28 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
     }
 
     fn tangent(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> Tangent<f64, NX, NU> {
-        if self.last_input.is_none() {
+        let Some(last) = &self.last_input else {
             return self.rates.tangent(x, u);
-        }
-        let (a, b) = self.jacobian(x, u);
-        (self.derivative(x, u), a, b)
+        };
+        let [there] = last.complete(
+            [*u],
+            last.rk4
+                .differentiate_each(&self.rates, &[*x], &[*u], last.t_s),
+        );
+        there
     }
 
     fn embedded(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> Tangent<f64, NX, NU> {
         let Some(last) = &self.last_input else {
             return self.rates.embedded(x, u);
         };
-        let (a, b) = last.write_rows(last.rk4.linearize(&self.rates, x, u, last.t_s));
-        (self.derivative(x, u), a, b)
+        let [there] = last.complete(
+            [*u],
+            last.rk4.linearize_each(&self.rates, &[*x], &[*u], last.t_s),
+        );
+        there
     }
 
-    // Asked for only without a last input: a controller has no groups of a model with a period.
     const TOGETHER: bool = true;
 
     fn embedded_each<const POINTS: usize>(
@@ -255,11 +274,12 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
         u: &[SVector<f64, NU>; POINTS],
         tangents: &mut [Tangent<f64, NX, NU>; POINTS],
     ) {
-        if self.last_input.is_none() {
-            return self.rates.embedded_each(x, u, tangents);
-        }
-        for (i, tangent) in tangents.iter_mut().enumerate() {
-            *tangent = self.embedded(&x[i], &u[i]);
+        match &self.last_input {
+            None => self.rates.embedded_each(x, u, tangents),
+            Some(last) => {
+                let there = last.rk4.linearize_each(&self.rates, x, u, last.t_s);
+                *tangents = last.complete(*u, there);
+            }
         }
     }
 
@@ -269,11 +289,12 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
         u: &[SVector<f64, NU>; POINTS],
         tangents: &mut [Tangent<f64, NX, NU>; POINTS],
     ) {
-        if self.last_input.is_none() {
-            return self.rates.tangent_each(x, u, tangents);
-        }
-        for (i, tangent) in tangents.iter_mut().enumerate() {
-            *tangent = self.tangent(&x[i], &u[i]);
+        match &self.last_input {
+            None => self.rates.tangent_each(x, u, tangents),
+            Some(last) => {
+                let there = last.rk4.differentiate_each(&self.rates, x, u, last.t_s);
+                *tangents = last.complete(*u, there);
+            }
         }
     }
 

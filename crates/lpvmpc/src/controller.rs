@@ -438,12 +438,7 @@ where
         samples: impl Fn(Group<'_, T, NX, NU>) -> Option<[Sample<T, NX, NU>; GROUP]>,
     ) -> usize {
         let mut done = 0;
-        // A plant in discrete time has nothing to integrate.
-        let horizon = match self.model.period() {
-            None => self.settings.horizon,
-            Some(_) => 0,
-        };
-        while done + GROUP <= horizon {
+        while done + GROUP <= self.settings.horizon {
             let expected: [_; GROUP] = from_fn(|k| self.expected(x, inputs, first + done + k));
             let (states, inputs) = (expected.map(|(x, _)| x), expected.map(|(_, u)| u));
             let Some(made) = samples((&states, &inputs)) else {

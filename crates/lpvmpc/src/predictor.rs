@@ -223,12 +223,13 @@ impl Rk4 {
         T: Scalar,
         P: LpvModel<T, NX, NU, NS>,
     {
-        if let Some(period) = model.period() {
-            return follow_periods(x, periods(period, t_s), |x| model.embedded(x, u));
-        }
         let embedding = |x: &[SVector<T, NX>; 1], tangents: &mut [Tangent<T, NX, NU>; 1]| {
             *tangents = [model.embedded(&x[0], u)];
         };
+        if let Some(period) = model.period() {
+            let [(_, a_d, b_d)] = follow_periods(&[*x], periods(period, t_s), embedding);
+            return (a_d, b_d);
+        }
         #[cfg(target_os = "none")]
         let embedding: &TangentAt<'_, T, NX, NU> = &embedding;
         let [(_, a_d, b_d)] = self.compose(model, &[*x], t_s, embedding);
@@ -237,7 +238,7 @@ impl Rk4 {
 
     /// The state after a sample from each `x` under its `u`, with the matrices of [`Rk4::linearize`].
     #[inline(never)]
-    pub(crate) fn linearize_each<
+    pub fn linearize_each<
         T,
         P,
         const NX: usize,
@@ -256,12 +257,15 @@ impl Rk4 {
         P: LpvModel<T, NX, NU, NS>,
     {
         let at = |x: &_, tangents: &mut _| model.embedded_each(x, u, tangents);
-        self.compose(model, x, t_s, at)
+        match model.period() {
+            Some(period) => follow_periods(x, periods(period, t_s), at),
+            None => self.compose(model, x, t_s, at),
+        }
     }
 
     /// The state after a sample from each `x` under its `u`, with the derivatives of [`Rk4::differentiate`].
     #[inline(never)]
-    pub(crate) fn differentiate_each<
+    pub fn differentiate_each<
         T,
         P,
         const NX: usize,
@@ -280,7 +284,10 @@ impl Rk4 {
         P: LpvModel<T, NX, NU, NS>,
     {
         let at = |x: &_, tangents: &mut _| model.tangent_each(x, u, tangents);
-        self.compose(model, x, t_s, at)
+        match model.period() {
+            Some(period) => follow_periods(x, periods(period, t_s), at),
+            None => self.compose(model, x, t_s, at),
+        }
     }
 
     /// The derivatives of [`Rk4::advance`] with respect to `x` and `u`: the same recursion with the
@@ -298,12 +305,13 @@ impl Rk4 {
         T: Scalar,
         P: LpvModel<T, NX, NU, NS>,
     {
-        if let Some(period) = model.period() {
-            return follow_periods(x, periods(period, t_s), |x| model.tangent(x, u));
-        }
         let tangent = |x: &[SVector<T, NX>; 1], tangents: &mut [Tangent<T, NX, NU>; 1]| {
             *tangents = [model.tangent(&x[0], u)];
         };
+        if let Some(period) = model.period() {
+            let [(_, a_d, b_d)] = follow_periods(&[*x], periods(period, t_s), tangent);
+            return (a_d, b_d);
+        }
         #[cfg(target_os = "none")]
         let tangent: &TangentAt<'_, T, NX, NU> = &tangent;
         let [(_, a_d, b_d)] = self.compose(model, &[*x], t_s, tangent);
@@ -443,18 +451,26 @@ pub(crate) fn over_periods<T: Scalar, const NX: usize, const NU: usize>(
     })
 }
 
-/// The pair over so many periods, along the motion from `x`, from the map and its pair `at` each state.
-fn follow_periods<T: Scalar, const NX: usize, const NU: usize>(
-    x: &SVector<T, NX>,
+/// The states after so many periods from each `x`, and the pairs over them along these motions, from the map and its
+/// pairs `at` the states.
+fn follow_periods<T: Scalar, const NX: usize, const NU: usize, const POINTS: usize>(
+    x: &[SVector<T, NX>; POINTS],
     periods: usize,
-    at: impl Fn(&SVector<T, NX>) -> (SVector<T, NX>, SMatrix<T, NX, NX>, SMatrix<T, NX, NU>),
-) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>) {
-    let begin = (*x, SMatrix::identity(), SMatrix::zeros());
-    let (_, a_d, b_d) = (0..periods).fold(begin, |(x, a_d, b_d), _| {
-        let (next, a, b) = at(&x);
-        (next, product(&a, &a_d), product(&a, &b_d) + b)
-    });
-    (a_d, b_d)
+    at: impl Fn(&[SVector<T, NX>; POINTS], &mut [Tangent<T, NX, NU>; POINTS]),
+) -> [Tangent<T, NX, NU>; POINTS] {
+    let mut reached = x.map(|x| (x, SMatrix::identity(), SMatrix::zeros()));
+    let mut next = reached;
+    for done in 0..periods {
+        at(&reached.map(|(x, ..)| x), &mut next);
+        for ((x, a_d, b_d), (x_next, a, b)) in reached.iter_mut().zip(&next) {
+            *x = *x_next;
+            (*a_d, *b_d) = match done {
+                0 => (*a, *b),
+                _ => (product(a, a_d), product(a, b_d) + b),
+            };
+        }
+    }
+    reached
 }
 
 /// One step of length `h` seconds for a constant pair, the Taylor polynomials of order four: with
