@@ -226,10 +226,6 @@ impl Rk4 {
         let embedding = |x: &[SVector<T, NX>; 1], tangents: &mut [Tangent<T, NX, NU>; 1]| {
             *tangents = [model.embedded(&x[0], u)];
         };
-        if let Some(period) = model.period() {
-            let [(_, a_d, b_d)] = follow_periods(&[*x], periods(period, t_s), embedding);
-            return (a_d, b_d);
-        }
         #[cfg(target_os = "none")]
         let embedding: &TangentAt<'_, T, NX, NU> = &embedding;
         let [(_, a_d, b_d)] = self.compose(model, &[*x], t_s, embedding);
@@ -257,10 +253,7 @@ impl Rk4 {
         P: LpvModel<T, NX, NU, NS>,
     {
         let at = |x: &_, tangents: &mut _| model.embedded_each(x, u, tangents);
-        match model.period() {
-            Some(period) => follow_periods(x, periods(period, t_s), at),
-            None => self.compose(model, x, t_s, at),
-        }
+        self.compose(model, x, t_s, at)
     }
 
     /// The state after a sample from each `x` under its `u`, with the derivatives of [`Rk4::differentiate`].
@@ -284,10 +277,7 @@ impl Rk4 {
         P: LpvModel<T, NX, NU, NS>,
     {
         let at = |x: &_, tangents: &mut _| model.tangent_each(x, u, tangents);
-        match model.period() {
-            Some(period) => follow_periods(x, periods(period, t_s), at),
-            None => self.compose(model, x, t_s, at),
-        }
+        self.compose(model, x, t_s, at)
     }
 
     /// The derivatives of [`Rk4::advance`] with respect to `x` and `u`: the same recursion with the
@@ -308,10 +298,6 @@ impl Rk4 {
         let tangent = |x: &[SVector<T, NX>; 1], tangents: &mut [Tangent<T, NX, NU>; 1]| {
             *tangents = [model.tangent(&x[0], u)];
         };
-        if let Some(period) = model.period() {
-            let [(_, a_d, b_d)] = follow_periods(&[*x], periods(period, t_s), tangent);
-            return (a_d, b_d);
-        }
         #[cfg(target_os = "none")]
         let tangent: &TangentAt<'_, T, NX, NU> = &tangent;
         let [(_, a_d, b_d)] = self.compose(model, &[*x], t_s, tangent);
@@ -323,7 +309,8 @@ impl Rk4 {
     ///
     /// With A_j, B_j at stage j, the stages' slopes are K_j x + L_j u (up to a constant where the
     /// pairs are Jacobians): K_1 = A_1, L_1 = B_1, K_2 = A_2 (I + h/2 K_1),
-    /// L_2 = B_2 + h/2 A_2 L_1, and so on. f takes the state from stage to stage.
+    /// L_2 = B_2 + h/2 A_2 L_1, and so on. f takes the state from stage to stage. In discrete time there is nothing
+    /// to integrate.
     // On a microcontroller, where flash is scarce, both kinds of pairs share its machine code.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
@@ -338,6 +325,9 @@ impl Rk4 {
         T: Scalar,
         P: LpvModel<T, NX, NU, NS>,
     {
+        if let Some(period) = model.period() {
+            return follow_periods(x, periods(period, t_s), at);
+        }
         let h = self.step_length(t_s);
         let [half, third, sixth] =
             [0.5, 1.0 / 3.0, 1.0 / 6.0].map(|part| h * convert::<f64, T>(part));
