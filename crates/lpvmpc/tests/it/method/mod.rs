@@ -4,6 +4,7 @@
 mod cart_pole;
 mod controller;
 mod direction;
+mod discrete;
 mod guaranteed;
 mod horizon;
 mod plants;
