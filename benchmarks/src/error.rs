@@ -2,6 +2,7 @@
 
 use ballbot_scenario::ScenarioError;
 use lpvmpc::ControllerError;
+use lpvmpc_sequences::SequenceError;
 use lpvmpc_sim::PlantError;
 use thiserror::Error;
 
@@ -11,6 +12,9 @@ pub enum BenchmarkError {
     /// A built-in scenario does not load.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
+    /// A sequence of problems cannot be made.
+    #[error(transparent)]
+    Sequence(#[from] SequenceError),
     /// The controller refuses the scenario's settings.
     #[error("controller: {0}")]
     Controller(#[from] ControllerError),

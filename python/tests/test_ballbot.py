@@ -246,6 +246,7 @@ def test_times_of_a_step() -> None:
     (one,) = found.sequences
     assert one["name"] == "two-setpoints"
     assert 0 < one["qp_us"]["median"] < one["step_us"]["median"] < 1e4
+    assert one["step_us"]["median"] < one["step_cold_us"]["median"]
     assert found.to_dataframe().loc["two-setpoints", "step_us.p99"] == one["step_us"]["p99"]
     assert found.guaranteed["guaranteed_us"]["median"] > 0
 

@@ -2,7 +2,8 @@
 
 use crate::BenchmarkError;
 use crate::comparison::Contender;
-use lpvmpc::{Capacity, Ocp, Solution, Solver, SolverSettings};
+use lpvmpc::{Ocp, Solution, Solver, SolverSettings};
+use lpvmpc_sequences::working_memory;
 use nalgebra::SVector;
 
 /// Our solver. The first problem of a sequence is solved cold, each other one as the settings
@@ -17,15 +18,7 @@ pub struct Own<'a, const NX: usize, const NU: usize> {
 impl<'a, const NX: usize, const NU: usize> Own<'a, NX, NU> {
     /// The solver, with room for every bound of these problems.
     pub fn new(problems: &'a [Ocp<f64, NX, NU>], settings: SolverSettings<f64>) -> Self {
-        let stages = problems.iter().map(Ocp::length).max().unwrap_or(1);
-        // A row for each input, and those of a terminal equality; then the bounds of the states.
-        let rows = stages * NU + NX;
-        let capacity = Capacity {
-            stages,
-            rows,
-            active: rows + stages * NX,
-            ..Capacity::default()
-        };
+        let capacity = working_memory(problems);
         Self {
             problems,
             settings,

@@ -2,6 +2,7 @@
 
 use crate::{ModelError, RefinementError, RegulatorError};
 use ballbot_scenario::ScenarioError;
+use lpvmpc_sequences::SequenceError;
 use lpvmpc_sim::PlantError;
 
 /// Why a study has no result. Those of the paper have no input, and none of this should happen.
@@ -22,6 +23,9 @@ pub enum StudyError {
     /// Models that cannot be compared.
     #[error(transparent)]
     Models(#[from] ModelError),
+    /// Problems to be timed that cannot be made.
+    #[error(transparent)]
+    Sequence(#[from] SequenceError),
     /// A row of the reference costs lacks a number.
     #[error("the reference costs have no number in column `{column}` of the row {row}")]
     ReferenceCosts {

@@ -4,6 +4,10 @@
 //! time counts, so that what else the machine does is left out; the statistics are over the
 //! samples of the sequence. The clock is handed in: a monotonic one, of the machine.
 
+mod problems;
+
+pub use problems::{PROBLEMS, time_problems};
+
 use crate::StudyError;
 use ballbot::{Controller, ControllerSettings};
 use ballbot_scenario::{Prepared, Scenario, ScenarioError};
@@ -59,13 +63,15 @@ pub struct Times {
 /// The times of one sequence.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SequenceTimes {
-    /// The scenario.
+    /// The scenario, or one of [`PROBLEMS`].
     pub name: String,
     /// The quadratic program alone.
     pub qp_us: Times,
-    /// The whole step: scheduling, predictor, quadratic program, rollout.
+    /// The same after other work, of 48 MB, has taken the caches.
+    pub qp_cold_us: Times,
+    /// The whole step: scheduling, predictor, quadratic program, rollout; of [`PROBLEMS`], the program alone.
     pub step_us: Times,
-    /// The whole step after other work, of 48 MB, has taken the caches.
+    /// The same after other work.
     pub step_cold_us: Times,
     /// Most bounds active in one sample (components of a terminal equality included).
     pub max_active: usize,
@@ -227,8 +233,9 @@ pub fn time(
     Ok(SequenceTimes {
         name: name.to_owned(),
         qp_us: Times::new(record.qp),
+        qp_cold_us: Times::new(record.qp_cold),
         step_us: Times::new(record.step),
-        step_cold_us: Times::new(record.cold),
+        step_cold_us: Times::new(record.step_cold),
         max_active: record.max_active,
     })
 }
@@ -236,8 +243,9 @@ pub fn time(
 #[derive(Default)]
 struct Record {
     qp: Vec<f64>,
+    qp_cold: Vec<f64>,
     step: Vec<f64>,
-    cold: Vec<f64>,
+    step_cold: Vec<f64>,
     max_active: usize,
 }
 
@@ -265,32 +273,34 @@ fn time_plane(
             terminal: at(horizon),
         };
         let before = controller.clone();
-        let step = shortest(|| {
+        let mut step = |other_work: Option<&mut OtherWork>| {
             controller.clone_from(&before);
+            other_work.map(OtherWork::sweep);
             let start = clock();
             black_box(controller.step(black_box(&x), &reference, &mut workspace));
             clock() - start
-        });
-        let qp = shortest(|| {
-            let mut solution: Solution<f64, 4, 1> = before.solution().clone();
+        };
+        record.step.push(shortest(|| step(None)));
+        if k % stride == 0 {
+            let cold = shortest_of(COLD_PASSES, || step(Some(&mut other_work)));
+            record.step_cold.push(cold);
+        }
+        let mut solution = before.solution().clone();
+        let mut qp = |other_work: Option<&mut OtherWork>| {
+            solution.clone_from(before.solution());
+            other_work.map(OtherWork::sweep);
             let settings = &controller.settings().solver;
             let start = clock();
             solver.solve(black_box(workspace.ocp()), settings, &mut solution);
             let elapsed = clock() - start;
             black_box(&solution);
             elapsed
-        });
+        };
+        record.qp.push(shortest(|| qp(None)));
         if k % stride == 0 {
-            record.cold.push(shortest_of(COLD_PASSES, || {
-                controller.clone_from(&before);
-                other_work.sweep();
-                let start = clock();
-                black_box(controller.step(black_box(&x), &reference, &mut workspace));
-                clock() - start
-            }));
+            let cold = shortest_of(COLD_PASSES, || qp(Some(&mut other_work)));
+            record.qp_cold.push(cold);
         }
-        record.step.push(step);
-        record.qp.push(qp);
         record.max_active = record.max_active.max(controller.solution().active.len());
         x = next(prepared, &x, &controller)?;
     }

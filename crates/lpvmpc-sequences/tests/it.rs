@@ -15,18 +15,6 @@ fn recipe(kind: Kind, share: f64) -> Recipe {
     }
 }
 
-fn each<const NX: usize, const NU: usize>(
-    check: impl Fn(&Recipe, &Sequence<NX, NU>),
-) -> Result<(), SequenceError> {
-    for kind in Kind::ALL {
-        for share in SHARES {
-            let recipe = recipe(kind, share);
-            check(&recipe, &recipe.make()?);
-        }
-    }
-    Ok(())
-}
-
 /// Every problem is solved, from nothing and from the sample before, and its optimality conditions hold.
 fn solved<const NX: usize, const NU: usize>(recipe: &Recipe, sequence: &Sequence<NX, NU>) {
     assert_eq!(sequence.problems.len(), recipe.samples);
@@ -50,26 +38,26 @@ fn solved<const NX: usize, const NU: usize>(recipe: &Recipe, sequence: &Sequence
     }
 }
 
+fn every_sequence_keeps_its_promise<const NX: usize, const NU: usize>() -> Result<(), SequenceError>
+{
+    for kind in Kind::ALL {
+        for share in SHARES {
+            let recipe = recipe(kind, share);
+            let sequence = recipe.make::<NX, NU>()?;
+            let found = sequence.share;
+            assert!((found - share).abs() <= 0.05, "{recipe:?}: {found}");
+            solved(&recipe, &sequence);
+        }
+    }
+    Ok(())
+}
+
 #[test]
 fn the_share_is_reached_and_everything_is_solved() -> Result<(), SequenceError> {
-    let near =
-        |wanted: f64, found: f64| assert!((found - wanted).abs() <= 0.05, "{wanted} {found}");
-    each::<4, 1>(|recipe, sequence| {
-        near(recipe.share, sequence.share);
-        solved(recipe, sequence);
-    })?;
-    each::<8, 2>(|recipe, sequence| {
-        near(recipe.share, sequence.share);
-        solved(recipe, sequence);
-    })?;
-    each::<12, 4>(|recipe, sequence| {
-        near(recipe.share, sequence.share);
-        solved(recipe, sequence);
-    })?;
-    each::<16, 6>(|recipe, sequence| {
-        near(recipe.share, sequence.share);
-        solved(recipe, sequence);
-    })
+    every_sequence_keeps_its_promise::<4, 1>()?;
+    every_sequence_keeps_its_promise::<8, 2>()?;
+    every_sequence_keeps_its_promise::<12, 4>()?;
+    every_sequence_keeps_its_promise::<16, 6>()
 }
 
 #[test]

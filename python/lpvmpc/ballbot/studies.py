@@ -18,8 +18,8 @@ class Bench:
     """Times of controllers' steps on this machine, microseconds: median, 99th percentile and longest."""
 
     sequences: list[dict[str, Any]]
-    """Of each scenario the quadratic program alone (``qp_us``), the whole step (``step_us``), and the step when other
-    work was in the cache (``step_cold_us``)."""
+    """Of each scenario the quadratic program alone (``qp_us``), the whole step (``step_us``), and both when other work
+    was in the cache (``qp_cold_us``, ``step_cold_us``); of a sequence of problems the step is the program alone."""
     guaranteed: dict[str, dict[str, float]]
     """The guaranteed step of ``far-setpoints`` beside plain ones."""
 
@@ -42,7 +42,8 @@ def bench(
     Parameters
     ----------
     scenarios
-        Scenarios, or names of built-in ones; without, the program's choice.
+        Scenarios, or names of built-in ones; without, the program's choice, with sequences of problems of other
+        sizes and of many active bounds.
     progress
         Whether to show a progress bar (needs tqdm).
 
@@ -54,7 +55,7 @@ def bench(
     chosen = _lpvmpc.timed_scenarios() if scenarios is None else scenarios
     loaded = [one if isinstance(one, Scenario) else Scenario.builtin(one) for one in chosen]
     with reported(progress) as report:
-        return Bench(*_lpvmpc.bench([one._native for one in loaded], report))
+        return Bench(*_lpvmpc.bench([one._native for one in loaded], scenarios is None, report))
 
 
 @dataclass(frozen=True)

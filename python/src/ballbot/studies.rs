@@ -5,7 +5,9 @@ use super::values::plain;
 use crate::errors::{of_scenario, study};
 use crate::work::{Report, work};
 use ballbot_studies::reproduction::{Claim, Reproduction};
-use ballbot_studies::timing::{GuaranteedTimes, SEQUENCES, SequenceTimes, time, time_guaranteed};
+use ballbot_studies::timing::{
+    GuaranteedTimes, PROBLEMS, SEQUENCES, SequenceTimes, time, time_guaranteed, time_problems,
+};
 use ballbot_studies::{Campaign, Outcome, Scenarios, StudyError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -17,11 +19,13 @@ pub fn timed_scenarios() -> Vec<&'static str> {
     SEQUENCES.to_vec()
 }
 
-/// The times of the scenarios' controllers, and of the guaranteed step.
+/// The times of the scenarios' controllers, of the sequences of problems if `problems`, and of the
+/// guaranteed step.
 #[pyfunction]
 pub fn bench<'py>(
     py: Python<'py>,
     scenarios: Vec<PyRef<'py, Scenario>>,
+    problems: bool,
     report: Report<'py>,
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     let scenarios: Vec<_> = scenarios.iter().map(|one| one.parts()).collect();
@@ -30,11 +34,17 @@ pub fn bench<'py>(
         for (document, folder) in &scenarios {
             prepared.push(prepare(document.scenario(), folder, watch)?);
         }
-        watch.begin("timing", scenarios.len() + 1);
+        let problems: &[&str] = if problems { &PROBLEMS } else { &[] };
+        let count = scenarios.len() + problems.len();
+        watch.begin("timing", count + 1);
         let clock = watch.clock();
-        let mut sequences = Vec::with_capacity(scenarios.len());
+        let mut sequences = Vec::with_capacity(count);
         for ((document, _), prepared) in scenarios.iter().zip(&prepared) {
             sequences.push(time(document.origin(), prepared, &clock)?);
+            watch.step();
+        }
+        for name in problems {
+            sequences.push(time_problems(name, &clock)?);
             watch.step();
         }
         let guaranteed = time_guaranteed(&clock)?;

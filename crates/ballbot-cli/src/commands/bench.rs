@@ -6,7 +6,7 @@ use crate::json;
 use crate::output;
 use crate::progress::Progress;
 use crate::table::Table;
-use ballbot_studies::timing::{self, GuaranteedTimes, SEQUENCES, SequenceTimes, Times};
+use ballbot_studies::timing::{self, GuaranteedTimes, PROBLEMS, SEQUENCES, SequenceTimes, Times};
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -20,12 +20,13 @@ Examples:
   ballbot bench my.toml --parameters out/identification/parameters.toml
   ballbot bench --json times.json
 
-Times the quadratic program alone and the controller's whole step on this machine, along closed
-loops of the built-in scenarios; and the guaranteed step against the plain one. Each sample is repeated and its shortest time counts,
-so that all it needs is in the cache. The columns `cold` are of steps after a sweep of 48 MB, as when
-other work runs between two samples.")]
+Times the quadratic program alone (QP) and the controller's whole step on this machine, along closed
+loops of the built-in scenarios; the quadratic program alone on sequences of larger problems, longer
+horizons and many active bounds; and the guaranteed step against the plain one. Each sample is
+repeated and its shortest time counts, so that all it needs is in the cache. The columns `cold` are
+after a sweep of 48 MB, as when other work runs between two samples.")]
 pub struct BenchArguments {
-    /// A built-in scenario or a TOML file [default: four of the built-in ones]
+    /// A built-in scenario or a TOML file [default: four of the built-in ones, and problems of other sizes]
     pub scenario: Option<String>,
     /// What it is changed by.
     #[command(flatten)]
@@ -40,20 +41,25 @@ pub struct BenchArguments {
 /// # Errors
 /// A scenario cannot be run, or the file cannot be written.
 pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
-    let names = match &arguments.scenario {
-        Some(name) => vec![name.as_str()],
-        None => SEQUENCES.to_vec(),
+    let (names, problems) = match &arguments.scenario {
+        Some(name) => (vec![name.as_str()], Vec::new()),
+        None => (SEQUENCES.to_vec(), PROBLEMS.to_vec()),
     };
     let file = arguments.json.as_deref();
     let file = file.filter(|path| *path != Path::new("-"));
     file.map(output::check_writable).transpose()?;
     let start = Instant::now();
     let clock = || start.elapsed();
-    let progress = Progress::new("timing", names.len() + 1);
-    let mut sequences: Vec<SequenceTimes> = Vec::with_capacity(names.len());
+    let count = names.len() + problems.len();
+    let progress = Progress::new("timing", count + 1);
+    let mut sequences: Vec<SequenceTimes> = Vec::with_capacity(count);
     for name in names {
         let prepared = arguments.options.prepare(name)?;
         sequences.push(timing::time(name, &prepared, &clock)?);
+        progress.set(sequences.len());
+    }
+    for name in problems {
+        sequences.push(timing::time_problems(name, &clock)?);
         progress.set(sequences.len());
     }
     let guaranteed = timing::time_guaranteed(&clock)?;
@@ -69,6 +75,8 @@ pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
         "QP median",
         "p99",
         "max",
+        "cold median",
+        "max",
         "step median",
         "p99",
         "max",
@@ -79,10 +87,14 @@ pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
     for sequence in &sequences {
         let cells = |times: Times| [times.median, times.p99, times.max].map(|t| format!("{t:.2}"));
         let mut row = vec![sequence.name.clone()];
-        row.extend(cells(sequence.qp_us));
-        row.extend(cells(sequence.step_us));
-        let [median, _, max] = cells(sequence.step_cold_us);
-        row.extend([median, max]);
+        for (warm, cold) in [
+            (sequence.qp_us, sequence.qp_cold_us),
+            (sequence.step_us, sequence.step_cold_us),
+        ] {
+            row.extend(cells(warm));
+            let [median, _, max] = cells(cold);
+            row.extend([median, max]);
+        }
         row.push(sequence.max_active.to_string());
         table.row(row);
     }

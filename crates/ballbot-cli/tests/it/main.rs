@@ -5,6 +5,7 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
+mod bench;
 mod certify;
 mod closed_loops;
 mod identify;
