@@ -1,0 +1,118 @@
+//! Writes the sequences on which solvers are compared into a folder:
+//!
+//! ```text
+//! write-problems FOLDER [size=4x1,8x2] [horizon=20,50] [kind=inputs,soft] [share=0,0.4]
+//! ```
+//!
+//! A file that is there already is kept.
+
+use lpvmpc::Ocp;
+use lpvmpc_problems::file;
+use lpvmpc_problems::header::Header;
+use lpvmpc_problems::layout::Sizes;
+use lpvmpc_sequences::{Kind, Recipe};
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+/// Problems of a sequence, from one seed.
+const SAMPLES: usize = 12;
+const SEED: u64 = 1;
+
+const SIZES: [&str; 4] = ["4x1", "8x2", "12x4", "16x6"];
+const HORIZONS: [&str; 4] = ["20", "50", "100", "200"];
+const SHARES: [&str; 6] = ["0", "0.1", "0.2", "0.4", "0.6", "0.8"];
+
+/// What to write of everything.
+struct Selection {
+    folder: PathBuf,
+    chosen: Vec<String>,
+}
+
+impl Selection {
+    /// The chosen values of a key, or all there are.
+    fn of<'a>(&'a self, key: &str, all: &[&'a str]) -> Vec<&'a str> {
+        let of_key = |word: &'a String| word.strip_prefix(key)?.strip_prefix('=');
+        match self.chosen.iter().find_map(of_key) {
+            Some(list) => list.split(',').collect(),
+            None => all.to_vec(),
+        }
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let folder = arguments.next().ok_or(
+        "usage: write-problems FOLDER [size=4x1,...] [horizon=20,...] [kind=inputs,...] [share=0,...]",
+    )?;
+    let selection = Selection {
+        folder: PathBuf::from(folder),
+        chosen: arguments.collect(),
+    };
+    std::fs::create_dir_all(&selection.folder)?;
+    let kinds = Kind::ALL.map(Kind::name);
+    for size in selection.of("size", &SIZES) {
+        for horizon in selection.of("horizon", &HORIZONS) {
+            for name in selection.of("kind", &kinds) {
+                let kind = Kind::ALL.into_iter().find(|kind| kind.name() == name);
+                let kind =
+                    kind.ok_or_else(|| format!("kind {name}: it must be one of {kinds:?}"))?;
+                for share in selection.of("share", &SHARES) {
+                    let recipe = Recipe {
+                        kind,
+                        horizon: horizon.parse()?,
+                        samples: SAMPLES,
+                        share: share.parse()?,
+                        seed: SEED,
+                    };
+                    let path = format!("{size}-N{horizon}-{name}-{share}.qps");
+                    write_one(size, &recipe, &selection.folder.join(path))?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Makes and writes a sequence. A recipe for which there is none is said and left out: not every share
+/// can be reached with every kind.
+fn write_one(size: &str, recipe: &Recipe, path: &Path) -> Result<(), Box<dyn Error>> {
+    if path.exists() {
+        return Ok(());
+    }
+    match size {
+        "4x1" => make::<4, 1>(recipe, path),
+        "8x2" => make::<8, 2>(recipe, path),
+        "12x4" => make::<12, 4>(recipe, path),
+        "16x6" => make::<16, 6>(recipe, path),
+        _ => Err(format!("size {size}: it must be one of {SIZES:?}").into()),
+    }
+}
+
+fn make<const NX: usize, const NU: usize>(
+    recipe: &Recipe,
+    path: &Path,
+) -> Result<(), Box<dyn Error>> {
+    let sequence = match recipe.make::<NX, NU>() {
+        Ok(sequence) => sequence,
+        Err(reason) => {
+            println!("no {}: {reason}", path.display());
+            return Ok(());
+        }
+    };
+    let problems = &sequence.problems;
+    let first: &Ocp<f64, NX, NU> = problems.first().ok_or("a sequence without problems")?;
+    let header = Header {
+        sizes: Sizes::of(first),
+        common: problems.iter().all(|ocp| ocp.own.is_empty()),
+        problems: problems.len(),
+        kind: recipe.kind.name().to_owned(),
+        wanted: recipe.share,
+        share: sequence.share,
+    };
+    // Under another name first, so that a file is whole or not there.
+    let unfinished = path.with_extension("part");
+    file::write(&unfinished, &header, problems)?;
+    std::fs::rename(&unfinished, path)?;
+    println!("{}: {header}", path.display());
+    Ok(())
+}
