@@ -1,0 +1,96 @@
+#!/usr/bin/env python3
+"""The measurements as Markdown: all of them into RESULTS.md, a part in place of what stands between the two
+"compare" comments of ../README.md.
+
+    tables.py FOLDER --note TEXT
+"""
+
+import argparse
+import pathlib
+
+import results
+
+HERE = pathlib.Path(__file__).parent
+# What the README has of all files: these shares of active bounds.
+SHARES = (0.0, 0.2, 0.4, 0.8)
+IN_README = ("lpvmpc", "lpvmpc, cold", "HPIPM, exact", "HPIPM, 1e-8", "DAQP", "PIQP multistage", "Clarabel",
+             "OSQP")
+
+
+def number(value):
+    return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
+
+
+def cell(times, name):
+    """Median and worst; what is not exact in brackets, what leaves problems unsolved with their number."""
+    time = times.get(name)
+    if time is None:
+        return "–"
+    text = f"{number(time.median)} / {number(time.worst)}"
+    if time.failures:
+        return f"({text}, {time.failures} unsolved)"
+    return text if time.exact else f"({text})"
+
+
+def table(files, names):
+    head = ["problems", "active", *names, "ratio"]
+    lines = ["| " + " | ".join(head) + " |", "| --- |" + " ---: |" * (len(head) - 1)]
+    for (size, horizon, kind, _), (active, times) in files.items():
+        rivals = [time.median for name, time in times.items() if not name.startswith("lpvmpc") and time.exact]
+        own = min(times[name].median for name in ("lpvmpc", "lpvmpc, cold"))
+        ratio = number(min(rivals) / own) if rivals else "–"
+        cells = [cell(times, name) for name in names]
+        row = [f"{size}, N = {horizon}, {kind}", f"{active:.0f}", *cells, ratio]
+        lines.append("| " + " | ".join(row) + " |")
+    return "\n".join(lines)
+
+
+def riccati_table(lines):
+    """Our solver without bounds beside the faster form of HPIPM's recursion."""
+    sizes = {}
+    for line in lines:
+        times = sizes.setdefault((line["size"], line["horizon"]), {})
+        name = "HPIPM Riccati" if line["contender"] == "HPIPM Riccati" else line["contender"]
+        times[name] = min(times.get(name, float("inf")), float(line["median_us"]))
+    names = list(dict.fromkeys(name for times in sizes.values() for name in times))
+    rows = ["| problems | " + " | ".join(names) + " |", "| --- |" + " ---: |" * len(names)]
+    order = sorted(sizes.items(), key=lambda item: (int(item[0][0].split("x")[0]), int(item[0][1])))
+    for (size, horizon), times in order:
+        cells = [number(times[name]) if name in times else "–" for name in names]
+        rows.append(f"| {size}, N = {horizon} | " + " | ".join(cells) + " |")
+    return "\n".join(rows)
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("folder", type=pathlib.Path)
+    arguments.add_argument("--note", default="", help="machine, versions and date")
+    options = arguments.parse_args()
+    files, riccati, overheads, residual = results.read(options.folder)
+    present = [name for name in results.CONTENDERS if any(name in times for _, times in files.values())]
+    calls = ", ".join(f"{name} {number(us)}" for name, us in overheads)
+    about = "\n\n".join(filter(None, [
+        options.note,
+        f"A call that does next to nothing, part of each time [us]: {calls}. Largest residual of the "
+        f"optimality conditions at our answers: {residual:.1e}.",
+    ]))
+    whole = "\n\n".join([
+        "# Solvers on the problem files", "Written by `tables.py`; what is timed is said in README.md.",
+        about, "Median / worst over a sequence [us]; in brackets what is not exact (first input off by more "
+        "than 1e-6 of the largest). *ratio*: the fastest exact rival's median, divided by our faster "
+        "one.", table(files, present), "Without bounds, the Riccati recursion alone, median [us]:",
+        riccati_table(riccati)])
+    (HERE / "RESULTS.md").write_text(whole + "\n")
+
+    chosen = {key: value for key, value in files.items() if key[1] in (20, 100) and key[3] in SHARES}
+    names = [name for name in IN_README if name in present]
+    part = "\n\n".join([about, table(chosen, names), "Without bounds, the Riccati recursion alone, median [us]:",
+                        riccati_table(riccati)])
+    begin, end = "<!-- compare -->\n", "\n<!-- end of compare -->"
+    readme = HERE.parent / "README.md"
+    head, rest = readme.read_text().split(begin, 1)
+    readme.write_text(head + begin + "\n" + part + "\n" + end + rest.split(end, 1)[1])
+
+
+if __name__ == "__main__":
+    main()
