@@ -24,9 +24,9 @@ import own
 import problem_file
 
 # More variables than these take a dense solver too long.
-MOST_DENSE = 320
+MOST_DENSE = 240
 # A contender that takes longer for one sweep through a sequence is timed once [s].
-SLOW = 1.0
+SLOW = 0.3
 MOST_SWEEPS = 20
 COLUMNS = ("size", "horizon", "kind", "wanted", "active", "contender", "variant", "choices", "median_us",
            "worst_us", "u0_error", "our_residual", "failures")

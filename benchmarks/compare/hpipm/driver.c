@@ -12,13 +12,15 @@
 #include <string.h>
 #include <time.h>
 
-enum { MOST_LIBRARIES = 4, MOST_CONTENDERS = 32, MOST_INPUTS = 16, LEAST_SWEEPS = 3, MOST_SWEEPS = 50 };
+enum { MOST_LIBRARIES = 4, MOST_CONTENDERS = 32, MOST_INPUTS = 16, TRIAL_SWEEPS = 3, LEAST_SWEEPS = 6, MOST_SWEEPS = 50 };
 
 /* An answer is exact enough if u_0 is off by no more than this, relative to the largest first input of the
  * sequence. */
 static const double EXACT = 1e-6;
 /* What is farther off is no answer. */
 static const double ROUGH = 1e-2;
+/* A contender that takes longer for one sweep is slow [s]. */
+static const double SLOW = 0.5;
 /* Barrier parameters to begin with: HPIPM's default is the first. */
 static const double MU0[] = {10, 1, 0.1};
 /* Tolerances; with the first, answers can be too far off. */
@@ -75,13 +77,19 @@ static void sweep(const struct race *r, struct contender *c)
     }
 }
 
-/* All contenders in turn, until the time is over. */
-static void run(struct race *r, double seconds)
+/* All contenders in turn, at least so often and until the time is over; those that are slow only once. */
+static void run(struct race *r, int least, double seconds)
 {
     double end = now() + seconds;
-    for (int turn = 0; turn < LEAST_SWEEPS || (now() < end && turn < MOST_SWEEPS); turn++)
-        for (int i = 0; i < r->count; i++)
+    int slow[MOST_CONTENDERS] = {0};
+    for (int turn = 0; turn < least || (now() < end && turn < MOST_SWEEPS); turn++)
+        for (int i = 0; i < r->count; i++) {
+            double begin = now();
+            if (slow[i])
+                continue;
             sweep(r, r->contenders[i]);
+            slow[i] = now() - begin > SLOW;
+        }
 }
 
 static int ascending(const void *a, const void *b)
@@ -156,7 +164,7 @@ static double try_choices(const struct race *of, struct choices choices, double 
     struct race trial = *of;
     trial.count = 0;
     enter(&trial, hpipm_new(of->sequence, choices));
-    run(&trial, 0);
+    run(&trial, TRIAL_SWEEPS, 0);
     struct contender *c = trial.contenders[0];
     double time = median(c->shortest, of->sequence->problems);
     int usable = error_of(of, c) <= exact && c->failures == 0;
@@ -238,7 +246,7 @@ static void bounded(const struct sequence *s, const struct options *o)
         if (exact_choices(&r, &exact) && exact.tolerance != best.tolerance)
             enter_all_starts(&r, exact, notes);
     }
-    run(&r, o->seconds);
+    run(&r, LEAST_SWEEPS, o->seconds);
     for (int i = 0; i < r.count; i++)
         report(&r, r.contenders[i], notes[i], o->out);
     clear(&r);
@@ -254,7 +262,7 @@ static void unbounded(const struct sequence *s, const struct options *o)
         enter(&r, own_new(o->libraries[l], s, 0, 0));
     for (int square_root = 0; square_root < 2; square_root++)
         enter(&r, hpipm_riccati_new(s, square_root));
-    run(&r, 0.2);
+    run(&r, LEAST_SWEEPS, 0.2);
     for (int i = 0; i < r.count; i++)
         report(&r, r.contenders[i], "", o->out);
     clear(&r);
