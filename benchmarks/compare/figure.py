@@ -26,7 +26,7 @@ STYLES = {
     "OSQP": ("#7F7F7F", "P", "-", "OSQP"),
     "Clarabel": ("#E69F00", "X", "-", "Clarabel"),
 }
-KINDS = {"inputs": "input bounds", "states": "state bounds", "rows": "general rows", "soft": "soft state bounds"}
+KINDS = {"inputs": "input bounds", "states": "state bounds", "rows": "general rows", "soft": "input and soft state bounds"}
 
 
 def draw(axes, points, name):
@@ -46,7 +46,7 @@ def main():
     files = {key: value for key, value in files.items() if key[1] == horizon}
     sizes = list(dict.fromkeys(key[0] for key in files))
     plt.rcParams.update({"font.family": "serif", "font.size": 9, "axes.linewidth": 0.6, "mathtext.fontset": "dejavuserif"})
-    figure, grid = plt.subplots(len(sizes), len(KINDS), figsize=(9.5, 2.2 * len(sizes) + 0.9), sharey="row",
+    figure, grid = plt.subplots(len(sizes), len(KINDS), figsize=(9.5, 2.3 * len(sizes) + 0.9), sharey="row",
                                 squeeze=False)
     for row, size in zip(grid, sizes):
         for axes, (kind, title) in zip(row, KINDS.items()):
@@ -71,7 +71,7 @@ def main():
     figure.legend(handles=handles, loc="lower center", ncol=4, frameon=False)
     figure.suptitle(f"Time for a quadratic program, N = {horizon}, states × inputs", fontsize=11)
     figure.tight_layout(rect=(0, 0.75 / figure.get_figheight(), 1, 1))
-    figure.savefig(path, dpi=160)
+    figure.savefig(path, dpi=130, pil_kwargs={"optimize": True})
 
 
 if __name__ == "__main__":

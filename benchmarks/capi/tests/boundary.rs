@@ -62,7 +62,7 @@ fn same_answers<const NX: usize, const NU: usize>(kind: Kind) -> Result<(), Box<
     let problems: Vec<Ocp<f64, NX, NU>> = recipe.make()?.problems;
     let room = working_memory(&problems);
     let (mut solver, mut solution) = (Solver::allocate(room), Solution::allocate(room));
-    let mut of_c = null_mut();
+    let mut of_c: Handle = null_mut();
     for ocp in &problems {
         solver.solve(ocp, &SolverSettings::default(), &mut solution);
         let mut numbers = Vec::new();

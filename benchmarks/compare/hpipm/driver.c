@@ -198,13 +198,20 @@ static struct choices best_choices(const struct race *r, enum mode mode, int qui
     return best;
 }
 
-/* The same with the loosest tolerance whose answers are exact; 0 where there is none. */
+/* The same with the loosest tolerance whose answers are exact, or else uncondensed and with HPIPM's own first
+ * barrier parameter; 0 where there is none. */
 static int exact_choices(const struct race *r, struct choices *choices)
 {
-    for (size_t t = 0; t < LENGTH(TOLERANCES); t++) {
-        choices->tolerance = TOLERANCES[t];
-        if (isfinite(try_choices(r, *choices, EXACT)))
-            return 1;
+    for (int retry = 0; retry < 2; retry++) {
+        if (retry) {
+            choices->blocks = r->sequence->horizon;
+            choices->mu0 = MU0[0];
+        }
+        for (size_t t = 0; t < LENGTH(TOLERANCES); t++) {
+            choices->tolerance = TOLERANCES[t];
+            if (isfinite(try_choices(r, *choices, EXACT)))
+                return 1;
+        }
     }
     return 0;
 }
@@ -243,7 +250,9 @@ static void bounded(const struct sequence *s, const struct options *o)
     for (int mode = MODE_SPEED_ABS; mode <= MODE_BALANCE; mode++) {
         struct choices best = best_choices(&r, mode, o->quick), exact = best;
         enter_all_starts(&r, best, notes);
-        if (exact_choices(&r, &exact) && exact.tolerance != best.tolerance)
+        int found = exact_choices(&r, &exact);
+        int other = exact.tolerance != best.tolerance || exact.blocks != best.blocks;
+        if (found && (other || exact.mu0 != best.mu0))
             enter_all_starts(&r, exact, notes);
     }
     run(&r, LEAST_SWEEPS, o->seconds);

@@ -96,8 +96,7 @@ impl Sizes {
     }
 }
 
-/// Appends the numbers of `ocp`. A row or bound that cannot count (of x_0, which is given, or of an input at
-/// the end) is written without bounds.
+/// Appends the numbers of `ocp`.
 ///
 /// # Errors
 /// [`ProblemError::NotInFormat`]: a terminal equality.
@@ -159,32 +158,16 @@ fn write_rows<const NX: usize, const NU: usize>(
     numbers: &mut Vec<f64>,
 ) {
     let end = i == ocp.length();
-    let rows: Vec<GeneralRow<f64, NX, NU>> = (0..ocp.rows_per_stage)
-        .filter_map(|j| ocp.row(i, j).copied())
-        .map(|row| {
-            let of_state = row.u.iter().all(|entry| *entry == 0.0);
-            let counts = if of_state { i > 0 } else { !end };
-            let (lower, upper) = if counts {
-                (row.lower, row.upper)
-            } else {
-                (f64::NEG_INFINITY, f64::INFINITY)
-            };
-            GeneralRow {
-                lower,
-                upper,
-                ..row
-            }
-        })
-        .collect();
+    let rows = || (0..ocp.rows_per_stage).filter_map(|j| ocp.row(i, j));
     for column in 0..NX {
-        numbers.extend(rows.iter().map(|row| row.x[column]));
+        numbers.extend(rows().map(|row| row.x[column]));
     }
     for column in (0..NU).filter(|_| !end) {
-        numbers.extend(rows.iter().map(|row| row.u[column]));
+        numbers.extend(rows().map(|row| row.u[column]));
     }
-    numbers.extend(rows.iter().map(|row| row.lower));
-    numbers.extend(rows.iter().map(|row| row.upper));
-    write_prices(rows.iter().map(|row| &row.soft), numbers);
+    numbers.extend(rows().map(|row| row.lower));
+    numbers.extend(rows().map(|row| row.upper));
+    write_prices(rows().map(|row| &row.soft), numbers);
 }
 
 /// A problem of these sizes with no cost but unit input weights, and no bounds. With `common` weights and

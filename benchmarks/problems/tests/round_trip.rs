@@ -48,12 +48,6 @@ fn problems_of_all_kinds_come_back_from_a_file() -> Outcome {
             let (_, numbers) = file::numbers(&path, number)?;
             let mut found = layout::empty::<8, 2>(&header.sizes, true)?;
             layout::read(&numbers, &mut found)?;
-            let rows = expected.rows_per_stage;
-            // Rows of the end have an input, so they cannot count there and are written without bounds.
-            let met = expected.length() * rows;
-            assert_eq!(found.rows[..met], expected.rows[..met]);
-            assert!(found.rows[met..].iter().all(|row| row.upper.is_infinite()));
-            found.rows = expected.rows.clone();
             assert_eq!(&found, expected);
         }
     }
