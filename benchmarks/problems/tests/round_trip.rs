@@ -48,7 +48,13 @@ fn problems_of_all_kinds_come_back_from_a_file() -> Outcome {
             let (_, numbers) = file::numbers(&path, number)?;
             let mut found = layout::empty::<8, 2>(&header.sizes, true)?;
             layout::read(&numbers, &mut found)?;
-            assert_eq!(&found, expected);
+            // At the end only the state's part of a row counts, and only that is written.
+            let mut expected = expected.clone();
+            let end = expected.length() * expected.rows_per_stage;
+            for row in expected.rows.iter_mut().skip(end) {
+                row.u.fill(0.0);
+            }
+            assert_eq!(found, expected);
         }
     }
     Ok(())
