@@ -265,15 +265,6 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         self.max_changes - self.changes
     }
 
-    /// Counts so many changes of the active set, if there may be as many.
-    pub(crate) fn count_changes(&mut self, count: usize) -> bool {
-        let allowed = count <= self.changes_left();
-        if allowed {
-            self.changes += count;
-        }
-        allowed
-    }
-
     /// Counts one more change of the active set.
     pub(crate) fn count_change(&mut self) -> Result<(), Status<T>> {
         if self.changes >= self.max_changes {

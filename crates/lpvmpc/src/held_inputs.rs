@@ -7,13 +7,11 @@
 use crate::adjoint::Adjoint;
 use crate::list::List;
 use crate::model::Scalar;
-use crate::ocp::{Bounds, Common, Ocp, Stage};
-use crate::riccati::{BadPivot, CostToGo, StageFactor};
-use crate::rows::{self, Trajectory};
+use crate::ocp::{Common, Ocp, Stage};
+use crate::riccati::{Adjustment, BadPivot, CostToGo, StageFactor, StageMinimum};
+use crate::rows::Trajectory;
 use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
 use crate::solver::{Solver, SolverSettings, WarmStart};
-use crate::working_set::copy;
-use nalgebra::SVector;
 
 /// Searches with held inputs; two are enough in `f64`, more than ten are rare in `f32`.
 const MOST_SEARCHES: usize = 20;
@@ -48,17 +46,6 @@ impl<const NU: usize> HeldInputs<NU> {
         self.any = false;
     }
 
-    /// Who is held, stage by stage.
-    pub fn sides(&self) -> &[[Option<Side>; NU]] {
-        &self.sides
-    }
-
-    /// Holds these inputs, and no others.
-    pub fn hold(&mut self, sides: &[[Option<Side>; NU]]) {
-        copy(&mut self.sides, sides);
-        self.any = true;
-    }
-
     /// The sides at `stage`; `None` where no input is held.
     #[inline(always)]
     pub fn of(&self, stage: usize) -> Option<&[Option<Side>; NU]> {
@@ -67,69 +54,6 @@ impl<const NU: usize> HeldInputs<NU> {
         } else {
             None
         }
-    }
-
-    /// Holds the inputs whose bounds are among `before`, `shift` stages earlier; whether there are any.
-    pub fn hold_again<T: Scalar, const NX: usize>(
-        &mut self,
-        ocp: &Ocp<T, NX, NU>,
-        before: &ActiveSet<T>,
-        shift: usize,
-    ) -> bool {
-        let rows = before.iter().filter_map(|row| {
-            let stage = row.bound.stage.checked_sub(shift)?;
-            let bound = BoundId { stage, ..row.bound };
-            // The bound may have gone since.
-            let (lower, upper) = rows::limits(ocp, &bound);
-            let limit = if bound.side == Side::Upper {
-                upper
-            } else {
-                lower
-            };
-            limit.is_finite().then_some(ActiveRow { bound, ..row })
-        });
-        self.take_in(rows)
-    }
-
-    /// At stage `i` holds the inputs of `u` that are beyond their bounds by more than the `tolerance`,
-    /// relative to the bounds' size, and lets go of those that the cost, whose gradient in the inputs is
-    /// `pulled`, draws into theirs. Returns how many that are.
-    pub fn exchange<T: Scalar>(
-        &mut self,
-        i: usize,
-        bounds: &Bounds<T, NU>,
-        u: &SVector<T, NU>,
-        tolerance: T,
-        pulled: impl Fn() -> SVector<T, NU>,
-    ) -> usize {
-        let Some(held) = self.sides.get_mut(i) else {
-            return 0;
-        };
-        let none = *held == [None; NU];
-        // Most hold nothing and exceed nothing.
-        if none && bounds.hold_at(u) {
-            return 0;
-        }
-        let gradient = if none { SVector::zeros() } else { pulled() };
-        let limits = bounds.lower.iter().zip(bounds.upper.iter());
-        let inputs = u.iter().zip(gradient.iter()).zip(limits);
-        let mut changes = 0;
-        for (place, ((value, slope), (lower, upper))) in held.iter_mut().zip(inputs) {
-            let margin = tolerance * rows::size_of_bound(*lower, *upper);
-            let wanted = match *place {
-                Some(Side::Upper) => (*slope <= T::zero()).then_some(Side::Upper),
-                Some(side) => (*slope >= T::zero()).then_some(side),
-                None if *value > *upper + margin => Some(Side::Upper),
-                None if *value < *lower - margin => Some(Side::Lower),
-                None => None,
-            };
-            if wanted != *place {
-                *place = wanted;
-                changes += 1;
-            }
-        }
-        self.any |= changes > 0;
-        changes
     }
 
     /// Holds the inputs whose bounds are among `rows`; whether that is news.
@@ -200,9 +124,8 @@ impl<const NU: usize> HeldInputs<NU> {
     }
 }
 
-/// [`StageFactor::eliminate`] with the inputs that have a side in `held` as constants: their columns
-/// of B move into c, their costs into the linear parts. In their place stand unknowns of their own, at
-/// the bounds, which no deviation moves.
+/// [`StageFactor::eliminate`] with the inputs that have a side in `held` as constants, which no deviation
+/// moves.
 #[cold]
 #[inline(never)]
 pub(crate) fn eliminate_held<T: Scalar, const NX: usize, const NU: usize>(
@@ -212,32 +135,35 @@ pub(crate) fn eliminate_held<T: Scalar, const NX: usize, const NU: usize>(
     held: &[Option<Side>; NU],
     cost_to_go: &mut CostToGo<T, NX>,
 ) -> Result<(), BadPivot<T>> {
-    let (mut fixed, mut weights) = (*stage, *common);
-    let values = || {
-        held.iter().enumerate().filter_map(|(j, side)| match side {
-            Some(Side::Upper) => Some((j, common.u.upper[j])),
-            Some(_) => Some((j, common.u.lower[j])),
-            None => None,
-        })
-    };
-    for (j, value) in values() {
-        fixed.c += stage.b.column(j) * value;
-        fixed.linear_x += common.s.row(j).transpose() * value;
-        fixed.linear_u += common.r.column(j) * value;
-        fixed.b.column_mut(j).fill(T::zero());
-        weights.s.row_mut(j).fill(T::zero());
-        weights.r.row_mut(j).fill(T::zero());
-        weights.r.column_mut(j).fill(T::zero());
-    }
-    for (j, value) in values() {
-        weights.r[(j, j)] = T::one();
-        fixed.linear_u[j] = -value;
-    }
-    factor.eliminate(&fixed, &weights, cost_to_go)?;
-    for (j, _) in values() {
-        factor.inverse_factor[(j, j)] = T::zero();
+    let constants = Constants { held, common };
+    factor.eliminate_adjusted(stage, common, cost_to_go, Some(&constants))?;
+    for (j, side) in held.iter().enumerate() {
+        if side.is_some() {
+            factor.inverse_factor[(j, j)] = T::zero();
+        }
     }
     Ok(())
+}
+
+/// Inputs that are constants of a stage.
+struct Constants<'a, T, const NX: usize, const NU: usize> {
+    held: &'a [Option<Side>; NU],
+    common: &'a Common<T, NX, NU>,
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize> Adjustment<T, NX, NU>
+    for Constants<'_, T, NX, NU>
+{
+    fn adjust(&self, minimum: &mut StageMinimum<T, NX, NU>) {
+        let bounds = &self.common.u;
+        for (j, side) in self.held.iter().enumerate() {
+            match side {
+                Some(Side::Upper) => minimum.hold(j, bounds.upper[j]),
+                Some(_) => minimum.hold(j, bounds.lower[j]),
+                None => {}
+            }
+        }
+    }
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {

@@ -76,6 +76,7 @@ mod held_inputs;
 mod kkt;
 mod last_plan;
 mod list;
+mod many_bounds;
 mod memory;
 mod model;
 mod number;
@@ -85,7 +86,7 @@ mod plan;
 mod policy;
 mod predictor;
 mod preview;
-mod primal_dual;
+
 mod ramp;
 mod regulator;
 pub mod riccati;
@@ -121,7 +122,7 @@ pub use guaranteed::{
 pub use kkt::{KktResidual, kkt_residual};
 pub use list::List;
 pub use memory::{
-    Capacity, ControllerArrays, ControllerMemory, PrimalDualArrays, SolverArrays, SolverMemory,
+    Capacity, ControllerArrays, ControllerMemory, ManyBoundsArrays, SolverArrays, SolverMemory,
     WorkspaceArrays, WorkspaceMemory,
 };
 pub use model::{LpvModel, Scalar};

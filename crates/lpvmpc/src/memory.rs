@@ -1,10 +1,10 @@
 //! The memory of solver and controller: how much of it a horizon takes, and where it comes from.
 
 use crate::list::List;
+use crate::many_bounds::{BoundSide, ManyBounds};
 use crate::model::Scalar;
 use crate::ocp::{Common, GeneralRow, Stage};
-use crate::primal_dual::PrimalDual;
-use crate::riccati::{CostToGo, StageFactor};
+use crate::riccati::StageFactor;
 use crate::solution::{PackedRow, Side};
 use crate::working_set::Terms;
 use nalgebra::{SMatrix, SVector};
@@ -58,7 +58,7 @@ pub struct SolverMemory<T: 'static, const NX: usize, const NU: usize> {
     /// What the dual method works with.
     pub(crate) dual: DualMemory<T, NU>,
     /// Of the first phase: no entry, or one.
-    pub(crate) primal_dual: List<PrimalDual<T, NX, NU>>,
+    pub(crate) many_bounds: List<ManyBounds<T, NX, NU>>,
 }
 
 /// Memory of the dual active-set method.
@@ -80,7 +80,7 @@ pub(crate) struct DualMemory<T: 'static, const NU: usize> {
 
 impl<T, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
     /// Bytes that a capacity takes: to plan memory before there is any. As [`SolverArrays`] it may take a
-    /// few more, for the alignment of its parts; on the heap it takes those of [`PrimalDualArrays`], too.
+    /// few more, for the alignment of its parts; on the heap it takes those of [`ManyBoundsArrays`], too.
     pub const fn bytes(
         Capacity {
             stages,
@@ -139,13 +139,16 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
             },
             // A module for a browser has to be small.
             #[cfg(target_arch = "wasm32")]
-            primal_dual: List::empty(),
+            many_bounds: List::empty(),
             #[cfg(not(target_arch = "wasm32"))]
-            primal_dual: List::repeat(
-                PrimalDual::new(
+            many_bounds: List::repeat(
+                ManyBounds::new(
                     List::repeat(StageFactor::zeros(), stages),
-                    List::repeat(CostToGo::zeros(), stages),
-                    core::array::from_fn(|_| List::repeat([None; NU], stages)),
+                    (
+                        List::repeat(SVector::zeros(), stages),
+                        List::repeat(SVector::zeros(), stages),
+                    ),
+                    List::repeat(BoundSide::empty(), sides_of::<NX, NU>(capacity)),
                 ),
                 1,
             ),
@@ -154,55 +157,75 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
-    /// The same with memory for many active input bounds, in problems of up to `N` stages.
-    pub fn with_primal_dual<const N: usize>(
+    /// The same with memory for many active bounds, in problems of up to `N` stages whose bounds have up to
+    /// `B` finite sides.
+    pub fn with_many_bounds<const N: usize, const B: usize>(
         self,
-        arrays: &'static mut PrimalDualArrays<T, NX, NU, N>,
+        arrays: &'static mut ManyBoundsArrays<T, NX, NU, N, B>,
     ) -> Self {
-        let PrimalDualArrays {
+        let ManyBoundsArrays {
             factors,
-            costs_to_go,
-            guesses,
+            u,
+            x,
+            sides,
             phase,
         } = arrays;
-        let guesses = guesses.each_mut().map(|list| List::Static(list));
-        let (factors, costs_to_go) = (List::Static(factors), List::Static(costs_to_go));
-        *phase = [PrimalDual::new(factors, costs_to_go, guesses)];
+        let trajectory = (List::Static(u), List::Static(x));
+        *phase = [ManyBounds::new(
+            List::Static(factors),
+            trajectory,
+            List::Static(sides),
+        )];
         Self {
-            primal_dual: List::Static(phase),
+            many_bounds: List::Static(phase),
             ..self
         }
     }
 }
 
-/// Memory with which problems with many active input bounds are solved in less time, for `N` stages. On
+/// Memory with which problems with many active bounds are solved in less time, for `N` stages and `B` finite
+/// sides of bounds: twice the bounded states, inputs and general rows of all stages as a rule. On
 /// the heap it is always there, but for WebAssembly. Where it is not, neither is its machine code; the
 /// answers are the same.
 #[derive(Debug)]
-pub struct PrimalDualArrays<T: 'static, const NX: usize, const NU: usize, const N: usize> {
+pub struct ManyBoundsArrays<
+    T: 'static,
+    const NX: usize,
+    const NU: usize,
+    const N: usize,
+    const B: usize,
+> {
     factors: [StageFactor<T, NX, NU>; N],
-    costs_to_go: [CostToGo<T, NX>; N],
-    guesses: [[[Option<Side>; NU]; N]; 2],
+    u: [SVector<T, NU>; N],
+    x: [SVector<T, NX>; N],
+    sides: [BoundSide<T>; B],
     /// What is made of the others once they are lent.
-    phase: [PrimalDual<T, NX, NU>; 1],
+    phase: [ManyBounds<T, NX, NU>; 1],
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Default
-    for PrimalDualArrays<T, NX, NU, N>
+impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const B: usize> Default
+    for ManyBoundsArrays<T, NX, NU, N, B>
 {
     #[inline(always)]
     fn default() -> Self {
         Self {
             factors: [StageFactor::zeros(); N],
-            costs_to_go: [CostToGo::zeros(); N],
-            guesses: [[[None; NU]; N]; 2],
-            phase: [PrimalDual::new(
+            u: [SVector::zeros(); N],
+            x: [SVector::zeros(); N],
+            sides: [BoundSide::empty(); B],
+            phase: [ManyBounds::new(
                 List::empty(),
+                (List::empty(), List::empty()),
                 List::empty(),
-                [List::empty(), List::empty()],
             )],
         }
     }
+}
+
+/// Finite sides of bounds that problems of this capacity may have.
+#[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
+fn sides_of<const NX: usize, const NU: usize>(capacity: Capacity) -> usize {
+    2 * (capacity.stages + 1) * (NX + NU + capacity.general_rows)
 }
 
 /// The same as arrays, for memory that is known when a program is built: `N` stages, `M` rows.
@@ -234,7 +257,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
                 factor: List::Static(self.factor.as_flattened_mut()),
                 numbers: self.numbers.each_mut().map(|list| List::Static(list)),
             },
-            primal_dual: List::empty(),
+            many_bounds: List::empty(),
         }
     }
 }
@@ -308,13 +331,13 @@ impl<T: Scalar, const NX: usize, const NU: usize> WorkspaceMemory<T, NX, NU> {
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> WorkspaceMemory<T, NX, NU> {
-    /// The same with memory for many active input bounds.
-    pub fn with_primal_dual<const N: usize>(
+    /// The same with memory for many active bounds.
+    pub fn with_many_bounds<const N: usize, const B: usize>(
         self,
-        arrays: &'static mut PrimalDualArrays<T, NX, NU, N>,
+        arrays: &'static mut ManyBoundsArrays<T, NX, NU, N, B>,
     ) -> Self {
         Self {
-            solver: self.solver.with_primal_dual(arrays),
+            solver: self.solver.with_many_bounds(arrays),
             ..self
         }
     }

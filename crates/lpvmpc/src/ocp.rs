@@ -2,6 +2,7 @@
 
 use crate::list::List;
 use crate::model::Scalar;
+use crate::small_matrix::add_product;
 use nalgebra::{SMatrix, SVector, convert};
 
 /// The price of exceeding a soft bound by `s` (in the unit of the bounded quantity):
@@ -192,6 +193,15 @@ impl<T: Scalar, const NX: usize, const NU: usize> Stage<T, NX, NU> {
             linear_x: SVector::zeros(),
             linear_u: SVector::zeros(),
         }
+    }
+
+    /// The next state, A x + B u + c.
+    #[inline(always)]
+    pub fn next(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NX> {
+        let mut next = self.c;
+        add_product(&mut next, &self.a, x);
+        add_product(&mut next, &self.b, u);
+        next
     }
 }
 

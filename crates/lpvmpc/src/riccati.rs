@@ -8,8 +8,10 @@
 
 use crate::model::Scalar;
 use crate::ocp::{Common, Stage};
-use crate::small_matrix::{add_product, product, transposed_product};
-use nalgebra::{SMatrix, SVector, convert};
+use crate::small_matrix::{
+    add_product, add_symmetric_product, mirror, product, transposed, transposed_product,
+};
+use nalgebra::{SMatrix, SVector};
 
 /// Cost-to-go x'Px/2 + p'x.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,8 +32,7 @@ impl<T: Scalar, const NX: usize> CostToGo<T, NX> {
     }
 }
 
-/// What a stage's minimisation leaves behind: the policy u = K x + k + L^-T v and the dynamics
-/// under it, x+ = (A + BK) x + B L^-T v + (c + B k).
+/// What a stage's minimisation leaves behind: the policy u = K x + k + L^-T v.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StageFactor<T, const NX: usize, const NU: usize> {
     /// Feedback K, `NU` x `NX`, with the sign of u = K x; gains are for u = -K x throughout.
@@ -40,12 +41,65 @@ pub struct StageFactor<T, const NX: usize, const NU: usize> {
     pub feedforward: SVector<T, NU>,
     /// L^-1, `NU` x `NU`, lower triangular.
     pub inverse_factor: SMatrix<T, NU, NU>,
-    /// A + BK, `NX` x `NX`.
-    pub closed_loop: SMatrix<T, NX, NX>,
-    /// B L^-T, `NX` x `NU`.
-    pub input: SMatrix<T, NX, NU>,
-    /// c + B k, `NX`.
-    pub drift: SVector<T, NX>,
+}
+
+/// What a stage and the cost-to-go behind it make of its input: u'Hu/2 + u'(G x + g), beside linear_x'x.
+/// Its minimum is where H u = -(G x + g).
+pub(crate) struct StageMinimum<T, const NX: usize, const NU: usize> {
+    /// H, symmetric; its lower triangle is read.
+    pub hessian: SMatrix<T, NU, NU>,
+    /// G.
+    pub g_x: SMatrix<T, NU, NX>,
+    pub g: SVector<T, NU>,
+    pub linear_x: SVector<T, NX>,
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize> StageMinimum<T, NX, NU> {
+    /// Makes input `j` a constant. An unknown of its own stands in its place, at the same value.
+    pub fn hold(&mut self, j: usize, value: T) {
+        self.linear_x += self.g_x.row(j).transpose() * value;
+        self.g_x.row_mut(j).fill(T::zero());
+        self.g += self.hessian.column(j) * value;
+        self.g[j] = -value;
+        self.hessian.row_mut(j).fill(T::zero());
+        self.hessian.column_mut(j).fill(T::zero());
+        self.hessian[(j, j)] = T::one();
+    }
+}
+
+/// What changes a stage's minimisation.
+pub(crate) trait Adjustment<T, const NX: usize, const NU: usize> {
+    fn adjust(&self, minimum: &mut StageMinimum<T, NX, NU>);
+}
+
+/// From so many states on, the machine's widest vectors pay.
+const WIDE: usize = 6;
+
+/// A backward step, as a piece of work that is compiled for several kinds of vectors.
+#[cfg(feature = "simd")]
+struct Elimination<'a, T, const NX: usize, const NU: usize> {
+    factor: &'a mut StageFactor<T, NX, NU>,
+    stage: &'a Stage<T, NX, NU>,
+    weights: &'a Common<T, NX, NU>,
+    cost_to_go: &'a mut CostToGo<T, NX>,
+    adjustment: Option<&'a dyn Adjustment<T, NX, NU>>,
+}
+
+#[cfg(feature = "simd")]
+impl<T: Scalar, const NX: usize, const NU: usize> pulp::WithSimd for Elimination<'_, T, NX, NU> {
+    type Output = Result<(), BadPivot<T>>;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
+        let Self {
+            factor,
+            stage,
+            weights,
+            cost_to_go,
+            adjustment,
+        } = self;
+        factor.eliminate_here(stage, weights, cost_to_go, adjustment)
+    }
 }
 
 /// R + B'PB is not positive definite: the pivot that is not positive (or not finite).
@@ -59,9 +113,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
             feedback: SMatrix::zeros(),
             feedforward: SVector::zeros(),
             inverse_factor: SMatrix::zeros(),
-            closed_loop: SMatrix::zeros(),
-            input: SMatrix::zeros(),
-            drift: SVector::zeros(),
         }
     }
 
@@ -77,36 +128,78 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         weights: &Common<T, NX, NU>,
         cost_to_go: &mut CostToGo<T, NX>,
     ) -> Result<(), BadPivot<T>> {
+        // Where flash is scarce there is one piece of machine code for both.
+        if cfg!(feature = "simd") && NX >= WIDE || !cfg!(feature = "alloc") {
+            self.eliminate_adjusted(stage, weights, cost_to_go, None)
+        } else {
+            self.eliminate_here(stage, weights, cost_to_go, None)
+        }
+    }
+
+    /// The same, with the condition for the stage's minimum changed or not.
+    #[inline(never)]
+    pub(crate) fn eliminate_adjusted(
+        &mut self,
+        stage: &Stage<T, NX, NU>,
+        weights: &Common<T, NX, NU>,
+        cost_to_go: &mut CostToGo<T, NX>,
+        adjustment: Option<&dyn Adjustment<T, NX, NU>>,
+    ) -> Result<(), BadPivot<T>> {
+        #[cfg(feature = "simd")]
+        if NX >= WIDE {
+            return pulp::Arch::new().dispatch(Elimination {
+                factor: self,
+                stage,
+                weights,
+                cost_to_go,
+                adjustment,
+            });
+        }
+        self.eliminate_here(stage, weights, cost_to_go, adjustment)
+    }
+
+    #[inline(always)]
+    fn eliminate_here(
+        &mut self,
+        stage: &Stage<T, NX, NU>,
+        weights: &Common<T, NX, NU>,
+        cost_to_go: &mut CostToGo<T, NX>,
+        adjustment: Option<&dyn Adjustment<T, NX, NU>>,
+    ) -> Result<(), BadPivot<T>> {
         let Stage { a, b, c, .. } = stage;
         let CostToGo { quadratic, linear } = cost_to_go;
         let p_a = product(quadratic, a);
         let p_b = product(quadratic, b);
         let p_next = *linear + product(quadratic, c);
+        let (a, b) = (transposed(a), transposed(b));
 
-        // H u = -(G x + g) is the condition for the stage's minimum. P is symmetric, so
-        // B'P = (P B)'.
-        let hessian = weights.r + transposed_product(b, &p_b);
-        let g_x = weights.s + transposed_product(&p_b, a);
-        let g = stage.linear_u + transposed_product(b, &p_next);
-        let UnitFactor { inverse, pivots } = UnitFactor::new(&hessian)?;
+        let mut minimum = StageMinimum {
+            hessian: weights.r + product(&b, &p_b),
+            g_x: weights.s + product(&b, &p_a),
+            g: stage.linear_u + product(&b, &p_next),
+            linear_x: stage.linear_x + product(&a, &p_next),
+        };
+        if let Some(adjustment) = adjustment {
+            adjustment.adjust(&mut minimum);
+        }
+        let UnitFactor { inverse, pivots } = UnitFactor::new(&minimum.hessian)?;
         let reciprocals = pivots.map(|pivot| T::one() / pivot);
-        let l_g_x = product(&inverse, &g_x);
-        let scaled_g_x = scaled_rows(&l_g_x, &reciprocals);
-        let scaled_g = scaled_rows(&product(&inverse, &g), &reciprocals);
-        self.feedback = -transposed_product(&inverse, &scaled_g_x);
-        self.feedforward = -transposed_product(&inverse, &scaled_g);
+        // -D^-1 L^-1 of G and g.
+        let l_g_x = product(&inverse, &minimum.g_x);
+        let scaled_g_x = scaled_rows(&l_g_x, &-reciprocals);
+        let scaled_g = scaled_rows(&product(&inverse, &minimum.g), &-reciprocals);
+        let transposed_inverse = transposed(&inverse);
+        self.feedback = product(&transposed_inverse, &scaled_g_x);
+        self.feedforward = product(&transposed_inverse, &scaled_g);
+        self.inverse_factor = scaled_rows(&inverse, &reciprocals.map(|d| d.sqrt()));
 
         // A'P(A + BK) + Q + S'K, and the same for the linear part.
-        *quadratic = symmetric(
-            &(weights.q + transposed_product(a, &p_a) - transposed_product(&l_g_x, &scaled_g_x)),
-        );
-        *linear =
-            stage.linear_x + transposed_product(a, &p_next) - transposed_product(&l_g_x, &scaled_g);
-
-        self.inverse_factor = scaled_rows(&inverse, &reciprocals.map(|d| d.sqrt()));
-        self.closed_loop = a + product(b, &self.feedback);
-        self.input = product(b, &self.inverse_factor.transpose());
-        self.drift = c + product(b, &self.feedforward);
+        let l_g_x = transposed(&l_g_x);
+        *quadratic = weights.q;
+        add_symmetric_product(quadratic, &a, &p_a);
+        add_symmetric_product(quadratic, &l_g_x, &scaled_g_x);
+        mirror(quadratic);
+        *linear = minimum.linear_x + product(&l_g_x, &scaled_g);
         Ok(())
     }
 
@@ -118,30 +211,21 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         u += transposed_product(&self.inverse_factor, v);
         u
     }
-
-    /// The next state under the policy.
-    #[inline(always)]
-    pub fn next(&self, x: &SVector<T, NX>, v: &SVector<T, NU>) -> SVector<T, NX> {
-        let mut next = self.drift;
-        add_product(&mut next, &self.input, v);
-        add_product(&mut next, &self.closed_loop, x);
-        next
-    }
 }
 
-#[inline(always)]
-/// The mean of `m` and its transpose: rounding would make the cost-to-go drift apart.
-fn symmetric<T: Scalar, const K: usize>(m: &SMatrix<T, K, K>) -> SMatrix<T, K, K> {
-    (m + m.transpose()) * convert::<f64, T>(0.5)
-}
-
-#[inline(always)]
 /// diag(`factors`) `m`
+#[inline(always)]
 fn scaled_rows<T: Scalar, const R: usize, const C: usize>(
     m: &SMatrix<T, R, C>,
     factors: &SVector<T, R>,
 ) -> SMatrix<T, R, C> {
-    SMatrix::from_fn(|i, j| m[(i, j)] * factors[i])
+    let mut out = *m;
+    for column in &mut out.data.0 {
+        for (entry, factor) in column.iter_mut().zip(&factors.data.0[0]) {
+            *entry *= *factor;
+        }
+    }
+    out
 }
 
 /// L^-1 and D of the factorisation L D L' with unit lower triangular L.

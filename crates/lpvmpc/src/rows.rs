@@ -2,8 +2,9 @@
 //! normalised deviations v. Rows are formed only when they are violated.
 
 use crate::model::Scalar;
-use crate::ocp::{Bounds, Ocp, Penalty, SoftBounds, Terminal};
+use crate::ocp::{Bounds, Ocp, Penalty, SoftBounds, Stage, Terminal};
 use crate::riccati::StageFactor;
+use crate::small_matrix::{add_product, product, transposed, transposed_times};
 use crate::solution::{ActiveRow, BoundId, Part, Quantity, Side};
 use crate::working_set::{Row, Terms, first};
 use nalgebra::{SVector, convert};
@@ -300,10 +301,9 @@ pub(crate) fn form_row<T: Scalar, const NX: usize, const NU: usize>(
         costate += factor.feedback.tr_mul(&normal_u) * sign;
         row.support += 1;
     }
-    let before = factors.iter().zip(row.alpha.iter_mut()).take(bound.stage);
-    for (factor, alpha) in before.rev() {
-        *alpha = factor.input.tr_mul(&costate);
-        costate = factor.closed_loop.tr_mul(&costate);
+    let stages = ocp.stages.iter().zip(factors).zip(row.alpha.iter_mut());
+    for ((stage, factor), alpha) in stages.take(bound.stage).rev() {
+        *alpha = step_back(stage, factor, &mut costate);
     }
     let infinity: T = convert(f64::INFINITY);
     let (cap, compliance) = match (part, soft) {
@@ -322,6 +322,20 @@ pub(crate) fn form_row<T: Scalar, const NX: usize, const NU: usize>(
         },
         ..Terms::empty()
     };
+}
+
+/// Takes the derivative in the state behind a stage to the one in front of it, under the stage's policy;
+/// returns the derivative in the stage's normalised deviation.
+#[inline(always)]
+pub(crate) fn step_back<T: Scalar, const NX: usize, const NU: usize>(
+    stage: &Stage<T, NX, NU>,
+    factor: &StageFactor<T, NX, NU>,
+    costate: &mut SVector<T, NX>,
+) -> SVector<T, NU> {
+    let input = transposed_times(&stage.b, costate);
+    *costate = transposed_times(&stage.a, costate);
+    add_product(costate, &transposed(&factor.feedback), &input);
+    product(&factor.inverse_factor, &input)
 }
 
 /// The gradient that the rows `active` at a stage add to the state and the input.
@@ -371,10 +385,9 @@ pub(crate) fn subtract<
 ) {
     let n = ocp.length();
     let (mut costate, _) = gradient(ocp, active_at(n));
-    let stages = factors.iter().zip(v.iter_mut()).enumerate().take(n);
-    for (i, (factor, v)) in stages.rev() {
-        *v += factor.input.tr_mul(&costate);
-        costate = factor.closed_loop.tr_mul(&costate);
+    let stages = ocp.stages.iter().zip(factors).zip(v.iter_mut());
+    for (i, ((stage, factor), v)) in stages.enumerate().take(n).rev() {
+        *v += step_back(stage, factor, &mut costate);
         if places.may_be_at(i) {
             let (rows_x, rows_u) = gradient(ocp, active_at(i));
             *v += factor.inverse_factor * rows_u;

@@ -5,7 +5,7 @@
 //! reassociation; a transpose and a product by columns does.
 
 use crate::model::Scalar;
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 
 /// A B
 #[inline(always)]
@@ -90,5 +90,109 @@ pub(crate) fn transposed_product<T: Scalar, const R: usize, const K: usize, cons
     a: &SMatrix<T, K, R>,
     b: &SMatrix<T, K, C>,
 ) -> SMatrix<T, R, C> {
-    product(&a.transpose(), b)
+    product(&transposed(a), b)
+}
+
+/// A' v, each entry in two sums side by side: where one product waits for another, half the way is half the
+/// time.
+#[inline(always)]
+pub(crate) fn transposed_times<T: Scalar, const R: usize, const C: usize>(
+    a: &SMatrix<T, R, C>,
+    v: &SVector<T, R>,
+) -> SVector<T, C> {
+    let mut out = SVector::zeros();
+    let (pairs, last) = v.data.0[0].as_chunks::<2>();
+    for (out, column) in out.data.0[0].iter_mut().zip(&a.data.0) {
+        let (columns, rest) = column.as_chunks::<2>();
+        let mut sums = [T::zero(); 2];
+        for (a, v) in columns.iter().zip(pairs) {
+            for ((sum, a), v) in sums.iter_mut().zip(a).zip(v) {
+                *sum += *a * *v;
+            }
+        }
+        for (a, v) in rest.iter().zip(last) {
+            sums[0] += *a * *v;
+        }
+        *out = sums[0] + sums[1];
+    }
+    out
+}
+
+/// A'
+#[inline(always)]
+pub(crate) fn transposed<T: Scalar, const R: usize, const C: usize>(
+    a: &SMatrix<T, R, C>,
+) -> SMatrix<T, C, R> {
+    let mut out = SMatrix::zeros();
+    for (i, a) in a.data.0.iter().enumerate() {
+        for (out, a) in out.data.0.iter_mut().zip(a) {
+            out[i] = *a;
+        }
+    }
+    out
+}
+
+/// Rows and columns of a tile of a symmetric product.
+const TILE: usize = 4;
+
+/// out += A B, a product that is symmetric: above the diagonal it may be left as it is, see [`mirror`].
+#[inline(always)]
+pub(crate) fn add_symmetric_product<T: Scalar, const R: usize, const K: usize>(
+    out: &mut SMatrix<T, R, R>,
+    a: &SMatrix<T, R, K>,
+    b: &SMatrix<T, K, R>,
+) {
+    // In small matrices half of the products are not worth telling them apart.
+    if R <= TILE || !R.is_multiple_of(TILE) {
+        add_product(out, a, b);
+        return;
+    }
+    for column in (0..R).step_by(TILE) {
+        for row in (column..R).step_by(TILE) {
+            add_tile(out, a, b, row, column);
+        }
+    }
+}
+
+/// The tile of out += A B whose first entry is at `row` and `column`.
+#[inline(always)]
+fn add_tile<T: Scalar, const R: usize, const K: usize>(
+    out: &mut SMatrix<T, R, R>,
+    a: &SMatrix<T, R, K>,
+    b: &SMatrix<T, K, R>,
+    row: usize,
+    column: usize,
+) {
+    let mut sums = [[T::zero(); TILE]; TILE];
+    let columns = b.data.0.get(column..).and_then(|b| b.first_chunk::<TILE>());
+    let Some(columns) = columns else {
+        return;
+    };
+    for (k, a) in a.data.0.iter().enumerate() {
+        let Some(a) = a.get(row..).and_then(|a| a.first_chunk::<TILE>()) else {
+            return;
+        };
+        for (sums, b) in sums.iter_mut().zip(columns) {
+            for (sum, a) in sums.iter_mut().zip(a) {
+                *sum += *a * b[k];
+            }
+        }
+    }
+    let out = out.data.0.get_mut(column..).unwrap_or_default();
+    for (out, sums) in out.iter_mut().zip(&sums) {
+        let out = out.get_mut(row..).unwrap_or_default();
+        for (out, sum) in out.iter_mut().zip(sums) {
+            *out += *sum;
+        }
+    }
+}
+
+/// Makes the matrix symmetric by what is below its diagonal.
+#[inline(always)]
+pub(crate) fn mirror<T: Scalar, const K: usize>(m: &mut SMatrix<T, K, K>) {
+    for j in 1..K {
+        for i in 0..j {
+            m.data.0[j][i] = m.data.0[i][j];
+        }
+    }
 }

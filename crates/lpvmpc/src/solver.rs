@@ -5,15 +5,15 @@ use crate::active_set::DualActiveSet;
 use crate::farkas::infeasibility_margin;
 use crate::held_inputs::{HeldInputs, eliminate_held};
 use crate::list::List;
+use crate::many_bounds::ManyBounds;
 #[cfg(feature = "alloc")]
 use crate::memory::Capacity;
 use crate::memory::SolverMemory;
 use crate::model::Scalar;
 use crate::ocp::{Bounds, Common, Ocp, SoftBounds};
-use crate::primal_dual::PrimalDual;
 use crate::riccati::{CostToGo, StageFactor};
 use crate::rows::Trajectory;
-use crate::small_matrix::{add_product, product};
+use crate::small_matrix::product;
 use crate::solution::{ActiveRow, ActiveSet, Quantity, Solution, Status};
 use crate::working_set::first;
 use nalgebra::{SVector, convert};
@@ -82,7 +82,7 @@ pub struct Solver<T: 'static, const NX: usize, const NU: usize> {
     /// None but within [`Solver::search_with_held_inputs`].
     pub(crate) held: HeldInputs<NU>,
     /// The first phase, if there is memory for it; no entry or one.
-    primal_dual: List<PrimalDual<T, NX, NU>>,
+    many_bounds: List<ManyBounds<T, NX, NU>>,
     /// The longest horizon that there is memory for.
     stages: usize,
 }
@@ -96,7 +96,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             factors: memory.factors,
             dual: DualActiveSet::new(memory.dual),
             held: HeldInputs::none(memory.held),
-            primal_dual: memory.primal_dual,
+            many_bounds: memory.many_bounds,
         }
     }
 
@@ -146,11 +146,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         };
         let begun = factorized.and_then(|()| self.roll_out(ocp, solution));
         let outcome = begun.and_then(|()| {
-            if self.solve_at_once(ocp, settings, solution, &mut spent) {
-                Ok(())
-            } else {
-                self.solve_one_by_one(ocp, settings, solution, &mut spent)
-            }
+            let at_once = self.solve_at_once(ocp, settings, solution, &mut spent);
+            at_once.unwrap_or_else(|| self.solve_one_by_one(ocp, settings, solution, &mut spent))
         });
         solution.changes = spent;
         solution.status = match outcome {
@@ -165,8 +162,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         };
     }
 
-    /// Whether the first phase, if there is memory for one, has solved the problem, whose trajectory
-    /// without bounds is in the solution.
+    /// What the first phase, if there is memory for one, makes of the problem, whose trajectory
+    /// without bounds is in the solution; `None` if that is for the dual method.
     #[inline(always)]
     fn solve_at_once(
         &mut self,
@@ -174,14 +171,14 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU>,
         spent: &mut usize,
-    ) -> bool {
-        let mut phase = core::mem::replace(&mut self.primal_dual, List::empty());
-        let solved = phase.iter_mut().any(|phase| {
+    ) -> Option<Result<(), Status<T>>> {
+        let mut phase = core::mem::replace(&mut self.many_bounds, List::empty());
+        let outcome = phase.first_mut().and_then(|phase| {
             let run = phase.run;
             run(phase, self, ocp, settings, solution, spent)
         });
-        self.primal_dual = phase;
-        solved
+        self.many_bounds = phase;
+        outcome
     }
 
     /// The dual method, from the trajectory without bounds; with held inputs where rounding ends it.
@@ -222,20 +219,15 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         ocp: &Ocp<T, NX, NU>,
         proof: &mut ActiveSet<T>,
     ) -> Option<Status<T>> {
-        if !(self.dual.report_conflict(proof) && infeasibility_margin(ocp, proof) > T::zero()) {
+        let verdict = if self.dual.report_conflict(proof) {
+            infeasible(ocp, proof)
+        } else {
+            None
+        };
+        if verdict.is_none() {
             proof.clear();
-            return None;
         }
-        // The bounds of inputs can be met by themselves: the earliest other bound is the cause.
-        let mut cause = proof.iter().next()?;
-        for row in proof.iter() {
-            let of_input = |row: &ActiveRow<T>| matches!(row.bound.quantity, Quantity::Input(_));
-            let earlier = of_input(&cause) || row.bound.stage < cause.bound.stage;
-            if !of_input(&row) && earlier {
-                cause = row;
-            }
-        }
-        Some(Status::Infeasible(cause.bound))
+        verdict
     }
 
     /// The dual method, from the trajectory of the deviations as they are.
@@ -307,9 +299,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         let n = ocp.length();
         let policy = first(&self.factors, n).iter().zip(first(&self.dual.v, n));
         let places = solution.u.iter_mut().zip(solution.x.iter_mut());
-        for ((factor, v), (u, x_next)) in policy.zip(places) {
+        for ((stage, (factor, v)), (u, x_next)) in ocp.stages.iter().zip(policy).zip(places) {
             *u = factor.policy(&x, v);
-            x = factor.next(&x, v);
+            x = stage.next(&x, u);
             *x_next = x;
         }
         // A number that is not finite anywhere spreads to the last state or its input.
@@ -349,6 +341,26 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     }
 }
 
+/// The verdict that the problem is infeasible, if the rows are a proof.
+pub(crate) fn infeasible<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    proof: &ActiveSet<T>,
+) -> Option<Status<T>> {
+    if !(infeasibility_margin(ocp, proof) > T::zero()) {
+        return None;
+    }
+    // The bounds of inputs can be met by themselves: the earliest other bound is the cause.
+    let mut cause = proof.iter().next()?;
+    for row in proof.iter() {
+        let of_input = |row: &ActiveRow<T>| matches!(row.bound.quantity, Quantity::Input(_));
+        let earlier = of_input(&cause) || row.bound.stage < cause.bound.stage;
+        if !of_input(&row) && earlier {
+            cause = row;
+        }
+    }
+    Some(Status::Infeasible(cause.bound))
+}
+
 pub(crate) fn trajectory<T, const NX: usize, const NU: usize>(
     solution: &Solution<T, NX, NU>,
 ) -> Trajectory<'_, T, NX, NU> {
@@ -384,20 +396,25 @@ fn fall_back<T: Scalar, const NX: usize, const NU: usize>(
     solution: &mut Solution<T, NX, NU>,
 ) {
     clip_inputs(ocp, solution);
-    let mut x = ocp.x0;
-    let places = solution.u.iter().zip(solution.x.iter_mut());
-    for (stage, (u, x_next)) in ocp.stages.iter().zip(places).take(ocp.length()) {
-        let mut next = stage.c;
-        add_product(&mut next, &stage.a, &x);
-        add_product(&mut next, &stage.b, u);
-        x = next;
-        *x_next = x;
-    }
+    roll_forward(ocp, solution);
     solution.cost = cost(ocp, solution);
 }
 
+/// The states that the solution's inputs lead to.
+pub(crate) fn roll_forward<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    solution: &mut Solution<T, NX, NU>,
+) {
+    let mut x = ocp.x0;
+    let places = solution.u.iter().zip(solution.x.iter_mut());
+    for (stage, (u, x_next)) in ocp.stages.iter().zip(places).take(ocp.length()) {
+        x = stage.next(&x, u);
+        *x_next = x;
+    }
+}
+
 /// Moves the inputs into their bounds.
-fn clip_inputs<T: Scalar, const NX: usize, const NU: usize>(
+pub(crate) fn clip_inputs<T: Scalar, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
     solution: &mut Solution<T, NX, NU>,
 ) {

@@ -2,7 +2,7 @@
 
 use super::plan::PlannedStage;
 use crate::list::List;
-use crate::memory::{Capacity, PrimalDualArrays, SolverArrays, SolverMemory};
+use crate::memory::{Capacity, ManyBoundsArrays, SolverArrays, SolverMemory};
 use crate::model::Scalar;
 use crate::ocp::{Common, Stage};
 use crate::solution::PackedRow;
@@ -114,12 +114,12 @@ impl<T: Scalar, const NU: usize, const NA: usize> GuaranteedWorkspaceMemory<T, N
 impl<T: Scalar, const NU: usize, const NA: usize> GuaranteedWorkspaceMemory<T, NU, NA> {
     /// The same with memory for many active input bounds, for two stages more than the horizon has
     /// samples.
-    pub fn with_primal_dual<const NP: usize>(
+    pub fn with_many_bounds<const NP: usize, const B: usize>(
         self,
-        arrays: &'static mut PrimalDualArrays<T, NA, NU, NP>,
+        arrays: &'static mut ManyBoundsArrays<T, NA, NU, NP, B>,
     ) -> Self {
         Self {
-            solver: self.solver.with_primal_dual(arrays),
+            solver: self.solver.with_many_bounds(arrays),
             ..self
         }
     }

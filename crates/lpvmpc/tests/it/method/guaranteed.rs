@@ -6,7 +6,7 @@ use lpvmpc::riccati::{CostToGo, StageFactor};
 use lpvmpc::{
     Bounds, Capacity, Common, Decision, GuaranteedArrays, GuaranteedController, GuaranteedError,
     GuaranteedIterations, GuaranteedSettings, GuaranteedStep, GuaranteedWorkspace,
-    GuaranteedWorkspaceArrays, LpvModel, PrimalDualArrays, Rk4, Rollout, Scheduling,
+    GuaranteedWorkspaceArrays, LpvModel, ManyBoundsArrays, Rk4, Rollout, Scheduling,
     SolverSettings, Stage, Status, TerminalSet,
 };
 use lpvmpc_testkit::rng::Rng;
@@ -215,9 +215,15 @@ fn a_shorter_horizon_is_the_one_of_a_smaller_memory() {
     let arrays = Box::leak(Box::new(GuaranteedArrays::<f64, 4, 1, N>::default()));
     let mut large = Guaranteed::new(plant(), short, arrays.lend()).unwrap();
     let arrays = GuaranteedWorkspaceArrays::<f64, 1, 5, { N + 2 }, 200>::default();
-    let many = Box::leak(Box::new(PrimalDualArrays::<f64, 5, 1, { N + 2 }>::default()));
+    let many = Box::leak(Box::new(ManyBoundsArrays::<
+        f64,
+        5,
+        1,
+        { N + 2 },
+        { 12 * (N + 3) },
+    >::default()));
     let arrays = Box::leak(Box::new(arrays)).lend();
-    let mut large_memory = GuaranteedWorkspace::new(arrays.with_primal_dual(many));
+    let mut large_memory = GuaranteedWorkspace::new(arrays.with_many_bounds(many));
     let mut small = guaranteed(short);
     let mut small_memory = small.workspace::<5>();
     let mut x = Vector4::zeros();

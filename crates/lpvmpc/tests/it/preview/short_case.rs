@@ -5,7 +5,7 @@ use super::case::{Case, Hardness};
 use super::plants::{NU, NX, Pendulum, Scheduled};
 use lpvmpc::{
     Bounds, Capacity, Controller, ControllerArrays, ControllerMemory, ControllerSettings,
-    GeneralRow, Iterations, List, Predictor, Preview, PrimalDualArrays, Reference, Rk4, Scheduling,
+    GeneralRow, Iterations, List, ManyBoundsArrays, Predictor, Preview, Reference, Rk4, Scheduling,
     Solution, TerminalIngredient, Weights, Workspace, WorkspaceArrays,
 };
 use lpvmpc_testkit::rng::Rng;
@@ -156,8 +156,14 @@ fn lent_arrays_give_the_answers_of_the_heap() {
     const ACTIVE: usize = 200;
     type Arrays = WorkspaceArrays<f64, NX, NU, STAGES, ACTIVE, STAGES, { 3 * (STAGES + 1) }>;
     let arrays = Box::leak(Box::new(Arrays::default()));
-    let many = Box::leak(Box::new(PrimalDualArrays::<f64, NX, NU, STAGES>::default()));
-    let mut lent_workspace = Workspace::new(arrays.lend().with_primal_dual(many));
+    let many = Box::leak(Box::new(ManyBoundsArrays::<
+        f64,
+        NX,
+        NU,
+        STAGES,
+        { 2 * (STAGES + 1) * (NX + NU) },
+    >::default()));
+    let mut lent_workspace = Workspace::new(arrays.lend().with_many_bounds(many));
     for seed in 0..60 {
         let case = Case::random(&mut Rng::new(seed), Hardness::Hard);
         let settings = case.settings(Iterations::default());

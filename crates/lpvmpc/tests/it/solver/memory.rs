@@ -4,9 +4,9 @@
 use super::support::{capacity, cold, kind, solve, solve_with};
 use lpvmpc::{
     Bounds, Capacity, ControllerArrays, ControllerMemory, GeneralRow, GuaranteedArrays,
-    GuaranteedMemory, GuaranteedWorkspaceArrays, GuaranteedWorkspaceMemory, List, Ocp,
-    PrimalDualArrays, Solution, Solver, SolverArrays, SolverMemory, SolverSettings, Status,
-    WorkspaceArrays, WorkspaceMemory, kkt_residual,
+    GuaranteedMemory, GuaranteedWorkspaceArrays, GuaranteedWorkspaceMemory, List, ManyBoundsArrays,
+    Ocp, Solution, Solver, SolverArrays, SolverMemory, SolverSettings, Status, WorkspaceArrays,
+    WorkspaceMemory, kkt_residual,
 };
 use lpvmpc_testkit::clarabel::{self, Verdict};
 use lpvmpc_testkit::problems::{Family, problem};
@@ -92,10 +92,14 @@ fn lent_arrays_give_the_answers_of_memory_on_the_heap() {
     let arrays = Box::leak(Box::new(
         SolverArrays::<f64, NX, NU, { N + 3 }, MANY>::default(),
     ));
-    let many = Box::leak(Box::new(
-        PrimalDualArrays::<f64, NX, NU, { N + 3 }>::default(),
-    ));
-    let mut solver = Solver::new(arrays.lend().with_primal_dual(many));
+    let many = Box::leak(Box::new(ManyBoundsArrays::<
+        f64,
+        NX,
+        NU,
+        { N + 3 },
+        { 2 * (N + 1) * (NX + NU + 1) },
+    >::default()));
+    let mut solver = Solver::new(arrays.lend().with_many_bounds(many));
     let room = Capacity {
         stages: N + 5,
         rows: 0,

@@ -1,0 +1,387 @@
+//! A first phase for many active bounds, of any kind.
+//!
+//! The dual method takes one bound after the other, each at the price of a pass along the horizon and of
+//! all rows before it. Here all of them are guessed at once. A guess comes from the last sample, or from an
+//! interior-point method that goes on until it can be told which bounds will be active. The program in
+//! which these hold says which of them should not, and which are missing; that takes a few factorisations,
+//! however many bounds there are. Where it finds nothing the dual method begins as if nothing had been.
+
+mod exchange;
+mod interior_point;
+mod newton;
+mod side;
+
+pub(crate) use side::BoundSide;
+
+use crate::list::List;
+use crate::model::Scalar;
+use crate::ocp::Ocp;
+use crate::riccati::StageFactor;
+use crate::rows::{self, Trajectory};
+use crate::solution::{ActiveRow, ActiveSet, Part, Quantity, Solution, Status};
+use crate::solver::{
+    Solver, SolverSettings, WarmStart, clip_inputs, cost, infeasible, roll_forward, trajectory,
+};
+use crate::working_set::first_mut;
+use exchange::{Program, Tolerances, exchange};
+use interior_point::{Foretold, InteriorPoint};
+use nalgebra::{SVector, convert};
+use side::Role;
+
+/// With so many violated bounds, and some more for each input, a few factorisations cost less than a pass for
+/// each bound.
+const MANY: usize = 24;
+const MANY_PER_INPUT: usize = 8;
+/// And so many inputs that the regulator saturates, where there is one of each stage.
+const MANY_SATURATED: usize = 8;
+/// Of a guess that is to be exchanged, one active side in so many may be wrong: from farther away it is a
+/// shorter way to begin anew.
+const FEW: usize = 4;
+/// Guesses of the interior-point method that are tried.
+const TRIALS: usize = 5;
+/// Shorter parts of the way mean that bounds may contradict each other.
+const STUCK: f64 = 0.1;
+/// The roles that a step foretells are tried when one in so many of the active sides, or fewer, has changed
+/// its since the step before.
+const CERTAIN: usize = 10;
+/// And when that step went so far.
+const FREE: f64 = 0.5;
+/// Where the products of slack and multiplier begin, as a part of the largest cost of a stage.
+const CENTRE: f64 = 0.01;
+/// Factorisations, each as much work as a change of the active set for every state and input.
+const MOST_FACTORISATIONS: usize = 24;
+/// Part of the changes that there may be, for the dual method has to have enough where this phase has
+/// no answer: one in so many.
+const SHARE: usize = 4;
+
+/// Memory of the phase, beside the step that knows it: a solver without it has no machine code for it.
+#[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
+pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
+    /// The factors of the problem with the sides' costs.
+    factors: List<StageFactor<T, NX, NU>>,
+    /// A trajectory.
+    u: List<SVector<T, NU>>,
+    x: List<SVector<T, NX>>,
+    sides: List<BoundSide<T>>,
+    pub run: Run<T, NX, NU>,
+}
+
+/// Solves the problem whose trajectory without bounds is in the solution, or proves that it is infeasible;
+/// counts changes of the active set. `None`, and all as before, if that is for the dual method.
+type Run<T, const NX: usize, const NU: usize> = fn(
+    &mut ManyBounds<T, NX, NU>,
+    &mut Solver<T, NX, NU>,
+    &Ocp<T, NX, NU>,
+    &SolverSettings<T>,
+    &mut Solution<T, NX, NU>,
+    &mut usize,
+) -> Option<Result<(), Status<T>>>;
+
+impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
+    pub fn new(
+        factors: List<StageFactor<T, NX, NU>>,
+        (u, x): (List<SVector<T, NU>>, List<SVector<T, NX>>),
+        sides: List<BoundSide<T>>,
+    ) -> Self {
+        Self {
+            factors,
+            u,
+            x,
+            sides,
+            run: Self::solve,
+        }
+    }
+
+    fn solve(
+        &mut self,
+        solver: &mut Solver<T, NX, NU>,
+        ocp: &Ocp<T, NX, NU>,
+        settings: &SolverSettings<T>,
+        solution: &mut Solution<T, NX, NU>,
+        spent: &mut usize,
+    ) -> Option<Result<(), Status<T>>> {
+        let n = ocp.length();
+        let fits = n <= self.factors.len().min(self.u.len()).min(self.x.len());
+        if !fits || ocp.terminal.equality.is_some() {
+            return None;
+        }
+        let shift = match settings.warm_start {
+            _ if !solution.status.is_solved() => None,
+            WarmStart::Cold => None,
+            WarmStart::Same => Some(0),
+            WarmStart::Shifted => Some(1),
+        };
+        let known = shift.map_or(0, |_| solution.active.len());
+        let (mut violated, mut inputs) = (0, 0);
+        rows::violated_bounds(ocp, &trajectory(solution), &mut |candidate| {
+            violated += 1;
+            inputs += usize::from(matches!(candidate.bound.quantity, Quantity::Input(_)));
+        });
+        // Those that the regulator saturates are nearly right where a single input moves the states.
+        let saturated = NU == 1 && 2 * inputs > violated && inputs >= MANY_SATURATED;
+        // No more can hold independently than there are inputs.
+        let expected = violated.max(known).min(n * NU);
+        if expected < MANY + MANY_PER_INPUT * NU && !saturated {
+            return None;
+        }
+        let count = side::collect(ocp, &mut self.sides)?;
+        let sides = first_mut(&mut self.sides, count);
+        newton::measure(ocp, sides, &trajectory(solution));
+        let scale = largest_cost(ocp, solution);
+        let tolerances = Tolerances {
+            violation: solver.dual.tolerance,
+            penalty: scale * T::default_epsilon().powf(convert(-0.4)),
+        };
+        let cap = MOST_FACTORISATIONS * (NX + NU);
+        let cap = cap.min(solver.dual.changes_left() / SHARE);
+        let mut changes = || {
+            let allowed = *spent + NX + NU <= cap;
+            *spent += if allowed { NX + NU } else { 0 };
+            allowed
+        };
+        let mut program = Program {
+            ocp,
+            factors: &mut self.factors,
+            v: &mut solver.dual.v,
+            u: &mut self.u,
+            x: &mut self.x,
+        };
+        let mut found = shift.filter(|_| known > 0).is_some_and(|shift| {
+            guess_again(sides, &solution.active, shift);
+            exchange(&mut program, sides, &tolerances, FEW, &mut changes)
+        });
+        if !found && saturated {
+            guess_saturated(ocp, &solver.factors, sides);
+            found = exchange(&mut program, sides, &tolerances, 1, &mut changes);
+        }
+        let outcome = if found {
+            Some(Ok(()))
+        } else {
+            newton::measure(ocp, sides, &trajectory(solution));
+            let proof = &mut solution.active;
+            search(&mut program, sides, &tolerances, scale, proof, &mut changes)
+        };
+        let outcome = match outcome {
+            Some(Ok(())) => report(&program, sides, solution).then_some(Ok(())),
+            other => other,
+        };
+        solver.dual.v.fill(SVector::zeros());
+        if outcome.is_none() {
+            solution.active.clear();
+            let left = solver.dual.changes_left().saturating_sub(*spent);
+            solver.dual.reset(solver.dual.tolerance, left);
+            // What it was made from was finite.
+            solver.roll_out(ocp, solution).ok();
+        }
+        outcome
+    }
+}
+
+/// The interior-point method, until the roles that it foretells are right, or its multipliers prove that the
+/// problem is infeasible.
+fn search<T: Scalar, const NX: usize, const NU: usize>(
+    program: &mut Program<'_, T, NX, NU>,
+    sides: &mut [BoundSide<T>],
+    tolerances: &Tolerances<T>,
+    scale: T,
+    proof: &mut ActiveSet<T>,
+    changes: &mut impl FnMut() -> bool,
+) -> Option<Result<(), Status<T>>> {
+    let ocp = program.ocp;
+    let mut method = InteriorPoint::new(sides, scale * convert(CENTRE));
+    let (mut part, mut trials) = (T::zero(), TRIALS);
+    while trials > 0 && changes() {
+        let predicted = method.predict(ocp, sides, program.factors, (program.u, program.x));
+        let Foretold { changed, active } = predicted.ok()?;
+        if part > convert(FREE) && CERTAIN * changed <= active {
+            trials -= 1;
+            if exchange(program, sides, tolerances, FEW, &mut *changes) {
+                return Some(Ok(()));
+            }
+            // The prediction once more, for its factors.
+            let again = method.predict(ocp, sides, program.factors, (program.u, program.x));
+            again.ok()?;
+        }
+        part = method.correct(
+            ocp,
+            sides,
+            program.factors,
+            program.v,
+            (program.u, program.x),
+        );
+        if part < convert(STUCK) {
+            // Where no point satisfies all bounds, multipliers grow until they are a proof of it.
+            list_multipliers(sides, proof);
+            if let Some(infeasible) = infeasible(ocp, proof) {
+                return Some(Err(infeasible));
+            }
+            if !(part > convert(1e-6)) {
+                return None;
+            }
+        }
+    }
+    None
+}
+
+/// Lists the hard bounds of states and rows with the multipliers of the interior-point method, as far as
+/// there are places and they count.
+fn list_multipliers<T: Scalar>(sides: &[BoundSide<T>], list: &mut ActiveSet<T>) {
+    list.clear();
+    let decide = |side: &&BoundSide<T>| side.input().is_none() && side.soft.is_none();
+    let multipliers = sides.iter().filter(decide);
+    let multipliers = multipliers.map(|side| (side.bound, side.interior.multiplier));
+    let largest = multipliers
+        .clone()
+        .fold(T::zero(), |most, (_, multiplier)| most.max(multiplier));
+    for (bound, multiplier) in multipliers {
+        if multiplier > largest * T::default_epsilon().sqrt() {
+            list.push(ActiveRow {
+                bound,
+                part: Part::Hard,
+                multiplier: multiplier / largest,
+                exceeded: false,
+            });
+        }
+    }
+}
+
+/// The inputs that the regulator without bounds drives into them, when they are bounded.
+fn guess_saturated<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    factors: &[StageFactor<T, NX, NU>],
+    mut sides: &mut [BoundSide<T>],
+) {
+    let at_rest = SVector::zeros();
+    let mut x = ocp.x0;
+    let stages = ocp.stages.iter().zip(factors);
+    for (i, (stage, factor)) in stages.enumerate().take(ocp.length()) {
+        let mut u = factor.policy(&x, &at_rest);
+        for side in side::split_first_mut(&mut sides, i) {
+            side.role = Role::Free;
+            if let Some(j) = side.input()
+                && side.distance_at(ocp, &x, Some(&u)) < T::zero()
+            {
+                side.role = Role::Held;
+                u[j] = side.limit;
+            }
+        }
+        x = stage.next(&x, &u);
+    }
+    sides.iter_mut().for_each(|side| side.role = Role::Free);
+}
+
+/// The roles of the rows that were active before, `shift` stages earlier.
+fn guess_again<T: Scalar>(sides: &mut [BoundSide<T>], before: &ActiveSet<T>, shift: usize) {
+    for side in sides.iter_mut() {
+        side.role = Role::Free;
+        side.estimate = T::zero();
+    }
+    for row in before.iter() {
+        let Some(stage) = row.bound.stage.checked_sub(shift) else {
+            continue;
+        };
+        let begin = sides.partition_point(|side| side.bound.stage < stage);
+        let here = sides.iter_mut().skip(begin);
+        let mut here = here.take_while(|side| side.bound.stage == stage);
+        let same = |side: &&mut BoundSide<T>| {
+            side.bound.quantity == row.bound.quantity && side.bound.side == row.bound.side
+        };
+        if let Some(side) = here.find(same) {
+            let exceeded = row.part == Part::Quadratic || row.exceeded;
+            if exceeded && side.soft.is_some() {
+                side.role = Role::Exceeded;
+            } else if side.role == Role::Free {
+                side.role = Role::Held;
+                side.estimate = row.multiplier.min(side.price());
+            }
+        }
+    }
+}
+
+/// The answer of the last guess becomes the solution; `false` where it has no place for all active rows.
+fn report<T: Scalar, const NX: usize, const NU: usize>(
+    program: &Program<'_, T, NX, NU>,
+    sides: &[BoundSide<T>],
+    solution: &mut Solution<T, NX, NU>,
+) -> bool {
+    let ocp = program.ocp;
+    let listed = list(sides, &mut solution.active);
+    for (u, found) in solution
+        .u
+        .iter_mut()
+        .zip(program.u.iter())
+        .take(ocp.length())
+    {
+        *u = *found;
+    }
+    clip_inputs(ocp, solution);
+    roll_forward(ocp, solution);
+    solution.cost = cost(ocp, solution);
+    listed && solution.cost.is_finite()
+}
+
+/// Lists the rows that are active in the answer.
+fn list<T: Scalar>(sides: &[BoundSide<T>], active: &mut ActiveSet<T>) -> bool {
+    active.clear();
+    sides.iter().all(|side| {
+        let row = |part, multiplier, exceeded| ActiveRow {
+            bound: side.bound,
+            part,
+            multiplier,
+            exceeded,
+        };
+        match (side.role, side.soft) {
+            (Role::Free, _) | (Role::Exceeded, None) => true,
+            (Role::Held, soft) => {
+                let part = soft.map_or(Part::Hard, |_| Part::Linear);
+                active.push(row(part, side.estimate.max(T::zero()), false))
+            }
+            (Role::Exceeded, Some(price)) => {
+                let linear =
+                    price.linear <= T::zero() || active.push(row(Part::Linear, price.linear, true));
+                let excess = (-side.distance).max(T::zero());
+                linear
+                    && (price.quadratic <= T::zero()
+                        || active.push(row(Part::Quadratic, price.quadratic * excess, false)))
+            }
+        }
+    })
+}
+
+/// The largest cost of a stage on the trajectory without bounds, in magnitudes: the size that multiplied
+/// distances have.
+fn largest_cost<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    solution: &Solution<T, NX, NU>,
+) -> T {
+    let of =
+        |weight: T, value: T, linear: T| value.abs() * (weight.abs() * value.abs() + linear.abs());
+    let mut largest = T::zero();
+    let Trajectory { x, u } = trajectory(solution);
+    let mut state = &ocp.x0;
+    for (i, ((stage, u), next)) in ocp
+        .stages
+        .iter()
+        .zip(u)
+        .zip(x)
+        .enumerate()
+        .take(ocp.length())
+    {
+        let common = ocp.common_at(i);
+        let mut sum = T::zero();
+        for j in 0..NX {
+            sum += of(common.q[(j, j)], state[j], stage.linear_x[j]);
+        }
+        for j in 0..NU {
+            sum += of(common.r[(j, j)], u[j], stage.linear_u[j]);
+        }
+        largest = largest.max(sum);
+        state = next;
+    }
+    let mut sum = T::zero();
+    for j in 0..NX {
+        sum += of(ocp.terminal.p[(j, j)], state[j], ocp.terminal.linear_x[j]);
+    }
+    largest.max(sum)
+}

@@ -1,0 +1,184 @@
+//! The primal-dual active set: the program in which the sides of a guess hold with equality, and the guess
+//! that follows from its answer; a semismooth Newton method (Hintermueller, Ito and Kunisch 2002).
+//!
+//! Held inputs are constants of the factorisation. Held states and rows are an augmented Lagrangian: a
+//! large weight on their distance, and multipliers that take up what it leaves. The same passes that find
+//! the multipliers remove what rounding has left in the optimality conditions.
+
+use super::newton;
+use super::side::{BoundSide, Role};
+use crate::model::Scalar;
+use crate::ocp::Ocp;
+use crate::riccati::StageFactor;
+use crate::rows::Trajectory;
+use nalgebra::{SVector, convert};
+
+/// Passes that refine an answer.
+const REFINEMENTS: usize = 6;
+
+/// Numbers that the search goes by.
+#[derive(Clone, Copy)]
+pub(super) struct Tolerances<T> {
+    /// Relative violation that counts as none.
+    pub violation: T,
+    /// Weight of the distance of a side that is held, in cost per square of its size.
+    pub penalty: T,
+}
+
+/// What the search works on.
+pub(super) struct Program<'a, T: 'static, const NX: usize, const NU: usize> {
+    pub ocp: &'a Ocp<T, NX, NU>,
+    pub factors: &'a mut [StageFactor<T, NX, NU>],
+    pub v: &'a mut [SVector<T, NU>],
+    pub u: &'a mut [SVector<T, NU>],
+    pub x: &'a mut [SVector<T, NX>],
+}
+
+/// Exchanges sides until the guess is right, whose trajectory and multipliers (`estimate`) then are the
+/// answer; `false` if that is not found. One in `few` active sides may be wrong at first. `count` is asked
+/// before every factorisation.
+pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
+    program: &mut Program<'_, T, NX, NU>,
+    sides: &mut [BoundSide<T>],
+    tolerances: &Tolerances<T>,
+    few: usize,
+    mut count: impl FnMut() -> bool,
+) -> bool {
+    let active = sides.iter().filter(|side| side.role != Role::Free).count();
+    let mut most = (active / few).max(2);
+    let loose: T = convert(1e-6);
+    let loose = tolerances.violation.max(loose);
+    while count() {
+        for side in sides.iter_mut() {
+            (side.base, side.weight) = match side.role {
+                Role::Free => (T::zero(), T::zero()),
+                Role::Held if side.input().is_some() => (T::zero(), T::zero()),
+                Role::Held => (side.estimate, tolerances.penalty / (side.size * side.size)),
+                Role::Exceeded => (side.price(), side.curvature()),
+            };
+        }
+        if newton::factorize(program.ocp, sides, program.factors).is_err() {
+            return false;
+        }
+        newton::roll_out(program.ocp, program.factors, (program.u, program.x));
+        measure(program, sides);
+        for side in sides.iter_mut().filter(|side| side.is_weighted()) {
+            side.base = side.multiplier_at(side.distance);
+        }
+        let mut residual = explain(program, sides);
+        let mut wrong = reassign(sides, loose, loose * residual.largest);
+        if wrong == 0 {
+            if !refine(program, sides, &mut residual, tolerances.violation) {
+                return false;
+            }
+            wrong = reassign(
+                sides,
+                tolerances.violation,
+                tolerances.violation * residual.largest,
+            );
+            if wrong == 0 {
+                return true;
+            }
+        }
+        // A guess from near by is right after a few exchanges, each of which leaves fewer sides wrong.
+        if wrong > most {
+            break;
+        }
+        most = wrong - wrong / 4;
+    }
+    false
+}
+
+/// Measures the sides on the trajectory. Of what is held, rounding is no distance: the weight would make
+/// much of it.
+fn measure<T: Scalar, const NX: usize, const NU: usize>(
+    program: &Program<'_, T, NX, NU>,
+    sides: &mut [BoundSide<T>],
+) {
+    let trajectory = Trajectory {
+        x: program.x,
+        u: program.u,
+    };
+    newton::measure(program.ocp, sides, &trajectory);
+    let rounding = T::default_epsilon() * convert(8.0);
+    for side in sides.iter_mut().filter(|side| side.role == Role::Held) {
+        if side.distance.abs() <= rounding * side.size {
+            side.distance = T::zero();
+        }
+    }
+}
+
+fn explain<T: Scalar, const NX: usize, const NU: usize>(
+    program: &mut Program<'_, T, NX, NU>,
+    sides: &mut [BoundSide<T>],
+) -> newton::Residual<T> {
+    let trajectory = Trajectory {
+        x: program.x,
+        u: program.u,
+    };
+    newton::explain(program.ocp, program.factors, sides, &trajectory, program.v)
+}
+
+/// Moves to the minimum with the sides as they are, to rounding, from a point whose `residual` is known;
+/// whether that is near enough.
+fn refine<T: Scalar, const NX: usize, const NU: usize>(
+    program: &mut Program<'_, T, NX, NU>,
+    sides: &mut [BoundSide<T>],
+    residual: &mut newton::Residual<T>,
+    tolerance: T,
+) -> bool {
+    let mut last: T = convert(f64::INFINITY);
+    for _ in 0..REFINEMENTS {
+        let held = sides.iter().filter(|side| side.role == Role::Held);
+        let missed = held.fold(T::zero(), |most, side| {
+            most.max(side.distance.abs() / side.size)
+        });
+        let unexplained = residual.rest / residual.largest.max(T::default_epsilon());
+        let worst = missed.max(unexplained);
+        if worst <= T::default_epsilon() * convert(16.0) {
+            return true;
+        }
+        if !(worst < last * convert(0.5)) {
+            return worst <= tolerance;
+        }
+        last = worst;
+        let trajectory = (&mut *program.u, &mut *program.x);
+        newton::deviate(program.ocp, program.factors, program.v, trajectory, sides);
+        measure(program, sides);
+        *residual = explain(program, sides);
+    }
+    last <= tolerance
+}
+
+/// Gives every side the role that follows from its distance and multiplier; how many change.
+fn reassign<T: Scalar>(sides: &mut [BoundSide<T>], violation: T, rounding: T) -> usize {
+    let mut changes = 0;
+    for side in sides {
+        let margin = violation * side.size;
+        let held = |side: &BoundSide<T>| match side.soft {
+            Some(price) if price.linear <= T::zero() => Role::Exceeded,
+            _ => Role::Held,
+        };
+        let role = match side.role {
+            Role::Free if side.distance < -margin => held(side),
+            Role::Held if side.estimate < -rounding => Role::Free,
+            Role::Held if side.estimate > side.price() + rounding => Role::Exceeded,
+            Role::Exceeded if side.distance > margin => match held(side) {
+                Role::Held => Role::Held,
+                _ => Role::Free,
+            },
+            known => known,
+        };
+        if role != side.role {
+            if side.role == Role::Free {
+                side.estimate = T::zero();
+            }
+            if side.role == Role::Exceeded {
+                side.estimate = side.price();
+            }
+            side.role = role;
+            changes += 1;
+        }
+    }
+    changes
+}

@@ -1,0 +1,315 @@
+//! The linear-quadratic program that the sides of the bounds make of the problem: its factors, its
+//! trajectory, and what is missing for a minimum.
+
+use super::side::{BoundSide, Role, split_first_mut, split_off, split_off_mut};
+use crate::model::Scalar;
+use crate::ocp::{Common, Ocp, Stage};
+use crate::riccati::{Adjustment, BadPivot, CostToGo, StageFactor, StageMinimum};
+use crate::rows::{self, Trajectory};
+use crate::small_matrix::{product, transposed_product, transposed_times};
+use crate::solution::Quantity;
+use nalgebra::SVector;
+
+/// The factors of the problem with the cost of every side's multiplier; inputs that are held are constants.
+pub(super) fn factorize<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    sides: &[BoundSide<T>],
+    factors: &mut [StageFactor<T, NX, NU>],
+) -> Result<(), BadPivot<T>> {
+    let n = ocp.length();
+    let mut cost_to_go = CostToGo {
+        quadratic: ocp.terminal.p,
+        linear: ocp.terminal.linear_x,
+    };
+    let mut before = sides;
+    add_to_cost(ocp, split_off(&mut before, n), &mut cost_to_go);
+    let stages = ocp.stages.iter().zip(factors.iter_mut());
+    for (i, (stage, factor)) in stages.enumerate().take(n).rev() {
+        let here = split_off(&mut before, i);
+        eliminate(ocp, i, stage, here, factor, &mut cost_to_go)?;
+        add_to_cost(ocp, here, &mut cost_to_go);
+    }
+    Ok(())
+}
+
+#[inline(never)]
+fn eliminate<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    i: usize,
+    stage: &Stage<T, NX, NU>,
+    sides: &[BoundSide<T>],
+    factor: &mut StageFactor<T, NX, NU>,
+    cost_to_go: &mut CostToGo<T, NX>,
+) -> Result<(), BadPivot<T>> {
+    let costs = Costs { ocp, sides };
+    factor.eliminate_adjusted(stage, ocp.common_at(i), cost_to_go, Some(&costs))?;
+    for side in sides {
+        if let (Some(j), Role::Held) = (side.input(), side.role) {
+            factor.inverse_factor[(j, j)] = T::zero();
+        }
+    }
+    Ok(())
+}
+
+/// The costs of a stage's sides.
+struct Costs<'a, T: 'static, const NX: usize, const NU: usize> {
+    ocp: &'a Ocp<T, NX, NU>,
+    sides: &'a [BoundSide<T>],
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize> Adjustment<T, NX, NU> for Costs<'_, T, NX, NU> {
+    fn adjust(&self, minimum: &mut StageMinimum<T, NX, NU>) {
+        for side in self.sides {
+            add_to_minimum(self.ocp, side, minimum);
+        }
+    }
+}
+
+/// The part of a side's cost that has to do with the input.
+#[inline(always)]
+fn add_to_minimum<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    side: &BoundSide<T>,
+    minimum: &mut StageMinimum<T, NX, NU>,
+) {
+    match side.bound.quantity {
+        Quantity::Input(j) if side.role == Role::Held => minimum.hold(j, side.limit),
+        Quantity::Input(j) => {
+            minimum.hessian[(j, j)] += side.weight;
+            minimum.g[j] -= pull(side);
+        }
+        Quantity::Row(j) => {
+            if let Some(row) = ocp.row(side.bound.stage, j) {
+                let weighted = row.u * side.weight;
+                minimum.hessian += weighted * row.u.transpose();
+                minimum.g_x += weighted * row.x.transpose();
+                minimum.g -= row.u * pull(side);
+            }
+        }
+        Quantity::State(_) => {}
+    }
+}
+
+/// The parts of the sides' costs that have to do with the state alone.
+fn add_to_cost<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    sides: &[BoundSide<T>],
+    cost: &mut CostToGo<T, NX>,
+) {
+    for side in sides {
+        match side.bound.quantity {
+            Quantity::State(j) => {
+                cost.quadratic[(j, j)] += side.weight;
+                cost.linear[j] -= pull(side);
+            }
+            Quantity::Row(j) => {
+                if let Some(row) = ocp.row(side.bound.stage, j) {
+                    cost.quadratic += row.x * side.weight * row.x.transpose();
+                    cost.linear -= row.x * pull(side);
+                }
+            }
+            Quantity::Input(_) => {}
+        }
+    }
+}
+
+/// The side's cost is weight * value^2 / 2 - pull * value.
+fn pull<T: Scalar>(side: &BoundSide<T>) -> T {
+    side.sign() * side.base + side.weight * side.limit
+}
+
+/// The trajectory of the factors' policies, and the distance of every side on it.
+pub(super) fn roll_out<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    factors: &[StageFactor<T, NX, NU>],
+    (u, x): (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
+) {
+    let at_rest = SVector::zeros();
+    let mut state = ocp.x0;
+    let places = u.iter_mut().zip(x.iter_mut());
+    let stages = ocp.stages.iter().zip(factors).zip(places);
+    for ((stage, factor), (u, x)) in stages.take(ocp.length()) {
+        *u = factor.policy(&state, &at_rest);
+        state = stage.next(&state, u);
+        *x = state;
+    }
+}
+
+/// The distances of all sides on a trajectory.
+pub(super) fn measure<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    sides: &mut [BoundSide<T>],
+    trajectory: &Trajectory<'_, T, NX, NU>,
+) {
+    let mut stage = 0;
+    let mut x = ocp.x0;
+    for side in sides {
+        if side.bound.stage != stage {
+            stage = side.bound.stage;
+            x = trajectory.state(ocp, stage);
+        }
+        let u = trajectory.u.get(stage).filter(|_| stage < ocp.length());
+        side.distance = side.distance_at(ocp, &x, u);
+    }
+}
+
+/// The derivative of the sides' part of the Lagrangian at a stage, in state and input, with these
+/// multipliers.
+fn gradient<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    sides: &[BoundSide<T>],
+    multiplier: impl Fn(&BoundSide<T>) -> T,
+) -> (SVector<T, NX>, SVector<T, NU>) {
+    let mut sum = (SVector::zeros(), SVector::zeros());
+    for side in sides {
+        let slope = -side.sign() * multiplier(side);
+        match side.bound.quantity {
+            Quantity::State(j) => sum.0[j] += slope,
+            Quantity::Input(j) => sum.1[j] += slope,
+            Quantity::Row(_) => {
+                let (x, u) = rows::normal(ocp, &side.bound);
+                sum.0 += x * slope;
+                sum.1 += u * slope;
+            }
+        }
+    }
+    sum
+}
+
+/// Adds to the trajectory what `change` of the sides' multipliers makes of its minimum.
+pub(super) fn shift<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    factors: &[StageFactor<T, NX, NU>],
+    sides: &[BoundSide<T>],
+    change: impl Fn(&BoundSide<T>) -> T,
+    v: &mut [SVector<T, NU>],
+    trajectory: (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
+) {
+    let n = ocp.length();
+    let mut before = sides;
+    let (mut costate, _) = gradient(ocp, split_off(&mut before, n), &change);
+    let stages = ocp.stages.iter().zip(factors).zip(v.iter_mut());
+    for (i, ((stage, factor), v)) in stages.enumerate().take(n).rev() {
+        let (slope_x, slope_u) = gradient(ocp, split_off(&mut before, i), &change);
+        *v = step_back(stage, factor, &slope_u, &mut costate);
+        costate += slope_x;
+    }
+    deviate(ocp, factors, v, trajectory, &mut []);
+}
+
+/// The deviation that takes the gradient `slope` in the input, and what the costate means for it, away; the
+/// costate becomes that in front of the stage.
+#[inline(always)]
+fn step_back<T: Scalar, const NX: usize, const NU: usize>(
+    stage: &Stage<T, NX, NU>,
+    factor: &StageFactor<T, NX, NU>,
+    slope: &SVector<T, NU>,
+    costate: &mut SVector<T, NX>,
+) -> SVector<T, NU> {
+    let input = transposed_times(&stage.b, costate) + slope;
+    *costate = transposed_times(&stage.a, costate) + transposed_product(&factor.feedback, &input);
+    -product(&factor.inverse_factor, &input)
+}
+
+/// Adds the deviations `v` from the policies to the trajectory. The multipliers of held states and rows take
+/// up what their weight makes of the distance after it: of the change itself, since the change of a sum is
+/// lost in rounding.
+pub(super) fn deviate<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    factors: &[StageFactor<T, NX, NU>],
+    v: &[SVector<T, NU>],
+    (u, x): (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
+    mut sides: &mut [BoundSide<T>],
+) {
+    let n = ocp.length();
+    let mut change = SVector::zeros();
+    let places = u.iter_mut().zip(x.iter_mut());
+    let stages = ocp.stages.iter().zip(factors).zip(v).zip(places);
+    for (i, (((stage, factor), v), (u, x))) in stages.enumerate().take(n) {
+        let input =
+            product(&factor.feedback, &change) + transposed_product(&factor.inverse_factor, v);
+        take_up(ocp, split_first_mut(&mut sides, i), &change, Some(&input));
+        change = product(&stage.a, &change) + product(&stage.b, &input);
+        *u += input;
+        *x += change;
+    }
+    take_up(ocp, sides, &change, None);
+}
+
+fn take_up<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    sides: &mut [BoundSide<T>],
+    change_x: &SVector<T, NX>,
+    change_u: Option<&SVector<T, NU>>,
+) {
+    for side in sides.iter_mut().filter(|side| side.is_weighted()) {
+        let (normal_x, normal_u) = rows::normal(ocp, &side.bound);
+        let change = normal_x.dot(change_x) + change_u.map_or(T::zero(), |u| normal_u.dot(u));
+        side.base -= side.weight * (side.distance + side.sign() * change);
+    }
+}
+
+/// What is missing for a minimum.
+pub(super) struct Residual<T> {
+    /// Largest entry of the Lagrangian's gradient in inputs that are not held.
+    pub rest: T,
+    /// Largest term of a gradient.
+    pub largest: T,
+}
+
+/// The problem's own adjoint recursion on the trajectory, with the multipliers of the sides at their
+/// distances: gives every held input its multiplier, and leaves in `v` the deviations that take what is
+/// left of the gradient away.
+pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    factors: &[StageFactor<T, NX, NU>],
+    sides: &mut [BoundSide<T>],
+    trajectory: &Trajectory<'_, T, NX, NU>,
+    v: &mut [SVector<T, NU>],
+) -> Residual<T> {
+    let n = ocp.length();
+    let mut residual = Residual {
+        rest: T::zero(),
+        largest: T::zero(),
+    };
+    let of_rows = |side: &BoundSide<T>| match side.input() {
+        None => side.multiplier_at(side.distance),
+        Some(_) => T::zero(),
+    };
+    let mut before = sides;
+    let end = split_off_mut(&mut before, n);
+    let (mut costate, _) = gradient(ocp, end, of_rows);
+    end.iter_mut().for_each(|side| side.estimate = side.base);
+    let of_cost = ocp.terminal.p * trajectory.state(ocp, n) + ocp.terminal.linear_x;
+    // The sizes of what adds up to the costate, and cancels where the sides decide.
+    let mut sizes = costate.abs() + of_cost.abs();
+    costate += of_cost;
+    let mut correction = SVector::zeros();
+    let stages = ocp.stages.iter().zip(factors).zip(v.iter_mut());
+    for (i, ((stage, factor), v)) in stages.enumerate().take(n).rev() {
+        let here = split_off_mut(&mut before, i);
+        let (slope_x, slope_u) = gradient(ocp, here, of_rows);
+        let (x, u) = (trajectory.state(ocp, i), trajectory.u.get(i));
+        let u = u.copied().unwrap_or_else(SVector::zeros);
+        let Common { q, r, s, .. } = ocp.common_at(i);
+        let through = transposed_times(&stage.b, &costate);
+        let mut slope = product(r, &u) + product(s, &x) + stage.linear_u + through + slope_u;
+        let terms = transposed_times(&stage.b.abs(), &sizes);
+        residual.largest = residual.largest.max(terms.amax()).max(slope_u.amax());
+        for side in here.iter_mut().filter(|side| side.role == Role::Held) {
+            side.estimate = match side.input() {
+                None => side.base,
+                Some(j) => side.sign() * core::mem::replace(&mut slope[j], T::zero()),
+            };
+        }
+        residual.rest = residual.rest.max(slope.amax());
+        costate = transposed_times(&stage.a, &costate)
+            + product(q, &x)
+            + transposed_product(s, &u)
+            + stage.linear_x;
+        sizes = costate.abs() + slope_x.abs();
+        costate += slope_x;
+        *v = step_back(stage, factor, &slope, &mut correction);
+    }
+    residual
+}

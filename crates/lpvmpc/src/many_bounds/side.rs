@@ -1,0 +1,239 @@
+//! The finite sides of all bounds, as the phase for many active bounds works with them.
+
+use crate::model::Scalar;
+use crate::ocp::{Ocp, Penalty};
+use crate::rows;
+use crate::solution::{BoundId, Quantity, Side};
+use nalgebra::{SVector, convert};
+
+/// How a side takes part in the program with equalities that a guess leads to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// Not at all.
+    Free,
+    /// It holds with equality.
+    Held,
+    /// It is soft, and exceeded.
+    Exceeded,
+}
+
+/// One finite side of a bound. Its distance d = value - lower or upper - value is to be >= 0; what is
+/// soft may be exceeded by s >= 0, d + s >= 0.
+///
+/// In a linear-quadratic program the side acts with the multiplier base - weight * d.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BoundSide<T> {
+    pub bound: BoundId,
+    pub limit: T,
+    /// The size against which a violation is measured.
+    pub size: T,
+    pub soft: Option<Penalty<T>>,
+    pub role: Role,
+    /// The role that the interior-point method foretold a step before.
+    pub last_role: Role,
+    /// Multiplier at d = 0, and how fast it falls with d.
+    pub base: T,
+    pub weight: T,
+    /// d on the trajectory at hand.
+    pub distance: T,
+    /// Multiplier of the guess.
+    pub estimate: T,
+    /// Of the interior-point method.
+    pub interior: Interior<T>,
+}
+
+/// A side's unknowns in the interior-point method, all above zero, or a step of them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Interior<T> {
+    /// d + s.
+    pub slack: T,
+    pub multiplier: T,
+    /// s, of a soft side.
+    pub excess: T,
+    /// Multiplier of s >= 0.
+    pub rest: T,
+}
+
+impl<T: Scalar> Interior<T> {
+    fn zero() -> Self {
+        let zero = T::zero();
+        Self {
+            slack: zero,
+            multiplier: zero,
+            excess: zero,
+            rest: zero,
+        }
+    }
+}
+
+impl<T: Scalar> BoundSide<T> {
+    /// A place for a side.
+    pub fn empty() -> Self {
+        Self::new(
+            BoundId {
+                stage: 0,
+                quantity: Quantity::State(0),
+                side: Side::Lower,
+            },
+            T::zero(),
+            T::one(),
+            None,
+        )
+    }
+
+    fn new(bound: BoundId, limit: T, size: T, soft: Option<Penalty<T>>) -> Self {
+        Self {
+            bound,
+            limit,
+            size,
+            soft,
+            role: Role::Free,
+            last_role: Role::Free,
+            base: T::zero(),
+            weight: T::zero(),
+            distance: T::zero(),
+            estimate: T::zero(),
+            interior: Interior::zero(),
+        }
+    }
+
+    /// The input that the side bounds.
+    pub fn input(&self) -> Option<usize> {
+        match self.bound.quantity {
+            Quantity::Input(j) => Some(j),
+            _ => None,
+        }
+    }
+
+    /// Whether it is held by a weight on its distance.
+    pub fn is_weighted(&self) -> bool {
+        self.role == Role::Held && self.input().is_none()
+    }
+
+    /// 1 for a lower bound, -1 for an upper one: the derivative of d in the bounded quantity.
+    pub fn sign(&self) -> T {
+        match self.bound.side {
+            Side::Upper => -T::one(),
+            _ => T::one(),
+        }
+    }
+
+    /// d where the quantity is bounded at these values of the stage.
+    pub fn distance_at<const NX: usize, const NU: usize>(
+        &self,
+        ocp: &Ocp<T, NX, NU>,
+        x: &SVector<T, NX>,
+        u: Option<&SVector<T, NU>>,
+    ) -> T {
+        let value = match self.bound.quantity {
+            Quantity::State(j) => x[j],
+            Quantity::Input(j) => u.map_or(self.limit, |u| u[j]),
+            Quantity::Row(j) => {
+                let row = ocp.row(self.bound.stage, j);
+                row.map_or(self.limit, |row| row.value(x, u))
+            }
+        };
+        (value - self.limit) * self.sign()
+    }
+
+    /// The multiplier at the distance d.
+    pub fn multiplier_at(&self, distance: T) -> T {
+        self.base - self.weight * distance
+    }
+
+    /// The linear price, infinite for a hard side: the largest multiplier at which the side holds.
+    pub fn price(&self) -> T {
+        let infinite = convert(f64::INFINITY);
+        self.soft.map_or(infinite, |penalty| penalty.linear)
+    }
+
+    /// The curvature of the excess' cost.
+    pub fn curvature(&self) -> T {
+        self.soft.map_or(T::zero(), |penalty| penalty.quadratic)
+    }
+}
+
+/// Puts the finite sides of all bounds of the problem into `sides`, stage by stage; how many there are, or `None` where there are not enough places, or a bound is NaN.
+pub(super) fn collect<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    sides: &mut [BoundSide<T>],
+) -> Option<usize> {
+    let mut count = 0;
+    let mut add = |stage, quantity, (lower, upper): (T, T), soft: Option<Penalty<T>>| {
+        let free = |price: Penalty<T>| price.linear <= T::zero() && price.quadratic <= T::zero();
+        if soft.is_some_and(free) {
+            return Some(());
+        }
+        let size = rows::size_of_bound(lower, upper);
+        for (side, limit) in [(Side::Lower, lower), (Side::Upper, upper)] {
+            // Whether a bound that is NaN is met, the dual method is to say.
+            limit.partial_cmp(&limit)?;
+            if limit.is_finite() {
+                let bound = BoundId {
+                    stage,
+                    quantity,
+                    side,
+                };
+                *sides.get_mut(count)? = BoundSide::new(bound, limit, size, soft);
+                count += 1;
+            }
+        }
+        Some(())
+    };
+    let n = ocp.length();
+    for i in 0..=n {
+        let common = ocp.common_at(i);
+        let (x, soft_x) = match i == n {
+            true => (&ocp.terminal.x, &ocp.terminal.soft_x),
+            false => (&common.x, &common.soft_x),
+        };
+        if i > 0 {
+            let limits = x.lower.iter().zip(x.upper.iter());
+            for (j, ((lower, upper), soft)) in limits.zip(soft_x).enumerate() {
+                add(i, Quantity::State(j), (*lower, *upper), *soft)?;
+            }
+        }
+        if i < n {
+            let limits = common.u.lower.iter().zip(common.u.upper.iter());
+            for (j, (lower, upper)) in limits.enumerate() {
+                add(i, Quantity::Input(j), (*lower, *upper), None)?;
+            }
+        }
+        for (j, row) in ocp.rows_of(i).iter().enumerate() {
+            add(i, Quantity::Row(j), (row.lower, row.upper), row.soft)?;
+        }
+    }
+    Some(count)
+}
+
+/// Takes the sides of the last stages, from `stage` on, off the list.
+pub(super) fn split_off<'a, T>(sides: &mut &'a [BoundSide<T>], stage: usize) -> &'a [BoundSide<T>] {
+    let before = sides.iter().rposition(|side| side.bound.stage < stage);
+    let (rest, here) = sides.split_at(before.map_or(0, |last| last + 1));
+    *sides = rest;
+    here
+}
+
+/// [`split_off`] for sides that are to change.
+pub(super) fn split_off_mut<'a, T>(
+    sides: &mut &'a mut [BoundSide<T>],
+    stage: usize,
+) -> &'a mut [BoundSide<T>] {
+    let before = sides.iter().rposition(|side| side.bound.stage < stage);
+    let whole = core::mem::take(sides);
+    let (rest, here) = whole.split_at_mut(before.map_or(0, |last| last + 1));
+    *sides = rest;
+    here
+}
+
+/// Takes the sides of the first stages, up to `stage`, off the list.
+pub(super) fn split_first_mut<'a, T>(
+    sides: &mut &'a mut [BoundSide<T>],
+    stage: usize,
+) -> &'a mut [BoundSide<T>] {
+    let whole = core::mem::take(sides);
+    let behind = whole.iter().position(|side| side.bound.stage > stage);
+    let (here, rest) = whole.split_at_mut(behind.unwrap_or(whole.len()));
+    *sides = rest;
+    here
+}
