@@ -41,7 +41,8 @@ finish "packages and types"
 PATH=/usr/bin:/bin pip venv install "$python"/lpvmpc-*.whl
 cd python
 # Not `python -m pytest`, which would take the package of this folder instead of the installed one.
-# In two processes, a file in one of them; then, alone, what takes time or is interrupted.
+# In two processes, each with a half of the files until it helps the other; then, alone, what takes times or is
+# interrupted.
 pytest=("$python/venv/bin/pytest" --quiet -p no:cacheprovider tests)
-"${pytest[@]}" --numprocesses 2 --dist loadfile -m "not alone"
+"${pytest[@]}" --numprocesses 2 --dist worksteal -m "not alone"
 "${pytest[@]}" -m alone
