@@ -5,7 +5,7 @@ cd "$(dirname "$0")/.."
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}
 
 .ci/install-browser.sh
-: "${CHROMIUM:=$(command -v chromium-headless-shell || command -v chromium)}"
+[[ -n ${CHROMIUM:-} ]] || CHROMIUM=$(command -v chromium-headless-shell || command -v chromium)
 export CHROMIUM
 
 cargo build --locked --release --features page -p ballbot-cli
