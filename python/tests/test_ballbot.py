@@ -241,6 +241,7 @@ def test_a_certificate_that_claims_too_much_is_refused(
         ballbot.certify(scenario, size=2.0)
 
 
+@pytest.mark.alone
 def test_times_of_a_step() -> None:
     found = ballbot.bench(["two-setpoints"])
     (one,) = found.sequences
