@@ -241,6 +241,7 @@ def test_a_certificate_that_claims_too_much_is_refused(
         ballbot.certify(scenario, size=2.0)
 
 
+@pytest.mark.alone
 def test_times_of_a_step() -> None:
     found = ballbot.bench(["two-setpoints"])
     (one,) = found.sequences
@@ -256,6 +257,7 @@ def test_the_papers_numbers() -> None:
     assert len(claims) > 20 and sum(one["agrees"] is True for one in claims) > len(claims) / 2
 
 
+@pytest.mark.alone
 def test_the_lock_is_let_go_and_progress_told(
     capfd: pytest.CaptureFixture[str], scenario: ballbot.Scenario
 ) -> None:
@@ -279,6 +281,7 @@ def test_the_lock_is_let_go_and_progress_told(
     assert "simulating" in capfd.readouterr().err
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(
     "long",
     [

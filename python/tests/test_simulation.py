@@ -139,6 +139,7 @@ def test_progress(capsys):
     assert "10/10" in capsys.readouterr().err
 
 
+@pytest.mark.alone
 def test_ctrl_c_ends_it():
     plant, mpc = cart_pole(), controller()
     # Python ignores what a finaliser raises, an interrupt, too: nothing is left that could be finalised.

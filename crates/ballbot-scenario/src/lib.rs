@@ -56,6 +56,7 @@ pub use prepare::plausible;
 pub use prepare::prepared::{Plane, Prepared, Problem};
 pub use prepare::proofs;
 pub use prepare::reference::PhiReference;
+pub use prepare::rollout;
 pub use prepare::standing::Standing;
 pub use prepare::three_motors::ThreeMotors;
 pub use prepare::uncertainty::{RobotDistribution, Uncertainty};

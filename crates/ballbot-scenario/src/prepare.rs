@@ -13,7 +13,7 @@ pub(crate) mod prepared;
 mod problem;
 pub mod proofs;
 pub(crate) mod reference;
-mod rollout;
+pub mod rollout;
 pub(crate) mod standing;
 pub(crate) mod three_motors;
 mod time_series;

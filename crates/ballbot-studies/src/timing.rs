@@ -12,8 +12,7 @@ use crate::StudyError;
 use ballbot::{Controller, ControllerSettings};
 use ballbot_scenario::{Prepared, Scenario, ScenarioError};
 use lpvmpc::{
-    GuaranteedController, GuaranteedIterations, Iterations, Reference, Solution, Solver,
-    TerminalIngredient,
+    GuaranteedController, GuaranteedIterations, Iterations, Reference, Solver, TerminalIngredient,
 };
 use lpvmpc_sim::advance;
 use nalgebra::Vector4;

@@ -64,10 +64,12 @@ fn optimum(taken: &[Taken], inputs: &[f64], now: usize) -> (Vector3<f64>, Matrix
         mean.push(f * mean[k] + g * inputs[k]);
         covariance.push(f * covariance[k] * f.transpose() + q);
     }
+    // Each is needed for thousands of pairs.
+    let powers: Vec<_> = (0..=now as u32).map(|steps| f.pow(steps)).collect();
     // Of the states at two samples: F^(i - j) P_j.
     let mixed = |i: usize, j: usize| match i >= j {
-        true => f.pow((i - j) as u32) * covariance[j],
-        false => (f.pow((j - i) as u32) * covariance[i]).transpose(),
+        true => powers[i - j] * covariance[j],
+        false => (powers[j - i] * covariance[i]).transpose(),
     };
     let arrived: Vec<_> = taken.iter().filter(|taken| taken.arrives <= now).collect();
     let count = arrived.len();

@@ -1,7 +1,7 @@
 //! How long a cart-pole from a file takes beside one that is written in Rust.
 //!
 //! ```text
-//! cargo run --release -p lpvmpc-plant --example time_evaluation
+//! cargo bench -p lpvmpc-plant --bench time_evaluation
 //! ```
 
 use lpvmpc::{AlongMotion, Dynamics, LpvModel, Number, Tangent};

@@ -2,7 +2,7 @@
 //! from the upright, or its own embedding.
 //!
 //! ```text
-//! cargo run --release -p lpvmpc-plant --example descent
+//! cargo bench -p lpvmpc-plant --bench descent
 //! ```
 
 use lpvmpc::{

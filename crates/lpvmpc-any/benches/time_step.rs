@@ -2,7 +2,7 @@
 //! Rust: both in the same closed loop, in turns.
 //!
 //! ```text
-//! cargo run --release -p lpvmpc-any --example time_step [PLANT]
+//! cargo bench -p lpvmpc-any --bench time_step [-- PLANT]
 //! ```
 
 use ballbot::Ballbot;
@@ -141,7 +141,11 @@ fn row<P, const NX: usize, const NU: usize, const NS: usize>(
 where
     P: LpvModel<f64, NX, NU, NS> + Clone,
 {
-    if std::env::args().nth(1).is_some_and(|wanted| wanted != name) {
+    // `cargo bench` adds an option of its own.
+    let mut wanted = std::env::args()
+        .skip(1)
+        .filter(|argument| !argument.starts_with("--"));
+    if wanted.next().is_some_and(|wanted| wanted != name) {
         return Ok(());
     }
     for (kind, iterations) in [

@@ -1,0 +1,131 @@
+//! How exactly the guaranteed loop's plans are rolled out: numbers of steps, and errors within their bounds.
+
+use ballbot_scenario::rollout::{accurate, derivatives_error};
+use ballbot_scenario::{PredictorTable, Scenario};
+use lpvmpc::{Bounds, Rk4, Rollout};
+use lpvmpc_sim::{Random, Tolerances};
+use nalgebra::{Matrix4, Vector1, Vector4};
+use std::path::Path;
+
+/// Whether the tilt and the rates are within their bounds.
+fn stays(bounds: &Bounds<f64, 4>, x: &Vector4<f64>) -> bool {
+    (1..4).all(|i| x[i] >= bounds.lower[i] && x[i] <= bounds.upper[i])
+}
+
+/// A margin that no permitted number of steps keeps is refused with the number that would.
+#[test]
+fn steps_that_are_too_coarse_are_refused_with_the_number_needed() {
+    let prepared = Scenario::load("far-setpoints").unwrap();
+    let prepared = prepared.prepare(Path::new(".")).unwrap();
+    let terminal = prepared.guaranteed().unwrap().terminal;
+    let refused = |margin: f64, wanted: Option<usize>| {
+        let (ballbot, plain) = (&prepared.ballbot, &prepared.settings);
+        let rollout = accurate(ballbot, plain, &terminal, margin, wanted);
+        rollout.map_or_else(|error| error.to_string(), |rollout| format!("{rollout:?}"))
+    };
+    assert!(refused(4e-3, Some(10)).contains("needs 12 integration steps"));
+    assert!(refused(4e-3, Some(65)).contains("64 are the most"));
+    assert!(refused(4e-3, Some(13)).contains("substeps: 13"));
+    let fine = refused(1e-5, None);
+    assert!(
+        fine.contains("controller.t_s") && fine.contains("needs about 128"),
+        "{fine}"
+    );
+}
+
+/// Between the points of the grid the derivatives are off by no more than there, beside many fine steps;
+/// a prediction too coarse for them is refused with the number needed.
+#[test]
+fn derivatives_are_as_accurate_as_a_guarantee_needs() {
+    let mut scenario = Scenario::load("far-setpoints").unwrap();
+    let prepared = scenario.prepare(Path::new(".")).unwrap();
+    let (ballbot, plain) = (prepared.ballbot, prepared.settings);
+    let rk4 = prepared.guaranteed().unwrap().rk4;
+    assert_eq!(rk4.substeps, 4);
+    let grid = derivatives_error(&ballbot, &plain, rk4);
+    assert!((0.003..0.005).contains(&grid), "{grid}");
+    let fine = Rk4 { substeps: 48 };
+    let mut random = Random::new(8, 0);
+    let mut worst = 0.0_f64;
+    for _ in 0..3000 {
+        let start = plain.x.upper.map(|limit| {
+            let part = random.symmetric();
+            if limit.is_finite() { part * limit } else { 0.0 }
+        });
+        let u = plain.u.upper * random.symmetric();
+        if !stays(&plain.x, &fine.advance(&ballbot, &start, &u, plain.t_s)) {
+            continue;
+        }
+        let (a, b) = rk4.differentiate(&ballbot, &start, &u, plain.t_s);
+        let (a_fine, b_fine) = fine.differentiate(&ballbot, &start, &u, plain.t_s);
+        let unit = plain.x.upper;
+        let unit = Vector4::new(unit[2] * plain.t_s, unit[1], unit[2], unit[3]);
+        let scaled =
+            |a: &Matrix4<f64>| Matrix4::from_fn(|i, j| a[(i, j)] * unit[j] / unit[i]).amax();
+        let by_state = scaled(&(a - a_fine)) / scaled(&a_fine);
+        let by_input = (b - b_fine).component_div(&unit).amax();
+        let by_input = by_input / b_fine.component_div(&unit).amax();
+        worst = worst.max(by_state).max(by_input);
+    }
+    assert!(worst < 1.3 * grid && worst > 0.5 * grid, "{worst} {grid}");
+
+    scenario.controller.predictor = Some(PredictorTable::StageConsistent { substeps: Some(2) });
+    let refused = scenario.prepare(Path::new(".")).unwrap_err().to_string();
+    assert!(
+        refused.contains("stage_consistent.substeps") && refused.contains("it needs 4"),
+        "{refused}"
+    );
+}
+
+/// From random states under random torques, the rollout is as close as is said to a plant that is
+/// integrated to 1e-12, and the plant is between two steps where it is said to be.
+#[test]
+fn the_error_is_within_its_bound() {
+    let prepared = Scenario::load("far-setpoints").unwrap();
+    let prepared = prepared.prepare(Path::new(".")).unwrap();
+    let settings = *prepared.guaranteed().unwrap();
+    let Rollout {
+        rk4,
+        error,
+        between,
+    } = settings.rollout;
+    let tolerances = Tolerances {
+        relative: 1e-12,
+        absolute: 1e-12,
+    };
+    let mut random = Random::new(7, 0);
+    let (mut largest, mut runs) = (0.0_f64, 0);
+    while runs < 3000 {
+        // Small motions as well as large ones.
+        let size = random.uniform().powi(2);
+        let part = |i: usize, random: &mut Random| {
+            size * random.symmetric() * if i == 0 { 0.0 } else { settings.x.upper[i] }
+        };
+        let start = Vector4::from_fn(|i, _| part(i, &mut random));
+        let u = Vector1::new(size * random.symmetric() * settings.u.upper[0]);
+        let exact = |seconds: f64| {
+            lpvmpc_sim::advance(&prepared.ballbot, &start, &u, seconds, tolerances).unwrap()
+        };
+        let end = exact(settings.t_s);
+        if !stays(&settings.x, &end) {
+            continue;
+        }
+        runs += 1;
+        let share = lpvmpc::share_of_bounds(&start, &settings.x, &u, &settings.u);
+        let off = (rk4.advance(&prepared.ballbot, &start, &u, settings.t_s) - end).abs();
+        for i in 0..4 {
+            let part = (off[i] - 1e-11) / (error[i] * share);
+            largest = largest.max(part);
+            assert!(part <= 1.0, "{start} {u}: {off}");
+        }
+        let step = settings.t_s / rk4.substeps as f64;
+        let ends = [start, exact(step)];
+        let inside = exact(step * random.uniform());
+        for i in 0..4 {
+            let [lower, upper] = [ends[0].inf(&ends[1])[i], ends[0].sup(&ends[1])[i]];
+            assert!(inside[i] <= upper + between[i] && inside[i] >= lower - between[i]);
+        }
+    }
+    // The factor of 2 is there, and little more.
+    assert!((0.2..0.75).contains(&largest), "{largest}");
+}
