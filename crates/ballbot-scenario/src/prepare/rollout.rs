@@ -7,7 +7,8 @@
 //! of |tilt|, |rate| and |torque| over its bound. The largest value is looked for on a grid of tilts,
 //! rates and torques over their bounds, corners included, among the motions that stay within them;
 //! twice that is taken for what lies between the points. It is an estimate with a safety factor, not a
-//! proof. The same goes for how far a state lies beyond both ends of a step, which is taken as it is.
+//! proof; a test encloses the error at points of the grid by machine. The same goes for how far a state lies
+//! beyond both ends of a step, which is taken as it is.
 //!
 //! Deviations from a plan are carried on by the derivatives of the prediction, whose Runge-Kutta steps
 //! are coarser. Their error is that of step doubling on the same grid, and has to be small against the
@@ -267,6 +268,7 @@ fn drift(
 mod tests {
     use super::*;
     use crate::{PredictorTable, Scenario};
+    use lpvmpc_certificate::RolloutClaim;
     use lpvmpc_sim::{Random, Tolerances};
     use std::path::Path;
 
@@ -333,6 +335,44 @@ mod tests {
             refused.contains("stage_consistent.substeps") && refused.contains("it needs 4"),
             "{refused}"
         );
+    }
+
+    /// At points of the grid the error is enclosed by machine, its own width included: the factor of 2 covers more
+    /// than step doubling.
+    #[test]
+    fn the_error_at_points_of_the_grid_is_proved() {
+        let prepared = Scenario::load("far-setpoints").unwrap();
+        let prepared = prepared.prepare(Path::new(".")).unwrap();
+        let settings = *prepared.guaranteed().unwrap();
+        let Rollout {
+            rk4,
+            error,
+            between,
+        } = settings.rollout;
+        let claim = RolloutClaim {
+            t_s: settings.t_s,
+            substeps: rk4.substeps,
+            x: settings.x,
+            u: settings.u,
+            error,
+            between,
+        };
+        let (mut largest, mut looked) = (0.0_f64, 0);
+        for (x, u) in motions(&prepared.ballbot, &prepared.settings, rk4).step_by(7) {
+            // Theta, both rates and the torque, and the time.
+            let sample = claim.enclose::<_, 3, 5>(&prepared.ballbot, &x, &u).unwrap();
+            // None at rest, and where the rollout leaves the bounds within the sample.
+            let Some(sample) = sample.filter(|sample| sample.stays) else {
+                continue;
+            };
+            looked += 1;
+            for i in 0..4 {
+                largest = largest.max(sample.error[i].magnitude() / error[i]);
+                assert!(sample.between[i] <= between[i], "{i}: {x} {u}");
+            }
+        }
+        assert!(looked > 50, "{looked}");
+        assert!((0.45..0.85).contains(&largest), "{largest}");
     }
 
     /// From random states under random torques, the rollout is as close as is said to a plant that is
