@@ -8,7 +8,9 @@ mod composition;
 mod elementary;
 mod flow;
 mod interval;
+mod motion;
 mod positive;
+mod runge_kutta;
 mod series;
 mod taylor_map;
 mod taylor_model;
@@ -18,6 +20,7 @@ pub(crate) use flow::product;
 pub use flow::{FlowError, Frame, SampleEnclosure, SampledLaw};
 pub use interval::Interval;
 pub(crate) use positive::{is_positive_definite, smallest_eigenvalue};
+pub(crate) use runge_kutta::ScaledPlant;
 pub use taylor_map::TaylorMap;
 pub use taylor_model::TaylorModel;
 

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | a gain and a cost for a set of schedulings | [`synthesize_terminal`] (linear matrix inequalities) |
 //! | a set, and the proof that it is one | [`certify_terminal`], [`Certificate::prove`] |
+//! | how far a rollout by Runge-Kutta steps is from its plant | [`RolloutClaim`] |
 //! | numbers that contain what they stand for | [`Interval`], [`TaylorModel`], [`TaylorMap`] |
 //! | where a sampled loop may be after a sample | [`SampleEnclosure`] |
 //!
@@ -24,12 +25,15 @@
 //! println!("sin is from {} to {}", sine.lower, sine.upper);
 //! ```
 
+mod cover;
 mod enclosure;
+mod rollout;
 mod terminal;
 
 pub use enclosure::{
     Arithmetic, FlowError, Frame, Interval, SampleEnclosure, SampledLaw, TaylorMap, TaylorModel,
 };
+pub use rollout::{EnclosedSample, RolloutClaim, RolloutError, RolloutProof};
 pub use terminal::{
     Certificate, CertificateProblem, CertifyError, ClaimError, DocumentError, Effort, MOST_BOXES,
     MOST_BYTES, PROOF_REVISION, Proof, QuadraticClaim, Record, SampledClaim, SynthesisError,

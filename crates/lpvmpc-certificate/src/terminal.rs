@@ -3,7 +3,6 @@
 mod certificate;
 mod claim;
 mod counterexample;
-mod cover;
 mod decrease;
 mod design;
 mod document;

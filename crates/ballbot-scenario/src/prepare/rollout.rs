@@ -7,7 +7,8 @@
 //! of |tilt|, |rate| and |torque| over its bound. The largest value is looked for on a grid of tilts,
 //! rates and torques over their bounds, corners included, among the motions that stay within them;
 //! twice that is taken for what lies between the points. It is an estimate with a safety factor, not a
-//! proof. The same goes for how far a state lies beyond both ends of a step, which is taken as it is.
+//! proof; a test encloses the error at points of the grid by machine. The same goes for how far a state lies
+//! beyond both ends of a step, which is taken as it is.
 //!
 //! Deviations from a plan are carried on by the derivatives of the prediction, whose Runge-Kutta steps
 //! are coarser. Their error is that of step doubling on the same grid, and has to be small against the
@@ -204,7 +205,7 @@ fn error(
 }
 
 /// States and torques on a grid over their bounds from which a sample, with `rk4`, ends within the bounds.
-fn motions(
+pub fn motions(
     ballbot: &Ballbot<f64>,
     plain: &ControllerSettings<f64>,
     rk4: Rk4,

@@ -1,8 +1,9 @@
 //! How exactly the guaranteed loop's plans are rolled out: numbers of steps, and errors within their bounds.
 
-use ballbot_scenario::rollout::{accurate, derivatives_error};
+use ballbot_scenario::rollout::{accurate, derivatives_error, motions};
 use ballbot_scenario::{PredictorTable, Scenario};
 use lpvmpc::{Bounds, Rk4, Rollout};
+use lpvmpc_certificate::RolloutClaim;
 use lpvmpc_sim::{Random, Tolerances};
 use nalgebra::{Matrix4, Vector1, Vector4};
 use std::path::Path;
@@ -75,6 +76,44 @@ fn derivatives_are_as_accurate_as_a_guarantee_needs() {
         refused.contains("stage_consistent.substeps") && refused.contains("it needs 4"),
         "{refused}"
     );
+}
+
+/// At points of the grid the error is enclosed by machine, its own width included: the factor of 2 covers more
+/// than step doubling.
+#[test]
+fn the_error_at_points_of_the_grid_is_proved() {
+    let prepared = Scenario::load("far-setpoints").unwrap();
+    let prepared = prepared.prepare(Path::new(".")).unwrap();
+    let settings = *prepared.guaranteed().unwrap();
+    let Rollout {
+        rk4,
+        error,
+        between,
+    } = settings.rollout;
+    let claim = RolloutClaim {
+        t_s: settings.t_s,
+        substeps: rk4.substeps,
+        x: settings.x,
+        u: settings.u,
+        error,
+        between,
+    };
+    let (mut largest, mut looked) = (0.0_f64, 0);
+    for (x, u) in motions(&prepared.ballbot, &prepared.settings, rk4).step_by(7) {
+        // Theta, both rates and the torque, and the time.
+        let sample = claim.enclose::<_, 3, 5>(&prepared.ballbot, &x, &u).unwrap();
+        // None at rest, and where the rollout leaves the bounds within the sample.
+        let Some(sample) = sample.filter(|sample| sample.stays) else {
+            continue;
+        };
+        looked += 1;
+        for i in 0..4 {
+            largest = largest.max(sample.error[i].magnitude() / error[i]);
+            assert!(sample.between[i] <= between[i], "{i}: {x} {u}");
+        }
+    }
+    assert!(looked > 50, "{looked}");
+    assert!((0.45..0.85).contains(&largest), "{largest}");
 }
 
 /// From random states under random torques, the rollout is as close as is said to a plant that is

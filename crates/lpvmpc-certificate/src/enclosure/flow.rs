@@ -4,7 +4,8 @@ use super::Columns;
 use super::composition::{Composition, Uncertain};
 use super::elementary::Arithmetic;
 use super::interval::Interval;
-use super::series::{CAPACITY, Series};
+use super::motion::{a_priori, coefficients};
+use super::series::CAPACITY;
 use super::taylor_map::{ROUNDING, TaylorMap};
 use super::taylor_model::TaylorModel;
 use lpvmpc::{Embedding, Number};
@@ -211,9 +212,9 @@ impl<M, const NX: usize, const NU: usize> Step<'_, M, NX, NU> {
         M: Embedding<NX, NU, NS>,
     {
         let inputs = ranges(model_inputs);
-        let during = self.a_priori(&ranges(columns), &inputs)?;
-        let remainder = &coefficients(self.model, &during, &inputs, ORDER)[ORDER];
-        let series = coefficients(self.model, columns, model_inputs, ORDER - 1);
+        let during = a_priori(self.model, None, self.length, &ranges(columns), &inputs)?;
+        let remainder = &coefficients(self.model, None, &during, &inputs, ORDER)[ORDER];
+        let series = coefficients(self.model, None, columns, model_inputs, ORDER - 1);
         let step = Interval::point(self.length);
         let end = (0..columns.len()).map(|column| {
             std::array::from_fn(|i| {
@@ -235,53 +236,7 @@ impl<M, const NX: usize, const NU: usize> Step<'_, M, NX, NU> {
         });
         Ok((end.collect(), path))
     }
-
-    /// Columns that no motion leaves during the step: with Y = Y(0) + [0, h] f(Y') inside Y',
-    /// the Picard iteration maps Y' into itself.
-    fn a_priori<const NS: usize>(
-        &self,
-        start: &Columns<Interval, NX>,
-        inputs: &Columns<Interval, NU>,
-    ) -> Result<Columns<Interval, NX>, FlowError>
-    where
-        M: Embedding<NX, NU, NS>,
-    {
-        let time = Interval::new(0.0, self.length);
-        let rates = &coefficients(self.model, start, inputs, 1)[1];
-        let ahead = time * Interval::point(FIRST_GUESS);
-        let mut guess = zip(start, rates, |start, rate| start + ahead * rate);
-        for _ in 0..MOST_PICARD_STEPS {
-            let rates = &coefficients(self.model, &guess, inputs, 1)[1];
-            let image = zip(start, rates, |start, rate| start + time * rate);
-            let inside = |(guess, image): (&[Interval; NX], &[Interval; NX])| {
-                guess
-                    .iter()
-                    .zip(image)
-                    .all(|(guess, image)| guess.contains(*image))
-            };
-            if guess.iter().zip(&image).all(inside) {
-                return Ok(image);
-            }
-            let widened =
-                |x: &Interval| Interval::around(x.middle(), (1.0 + INFLATION) * x.radius());
-            guess = image
-                .iter()
-                .map(|column| column.each_ref().map(widened))
-                .collect();
-            let unbounded = |x: &Interval| !x.magnitude().is_finite();
-            if guess.iter().flatten().any(unbounded) {
-                break;
-            }
-        }
-        Err(FlowError::NoEnclosure { step: self.length })
-    }
 }
-
-const MOST_PICARD_STEPS: usize = 30;
-/// The first guess goes by the initial rate, for this many steps.
-const FIRST_GUESS: f64 = 1.5;
-/// Share of its width by which a guess is widened on either side.
-const INFLATION: f64 = 0.05;
 
 /// T^-1 M R for an uncertain M: its error is T^-1 E R, and a column of E that is nearly zero stays
 /// apart. With W = diag(w) R, F = T^-1 E diag(1/w).
@@ -352,53 +307,4 @@ fn ranges<const D: usize, const N: usize>(
         .iter()
         .map(|column| column.map(TaylorModel::range))
         .collect()
-}
-
-fn zip<const N: usize>(
-    a: &Columns<Interval, N>,
-    b: &Columns<Interval, N>,
-    f: impl Fn(Interval, Interval) -> Interval,
-) -> Columns<Interval, N> {
-    let columns = a.iter().zip(b);
-    columns
-        .map(|(a, b)| std::array::from_fn(|i| f(a[i], b[i])))
-        .collect()
-}
-
-/// The Taylor coefficients 0 to `order` of the columns' motion, the first of which is the state:
-/// (k+1) Y_{k+1} = sum over j of A_j Y_{k-j} + B_k W.
-fn coefficients<T, M, const NX: usize, const NU: usize, const NS: usize>(
-    model: &M,
-    start: &Columns<T, NX>,
-    inputs: &Columns<T, NU>,
-    order: usize,
-) -> Vec<Columns<T, NX>>
-where
-    T: Arithmetic,
-    M: Embedding<NX, NU, NS>,
-{
-    let mut known = vec![start.clone()];
-    for k in 0..order {
-        let x = SVector::from_fn(|i, _| Series::new(known.iter().map(|y| y[0][i])));
-        let u = SVector::from_fn(|i, _| Series::fixed(inputs[0][i]));
-        let (a, b) = model.matrices(&model.scheduling(&x, &u));
-        let share = T::constant((k + 1) as f64).reciprocal();
-        let next = (0..start.len()).map(|column| {
-            std::array::from_fn(|i| {
-                let mut sum = T::constant(0.0);
-                for (j, y) in known.iter().rev().enumerate() {
-                    for m in 0..NX {
-                        sum = sum.plus_product(a[(i, m)].coefficient(j), &y[column][m]);
-                    }
-                }
-                for m in 0..NU {
-                    sum = sum.plus_product(b[(i, m)].coefficient(k), &inputs[column][m]);
-                }
-                sum * share
-            })
-        });
-        let next = next.collect();
-        known.push(next);
-    }
-    known
 }

@@ -42,6 +42,15 @@ impl<T: Arithmetic> Series<T> {
         }
     }
 
+    /// `value` + `slope` t, of which the first `known` coefficients count.
+    pub fn line(value: T, slope: T, known: usize) -> Self {
+        let mut series = Self::fixed(value);
+        series.coefficients[1] = slope;
+        series.known = known;
+        series.length = 2;
+        series
+    }
+
     pub fn coefficient(&self, k: usize) -> &T {
         &self.coefficients[k]
     }

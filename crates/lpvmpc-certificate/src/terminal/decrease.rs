@@ -1,8 +1,8 @@
 //! Proof that the terminal law decreases the terminal cost over each sample.
 
-use super::cover::{Cell, Finding};
 use super::ellipsoid::Ellipsoid;
 use super::normalised::{Normaliser, Square, corners, from_fn, transposed};
+use crate::cover::{Cell, Finding};
 use crate::enclosure::{
     Arithmetic, Interval, SampleEnclosure, SampledLaw, is_positive_definite, product,
     smallest_eigenvalue,

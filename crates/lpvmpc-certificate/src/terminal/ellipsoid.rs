@@ -1,7 +1,7 @@
 //! The set x'Px <= level.
 
-use super::cover::Cell;
 use super::normalised::{Normaliser, from_fn, transposed};
+use crate::cover::Cell;
 use crate::enclosure::{Arithmetic, Interval, is_positive_definite, product};
 use nalgebra::{SMatrix, SVector};
 

@@ -2,11 +2,11 @@
 
 use super::certificate::Certificate;
 use super::claim::ClaimError;
-use super::cover::{Covered, Uncovered};
 use super::ellipsoid::Ellipsoid;
 use super::normalised::Normaliser;
 use super::quadratic;
 use super::sampled::{BoxOfMotion, SampledClaim, axis, limit_error, point, symmetric};
+use crate::cover::{Covered, Uncovered};
 use lpvmpc::Embedding;
 use nalgebra::SVector;
 

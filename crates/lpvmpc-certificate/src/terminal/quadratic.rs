@@ -1,8 +1,8 @@
 //! Quadratic stability: one P for a scheduling that moves anyhow within a box.
 
-use super::cover::{Cell, Covered, Finding, Uncovered, cover};
 use super::lmi::{AffineMatrix, maximise_log_det};
 use super::normalised::{Normaliser, corners, from_fn, minus_identity, transposed};
+use crate::cover::{Cell, Covered, Finding, Uncovered, cover};
 use crate::enclosure::{
     Interval, TaylorMap, TaylorModel, is_positive_definite, product, smallest_eigenvalue,
 };

@@ -2,11 +2,11 @@
 
 use super::certificate::TerminalClaim;
 use super::claim::ClaimError;
-use super::cover::{Uncovered, cover};
 use super::decrease::{Decrease, allowed};
 use super::ellipsoid::Ellipsoid;
 use super::normalised::{Normaliser, from_fn};
 use super::proof::Proof;
+use crate::cover::{Uncovered, cover};
 use crate::enclosure::{Interval, SampledLaw};
 use lpvmpc::Embedding;
 use nalgebra::{SMatrix, SVector};

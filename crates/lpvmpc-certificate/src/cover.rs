@@ -5,7 +5,7 @@ use nalgebra::SVector;
 
 /// The points with |x_i - centre_i| <= half_widths_i.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Cell<const N: usize> {
+pub(crate) struct Cell<const N: usize> {
     pub centre: SVector<f64, N>,
     pub half_widths: SVector<f64, N>,
 }
@@ -35,7 +35,7 @@ impl<const N: usize> Cell<N> {
 
 /// What was found out about a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Finding {
+pub(crate) enum Finding {
     /// Nothing is claimed there.
     Outside,
     /// The statement holds, with this much to spare.
@@ -56,7 +56,7 @@ pub(super) enum Finding {
 
 /// A statement that was proved.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Covered {
+pub(crate) struct Covered {
     /// Cells on which it was proved.
     pub cells: usize,
     /// The smallest spare.
@@ -65,7 +65,7 @@ pub(super) struct Covered {
 
 /// A statement that was not proved.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Uncovered<const N: usize> {
+pub(crate) enum Uncovered<const N: usize> {
     /// It is false here.
     False { at: SVector<f64, N> },
     /// It could not be decided near here: the way of proof cannot succeed, or not with so many
@@ -81,7 +81,7 @@ const TOGETHER: usize = 64;
 
 /// Proves a statement on `whole` by looking at `most_cells` cells at most. `progress` hears which
 /// share of it is done.
-pub(super) fn cover<const N: usize>(
+pub(crate) fn cover<const N: usize>(
     whole: Cell<N>,
     most_cells: usize,
     examine: impl Fn(&Cell<N>) -> Finding + Sync,
