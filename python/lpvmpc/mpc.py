@@ -113,8 +113,11 @@ class Plan:
     @property
     def is_guaranteed(self) -> bool:
         """Whether, with a certificate, there will be a plan at every later sample: states at the samples and inputs
-        keep their bounds, and the plan's cost falls by the stage cost, while the plant is the model, up to the error of
-        its Runge-Kutta steps, for which a thousandth of the bounds is kept."""
+        keep their bounds, and the plan's cost falls by the stage cost while references beyond the horizon stay; while
+        the plant is the model, up to the error of its Runge-Kutta steps, for which a thousandth of the bounds is kept,
+        its state is known exactly and its input acts at once. Of a plan by `Mpc.decide` it is said of the model alone,
+        from the estimated state, under the disturbances beside the inputs as they are estimated then: the plant keeps
+        to it as far as the estimate is right and stays."""
         return self.decision in ("new plan", "candidate", "terminal law")
 
     @property
@@ -162,7 +165,8 @@ class Mpc:
         without one) from there on; a matrix (n, n) or its diagonal; ``"equality"``, x_N = x_ref; or a
         `Certificate` of this plant, with its cost and its set: the loop is then guaranteed as `Plan.decision` says. Its
         reference is the certificate's equilibrium, but for states that no formula of the plant reads (a cart's
-        position): these may be sent anywhere, at every sample.
+        position): these may be sent anywhere, at every sample, and by stage where it is known ahead. With an
+        `estimator` the guarantee is for the model from the estimated state, not for the plant.
     x_bounds, u_bounds
         Bounds of x_1 to x_N and of the inputs: (lower, upper), or by name,
         ``{"position": (-1, 1)}``; a state or input that is not named has those of the plant.
@@ -206,7 +210,8 @@ class Mpc:
     tolerance
         A descent ends when the cost falls by less than this part of it.
     estimator
-        How the state is found from readings; then `observe` and `decide` take the place of `step`.
+        How the state is found from readings; then `observe` and `decide` take the place of `step`. With a certificate
+        its disturbances are beside inputs: one on a state would move the equilibrium.
 
     Raises
     ------
@@ -335,7 +340,8 @@ class Mpc:
             The measured state, shape (n,). One that is not finite is answered by a plan whose
             status says so.
         x_ref
-            The reference, (n,) or (stages, n). Without: the plant's equilibrium, or zero.
+            The reference, (n,) or (stages, n). Without: the plant's equilibrium, or zero. With a certificate it is all
+            that a step may be told.
         u_ref
             The input that costs nothing, (m,) or (stages, m). With one, `x_ref` is taken as it is.
         q, r
@@ -425,7 +431,8 @@ class Mpc:
 
         Its first input must be applied (or `set_last_input` say what was): the estimator counts on it. Stage 0 is when it
         acts, the delay after the last readings. While there is no estimate, the plan's status says so, and its inputs
-        are those nearest to zero within the bounds.
+        are those nearest to zero within the bounds. With a certificate, `Plan.is_guaranteed` is then said of the model
+        from that state alone.
 
         Parameters
         ----------

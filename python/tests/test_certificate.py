@@ -129,8 +129,10 @@ def test_a_guaranteed_loop_reaches_its_equilibrium(certified):
         mpc.set(q=[20, 5, 0.1, 0.1])
     with pytest.raises(lpvmpc.SettingError, match="tilt is 0.1.* reads: position$"):
         mpc.step(x0, x_ref=[0, 0.1, 0, 0])
-    with pytest.raises(lpvmpc.SettingError, match="nothing else that is ahead"):
+    with pytest.raises(lpvmpc.SettingError, match="u_ref: .* nothing else that is ahead"):
         mpc.step(x0, u_ref=[0.1])
+    with pytest.raises(lpvmpc.SettingError, match="x_ref, stage 1: tilt is 0.1"):
+        mpc.step(x0, x_ref=[[0, 0, 0, 0], [0, 0.1, 0, 0]])
     assert pickle.loads(pickle.dumps(mpc)).step(x0).decision == "new plan"
     other = lpvmpc.Plant.from_matrices(np.zeros((4, 4)), np.ones((4, 1)))
     with pytest.raises(lpvmpc.CertificateError, match="another plant"):
@@ -187,6 +189,77 @@ def test_a_far_set_point_is_reached_as_fast_as_without_a_guarantee(on_a_track):
         return np.argmax(abs(run.x[:, 0] - goal) < 0.05 * goal) * T_S
 
     assert arrives(certificate, 12.0) < 1.1 * arrives("lqr", 12.0)
+
+
+def drive(plant, certificate, told, count=100, change=30):
+    """The cost of a loop on the plant, integrated to 1e-11, whose set point is told so many samples ahead."""
+    reference = np.zeros((count + told + 1, 4))
+    reference[change:, 0] = 4.0
+    mpc = lpvmpc.Mpc(plant, T_S, 30, *WEIGHTS, terminal=certificate)
+    x, cost, moved = np.zeros(4), 0.0, None
+    for k in range(count):
+        plan = mpc.step(x, reference[k : k + told + 1])
+        assert plan.is_guaranteed, f"{k}: {plan.status}"
+        e = x - reference[k]
+        cost += e @ np.diag(WEIGHTS[0]) @ e + WEIGHTS[1][0] * plan.u0[0] ** 2
+        motion = exact(plant, x, plan.u0)
+        assert abs(motion[:, 1]).max() <= 0.5 and abs(motion[:, 2]).max() <= 2 and abs(plan.u0[0]) <= 10
+        x = motion[-1]
+        moved = k if moved is None and abs(x[0]) > 0.01 else moved
+    assert abs(x[0] - 4.0) < 0.05
+    return cost, moved
+
+
+def test_a_set_point_that_is_told_ahead_costs_less(on_a_track):
+    (late, after), (early, before) = drive(*on_a_track, told=0), drive(*on_a_track, told=30)
+    assert early < 0.25 * late
+    assert before < 30 <= after
+
+
+def test_a_guaranteed_loop_behind_readings_tracks(on_a_track):
+    plant, certificate = on_a_track
+    estimator = lpvmpc.Estimator(
+        measured={"position": 1e-6, "tilt": 1e-6}, state_noise=[1e-6, 1e-6, 1e-4, 1e-4],
+        initial_state=1e-4, disturbances={"force": lpvmpc.Disturbance(noise=1.0)}, delay=T_S,
+    )  # fmt: skip
+
+    def run(estimator):
+        mpc = lpvmpc.Mpc(plant, T_S, 20, *WEIGHTS, terminal=certificate, estimator=estimator)
+        # Half a newton from the side, as it acts on an upright pole.
+        load = plant.f(np.zeros(4), [0.5])
+        sensors = {name: lpvmpc.Sensor(noise=1e-3) for name in ("position", "tilt")}
+        return lpvmpc.simulate(
+            plant, mpc, x0=np.zeros(4), duration=9.0, x_ref=lambda t: [0.0 if t < 2 else 1.0, 0, 0, 0],
+            sensors=sensors, delay=T_S, disturbances=[lpvmpc.Load(1.0, np.inf, load)],
+        )  # fmt: skip
+
+    found = run(estimator)
+    assert sum(plan.is_guaranteed for plan in found.plans) >= 0.95 * len(found.plans)
+    assert abs(found["position"][-20:].mean() - 1.0) < 0.02
+    assert abs(found.disturbances["force"][-20:].mean() - 0.5) < 0.1
+    assert abs(found.u).max() <= 10
+    # Without the disturbance in its model it stands aside.
+    unaware = run(lpvmpc.Estimator(**{**vars(estimator), "disturbances": {}}))
+    assert abs(unaware["position"][-20:].mean() - 1.0) > 0.03
+
+
+def test_what_an_estimator_and_a_certificate_have_no_meaning_for_is_refused(on_a_track):
+    plant, certificate = on_a_track
+    moving = lpvmpc.Estimator({"position": 1e-6, "tilt": 1e-6}, 1e-4, {"speed": lpvmpc.Disturbance(0.1)})
+    with pytest.raises(lpvmpc.SettingError, match=r"speed is a state.*beside an input \(force\)"):
+        lpvmpc.Mpc(plant, T_S, 20, *WEIGHTS, terminal=certificate, estimator=moving)
+    mpc = lpvmpc.Mpc(
+        plant, T_S, 20, *WEIGHTS, terminal=certificate,
+        estimator=lpvmpc.Estimator({"position": 1e-6, "tilt": 1e-6}, 1e-4),
+    )  # fmt: skip
+    plan = mpc.decide()
+    assert not plan.is_guaranteed and plan.message.startswith("not guaranteed: ") and abs(plan.u0[0]) <= 10
+    # A pole that lies too far over: nothing leads into the set, and the plan says so.
+    mpc.observe(0.0, [0.0, 1.2])
+    plan = mpc.decide([[0, 0, 0, 0], [1, 0, 0, 0]])
+    assert not plan.is_guaranteed and plan.message.startswith("not guaranteed, "), plan
+    with pytest.raises(lpvmpc.SettingError, match="disturbance: .* nothing else that is ahead"):
+        mpc.decide(disturbance=[0, 0, 0, 0])
 
 
 def test_a_plant_that_notices_where_it_stands_has_no_other_set_points():

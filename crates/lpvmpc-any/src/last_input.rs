@@ -20,11 +20,17 @@ impl<const NX: usize, const NU: usize, const NS: usize> Disturbed<NX, NU, NS> {
         self.beside.map_or(*u, |beside| u + beside)
     }
 
-    fn inputs<const POINTS: usize>(
+    /// What of several points is asked `of` the plant, at the inputs that act there.
+    #[inline(always)]
+    fn at_inputs<const POINTS: usize>(
         &self,
         u: &[SVector<f64, NU>; POINTS],
-    ) -> [SVector<f64, NU>; POINTS] {
-        u.map(|u| self.input(&u))
+        of: impl FnOnce(&[SVector<f64, NU>; POINTS]),
+    ) {
+        match &self.beside {
+            None => of(u),
+            Some(beside) => of(&u.map(|u| u + beside)),
+        }
     }
 
     fn disturbed(&self, rate: SVector<f64, NX>) -> SVector<f64, NX> {
@@ -64,6 +70,8 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
         parts.into_iter().flatten().reduce(|sum, part| sum + part)
     }
 
+    // Called for every stage of every step of every rollout.
+    #[inline(always)]
     fn derivative(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> SVector<f64, NX> {
         self.disturbed(self.plant.derivative(x, &self.input(u)))
     }
@@ -94,7 +102,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
         u: &[SVector<f64, NU>; POINTS],
         tangents: &mut [Tangent<f64, NX, NU>; POINTS],
     ) {
-        self.plant.embedded_each(x, &self.inputs(u), tangents);
+        self.at_inputs(u, |u| self.plant.embedded_each(x, u, tangents));
         self.disturb(tangents);
     }
 
@@ -104,7 +112,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
         u: &[SVector<f64, NU>; POINTS],
         tangents: &mut [Tangent<f64, NX, NU>; POINTS],
     ) {
-        self.plant.tangent_each(x, &self.inputs(u), tangents);
+        self.at_inputs(u, |u| self.plant.tangent_each(x, u, tangents));
         self.disturb(tangents);
     }
 

@@ -20,11 +20,12 @@ pub(crate) struct Filled<P> {
 impl<P> Filled<P> {
     /// The first of `places` that decays as x_dot = -x: in discrete time none, where what
     /// nothing moves is zero after a period.
-    fn first_decaying(&self, places: usize, period: Option<f64>) -> usize {
-        match period {
-            None => self.states,
-            Some(_) => places,
+    #[inline(always)]
+    fn first_decaying(&self, places: usize, period: impl FnOnce() -> Option<f64>) -> usize {
+        if self.states >= places || period().is_some() {
+            return places;
         }
+        self.states
     }
 }
 
@@ -34,7 +35,7 @@ impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for Filled<SizedPlant<NX
     }
 
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
-        let from = self.first_decaying(NX, self.period());
+        let from = self.first_decaying(NX, || self.period());
         decaying(self.plant.f(x, u), x, from)
     }
 
@@ -47,7 +48,7 @@ impl<const NX: usize, const NU: usize> Dynamics<NX, NU> for Filled<SizedPlant<NX
         tangents: &mut [Tangent<T, NX, NU>; POINTS],
     ) -> bool {
         let there = Dynamics::tangent_each(&self.plant, x, u, tangents);
-        fill(tangents, x, self.first_decaying(NX, self.period()));
+        fill(tangents, x, self.first_decaying(NX, || self.period()));
         there
     }
 }
@@ -93,7 +94,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         scheduling: &SVector<N, NS>,
     ) -> (SMatrix<N, NX, NX>, SMatrix<N, NX, NU>) {
         let (mut a, b) = Embedding::matrices(&self.plant, scheduling);
-        for i in self.first_decaying(NX, Embedding::period(self))..NX {
+        for i in self.first_decaying(NX, || Embedding::period(self))..NX {
             a[(i, i)] = N::constant(-1.0);
         }
         (a, b)
@@ -104,7 +105,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
     }
 
     fn f<N: Number>(&self, x: &SVector<N, NX>, u: &SVector<N, NU>) -> SVector<N, NX> {
-        let from = self.first_decaying(NX, Embedding::period(self));
+        let from = self.first_decaying(NX, || Embedding::period(self));
         decaying(Embedding::f(&self.plant, x, u), x, from)
     }
 
@@ -131,7 +132,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         fill(
             tangents,
             x,
-            self.first_decaying(NX, Embedding::period(self)),
+            self.first_decaying(NX, || Embedding::period(self)),
         );
     }
 
@@ -145,7 +146,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
         fill(
             tangents,
             x,
-            self.first_decaying(NX, Embedding::period(self)),
+            self.first_decaying(NX, || Embedding::period(self)),
         );
         there
     }
@@ -248,6 +249,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS
         whichever!(self, model => LpvModel::<f64, NX, NU, NS>::embedded(model, x, u))
     }
 
+    #[inline(always)]
     fn derivative(&self, x: &SVector<f64, NX>, u: &SVector<f64, NU>) -> SVector<f64, NX> {
         whichever!(self, model => LpvModel::<f64, NX, NU, NS>::derivative(model, x, u))
     }

@@ -1,8 +1,9 @@
 //! A controller of any size.
 
+use crate::check::Names;
 use crate::error::MpcError;
 use crate::estimator::{Estimate, EstimatorSettings};
-use crate::guaranteed::Guarantee;
+use crate::guaranteed::{Guarantee, check_estimator};
 use crate::plan::Plan;
 use crate::preview::Preview;
 use crate::settings::MpcSettings;
@@ -84,8 +85,12 @@ impl Mpc {
     /// A list of the preview that has not the plant's sizes, or has a number that makes no sense.
     pub fn step(&mut self, x: &[f64], preview: &Preview) -> Result<Plan, MpcError> {
         match &mut self.guarantee {
-            Some(guarantee) => guarantee.step(self.sized.as_mut(), x, preview),
-            None => self.sized.step(x, preview),
+            Some(guarantee) => {
+                let plan = guarantee.step(self.sized.as_mut(), x, None, preview)?;
+                self.sized.apply(&plan.first_input());
+                Ok(plan)
+            }
+            None => self.sized.step(x, None, preview),
         }
     }
 
@@ -96,8 +101,8 @@ impl Mpc {
     /// As [`new`](Self::new); the controller is as it was then.
     pub fn set_settings(&mut self, settings: &MpcSettings) -> Result<(), MpcError> {
         let guarantee = Guarantee::new(self.sized.plant(), settings)?;
-        if guarantee.is_some() && self.sized.estimator().is_some() {
-            return Err(not_exact());
+        if let (Some(_), Some(estimator)) = (&guarantee, self.sized.estimator()) {
+            check_estimator(&Names::new(self.sized.plant()), estimator)?;
         }
         if places(self.sized.plant(), settings).0 <= self.sized.places() {
             self.sized.set_settings(settings)?;
@@ -144,10 +149,11 @@ impl Mpc {
     /// [`Self::decide`]. One that is there already is taken over with its state; `None` ends it.
     ///
     /// # Errors
-    /// The setting that makes no sense; a disturbance that the readings cannot tell. All is as it was then.
+    /// The setting that makes no sense; a disturbance that the readings cannot tell; with a certified terminal set one on
+    /// a state, which moves the equilibrium that the certificate is about. All is as it was then.
     pub fn set_estimator(&mut self, settings: Option<&EstimatorSettings>) -> Result<(), MpcError> {
-        if self.guarantee.is_some() && settings.is_some() {
-            return Err(not_exact());
+        if let (Some(_), Some(settings)) = (&self.guarantee, settings) {
+            check_estimator(&Names::new(self.sized.plant()), settings)?;
         }
         self.sized.set_estimator(settings)
     }
@@ -168,10 +174,22 @@ impl Mpc {
     ///
     /// While there is no estimate, the plan's status says so, and its inputs are those nearest to zero.
     ///
+    /// With a certified terminal set the loop is that of [`Self::step`] from the estimate carried through the delay. What
+    /// [`Plan::decision`] says is then of the model from there, with the disturbances beside the inputs as they are
+    /// estimated; of the plant nothing is guaranteed.
+    ///
     /// # Errors
     /// There is no estimator; or as [`Self::step`].
     pub fn decide(&mut self, preview: &Preview) -> Result<Plan, MpcError> {
-        self.sized.decide(preview)
+        let Some(guarantee) = &mut self.guarantee else {
+            return self.sized.decide(preview);
+        };
+        let ahead = self.sized.ahead()?;
+        let beside = ahead.beside.as_deref();
+        let plan = guarantee.step(self.sized.as_mut(), &ahead.x, beside, preview)?;
+        self.sized.apply(&plan.first_input());
+        self.sized.send();
+        Ok(plan)
     }
 
     /// The estimate at the last readings; `None` without an estimator.
@@ -196,9 +214,4 @@ impl Mpc {
     pub fn states(&self) -> usize {
         self.states
     }
-}
-
-fn not_exact() -> MpcError {
-    let fault = "what a certified terminal set guarantees is for the exact state, without delay";
-    MpcError::new("estimator", fault)
 }

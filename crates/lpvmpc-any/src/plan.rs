@@ -25,7 +25,8 @@ pub struct Plan {
     /// Quadratic programs that were solved.
     pub problems: usize,
     /// The steady state that it heads for: the nearest to the end of the references. `None` with an input
-    /// reference that was given, and where none was found.
+    /// reference that was given, and where none was found. With a certified terminal set it is the one about which the plan
+    /// ends in the set, on the way to the end of the references; `None` where nothing is guaranteed.
     pub target: Option<Target>,
     /// What the first input is backed by, of a controller with a certified terminal set
     /// ([`crate::TerminalSet`]); `None` of any other.

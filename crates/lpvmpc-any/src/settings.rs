@@ -108,11 +108,12 @@ pub enum Terminal {
 /// set again, and lowers that cost by at least the stage cost. The controller takes it at its word.
 ///
 /// It goes to this equilibrium, or to one moved along states that no formula of the plant reads
-/// ([`lpvmpc_plant::PlantData::is_invariant_along`]): there the reference may be anything, and what the bounds have no room
-/// for is gone to as far as they have. It applies no plan that a rollout of the nonlinear plant does not confirm
+/// ([`lpvmpc_plant::PlantData::is_invariant_along`]): there the reference may be anything, stage by stage, and what the bounds
+/// have no room for is gone to as far as they have. It applies no plan that a rollout of the nonlinear plant does not confirm
 /// ([`crate::Plan::decision`]). Once there is a plan, there is one at every later sample, states at the samples and
-/// inputs keep their bounds, and the plan's cost falls by at least the stage cost, for the plant as its rollouts
-/// have it, with the measured state exact, no delay and no disturbance. Rollouts are by Runge-Kutta steps, four for each
+/// inputs keep their bounds, and the plan's cost falls by at least the stage cost while references beyond the horizon stay,
+/// for the plant as its rollouts have it, with the measured state exact, no delay and no disturbance. By
+/// [`crate::Mpc::decide`] that is said of the model from the estimated state, not of the plant. Rollouts are by Runge-Kutta steps, four for each
 /// of `substeps`; their error is not enclosed, and a thousandth of the distance to each bound is kept for it. Between
 /// the samples the bounds hold in the terminal set only.
 #[derive(Debug, Clone, PartialEq)]

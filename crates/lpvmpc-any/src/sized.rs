@@ -17,8 +17,13 @@ use nalgebra::SVector;
 
 /// A controller whose size nobody sees.
 pub(crate) trait AnySize: Send + Sync {
-    /// See [`crate::Mpc::step`].
-    fn step(&mut self, x: &[f64], preview: &Preview) -> Result<Plan, MpcError>;
+    /// See [`crate::Mpc::step`]; `beside` is added to the input, if it is there.
+    fn step(
+        &mut self,
+        x: &[f64],
+        beside: Option<&[f64]>,
+        preview: &Preview,
+    ) -> Result<Plan, MpcError>;
     /// See [`crate::Mpc::set_settings`].
     fn set_settings(&mut self, settings: &MpcSettings) -> Result<(), MpcError>;
     /// See [`crate::Mpc::set_parameter`].
@@ -41,10 +46,24 @@ pub(crate) trait AnySize: Send + Sync {
     fn observe(&mut self, t: f64, readings: &[Option<f64>]) -> Result<Vec<Verdict>, MpcError>;
     /// See [`crate::Mpc::decide`].
     fn decide(&mut self, preview: &Preview) -> Result<Plan, MpcError>;
+    /// Where the next input will act, of which there is no disturbance on a state.
+    fn ahead(&self) -> Result<Ahead, MpcError>;
+    /// The input `u`, of the plant's size, is applied in place of the last plan's.
+    fn apply(&mut self, u: &[f64]);
+    /// The applied input was sent: an estimator counts on it.
+    fn send(&mut self);
     /// See [`crate::Mpc::estimate`].
     fn estimate(&self) -> Option<Estimate>;
     /// The settings of the estimator.
     fn estimator(&self) -> Option<&EstimatorSettings>;
+}
+
+/// What an estimator says of when the next input will act.
+pub(crate) struct Ahead {
+    /// The state; not a number where there is no estimate.
+    pub x: Vec<f64>,
+    /// What acts beside the input; `None` where no disturbance is looked for.
+    pub beside: Option<Vec<f64>>,
 }
 
 type Planner<const NX: usize, const NU: usize, const NS: usize> =
@@ -215,9 +234,19 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
 }
 
 impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU, NS> {
-    fn step(&mut self, x: &[f64], preview: &Preview) -> Result<Plan, MpcError> {
+    fn step(
+        &mut self,
+        x: &[f64],
+        beside: Option<&[f64]>,
+        preview: &Preview,
+    ) -> Result<Plan, MpcError> {
         let x = self.names.vector(Axis::States, "x", x)?;
-        self.plan_from(x, None, preview)
+        let beside = match beside {
+            Some(beside) => Some(self.names.vector(Axis::Inputs, "disturbance", beside)?),
+            None => None,
+        };
+        let acting = beside.map(|beside| (beside, SVector::zeros()));
+        self.plan_from(x, acting, preview)
     }
 
     fn set_settings(&mut self, settings: &MpcSettings) -> Result<(), MpcError> {
@@ -321,6 +350,27 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
             filter.send(&self.applied, &known);
         }
         Ok(plan)
+    }
+
+    fn ahead(&self) -> Result<Ahead, MpcError> {
+        let filter = self.filter.as_ref().ok_or_else(no_estimator)?;
+        let looked_for = !filter.settings.disturbances.is_empty();
+        let (x, (beside, _)) = (filter.ahead(), filter.disturbance());
+        let beside = &beside.as_slice()[..self.names.inputs.len()];
+        Ok(Ahead {
+            x: x.as_slice()[..self.names.states.len()].to_vec(),
+            beside: looked_for.then(|| beside.to_vec()),
+        })
+    }
+
+    fn apply(&mut self, u: &[f64]) {
+        self.applied = SVector::from_fn(|j, _| u.get(j).copied().unwrap_or(0.0));
+    }
+
+    fn send(&mut self) {
+        if let Some(filter) = &mut self.filter {
+            filter.send(&self.applied, &SVector::zeros());
+        }
     }
 
     fn estimate(&self) -> Option<Estimate> {

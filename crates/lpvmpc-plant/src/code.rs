@@ -1,8 +1,8 @@
 //! A program made ready for evaluation: what the results need, on as few registers as it takes.
 
 use crate::operation::{Binary, Operation, Unary};
+use crate::registers::{FEW, Kept, Name, Registers};
 use lpvmpc::{Bivariate, Elementary, Number};
-use std::cell::RefCell;
 use std::collections::HashMap;
 
 /// The numbers that are given, in the order of their registers, which are the first ones.
@@ -266,14 +266,10 @@ impl Leaves {
         self.constants.len() + lists.map(Vec::len).iter().sum::<usize>()
     }
 
-    /// Puts them into the first registers: the `fixed` ones, then each `leaf`.
+    /// Puts each `leaf` into the registers behind those of the fixed numbers.
     #[inline(always)]
-    fn fill<N: Number>(&self, registers: &mut [N], fixed: &[f64], leaf: impl Fn(Leaf) -> N) {
-        let (places, rest) = registers.split_at_mut(fixed.len());
-        for (register, value) in places.iter_mut().zip(fixed) {
-            *register = N::constant(*value);
-        }
-        let (states, rest) = rest.split_at_mut(self.states.len());
+    fn fill<N: Number>(&self, registers: &mut [N], leaf: impl Fn(Leaf) -> N) {
+        let (states, rest) = registers.split_at_mut(self.states.len());
         for (register, i) in states.iter_mut().zip(&self.states) {
             *register = leaf(Leaf::State(*i));
         }
@@ -408,22 +404,31 @@ impl Code {
         }
     }
 
-    /// The same for a kind of number with registers that are kept, and in less time.
+    /// The same for a kind of number with registers that are kept, and in less time. Where the registers hold the numbers
+    /// that are `fixed` under this `name` already, these are not written again.
     #[inline(always)]
     pub fn evaluate_fast<N: Kept>(
         &self,
-        fixed: &[f64],
+        (fixed, name): (&[f64], Name),
         leaf: impl Fn(Leaf) -> N,
         mut result: impl FnMut(usize, N),
     ) {
         if self.registers > FEW {
             return self.evaluate(fixed, leaf, result);
         }
-        N::with(|registers| {
-            self.leaves.fill(registers, fixed, leaf);
-            run_short(&self.short, registers);
+        N::with(|Registers { numbers, holds }| {
+            if *holds != name {
+                numbers
+                    .iter_mut()
+                    .zip(fixed)
+                    .for_each(|(register, value)| *register = N::constant(*value));
+                // No instruction has them for a target.
+                *holds = name;
+            }
+            self.leaves.fill(&mut numbers[fixed.len()..], leaf);
+            run_short(&self.short, numbers);
             for (place, register) in self.results.iter().enumerate() {
-                result(place, registers[*register as u8 as usize]);
+                result(place, numbers[*register as u8 as usize]);
             }
         });
     }
@@ -436,7 +441,11 @@ impl Code {
         leaf: impl Fn(Leaf) -> N,
         mut result: impl FnMut(usize, N),
     ) {
-        self.leaves.fill(registers, fixed, leaf);
+        let (places, rest) = registers.split_at_mut(fixed.len());
+        for (register, value) in places.iter_mut().zip(fixed) {
+            *register = N::constant(*value);
+        }
+        self.leaves.fill(rest, leaf);
         run(&self.instructions, registers);
         for (place, register) in self.results.iter().enumerate() {
             result(place, registers[*register as usize]);
@@ -447,9 +456,6 @@ impl Code {
 /// Registers of kinds of numbers with more bytes are not on the stack.
 const LARGE: usize = 256;
 
-/// So many registers are kept: any `u8` is one of them, and need not be checked.
-pub(crate) const FEW: usize = 256;
-
 fn short(instruction: &Instruction) -> ShortInstruction {
     ShortInstruction {
         function: instruction.function,
@@ -458,54 +464,45 @@ fn short(instruction: &Instruction) -> ShortInstruction {
     }
 }
 
-/// A kind of number with registers that are kept from one evaluation to the next: to clear them would take longer than
-/// many a code.
-pub(crate) trait Kept: Number {
-    /// Calls `run` with registers that hold anything.
-    fn with(run: impl FnOnce(&mut [Self; FEW]));
-}
-
-thread_local! {
-    static FLOATS: RefCell<[f64; FEW]> = const { RefCell::new([0.0; FEW]) };
-}
-
-impl Kept for f64 {
-    #[inline(always)]
-    fn with(run: impl FnOnce(&mut [Self; FEW])) {
-        FLOATS.with_borrow_mut(run);
-    }
+/// The value of an instruction of these sources, each of which it reads itself: none reads more than it has. Each stores
+/// its own value, too: a common place for all values would be copied once more.
+macro_rules! put {
+    ($set:ident, $instruction:ident, [$($source:ident),+], $value:expr) => {{
+        let [$($source,)+ ..] = $instruction.sources;
+        $set!($instruction.target, $value);
+    }};
 }
 
 /// Works the instructions out on the registers that `at` and `set` reach.
 macro_rules! work {
     ($instructions:expr, $at:ident, $set:ident) => {
-        for instruction in $instructions {
-            let [x, y, z, w] = instruction.sources;
-            let target = instruction.target;
-            // Each stores its own value: a common place for all values would be copied once more.
-            match instruction.function {
-                Function::Add => $set!(target, $at!(x) + $at!(y)),
-                Function::Subtract => $set!(target, $at!(x) - $at!(y)),
-                Function::Multiply => $set!(target, $at!(x) * $at!(y)),
-                Function::Divide => $set!(target, $at!(x) / $at!(y)),
-                Function::Negative => $set!(target, -$at!(x)),
-                Function::Square => $set!(target, $at!(x) * $at!(x)),
-                Function::MultiplyAdd => $set!(target, $at!(x) * $at!(y) + $at!(z)),
-                Function::MultiplySubtract => $set!(target, $at!(x) * $at!(y) - $at!(z)),
-                Function::SubtractProduct => $set!(target, $at!(z) - $at!(x) * $at!(y)),
-                Function::AddProducts => $set!(target, $at!(x) * $at!(y) + $at!(z) * $at!(w)),
+        for i in $instructions {
+            match i.function {
+                Function::Add => put!($set, i, [x, y], $at!(x) + $at!(y)),
+                Function::Subtract => put!($set, i, [x, y], $at!(x) - $at!(y)),
+                Function::Multiply => put!($set, i, [x, y], $at!(x) * $at!(y)),
+                Function::Divide => put!($set, i, [x, y], $at!(x) / $at!(y)),
+                Function::Negative => put!($set, i, [x], -$at!(x)),
+                Function::Square => put!($set, i, [x], $at!(x) * $at!(x)),
+                Function::MultiplyAdd => put!($set, i, [x, y, z], $at!(x) * $at!(y) + $at!(z)),
+                Function::MultiplySubtract => put!($set, i, [x, y, z], $at!(x) * $at!(y) - $at!(z)),
+                Function::SubtractProduct => put!($set, i, [x, y, z], $at!(z) - $at!(x) * $at!(y)),
+                Function::AddProducts => {
+                    put!($set, i, [x, y, z, w], $at!(x) * $at!(y) + $at!(z) * $at!(w));
+                }
                 Function::SubtractProducts => {
-                    $set!(target, $at!(x) * $at!(y) - $at!(z) * $at!(w))
+                    put!($set, i, [x, y, z, w], $at!(x) * $at!(y) - $at!(z) * $at!(w));
                 }
                 Function::SinCos => {
+                    let [x, y, ..] = i.sources;
                     let (sin, cos) = $at!(x).sin_cos();
-                    $set!(target, sin);
+                    $set!(i.target, sin);
                     $set!(y, cos);
                 }
-                Function::Whole(exponent) => $set!(target, $at!(x).powi(exponent.into())),
-                Function::Unary(function) => $set!(target, function.of($at!(x))),
+                Function::Whole(exponent) => put!($set, i, [x], $at!(x).powi(exponent.into())),
+                Function::Unary(function) => put!($set, i, [x], function.of($at!(x))),
                 Function::Bivariate(function) => {
-                    $set!(target, $at!(x).bivariate($at!(y), function))
+                    put!($set, i, [x, y], $at!(x).bivariate($at!(y), function));
                 }
             }
         }

@@ -58,7 +58,11 @@ pub(crate) fn derive(
                 }
             }
         };
+        let is_constant = program.number(varying[index].value).is_some();
         let slopes = &mut varying[index].slopes;
+        if is_constant {
+            slopes.clear();
+        }
         slopes.retain(|(_, slope)| program.number(*slope) != Some(0.0));
         count += slopes.len();
         if count > most {

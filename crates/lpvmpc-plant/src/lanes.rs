@@ -1,6 +1,6 @@
 //! Several numbers at once.
 
-use crate::code::{FEW, Kept};
+use crate::registers::{Kept, Registers};
 use lpvmpc::{Bivariate, Elementary, Number};
 use std::any::Any;
 use std::array::from_fn;
@@ -91,18 +91,19 @@ impl<const POINTS: usize> Number for Lanes<POINTS> {
 }
 
 thread_local! {
-    static FOURS: RefCell<[Lanes<4>; FEW]> = const { RefCell::new([Lanes([0.0; 4]); FEW]) };
+    static FOURS: RefCell<Registers<Lanes<4>>> =
+        const { RefCell::new(Registers::of(Lanes([0.0; 4]))) };
 }
 
 impl<const POINTS: usize> Kept for Lanes<POINTS> {
     /// Kept for the number of points that a controller takes together.
     #[inline(always)]
-    fn with(run: impl FnOnce(&mut [Self; FEW])) {
+    fn with(run: impl FnOnce(&mut Registers<Self>)) {
         FOURS.with_borrow_mut(|fours| {
             let fours: &mut dyn Any = fours;
             match fours.downcast_mut() {
                 Some(registers) => run(registers),
-                None => run(&mut [Self([0.0; POINTS]); FEW]),
+                None => run(&mut Registers::of(Self([0.0; POINTS]))),
             }
         });
     }

@@ -112,6 +112,7 @@ mod plant;
 mod prepared;
 mod program;
 mod recording;
+mod registers;
 mod sized;
 mod source;
 mod tangent;

@@ -3,6 +3,8 @@
 use crate::code::{Code, Leaf};
 use crate::lanes::Lanes;
 use crate::operation::Operation;
+use crate::program::Program;
+use crate::registers::Name;
 use lpvmpc::Number;
 use nalgebra::SVector;
 use std::any::{Any, TypeId};
@@ -19,15 +21,35 @@ pub(crate) struct Prepared {
 }
 
 /// What a [`Prepared`] code has of the values of the parameters.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(crate) struct Fixed {
     code: Vec<f64>,
     moving: Vec<f64>,
+    /// The name of `moving`.
+    name: Name,
+}
+
+impl PartialEq for Fixed {
+    /// The same numbers.
+    fn eq(&self, other: &Self) -> bool {
+        (&self.code, &self.moving) == (&other.code, &other.moving)
+    }
 }
 
 impl Prepared {
     /// What the `results` of the program need.
     pub fn new(operations: &[Operation], results: &[usize]) -> Self {
+        let code = Code::new(operations, results);
+        // Each once, and none whose result is known.
+        let mut program = Program::new(usize::MAX);
+        let taken = program.take(operations, results, None);
+        match &taken {
+            Some(results) => Self::with_code(code, program.operations(), results),
+            None => Self::with_code(code, operations, results),
+        }
+    }
+
+    fn with_code(code: Code, operations: &[Operation], results: &[usize]) -> Self {
         let mut settled = vec![false; operations.len()];
         for (index, operation) in operations.iter().enumerate() {
             settled[index] = match operation {
@@ -57,7 +79,7 @@ impl Prepared {
         let settled = Code::new(operations, &asked.collect::<Vec<usize>>());
         moving.leaves.parameters = (0..moving.leaves.parameters.len()).collect();
         Self {
-            code: Code::new(operations, results),
+            code,
             settled,
             moving,
         }
@@ -69,15 +91,16 @@ impl Prepared {
         let fixed = self.settled.fixed(parameters);
         // It has no leaf.
         let evaluated = |_, value| settled.push(value);
-        self.settled.evaluate_fast(&fixed, |_| f64::NAN, evaluated);
+        self.settled.evaluate(&fixed, |_| f64::NAN, evaluated);
         Fixed {
             code: self.code.fixed(parameters),
             moving: self.moving.fixed(&settled),
+            name: Name::new(),
         }
     }
 
     /// Works the results out at a state, an input and a scheduling of at least the plant's sizes; `result` takes them by
-    /// their place. In `f64` they are the same to the last bit, in less time.
+    /// their place. In `f64` they are the same to the last bit, the sign of zeros apart, in less time.
     #[inline(always)]
     pub fn evaluate<N: Number>(
         &self,
@@ -95,7 +118,8 @@ impl Prepared {
         if TypeId::of::<N>() == TypeId::of::<f64>() {
             let leaf = |of| float(leaf(of));
             let result = |place, value| result(place, N::constant(value));
-            self.moving.evaluate_fast(&fixed.moving, leaf, result);
+            self.moving
+                .evaluate_fast((&fixed.moving, fixed.name), leaf, result);
         } else {
             self.code.evaluate(&fixed.code, leaf, result);
         }
@@ -118,7 +142,9 @@ impl Prepared {
                 Leaf::Scheduling(_) => Lanes([f64::NAN; POINTS]),
             };
             let result = |place, values: Lanes<POINTS>| result(place, values.0.map(N::constant));
-            return self.moving.evaluate_fast(&fixed.moving, leaf, result);
+            return self
+                .moving
+                .evaluate_fast((&fixed.moving, fixed.name), leaf, result);
         }
         if POINTS == 1 {
             let motion = (x[0].as_slice(), u[0].as_slice());

@@ -1,5 +1,6 @@
 //! Programs that are made here: each operation once, and none whose result is known.
 
+use crate::derive::needed;
 use crate::operation::{Binary, Operation, Unary};
 use lpvmpc::{Bivariate, Elementary};
 use std::collections::HashMap;
@@ -15,6 +16,9 @@ pub(crate) struct Program {
     /// Numbers that meet stay as they are: their result would be rounded.
     exact: bool,
 }
+
+/// So many operations deep it is asked whether a number is above zero.
+const DEEPEST: usize = 6;
 
 /// An operation that can be looked up.
 #[derive(PartialEq, Eq, Hash)]
@@ -98,6 +102,27 @@ impl Program {
         match self.operations.get(place) {
             Some(Operation::Unary(Unary::Negative, x)) => Some(*x),
             _ => None,
+        }
+    }
+
+    /// Whether it is never below zero where it is a number, or, with `strictly`, above it; looked at no deeper than this.
+    fn is_above_zero(&self, place: usize, strictly: bool, depth: usize) -> bool {
+        let (Some(operation), Some(depth)) = (self.operations.get(place), depth.checked_sub(1))
+        else {
+            return false;
+        };
+        match *operation {
+            Operation::Constant(value) => value > 0.0 || (value == 0.0 && !strictly),
+            // A small square is rounded to zero.
+            Operation::Binary(Binary::Multiply, x, y) => x == y && !strictly,
+            Operation::Binary(Binary::Add, x, y) => {
+                let is = |place, strictly| self.is_above_zero(place, strictly, depth);
+                is(x, false) && is(y, false) && (!strictly || is(x, true) || is(y, true))
+            }
+            Operation::Unary(Unary::Elementary(Elementary::Sqrt), x) => {
+                self.is_above_zero(x, strictly, depth)
+            }
+            _ => false,
         }
     }
 
@@ -212,6 +237,9 @@ impl Program {
             }
             Binary::Divide => match self.negated(x) {
                 _ if self.is(y, 1.0) => Some(x),
+                _ if self.is(x, 1.0) => self.inverse(y),
+                // Friction that a plant has none of, as a rule.
+                _ if self.is(x, 0.0) && self.is_above_zero(y, true, DEEPEST) => Some(x),
                 Some(x) => {
                     let quotient = self.divide(x, y)?;
                     self.negative(quotient)
@@ -232,6 +260,30 @@ impl Program {
             },
             Binary::Bivariate(_) => self.push(operation),
         }
+    }
+
+    /// The `results` of `operations`, whose scheduling parameters have these places here, or stay what they are.
+    pub fn take(
+        &mut self,
+        operations: &[Operation],
+        results: &[usize],
+        scheduling: Option<&[usize]>,
+    ) -> Option<Vec<usize>> {
+        let needed = needed(operations, results);
+        let mut places = vec![0; operations.len()];
+        for (index, operation) in operations.iter().enumerate() {
+            if needed[index] {
+                places[index] = match (*operation, scheduling) {
+                    (Operation::Scheduling(i), Some(scheduling)) => *scheduling.get(i)?,
+                    (Operation::Unary(function, x), _) => self.unary(function, places[x])?,
+                    (Operation::Binary(function, x, y), _) => {
+                        self.binary(function, places[x], places[y])?
+                    }
+                    (leaf, _) => self.push(leaf)?,
+                };
+            }
+        }
+        Some(results.iter().map(|result| places[*result]).collect())
     }
 
     /// -(x y).

@@ -1,7 +1,7 @@
 //! Formulas of f and its derivatives, and of f and an embedding's matrices, in one code each.
 
 use crate::data::{EmbeddingData, PlantData};
-use crate::derive::{Varying, derive, needed};
+use crate::derive::{Varying, derive};
 use crate::operation::Operation;
 use crate::prepared::{Fixed, Prepared};
 use crate::program::Program;
@@ -66,8 +66,8 @@ impl TangentCode {
     pub fn of_embedding(data: &PlantData, embedding: &EmbeddingData) -> Option<Self> {
         let mut program = Program::new(LONGEST);
         let operations = &data.operations;
-        let s = program.take(operations, &embedding.scheduling, &[])?;
-        let take = |program: &mut Program, list: &[usize]| program.take(operations, list, &s);
+        let s = program.take(operations, &embedding.scheduling, None)?;
+        let take = |program: &mut Program, list: &[usize]| program.take(operations, list, Some(&s));
         let rows = |matrix: &[Vec<usize>]| matrix.concat();
         let a = take(&mut program, &rows(&embedding.a))?;
         let b = take(&mut program, &rows(&embedding.b))?;
@@ -144,30 +144,4 @@ impl TangentCode {
 /// So many instructions take as long as a pass of dual numbers through so many, with so many variables.
 fn longest(length: usize, variables: usize) -> usize {
     length.saturating_mul(2 + variables / 2) + 16
-}
-
-impl Program {
-    /// The `results` of `operations`, whose scheduling parameters have these places here.
-    fn take(
-        &mut self,
-        operations: &[Operation],
-        results: &[usize],
-        scheduling: &[usize],
-    ) -> Option<Vec<usize>> {
-        let needed = needed(operations, results);
-        let mut places = vec![0; operations.len()];
-        for (index, operation) in operations.iter().enumerate() {
-            if needed[index] {
-                places[index] = match *operation {
-                    Operation::Scheduling(i) => *scheduling.get(i)?,
-                    Operation::Unary(function, x) => self.unary(function, places[x])?,
-                    Operation::Binary(function, x, y) => {
-                        self.binary(function, places[x], places[y])?
-                    }
-                    leaf => self.push(leaf)?,
-                };
-            }
-        }
-        Some(results.iter().map(|result| places[*result]).collect())
-    }
 }

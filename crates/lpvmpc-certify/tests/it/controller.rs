@@ -7,12 +7,12 @@ use lpvmpc_plant::SizedPlant;
 use lpvmpc_sim::{Tolerances, advance};
 use nalgebra::{SVector, Vector4};
 
-const EXACT: Tolerances = Tolerances {
+pub const EXACT: Tolerances = Tolerances {
     relative: 1e-12,
     absolute: 1e-12,
 };
 
-fn cart_pole_settings() -> MpcSettings {
+pub fn cart_pole_settings() -> MpcSettings {
     let (plant, certificate) = &*CART_POLE;
     let set = certificate.terminal_set(plant).unwrap();
     MpcSettings {

@@ -6,6 +6,7 @@
     reason = "a test that cannot go on must fail, in its support functions too"
 )]
 
+mod ahead;
 mod claims;
 mod controller;
 mod discrete;

@@ -334,6 +334,63 @@ fn a_loop_is_guaranteed_by_a_certificate_that_is_proved_first() {
     assert!(message.contains("stands in place of terminal"), "{message}");
 }
 
+/// A cart whose position no formula reads: its references are seen ahead, and one that the certificate says nothing of is
+/// refused by its place.
+#[test]
+fn a_guaranteed_loop_sees_its_references_ahead() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let plant = r#"{"schema": 1, "name": "cart", "equilibrium": {"x": [0, 0], "u": [0]},
+        "states": [{"name": "position", "lower": -5, "upper": 5}, {"name": "speed", "lower": -1, "upper": 1}],
+        "inputs": [{"name": "force", "lower": -1, "upper": 1}],
+        "operations": [["state", 1], ["input", 0]], "derivative": [0, 1]}"#;
+    fs::write(path.join("cart.json"), plant).unwrap();
+    let text = "name = \"cart\"\nplant = \"cart.json\"\nx0 = [0, 0]\nduration = 6\n\
+                [controller]\nt_s = 0.1\nhorizon = 20\nq = [1, 0.1]\nr = [0.1]\n\
+                [[reference]]\ntime = 0\nx = [0, 0]\n[[reference]]\ntime = 2\nx = [2, 0]\n";
+    fs::write(path.join("cart.toml"), text).unwrap();
+    succeed(path, &["certify", "cart.toml", "--out", "c.json"]);
+    let with = changed(text, "r = [0.1]", "r = [0.1]\ncertificate = \"c.json\"");
+    fs::write(path.join("with.toml"), &with).unwrap();
+    let summary = succeed(path, &["simulate", "with.toml", "--json", "--out", "ahead"]);
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    assert!(
+        (summary["final_state"][0].as_f64().unwrap() - 2.0).abs() < 0.05,
+        "{summary}"
+    );
+    assert_eq!(summary["bounds_exceeded"], serde_json::json!([]));
+    let rows = fs::read_to_string(path.join("ahead/trajectory.csv")).unwrap();
+    let header: Vec<&str> = rows.lines().next().unwrap().split(',').collect();
+    let column = header
+        .iter()
+        .position(|name| name.starts_with("position"))
+        .unwrap();
+    let before: f64 = rows
+        .lines()
+        .nth(1 + 19)
+        .unwrap()
+        .split(',')
+        .nth(column)
+        .unwrap()
+        .parse()
+        .unwrap();
+    assert!(before > 0.05, "{before} m at 1.9 s, {header:?}");
+
+    let moving = changed(&with, "x = [2, 0]", "x = [2, 0.5]");
+    fs::write(path.join("moving.toml"), moving).unwrap();
+    let message = fail(path, &["simulate", "moving.toml", "--out", "moving"]);
+    let expected = "speed is 0.5, and the certificate is about 0; elsewhere may be what no formula of the plant reads: position";
+    assert!(message.contains(expected), "{message}");
+    let estimated = changed(
+        &with,
+        "[[reference]]\ntime = 0",
+        "estimator = {}\n[[reference]]\ntime = 0",
+    );
+    fs::write(path.join("estimated.toml"), estimated).unwrap();
+    let message = fail(path, &["simulate", "estimated.toml"]);
+    assert!(message.contains("estimator"), "{message}");
+}
+
 #[test]
 fn a_controller_is_printed_as_a_program() {
     let folder = pendulum();

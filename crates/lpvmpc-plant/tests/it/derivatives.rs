@@ -303,6 +303,65 @@ fn several_points_at_once_are_as_one_by_one() {
     }
 }
 
+/// Numbers that stay from one evaluation to the next are those of the plant that is evaluated.
+#[test]
+fn plants_that_take_turns_keep_their_own_numbers() {
+    let one = SizedEmbedding::<4, 1, 2>::new(plant("cart-pole")).unwrap();
+    let mut other = one.clone();
+    other.set_parameter("pole_mass", 0.5).unwrap();
+    for point in points("cart-pole") {
+        let (x, u) = (
+            SVector::from_column_slice(&point.x),
+            SVector::from_column_slice(&point.u),
+        );
+        let mut found = Vec::new();
+        for plant in [&one, &other] {
+            let f: SVector<f64, 4> = Embedding::f(plant, &x, &u);
+            let lifted = |v: f64| Dual::<f64, 1>::fixed(v);
+            let by_duals = Embedding::f(plant, &x.map(lifted), &u.map(lifted));
+            assert_eq!(f, by_duals.map(|rate| rate.value));
+            let mut tangents = [(SVector::zeros(), SMatrix::zeros(), SMatrix::zeros()); 4];
+            LpvModel::tangent_each(plant, &[x; 4], &[u; 4], &mut tangents);
+            assert_eq!(tangents[2], LpvModel::tangent(plant, &x, &u));
+            found.push(f);
+        }
+        assert!(found[0] != found[1] || u[0] == 0.0 || x[1] == 0.0);
+    }
+}
+
+/// Friction that there is none of, 0/sqrt(y^2 + c), is left out with its derivatives; where the root may be zero it is
+/// not.
+#[test]
+fn a_quotient_that_is_always_zero_has_no_derivative() {
+    use Operation::{Binary as B, Constant, Input, State, Unary as U};
+    let root = Unary::Elementary(Elementary::Sqrt);
+    let start = [State(0), State(1), Input(0), Constant(0.0), Constant(1e-3)];
+    let of = |rest: &[Operation]| plant_of([&start[..], rest].concat());
+    let never_zero = of(&[
+        B(Binary::Multiply, 1, 1),
+        B(Binary::Add, 5, 4),
+        U(root, 6),
+        B(Binary::Divide, 3, 7),
+        B(Binary::Multiply, 8, 0),
+        B(Binary::Add, 9, 2),
+    ]);
+    let zero_at_rest = of(&[
+        B(Binary::Multiply, 1, 1),
+        U(root, 5),
+        B(Binary::Divide, 3, 6),
+        B(Binary::Add, 7, 2),
+    ]);
+    for x in ARGUMENTS {
+        for y in ARGUMENTS {
+            let (x, u) = (SVector::from([x, y]), SVector::from([0.7]));
+            compare("never zero", &never_zero, x, u);
+            let (f, a, b) = by_formulas(&never_zero, &x, &u);
+            assert_eq!((f[0], a[(0, 0)], a[(0, 1)], b[0]), (0.7, 0.0, 0.0, 1.0));
+            assert_eq!(zero_at_rest.f(&x, &u)[0].is_nan(), y * y == 0.0);
+        }
+    }
+}
+
 #[test]
 fn a_changed_parameter_is_seen_by_all_formulas() {
     let mut changed = SizedEmbedding::<4, 1, 2>::new(plant("cart-pole")).unwrap();
