@@ -22,7 +22,7 @@ use crate::solution::{ActiveRow, ActiveSet, Part, Quantity, Solution, Status};
 use crate::solver::{
     Solver, SolverSettings, WarmStart, clip_inputs, cost, infeasible, roll_forward, trajectory,
 };
-use crate::working_set::first_mut;
+use crate::working_set::{copy, first, first_mut};
 use exchange::{Program, Tolerances, exchange};
 use interior_point::{Foretold, InteriorPoint};
 use nalgebra::{SVector, convert};
@@ -306,17 +306,15 @@ fn report<T: Scalar, const NX: usize, const NU: usize>(
     solution: &mut Solution<T, NX, NU>,
 ) -> bool {
     let ocp = program.ocp;
+    let n = ocp.length();
     let listed = list(sides, &mut solution.active);
-    for (u, found) in solution
-        .u
-        .iter_mut()
-        .zip(program.u.iter())
-        .take(ocp.length())
-    {
-        *u = *found;
-    }
+    copy(first_mut(&mut solution.u, n), program.u);
+    copy(first_mut(&mut solution.x, n), program.x);
+    // As a rule nothing moves, and the states stay what they are.
     clip_inputs(ocp, solution);
-    roll_forward(ocp, solution);
+    if first(&solution.u, n) != first(program.u, n) {
+        roll_forward(ocp, solution);
+    }
     solution.cost = cost(ocp, solution);
     listed && solution.cost.is_finite()
 }

@@ -6,7 +6,7 @@
 //! with a multiplier that is linear in its distance.
 
 use super::newton;
-use super::side::{BoundSide, Interior, Role};
+use super::side::{BoundSide, Interior, Role, Target};
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::riccati::{BadPivot, StageFactor};
@@ -18,13 +18,6 @@ const NEARLY: f64 = 0.995;
 
 /// Least slack and excess to begin with, as a part of the bound's size.
 const LEAST: f64 = 1.0;
-
-/// What a side is to come to in a Newton step: slack * multiplier, and excess * rest.
-#[derive(Clone, Copy)]
-struct Target<T> {
-    slack: T,
-    excess: T,
-}
 
 /// The program of a Newton step, of one side.
 #[derive(Clone, Copy)]
@@ -160,7 +153,7 @@ impl<T: Scalar> InteriorPoint<T> {
         for side in sides.iter_mut() {
             side.last_role = side.role;
             side.role = Role::Free;
-            (side.base, side.weight) = Linear::new(side, NO_TARGET()).multiplier();
+            (side.base, side.weight) = Linear::new(side, Target::zero()).multiplier();
         }
         newton::factorize(ocp, sides, factors)?;
         newton::roll_out(ocp, factors, (u, x));
@@ -171,7 +164,7 @@ impl<T: Scalar> InteriorPoint<T> {
         };
         for side in sides.iter_mut() {
             let at = &side.interior;
-            let to = Linear::new(side, NO_TARGET()).at(side.distance);
+            let to = Linear::new(side, Target::zero()).at(side.distance);
             // What goes to zero first, relative to where it is.
             let holds = to.slack * at.multiplier < to.multiplier * at.slack;
             let exceeded = side.soft.is_some() && to.rest * at.excess < to.excess * at.rest;
@@ -197,45 +190,25 @@ impl<T: Scalar> InteriorPoint<T> {
         v: &mut [SVector<T, NU>],
         (u, x): (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
     ) -> T {
-        let predicted = |side: &BoundSide<T>| Linear::new(side, NO_TARGET()).at(side.distance);
+        let predicted = |side: &BoundSide<T>| Linear::new(side, Target::zero()).at(side.distance);
         let part = Part::until_zero(sides, predicted);
         let (sum, _) = products(sides, |side| along(&side.interior, &predicted(side), part));
         let ratio = sum / self.count / self.complementarity;
         let center = ratio * ratio * ratio * self.complementarity;
         for side in sides.iter_mut() {
-            let linear = Linear::new(side, target(side, &predicted(side), center));
-            // Until the step is taken, what the multiplier at d = 0 changes by.
-            let (base, _) = linear.multiplier();
+            side.target = target(side, &predicted(side), center);
+            let (base, _) = Linear::new(side, side.target).multiplier();
             side.estimate = base - side.base;
         }
         newton::shift(ocp, factors, sides, |side| side.estimate, v, (u, x));
-        for side in sides.iter_mut() {
-            let target = target(side, &predicted(side), center);
-            side.base = target.slack;
-            side.weight = target.excess;
-        }
         newton::measure(ocp, sides, &Trajectory { x, u });
-        let corrected = |side: &BoundSide<T>| {
-            let target = Target {
-                slack: side.base,
-                excess: side.weight,
-            };
-            Linear::new(side, target).at(side.distance)
-        };
+        let corrected = |side: &BoundSide<T>| Linear::new(side, side.target).at(side.distance);
         let part = Part::until_zero(sides, corrected).shortened(convert(NEARLY));
         for side in sides.iter_mut() {
             side.interior = along(&side.interior, &corrected(side), part);
         }
         self.measure(sides);
         part.shortest()
-    }
-}
-
-#[allow(non_snake_case)]
-fn NO_TARGET<T: Scalar>() -> Target<T> {
-    Target {
-        slack: T::zero(),
-        excess: T::zero(),
     }
 }
 

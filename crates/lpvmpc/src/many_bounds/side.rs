@@ -36,10 +36,11 @@ pub(crate) struct BoundSide<T> {
     pub weight: T,
     /// d on the trajectory at hand.
     pub distance: T,
-    /// Multiplier of the guess.
+    /// Multiplier of the guess, or a change of the base.
     pub estimate: T,
     /// Of the interior-point method.
     pub interior: Interior<T>,
+    pub target: Target<T>,
 }
 
 /// A side's unknowns in the interior-point method, all above zero, or a step of them.
@@ -52,6 +53,22 @@ pub(crate) struct Interior<T> {
     pub excess: T,
     /// Multiplier of s >= 0.
     pub rest: T,
+}
+
+/// What a side is to come to in a Newton step: slack * multiplier, and excess * rest.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Target<T> {
+    pub slack: T,
+    pub excess: T,
+}
+
+impl<T: Scalar> Target<T> {
+    pub fn zero() -> Self {
+        Self {
+            slack: T::zero(),
+            excess: T::zero(),
+        }
+    }
 }
 
 impl<T: Scalar> Interior<T> {
@@ -94,6 +111,7 @@ impl<T: Scalar> BoundSide<T> {
             distance: T::zero(),
             estimate: T::zero(),
             interior: Interior::zero(),
+            target: Target::zero(),
         }
     }
 
