@@ -34,9 +34,11 @@ const MANY: usize = 24;
 const MANY_PER_INPUT: usize = 8;
 /// And so many inputs that the regulator saturates, where there is one of each stage.
 const MANY_SATURATED: usize = 8;
-/// Of a guess that is to be exchanged, one active side in so many may be wrong: from farther away it is a
-/// shorter way to begin anew.
-const FEW: usize = 4;
+/// Of a guess that is to be exchanged, one active side in so many may be wrong, and each must be better than
+/// the one before: from farther away it is a shorter way to begin anew.
+const NEAR: (usize, usize) = (4, 0);
+/// Saturated inputs may all be wrong, and twice no better.
+const FAR: (usize, usize) = (1, 2);
 /// Guesses of the interior-point method that are tried.
 const TRIALS: usize = 5;
 /// Shorter parts of the way mean that bounds may contradict each other.
@@ -122,7 +124,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         let saturated = NU == 1 && 2 * inputs > violated && inputs >= MANY_SATURATED;
         // No more can hold independently than there are inputs.
         let expected = violated.max(known).min(n * NU);
-        if expected < MANY + MANY_PER_INPUT * NU && !saturated {
+        let many = expected >= MANY + MANY_PER_INPUT * NU;
+        if !many && !saturated {
             return None;
         }
         let count = side::collect(ocp, &mut self.sides)?;
@@ -147,16 +150,18 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             u: &mut self.u,
             x: &mut self.x,
         };
-        let mut found = shift.filter(|_| known > 0).is_some_and(|shift| {
+        let mut found = shift.filter(|_| many && known > 0).is_some_and(|shift| {
             guess_again(sides, &solution.active, shift);
-            exchange(&mut program, sides, &tolerances, FEW, &mut changes)
+            exchange(&mut program, sides, &tolerances, NEAR, &mut changes)
         });
         if !found && saturated {
             guess_saturated(ocp, &solver.factors, sides);
-            found = exchange(&mut program, sides, &tolerances, 1, &mut changes);
+            found = exchange(&mut program, sides, &tolerances, FAR, &mut changes);
         }
         let outcome = if found {
             Some(Ok(()))
+        } else if !many {
+            None
         } else {
             newton::measure(ocp, sides, &trajectory(solution));
             let proof = &mut solution.active;
@@ -196,7 +201,7 @@ fn search<T: Scalar, const NX: usize, const NU: usize>(
         let Foretold { changed, active } = predicted.ok()?;
         if part > convert(FREE) && CERTAIN * changed <= active {
             trials -= 1;
-            if exchange(program, sides, tolerances, FEW, &mut *changes) {
+            if exchange(program, sides, tolerances, NEAR, &mut *changes) {
                 return Some(Ok(()));
             }
             // The prediction once more, for its factors.

@@ -35,13 +35,13 @@ pub(super) struct Program<'a, T: 'static, const NX: usize, const NU: usize> {
 }
 
 /// Exchanges sides until the guess is right, whose trajectory and multipliers (`estimate`) then are the
-/// answer; `false` if that is not found. One in `few` active sides may be wrong at first. `count` is asked
-/// before every factorisation.
+/// answer; `false` if that is not found. One in `few` active sides may be wrong at first, and `patience`
+/// guesses may be hardly better than the one before. `count` is asked before every factorisation.
 pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
     program: &mut Program<'_, T, NX, NU>,
     sides: &mut [BoundSide<T>],
     tolerances: &Tolerances<T>,
-    few: usize,
+    (few, mut patience): (usize, usize),
     mut count: impl FnMut() -> bool,
 ) -> bool {
     let active = sides.iter().filter(|side| side.role != Role::Free).count();
@@ -81,10 +81,13 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
             }
         }
         // A guess from near by is right after a few exchanges, each of which leaves fewer sides wrong.
-        if wrong > most {
+        if wrong <= most {
+            most = wrong - wrong / 4;
+        } else if patience > 0 {
+            patience -= 1;
+        } else {
             break;
         }
-        most = wrong - wrong / 4;
     }
     false
 }
