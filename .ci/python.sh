@@ -20,8 +20,6 @@ packages() {
 }
 beside "packages and types" packages
 
-(cd python && cargo fmt --check && cargo clippy --locked --release -- -D warnings)
-
 # Alone with what it depends on. Without the compiler: a wheel needs none.
 python3 -m venv "$python/alone"
 pip alone wheel --no-deps --wheel-dir "$python" ./python
