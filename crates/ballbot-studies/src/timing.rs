@@ -2,7 +2,7 @@
 //!
 //! Every sample of a closed loop is repeated from the same memory of the past, and the shortest
 //! time counts, so that what else the machine does is left out; the statistics are over the
-//! samples of the sequence. The clock is handed in: a monotonic one, of the machine.
+//! samples of the sequence. The clock is handed in ([`Stopwatch`]).
 
 mod problems;
 
@@ -29,10 +29,7 @@ pub const SEQUENCES: [&str; 4] = [
     "tight-bounds",
 ];
 
-/// Repetitions of each sample.
-const PASSES: usize = 30;
-
-/// Samples of a sequence, spread evenly, that are timed with a cold cache, and their repetitions: each
+/// Samples of a sequence, spread evenly, that are timed with a cold cache, and the most of their repetitions: each
 /// needs a sweep, which takes a thousand times as long as a step.
 const COLD_SAMPLES: usize = 40;
 const COLD_PASSES: usize = 3;
@@ -43,8 +40,49 @@ const SWEPT: usize = 48 << 20;
 const GUARDED_SAMPLES: usize = 400;
 const HOLD: usize = 80;
 
-/// The time since some instant.
+/// The time since some instant, of a monotonic clock.
 pub type Clock<'a> = &'a dyn Fn() -> Duration;
+
+/// How times are taken.
+#[derive(Clone, Copy)]
+pub struct Stopwatch<'a> {
+    /// By which clock.
+    pub clock: Clock<'a>,
+    /// Repetitions of each sample; with a cold cache at most three of them.
+    pub passes: usize,
+}
+
+impl<'a> Stopwatch<'a> {
+    /// Repetitions that leave out what else the machine does.
+    pub const PASSES: usize = 30;
+
+    /// Times by this clock, of [`Self::PASSES`] repetitions.
+    pub fn new(clock: Clock<'a>) -> Self {
+        Self {
+            clock,
+            passes: Self::PASSES,
+        }
+    }
+
+    fn time(&self) -> Duration {
+        (self.clock)()
+    }
+
+    /// The shortest of all repetitions, in microseconds.
+    fn shortest(&self, repetition: impl FnMut() -> Duration) -> f64 {
+        shortest_of(self.passes, repetition)
+    }
+
+    /// The shortest of those for which the caches are swept.
+    fn shortest_cold(&self, repetition: impl FnMut() -> Duration) -> f64 {
+        shortest_of(self.passes.min(COLD_PASSES), repetition)
+    }
+}
+
+fn shortest_of(passes: usize, mut repetition: impl FnMut() -> Duration) -> f64 {
+    let times = (0..passes).map(|_| repetition());
+    times.min().unwrap_or_default().as_secs_f64() * 1e6
+}
 
 type Control = Controller<f64>;
 
@@ -112,7 +150,7 @@ pub struct GuaranteedTimes {
 ///
 /// # Errors
 /// A controller refuses its settings or the plant cannot be integrated.
-pub fn time_guaranteed(clock: Clock<'_>) -> Result<GuaranteedTimes, StudyError> {
+pub fn time_guaranteed(watch: Stopwatch<'_>) -> Result<GuaranteedTimes, StudyError> {
     let prepared = Scenario::load("far-setpoints")?.prepare(Path::new("."))?;
     let Some(mut settings) = prepared.guaranteed().copied() else {
         return Err(StudyError::Unsuitable("no terminal set"));
@@ -136,20 +174,20 @@ pub fn time_guaranteed(clock: Clock<'_>) -> Result<GuaranteedTimes, StudyError> 
         let wanted = [1.0, -0.5, 2.0, -2.0, 0.0][k / HOLD % 5];
         let reference = Reference::constant(Vector4::new(wanted, 0.0, 0.0, 0.0));
         let before = plain.clone();
-        plain_us.push(shortest(|| {
+        plain_us.push(watch.shortest(|| {
             plain.clone_from(&before);
-            let start = clock();
+            let start = watch.time();
             black_box(plain.step(black_box(&x), &reference, &mut workspace));
-            clock() - start
+            watch.time() - start
         }));
         let (before, remembered) = (guaranteed.clone(), memory.clone());
         let mut u = prepared.settings.u.lower;
-        guaranteed_us.push(shortest(|| {
+        guaranteed_us.push(watch.shortest(|| {
             guaranteed.clone_from(&before);
             memory.clone_from(&remembered);
-            let start = clock();
+            let start = watch.time();
             u = black_box(guaranteed.step(black_box(&x), wanted, &mut memory)).u;
-            clock() - start
+            watch.time() - start
         }));
         x = advance(&prepared.ballbot, &x, &u, settings.t_s, prepared.tolerances)?;
     }
@@ -159,8 +197,8 @@ pub fn time_guaranteed(clock: Clock<'_>) -> Result<GuaranteedTimes, StudyError> 
     };
     let near = |k: usize| [1.0, -0.5, 2.0, -2.0, 0.0][k / HOLD % 5];
     let far = |_: usize| prepared.ballbot.geometry.ball_angle(2.5);
-    let descent = DescentTimes::of(&prepared, descent_settings, GUARDED_SAMPLES, near, clock)?;
-    let far = DescentTimes::of(&prepared, descent_settings, HOLD, far, clock)?;
+    let descent = DescentTimes::of(&prepared, descent_settings, GUARDED_SAMPLES, near, watch)?;
+    let far = DescentTimes::of(&prepared, descent_settings, HOLD, far, watch)?;
     Ok(GuaranteedTimes {
         plain_us: Times::new(plain_us),
         descent_us: descent.step,
@@ -183,7 +221,7 @@ impl DescentTimes {
         settings: ControllerSettings<f64>,
         samples: usize,
         wanted: impl Fn(usize) -> f64,
-        clock: Clock<'_>,
+        watch: Stopwatch<'_>,
     ) -> Result<Self, StudyError> {
         let controller = Control::allocate(prepared.ballbot, settings);
         let mut controller = controller.map_err(ScenarioError::from)?;
@@ -193,18 +231,18 @@ impl DescentTimes {
         for k in 0..samples {
             let reference = Reference::constant(Vector4::new(wanted(k), 0.0, 0.0, 0.0));
             let before = controller.clone();
-            feedback.push(shortest(|| {
+            feedback.push(watch.shortest(|| {
                 controller.clone_from(&before);
                 controller.prepare(&reference, &mut workspace);
-                let start = clock();
+                let start = watch.time();
                 black_box(controller.feedback(black_box(&x), &reference, &mut workspace));
-                clock() - start
+                watch.time() - start
             }));
-            step.push(shortest(|| {
+            step.push(watch.shortest(|| {
                 controller.clone_from(&before);
-                let start = clock();
+                let start = watch.time();
                 black_box(controller.step(black_box(&x), &reference, &mut workspace));
-                clock() - start
+                watch.time() - start
             }));
             x = next(prepared, &x, &controller)?;
         }
@@ -223,11 +261,11 @@ impl DescentTimes {
 pub fn time(
     name: &str,
     prepared: &Prepared,
-    clock: Clock<'_>,
+    watch: Stopwatch<'_>,
 ) -> Result<SequenceTimes, StudyError> {
     let mut record = Record::default();
     for plane in 0..prepared.planes.len() {
-        time_plane(prepared, plane, clock, &mut record)?;
+        time_plane(prepared, plane, watch, &mut record)?;
     }
     Ok(SequenceTimes {
         name: name.to_owned(),
@@ -251,7 +289,7 @@ struct Record {
 fn time_plane(
     prepared: &Prepared,
     plane: usize,
-    clock: Clock<'_>,
+    watch: Stopwatch<'_>,
     record: &mut Record,
 ) -> Result<(), StudyError> {
     let plane = &prepared.planes[plane];
@@ -275,13 +313,13 @@ fn time_plane(
         let mut step = |other_work: Option<&mut OtherWork>| {
             controller.clone_from(&before);
             other_work.map(OtherWork::sweep);
-            let start = clock();
+            let start = watch.time();
             black_box(controller.step(black_box(&x), &reference, &mut workspace));
-            clock() - start
+            watch.time() - start
         };
-        record.step.push(shortest(|| step(None)));
+        record.step.push(watch.shortest(|| step(None)));
         if k % stride == 0 {
-            let cold = shortest_of(COLD_PASSES, || step(Some(&mut other_work)));
+            let cold = watch.shortest_cold(|| step(Some(&mut other_work)));
             record.step_cold.push(cold);
         }
         let mut solution = before.solution().clone();
@@ -289,15 +327,15 @@ fn time_plane(
             solution.clone_from(before.solution());
             other_work.map(OtherWork::sweep);
             let settings = &controller.settings().solver;
-            let start = clock();
+            let start = watch.time();
             solver.solve(black_box(workspace.ocp()), settings, &mut solution);
-            let elapsed = clock() - start;
+            let elapsed = watch.time() - start;
             black_box(&solution);
             elapsed
         };
-        record.qp.push(shortest(|| qp(None)));
+        record.qp.push(watch.shortest(|| qp(None)));
         if k % stride == 0 {
-            let cold = shortest_of(COLD_PASSES, || qp(Some(&mut other_work)));
+            let cold = watch.shortest_cold(|| qp(Some(&mut other_work)));
             record.qp_cold.push(cold);
         }
         record.max_active = record.max_active.max(controller.solution().active.len());
@@ -335,14 +373,4 @@ impl OtherWork {
         }
         black_box(&self.memory);
     }
-}
-
-/// The shortest of [`PASSES`] repetitions, in microseconds.
-fn shortest(repetition: impl FnMut() -> Duration) -> f64 {
-    shortest_of(PASSES, repetition)
-}
-
-fn shortest_of(passes: usize, mut repetition: impl FnMut() -> Duration) -> f64 {
-    let times = (0..passes).map(|_| repetition());
-    times.min().unwrap_or_default().as_secs_f64() * 1e6
 }

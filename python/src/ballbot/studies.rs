@@ -6,7 +6,8 @@ use crate::errors::{of_scenario, study};
 use crate::work::{Report, work};
 use ballbot_studies::reproduction::{Claim, Reproduction};
 use ballbot_studies::timing::{
-    GuaranteedTimes, PROBLEMS, SEQUENCES, SequenceTimes, time, time_guaranteed, time_problems,
+    GuaranteedTimes, PROBLEMS, SEQUENCES, SequenceTimes, Stopwatch, time, time_guaranteed,
+    time_problems,
 };
 use ballbot_studies::{Campaign, Outcome, Scenarios, StudyError};
 use pyo3::prelude::*;
@@ -38,16 +39,17 @@ pub fn bench<'py>(
         let count = scenarios.len() + problems.len();
         watch.begin("timing", count + 1);
         let clock = watch.clock();
+        let stopwatch = Stopwatch::new(&clock);
         let mut sequences = Vec::with_capacity(count);
         for ((document, _), prepared) in scenarios.iter().zip(&prepared) {
-            sequences.push(time(document.origin(), prepared, &clock)?);
+            sequences.push(time(document.origin(), prepared, stopwatch)?);
             watch.step();
         }
         for name in problems {
-            sequences.push(time_problems(name, &clock)?);
+            sequences.push(time_problems(name, stopwatch)?);
             watch.step();
         }
-        let guaranteed = time_guaranteed(&clock)?;
+        let guaranteed = time_guaranteed(stopwatch)?;
         watch.step();
         Ok::<(Vec<SequenceTimes>, GuaranteedTimes), StudyError>((sequences, guaranteed))
     })?;

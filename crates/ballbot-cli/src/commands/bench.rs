@@ -6,8 +6,11 @@ use crate::json;
 use crate::output;
 use crate::progress::Progress;
 use crate::table::Table;
-use ballbot_studies::timing::{self, GuaranteedTimes, PROBLEMS, SEQUENCES, SequenceTimes, Times};
+use ballbot_studies::timing::{
+    self, GuaranteedTimes, PROBLEMS, SEQUENCES, SequenceTimes, Stopwatch, Times,
+};
 use clap::Args;
+use clap::builder::RangedU64ValueParser;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -31,6 +34,9 @@ pub struct BenchArguments {
     /// What it is changed by.
     #[command(flatten)]
     pub options: ScenarioOptions,
+    /// How often each sample is repeated, 1 to 100000 times; less is quicker, and other work disturbs more
+    #[arg(long, value_name = "COUNT", default_value_t = Stopwatch::PASSES, value_parser = RangedU64ValueParser::<usize>::new().range(1..=100_000))]
+    pub passes: usize,
     /// Also write the times to this file as JSON; - for standard output, in place of the table
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
@@ -50,19 +56,23 @@ pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
     file.map(output::check_writable).transpose()?;
     let start = Instant::now();
     let clock = || start.elapsed();
+    let watch = Stopwatch {
+        clock: &clock,
+        passes: arguments.passes,
+    };
     let count = names.len() + problems.len();
     let progress = Progress::new("timing", count + 1);
     let mut sequences: Vec<SequenceTimes> = Vec::with_capacity(count);
     for name in names {
         let prepared = arguments.options.prepare(name)?;
-        sequences.push(timing::time(name, &prepared, &clock)?);
+        sequences.push(timing::time(name, &prepared, watch)?);
         progress.set(sequences.len());
     }
     for name in problems {
-        sequences.push(timing::time_problems(name, &clock)?);
+        sequences.push(timing::time_problems(name, watch)?);
         progress.set(sequences.len());
     }
-    let guaranteed = timing::time_guaranteed(&clock)?;
+    let guaranteed = timing::time_guaranteed(watch)?;
     progress.set(sequences.len() + 1);
     let document = json::text(&json!({ "sequences": sequences, "guarded": guaranteed }));
     match file {

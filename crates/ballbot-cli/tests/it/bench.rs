@@ -4,7 +4,7 @@ use crate::{failure, json};
 
 #[test]
 fn every_sequence_has_its_times() {
-    let result = json(&["bench", "--json", "-"]);
+    let result = json(&["bench", "--passes", "1", "--json", "-"]);
     let sequences = result["sequences"].as_array().unwrap();
     let names = [
         "two-setpoints",
@@ -27,6 +27,11 @@ fn every_sequence_has_its_times() {
         let many = name.starts_with("many") || name.starts_with("long");
         assert_eq!(active > 30, many, "{name}: {active} active");
     }
+}
+
+#[test]
+fn a_time_needs_a_pass() {
+    assert!(failure(&["bench", "--passes", "0"], 2).contains("--passes"));
 }
 
 #[test]

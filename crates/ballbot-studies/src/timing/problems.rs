@@ -1,6 +1,6 @@
 //! Quadratic programs larger than the ballbot's, and with many active bounds.
 
-use super::{COLD_PASSES, Clock, OtherWork, SequenceTimes, Times, shortest, shortest_of};
+use super::{OtherWork, SequenceTimes, Stopwatch, Times};
 use crate::StudyError;
 use lpvmpc::{Solution, Solver, SolverSettings};
 use lpvmpc_sequences::{Kind, Recipe, working_memory};
@@ -31,11 +31,11 @@ const LONG: Recipe = Recipe {
 ///
 /// # Errors
 /// No such sequence, or it cannot be made.
-pub fn time_problems(name: &str, clock: Clock<'_>) -> Result<SequenceTimes, StudyError> {
+pub fn time_problems(name: &str, watch: Stopwatch<'_>) -> Result<SequenceTimes, StudyError> {
     match name {
-        "many-bounds-8x2" => time::<8, 2>(name, &MANY_BOUNDS, clock),
-        "many-bounds-12x4" => time::<12, 4>(name, &MANY_BOUNDS, clock),
-        "long-4x1" => time::<4, 1>(name, &LONG, clock),
+        "many-bounds-8x2" => time::<8, 2>(name, &MANY_BOUNDS, watch),
+        "many-bounds-12x4" => time::<12, 4>(name, &MANY_BOUNDS, watch),
+        "long-4x1" => time::<4, 1>(name, &LONG, watch),
         _ => Err(StudyError::Unsuitable("no such sequence of problems")),
     }
 }
@@ -43,7 +43,7 @@ pub fn time_problems(name: &str, clock: Clock<'_>) -> Result<SequenceTimes, Stud
 fn time<const NX: usize, const NU: usize>(
     name: &str,
     recipe: &Recipe,
-    clock: Clock<'_>,
+    watch: Stopwatch<'_>,
 ) -> Result<SequenceTimes, StudyError> {
     let problems = recipe.make::<NX, NU>()?.problems;
     let room = working_memory(&problems);
@@ -57,14 +57,14 @@ fn time<const NX: usize, const NU: usize>(
         let mut solve = |other_work: Option<&mut OtherWork>| -> Duration {
             solution.clone_from(&before);
             other_work.map(OtherWork::sweep);
-            let start = clock();
+            let start = watch.time();
             solver.solve(black_box(ocp), &settings, &mut solution);
-            let elapsed = clock() - start;
+            let elapsed = watch.time() - start;
             black_box(&solution);
             elapsed
         };
-        warm.push(shortest(|| solve(None)));
-        cold.push(shortest_of(COLD_PASSES, || solve(Some(&mut other_work))));
+        warm.push(watch.shortest(|| solve(None)));
+        cold.push(watch.shortest_cold(|| solve(Some(&mut other_work))));
         max_active = max_active.max(solution.active.len());
     }
     let (warm, cold) = (Times::new(warm), Times::new(cold));
