@@ -2,7 +2,7 @@
 //! which no plan is applied that the nonlinear model does not confirm.
 //!
 //! Every sample begins with a plan that is known to work: the rest of the last one, with feedback
-//! towards its states, ended by the terminal law. A quadratic program along it, with the set point as
+//! towards its states, ended by the terminal law. It is rolled out where the plant is not as planned. A quadratic program along it, with the set point as
 //! one more unknown, proposes a better one. Only if the nonlinear rollout of the proposal keeps all bounds, ends in the
 //! terminal set and costs no more, it takes the place of the candidate (suboptimal MPC: Scokaert,
 //! Mayne and Rawlings 1999; Allan, Bates, Risbeck and Rawlings 2017; artificial set point: Limon,
@@ -14,12 +14,16 @@
 //! fixed weights and fixed bounds.
 
 mod aim;
+#[cfg(all(test, feature = "alloc"))]
+mod carriage;
 mod least_cost;
 mod memory;
 mod plan;
 mod program;
+mod rest;
 mod search;
 mod settings;
+mod slopes;
 mod take_over;
 mod tube;
 mod workspace;
@@ -44,6 +48,8 @@ pub use settings::{
     GuaranteedError, GuaranteedIterations, GuaranteedSettings, Rollout, TerminalSet,
     share_of_bounds,
 };
+pub use slopes::NEAR_SAMPLES;
+use slopes::SampleSlopes;
 pub use workspace::GuaranteedWorkspace;
 
 /// What the applied input is backed by, from the strongest to the weakest.
@@ -153,6 +159,8 @@ struct Planner<P, T: 'static, const NX: usize, const NU: usize, const NS: usize>
     pressure: T,
     /// Where the last program met the terminal set's edge, as y of the program.
     touch: Option<SVector<T, NX>>,
+    /// The derivatives of the prediction at the samples of the last plan that needed them.
+    slopes: List<SampleSlopes<T, NX, NU>>,
 }
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize> GuaranteedController<P, T, NX, NU, NS>
@@ -173,9 +181,15 @@ where
         const {
             assert!(NU > 0, "the set point enters through the first input");
         }
-        let GuaranteedMemory { plans, drift, aims } = memory;
+        let GuaranteedMemory {
+            plans,
+            drift,
+            slopes,
+            aims,
+        } = memory;
         let places = plans.iter().map(|list| list.len());
-        let largest = places.fold(drift.len().min(aims.len()), usize::min);
+        let places = places.chain([drift.len(), slopes.len()]);
+        let largest = places.fold(aims.len(), usize::min);
         settings.check(&model, largest)?;
         let horizon = settings.horizon;
         let [last, along, trial, nearer] = plans.map(|list| Plan::new(list.shortened(horizon)));
@@ -190,6 +204,7 @@ where
             end_drift: T::zero(),
             pressure: T::zero(),
             touch: None,
+            slopes: slopes.shortened(horizon),
         };
         let mut controller = Self {
             planner,
@@ -331,7 +346,7 @@ where
             nearer,
             ..
         } = self;
-        if !self.has_plan {
+        if !self.has_plan || !planner.is_under_way(last) {
             return Repeated::No;
         }
         planner.repeat(x, last, along.cost, trial);
@@ -373,7 +388,8 @@ where
     }
 
     /// The plan's states x_1 to x_N on the nonlinear model, as many as the horizon; none if there
-    /// is no plan.
+    /// is no plan. Of a [`Decision::Candidate`] they may be those of the plan before, moved by its
+    /// derivatives: right to first order in the integration error of a sample.
     pub fn rollout(&self) -> impl Iterator<Item = &SVector<T, NX>> {
         self.plan().map(|stage| &stage.x)
     }
@@ -437,6 +453,7 @@ where
         self.end_drift = T::zero();
         self.pressure = T::zero();
         self.touch = None;
+        self.slopes.fill(SampleSlopes::unknown());
     }
 }
 

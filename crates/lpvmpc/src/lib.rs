@@ -116,8 +116,8 @@ pub use from_dynamics::{AlongMotion, AlongRay, GaussLegendre};
 pub use guaranteed::{
     Decision, GuaranteedArrays, GuaranteedController, GuaranteedError, GuaranteedIterations,
     GuaranteedMemory, GuaranteedSettings, GuaranteedStep, GuaranteedWorkspace,
-    GuaranteedWorkspaceArrays, GuaranteedWorkspaceMemory, Rollout, SetPoints, TerminalSet,
-    share_of_bounds,
+    GuaranteedWorkspaceArrays, GuaranteedWorkspaceMemory, NEAR_SAMPLES, Rollout, SetPoints,
+    TerminalSet, share_of_bounds,
 };
 pub use kkt::{KktResidual, kkt_residual};
 pub use list::List;

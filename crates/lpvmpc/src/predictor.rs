@@ -391,6 +391,34 @@ impl Rk4 {
         x
     }
 
+    /// The same, with the state after `each` step. In discrete time a step is as many periods as fit into it.
+    #[inline(always)]
+    pub(crate) fn advance_through<T, M, const NX: usize, const NU: usize, const NS: usize>(
+        self,
+        model: &M,
+        x: &SVector<T, NX>,
+        u: &SVector<T, NU>,
+        t_s: T,
+        mut each: impl FnMut(&SVector<T, NX>),
+    ) -> SVector<T, NX>
+    where
+        T: Scalar,
+        M: LpvModel<T, NX, NU, NS>,
+    {
+        let h = self.step_length(t_s);
+        let discrete = model.period().is_some();
+        let mut x = *x;
+        for _ in 0..self.substeps {
+            x = if discrete {
+                Self { substeps: 1 }.advance(model, &x, u, h)
+            } else {
+                Self::step(model, &x, u, h)
+            };
+            each(&x);
+        }
+        x
+    }
+
     /// The state `h` seconds after `x` under the input `u`, by one step.
     #[inline(always)]
     pub fn step<T, M, const NX: usize, const NU: usize, const NS: usize>(

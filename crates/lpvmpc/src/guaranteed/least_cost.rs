@@ -54,91 +54,13 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> LeastCost<'a, T, NX, NU> {
 #[cfg(all(test, feature = "alloc"))]
 mod tests {
     use super::*;
-    use crate::guaranteed::plan::Plan;
-    use crate::guaranteed::{
-        GuaranteedController, GuaranteedIterations, GuaranteedSettings, Rollout, SetPoints,
-        TerminalSet,
-    };
+    use crate::guaranteed::carriage::{Carriage, N, plan, settings, vector};
+    use crate::guaranteed::{GuaranteedController, SetPoints};
     use crate::list::List;
-    use crate::model::LpvModel;
-    use crate::ocp::Bounds;
-    use crate::predictor::Rk4;
     use crate::settings::Weights;
-    use crate::solver::SolverSettings;
     use alloc::vec::Vec;
     use lpvmpc_testkit::rng::Rng;
-    use nalgebra::{Matrix1, Matrix1x3, Matrix3, Vector1, Vector3};
-
-    const N: usize = 12;
-
-    /// Place, speed and the lag of a drive; drag grows with the speed squared.
-    #[derive(Clone, Copy, Debug, PartialEq)]
-    struct Carriage {
-        drag: f64,
-        lag: f64,
-    }
-
-    impl LpvModel<f64, 3, 1, 1> for Carriage {
-        fn scheduling(&self, x: &Vector3<f64>, _: &Vector1<f64>) -> Vector1<f64> {
-            Vector1::new(x[1] * x[1])
-        }
-
-        fn matrices(&self, s: &Vector1<f64>) -> (Matrix3<f64>, Vector3<f64>) {
-            let drag = -self.drag * s[0];
-            let a = Matrix3::new(0.0, 1.0, 0.0, 0.0, drag, 1.0, 0.0, 0.0, -self.lag);
-            (a, Vector3::new(0.0, 0.0, self.lag))
-        }
-    }
-
-    fn vector<const K: usize>(random: &mut Rng, size: f64) -> SVector<f64, K> {
-        SVector::from_fn(|_, _| random.uniform(-size, size))
-    }
-
-    /// Positive definite, of random size.
-    fn weight(random: &mut Rng) -> Matrix3<f64> {
-        let root = Matrix3::from_fn(|_, _| random.uniform(-1.0, 1.0));
-        (root * root.transpose() + Matrix3::identity() * 0.01) * random.power_of_ten(-1.0, 3.0)
-    }
-
-    fn settings(random: &mut Rng) -> GuaranteedSettings<f64, 3, 1> {
-        GuaranteedSettings {
-            t_s: 0.1,
-            horizon: N,
-            rk4: Rk4 { substeps: 1 },
-            rollout: Rollout {
-                rk4: Rk4 { substeps: 2 },
-                error: Vector3::repeat(1e-6),
-                between: Vector3::repeat(1e-3),
-            },
-            weights: Weights {
-                q: weight(random),
-                r: Matrix1::new(random.power_of_ten(-2.0, 2.0)),
-            },
-            terminal: TerminalSet {
-                gain: Matrix1x3::new(1.0, 1.5, 0.5),
-                p: weight(random) * 10.0,
-                level: random.power_of_ten(0.0, 6.0),
-            },
-            x: Bounds {
-                lower: Vector3::new(f64::NEG_INFINITY, -3.0, -3.0),
-                upper: Vector3::new(f64::INFINITY, 3.0, 3.0),
-            },
-            u: Bounds {
-                lower: Vector1::new(-2.0),
-                upper: Vector1::new(2.0),
-            },
-            direction: Vector3::x(),
-            set_points: [f64::NEG_INFINITY, f64::INFINITY],
-            offset_weight: random.power_of_ten(-1.0, 4.0),
-            margin: 4e-3,
-            iterations: GuaranteedIterations {
-                known: 1,
-                unknown: 10,
-            },
-            soft_price: 1e3,
-            solver: SolverSettings::default(),
-        }
-    }
+    use nalgebra::{Matrix1x3, Vector1, Vector3};
 
     fn aims(random: &mut Rng, last: f64) -> Aims<f64> {
         let mut aims = Aims::new(List::repeat(0.0, N));
@@ -214,7 +136,6 @@ mod tests {
                 .planner;
             let start: Vector3<f64> = vector(&mut random, 2.5);
             planner.aims = aims(&mut random, start[0]);
-            let plan = || Plan::new(List::repeat(super::super::PlannedStage::zeros(), N));
             let [mut along, mut expected, mut found] = [plan(), plan(), plan()];
             planner.follow_terminal_law(&start, &mut along);
             let policy: Vec<_> = along

@@ -1,6 +1,7 @@
 //! The memory of a guaranteed controller and its workspace.
 
 use super::plan::PlannedStage;
+use super::slopes::SampleSlopes;
 use crate::list::List;
 use crate::memory::{Capacity, ManyBoundsArrays, SolverArrays, SolverMemory};
 use crate::model::Scalar;
@@ -17,13 +18,15 @@ pub struct GuaranteedMemory<T: 'static, const NX: usize, const NU: usize> {
     /// One for each sample.
     pub(super) drift: List<SVector<T, NX>>,
     /// One for each sample.
+    pub(super) slopes: List<SampleSlopes<T, NX, NU>>,
+    /// One for each sample.
     pub(super) aims: List<T>,
 }
 
 impl<T, const NX: usize, const NU: usize> GuaranteedMemory<T, NX, NU> {
     /// Bytes that this horizon takes, as [`SolverMemory::bytes`].
     pub const fn bytes(horizon: usize) -> usize {
-        let stage = 4 * size_of::<PlannedStage<T, NX, NU>>();
+        let stage = 4 * size_of::<PlannedStage<T, NX, NU>>() + size_of::<SampleSlopes<T, NX, NU>>();
         horizon * (stage + size_of::<SVector<T, NX>>() + size_of::<T>())
     }
 }
@@ -35,6 +38,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuaranteedMemory<T, NX, NU> {
         Self {
             plans: core::array::from_fn(|_| List::repeat(PlannedStage::zeros(), horizon)),
             drift: List::repeat(SVector::zeros(), horizon),
+            slopes: List::repeat(SampleSlopes::unknown(), horizon),
             aims: List::repeat(T::zero(), horizon),
         }
     }
@@ -45,6 +49,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuaranteedMemory<T, NX, NU> {
 pub struct GuaranteedArrays<T, const NX: usize, const NU: usize, const N: usize> {
     plans: [[PlannedStage<T, NX, NU>; N]; 4],
     drift: [SVector<T, NX>; N],
+    slopes: [SampleSlopes<T, NX, NU>; N],
     aims: [T; N],
 }
 
@@ -54,6 +59,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> GuaranteedArra
         GuaranteedMemory {
             plans: self.plans.each_mut().map(|list| List::Static(list)),
             drift: List::Static(&mut self.drift),
+            slopes: List::Static(&mut self.slopes),
             aims: List::Static(&mut self.aims),
         }
     }
@@ -67,6 +73,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize> Default
         Self {
             plans: [[PlannedStage::zeros(); N]; 4],
             drift: [SVector::zeros(); N],
+            slopes: [SampleSlopes::unknown(); N],
             aims: [T::zero(); N],
         }
     }

@@ -1,12 +1,11 @@
 //! Plans on the nonlinear model: their rollout as policies, cost and feasibility.
 
-use super::Planner;
 use super::least_cost::LeastCost;
+use super::{GuaranteedSettings, Planner};
 use crate::list::List;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Bounds;
 use crate::policy::input_at;
-use crate::predictor::Rk4;
 use crate::working_set::copy;
 use nalgebra::{SMatrix, SVector, convert};
 
@@ -27,6 +26,8 @@ pub(super) struct Plan<T: 'static, const NX: usize, const NU: usize> {
     pub set_point: T,
     /// Cost, the offset from the wanted set point included.
     pub cost: T,
+    /// Whether the states are another plan's, moved, instead of a rollout.
+    pub estimated: bool,
 }
 
 /// Sample i of a plan.
@@ -69,6 +70,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Plan<T, NX, NU> {
             end: SVector::zeros(),
             set_point: T::zero(),
             cost: T::zero(),
+            estimated: false,
         }
     }
 
@@ -84,10 +86,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> Plan<T, NX, NU> {
         self.end = other.end;
         self.set_point = other.set_point;
         self.cost = other.cost;
+        self.estimated = other.estimated;
     }
 
     /// Takes over how far the plant may be from the plan `last`.
-    fn drift_as(&mut self, last: &Self) {
+    pub(super) fn drift_as(&mut self, last: &Self) {
         for (stage, last) in self.stages.iter_mut().zip(&last.stages) {
             stage.drift = last.drift;
         }
@@ -106,28 +109,9 @@ where
         (self.settings.terminal.p * error).dot(&error)
     }
 
-    /// `plan` becomes the rest of `last` from the measured state, ended by the terminal law.
-    pub(super) fn rest(
-        &self,
-        x0: &SVector<T, NX>,
-        last: &Plan<T, NX, NU>,
-        plan: &mut Plan<T, NX, NU>,
-    ) {
-        let mut planned = last.stages.iter().zip(last.stages.iter().skip(1));
-        self.simulate(x0, plan, None, |x| match planned.next() {
-            Some((before, PlannedStage { u, feedback, .. })) => (
-                input_at(x, (&before.x, u), feedback, &self.settings.u),
-                *feedback,
-            ),
-            None => self.terminal_law(x, last.set_point),
-        });
-        plan.drift_as(last);
-        self.aim_as_surely(plan, last.set_point);
-    }
-
     /// Gives a rollout that ended in the terminal set around `near` its best set point. Its end may lie
     /// as near to the edge of the set as it did.
-    fn aim_as_surely(&self, plan: &mut Plan<T, NX, NU>, near: T) {
+    pub(super) fn aim_as_surely(&self, plan: &mut Plan<T, NX, NU>, near: T) {
         let level = self.settings.terminal.level;
         let edge = self.terminal_value(&plan.end, near).min(level);
         let almost = self.almost(self.end_drift);
@@ -145,7 +129,7 @@ where
         plan: &mut Plan<T, NX, NU>,
     ) {
         let d = &self.settings.direction;
-        let gone = (x0 - last.start).dot(d) / d.norm_squared();
+        let gone = self.gone(x0, last);
         let mut stages = last.states().zip(&last.stages);
         let near = last.set_point + gone;
         let whole = self.simulate(x0, plan, Some((near, most)), |x| match stages.next() {
@@ -159,6 +143,23 @@ where
             self.aim(plan, near, self.almost(self.end_drift));
             plan.drift_as(last);
         }
+    }
+
+    /// How far along the direction the plant has gone since `last` was made.
+    fn gone(&self, x0: &SVector<T, NX>, last: &Plan<T, NX, NU>) -> T {
+        let d = &self.settings.direction;
+        (x0 - last.start).dot(d) / d.norm_squared()
+    }
+
+    /// Whether the plan `last` ends farther from what is wanted than its terminal set reaches. Where it does not, the
+    /// plant arrives, and the same plan once more would shoot past.
+    pub(super) fn is_under_way(&self, last: &Plan<T, NX, NU>) -> bool {
+        let GuaranteedSettings {
+            terminal,
+            direction,
+            ..
+        } = &self.settings;
+        (last.set_point - self.aims.end).abs() > terminal.extent(direction)
     }
 
     /// The terminal value that a new plan may reach when the plant ends as far from it as from a plan
@@ -189,7 +190,7 @@ where
     }
 
     /// The terminal law around the set point, cut off at the input bounds, and its feedback matrix.
-    fn terminal_law(
+    pub(super) fn terminal_law(
         &self,
         x: &SVector<T, NX>,
         set_point: T,
@@ -233,7 +234,7 @@ where
     /// `plan` becomes the rollout under `input`, which gives the input and the feedback matrix at each
     /// stage's state. With a set point nearby and the `most` that it may cost, it ends, and the answer is
     /// `false`, where every plan that begins like this costs more or leaves the bounds.
-    fn simulate(
+    pub(super) fn simulate(
         &self,
         x0: &SVector<T, NX>,
         plan: &mut Plan<T, NX, NU>,
@@ -241,8 +242,6 @@ where
         mut input: impl FnMut(&SVector<T, NX>) -> (SVector<T, NU>, SMatrix<T, NU, NX>),
     ) -> bool {
         let settings = &self.settings;
-        let substeps = settings.rollout.rk4.substeps;
-        let step = settings.t_s / convert::<f64, T>(substeps as f64);
         let mut x = *x0;
         let mut least = most.map(|(near, most)| {
             let least = LeastCost::new(settings, &self.aims, near);
@@ -257,26 +256,41 @@ where
                     return false;
                 }
             }
-            let (mut highest, mut lowest) = (x, x);
-            for _ in 0..substeps {
-                x = Rk4 { substeps: 1 }.advance(&self.model, &x, &u, step);
-                (highest, lowest) = (highest.sup(&x), lowest.inf(&x));
-            }
-            *stage = PlannedStage {
-                u,
-                feedback,
-                x,
-                highest,
-                lowest,
-                drift: SVector::zeros(),
-            };
+            *stage = self.sample(&x, u, feedback);
+            x = stage.x;
             if most.is_some() && !self.keeps(&settings.x, stage, &SVector::zeros()) {
                 plan.cost = convert(f64::INFINITY);
                 return false;
             }
         }
         (plan.start, plan.end, plan.end_drift) = (*x0, x, T::zero());
+        plan.estimated = false;
         true
+    }
+
+    /// The rollout of a sample from `x` under `u`.
+    // Not inlined, so that the loop has the registers for itself.
+    #[inline(never)]
+    pub(super) fn sample(
+        &self,
+        x: &SVector<T, NX>,
+        u: SVector<T, NU>,
+        feedback: SMatrix<T, NU, NX>,
+    ) -> PlannedStage<T, NX, NU> {
+        let GuaranteedSettings { rollout, t_s, .. } = &self.settings;
+        let (mut highest, mut lowest) = (*x, *x);
+        let follow = |x: &SVector<T, NX>| (highest, lowest) = (highest.sup(x), lowest.inf(x));
+        let x = rollout
+            .rk4
+            .advance_through(&self.model, x, &u, *t_s, follow);
+        PlannedStage {
+            u,
+            feedback,
+            x,
+            highest,
+            lowest,
+            drift: SVector::zeros(),
+        }
     }
 
     /// Gives the rollout `plan` the admissible set point that is best for it, and its cost. The cost
@@ -365,10 +379,10 @@ where
     }
 
     /// The same, and how far from `plan` that is, as far as it has to be known.
-    pub(super) fn becomes_robust(&self, plan: &mut Plan<T, NX, NU>) -> bool {
+    pub(super) fn becomes_robust(&mut self, plan: &mut Plan<T, NX, NU>) -> bool {
         let x = shrunk(&self.settings.x, self.rounding());
-        self.find_drift_while(plan, |stage, before| {
-            self.keeps(&x, stage, &before.sup(&stage.drift))
+        self.find_drift_while(plan, |planner, stage, before| {
+            planner.keeps(&x, stage, &before.sup(&stage.drift))
         }) && self.is_robust(plan)
     }
 

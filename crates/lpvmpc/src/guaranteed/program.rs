@@ -9,6 +9,7 @@
 //! with the multiplier of the program before. The acceptance test asks for the ball itself.
 
 use super::plan::{Plan, shrunk, width};
+use super::slopes::Slopes;
 use super::{GuaranteedWorkspace, Planner};
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Bounds, Common, Ocp, Penalty, Stage};
@@ -21,7 +22,21 @@ where
     P: LpvModel<T, NX, NU, NS>,
 {
     /// The program along the plan `along`, whose states it lets be where they keep half of the margin.
-    pub(super) fn pose<const NA: usize>(&self, along: &Plan<T, NX, NU>, ocp: &mut Ocp<T, NA, NU>) {
+    pub(super) fn pose<const NA: usize>(
+        &mut self,
+        along: &Plan<T, NX, NU>,
+        ocp: &mut Ocp<T, NA, NU>,
+    ) {
+        if self.slope == Slope::Jacobian {
+            for (i, (x, planned)) in along.states().zip(&along.stages).enumerate() {
+                self.slopes_at(i, x, &planned.u);
+            }
+        }
+        self.pose_with_slopes(along, ocp);
+    }
+
+    /// The same where the derivatives along the plan, if they are asked for, are known.
+    fn pose_with_slopes<const NA: usize>(&self, along: &Plan<T, NX, NU>, ocp: &mut Ocp<T, NA, NU>) {
         let settings = &self.settings;
         // The last stage of the horizon follows its samples.
         ocp.horizon = settings.horizon + 2;
@@ -57,7 +72,14 @@ where
         for ((i, ((x, planned), wanted)), stage) in samples.enumerate().zip(&mut stages) {
             let aim = (i < self.aims.changes).then_some(*wanted - along.set_point);
             let relative = (x - origin, planned.x - origin);
-            (*stage.0, *stage.1) = self.sample_stage(x, &planned.u, relative, aim);
+            let slopes = match (self.slope, self.slopes.get(i)) {
+                (Slope::Jacobian, Some(known)) => known.slopes,
+                _ => {
+                    let (model, t_s) = (&self.model, settings.t_s);
+                    settings.rk4.linearize(model, x, &planned.u, t_s)
+                }
+            };
+            (*stage.0, *stage.1) = self.sample_stage(&slopes, &planned.u, relative, aim);
             if i > 0 {
                 stage.1.x = bounds(i, x);
             }
@@ -136,25 +158,21 @@ where
         (stage, common)
     }
 
-    /// One sample of the plant, linear along (x, u), exact at the plan itself: it leads from the first of
-    /// the `relative` states to the second. With an `aim` the stage cost is about it, else about z.
+    /// One sample of the plant, linear by the `slopes`, exact at the plan itself: under `u` it leads from the
+    /// first of the `relative` states to the second. With an `aim` the stage cost is about it, else about z.
     fn sample_stage<const NA: usize>(
         &self,
-        x: &SVector<T, NX>,
+        (a, b): &Slopes<T, NX, NU>,
         u: &SVector<T, NU>,
         relative: (SVector<T, NX>, SVector<T, NX>),
         aim: Option<T>,
     ) -> (Stage<T, NA, NU>, Common<T, NA, NU>) {
         let settings = &self.settings;
-        let (a, b) = match self.slope {
-            Slope::Jacobian => settings.rk4.differentiate(&self.model, x, u, settings.t_s),
-            Slope::Embedding => settings.rk4.linearize(&self.model, x, u, settings.t_s),
-        };
         let (x_here, x_next) = relative;
         let mut stage = Stage::<T, NA, NU>::new();
-        stage.a.view_mut((0, 0), (NX, NX)).copy_from(&a);
+        stage.a.view_mut((0, 0), (NX, NX)).copy_from(a);
         stage.a[(NX, NX)] = T::one();
-        stage.b.view_mut((0, 0), (NX, NU)).copy_from(&b);
+        stage.b.view_mut((0, 0), (NX, NU)).copy_from(b);
         stage.c = augmented(&(x_next - a * x_here - b * u), T::zero());
         // Damped towards the plan's input.
         stage.linear_u = settings.weights.r * u * -self.damping;

@@ -59,7 +59,10 @@ where
             let outcome = if workspace.solution.status.is_solved() {
                 planner.learn(workspace, along);
                 let outcome = planner.search(along, least, workspace, [trial, nearer]);
-                planner.learn_drift(along, workspace);
+                match &outcome {
+                    Outcome::Found(found) if found.feasible => planner.take_drift(trial),
+                    _ => planner.learn_drift(along, workspace),
+                }
                 outcome
             } else {
                 Outcome::Nothing
@@ -155,7 +158,7 @@ where
     /// cost so far; while no feasible plan is known, the first that is feasible, or else nearer to it.
     /// What is found is left in the first of the two plans; the second is kept where a plan is known.
     fn search<const NA: usize>(
-        &self,
+        &mut self,
         along: &Plan<T, NX, NU>,
         least: Option<T>,
         workspace: &GuaranteedWorkspace<T, NU, NA>,
@@ -167,7 +170,8 @@ where
         let before = self.merit(along);
         let most = least.map(|least| least + self.worthwhile(least));
         let mut near = None;
-        for fraction in FRACTIONS {
+        let mut dearer = [T::zero(); 2];
+        for (tried, fraction) in FRACTIONS.into_iter().enumerate() {
             let towards = program::answer(workspace, &origin);
             self.go_between(along, towards, convert(fraction), most, trial);
             // What is too dear need not be judged, which takes longer than its rollout.
@@ -189,6 +193,15 @@ where
                 swap(trial, nearer);
                 near = Some(found);
             }
+            // The parabola through the whole way, half of it and the plan itself rises from there on.
+            if let Some(dearer) = dearer.get_mut(tried) {
+                *dearer = trial.cost - along.cost;
+            }
+            let [whole, half] = dearer;
+            let rises = half * convert(4.0) - whole >= T::zero() && half.is_finite();
+            if tried == 1 && rises && least.is_some_and(|least| along.cost >= least) {
+                break;
+            }
         }
         if near.is_some() {
             swap(trial, nearer);
@@ -198,7 +211,7 @@ where
 
     /// Whether the rollout keeps all bounds wherever the plant can be that follows it, which is worked out
     /// where it does so itself.
-    fn judge(&self, plan: &mut Plan<T, NX, NU>) -> bool {
+    fn judge(&mut self, plan: &mut Plan<T, NX, NU>) -> bool {
         self.is_feasible(plan) && self.becomes_robust(plan)
     }
 

@@ -50,10 +50,12 @@ where
             end_drift,
             pressure,
             touch,
+            slopes,
         } = self;
         copy(stages, &previous.aims.stages);
         (*end, *changes) = (previous.aims.end, previous.aims.changes);
         copy(drift, &previous.drift);
+        copy(slopes, &previous.slopes);
         (*wanted, *damping, *slope) = (previous.wanted, previous.damping, previous.slope);
         (*end_drift, *pressure) = (previous.end_drift, previous.pressure);
         *touch = previous.touch;

@@ -9,13 +9,11 @@
 //! itself, so what is of second order in the deviation is left out.
 
 use super::plan::{Plan, PlannedStage};
-use super::{GuaranteedSettings, GuaranteedWorkspace, Planner, share_of_bounds};
+use super::slopes::Slopes;
+use super::{GuaranteedWorkspace, Planner, share_of_bounds};
 use crate::model::{LpvModel, Scalar};
 use crate::small_matrix::product;
 use nalgebra::{SMatrix, SVector, convert};
-
-/// A and B of a sample.
-type Slopes<T, const NX: usize, const NU: usize> = (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>);
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize> Planner<P, T, NX, NU, NS>
 where
@@ -23,23 +21,23 @@ where
     P: LpvModel<T, NX, NU, NS>,
 {
     /// Works out how far the plant may be from the states of `plan`.
-    pub(super) fn find_drift(&self, plan: &mut Plan<T, NX, NU>) {
-        self.find_drift_while(plan, |_, _| true);
+    pub(super) fn find_drift(&mut self, plan: &mut Plan<T, NX, NU>) {
+        self.find_drift_while(plan, |_, _, _| true);
     }
 
     /// The same, as long as the samples, each with the drift before it, are `accepted`; whether all are.
     pub(super) fn find_drift_while(
-        &self,
+        &mut self,
         plan: &mut Plan<T, NX, NU>,
-        accepted: impl Fn(&PlannedStage<T, NX, NU>, &SVector<T, NX>) -> bool,
+        accepted: impl Fn(&Self, &PlannedStage<T, NX, NU>, &SVector<T, NX>) -> bool,
     ) -> bool {
         let mut shape = SMatrix::zeros();
         let (mut x, mut before) = (plan.start, SVector::zeros());
-        for stage in plan.stages.iter_mut() {
-            let slopes = self.slopes(&x, &stage.u);
+        for (i, stage) in plan.stages.iter_mut().enumerate() {
+            let slopes = self.slopes_at(i, &x, &stage.u);
             shape = self.carried(&shape, (&x, &stage.u), &slopes, &stage.feedback);
             stage.drift = shape.diagonal().map(root);
-            if !accepted(stage, &before) {
+            if !accepted(self, stage, &before) {
                 return false;
             }
             (x, before) = (stage.x, stage.drift);
@@ -48,8 +46,16 @@ where
         true
     }
 
-    /// The same under the policy of the program that was made along `plan`, with its derivatives: what
-    /// the next program keeps free.
+    /// Takes what the next program keeps free from a new plan.
+    pub(super) fn take_drift(&mut self, plan: &Plan<T, NX, NU>) {
+        for (drift, stage) in self.drift.iter_mut().zip(&plan.stages) {
+            *drift = stage.drift;
+        }
+        self.end_drift = plan.end_drift;
+    }
+
+    /// The same under the policy of the program that was made along `plan`, with its derivatives, where
+    /// it led to no new plan.
     pub(super) fn learn_drift<const NA: usize>(
         &mut self,
         plan: &Plan<T, NX, NU>,
@@ -120,7 +126,7 @@ where
             } else {
                 plan.set_point
             };
-            let (a, b) = self.slopes(x, u);
+            let (a, b) = self.differentiate(x, u);
             let by_input = r * u * two + b.transpose() * gradient;
             let reach = feedback.abs() * drift;
             gradient = q * (x - d * aim) * two + a.transpose() * gradient;
@@ -137,17 +143,11 @@ where
     }
 
     /// The rollout's error over a sample from `x` under `u`, wherever along d that is.
-    fn error(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NX> {
+    pub(super) fn error(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NX> {
         let settings = &self.settings;
         let d = &settings.direction;
         let moving = x - d * (x.dot(d) / d.norm_squared());
         settings.rollout.error * share_of_bounds(&moving, &settings.x, u, &settings.u)
-    }
-
-    /// The derivatives of the prediction over a sample.
-    fn slopes(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> Slopes<T, NX, NU> {
-        let GuaranteedSettings { rk4, t_s, .. } = &self.settings;
-        rk4.differentiate(&self.model, x, u, *t_s)
     }
 
     /// How far the feedback within the ellipsoid `shape` moves the input.
