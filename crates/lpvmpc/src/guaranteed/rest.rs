@@ -100,7 +100,6 @@ where
 mod tests {
     use super::super::GuaranteedController;
     use super::super::carriage::{Carriage, N, plan, settings, vector};
-    use super::*;
     use lpvmpc_testkit::rng::Rng;
     use nalgebra::{SMatrix, Vector3};
 
