@@ -23,7 +23,7 @@ use crate::solver::{
     Solver, SolverSettings, WarmStart, clip_inputs, cost, infeasible, roll_forward, trajectory,
 };
 use crate::working_set::{copy, first, first_mut};
-use exchange::{Program, Tolerances, exchange};
+use exchange::{Patience, Program, Tolerances, exchange};
 use interior_point::{Foretold, InteriorPoint};
 use nalgebra::{SVector, convert};
 use side::Role;
@@ -36,9 +36,17 @@ const MANY_PER_INPUT: usize = 8;
 const MANY_SATURATED: usize = 8;
 /// Of a guess that is to be exchanged, one active side in so many may be wrong, and each must be better than
 /// the one before: from farther away it is a shorter way to begin anew.
-const NEAR: (usize, usize) = (4, 0);
+const NEAR: Patience = Patience {
+    few: 4,
+    guesses: 0,
+    singles: 0,
+};
 /// Saturated inputs may all be wrong, and twice no better.
-const FAR: (usize, usize) = (1, 2);
+const FAR: Patience = Patience {
+    few: 1,
+    guesses: 2,
+    singles: 6,
+};
 /// Guesses of the interior-point method that are tried.
 const TRIALS: usize = 5;
 /// Shorter parts of the way mean that bounds may contradict each other.
@@ -265,7 +273,7 @@ fn guess_saturated<T: Scalar, const NX: usize, const NU: usize>(
         for side in side::split_first_mut(&mut sides, i) {
             side.role = Role::Free;
             if let Some(j) = side.input()
-                && side.distance_at(ocp, &x, Some(&u)) < T::zero()
+                && side.distance_of(u[j]) < T::zero()
             {
                 side.role = Role::Held;
                 u[j] = side.limit;

@@ -71,6 +71,24 @@ pub(crate) fn add_scaled<T: Scalar, const R: usize, const C: usize>(
     }
 }
 
+/// out += a factor b'. Columns where b is zero are left out.
+#[inline(always)]
+pub(crate) fn add_outer_product<T: Scalar, const R: usize, const C: usize>(
+    out: &mut SMatrix<T, R, C>,
+    a: &SVector<T, R>,
+    factor: T,
+    b: &SVector<T, C>,
+) {
+    for (out, b) in out.data.0.iter_mut().zip(&b.data.0[0]) {
+        if *b != T::zero() {
+            let factor = *b * factor;
+            for (out, a) in out.iter_mut().zip(&a.data.0[0]) {
+                *out += *a * factor;
+            }
+        }
+    }
+}
+
 /// out = A + out factor
 #[inline(always)]
 pub(crate) fn extend<T: Scalar, const R: usize, const C: usize>(

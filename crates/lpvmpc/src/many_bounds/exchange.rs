@@ -13,6 +13,9 @@ use crate::riccati::StageFactor;
 use crate::rows::Trajectory;
 use nalgebra::{SVector, convert};
 
+/// So few sides that are wrong may be exchanged one by one.
+const A_FEW: usize = 6;
+
 /// Passes that refine an answer.
 const REFINEMENTS: usize = 6;
 
@@ -34,18 +37,29 @@ pub(super) struct Program<'a, T: 'static, const NX: usize, const NU: usize> {
     pub x: &'a mut [SVector<T, NX>],
 }
 
+/// How long a guess is exchanged.
+#[derive(Clone, Copy)]
+pub(super) struct Patience {
+    /// One active side in so many may be wrong at first.
+    pub few: usize,
+    /// So many guesses may be hardly better than the one before.
+    pub guesses: usize,
+    /// So often the first of a few sides that are wrong is exchanged alone.
+    pub singles: usize,
+}
+
 /// Exchanges sides until the guess is right, whose trajectory and multipliers (`estimate`) then are the
-/// answer; `false` if that is not found. One in `few` active sides may be wrong at first, and `patience`
-/// guesses may be hardly better than the one before. `count` is asked before every factorisation.
+/// answer; `false` if that is not found. `count` is asked before every factorisation.
 pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
     program: &mut Program<'_, T, NX, NU>,
     sides: &mut [BoundSide<T>],
     tolerances: &Tolerances<T>,
-    (few, mut patience): (usize, usize),
+    mut patience: Patience,
     mut count: impl FnMut() -> bool,
 ) -> bool {
     let active = sides.iter().filter(|side| side.role != Role::Free).count();
-    let mut most = (active / few).max(2);
+    let mut most = (active / patience.few).max(2);
+    let mut last = usize::MAX;
     let loose: T = convert(1e-6);
     let loose = tolerances.violation.max(loose);
     while count() {
@@ -81,13 +95,19 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
             }
         }
         // A guess from near by is right after a few exchanges, each of which leaves fewer sides wrong.
+        let alone = wrong <= A_FEW && wrong >= last && patience.singles > 0;
         if wrong <= most {
             most = wrong - wrong / 4;
-        } else if patience > 0 {
-            patience -= 1;
-        } else {
+        } else if patience.guesses > 0 {
+            patience.guesses -= 1;
+        } else if !alone {
             break;
         }
+        if alone {
+            patience.singles -= 1;
+            keep_first_change(sides);
+        }
+        last = wrong;
     }
     false
 }
@@ -119,7 +139,7 @@ fn explain<T: Scalar, const NX: usize, const NU: usize>(
         x: program.x,
         u: program.u,
     };
-    newton::explain(program.ocp, program.factors, sides, &trajectory, program.v)
+    newton::explain(program.ocp, sides, &trajectory, program.v)
 }
 
 /// Moves to the minimum with the sides as they are, to rounding, from a point whose `residual` is known;
@@ -146,6 +166,7 @@ fn refine<T: Scalar, const NX: usize, const NU: usize>(
         }
         last = worst;
         let trajectory = (&mut *program.u, &mut *program.x);
+        newton::descend(program.ocp, program.factors, program.v);
         newton::deviate(program.ocp, program.factors, program.v, trajectory, sides);
         measure(program, sides);
         *residual = explain(program, sides);
@@ -172,6 +193,7 @@ fn reassign<T: Scalar>(sides: &mut [BoundSide<T>], violation: T, rounding: T) ->
             },
             known => known,
         };
+        side.last_role = side.role;
         if role != side.role {
             if side.role == Role::Free {
                 side.estimate = T::zero();
@@ -184,4 +206,13 @@ fn reassign<T: Scalar>(sides: &mut [BoundSide<T>], violation: T, rounding: T) ->
         }
     }
     changes
+}
+
+/// Takes back all changes of roles but that of the first side. Exchanged at once a few sides may go in circles;
+/// the first alone, in a fixed order, cannot where inputs are all that is bounded (Murty 1974).
+fn keep_first_change<T: Scalar>(sides: &mut [BoundSide<T>]) {
+    let changed = sides.iter_mut().filter(|side| side.role != side.last_role);
+    for side in changed.skip(1) {
+        side.role = side.last_role;
+    }
 }

@@ -5,9 +5,11 @@ use super::side::{BoundSide, Role, split_first_mut, split_off, split_off_mut};
 use crate::model::Scalar;
 use crate::ocp::{Common, Ocp, Stage};
 use crate::riccati::{Adjustment, BadPivot, CostToGo, StageFactor, StageMinimum};
-use crate::rows::{self, Trajectory};
-use crate::small_matrix::{product, transposed_product, transposed_times};
-use crate::solution::Quantity;
+use crate::rows::Trajectory;
+use crate::small_matrix::{
+    add_outer_product, add_scaled, product, transposed_product, transposed_times,
+};
+use crate::solution::{BoundId, Quantity};
 use nalgebra::SVector;
 
 /// The factors of the problem with the cost of every side's multiplier; inputs that are held are constants.
@@ -58,32 +60,39 @@ struct Costs<'a, T: 'static, const NX: usize, const NU: usize> {
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> Adjustment<T, NX, NU> for Costs<'_, T, NX, NU> {
+    #[inline(always)]
     fn adjust(&self, minimum: &mut StageMinimum<T, NX, NU>) {
-        for side in self.sides {
-            add_to_minimum(self.ocp, side, minimum);
+        for bound in self.sides.chunk_by(is_same_quantity) {
+            add_to_minimum(self.ocp, bound, minimum);
         }
     }
 }
 
-/// The part of a side's cost that has to do with the input.
+/// The part of the cost of a bound's sides that has to do with the input.
 #[inline(always)]
 fn add_to_minimum<T: Scalar, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
-    side: &BoundSide<T>,
+    sides: &[BoundSide<T>],
     minimum: &mut StageMinimum<T, NX, NU>,
 ) {
+    let Some(side) = sides.first() else {
+        return;
+    };
     match side.bound.quantity {
-        Quantity::Input(j) if side.role == Role::Held => minimum.hold(j, side.limit),
-        Quantity::Input(j) => {
-            minimum.hessian[(j, j)] += side.weight;
-            minimum.g[j] -= pull(side);
-        }
+        Quantity::Input(j) => match sides.iter().find(|side| side.role == Role::Held) {
+            Some(held) => minimum.hold(j, held.limit),
+            None => {
+                let (weight, pull) = weight_and_pull(sides);
+                minimum.hessian[(j, j)] += weight;
+                minimum.g[j] -= pull;
+            }
+        },
         Quantity::Row(j) => {
+            let (weight, pull) = weight_and_pull(sides);
             if let Some(row) = ocp.row(side.bound.stage, j) {
-                let weighted = row.u * side.weight;
-                minimum.hessian += weighted * row.u.transpose();
-                minimum.g_x += weighted * row.x.transpose();
-                minimum.g -= row.u * pull(side);
+                add_outer_product(&mut minimum.hessian, &row.u, weight, &row.u);
+                add_outer_product(&mut minimum.g_x, &row.u, weight, &row.x);
+                add_scaled(&mut minimum.g, &row.u, -pull);
             }
         }
         Quantity::State(_) => {}
@@ -96,16 +105,24 @@ fn add_to_cost<T: Scalar, const NX: usize, const NU: usize>(
     sides: &[BoundSide<T>],
     cost: &mut CostToGo<T, NX>,
 ) {
-    for side in sides {
-        match side.bound.quantity {
+    for sides in sides.chunk_by(is_same_quantity) {
+        let Some(BoundId {
+            stage, quantity, ..
+        }) = sides.first().map(|side| side.bound)
+        else {
+            continue;
+        };
+        match quantity {
             Quantity::State(j) => {
-                cost.quadratic[(j, j)] += side.weight;
-                cost.linear[j] -= pull(side);
+                let (weight, pull) = weight_and_pull(sides);
+                cost.quadratic[(j, j)] += weight;
+                cost.linear[j] -= pull;
             }
             Quantity::Row(j) => {
-                if let Some(row) = ocp.row(side.bound.stage, j) {
-                    cost.quadratic += row.x * side.weight * row.x.transpose();
-                    cost.linear -= row.x * pull(side);
+                let (weight, pull) = weight_and_pull(sides);
+                if let Some(row) = ocp.row(stage, j) {
+                    add_outer_product(&mut cost.quadratic, &row.x, weight, &row.x);
+                    add_scaled(&mut cost.linear, &row.x, -pull);
                 }
             }
             Quantity::Input(_) => {}
@@ -113,9 +130,19 @@ fn add_to_cost<T: Scalar, const NX: usize, const NU: usize>(
     }
 }
 
-/// The side's cost is weight * value^2 / 2 - pull * value.
-fn pull<T: Scalar>(side: &BoundSide<T>) -> T {
-    side.sign() * side.base + side.weight * side.limit
+/// Whether two sides bound the same quantity of a stage.
+fn is_same_quantity<T>(a: &BoundSide<T>, b: &BoundSide<T>) -> bool {
+    a.bound.quantity == b.bound.quantity && a.bound.stage == b.bound.stage
+}
+
+/// The cost of a bound's sides is weight * value^2 / 2 - pull * value.
+fn weight_and_pull<T: Scalar>(sides: &[BoundSide<T>]) -> (T, T) {
+    sides.iter().fold((T::zero(), T::zero()), |sum, side| {
+        (
+            sum.0 + side.weight,
+            sum.1 + (side.sign() * side.base + side.weight * side.limit),
+        )
+    })
 }
 
 /// The trajectory of the factors' policies, and the distance of every side on it.
@@ -141,15 +168,22 @@ pub(super) fn measure<T: Scalar, const NX: usize, const NU: usize>(
     sides: &mut [BoundSide<T>],
     trajectory: &Trajectory<'_, T, NX, NU>,
 ) {
-    let mut stage = 0;
-    let mut x = ocp.x0;
-    for side in sides {
-        if side.bound.stage != stage {
-            stage = side.bound.stage;
+    let n = ocp.length();
+    let (mut at, mut x) = (0, ocp.x0);
+    for sides in sides.chunk_by_mut(is_same_quantity) {
+        let Some(side) = sides.first() else {
+            continue;
+        };
+        let stage = side.bound.stage;
+        if stage != at {
+            at = stage;
             x = trajectory.state(ocp, stage);
         }
-        let u = trajectory.u.get(stage).filter(|_| stage < ocp.length());
-        side.distance = side.distance_at(ocp, &x, u);
+        let u = trajectory.u.get(stage).filter(|_| stage < n);
+        let value = side.value(ocp, &x, u);
+        for side in sides {
+            side.distance = side.distance_of(value);
+        }
     }
 }
 
@@ -166,10 +200,11 @@ fn gradient<T: Scalar, const NX: usize, const NU: usize>(
         match side.bound.quantity {
             Quantity::State(j) => sum.0[j] += slope,
             Quantity::Input(j) => sum.1[j] += slope,
-            Quantity::Row(_) => {
-                let (x, u) = rows::normal(ocp, &side.bound);
-                sum.0 += x * slope;
-                sum.1 += u * slope;
+            Quantity::Row(j) => {
+                if let Some(row) = ocp.row(side.bound.stage, j) {
+                    add_scaled(&mut sum.0, &row.x, slope);
+                    add_scaled(&mut sum.1, &row.u, slope);
+                }
             }
         }
     }
@@ -243,9 +278,8 @@ fn take_up<T: Scalar, const NX: usize, const NU: usize>(
     change_u: Option<&SVector<T, NU>>,
 ) {
     for side in sides.iter_mut().filter(|side| side.is_weighted()) {
-        let (normal_x, normal_u) = rows::normal(ocp, &side.bound);
-        let change = normal_x.dot(change_x) + change_u.map_or(T::zero(), |u| normal_u.dot(u));
-        side.base -= side.weight * (side.distance + side.sign() * change);
+        let change = side.value(ocp, change_x, change_u) * side.sign();
+        side.base -= side.weight * (side.distance + change);
     }
 }
 
@@ -258,14 +292,13 @@ pub(super) struct Residual<T> {
 }
 
 /// The problem's own adjoint recursion on the trajectory, with the multipliers of the sides at their
-/// distances: gives every held input its multiplier, and leaves in `v` the deviations that take what is
-/// left of the gradient away.
+/// distances: gives every held input its multiplier, and leaves in `slopes` what is left of the gradient in
+/// the inputs.
 pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
-    factors: &[StageFactor<T, NX, NU>],
     sides: &mut [BoundSide<T>],
     trajectory: &Trajectory<'_, T, NX, NU>,
-    v: &mut [SVector<T, NU>],
+    slopes: &mut [SVector<T, NU>],
 ) -> Residual<T> {
     let n = ocp.length();
     let mut residual = Residual {
@@ -284,9 +317,8 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
     // The sizes of what adds up to the costate, and cancels where the sides decide.
     let mut sizes = costate.abs() + of_cost.abs();
     costate += of_cost;
-    let mut correction = SVector::zeros();
-    let stages = ocp.stages.iter().zip(factors).zip(v.iter_mut());
-    for (i, ((stage, factor), v)) in stages.enumerate().take(n).rev() {
+    let stages = ocp.stages.iter().zip(slopes.iter_mut());
+    for (i, (stage, left)) in stages.enumerate().take(n).rev() {
         let here = split_off_mut(&mut before, i);
         let (slope_x, slope_u) = gradient(ocp, here, of_rows);
         let (x, u) = (trajectory.state(ocp, i), trajectory.u.get(i));
@@ -309,7 +341,20 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
             + stage.linear_x;
         sizes = costate.abs() + slope_x.abs();
         costate += slope_x;
-        *v = step_back(stage, factor, &slope, &mut correction);
+        *left = slope;
     }
     residual
+}
+
+/// Makes of a gradient in the inputs, in `v`, the deviations that take it away.
+pub(super) fn descend<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    factors: &[StageFactor<T, NX, NU>],
+    v: &mut [SVector<T, NU>],
+) {
+    let mut costate = SVector::zeros();
+    let stages = ocp.stages.iter().zip(factors).zip(v.iter_mut());
+    for ((stage, factor), v) in stages.take(ocp.length()).rev() {
+        *v = step_back(stage, factor, v, &mut costate);
+    }
 }

@@ -136,21 +136,25 @@ impl<T: Scalar> BoundSide<T> {
         }
     }
 
-    /// d where the quantity is bounded at these values of the stage.
-    pub fn distance_at<const NX: usize, const NU: usize>(
+    /// The bounded quantity at these values of the stage.
+    pub fn value<const NX: usize, const NU: usize>(
         &self,
         ocp: &Ocp<T, NX, NU>,
         x: &SVector<T, NX>,
         u: Option<&SVector<T, NU>>,
     ) -> T {
-        let value = match self.bound.quantity {
+        match self.bound.quantity {
             Quantity::State(j) => x[j],
             Quantity::Input(j) => u.map_or(self.limit, |u| u[j]),
             Quantity::Row(j) => {
                 let row = ocp.row(self.bound.stage, j);
                 row.map_or(self.limit, |row| row.value(x, u))
             }
-        };
+        }
+    }
+
+    /// d where the quantity has this value.
+    pub fn distance_of(&self, value: T) -> T {
         (value - self.limit) * self.sign()
     }
 
