@@ -24,7 +24,8 @@ RANGES = {
 
 def plan_cost(problem: Problem, plan: lpvmpc.Plan, x_ref) -> float:
     """The cost of a plan, the prices of exceeded bounds included."""
-    prices = np.where(np.isfinite(problem.prices), problem.prices, 0.0)
+    prices = problem.prices_from(plan.x[0], np.asarray(x_ref, dtype=float))
+    prices = np.where(np.isfinite(prices), prices, 0.0)
     return float(plan.cost + (problem.excess(plan.x[1:]) @ prices).sum())
 
 

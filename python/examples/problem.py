@@ -92,6 +92,16 @@ class Problem:
             step=runge_kutta(example, mpc.t_s, settings["substeps"]),
         )  # fmt: skip
 
+    def prices_from(self, x: Array, x_ref: Array) -> Array:
+        """The prices of a sample at `x` whose references end at `x_ref`: far away they are higher. Written down once more from
+        the documentation of `lpvmpc::exact_prices_at`, for a plan that stands still."""
+        e = x - x_ref
+        still = e @ (self.p + self.horizon * self.q) @ e
+        diagonal = np.diag(self.p)
+        slope = np.where(diagonal > 0, diagonal, abs(self.p).max())
+        # NaN, where there is no price, stays.
+        return np.maximum(self.prices, 4 * np.sqrt(slope * still))
+
     def excess(self, x: Array, bounds: tuple[Array, Array] | None = None) -> Array:
         """By how much states exceed their bounds, in the states' units."""
         lower, upper = bounds if bounds is not None else (self.x_lower, self.x_upper)

@@ -26,7 +26,8 @@ class Converged:
         self.soft = np.flatnonzero(np.isfinite(problem.prices))
         slack = ca.SX.sym("s", len(self.soft), horizon)
         x_ref, u_ref = ca.SX.sym("x_ref", n, horizon + 1), ca.SX.sym("u_ref", m, horizon)
-        cost = ca.sum1(ca.SX(problem.prices[self.soft]).T @ ca.sum2(slack))
+        prices = ca.SX.sym("prices", len(self.soft))
+        cost = ca.sum1(prices.T @ ca.sum2(slack))
         for i in range(horizon):
             e, v = x[:, i] - x_ref[:, i], u[:, i] - u_ref[:, i]
             cost += ca.bilin(problem.q, e, e) + ca.bilin(problem.r, v, v)
@@ -36,7 +37,7 @@ class Converged:
         bounded = x[[int(j) for j in self.soft], 1:]
         constraints = ca.vertcat(ca.vec(gaps), ca.vec(bounded - slack), ca.vec(bounded + slack))
         unknowns = ca.veccat(x, u, slack)
-        nlp = {"x": unknowns, "p": ca.veccat(x_ref, u_ref), "f": cost, "g": constraints}
+        nlp = {"x": unknowns, "p": ca.veccat(x_ref, u_ref, prices), "f": cost, "g": constraints}
         options = {**_QUIET, "ipopt.tol": 1e-8, "ipopt.max_iter": 1000}
         self.solver = ca.nlpsol("ipopt", "ipopt", nlp, options)
         self.failures, self.times = 0, []
@@ -53,8 +54,9 @@ class Converged:
         lower[:, soft], upper[:, soft] = -np.inf, np.inf
         lower[0] = upper[0] = x
         slacks = np.zeros(horizon * len(soft))
+        prices = problem.prices_from(x, x_ref[-1])[soft]
         arguments = {
-            "p": np.concatenate([x_ref.ravel(), u_ref.ravel()]),
+            "p": np.concatenate([x_ref.ravel(), u_ref.ravel(), prices]),
             "lbx": np.concatenate([lower.ravel(), np.tile(problem.u_lower, horizon), slacks]),
             "ubx": np.concatenate([upper.ravel(), np.tile(problem.u_upper, horizon), slacks + np.inf]),
             "lbg": np.concatenate([np.zeros(horizon * problem.n), slacks - np.inf, soft_lower.ravel()]),
@@ -73,7 +75,7 @@ class Converged:
         self.plan = best[2]
         # IPOPT relaxes bounds by 1e-8: a slack below zero would pay.
         spared = np.minimum(0, self.plan[len(self.plan) - len(slacks) :]).reshape(horizon, -1).sum(0)
-        self.cost = -best[1] - float(spared @ problem.prices[soft])
+        self.cost = -best[1] - float(spared @ prices)
         return self.plan
 
     def _guesses(self, x: Array, x_ref: Array, u_ref: Array) -> list[Array]:

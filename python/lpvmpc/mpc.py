@@ -172,8 +172,8 @@ class Mpc:
         ``{"position": (-1, 1)}``; a state or input that is not named has those of the plant.
     state_bounds
         What becomes of a plan that cannot keep the bounds of the states: ``"soft"`` (exceeded as little as
-        possible), ``"hard"`` (infeasible), or prices by name, ``{"position": Penalty(1e3)}``; states
-        that are not named are hard then.
+        possible, at a price that grows with the distance of the goal), ``"hard"`` (infeasible), or prices by
+        name, ``{"position": Penalty(1e3)}``; states that are not named are hard then.
     u_ref
         The input that costs nothing, shape (m,). Without, the input that holds the plant at the end of
         the reference.
@@ -206,7 +206,8 @@ class Mpc:
         Quadratic programs per sample, at most (descent) or exactly (fixed).
     first_programs
         Quadratic programs, at most, in a sample without a plan from the one before: in the first, after a reset or
-        after a plan that was none (descent).
+        after a plan that was none (descent). Where they are more than `max_programs`, and so many are needed,
+        plans from two other beginnings are looked for, with as many for each.
     tolerance
         A descent ends when the cost falls by less than this part of it.
     estimator

@@ -9,9 +9,12 @@ use crate::last_input::{LastInput, Sampled};
 use crate::model::Model;
 use crate::plan::{Plan, Target};
 use crate::preview::Preview;
-use crate::settings::MpcSettings;
+use crate::settings::{MpcSettings, StateBounds};
 use crate::stage_lists::StageLists;
-use lpvmpc::{Controller, GeneralRow, List, Reference, Rk4, Verdict, Workspace};
+use lpvmpc::{
+    Controller, GeneralRow, List, Reference, Rk4, SoftBounds, TerminalIngredient, Verdict,
+    Workspace, exact_prices_at,
+};
 use lpvmpc_plant::{Plant, SizedPlant};
 use nalgebra::SVector;
 
@@ -139,7 +142,11 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             Controller::allocate(made.model, made.of_controller).map_err(refused)?;
         let rows = List::Owned(made.rows.into_boxed_slice());
         controller.set_rows(rows).map_err(refused)?;
-        let capacity = made.of_controller.capacity().with_own_stages();
+        let capacity = made
+            .of_controller
+            .capacity()
+            .with_own_stages()
+            .with_second_plan();
         let room = settings.rows.len();
         Ok(Self {
             plant: plant.clone(),
@@ -159,6 +166,23 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
     fn filter_with(&self, settings: &EstimatorSettings) -> Result<Filter<NX, NU, NS>, MpcError> {
         let settings = (&self.settings, settings);
         Filter::new(&self.plant, &self.names, settings, self.rest)
+    }
+
+    /// The prices of the states' bounds, where they are above those of the settings so far (`way`) from where the plan
+    /// has to go: those of a plan that stands still, than which a good one costs no more.
+    fn prices_from(&self, way: &SVector<f64, NX>) -> Option<SoftBounds<f64, NX>> {
+        let settings = self.controller.settings();
+        let TerminalIngredient::Cost(p) = &settings.terminal else {
+            return None;
+        };
+        let bounded = settings.soft_x.iter().any(Option::is_some);
+        if !bounded || p.amax() == 0.0 || self.settings.state_bounds != StateBounds::Soft {
+            return None;
+        }
+        let samples = settings.horizon as f64;
+        let still = way.dot(&(p * way + settings.weights.q * way * samples));
+        let prices = exact_prices_at(p, &settings.x, still);
+        (prices != settings.soft_x).then_some(prices)
     }
 
     /// The plan from `x`, where more acts on the plant than its input.
@@ -183,12 +207,18 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         let of_tasks = tasks.as_ref().map_or(0, |tasks| tasks.bounded.len());
         let most = of_stages.unwrap_or(self.settings.rows.len()) + of_tasks;
         if most > self.room {
-            let capacity = self.controller.settings().capacity().with_own_stages();
+            let capacity = self
+                .controller
+                .settings()
+                .capacity()
+                .with_own_stages()
+                .with_second_plan();
             self.workspace = Workspace::allocate(capacity.with_general_rows(most));
             self.room = most;
         }
-        let rows: Vec<&[GeneralRow<f64, NX, NU>]> = lists.rows.iter().map(Vec::as_slice).collect();
         let terminal = lists.x_ref.last().copied().unwrap_or(self.rest.0);
+        let prices = self.prices_from(&(x - terminal));
+        let rows: Vec<&[GeneralRow<f64, NX, NU>]> = lists.rows.iter().map(Vec::as_slice).collect();
         let outputs = tasks
             .as_ref()
             .map(|tasks| tasks as &dyn lpvmpc::Outputs<f64, NX, NU>);
@@ -199,6 +229,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             linear_x: &lists.linear_x,
             linear_u: &lists.linear_u,
             x: &lists.x_bounds,
+            soft_x: prices.as_slice(),
             u: &lists.u_bounds,
             rows: &rows,
             disturbance: &lists.disturbance,
@@ -265,7 +296,11 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
             self.controller.reset();
             self.last_input = last_input;
         }
-        let capacity = made.of_controller.capacity().with_own_stages();
+        let capacity = made
+            .of_controller
+            .capacity()
+            .with_own_stages()
+            .with_second_plan();
         self.workspace = Workspace::allocate(capacity.with_general_rows(settings.rows.len()));
         self.room = settings.rows.len();
         (self.settings, self.bounds) = (settings.clone(), made.bounds);

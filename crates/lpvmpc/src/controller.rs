@@ -2,6 +2,8 @@
 
 use crate::by_stage::{CostByStage, PlantByStage, Sample};
 use crate::changes::FixedRows;
+#[cfg(feature = "alloc")]
+use crate::elsewhere::Watch;
 use crate::list::List;
 use crate::memory::ControllerMemory;
 use crate::model::{LpvModel, Scalar};
@@ -70,6 +72,9 @@ pub struct Controller<P, T: 'static, const NX: usize, const NU: usize, const NS:
     pub(crate) rollout: List<SVector<T, NX>>,
     /// How the last plan is followed: of a descent only.
     pub(crate) policy: Policy<T, NX, NU>,
+    /// Whether another plan is to be looked for.
+    #[cfg(feature = "alloc")]
+    pub(crate) watch: Watch<T>,
     /// Rolled-out minus predicted state at the end of the horizon.
     pub(crate) gap: SVector<T, NX>,
     pub(crate) initialised: bool,
@@ -122,6 +127,8 @@ where
             settings,
             rollout,
             policy: Policy::new(planned, feedback),
+            #[cfg(feature = "alloc")]
+            watch: Watch::new(),
             gap: SVector::zeros(),
             initialised: false,
             problems: 0,

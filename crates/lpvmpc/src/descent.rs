@@ -37,6 +37,15 @@ pub(crate) enum Along {
     Jacobian,
 }
 
+/// Whether the states of a plan are what its inputs lead to.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum States {
+    /// They are.
+    Follow,
+    /// They are not: the motion from one need not end at the next.
+    Apart,
+}
+
 /// What came of a program.
 pub(crate) enum Outcome<T> {
     /// It has no answer.
@@ -95,22 +104,43 @@ where
         self.problems = 0;
         self.track(aim, &mut workspace.ocp);
         let iterations = &self.settings.iterations;
-        let (mut along, most) = if self.initialised {
+        let (along, most) = if self.initialised {
             (Along::Jacobian, iterations.most())
         } else {
             (Along::Scheduling, iterations.first())
         };
-        if !self.first_plan(x, aim, workspace) {
-            return self.give_up(Status::NotFinite);
-        }
+        #[cfg(feature = "alloc")]
+        let last = self.initialised.then_some(self.policy.cost);
         let mut prices = Prices::none();
+        let found = self
+            .first_plan(x, aim, workspace)
+            .then(|| self.search(x, aim, (along, most, tolerance), &mut prices, workspace));
+        #[cfg(feature = "alloc")]
+        let found = self.look_elsewhere(x, aim, (last, tolerance), (found, prices), workspace);
+        match found {
+            Some(status) => self.publish(status),
+            None => self.give_up(Status::NotFinite),
+        }
+    }
+
+    /// Improves the plan, with programs whose matrices are `along` at first, until the sample has had `most` of
+    /// them. Raises `prices` above their multipliers.
+    pub(crate) fn search<D: PlantByStage<P, T, NX, NU, NS>>(
+        &mut self,
+        x: &SVector<T, NX>,
+        aim: &Aim<'_, T, NX, NU, D>,
+        (along, most, tolerance): (Along, usize, T),
+        prices: &mut Prices<T, NX>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) -> Status<T> {
+        let mut along = along;
         let mut status = Status::NoImprovement;
         // Programs in a row that have brought nothing.
         let mut failures = 0;
         // The longest step that is tried along the embedding. It has no damping to shorten its answers.
         let mut longest_step = T::one();
         while self.problems() < most {
-            self.linearize_plan(x, aim, along, workspace);
+            self.linearize_plan(x, aim, (along, States::Follow), workspace);
             self.solve_program(workspace);
             let damped = self.policy.damping > T::zero();
             let longest = match along {
@@ -118,7 +148,7 @@ where
                 Along::Jacobian if damped => convert(STEPS[0]),
                 Along::Jacobian => T::one(),
             };
-            let outcome = self.improve(x, aim, (tolerance, longest), &mut prices, workspace);
+            let outcome = self.improve(x, aim, (tolerance, longest), prices, workspace);
             if let (Along::Scheduling, Outcome::Moved { step, .. }) = (along, &outcome) {
                 // A longer one only after one that was not shortened.
                 longest_step = if *step < longest {
@@ -178,17 +208,17 @@ where
                 }
             }
         }
-        self.publish(status);
+        status
     }
 
     /// The matrices of the program along the plan from `x`. Their affine terms make the linear model
-    /// exact on the plan itself.
+    /// exact on the plan itself, or, of states `Apart`, on each of its samples by itself.
     #[inline(never)]
     pub(crate) fn linearize_plan<D: PlantByStage<P, T, NX, NU, NS>>(
         &self,
         x: &SVector<T, NX>,
         aim: &Aim<'_, T, NX, NU, D>,
-        along: Along,
+        (along, plan): (Along, States),
         workspace: &mut Workspace<T, NX, NU>,
     ) {
         let ocp = &mut workspace.ocp;
@@ -217,6 +247,10 @@ where
             if i >= done {
                 (stage.a, stage.b) = own.sample_matrices(i, &self.model, settings, (x, u), along);
             }
+            let next = match plan {
+                States::Follow => *next,
+                States::Apart => own.next_state(i, &self.model, settings, x, u),
+            };
             stage.c = next - stage.a * x - stage.b * u;
             stage.linear_u = linear_u - u * damping;
             if D::SOME {
@@ -232,7 +266,7 @@ where
         }
     }
 
-    fn solve_program(&mut self, workspace: &mut Workspace<T, NX, NU>) {
+    pub(crate) fn solve_program(&mut self, workspace: &mut Workspace<T, NX, NU>) {
         // Along another plan other bounds are active, and to drop one takes longer than to find it.
         let warm_start = match self.problems {
             0 => self.settings.solver.warm_start,

@@ -57,7 +57,7 @@ where
     /// cheaper than `best`; returns what it costs then. Where none of them is finite, it is the input of the
     /// reference, held.
     #[inline(never)]
-    fn regulate<D: PlantByStage<P, T, NX, NU, NS>>(
+    pub(crate) fn regulate<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
         x: &SVector<T, NX>,
         aim: &Aim<'_, T, NX, NU, D>,

@@ -66,6 +66,8 @@ mod clock;
 mod controller;
 mod delay;
 mod descent;
+#[cfg(feature = "alloc")]
+mod elsewhere;
 mod embedding;
 mod estimator;
 mod farkas;
@@ -141,7 +143,7 @@ pub use regulator::{
 pub use regulator::{GuaranteedFeedback, StateFeedback};
 pub use settings::{
     ControllerError, ControllerSettings, InputReference, Iterations, Scheduling,
-    TerminalIngredient, Weights, exact_prices,
+    TerminalIngredient, Weights, exact_prices, exact_prices_at,
 };
 pub use shaping::{Motion, MoveLimits, SmoothMove};
 pub use solution::{

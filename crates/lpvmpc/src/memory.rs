@@ -25,6 +25,10 @@ pub struct Capacity {
     pub own_stages: usize,
     /// General rows of a stage; none, as a rule. Of a controller's workspace only.
     pub general_rows: usize,
+    /// A second plan: where a descent's plan is likely to be a dear local minimum, another one is looked for
+    /// (`docs/descent.md`). Of a controller's workspace on the heap only (not among the bytes), which then
+    /// serves for the horizon of `stages`.
+    pub second_plan: bool,
 }
 
 impl Capacity {
@@ -32,6 +36,15 @@ impl Capacity {
     pub const fn with_own_stages(self) -> Self {
         Self {
             own_stages: self.stages,
+            ..self
+        }
+    }
+
+    /// The same with room for a second plan.
+    #[cfg(feature = "alloc")]
+    pub const fn with_second_plan(self) -> Self {
+        Self {
+            second_plan: true,
             ..self
         }
     }

@@ -221,6 +221,10 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
 /// (`testdata/nonlinear-mpc/multipliers.py`).
 const PRICE_OF_WIDTH: f64 = 20.0;
 
+/// Price of an excess along a plan of some cost, in roots of that cost times P_jj: twice the slope that x'Px has
+/// anywhere at that cost.
+const PRICE_OF_COST: f64 = 4.0;
+
 /// Prices of soft state bounds, high enough to be exact as a rule, from the cost x'Px of a state
 /// from there on (`cost` is P): 20 P_jj times the width of the bound per unit of excess, in the unit
 /// of the cost.
@@ -230,6 +234,17 @@ const PRICE_OF_WIDTH: f64 = 20.0;
 pub fn exact_prices<T: Scalar, const NX: usize>(
     cost: &SMatrix<T, NX, NX>,
     x: &Bounds<T, NX>,
+) -> SoftBounds<T, NX> {
+    exact_prices_at(cost, x, T::zero())
+}
+
+/// The same for plans that cost up to `value`: far away the multiplier of a bound is that of the way ahead, and no longer
+/// that of the bound's own width. Where x'Px is `value`, its slope along a state is at most 2 (P_jj `value`)^(1/2)
+/// (Cauchy and Schwarz); no price is below twice as much.
+pub fn exact_prices_at<T: Scalar, const NX: usize>(
+    cost: &SMatrix<T, NX, NX>,
+    x: &Bounds<T, NX>,
+    value: T,
 ) -> SoftBounds<T, NX> {
     let sides = x.lower.iter().zip(x.upper.iter());
     let mut prices = [None; NX];
@@ -245,8 +260,11 @@ pub fn exact_prices<T: Scalar, const NX: usize>(
         let width = if width > T::zero() { width } else { T::one() };
         let own = cost.get((j, j)).copied().unwrap_or_else(T::zero);
         let slope = if own > T::zero() { own } else { cost.amax() };
+        let of_width = convert::<f64, T>(PRICE_OF_WIDTH) * slope * width;
+        let of_cost = convert::<f64, T>(PRICE_OF_COST) * (slope * value).sqrt();
         *place = Some(Penalty {
-            linear: convert::<f64, T>(PRICE_OF_WIDTH) * slope * width,
+            // Of a value that is no number, the first.
+            linear: of_width.max(of_cost),
             quadratic: T::zero(),
         });
     }

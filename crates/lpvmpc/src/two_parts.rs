@@ -3,7 +3,7 @@
 
 use crate::by_stage::PlantByStage;
 use crate::controller::{Controller, Reference, next_state};
-use crate::descent::{Along, Outcome};
+use crate::descent::{Along, Outcome, States};
 use crate::model::{LpvModel, Scalar};
 use crate::plan::{Aim, Prices, at};
 use crate::preview::Preview;
@@ -166,7 +166,7 @@ where
             self.take_if_some(taken.map(|(_, cost)| cost), &workspace.trial);
             self.adapt_damping(aim, &Outcome::NothingToGain { hidden: false });
         }
-        self.linearize_plan(&x, aim, Along::Jacobian, workspace);
+        self.linearize_plan(&x, aim, (Along::Jacobian, States::Follow), workspace);
         true
     }
 

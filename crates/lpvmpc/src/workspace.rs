@@ -1,6 +1,8 @@
 //! Scratch memory of a controller's step.
 
 use crate::by_stage::CostByStage;
+#[cfg(feature = "alloc")]
+use crate::elsewhere::Kept;
 use crate::list::List;
 #[cfg(feature = "alloc")]
 use crate::memory::Capacity;
@@ -29,6 +31,9 @@ pub struct Workspace<T: 'static, const NX: usize, const NU: usize> {
     by_stage: bool,
     /// Room for weights and bounds of the stages' own, while the program has none.
     own: List<Common<T, NX, NU>>,
+    /// Room for a second plan.
+    #[cfg(feature = "alloc")]
+    pub(crate) kept: Option<Kept<T, NX, NU>>,
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
@@ -54,13 +59,18 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
             trial: Trial { u, x },
             by_stage: false,
             own,
+            #[cfg(feature = "alloc")]
+            kept: None,
         }
     }
 
     /// A workspace with memory of its own.
     #[cfg(feature = "alloc")]
     pub fn allocate(capacity: Capacity) -> Self {
-        Self::new(WorkspaceMemory::allocate(capacity))
+        Self {
+            kept: capacity.second_plan.then(|| Kept::allocate(capacity)),
+            ..Self::new(WorkspaceMemory::allocate(capacity))
+        }
     }
 
     /// The quadratic program of the last step.

@@ -4,7 +4,7 @@ use crate::plants::{CartPole, Chain, cart_pole, chain};
 use ballbot::Ballbot;
 use lpvmpc::{
     AlongMotion, Bounds, Controller, ControllerSettings, InputReference, Iterations, LpvModel,
-    Reference, Rk4, TerminalIngredient, Weights,
+    Reference, Rk4, TerminalIngredient, Weights, Workspace,
 };
 use lpvmpc_any::{Limits, LinearModels, Mpc, MpcSettings, Preview, StateBounds, Terminal};
 use lpvmpc_plant::{Plant, PlantData};
@@ -66,7 +66,9 @@ where
         references: [[f64; NX]; 2],
         samples: usize,
     ) -> f64 {
-        let mut workspace = self.fixed.workspace();
+        // A controller of any size looks for other plans, too.
+        let room = self.fixed.settings().capacity().with_second_plan();
+        let mut workspace = Workspace::allocate(room);
         let mut x = SVector::<f64, NX>::from(start);
         let mut largest = 0.0_f64;
         let t_s = self.fixed.settings().t_s;

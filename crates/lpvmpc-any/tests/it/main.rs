@@ -15,4 +15,5 @@ mod outputs;
 mod plants;
 mod quadratic;
 mod stages;
+mod valleys;
 mod world;

@@ -20,6 +20,7 @@ const ROOM: Capacity = Capacity {
     active: 30,
     own_stages: 0,
     general_rows: 0,
+    second_plan: false,
 };
 type Problem = Ocp<f64, NX, NU>;
 

@@ -16,6 +16,7 @@ const SMALL: Capacity = Capacity {
     active: 6,
     own_stages: 0,
     general_rows: 0,
+    second_plan: false,
 };
 
 type Scalar1 = Ocp<f64, 1, 1>;
