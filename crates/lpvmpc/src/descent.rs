@@ -43,6 +43,7 @@ pub(crate) enum States {
     /// They are.
     Follow,
     /// They are not: the motion from one need not end at the next.
+    #[cfg(feature = "alloc")]
     Apart,
 }
 
@@ -249,6 +250,7 @@ where
             }
             let next = match plan {
                 States::Follow => *next,
+                #[cfg(feature = "alloc")]
                 States::Apart => own.next_state(i, &self.model, settings, x, u),
             };
             stage.c = next - stage.a * x - stage.b * u;
