@@ -87,7 +87,7 @@ def certify(
     """A terminal law, cost and set about an equilibrium, proved for the sampled nonlinear plant.
 
     Sets as large as the bounds allow are tried first, then halves of them, and of the first two that are proved the
-    larger one is kept, its level as high as can be shown. Seconds, as a rule; up to 8 states and 4 inputs.
+    larger one is kept, its level as high as can be shown. Seconds, as a rule; up to 12 states and 4 inputs.
 
     Parameters
     ----------

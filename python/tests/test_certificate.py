@@ -320,11 +320,20 @@ def test_a_plant_in_discrete_time_is_certified_as_it_is():
     assert abs(x - certificate.x).max() < 0.1
 
 
+def test_a_plant_with_a_kink_at_rest_is_certified():
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    plant = lpvmpc.Plant.from_casadi(x, u, 0.5 * ca.fabs(x) + u, states=["x"], inputs=["u"], bounds={"u": (-1, 1)})
+    certificate = lpvmpc.certify(plant, 0.1, [1], [1])
+    lpvmpc.verify(certificate, plant)
+    # On either side of the kink.
+    assert certificate.contains([0.2]) and certificate.contains([-0.2])
+
+
 def test_what_has_no_proof_is_refused():
     x, u = ca.SX.sym("x"), ca.SX.sym("u")
-    kinked = lpvmpc.Plant.from_casadi(x, u, ca.fabs(x) + u)
-    with pytest.raises(lpvmpc.PlantError, match="no proof can be had of `abs`"):
-        lpvmpc.certify(kinked, 0.1, [1], [1])
+    jumping = lpvmpc.Plant.from_casadi(x, u, ca.sign(x) * x + u)
+    with pytest.raises(lpvmpc.PlantError, match="no proof can be had of `sign`: it jumps"):
+        lpvmpc.certify(jumping, 0.1, [1], [1])
     with pytest.raises(lpvmpc.SettingError, match="t_s: it is -1 s"):
         lpvmpc.certify(double_integrator(), -1, [1, 1], [1])
     with pytest.raises(lpvmpc.SettingError, match="must lie between"):

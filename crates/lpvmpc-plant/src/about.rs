@@ -65,11 +65,11 @@ impl<const NX: usize, const NU: usize, const NS: usize> AboutEquilibrium<NX, NU,
                 NoFactors::Operation(i) => {
                     let (operation, place) = (&data.operations[i], format!("operations[{i}]"));
                     let name = operation.name();
-                    let fault = match operation.is_smooth() {
-                        true => format!(
+                    let fault = match operation.jumps() {
+                        false => format!(
                             "no proof can be had of `{name}`: no exact difference of it is known"
                         ),
-                        false => format!("no proof can be had of `{name}`: it has a kink or jumps"),
+                        true => format!("no proof can be had of `{name}`: it jumps"),
                     };
                     (place, fault)
                 }

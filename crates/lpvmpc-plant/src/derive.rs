@@ -352,6 +352,26 @@ impl Program {
                     program.either(first, a.unwrap_or(zero), b.unwrap_or(zero))
                 })
             }
+            // (1 - value sign x) / (|x| + |y|) by x, by y the same; 0 where both are.
+            Bivariate::MeanSign => {
+                let sizes = [x, y].map(|one| self.elementary(Elementary::Abs, one.value));
+                let [Some(first), Some(second)] = sizes else {
+                    return None;
+                };
+                let (size, one) = (self.add(first, second)?, self.constant(1.0)?);
+                let mut slope = |of: &Varying| {
+                    let sign = self.elementary(Elementary::Sign, of.value)?;
+                    let lost = self.multiply(value, sign)?;
+                    let rest = self.subtract(one, lost)?;
+                    let slope = self.divide(rest, size)?;
+                    self.bivariate(Bivariate::IfElseZero, size, slope)
+                };
+                let (by_x, by_y) = (slope(x)?, slope(y)?);
+                self.combined(value, both, |program, a, b| {
+                    let (a, b) = (program.part(a, by_x)?, program.part(b, by_y)?);
+                    program.sum(a, b)
+                })
+            }
             Bivariate::Power => match self.number(y.value) {
                 Some(0.0) => Some(fixed),
                 Some(0.5) => self.through(value, x, |program| {

@@ -68,7 +68,7 @@ pub(crate) fn factorise(
         }
         let found = match *operation {
             // Of numbers alone, too: enclosures have no value of it.
-            _ if !operation.is_smooth() => None,
+            _ if operation.jumps() => None,
             Operation::State(i) => program.component(i, states + inputs),
             Operation::Input(j) => program.component(states + j, states + inputs),
             Operation::Unary(function, x) => program.factored_unary(function, &factored[x]),
@@ -181,6 +181,9 @@ impl Program {
                 return self.negative(product);
             }
             Unary::Tan => return self.of_tangent((Cos, Sinc), x),
+            Unary::Elementary(Elementary::Abs) => {
+                return self.bivariate(Bivariate::MeanSign, x.at, x.base);
+            }
             Unary::Elementary(function) => function,
         };
         // A function of the mean times sin(h)/h or sinh(h)/h of half the difference.
@@ -229,6 +232,10 @@ impl Program {
         match function {
             Binary::Bivariate(Bivariate::Power) => return self.factored_power(x, y),
             Binary::Bivariate(Bivariate::Atan2) => return self.factored_angle(x, y),
+            Binary::Bivariate(Bivariate::Max) => return self.factored_choice(Binary::Add, x, y),
+            Binary::Bivariate(Bivariate::Min) => {
+                return self.factored_choice(Binary::Subtract, x, y);
+            }
             _ => {}
         }
         let at = self.binary(function, x.at, y.at)?;
@@ -246,10 +253,25 @@ impl Program {
                 let above = self.rows_together((&x.row, &moved), Binary::Subtract)?;
                 self.times_row(&above, inverse)?
             }
-            // What has a kink or jumps.
+            // What jumps, and what only such formulas have.
             Binary::Bivariate(_) => return None,
         };
         Some(Factored { at, base, row })
+    }
+
+    /// The larger of x and y, half of x + y + |x - y|, or with its last sign (`function`) changed the smaller one.
+    fn factored_choice(
+        &mut self,
+        function: Binary,
+        x: &Factored,
+        y: &Factored,
+    ) -> Option<Factored> {
+        let sum = self.factored_binary(Binary::Add, x, y)?;
+        let way = self.factored_binary(Binary::Subtract, x, y)?;
+        let apart = self.factored_unary(Unary::Elementary(Elementary::Abs), &way)?;
+        let both = self.factored_binary(function, &sum, &apart)?;
+        let half = self.constant(0.5)?;
+        self.factored_binary(Binary::Multiply, &fixed(half, half), &both)
     }
 
     /// The row of x times the mean of y, plus or minus (`function`) the row of y times the mean of x.

@@ -87,7 +87,9 @@
 //! | `["atan2", i, j]` | the angle of the point (j, i) |
 //! | `["neg", i]` and `sq`, `inv`, `sqrt`, `exp`, `log`, `expm1`, `log1p` | -x, x^2, 1/x, ... |
 //! | `["sin", i]` and `cos`, `tan`, `asin`, `acos`, `atan`, `sinh`, `cosh`, `tanh`, `asinh`, `acosh`, `atanh`, `sinc`, `sinhc` | sinc is sin(x)/x, sinhc is sinh(x)/x |
-//! | `["abs", i]` and `sign`, `floor`; `["min", i, j]` and `max` | have kinks or jump: no proof |
+//! | `["abs", i]`; `["min", i, j]` and `max` | have kinks |
+//! | `["mean_sign", i, j]` | (\|i\| - \|j\|)/(i - j), 0 where both are |
+//! | `["sign", i]` and `floor` | jump: no proof |
 //! | `["lt", i, j]` and `le`, `eq` | 1 or 0; no proof |
 //! | `["if_else_zero", i, j]` | j where i is not 0, else 0; no proof |
 #![allow(

@@ -82,7 +82,7 @@ pub(crate) const UNARY: [(&str, Unary); 25] = [
 ];
 
 /// The names of the functions of two numbers in a file.
-pub(crate) const BINARY: [(&str, Binary); 12] = [
+pub(crate) const BINARY: [(&str, Binary); 13] = [
     ("add", Binary::Add),
     ("sub", Binary::Subtract),
     ("mul", Binary::Multiply),
@@ -91,6 +91,7 @@ pub(crate) const BINARY: [(&str, Binary); 12] = [
     ("atan2", Binary::Bivariate(Bivariate::Atan2)),
     ("min", Binary::Bivariate(Bivariate::Min)),
     ("max", Binary::Bivariate(Bivariate::Max)),
+    ("mean_sign", Binary::Bivariate(Bivariate::MeanSign)),
     ("lt", Binary::Bivariate(Bivariate::Less)),
     ("le", Binary::Bivariate(Bivariate::LessOrEqual)),
     ("eq", Binary::Bivariate(Bivariate::Equal)),
@@ -110,12 +111,8 @@ impl Unary {
         }
     }
 
-    /// Whether it has a kink or jumps.
-    fn is_smooth(self) -> bool {
-        !matches!(
-            self,
-            Self::Elementary(Elementary::Abs | Elementary::Sign | Elementary::Floor)
-        )
+    fn jumps(self) -> bool {
+        matches!(self, Self::Elementary(Elementary::Sign | Elementary::Floor))
     }
 }
 
@@ -132,10 +129,13 @@ impl Binary {
         }
     }
 
-    /// Whether it has no kink and does not jump.
-    fn is_smooth(self) -> bool {
-        !matches!(self, Self::Bivariate(function)
-            if !matches!(function, Bivariate::Atan2 | Bivariate::Power))
+    fn jumps(self) -> bool {
+        matches!(
+            self,
+            Self::Bivariate(
+                Bivariate::Less | Bivariate::LessOrEqual | Bivariate::Equal | Bivariate::IfElseZero
+            )
+        )
     }
 }
 
@@ -153,12 +153,12 @@ impl Operation {
         }
     }
 
-    /// Whether it has a kink or jumps: no proof can be had of a plant that needs it.
-    pub fn is_smooth(&self) -> bool {
+    /// Whether it jumps: no proof can be had of a plant that needs it.
+    pub fn jumps(&self) -> bool {
         match self {
-            Self::Unary(function, _) => function.is_smooth(),
-            Self::Binary(function, ..) => function.is_smooth(),
-            _ => true,
+            Self::Unary(function, _) => function.jumps(),
+            Self::Binary(function, ..) => function.jumps(),
+            _ => false,
         }
     }
 

@@ -357,9 +357,9 @@ impl Plant {
         Some(())
     }
 
-    /// The first operation of which no proof can be had, since it has a kink or jumps, with its index; `None` where all
-    /// that f and the embedding need is smooth.
-    pub fn first_not_smooth(&self) -> Option<(usize, &'static str)> {
+    /// The first operation of which no proof can be had, since it jumps, with its index; `None` where nothing that f and the
+    /// embedding need does.
+    pub fn first_jump(&self) -> Option<(usize, &'static str)> {
         let data = self.data();
         let mut needed = vec![false; data.operations.len()];
         let embedding = data.embedding.as_ref();
@@ -374,7 +374,7 @@ impl Plant {
         for (index, operation) in data.operations.iter().enumerate().rev() {
             if needed[index] {
                 operation.arguments().for_each(|i| needed[i] = true);
-                if !operation.is_smooth() {
+                if operation.jumps() {
                     first = Some((index, operation.name()));
                 }
             }

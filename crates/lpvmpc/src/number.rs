@@ -180,7 +180,7 @@ pub enum Elementary {
     ExpM1,
     /// ln(1 + x) for x > -1, exact for small x, too.
     Ln1p,
-    /// |x|; at 0 with the derivative 1. No proof: it has a kink.
+    /// |x|; at 0 with the derivative 1.
     Abs,
     /// -1, 0 or 1; the derivative is 0. No proof: it jumps.
     Sign,
@@ -195,10 +195,13 @@ pub enum Bivariate {
     Atan2,
     /// x^y for x > 0; plain numbers also have it where a power of x <= 0 exists.
     Power,
-    /// The smaller one; of equal ones, x. No proof: it has a kink.
+    /// The smaller one; of equal ones, x.
     Min,
-    /// The larger one; of equal ones, x. No proof: it has a kink.
+    /// The larger one; of equal ones, x.
     Max,
+    /// (|x| - |y|)/(x - y), from -1 to 1: the mean sign of the numbers between x and y; 0 where both are. What is known of
+    /// the derivative of |x| at its kink is made of it.
+    MeanSign,
     /// 1 where x < y, else 0; the derivative is 0. No proof: it jumps.
     Less,
     /// 1 where x <= y, else 0; the derivative is 0. No proof: it jumps.
@@ -249,6 +252,14 @@ macro_rules! impl_number {
                 match function {
                     Bivariate::Atan2 => RealField::atan2(self, other),
                     Bivariate::Power => ComplexField::powf(self, other),
+                    Bivariate::MeanSign => {
+                        let size = ComplexField::abs(self) + ComplexField::abs(other);
+                        if size == 0.0 {
+                            0.0
+                        } else {
+                            (self + other) / size
+                        }
+                    }
                     _ => choice(self, other, function).map_or(Self::NAN, |choice| match choice {
                         Choice::First => self,
                         Choice::Second => other,
@@ -307,7 +318,7 @@ fn choice<T: PartialOrd + Number>(x: T, y: T, function: Bivariate) -> Option<Cho
         Bivariate::Less => Some(truth(order.is_lt())),
         Bivariate::LessOrEqual => Some(truth(order.is_le())),
         Bivariate::Equal => Some(truth(order.is_eq())),
-        Bivariate::Atan2 | Bivariate::Power | Bivariate::IfElseZero => None,
+        Bivariate::Atan2 | Bivariate::Power | Bivariate::MeanSign | Bivariate::IfElseZero => None,
     }
 }
 

@@ -21,6 +21,9 @@ pub trait Arithmetic: Number {
     /// 1/x; without bound where x may be zero.
     fn reciprocal(self) -> Self;
 
+    /// What is only known to be in this range, as the slope of a kink is: of a series, the beginning alone.
+    fn within(range: Interval) -> Self;
+
     /// Self + a b.
     fn plus_product(self, a: &Self, b: &Self) -> Self {
         self + *a * *b
@@ -30,17 +33,61 @@ pub trait Arithmetic: Number {
     fn taylor_coefficients(self, function: Elementary, count: usize) -> Coefficients<Self>;
 }
 
-/// A function of two numbers. What jumps or has a kink is not known: its series has no meaning.
+/// A function of two numbers. What jumps is not known.
 pub(super) fn bivariate<T: Arithmetic>(x: T, y: T, function: Bivariate) -> T {
     match function {
         Bivariate::Power => (y * x.ln()).exp(),
         Bivariate::Atan2 => angle(x, y),
-        Bivariate::Min
-        | Bivariate::Max
-        | Bivariate::Less
-        | Bivariate::LessOrEqual
-        | Bivariate::Equal
-        | Bivariate::IfElseZero => T::unknown(),
+        Bivariate::Max => (x + y + (x - y).elementary(Elementary::Abs)) * T::constant(0.5),
+        Bivariate::Min => (x + y - (x - y).elementary(Elementary::Abs)) * T::constant(0.5),
+        Bivariate::MeanSign => mean_sign(x, y),
+        Bivariate::Less | Bivariate::LessOrEqual | Bivariate::Equal | Bivariate::IfElseZero => {
+            T::unknown()
+        }
+    }
+}
+
+/// (|x| - |y|)/(x - y).
+fn mean_sign<T: Arithmetic>(x: T, y: T) -> T {
+    let sides = [x.range(), y.range()];
+    let above = sides.map(|side| side.lower >= 0.0);
+    let below = sides.map(|side| side.upper <= 0.0);
+    match (above, below) {
+        // Where both are zero, any number from -1 to 1 is a slope between them.
+        ([true, true], _) => T::constant(1.0),
+        (_, [true, true]) => T::constant(-1.0),
+        _ if sides[0].lower > 0.0 && sides[1].upper < 0.0 => (x + y) / (x - y),
+        _ if sides[0].upper < 0.0 && sides[1].lower > 0.0 => (x + y) / (y - x),
+        _ => T::within(mean_signs(sides)),
+    }
+}
+
+/// The same over ranges. As a slope of a convex function it rises with both.
+fn mean_signs([x, y]: [Interval; 2]) -> Interval {
+    let at = |x: f64, y: f64, sign: f64| {
+        let (x, y) = (Interval::point(x), Interval::point(y));
+        let size = absolute(x) + absolute(y);
+        let mean = (x + y) * size.reciprocal();
+        let all = Interval::new(-1.0, 1.0);
+        match mean.lower.is_finite() && mean.upper.is_finite() {
+            true => mean.common(all),
+            false => Interval::point(sign),
+        }
+    };
+    Interval::new(
+        at(x.lower, y.lower, -1.0).lower,
+        at(x.upper, y.upper, 1.0).upper,
+    )
+}
+
+/// |x|.
+fn absolute(x: Interval) -> Interval {
+    if x.lower >= 0.0 {
+        x
+    } else if x.upper <= 0.0 {
+        -x
+    } else {
+        Interval::new(0.0, x.magnitude())
     }
 }
 
@@ -131,8 +178,21 @@ pub(super) fn taylor_coefficients(
             Some(inverse) => recursion(places, inverse.value, |n, known| inverse.next(n, known)),
             None => coefficients[..count].fill(Interval::EVERYTHING),
         },
-        // They have a kink or jump.
-        Elementary::Abs | Elementary::Sign | Elementary::Floor => {
+        Elementary::Abs => {
+            let kink = x.lower < 0.0 && 0.0 < x.upper;
+            for (n, place) in places {
+                *place = match n {
+                    0 => absolute(x),
+                    1 if kink => Interval::new(-1.0, 1.0),
+                    1 if x.lower >= 0.0 => Interval::point(1.0),
+                    1 => Interval::point(-1.0),
+                    _ if kink => Interval::EVERYTHING,
+                    _ => Interval::point(0.0),
+                };
+            }
+        }
+        // They jump.
+        Elementary::Sign | Elementary::Floor => {
             coefficients[..count].fill(Interval::EVERYTHING);
         }
     }

@@ -4,7 +4,7 @@ use super::Columns;
 use super::composition::{Composition, Uncertain};
 use super::elementary::Arithmetic;
 use super::interval::Interval;
-use super::motion::{a_priori, coefficients};
+use super::motion::{a_priori, coefficients, iterated, matrices_during};
 use super::series::CAPACITY;
 use super::taylor_map::{ROUNDING, TaylorMap};
 use super::taylor_model::TaylorModel;
@@ -213,8 +213,17 @@ impl<M, const NX: usize, const NU: usize> Step<'_, M, NX, NU> {
     {
         let inputs = ranges(model_inputs);
         let during = a_priori(self.model, None, self.length, &ranges(columns), &inputs)?;
-        let remainder = &coefficients(self.model, None, &during, &inputs, ORDER)[ORDER];
-        let series = coefficients(self.model, None, columns, model_inputs, ORDER - 1);
+        let mut remainder =
+            coefficients(self.model, None, &during, &inputs, ORDER).swap_remove(ORDER);
+        let bounded = |column: &[Interval; NX]| column.iter().all(|x| x.magnitude().is_finite());
+        let series = if remainder.iter().all(bounded) {
+            coefficients(self.model, None, columns, model_inputs, ORDER - 1)
+        } else {
+            // A kink is in the way: there are no derivatives of the motion.
+            let matrices = matrices_during(self.model, &during, &inputs);
+            remainder = iterated(&matrices, &during, &inputs, ORDER).swap_remove(ORDER);
+            iterated(&matrices, columns, model_inputs, ORDER - 1)
+        };
         let step = Interval::point(self.length);
         let end = (0..columns.len()).map(|column| {
             std::array::from_fn(|i| {

@@ -198,6 +198,10 @@ impl Arithmetic for Interval {
         self
     }
 
+    fn within(range: Interval) -> Self {
+        range
+    }
+
     fn reciprocal(self) -> Self {
         if self.lower <= 0.0 && 0.0 <= self.upper {
             return Self::EVERYTHING;

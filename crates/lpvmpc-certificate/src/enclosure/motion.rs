@@ -6,7 +6,7 @@ use super::flow::FlowError;
 use super::interval::Interval;
 use super::series::Series;
 use lpvmpc::Embedding;
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 /// The Taylor coefficients 0 to `order` of the columns' motion, the first of which is the state:
 /// (k+1) Y_{k+1} = sum over j of A_j Y_{k-j} + B_k W. With a `scale` r, the state is r times the first
@@ -92,6 +92,52 @@ where
         }
     }
     Err(FlowError::NoEnclosure { step: length })
+}
+
+/// A and B wherever the first columns of `during` and `inputs` are.
+pub(super) fn matrices_during<M, const NX: usize, const NU: usize, const NS: usize>(
+    model: &M,
+    during: &Columns<Interval, NX>,
+    inputs: &Columns<Interval, NU>,
+) -> (SMatrix<Interval, NX, NX>, SMatrix<Interval, NX, NU>)
+where
+    M: Embedding<NX, NU, NS>,
+{
+    let (x, u) = (SVector::from(during[0]), SVector::from(inputs[0]));
+    model.matrices(&model.scheduling(&x, &u))
+}
+
+/// What stands in place of [`coefficients`] where A and B are only known to be somewhere in these `matrices`, in any
+/// way over time: (k+1) Y_{k+1} = A Y_k + B_k W with all of A and B, as B_0 = B and B_k = 0 for k > 0. By the Peano-Baker
+/// series, y(t) is the sum over k < n of integrals of A(t_1) ... A(t_k) y(0) and A(t_1) ... A(t_{k-1}) B(t_k) W over
+/// t > t_1 > ... > t_k > 0, and of those of n matrices with y(t_n) in place of y(0). Each is t^k/k! times a mean of
+/// such products, and the products are all in an interval, which is convex.
+pub(super) fn iterated<T: Arithmetic, const NX: usize, const NU: usize>(
+    (a, b): &(SMatrix<Interval, NX, NX>, SMatrix<Interval, NX, NU>),
+    start: &Columns<T, NX>,
+    inputs: &Columns<T, NU>,
+    order: usize,
+) -> Vec<Columns<T, NX>> {
+    let (a, b) = (a.map(T::within), b.map(T::within));
+    let mut known = vec![start.clone()];
+    for k in 0..order {
+        let share = T::constant((k + 1) as f64).reciprocal();
+        let before = &known[k];
+        let next = before.iter().zip(inputs).map(|(y, w)| {
+            std::array::from_fn(|i| {
+                let zero = T::constant(0.0);
+                let of_y = (0..NX).fold(zero, |sum, m| sum.plus_product(&a[(i, m)], &y[m]));
+                let sum = match k {
+                    0 => (0..NU).fold(of_y, |sum, m| sum.plus_product(&b[(i, m)], &w[m])),
+                    _ => of_y,
+                };
+                sum * share
+            })
+        });
+        let next = next.collect();
+        known.push(next);
+    }
+    known
 }
 
 const MOST_PICARD_STEPS: usize = 30;

@@ -152,6 +152,12 @@ impl<T: Arithmetic> Arithmetic for Series<T> {
         self.coefficients[0].range()
     }
 
+    fn within(range: Interval) -> Self {
+        let mut series = Self::unknown();
+        series.coefficients[0] = T::within(range);
+        series
+    }
+
     /// r x = 1, coefficient by coefficient.
     fn reciprocal(self) -> Self {
         let inverse = self.coefficients[0].reciprocal();

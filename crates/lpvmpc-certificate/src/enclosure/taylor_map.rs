@@ -18,9 +18,9 @@ pub struct TaylorMap<const R: usize, const C: usize, const D: usize> {
     pub error: f64,
 }
 
-/// Bounds the rounding of an entry of a sum of up to four products of matrices of up to a dozen
-/// rows, relative to the product of their norms, and of the norms themselves.
-pub(super) const ROUNDING: f64 = 64.0 * f64::EPSILON;
+/// Bounds the rounding of an entry of a sum of up to four products of matrices of up to 16 rows, relative to the product of
+/// their norms, of the norms themselves, and of sums of up to 1000 norms: as many as a sample's steps have errors.
+pub(super) const ROUNDING: f64 = 512.0 * f64::EPSILON;
 
 impl<const R: usize, const C: usize, const D: usize> TaylorMap<R, C, D> {
     /// The map with these entries.

@@ -46,11 +46,12 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
         let spread = self.spread(&middle, &sample.error_square);
         let at = |corner: &[f64; NX]| self.rest(&g.at(corner), &spread, 1.0);
         // The matrix depends on G'G, which is convex along lines: the corners are the worst.
-        if corners().all(|corner| is_positive_definite(&at(&corner))) {
+        let vary = g.slopes.map(|slope| slope.amax() > 0.0);
+        if corners(vary).all(|corner| is_positive_definite(&at(&corner))) {
             let mut states = self.states.lock().unwrap_or_else(PoisonError::into_inner);
             *states = std::array::from_fn(|i| states[i].hull(sample.states[i]));
             drop(states);
-            let spare = corners().map(|corner| smallest_eigenvalue(&at(&corner)));
+            let spare = corners(vary).map(|corner| smallest_eigenvalue(&at(&corner)));
             return Finding::Holds {
                 spare: spare.fold(f64::INFINITY, f64::min),
             };

@@ -80,10 +80,21 @@ fn triangular_inverse<const N: usize>(t: &Square<N>) -> Square<N> {
     inverse
 }
 
-/// All the 2^D corners of the box -1 <= z <= 1, as signs.
-pub(super) fn corners<const D: usize>() -> impl Iterator<Item = [f64; D]> {
-    (0..1_usize << D)
-        .map(|corner| std::array::from_fn(|i| if corner >> i & 1 == 1 { 1.0 } else { -1.0 }))
+/// The corners of the box -1 <= z <= 1, as signs, of the components that `vary`; the others stay at 0.
+pub(super) fn corners<const D: usize>(vary: [bool; D]) -> impl Iterator<Item = [f64; D]> {
+    let count = vary.iter().filter(|one| **one).count();
+    (0..1_usize << count).map(move |corner| {
+        let mut rest = corner;
+        vary.map(|varies| {
+            let sign = match (varies, rest & 1) {
+                (false, _) => return 0.0,
+                (true, 1) => 1.0,
+                (true, _) => -1.0,
+            };
+            rest >>= 1;
+            sign
+        })
+    })
 }
 
 /// M - shift I.

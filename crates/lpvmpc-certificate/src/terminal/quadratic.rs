@@ -73,8 +73,8 @@ where
         let decay = decay(model, k, normaliser, rate, cell).affine();
         let shift = Interval::point(decay.error);
         let at = |corner: &[f64; NS]| minus_identity(&decay.at(corner), shift);
-        if corners().all(|corner| is_positive_definite(&at(&corner))) {
-            let spare = corners().map(|corner| smallest_eigenvalue(&at(&corner)));
+        if corners([true; NS]).all(|corner| is_positive_definite(&at(&corner))) {
+            let spare = corners([true; NS]).map(|corner| smallest_eigenvalue(&at(&corner)));
             return Finding::Holds {
                 spare: spare.fold(f64::INFINITY, f64::min),
             };

@@ -85,7 +85,7 @@ fn a_document_is_proved_again_from_its_text() {
     assert_eq!(verified.boxes, certificate.record.boxes);
 }
 
-/// A linear plant has the largest ellipsoid in its bounds, at any size up to 8 states and 4 inputs.
+/// A linear plant needs one box, in places of its own size and in larger ones.
 #[test]
 fn linear_plants_need_one_box() {
     for (n, m) in [(1, 1), (3, 2), (5, 1)] {

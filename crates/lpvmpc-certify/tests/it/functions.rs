@@ -2,7 +2,7 @@
 
 use crate::claims::check;
 use crate::plants::signal;
-use lpvmpc::{Dynamics, Number};
+use lpvmpc::{Bivariate, Dynamics, Elementary, Number};
 use lpvmpc_certify::{CertifySettings, certify, verify};
 use lpvmpc_plant::{Plant, PlantData};
 use nalgebra::{Vector1, Vector2, Vector4};
@@ -80,6 +80,62 @@ fn a_pendulum_with_saturating_friction_is_certified() {
     verify(&certificate, &plant, &|_| ()).unwrap();
     // To where friction has a fifth of its slope at rest.
     assert!(certificate.state_limits[1].unwrap() > 0.4);
+}
+
+/// A boat of 1 (kg) with the drag of its speed squared, and a fender: aside of the quay (m) and speed (m/s); the thrust (N).
+/// The fender pushes beyond 0.2 m.
+struct Boat;
+
+impl Dynamics<2, 1> for Boat {
+    fn f<N: Number>(&self, x: &Vector2<N>, u: &Vector1<N>) -> Vector2<N> {
+        let number = N::constant;
+        let drag = number(0.8) * x[1] * x[1].elementary(Elementary::Abs);
+        let pressed = (x[0] - number(0.2)).bivariate(number(0.0), Bivariate::Max);
+        Vector2::new(x[1], u[0] - drag - number(3.0) * pressed)
+    }
+}
+
+/// Dry friction's jump is smoothed by a straight piece: a kink at either end.
+struct Slide;
+
+impl Dynamics<2, 1> for Slide {
+    fn f<N: Number>(&self, x: &Vector2<N>, u: &Vector1<N>) -> Vector2<N> {
+        let number = N::constant;
+        let grip = number(2.0) * x[1];
+        let grip = grip.bivariate(number(0.5), Bivariate::Min);
+        let grip = grip.bivariate(number(-0.5), Bivariate::Max);
+        Vector2::new(x[1], u[0] - grip)
+    }
+}
+
+/// Kinks at rest and away from it: where motions cross them the decrease is proved all the same.
+#[test]
+fn plants_with_kinks_are_certified() {
+    let bounded = |data: PlantData, reach: f64| {
+        Plant::new(PlantData {
+            states: vec![
+                signal("aside", "m", Some((-reach, reach))),
+                signal("speed", "m/s", None),
+            ],
+            inputs: vec![signal("thrust", "N", Some((-4.0, 4.0)))],
+            ..data
+        })
+        .unwrap()
+    };
+    let boat = bounded(PlantData::of_dynamics("boat", &Boat), 0.5);
+    let slide = bounded(PlantData::of_dynamics("slide", &Slide), 0.5);
+    for plant in [boat, slide] {
+        let settings = CertifySettings {
+            trials: 2,
+            ..CertifySettings::new(0.1, &[4.0, 1.0], &[0.5])
+        };
+        let certificate = certify(&plant, &settings, &|_| ()).unwrap();
+        assert!(check::<2, 3>(&plant, &certificate) > 0.0);
+        verify(&certificate, &plant, &|_| ()).unwrap();
+        // Beyond the kinks.
+        assert!(certificate.state_limits[0].unwrap() > 0.3);
+        assert!(certificate.state_limits[1].unwrap() > 1.0);
+    }
 }
 
 #[test]

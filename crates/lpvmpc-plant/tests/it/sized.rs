@@ -40,10 +40,10 @@ fn bounds_and_equilibrium_are_those_of_the_file() {
 
 #[test]
 fn an_operation_of_which_there_is_no_proof_has_a_name() {
-    assert_eq!(plant("cart-pole").first_not_smooth(), None);
-    let (index, name) = plant("functions").first_not_smooth().unwrap();
+    assert_eq!(plant("cart-pole").first_jump(), None);
+    let (index, name) = plant("functions").first_jump().unwrap();
     assert_eq!(name, plant("functions").data().operations[index].name());
-    assert!(["abs", "sign", "min", "max", "floor", "lt", "le", "eq"].contains(&name));
+    assert!(["sign", "floor", "lt", "le", "eq", "if_else_zero"].contains(&name));
 }
 
 #[test]

@@ -155,6 +155,14 @@ impl<T: Scalar + Number, const D: usize> Number for Dual<T, D> {
                 let lower = x.bivariate(y - T::one(), Bivariate::Power);
                 (y * lower, value * x.elementary(Elementary::Ln))
             }
+            Bivariate::MeanSign => {
+                let size = x.abs() + y.abs();
+                let by = |v: T| match size == T::zero() {
+                    true => size,
+                    false => (T::one() - value * v.elementary(Elementary::Sign)) / size,
+                };
+                (by(x), by(y))
+            }
             _ => {
                 return match choice(x, y, function) {
                     Some(Choice::First) => self,

@@ -180,6 +180,7 @@ fn dual_numbers_differentiate_functions_of_two_numbers() {
             Bivariate::Power,
             Bivariate::Min,
             Bivariate::Max,
+            Bivariate::MeanSign,
             Bivariate::Less,
             Bivariate::LessOrEqual,
             Bivariate::Equal,
@@ -225,6 +226,11 @@ fn functions_that_are_not_smooth_have_values_everywhere() {
         fixed(1.0).bivariate(dual(1.0), Bivariate::Max).slopes,
         [0.0]
     );
+    for (x, y, mean) in [(0.0, 0.0, 0.0), (0.0, -2.0, -1.0), (3.0, -1.0, 0.5)] {
+        assert_eq!(x.bivariate(y, Bivariate::MeanSign), mean);
+    }
+    let still = dual(0.0).bivariate(fixed(0.0), Bivariate::MeanSign);
+    assert_eq!(still, fixed(0.0));
     // What is not taken may have no value.
     let hole = fixed(0.0).bivariate(dual(f64::NAN), Bivariate::IfElseZero);
     assert_eq!(hole, fixed(0.0));
