@@ -28,10 +28,8 @@ use interior_point::{Foretold, InteriorPoint};
 use nalgebra::{SVector, convert};
 use side::Role;
 
-/// With so many violated bounds, and some more for each input, a few factorisations cost less than a pass for
-/// each bound.
-const MANY: usize = 24;
-const MANY_PER_INPUT: usize = 8;
+/// With so many violated bounds a few factorisations cost less than a pass for each bound.
+const MANY: usize = 32;
 /// And so many inputs that the regulator saturates, where there is one of each stage.
 const MANY_SATURATED: usize = 8;
 /// Of a guess that is to be exchanged, one active side in so many may be wrong, and each must be better than
@@ -41,11 +39,17 @@ const NEAR: Patience = Patience {
     guesses: 0,
     singles: 0,
 };
+/// Of general rows fewer, since each binds inputs and states.
+const NEAR_ROWS: Patience = Patience { few: 8, ..NEAR };
+/// One stage in so many is at the end of the horizon, of which the regulator tells more than the last answer.
+const TAIL: usize = 8;
+/// And where several inputs act together no more than these.
+const LONGEST_TAIL: usize = 4;
 /// Saturated inputs may all be wrong, and twice no better.
 const FAR: Patience = Patience {
     few: 1,
     guesses: 2,
-    singles: 6,
+    singles: 4,
 };
 /// Guesses of the interior-point method that are tried.
 const TRIALS: usize = 5;
@@ -75,6 +79,8 @@ pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
     x: List<SVector<T, NX>>,
     sides: List<BoundSide<T>>,
     pub run: Run<T, NX, NU>,
+    /// Takes down the last answer, before it is overwritten.
+    pub keep: fn(&mut Self, &Solution<T, NX, NU>),
 }
 
 /// Solves the problem whose trajectory without bounds is in the solution, or proves that it is infeasible;
@@ -100,6 +106,14 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             x,
             sides,
             run: Self::solve,
+            keep: Self::keep_states,
+        }
+    }
+
+    /// The states of the last answer, if bounds are active in it, as long as nothing else needs the place.
+    fn keep_states(&mut self, last: &Solution<T, NX, NU>) {
+        if !last.active.is_empty() {
+            copy(&mut self.x, &last.x);
         }
     }
 
@@ -130,9 +144,12 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         });
         // Those that the regulator saturates are nearly right where a single input moves the states.
         let saturated = NU == 1 && 2 * inputs > violated && inputs >= MANY_SATURATED;
+        // Where several inputs act together, general rows that were active are taken over one by one in less time.
+        let rows = NU > 1 && mostly_rows(&solution.active);
+        let expected = if rows { violated } else { violated.max(known) };
         // No more can hold independently than there are inputs.
-        let expected = violated.max(known).min(n * NU);
-        let many = expected >= MANY + MANY_PER_INPUT * NU;
+        let expected = expected.min(n * NU);
+        let many = expected >= MANY;
         if !many && !saturated {
             return None;
         }
@@ -160,10 +177,13 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         };
         let mut found = shift.filter(|_| many && known > 0).is_some_and(|shift| {
             guess_again(sides, &solution.active, shift);
-            exchange(&mut program, sides, &tolerances, NEAR, &mut changes)
+            guess_tail(ocp, &solver.factors, sides, (program.x, shift));
+            let patience = if rows { NEAR_ROWS } else { NEAR };
+            exchange(&mut program, sides, &tolerances, patience, &mut changes)
         });
         if !found && saturated {
-            guess_saturated(ocp, &solver.factors, sides);
+            sides.iter_mut().for_each(|side| side.role = Role::Free);
+            guess_saturated(ocp, &solver.factors, sides, (0, ocp.x0));
             found = exchange(&mut program, sides, &tolerances, FAR, &mut changes);
         }
         let outcome = if found {
@@ -259,29 +279,52 @@ fn list_multipliers<T: Scalar>(sides: &[BoundSide<T>], list: &mut ActiveSet<T>) 
     }
 }
 
-/// The inputs that the regulator without bounds drives into them, when they are bounded.
+/// The inputs of the stages from `begin` on that the regulator without bounds drives into them from `x`, when
+/// they are bounded. Of all sides there.
 fn guess_saturated<T: Scalar, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
     factors: &[StageFactor<T, NX, NU>],
     mut sides: &mut [BoundSide<T>],
+    (begin, mut x): (usize, SVector<T, NX>),
 ) {
     let at_rest = SVector::zeros();
-    let mut x = ocp.x0;
-    let stages = ocp.stages.iter().zip(factors);
-    for (i, (stage, factor)) in stages.enumerate().take(ocp.length()) {
+    let stages = ocp.stages.iter().zip(factors).enumerate();
+    for (i, (stage, factor)) in stages.take(ocp.length()).skip(begin) {
         let mut u = factor.policy(&x, &at_rest);
         for side in side::split_first_mut(&mut sides, i) {
-            side.role = Role::Free;
-            if let Some(j) = side.input()
-                && side.distance_of(u[j]) < T::zero()
-            {
-                side.role = Role::Held;
-                u[j] = side.limit;
+            if let Some(j) = side.input() {
+                side.role = Role::Free;
+                if side.distance_of(u[j]) < T::zero() {
+                    side.role = Role::Held;
+                    u[j] = side.limit;
+                }
             }
         }
         x = stage.next(&x, &u);
     }
-    sides.iter_mut().for_each(|side| side.role = Role::Free);
+}
+
+/// The inputs at the end of the horizon, of which the last answer knows least: those that the regulator
+/// saturates from where that answer's states, `shift` stages earlier, lead to.
+fn guess_tail<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    factors: &[StageFactor<T, NX, NU>],
+    mut sides: &mut [BoundSide<T>],
+    (last, shift): (&[SVector<T, NX>], usize),
+) {
+    let longest = if NU == 1 { usize::MAX } else { LONGEST_TAIL };
+    let begin = ocp.length() - (ocp.length() / TAIL).min(longest);
+    let before = (begin + shift).checked_sub(1);
+    if let Some(x) = before.and_then(|before| last.get(before)) {
+        let end = side::split_off_mut(&mut sides, begin);
+        guess_saturated(ocp, factors, end, (begin, *x));
+    }
+}
+
+/// Whether most of the bounds that were active are of general rows.
+fn mostly_rows<T: Scalar>(before: &ActiveSet<T>) -> bool {
+    let of_row = |row: &ActiveRow<T>| matches!(row.bound.quantity, Quantity::Row(_));
+    2 * before.iter().filter(of_row).count() > before.len()
 }
 
 /// The roles of the rows that were active before, `shift` stages earlier.

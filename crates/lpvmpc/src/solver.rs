@@ -144,6 +144,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         } else {
             factorized
         };
+        if let Some(phase) = self.many_bounds.first_mut() {
+            let keep = phase.keep;
+            keep(phase, solution);
+        }
         let begun = factorized.and_then(|()| self.roll_out(ocp, solution));
         let outcome = begun.and_then(|()| {
             let at_once = self.solve_at_once(ocp, settings, solution, &mut spent);

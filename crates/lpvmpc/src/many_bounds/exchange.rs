@@ -14,7 +14,7 @@ use crate::rows::Trajectory;
 use nalgebra::{SVector, convert};
 
 /// So few sides that are wrong may be exchanged one by one.
-const A_FEW: usize = 6;
+const A_FEW: usize = 4;
 
 /// Passes that refine an answer.
 const REFINEMENTS: usize = 6;

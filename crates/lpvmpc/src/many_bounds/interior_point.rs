@@ -32,8 +32,10 @@ struct Linear<T> {
 impl<T: Scalar> Linear<T> {
     fn new(side: &BoundSide<T>, target: Target<T>) -> Self {
         let at = &side.interior;
-        let of =
-            |value: T, multiplier: T, target: T| (multiplier + target / value, multiplier / value);
+        let of = |value: T, multiplier: T, target: T| {
+            let inverse = T::one() / value;
+            (multiplier + target * inverse, multiplier * inverse)
+        };
         let of_slack = of(at.slack, at.multiplier, target.slack);
         let (of_excess, soft) = match side.soft {
             None => ((T::zero(), T::zero()), None),
@@ -94,8 +96,53 @@ pub(super) struct Foretold {
 /// Where the method stands.
 pub(super) struct InteriorPoint<T> {
     /// Mean of slack * multiplier.
-    pub complementarity: T,
+    complementarity: T,
     count: T,
+    prediction: Prediction<T>,
+}
+
+/// What there is to know of the way to a prediction.
+#[derive(Clone, Copy)]
+struct Prediction<T> {
+    /// Where the first unknown is zero.
+    part: Part<T>,
+    /// How fast the sum of slack * multiplier changes with each of the two, and with both.
+    primal: T,
+    dual: T,
+    both: T,
+}
+
+impl<T: Scalar> Prediction<T> {
+    fn begin() -> Self {
+        Self {
+            part: Part::far(),
+            primal: T::zero(),
+            dual: T::zero(),
+            both: T::zero(),
+        }
+    }
+
+    /// Takes a side into account, which is to go from `at` to `to`; returns the products of its steps.
+    #[inline(always)]
+    fn add(&mut self, at: &Interior<T>, to: &Interior<T>, soft: bool) -> Target<T> {
+        self.part.keep_above_zero(at, to, soft);
+        let (slack, multiplier) = (to.slack - at.slack, to.multiplier - at.multiplier);
+        let (excess, rest) = (to.excess - at.excess, to.rest - at.rest);
+        let products = Target {
+            slack: slack * multiplier,
+            excess: excess * rest,
+        };
+        self.primal += slack * at.multiplier + excess * at.rest;
+        self.dual += multiplier * at.slack + rest * at.excess;
+        self.both += products.slack + products.excess;
+        products
+    }
+
+    /// The change of the sum of slack * multiplier where that first unknown is zero.
+    fn change(&self) -> T {
+        let Part { primal, dual } = self.part.shortened(T::one());
+        primal * self.primal + dual * self.dual + primal * dual * self.both
+    }
 }
 
 impl<T: Scalar> InteriorPoint<T> {
@@ -127,24 +174,30 @@ impl<T: Scalar> InteriorPoint<T> {
                 }
             };
         }
-        let mut start = Self {
-            complementarity: cost,
-            count: T::one(),
-        };
-        start.measure(sides);
-        start
+        Self::at(sides)
     }
 
-    fn measure(&mut self, sides: &[BoundSide<T>]) {
-        let (sum, count) = products(sides, |side| side.interior);
-        self.complementarity = sum / count;
-        self.count = count;
+    /// Where the sides' unknowns are.
+    fn at(sides: &[BoundSide<T>]) -> Self {
+        let (mut sum, mut count) = (T::zero(), T::zero());
+        for side in sides {
+            sum += side.interior.product();
+            count += T::one();
+            if side.soft.is_some() {
+                count += T::one();
+            }
+        }
+        Self {
+            complementarity: sum / count,
+            count,
+            prediction: Prediction::begin(),
+        }
     }
 
     /// A Newton step towards complementarity zero, on the way to `trajectory`: leaves the trajectory that it
     /// leads to there, and in every side the role that it foretells.
     pub fn predict<const NX: usize, const NU: usize>(
-        &self,
+        &mut self,
         ocp: &Ocp<T, NX, NU>,
         sides: &mut [BoundSide<T>],
         factors: &mut [StageFactor<T, NX, NU>],
@@ -162,6 +215,7 @@ impl<T: Scalar> InteriorPoint<T> {
             changed: 0,
             active: 0,
         };
+        let mut prediction = Prediction::begin();
         for side in sides.iter_mut() {
             let at = &side.interior;
             let to = Linear::new(side, Target::zero()).at(side.distance);
@@ -174,9 +228,11 @@ impl<T: Scalar> InteriorPoint<T> {
                 (false, false) => Role::Free,
             };
             side.estimate = to.multiplier.max(T::zero());
+            side.target = prediction.add(at, &to, side.soft.is_some());
             foretold.changed += usize::from(side.role != side.last_role);
             foretold.active += usize::from(side.role != Role::Free);
         }
+        self.prediction = prediction;
         Ok(foretold)
     }
 
@@ -190,53 +246,34 @@ impl<T: Scalar> InteriorPoint<T> {
         v: &mut [SVector<T, NU>],
         (u, x): (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
     ) -> T {
-        let predicted = |side: &BoundSide<T>| Linear::new(side, Target::zero()).at(side.distance);
-        let part = Part::until_zero(sides, predicted);
-        let (sum, _) = products(sides, |side| along(&side.interior, &predicted(side), part));
-        let ratio = sum / self.count / self.complementarity;
+        let sum = self.complementarity * self.count;
+        let ratio = ((sum + self.prediction.change()) / sum).max(T::zero());
         let center = ratio * ratio * ratio * self.complementarity;
         for side in sides.iter_mut() {
-            side.target = target(side, &predicted(side), center);
+            // The center, less what the prediction's own products add.
+            side.target = Target {
+                slack: center - side.target.slack,
+                excess: center - side.target.excess,
+            };
             let (base, _) = Linear::new(side, side.target).multiplier();
             side.estimate = base - side.base;
         }
         newton::shift(ocp, factors, sides, |side| side.estimate, v, (u, x));
         newton::measure(ocp, sides, &Trajectory { x, u });
         let corrected = |side: &BoundSide<T>| Linear::new(side, side.target).at(side.distance);
-        let part = Part::until_zero(sides, corrected).shortened(convert(NEARLY));
+        let mut part = Part::far();
+        for side in sides.iter() {
+            part.keep_above_zero(&side.interior, &corrected(side), side.soft.is_some());
+        }
+        let part = part.shortened(convert(NEARLY));
+        let mut sum = T::zero();
         for side in sides.iter_mut() {
             side.interior = along(&side.interior, &corrected(side), part);
+            sum += side.interior.product();
         }
-        self.measure(sides);
+        self.complementarity = sum / self.count;
         part.shortest()
     }
-}
-
-/// The center, less what the prediction's own products add.
-fn target<T: Scalar>(side: &BoundSide<T>, to: &Interior<T>, center: T) -> Target<T> {
-    let at = &side.interior;
-    Target {
-        slack: center - (to.slack - at.slack) * (to.multiplier - at.multiplier),
-        excess: center - (to.excess - at.excess) * (to.rest - at.rest),
-    }
-}
-
-/// Sum and number of the products that go to zero.
-fn products<T: Scalar>(
-    sides: &[BoundSide<T>],
-    at: impl Fn(&BoundSide<T>) -> Interior<T>,
-) -> (T, T) {
-    let mut sum = (T::zero(), T::zero());
-    for side in sides {
-        let at = at(side);
-        sum.0 += at.slack * at.multiplier;
-        sum.1 += T::one();
-        if side.soft.is_some() {
-            sum.0 += at.excess * at.rest;
-            sum.1 += T::one();
-        }
-    }
-    sum
 }
 
 /// Parts of a way.
@@ -249,25 +286,29 @@ struct Part<T> {
 }
 
 impl<T: Scalar> Part<T> {
-    /// Where the first unknown is zero.
-    fn until_zero(sides: &[BoundSide<T>], to: impl Fn(&BoundSide<T>) -> Interior<T>) -> Self {
-        let far: T = convert(1e3);
-        let (mut primal, mut dual) = (far, far);
+    /// Beyond any that counts.
+    fn far() -> Self {
+        let far = convert(1e3);
+        Self {
+            primal: far,
+            dual: far,
+        }
+    }
+
+    /// Not beyond where a side's first unknown is zero, on its way from `at` to `to`.
+    #[inline(always)]
+    fn keep_above_zero(&mut self, at: &Interior<T>, to: &Interior<T>, soft: bool) {
         let keep = |part: &mut T, at: T, to: T| {
             if to < at && at < *part * (at - to) {
                 *part = at / (at - to);
             }
         };
-        for side in sides {
-            let (at, to) = (&side.interior, to(side));
-            keep(&mut primal, at.slack, to.slack);
-            keep(&mut dual, at.multiplier, to.multiplier);
-            if side.soft.is_some() {
-                keep(&mut primal, at.excess, to.excess);
-                keep(&mut dual, at.rest, to.rest);
-            }
+        keep(&mut self.primal, at.slack, to.slack);
+        keep(&mut self.dual, at.multiplier, to.multiplier);
+        if soft {
+            keep(&mut self.primal, at.excess, to.excess);
+            keep(&mut self.dual, at.rest, to.rest);
         }
-        Self { primal, dual }
     }
 
     /// Times `factor`, at most the whole way.

@@ -40,6 +40,7 @@ pub(crate) struct BoundSide<T> {
     pub estimate: T,
     /// Of the interior-point method.
     pub interior: Interior<T>,
+    /// What the step is to come to; after a prediction, the products of its changes.
     pub target: Target<T>,
 }
 
@@ -72,6 +73,11 @@ impl<T: Scalar> Target<T> {
 }
 
 impl<T: Scalar> Interior<T> {
+    /// What goes to zero.
+    pub fn product(&self) -> T {
+        self.slack * self.multiplier + self.excess * self.rest
+    }
+
     fn zero() -> Self {
         let zero = T::zero();
         Self {
