@@ -76,3 +76,8 @@ fn dispatch(command: Command) -> Result<String, CommandError> {
         Command::Completions(arguments) => commands::completions::run(&arguments),
     }
 }
+
+/// The code of the README, compiled and run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;

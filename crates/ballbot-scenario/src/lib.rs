@@ -68,11 +68,6 @@ pub use run::planes::PlaneLoop;
 pub use run::record::{Record, RunHooks};
 pub use run::session::{FailureCause, Phase, Session};
 
-/// The code of the README, compiled and run with the tests.
-#[cfg(doctest)]
-#[doc = include_str!("../../../README.md")]
-struct Readme;
-
 /// The code of docs/robust-control.md.
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/robust-control.md")]
