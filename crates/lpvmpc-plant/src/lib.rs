@@ -47,7 +47,7 @@
 //! | the plant as Rust | [`Plant::to_rust`] |
 //! | a program for a microcontroller | [`Plant::to_firmware`] |
 //! | a proof about a steady state | [`AboutEquilibrium`]: f as A(s) x + B(s) u, exactly, of its formulas alone |
-//! | is a proof to be had of it? | [`Plant::first_not_smooth`] |
+//! | is a proof to be had of it? | [`Plant::first_jump`] |
 //!
 //! # Derivatives, and time
 //!
