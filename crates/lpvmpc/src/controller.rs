@@ -2,7 +2,7 @@
 
 use crate::by_stage::{CostByStage, PlantByStage, Sample};
 use crate::changes::FixedRows;
-#[cfg(feature = "alloc")]
+#[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
 use crate::elsewhere::Watch;
 use crate::list::List;
 use crate::memory::ControllerMemory;
@@ -73,7 +73,7 @@ pub struct Controller<P, T: 'static, const NX: usize, const NU: usize, const NS:
     /// How the last plan is followed: of a descent only.
     pub(crate) policy: Policy<T, NX, NU>,
     /// Whether another plan is to be looked for.
-    #[cfg(feature = "alloc")]
+    #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
     pub(crate) watch: Watch<T>,
     /// Rolled-out minus predicted state at the end of the horizon.
     pub(crate) gap: SVector<T, NX>,
@@ -127,7 +127,7 @@ where
             settings,
             rollout,
             policy: Policy::new(planned, feedback),
-            #[cfg(feature = "alloc")]
+            #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
             watch: Watch::new(),
             gap: SVector::zeros(),
             initialised: false,

@@ -43,7 +43,7 @@ pub(crate) enum States {
     /// They are.
     Follow,
     /// They are not: the motion from one need not end at the next.
-    #[cfg(feature = "alloc")]
+    #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
     Apart,
 }
 
@@ -110,13 +110,13 @@ where
         } else {
             (Along::Scheduling, iterations.first())
         };
-        #[cfg(feature = "alloc")]
+        #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
         let last = self.initialised.then_some(self.policy.cost);
         let mut prices = Prices::none();
         let found = self
             .first_plan(x, aim, workspace)
             .then(|| self.search(x, aim, (along, most, tolerance), &mut prices, workspace));
-        #[cfg(feature = "alloc")]
+        #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
         let found = self.look_elsewhere(x, aim, (last, tolerance), (found, prices), workspace);
         match found {
             Some(status) => self.publish(status),
@@ -250,7 +250,7 @@ where
             }
             let next = match plan {
                 States::Follow => *next,
-                #[cfg(feature = "alloc")]
+                #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
                 States::Apart => own.next_state(i, &self.model, settings, x, u),
             };
             stage.c = next - stage.a * x - stage.b * u;

@@ -66,7 +66,7 @@ mod clock;
 mod controller;
 mod delay;
 mod descent;
-#[cfg(feature = "alloc")]
+#[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
 mod elsewhere;
 mod embedding;
 mod estimator;

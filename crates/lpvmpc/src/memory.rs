@@ -27,7 +27,7 @@ pub struct Capacity {
     pub general_rows: usize,
     /// A second plan: where a descent's plan is likely to be a dear local minimum, another one is looked for
     /// (`docs/descent.md`). Of a controller's workspace on the heap only (not among the bytes), which then
-    /// serves for the horizon of `stages`.
+    /// serves for the horizon of `stages`; not in WebAssembly.
     pub second_plan: bool,
 }
 

@@ -1,7 +1,7 @@
 //! Scratch memory of a controller's step.
 
 use crate::by_stage::CostByStage;
-#[cfg(feature = "alloc")]
+#[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
 use crate::elsewhere::Kept;
 use crate::list::List;
 #[cfg(feature = "alloc")]
@@ -32,7 +32,7 @@ pub struct Workspace<T: 'static, const NX: usize, const NU: usize> {
     /// Room for weights and bounds of the stages' own, while the program has none.
     own: List<Common<T, NX, NU>>,
     /// Room for a second plan.
-    #[cfg(feature = "alloc")]
+    #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
     pub(crate) kept: Option<Kept<T, NX, NU>>,
 }
 
@@ -59,7 +59,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
             trial: Trial { u, x },
             by_stage: false,
             own,
-            #[cfg(feature = "alloc")]
+            #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
             kept: None,
         }
     }
@@ -68,6 +68,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
     #[cfg(feature = "alloc")]
     pub fn allocate(capacity: Capacity) -> Self {
         Self {
+            // A module for a browser has to be small.
+            #[cfg(not(target_arch = "wasm32"))]
             kept: capacity.second_plan.then(|| Kept::allocate(capacity)),
             ..Self::new(WorkspaceMemory::allocate(capacity))
         }
