@@ -1,10 +1,9 @@
 //! How exactly the guaranteed loop's plans are rolled out: numbers of steps, and errors within their bounds.
 
-use ballbot_scenario::rollout::search::motions;
-use ballbot_scenario::rollout::{accurate, derivatives_error};
+use ballbot_scenario::rollout::{accurate, derivatives_error, motions};
 use ballbot_scenario::{PredictorTable, Scenario};
 use lpvmpc::{Bounds, NEAR_SAMPLES, Rk4, Rollout};
-use lpvmpc_certificate::{Interval, RolloutClaim};
+use lpvmpc_certificate::RolloutClaim;
 use lpvmpc_sim::{Random, Tolerances};
 use nalgebra::{Matrix4, Vector1, Vector4};
 use std::path::Path;
@@ -25,7 +24,7 @@ fn steps_that_are_too_coarse_are_refused_with_the_number_needed() {
         let rollout = accurate(ballbot, plain, &terminal, margin, wanted);
         rollout.map_or_else(|error| error.to_string(), |rollout| format!("{rollout:?}"))
     };
-    assert!(refused(4e-3, Some(9)).contains("needs 10 integration steps"));
+    assert!(refused(4e-3, Some(10)).contains("needs 12 integration steps"));
     assert!(refused(4e-3, Some(65)).contains("64 are the most"));
     assert!(refused(4e-3, Some(13)).contains("substeps: 13"));
     let fine = refused(1e-5, None);
@@ -91,9 +90,8 @@ fn derivatives_are_as_accurate_as_a_guarantee_needs() {
     );
 }
 
-/// At points of the grid the error is enclosed by machine, its own width included, and lies within the box around
-/// what is claimed. The enclosures are wider than what is claimed along the axes on which errors are small: there
-/// their middles count.
+/// At points of the grid the error is enclosed by machine, its own width included: the factor of 2 covers more
+/// than step doubling.
 #[test]
 fn the_error_at_points_of_the_grid_is_proved() {
     let prepared = Scenario::load("far-setpoints").unwrap();
@@ -104,19 +102,15 @@ fn the_error_at_points_of_the_grid_is_proved() {
         error,
         between,
     } = settings.rollout;
-    let inverse = error.try_inverse().unwrap();
     let claim = RolloutClaim {
         t_s: settings.t_s,
         substeps: rk4.substeps,
         x: settings.x,
         u: settings.u,
-        // Of no account for a single sample.
-        error: Vector4::zeros(),
+        error,
         between,
     };
-    // The box around the parallelepiped.
-    let boxed = error.abs().column_sum();
-    let (mut largest, mut aligned, mut looked) = (0.0_f64, 0.0_f64, 0);
+    let (mut largest, mut looked) = (0.0_f64, 0);
     for (x, u) in motions(&prepared.ballbot, &prepared.settings, rk4).step_by(7) {
         // Theta, both rates and the torque, and the time.
         let sample = claim.enclose::<_, 3, 5>(&prepared.ballbot, &x, &u).unwrap();
@@ -125,17 +119,13 @@ fn the_error_at_points_of_the_grid_is_proved() {
             continue;
         };
         looked += 1;
-        let middle = Vector4::from(sample.error.map(Interval::middle));
-        let size = Vector4::from(sample.error.map(Interval::magnitude));
-        largest = largest.max(size.component_div(&boxed).max());
-        aligned = aligned.max((inverse * middle).abs().max());
         for i in 0..4 {
+            largest = largest.max(sample.error[i].magnitude() / error[i]);
             assert!(sample.between[i] <= between[i], "{i}: {x} {u}");
         }
     }
     assert!(looked > 50, "{looked}");
-    assert!((0.1..0.5).contains(&largest), "{largest}");
-    assert!((0.1..0.5).contains(&aligned), "{aligned}");
+    assert!((0.45..0.85).contains(&largest), "{largest}");
 }
 
 /// From random states under random torques, the rollout is as close as is said to a plant that is
@@ -154,7 +144,6 @@ fn the_error_is_within_its_bound() {
         relative: 1e-12,
         absolute: 1e-12,
     };
-    let inverse = error.try_inverse().unwrap();
     let mut random = Random::new(7, 0);
     let (mut largest, mut runs) = (0.0_f64, 0);
     while runs < 3000 {
@@ -174,12 +163,12 @@ fn the_error_is_within_its_bound() {
         }
         runs += 1;
         let share = lpvmpc::share_of_bounds(&start, &settings.x, &u, &settings.u);
-        let off = rk4.advance(&prepared.ballbot, &start, &u, settings.t_s) - end;
-        // What the integration leaves is 1e-11 at most.
-        let unknown = inverse.abs() * Vector4::repeat(1e-11);
-        let part = ((inverse * off).abs() - unknown).max() / share;
-        largest = largest.max(part);
-        assert!(part <= 1.0, "{start} {u}: {off}");
+        let off = (rk4.advance(&prepared.ballbot, &start, &u, settings.t_s) - end).abs();
+        for i in 0..4 {
+            let part = (off[i] - 1e-11) / (error[i] * share);
+            largest = largest.max(part);
+            assert!(part <= 1.0, "{start} {u}: {off}");
+        }
         let step = settings.t_s / rk4.substeps as f64;
         let ends = [start, exact(step)];
         let inside = exact(step * random.uniform());
@@ -188,75 +177,6 @@ fn the_error_is_within_its_bound() {
             assert!(inside[i] <= upper + between[i] && inside[i] >= lower - between[i]);
         }
     }
-    // The factor of 4 is there, and little more: what the search found is what there is.
-    assert!((0.15..0.251).contains(&largest), "{largest}");
-}
-
-/// The motions with the largest errors, and with the farthest ways beyond both ends of a step, that another search
-/// found (random starts, hill climbing), in shares of the bounds of tilt, rates and torque: they are within what is said
-/// of all, and show that it is no larger than its factors of safety make it. The last one of the second kind was once
-/// beyond it: of the tilt rate, a grid alone misses a half.
-#[test]
-fn the_worst_motions_of_another_search_are_within_the_bounds() {
-    let prepared = Scenario::load("far-setpoints").unwrap();
-    let prepared = prepared.prepare(Path::new(".")).unwrap();
-    let settings = *prepared.guaranteed().unwrap();
-    let Rollout {
-        rk4,
-        error,
-        between,
-    } = settings.rollout;
-    let tolerances = Tolerances {
-        relative: 1e-12,
-        absolute: 1e-12,
-    };
-    let motion = |shares: [f64; 4]| {
-        let [theta, phi_dot, theta_dot, torque] = shares;
-        let start = Vector4::new(0.0, theta, phi_dot, theta_dot);
-        let start = start.zip_map(&settings.x.upper, |share, limit| {
-            if share == 0.0 { 0.0 } else { share * limit }
-        });
-        (start, settings.u.upper * torque)
-    };
-    let plant = |start: &Vector4<f64>, u: &Vector1<f64>, seconds: f64| {
-        lpvmpc_sim::advance(&prepared.ballbot, start, u, seconds, tolerances).unwrap()
-    };
-    let inverse = error.try_inverse().unwrap();
-    let largest_errors = [
-        [0.2056, 1.0, 1.0, 0.9149],
-        [-0.3162, -1.0, -1.0, -1.0],
-        [-0.1790, -1.0, -1.0, -0.9030],
-        [-0.2432, -0.3810, 0.2284, -0.3810],
-    ];
-    for (i, shares) in largest_errors.into_iter().enumerate() {
-        let (start, u) = motion(shares);
-        let share = lpvmpc::share_of_bounds(&start, &settings.x, &u, &settings.u);
-        let off = rk4.advance(&prepared.ballbot, &start, &u, settings.t_s)
-            - plant(&start, &u, settings.t_s);
-        let part = (inverse * off)[i].abs() / share;
-        assert!((0.24..0.26).contains(&part), "{i}: {part}");
-    }
-    let farthest_ways = [
-        [0.1063, -0.5666, -0.5832, -0.9832],
-        [0.1093, -0.9985, -0.1498, -0.4124],
-        [0.0094, 0.0514, 0.1218, -0.8423],
-        [-0.1945, -0.8962, 0.9232, 0.6056],
-        [0.1198, 1.0, -0.8983, -0.6220],
-    ];
-    let step = settings.t_s / rk4.substeps as f64;
-    let mut most = Vector4::<f64>::zeros();
-    for shares in farthest_ways {
-        let (start, u) = motion(shares);
-        let mut x = start;
-        for taken in 0..rk4.substeps {
-            let next = Rk4 { substeps: 1 }.advance(&prepared.ballbot, &x, &u, step);
-            for part in [0.25, 0.375, 0.5, 0.625, 0.75] {
-                let inside = plant(&start, &u, (taken as f64 + part) * step);
-                let beyond = (inside - x.sup(&next)).sup(&(x.inf(&next) - inside));
-                most = most.sup(&beyond.component_div(&between));
-            }
-            x = next;
-        }
-    }
-    assert!(most.max() <= 1.0 && most.min() > 0.35, "{most}");
+    // The factor of 2 is there, and little more.
+    assert!((0.2..0.75).contains(&largest), "{largest}");
 }
