@@ -207,7 +207,7 @@ class Mpc:
     first_programs
         Quadratic programs, at most, in a sample without a plan from the one before: in the first, after a reset or
         after a plan that was none (descent). Where they are more than `max_programs`, and so many are needed,
-        plans from two other beginnings are looked for, with as many for each.
+        plans from two other beginnings are looked for, with as many for each: three times as many in all.
     tolerance
         A descent ends when the cost falls by less than this part of it.
     estimator

