@@ -127,6 +127,16 @@ impl<const NX: usize, const NU: usize, const NS: usize> Made<NX, NU, NS> {
     }
 }
 
+/// Memory for a step: every stage may have weights and bounds of its own and so many general rows, and there is room for a
+/// second plan.
+fn workspace<const NX: usize, const NU: usize, const NS: usize>(
+    settings: &lpvmpc::ControllerSettings<f64, NX, NU, NS>,
+    rows: usize,
+) -> Workspace<f64, NX, NU> {
+    let capacity = settings.capacity().with_own_stages().with_second_plan();
+    Workspace::allocate(capacity.with_general_rows(rows))
+}
+
 impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
     /// A controller for `plant`, which fits into the places.
     pub fn new(plant: &Plant, settings: &MpcSettings) -> Result<Self, MpcError> {
@@ -142,12 +152,8 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             Controller::allocate(made.model, made.of_controller).map_err(refused)?;
         let rows = List::Owned(made.rows.into_boxed_slice());
         controller.set_rows(rows).map_err(refused)?;
-        let capacity = made
-            .of_controller
-            .capacity()
-            .with_own_stages()
-            .with_second_plan();
         let room = settings.rows.len();
+        let workspace = workspace(controller.settings(), room);
         Ok(Self {
             plant: plant.clone(),
             names,
@@ -155,7 +161,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             bounds: made.bounds,
             rest,
             controller,
-            workspace: Workspace::allocate(capacity.with_general_rows(room)),
+            workspace,
             room,
             last_input,
             applied: rest.1,
@@ -207,14 +213,8 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         let of_tasks = tasks.as_ref().map_or(0, |tasks| tasks.bounded.len());
         let most = of_stages.unwrap_or(self.settings.rows.len()) + of_tasks;
         if most > self.room {
-            let capacity = self
-                .controller
-                .settings()
-                .capacity()
-                .with_own_stages()
-                .with_second_plan();
-            self.workspace = Workspace::allocate(capacity.with_general_rows(most));
             self.room = most;
+            self.workspace = workspace(self.controller.settings(), most);
         }
         let terminal = lists.x_ref.last().copied().unwrap_or(self.rest.0);
         let prices = self.prices_from(&(x - terminal));
@@ -296,13 +296,8 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
             self.controller.reset();
             self.last_input = last_input;
         }
-        let capacity = made
-            .of_controller
-            .capacity()
-            .with_own_stages()
-            .with_second_plan();
-        self.workspace = Workspace::allocate(capacity.with_general_rows(settings.rows.len()));
         self.room = settings.rows.len();
+        self.workspace = workspace(self.controller.settings(), self.room);
         (self.settings, self.bounds) = (settings.clone(), made.bounds);
         Ok(())
     }

@@ -2,8 +2,9 @@
 //! which no plan is applied that the nonlinear model does not confirm.
 //!
 //! Every sample begins with a plan that is known to work: the rest of the last one, with feedback
-//! towards its states, ended by the terminal law. It is rolled out where the plant is not as planned. A quadratic program along it, with the set point as
-//! one more unknown, proposes a better one. Only if the nonlinear rollout of the proposal keeps all bounds, ends in the
+//! towards its states, ended by the terminal law. Its states are those of the last plan, moved, where the plant is
+//! as planned, and a rollout elsewhere. A quadratic program along it, with the set point as one more unknown,
+//! proposes a better one. Only if the nonlinear rollout of the proposal keeps all bounds, ends in the
 //! terminal set and costs no more, it takes the place of the candidate (suboptimal MPC: Scokaert,
 //! Mayne and Rawlings 1999; Allan, Bates, Risbeck and Rawlings 2017; artificial set point: Limon,
 //! Alvarado, Alamo and Camacho 2008). So once there is a plan, there is one at every later sample,

@@ -383,12 +383,7 @@ impl Rk4 {
             let periods = periods(period, t_s);
             return (0..periods).fold(*x, |x, _| model.derivative(&x, u));
         }
-        let h = self.step_length(t_s);
-        let mut x = *x;
-        for _ in 0..self.substeps {
-            x = Self::step(model, &x, u, h);
-        }
-        x
+        self.advance_through(model, x, u, t_s, |_| ())
     }
 
     /// The same, with the state after `each` step. In discrete time a step is as many periods as fit into it.
