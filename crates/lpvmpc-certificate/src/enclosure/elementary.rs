@@ -480,9 +480,22 @@ fn sinhc_coefficient(n: usize, x: Interval) -> Interval {
         });
     let sum = if n.is_multiple_of(2) { even } else { even * x };
     let largest = Interval::point(x.magnitude());
-    let power = (0..=highest(n)).fold(Interval::point(1.0), |power, _| power * largest);
-    let rest = (power * TABLES.rest[n] * hyperbolic(largest).1).upper;
+    let rest = (power(largest, highest(n) + 1) * TABLES.rest[n] * hyperbolic(largest).1).upper;
     sum + Interval::new(-rest, rest)
+}
+
+/// x^n, of x >= 0.
+fn power(x: Interval, n: usize) -> Interval {
+    let half = if n > 1 {
+        power(x, n / 2)
+    } else {
+        Interval::point(1.0)
+    };
+    if n.is_multiple_of(2) {
+        half * half
+    } else {
+        half * half * x
+    }
 }
 
 /// sinc^(n)(x) / n!. The j-th derivative of sinc, the integral of s^j cos^(j)(s x) over s from 0
@@ -497,8 +510,7 @@ fn sinc_coefficient(n: usize, x: Interval) -> Interval {
         });
     let sum = if n.is_multiple_of(2) { even } else { even * x };
     let largest = Interval::point(x.magnitude());
-    let power = (0..=highest(n)).fold(Interval::point(1.0), |power, _| power * largest);
-    let rest = (power * TABLES.rest[n]).upper;
+    let rest = (power(largest, highest(n) + 1) * TABLES.rest[n]).upper;
     let bound = TABLES.largest[n].upper;
     (sum + Interval::new(-rest, rest)).common(Interval::new(-bound, bound))
 }

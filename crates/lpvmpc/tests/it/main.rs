@@ -8,5 +8,6 @@
 
 mod estimation;
 mod method;
+mod pendulum;
 mod preview;
 mod solver;

@@ -1,6 +1,7 @@
 //! Time by stamps: its beginning, gaps, other clocks, in both precisions.
 
-use super::pendulum::{INSTANTS, Observer, Pendulum, settings};
+use super::pendulum::{INSTANTS, Observer, PENDULUM, settings};
+use crate::pendulum::Pendulum;
 use lpvmpc::{
     Clock, DelayLine, Estimator, EstimatorSettings, Gate, LpvModel, Observation, Reading, Restart,
     Rk4, Tick, Verdict,
@@ -12,9 +13,12 @@ const UNIX: f64 = 1.8e9;
 
 /// The held-up pendulum under an unknown torque, observed at stamps from `start` on: the estimator
 /// after `samples` measurements, and the line of its inputs.
-fn observed(start: f64, samples: usize) -> (Observer<Pendulum>, DelayLine<f64, 1>, Vector2<f64>) {
+fn observed(
+    start: f64,
+    samples: usize,
+) -> (Observer<Pendulum<f64>>, DelayLine<f64, 1>, Vector2<f64>) {
     let mut estimator =
-        Observer::allocate(Pendulum, settings(), Vector2::zeros(), INSTANTS).unwrap();
+        Observer::allocate(PENDULUM, settings(), Vector2::zeros(), INSTANTS).unwrap();
     let mut line = DelayLine::allocate(4);
     let mut x = Vector2::new(0.05, 0.0);
     for k in 0..samples {
@@ -25,7 +29,7 @@ fn observed(start: f64, samples: usize) -> (Observer<Pendulum>, DelayLine<f64, 1
         assert!(seen.verdicts[0].is_used(), "sample {k}: {seen:?}");
         let u = Vector1::new(-30.0 * x[0] - 8.0 * x[1]);
         line.command(u, 0.0);
-        x = Rk4 { substeps: 1 }.advance(&Pendulum, &x, &u.add_scalar(0.2), T_S);
+        x = Rk4 { substeps: 1 }.advance(&PENDULUM, &x, &u.add_scalar(0.2), T_S);
     }
     (estimator, line, x)
 }

@@ -1,6 +1,7 @@
 //! The estimator against a dense textbook filter, statistics, and what it has to find.
 
-use super::pendulum::{INSTANTS, Observer, Pendulum, settings};
+use super::pendulum::{INSTANTS, Observer, PENDULUM, settings};
+use crate::pendulum::Pendulum;
 use lpvmpc::{Estimator, EstimatorError, EstimatorSettings, Gate, LpvModel, Reading, Rk4, Verdict};
 use lpvmpc_testkit::rng::Rng;
 use nalgebra::{Matrix1x2, Matrix2, Matrix3, SMatrix, SVector, Vector1, Vector2, Vector3};
@@ -11,11 +12,11 @@ pub struct Linear;
 
 impl LpvModel<f64, 2, 1, 1> for Linear {
     fn scheduling(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Vector1<f64> {
-        Vector1::zeros()
+        Vector1::new(1.0)
     }
 
-    fn matrices(&self, scheduling: &Vector1<f64>) -> (Matrix2<f64>, Vector2<f64>) {
-        Pendulum.matrices(scheduling)
+    fn matrices(&self, sinc: &Vector1<f64>) -> (Matrix2<f64>, Vector2<f64>) {
+        PENDULUM.matrices(sinc)
     }
 }
 
@@ -43,7 +44,7 @@ fn it_is_the_textbook_filter_of_the_joint_system() {
         Observer::allocate(Linear, settings, Vector2::new(0.05, 0.0), INSTANTS).unwrap();
     // The joint system in (x, d), written out: x_dot = A (x + E_x d) + B (u + E_u d), sampled by
     // its own Taylor series, y = x_1.
-    let (a, b) = Linear.matrices(&Vector1::zeros());
+    let (a, b) = Linear.matrices(&Vector1::new(1.0));
     let (coupling, b_d) = (a * settings.state_offset, b * settings.input_offset);
     let mut joint = Matrix3::zeros();
     joint.fixed_view_mut::<2, 2>(0, 0).copy_from(&a);
@@ -142,14 +143,14 @@ fn held_upright(
     settings: EstimatorSettings<f64, 2, 1, 1, 1>,
     torque: f64,
     offset: f64,
-) -> (Observer<Pendulum>, Vector2<f64>) {
-    let mut estimator = Observer::allocate(Pendulum, settings, Vector2::zeros(), INSTANTS).unwrap();
+) -> (Observer<Pendulum<f64>>, Vector2<f64>) {
+    let mut estimator = Observer::allocate(PENDULUM, settings, Vector2::zeros(), INSTANTS).unwrap();
     let mut z = Vector2::new(0.1, 0.0);
     for _ in 0..2000 {
         let model = estimator.model_state();
         let v = Vector1::new(-30.0 * model[0] - 8.0 * model[1]);
         let u = v - estimator.input_disturbance();
-        z = Rk4 { substeps: 1 }.advance(&Pendulum, &z, &u.add_scalar(torque), T_S);
+        z = Rk4 { substeps: 1 }.advance(&PENDULUM, &z, &u.add_scalar(torque), T_S);
         estimator.advance(&u, T_S);
         estimator.update(&[Some(Reading::fresh(z[0] - offset))]);
     }
@@ -235,20 +236,20 @@ fn the_covariance_stays_positive_in_single_precision() {
 #[test]
 fn without_readings_it_predicts_and_grows_less_certain() {
     let mut estimator =
-        Observer::allocate(Pendulum, settings(), Vector2::new(0.1, 0.0), INSTANTS).unwrap();
+        Observer::allocate(PENDULUM, settings(), Vector2::new(0.1, 0.0), INSTANTS).unwrap();
     let mut alone = Vector2::new(0.1, 0.0);
     let mut last = 0.0;
     for _ in 0..20 {
         estimator.advance(&Vector1::new(-1.0), T_S);
         assert_eq!(estimator.update(&[None]), [Verdict::Missing]);
-        alone = Rk4 { substeps: 1 }.advance(&Pendulum, &alone, &Vector1::new(-1.0), T_S);
+        alone = Rk4 { substeps: 1 }.advance(&PENDULUM, &alone, &Vector1::new(-1.0), T_S);
         assert_eq!(estimator.state(), alone);
         let trace = estimator.covariance().zz.trace();
         assert!(trace > last);
         last = trace;
     }
     estimator.reset(Vector2::new(0.1, 0.0));
-    let fresh = Observer::allocate(Pendulum, settings(), Vector2::new(0.1, 0.0), INSTANTS).unwrap();
+    let fresh = Observer::allocate(PENDULUM, settings(), Vector2::new(0.1, 0.0), INSTANTS).unwrap();
     assert_eq!(estimator.covariance(), fresh.covariance());
     assert_eq!(estimator.state(), fresh.state());
 }
@@ -258,7 +259,7 @@ fn settings_that_make_no_sense_are_named() {
     let refused = |change: &dyn Fn(&mut EstimatorSettings<f64, 2, 1, 1, 1>)| {
         let mut settings = settings();
         change(&mut settings);
-        Observer::allocate(Pendulum, settings, Vector2::zeros(), INSTANTS)
+        Observer::allocate(PENDULUM, settings, Vector2::zeros(), INSTANTS)
             .err()
             .unwrap()
     };

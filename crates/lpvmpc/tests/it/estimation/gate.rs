@@ -1,15 +1,16 @@
 //! Readings that must not be believed.
 
-use super::pendulum::{INSTANTS, Observer, Pendulum, settings};
+use super::pendulum::{INSTANTS, Observer, PENDULUM, settings};
+use crate::pendulum::Pendulum;
 use lpvmpc::{Reading, Rk4, Verdict};
 use nalgebra::{Vector1, Vector2};
 
 const T_S: f64 = 0.01;
 
 /// An estimator that has settled at the upright pendulum, and the held-up pendulum itself.
-fn settled() -> Observer<Pendulum> {
+fn settled() -> Observer<Pendulum<f64>> {
     let mut estimator =
-        Observer::allocate(Pendulum, settings(), Vector2::zeros(), INSTANTS).unwrap();
+        Observer::allocate(PENDULUM, settings(), Vector2::zeros(), INSTANTS).unwrap();
     for _ in 0..500 {
         estimator.advance(&Vector1::zeros(), T_S);
         estimator.update(&[Some(Reading::fresh(0.0))]);
@@ -72,7 +73,7 @@ fn after_a_blow_the_state_follows_the_sensor() {
     let mut verdicts = Vec::new();
     for _ in 0..60 {
         let u = Vector1::new(-40.0 * truth[0] - 12.0 * truth[1]);
-        truth = Rk4 { substeps: 1 }.advance(&Pendulum, &truth, &u, T_S);
+        truth = Rk4 { substeps: 1 }.advance(&PENDULUM, &truth, &u, T_S);
         estimator.advance(&u, T_S);
         verdicts.extend(estimator.update(&[Some(Reading::fresh(truth[0]))]));
     }

@@ -33,7 +33,7 @@ fn two_sensors() -> EstimatorSettings<f64, 2, 1, 2, 1> {
 
 /// The pendulum with the torque as a third state, sampled exactly.
 fn joint() -> (Matrix3<f64>, Vector3<f64>) {
-    let (a, b) = Linear.matrices(&Vector1::zeros());
+    let (a, b) = Linear.matrices(&Vector1::new(1.0));
     let mut rates = Matrix3::zeros();
     rates.fixed_view_mut::<2, 2>(0, 0).copy_from(&a);
     rates.fixed_view_mut::<2, 1>(0, 2).copy_from(&b);

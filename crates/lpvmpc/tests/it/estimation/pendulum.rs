@@ -1,30 +1,14 @@
 //! A pendulum about its upright position, and an estimator that sees its angle.
 
-use lpvmpc::{Estimator, EstimatorSettings, Gate, LpvModel};
-use nalgebra::{Matrix1x2, Matrix2, SMatrix, SVector, Vector1, Vector2};
+use crate::pendulum::Pendulum;
+use lpvmpc::{Estimator, EstimatorSettings, Gate};
+use nalgebra::{Matrix1x2, SMatrix, SVector, Vector1, Vector2};
 
 /// 1 kg on a rod of 1 m, with a torque in N m; x = (angle rad, rate rad/s).
-#[derive(Clone, Copy)]
-pub struct Pendulum;
-
-impl LpvModel<f64, 2, 1, 1> for Pendulum {
-    fn scheduling(&self, x: &Vector2<f64>, _: &Vector1<f64>) -> Vector1<f64> {
-        Vector1::new(x[0])
-    }
-
-    fn matrices(&self, scheduling: &Vector1<f64>) -> (Matrix2<f64>, Vector2<f64>) {
-        let angle = scheduling[0];
-        let sinc = if angle == 0.0 {
-            1.0
-        } else {
-            angle.sin() / angle
-        };
-        (
-            Matrix2::new(0.0, 1.0, 9.81 * sinc, 0.0),
-            Vector2::new(0.0, 1.0),
-        )
-    }
-}
+pub const PENDULUM: Pendulum<f64> = Pendulum {
+    stiffness: 9.81,
+    damping: 0.0,
+};
 
 /// The angle is measured with a deviation of 1 mrad; an unknown torque acts.
 pub fn settings() -> EstimatorSettings<f64, 2, 1, 1, 1> {

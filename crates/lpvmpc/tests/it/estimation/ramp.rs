@@ -1,17 +1,18 @@
 //! The ramped input: the same plant, and a controller that keeps the rate within bounds.
 
-use super::pendulum::Pendulum;
+use super::pendulum::PENDULUM;
+use crate::pendulum::Pendulum;
 use lpvmpc::{
     Bounds, Controller, ControllerSettings, InputReference, Iterations, LpvModel, Predictor,
     RampedInput, Reference, Rk4, Scheduling, SolverSettings, TerminalIngredient, Weights,
 };
 use nalgebra::{Matrix1, Matrix3, Vector1, Vector2, Vector3};
 
-type Ramped = RampedInput<Pendulum, 2>;
+type Ramped = RampedInput<Pendulum<f64>, 2>;
 
 #[test]
 fn its_motion_is_that_of_the_plant_under_a_ramp() {
-    let ramped = RampedInput(Pendulum);
+    let ramped = RampedInput(PENDULUM);
     let (x, u, rate) = (
         Vector2::new(0.4, -0.3),
         Vector1::new(1.2),
@@ -27,7 +28,7 @@ fn its_motion_is_that_of_the_plant_under_a_ramp() {
     let h = t_s / f64::from(steps);
     for i in 0..steps {
         let held = u + rate * (h * (f64::from(i) + 0.5));
-        plain = Rk4 { substeps: 1 }.advance(&Pendulum, &plain, &held, h);
+        plain = Rk4 { substeps: 1 }.advance(&PENDULUM, &plain, &held, h);
     }
     assert!(
         (found.fixed_rows::<2>(0) - plain).norm() < 1e-8,
@@ -67,7 +68,7 @@ fn rate_and_input_stay_within_bounds() {
         iterations: Iterations::Fixed(1),
         solver: SolverSettings::default(),
     };
-    let ramped = RampedInput(Pendulum);
+    let ramped = RampedInput(PENDULUM);
     let mut controller = Controller::allocate(ramped, settings).unwrap();
     let mut workspace = controller.workspace();
     let upright = Reference::constant(Vector3::zeros());

@@ -1,6 +1,7 @@
 //! The controller in its feedback pipeline: memory, hand-over, offsets, bounds.
 
-use super::pendulum::{Pendulum, settings};
+use super::pendulum::{PENDULUM, settings};
+use crate::pendulum::Pendulum;
 use lpvmpc::{
     Belief, Bounds, Controller, ControllerArrays, ControllerSettings, Estimator, EstimatorArrays,
     EstimatorError, EstimatorMemory, EstimatorSettings, FeedbackArrays, FeedbackMemory,
@@ -19,9 +20,9 @@ pub const COMMANDS: usize = 8;
 /// Bound of the torque, N m; it holds the pendulum at 0.4 rad at most.
 pub const LIMIT: f64 = 4.0;
 
-pub type Feedback<K> = OutputFeedback<Pendulum, K, f64, 2, 1, 1, 1, 1>;
-pub type PlannerOfTorque = Held<Pendulum, f64, 2, 1, 1>;
-type PlannerOfRate = Ramped<Pendulum, f64, 2, 1, 1, 3>;
+pub type Feedback<K> = OutputFeedback<Pendulum<f64>, K, f64, 2, 1, 1, 1, 1>;
+pub type PlannerOfTorque = Held<Pendulum<f64>, f64, 2, 1, 1>;
+type PlannerOfRate = Ramped<Pendulum<f64>, f64, 2, 1, 1, 3>;
 pub type Regulated<K> = Standalone<Feedback<K>, <K as Planner<f64, 2, 1>>::Workspace>;
 
 pub fn controller_settings(horizon: usize) -> ControllerSettings<f64, 2, 1, 1> {
@@ -60,8 +61,8 @@ fn feedback_settings() -> FeedbackSettings<f64, 1> {
     }
 }
 
-fn belief() -> Belief<Pendulum, f64, 2, 1, 1, 1, 1> {
-    let estimator = Estimator::allocate(Pendulum, settings(), Vector2::zeros(), INSTANTS);
+fn belief() -> Belief<Pendulum<f64>, f64, 2, 1, 1, 1, 1> {
+    let estimator = Estimator::allocate(PENDULUM, settings(), Vector2::zeros(), INSTANTS);
     Belief::Estimated(estimator.unwrap())
 }
 
@@ -72,7 +73,7 @@ fn around<K: Planner<f64, 2, 1>>(planner: K) -> Feedback<K> {
 
 /// The torque is held.
 pub fn held(horizon: usize) -> Regulated<PlannerOfTorque> {
-    let controller = Controller::allocate(Pendulum, controller_settings(horizon)).unwrap();
+    let controller = Controller::allocate(PENDULUM, controller_settings(horizon)).unwrap();
     Standalone {
         workspace: controller.workspace(),
         feedback: around(Held::new(controller)),
@@ -107,7 +108,7 @@ fn ramped(horizon: usize) -> Regulated<PlannerOfRate> {
         iterations: plain.iterations,
         solver: plain.solver,
     };
-    let controller = Controller::allocate(RampedInput(Pendulum), settings).unwrap();
+    let controller = Controller::allocate(RampedInput(PENDULUM), settings).unwrap();
     Standalone {
         workspace: controller.workspace(),
         feedback: around(Ramped::allocate(controller)),
@@ -168,7 +169,7 @@ impl World {
                 self.acting = self.travelling.remove(0).1;
             }
             let u = Vector1::new(self.acting + self.disturbance);
-            self.x = Rk4 { substeps: 1 }.advance(&Pendulum, &self.x, &u, T_S / 4.0);
+            self.x = Rk4 { substeps: 1 }.advance(&PENDULUM, &self.x, &u, T_S / 4.0);
         }
         self.k += 1;
     }
@@ -236,9 +237,9 @@ fn lent_memory_regulates_as_the_heap_does() {
         Box::leak(Box::new(EstimatorArrays::default()));
     let feedback: &mut FeedbackArrays<f64, 2, 1, N, COMMANDS> =
         Box::leak(Box::new(FeedbackArrays::default()));
-    let controller = Controller::new(Pendulum, controller_settings(N), controller.lend()).unwrap();
+    let controller = Controller::new(PENDULUM, controller_settings(N), controller.lend()).unwrap();
     let estimator =
-        Estimator::new(Pendulum, settings(), Vector2::zeros(), estimator.lend()).unwrap();
+        Estimator::new(PENDULUM, settings(), Vector2::zeros(), estimator.lend()).unwrap();
     let mut lent = Standalone {
         feedback: OutputFeedback::new(
             Belief::Estimated(estimator),
@@ -295,8 +296,8 @@ fn a_sensor_that_is_not_needed_is_not_heard() {
         initial_disturbance: one.initial_disturbance,
         gate: one.gate,
     };
-    let mut alone = Estimator::allocate(Pendulum, one, Vector2::zeros(), 4).unwrap();
-    let mut both = Estimator::allocate(Pendulum, two, Vector2::zeros(), 4).unwrap();
+    let mut alone = Estimator::allocate(PENDULUM, one, Vector2::zeros(), 4).unwrap();
+    let mut both = Estimator::allocate(PENDULUM, two, Vector2::zeros(), 4).unwrap();
     for k in 0..50 {
         let u = Vector1::new((0.3 * k as f64).sin());
         let angle = Some(Reading::fresh(0.01 * (0.2 * k as f64).cos()));
@@ -318,7 +319,7 @@ fn a_sensor_that_is_not_needed_is_not_heard() {
 #[test]
 fn an_estimator_needs_memory_for_the_present() {
     let memory = EstimatorMemory::allocate(0);
-    let refused = Estimator::new(Pendulum, settings(), SVector::zeros(), memory);
+    let refused = Estimator::new(PENDULUM, settings(), SVector::zeros(), memory);
     assert_eq!(refused.err(), Some(EstimatorError::Memory));
     let zero = EstimatorSettings {
         c: Matrix1x2::new(1.0, 0.0),
@@ -326,7 +327,7 @@ fn an_estimator_needs_memory_for_the_present() {
         ..settings()
     };
     assert!(
-        Estimator::<_, _, 2, 1, 1, 1, 1>::allocate(Pendulum, zero, SVector::zeros(), 4).is_err()
+        Estimator::<_, _, 2, 1, 1, 1, 1>::allocate(PENDULUM, zero, SVector::zeros(), 4).is_err()
     );
 }
 

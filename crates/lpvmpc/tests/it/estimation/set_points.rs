@@ -1,6 +1,6 @@
 //! Set points at which the plant needs an input to stand.
 
-use super::pendulum::Pendulum;
+use super::pendulum::PENDULUM;
 use lpvmpc::{
     AlongMotion, Bounds, Controller, ControllerSettings, Dynamics, InputReference, Iterations,
     LpvModel, Number, Predictor, RampedInput, Reference, Rk4, Scalar, Scheduling, SolverSettings,
@@ -40,7 +40,7 @@ fn settings(iterations: Iterations<f64>) -> ControllerSettings<f64, 2, 1, 1> {
 
 /// Where the pendulum is after 10 s under `settings`, from upright.
 fn arrives(settings: ControllerSettings<f64, 2, 1, 1>, angle: f64) -> (Vector2<f64>, f64) {
-    let mut controller = Controller::allocate(Pendulum, settings).unwrap();
+    let mut controller = Controller::allocate(PENDULUM, settings).unwrap();
     let mut workspace = controller.workspace();
     let reference = Reference::constant(Vector2::new(angle, 0.0));
     let mut x = Vector2::zeros();
@@ -49,7 +49,7 @@ fn arrives(settings: ControllerSettings<f64, 2, 1, 1>, angle: f64) -> (Vector2<f
         let plan = controller.step(&x, &reference, &mut workspace);
         assert!(plan.status.is_solved(), "{angle} rad: {}", plan.status);
         u = plan.u[0];
-        x = RK4.advance(&Pendulum, &x, &u, T_S);
+        x = RK4.advance(&PENDULUM, &x, &u, T_S);
     }
     (x, u[0])
 }
@@ -91,7 +91,7 @@ fn without_an_input_reference_it_is_drawn_off_its_set_point() {
 
 #[test]
 fn what_cannot_be_held_becomes_the_nearest_that_can_and_is_told() {
-    let mut controller = Controller::allocate(Pendulum, settings(Iterations::default())).unwrap();
+    let mut controller = Controller::allocate(PENDULUM, settings(Iterations::default())).unwrap();
     let mut workspace = controller.workspace();
     let x = Vector2::zeros();
     let mut target = |angle: f64| {
@@ -121,7 +121,7 @@ fn what_cannot_be_held_becomes_the_nearest_that_can_and_is_told() {
 
 #[test]
 fn new_bounds_move_the_target() {
-    let mut controller = Controller::allocate(Pendulum, settings(Iterations::default())).unwrap();
+    let mut controller = Controller::allocate(PENDULUM, settings(Iterations::default())).unwrap();
     let mut workspace = controller.workspace();
     let reference = Reference::constant(Vector2::new(0.5, 0.0));
     controller.step(&Vector2::zeros(), &reference, &mut workspace);
@@ -169,7 +169,7 @@ fn a_ramped_torque_holds_the_pendulum_too() {
         iterations: plain.iterations,
         solver: plain.solver,
     };
-    let ramped = RampedInput::<_, 2>(Pendulum);
+    let ramped = RampedInput::<_, 2>(PENDULUM);
     let mut controller = Controller::allocate(ramped, settings).unwrap();
     let mut workspace = controller.workspace();
     let reference = Reference::constant(Vector3::new(0.5, 0.0, 0.0));

@@ -1,16 +1,17 @@
 //! Decisions behind a filter and a delay that are told more than a reference.
 
-use super::pendulum::{Pendulum, settings};
+use super::pendulum::{PENDULUM, settings};
 use super::regulator::{
     DELAY, INSTANTS, LIMIT, N, PlannerOfTorque, Regulated, T_S, World, controller_settings, held,
 };
+use crate::pendulum::Pendulum;
 use lpvmpc::{
     Bounds, Capacity, Controller, ControllerMemory, DelayLine, Estimator, Measurement, Preview,
     Reference, Regulator, Status, Weights, Workspace,
 };
 use nalgebra::{Matrix1, Matrix2, RowVector2, Vector1, Vector2};
 
-type Told<'a> = Preview<'a, Pendulum, f64, 2, 1, 1>;
+type Told<'a> = Preview<'a, Pendulum<f64>, f64, 2, 1, 1>;
 
 fn room() -> Capacity {
     let settings = controller_settings(N);
@@ -115,7 +116,7 @@ fn a_decision_is_filter_delay_and_controller_one_after_the_other() {
     let mut regulator = roomy();
     let mut world = World::new(0.6, 1e-3);
     let mut filter = Estimator::<_, _, 2, 1, 1, 1, 1>::allocate(
-        Pendulum,
+        PENDULUM,
         settings(),
         Vector2::zeros(),
         INSTANTS,
@@ -123,7 +124,7 @@ fn a_decision_is_filter_delay_and_controller_one_after_the_other() {
     .unwrap();
     let mut line = DelayLine::new(lpvmpc::List::repeat((0.0, Vector1::zeros()), 8));
     let memory = ControllerMemory::allocate(room());
-    let mut controller = Controller::new(Pendulum, controller_settings(N), memory).unwrap();
+    let mut controller = Controller::new(PENDULUM, controller_settings(N), memory).unwrap();
     let mut workspace = Workspace::allocate(room());
     let mut at_bound = 0;
     for k in 0..150 {

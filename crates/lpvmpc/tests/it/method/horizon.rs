@@ -156,7 +156,7 @@ fn the_horizon_without_bounds_is_the_dense_solution() {
     matches_the_dense_solution::<1, 1>(&mut rng, 1, 1);
     matches_the_dense_solution::<4, 1>(&mut rng, 20, 20);
     matches_the_dense_solution::<2, 3>(&mut rng, 10, 10);
-    matches_the_dense_solution::<6, 2>(&mut rng, 12, 12);
+    matches_the_dense_solution::<6, 3>(&mut rng, 12, 12);
 }
 
 #[test]

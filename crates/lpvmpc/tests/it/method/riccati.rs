@@ -120,8 +120,8 @@ fn the_cost_to_go_in_front_is_the_minimum_over_the_input() {
     cost_to_go_is_the_minimum::<1, 1>(&mut rng);
     cost_to_go_is_the_minimum::<4, 1>(&mut rng);
     cost_to_go_is_the_minimum::<2, 3>(&mut rng);
-    cost_to_go_is_the_minimum::<6, 2>(&mut rng);
-    cost_to_go_is_the_minimum::<8, 4>(&mut rng);
+    cost_to_go_is_the_minimum::<6, 3>(&mut rng);
+    cost_to_go_is_the_minimum::<12, 4>(&mut rng);
 }
 
 /// Moving away from u = K x + k by d costs d'(R + B'PB)d/2 and nothing of first order.

@@ -1,7 +1,8 @@
 //! Settings and models that change while a controller runs.
 
-use super::plants::Pendulum;
-use super::short_case::{PLANT, settings};
+use super::plants::PENDULUM;
+use super::short_case::settings;
+use crate::pendulum::Pendulum;
 use lpvmpc::{
     Bounds, Controller, ControllerError, InputReference, Iterations, Predictor, Preview, Reference,
     Rk4, TerminalIngredient, Weights,
@@ -34,8 +35,8 @@ fn other_settings_are_those_of_a_controller_built_with_them() {
         other
     };
     for iterations in [Iterations::Fixed(2), Iterations::default()] {
-        let mut set = Controller::allocate(PLANT, settings()).unwrap();
-        let mut made = Controller::allocate(PLANT, other(iterations)).unwrap();
+        let mut set = Controller::allocate(PENDULUM, settings()).unwrap();
+        let mut made = Controller::allocate(PENDULUM, other(iterations)).unwrap();
         let [mut memory, mut own] = [set.workspace(), made.workspace()];
         let x = Vector2::new(0.4, 0.2);
         // With a past and a target that are not those of the new settings.
@@ -54,14 +55,17 @@ fn other_settings_are_those_of_a_controller_built_with_them() {
 /// With a past, too, the next plan is a good one: a descent ends where one without a past ends.
 #[test]
 fn a_plan_goes_on_under_other_weights_and_another_model() {
-    let heavy = Pendulum { stiffness: 15.0 };
+    let heavy = Pendulum {
+        stiffness: 15.0,
+        ..PENDULUM
+    };
     let precise = |r: f64| {
         let mut settings = settings();
         settings.weights.r[0] = r;
         settings.iterations = Iterations::descent(1e-9, 50);
         settings
     };
-    let mut changed = Controller::allocate(PLANT, precise(0.1)).unwrap();
+    let mut changed = Controller::allocate(PENDULUM, precise(0.1)).unwrap();
     let mut fresh = Controller::allocate(heavy, precise(1.0)).unwrap();
     let [mut memory, mut own] = [changed.workspace(), fresh.workspace()];
     let x = Vector2::new(0.3, -0.5);
@@ -76,7 +80,7 @@ fn a_plan_goes_on_under_other_weights_and_another_model() {
 
 #[test]
 fn settings_that_make_no_sense_are_refused_and_change_nothing() {
-    let mut controller = Controller::allocate(PLANT, settings()).unwrap();
+    let mut controller = Controller::allocate(PENDULUM, settings()).unwrap();
     let mut refused = |change: &dyn Fn(&mut super::short_case::Settings)| {
         let mut other = settings();
         change(&mut other);
@@ -116,14 +120,14 @@ fn a_plan_with_a_preview_is_taken_over() {
             horizon: settings.horizon + 5,
             ..settings
         };
-        let mut before = Controller::allocate(PLANT, settings).unwrap();
-        let mut after = Controller::allocate(PLANT, settings).unwrap();
-        let mut long = Controller::allocate(PLANT, longer).unwrap();
+        let mut before = Controller::allocate(PENDULUM, settings).unwrap();
+        let mut after = Controller::allocate(PENDULUM, settings).unwrap();
+        let mut long = Controller::allocate(PENDULUM, longer).unwrap();
         let mut workspace = long.workspace();
         let mut x = Vector2::new(0.3, 0.0);
         for _ in 0..5 {
             let u = before.step_with(&x, &told, &mut workspace).u[0];
-            x = Rk4 { substeps: 2 }.advance(&PLANT, &x, &u, 0.05);
+            x = Rk4 { substeps: 2 }.advance(&PENDULUM, &x, &u, 0.05);
         }
         after.take_over(&before);
         long.take_over(&before);

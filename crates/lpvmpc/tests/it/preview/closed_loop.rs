@@ -1,6 +1,6 @@
 //! What a preview is for: closed loops.
 
-use super::plants::{Cart, Pendulum};
+use super::plants::{CART, PENDULUM};
 use super::short_case::settings;
 use lpvmpc::{
     Bounds, Controller, ControllerMemory, ControllerSettings, GeneralRow, Iterations, List,
@@ -49,7 +49,7 @@ fn a_disturbance_that_is_known_ahead_costs_less() {
                     input_reference: lpvmpc::InputReference::Given(Vector1::zeros()),
                     ..settings()
                 };
-                let pendulum = Pendulum { stiffness: 9.81 };
+                let pendulum = PENDULUM;
                 let mut controller = Controller::allocate(pendulum, settings).unwrap();
                 let mut workspace = controller.workspace();
                 let (mut x, mut cost) = (Vector2::zeros(), 0.0);
@@ -96,7 +96,7 @@ fn a_constant_disturbance_leaves_no_offset() {
             iterations,
             ..settings()
         };
-        let pendulum = Pendulum { stiffness: 9.81 };
+        let pendulum = PENDULUM;
         let mut controller = Controller::allocate(pendulum, settings).unwrap();
         let mut workspace = controller.workspace();
         let mut x = Vector2::new(0.3, 0.0);
@@ -136,7 +136,7 @@ fn rows_hold_in_the_closed_loop() {
             };
             let room = settings.capacity().with_general_rows(1);
             let memory = ControllerMemory::allocate(room);
-            let pendulum = Pendulum { stiffness: 9.81 };
+            let pendulum = PENDULUM;
             let mut controller = Controller::new(pendulum, settings, memory).unwrap();
             if rows {
                 controller.set_rows(List::repeat(row, 1)).unwrap();
@@ -201,7 +201,7 @@ fn moving_gaps_are_passed() {
                 ..room
             };
             let memory = ControllerMemory::allocate(room);
-            let mut controller = Controller::new(Cart, settings, memory).unwrap();
+            let mut controller = Controller::new(CART, settings, memory).unwrap();
             let mut workspace = Workspace::allocate(room);
             let mut x = Vector2::zeros();
             let mut missed = 0;
@@ -215,7 +215,7 @@ fn moving_gaps_are_passed() {
                 let u = controller.step_with(&x, &preview, &mut workspace).u[0];
                 assert!(u[0].abs() <= 4.0);
                 missed += usize::from(!gate(k).contains(&x, 1e-5));
-                x = Rk4 { substeps: 1 }.advance(&Cart, &x, &u, T_S);
+                x = Rk4 { substeps: 1 }.advance(&CART, &x, &u, T_S);
             }
             missed
         };
@@ -345,7 +345,7 @@ struct Pushed;
 
 impl LpvModel<f64, 3, 1, 1> for Pushed {
     fn scheduling(&self, x: &Vector3<f64>, u: &Vector1<f64>) -> Vector1<f64> {
-        Pendulum { stiffness: 9.81 }.scheduling(&Vector2::new(x[0], x[1]), u)
+        PENDULUM.scheduling(&Vector2::new(x[0], x[1]), u)
     }
 
     fn matrices(&self, sinc: &Vector1<f64>) -> (Matrix3<f64>, Vector3<f64>) {
@@ -401,7 +401,7 @@ fn a_disturbance_is_a_state_that_stands_still() {
                 plain.u,
             )
         };
-        let mut told = Controller::allocate(Pendulum { stiffness: 9.81 }, plain).unwrap();
+        let mut told = Controller::allocate(PENDULUM, plain).unwrap();
         let mut state = Controller::allocate(Pushed, state).unwrap();
         let (mut memory, mut other) = (told.workspace(), state.workspace());
         let push = -1.5;

@@ -1,6 +1,7 @@
 //! A nonlinear plant with everything at once, against plans that IPOPT finds (`testdata/preview`).
 
-use super::plants::Pendulum;
+use super::plants::PENDULUM;
+use crate::pendulum::Pendulum;
 use lpvmpc::{
     Bounds, Controller, ControllerMemory, ControllerSettings, GeneralRow, Iterations, Penalty,
     Predictor, Preview, Reference, Rk4, Status, TerminalIngredient, Weights, Workspace,
@@ -148,6 +149,7 @@ fn lists(case: &Case) -> Lists {
         models: (0..N)
             .map(|i| Pendulum {
                 stiffness: if i < 8 { 9.81 } else { 9.81 + case.stiffer },
+                ..PENDULUM
             })
             .collect(),
     }
@@ -175,7 +177,10 @@ fn settings() -> ControllerSettings<f64, 2, 1, 1> {
 /// disturbance.
 #[test]
 fn a_descent_finds_the_plans_of_another_solver() {
-    let pendulum = Pendulum { stiffness: 1.0 };
+    let pendulum = Pendulum {
+        stiffness: 1.0,
+        ..PENDULUM
+    };
     let (mut active, mut converged) = (0, 0);
     for (line, case) in cases().iter().enumerate() {
         let lists = lists(case);

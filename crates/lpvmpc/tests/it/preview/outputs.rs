@@ -1,7 +1,8 @@
 //! Outputs: where they are linear, as the weights, linear costs and rows that they amount to; where they make no sense,
 //! refused.
 
-use super::short_case::{PLANT, Plan, Settings, settings};
+use super::plants::PENDULUM;
+use super::short_case::{Plan, Settings, settings};
 use lpvmpc::{
     Controller, ControllerMemory, GeneralRow, Iterations, OutputGoal, Outputs, Penalty, Predictor,
     Preview, PreviewError, PreviewMistake as Mistake, PreviewPart as Part, Reference, Rk4, Status,
@@ -9,7 +10,7 @@ use lpvmpc::{
 };
 use nalgebra::{Matrix1, Matrix2, RowVector2, Vector1, Vector2};
 
-type Told<'a> = Preview<'a, super::plants::Pendulum<f64>, f64, 2, 1, 1>;
+type Told<'a> = Preview<'a, crate::pendulum::Pendulum<f64>, f64, 2, 1, 1>;
 
 /// A bounded output with an input, and a weighted one of everything.
 #[derive(Debug)]
@@ -93,7 +94,7 @@ fn two() -> Two {
 fn plans(settings: Settings, preview: &Told<'_>, two_parts: bool) -> Vec<Plan> {
     let room = settings.capacity().with_own_stages().with_general_rows(2);
     let mut controller =
-        Controller::new(PLANT, settings, ControllerMemory::allocate(room)).unwrap();
+        Controller::new(PENDULUM, settings, ControllerMemory::allocate(room)).unwrap();
     let mut workspace = Workspace::allocate(room);
     let mut x = Vector2::new(0.6, -0.3);
     (0..6)
@@ -205,7 +206,7 @@ fn goals_without_sense_are_refused() {
             .with_own_stages()
             .with_general_rows(rows);
         let mut controller =
-            Controller::new(PLANT, settings, ControllerMemory::allocate(room)).unwrap();
+            Controller::new(PENDULUM, settings, ControllerMemory::allocate(room)).unwrap();
         let preview = Told {
             outputs: Some(&two),
             ..Preview::new(Reference::constant(Vector2::zeros()))

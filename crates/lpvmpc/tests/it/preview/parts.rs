@@ -1,6 +1,7 @@
 //! A step with a preview, taken in two parts.
 
-use super::short_case::{PLANT, Settings, along, moving, settings};
+use super::plants::PENDULUM;
+use super::short_case::{Settings, along, moving, settings};
 use lpvmpc::{
     Bounds, Controller, ControllerMemory, GeneralRow, Iterations, Penalty, Predictor, Preview, Rk4,
     Workspace,
@@ -37,7 +38,7 @@ fn row() -> GeneralRow<f64, 2, 1> {
 fn loops(settings: Settings, mut compare: impl FnMut(usize, f64, f64)) {
     let room = settings.capacity().with_own_stages().with_general_rows(1);
     let [mut whole, mut parts] = [(); 2]
-        .map(|()| Controller::new(PLANT, settings, ControllerMemory::allocate(room)).unwrap());
+        .map(|()| Controller::new(PENDULUM, settings, ControllerMemory::allocate(room)).unwrap());
     let [mut memory, mut other] = [(); 2].map(|()| Workspace::allocate(room));
     let mut x = Vector2::new(0.1, 0.0);
     for k in 0..80 {

@@ -1,7 +1,8 @@
 //! What makes no sense is refused by name, and leaves inputs that can be applied.
 
-use super::plants::Pendulum;
-use super::short_case::{PLANT, Plan, settings};
+use super::plants::PENDULUM;
+use super::short_case::{Plan, settings};
+use crate::pendulum::Pendulum;
 use lpvmpc::{
     Bounds, Controller, ControllerError, ControllerMemory, GeneralRow, Iterations, List, Penalty,
     Preview, PreviewError, PreviewMistake as Mistake, PreviewPart as Part, Reference, Status,
@@ -25,7 +26,7 @@ fn answer(preview: &Told<'_>) -> Plan {
         settings.iterations = iterations;
         let room = settings.capacity().with_own_stages().with_general_rows(1);
         let memory = ControllerMemory::allocate(room);
-        let mut controller = Controller::new(PLANT, settings, memory).unwrap();
+        let mut controller = Controller::new(PENDULUM, settings, memory).unwrap();
         let mut workspace = Workspace::allocate(room);
         let x = Vector2::new(0.1, 0.0);
         let first = controller.step_with(&x, &rest(), &mut workspace).clone();
@@ -233,7 +234,7 @@ fn what_there_is_no_room_for() {
     };
     assert_refused(&preview, Part::Rows, 2, Mistake::NoRoom);
     let settings = settings();
-    let mut controller = Controller::allocate(PLANT, settings).unwrap();
+    let mut controller = Controller::allocate(PENDULUM, settings).unwrap();
     let mut workspace = controller.workspace();
     let x = Vector2::new(0.1, 0.0);
     let weights = [settings.weights];
@@ -319,7 +320,7 @@ fn entries_beyond_the_horizon() {
     let step = |disturbance: &[Vector2<f64>], x: &[Bounds<f64, 2>]| {
         let room = settings().capacity().with_own_stages();
         let memory = ControllerMemory::allocate(room);
-        let mut controller = Controller::new(PLANT, settings(), memory).unwrap();
+        let mut controller = Controller::new(PENDULUM, settings(), memory).unwrap();
         let preview = Told {
             disturbance,
             x,
@@ -342,7 +343,7 @@ fn entries_beyond_the_horizon() {
 
 #[test]
 fn rows_of_the_controller() {
-    let mut controller = Controller::allocate(PLANT, settings()).unwrap();
+    let mut controller = Controller::allocate(PENDULUM, settings()).unwrap();
     for (lower, upper, mistake) in [
         (1.0, 0.0, Mistake::Crossed),
         (f64::NAN, 0.0, Mistake::Crossed),
@@ -369,7 +370,7 @@ fn a_broken_state_keeps_the_bounds_of_the_preview() {
         settings.iterations = iterations;
         let room = settings.capacity().with_own_stages();
         let memory = ControllerMemory::allocate(room);
-        let mut controller = Controller::new(PLANT, settings, memory).unwrap();
+        let mut controller = Controller::new(PENDULUM, settings, memory).unwrap();
         let mut workspace = Workspace::allocate(room);
         let bounds = |i: usize| Bounds {
             lower: Vector1::new(1.0 + i as f64),

@@ -2,7 +2,7 @@
 //! matter where the memory is.
 
 use super::case::{Case, Hardness};
-use super::plants::{NU, NX, Pendulum, Scheduled};
+use super::plants::{NU, NX, PENDULUM, Scheduled};
 use lpvmpc::{
     Bounds, Capacity, Controller, ControllerArrays, ControllerMemory, ControllerSettings,
     GeneralRow, Iterations, List, ManyBoundsArrays, Predictor, Preview, Reference, Rk4, Scheduling,
@@ -15,7 +15,6 @@ pub type Settings = ControllerSettings<f64, 2, 1, 1>;
 pub type Plan = Solution<f64, 2, 1>;
 type Row = GeneralRow<f64, 2, 1>;
 
-pub const PLANT: Pendulum<f64> = Pendulum { stiffness: 9.81 };
 const N: usize = 25;
 
 /// The pendulum's; bounded angle, soft.
@@ -89,7 +88,7 @@ fn assert_same(found: &Plan, expected: &Plan) {
 fn an_empty_preview_is_a_step() {
     for settings in ways() {
         let [mut short, mut long] =
-            [(); 2].map(|()| Controller::allocate(PLANT, settings).unwrap());
+            [(); 2].map(|()| Controller::allocate(PENDULUM, settings).unwrap());
         let [mut memory, mut other] = [short.workspace(), long.workspace()];
         let mut x = Vector2::new(0.6, 0.1);
         for k in 0..40 {
@@ -113,7 +112,7 @@ fn an_empty_preview_is_a_step() {
                 long.tracking_cost_with(&x, &preview),
                 short.tracking_cost(&x, &reference)
             );
-            x = Rk4 { substeps: 5 }.advance(&PLANT, &x, &expected.u[0], 0.05);
+            x = Rk4 { substeps: 5 }.advance(&PENDULUM, &x, &expected.u[0], 0.05);
         }
     }
 }
@@ -210,7 +209,8 @@ fn mixed() -> Row {
 fn rows_of_the_controller_are_those_of_every_sample() {
     for settings in ways() {
         let room = settings.capacity().with_general_rows(1);
-        let build = || Controller::new(PLANT, settings, ControllerMemory::allocate(room)).unwrap();
+        let build =
+            || Controller::new(PENDULUM, settings, ControllerMemory::allocate(room)).unwrap();
         let (mut of_controller, mut of_preview) = (build(), build());
         let [mut memory, mut other] = [(); 2].map(|()| Workspace::allocate(room));
         of_controller.set_rows(List::repeat(mixed(), 1)).unwrap();
@@ -228,12 +228,12 @@ fn rows_of_the_controller_are_those_of_every_sample() {
             assert_same(found, &expected);
             let value = mixed().x.dot(&x) + found.u[0][0];
             active += usize::from(value.abs() > 1.2 - 1e-6);
-            x = Rk4 { substeps: 5 }.advance(&PLANT, &x, &expected.u[0], 0.05);
+            x = Rk4 { substeps: 5 }.advance(&PENDULUM, &x, &expected.u[0], 0.05);
         }
         assert!(active > 0, "the row has to be in use");
         of_controller.set_rows(List::empty()).unwrap();
         of_controller.reset();
-        let mut without = Controller::allocate(PLANT, settings).unwrap();
+        let mut without = Controller::allocate(PENDULUM, settings).unwrap();
         let mut own = without.workspace();
         let states = moving(0);
         let expected = without.step(&x, &along(&states), &mut own);
@@ -254,7 +254,7 @@ fn rows_of_the_controller_hold_in_two_parts() {
     let room = settings.capacity().with_general_rows(1);
     let [mut whole, mut parts] = [(); 2].map(|()| {
         let memory = ControllerMemory::allocate(room);
-        let mut controller = Controller::new(PLANT, settings, memory).unwrap();
+        let mut controller = Controller::new(PENDULUM, settings, memory).unwrap();
         controller.set_rows(List::repeat(mixed(), 1)).unwrap();
         controller
     });
@@ -269,7 +269,7 @@ fn rows_of_the_controller_hold_in_two_parts() {
         for (found, expected) in found.iter().zip(expected) {
             assert!((found - expected).amax() < 1e-10, "sample {k}");
         }
-        x = Rk4 { substeps: 5 }.advance(&PLANT, &x, &found[0], 0.05);
+        x = Rk4 { substeps: 5 }.advance(&PENDULUM, &x, &found[0], 0.05);
     }
 }
 
@@ -281,9 +281,9 @@ fn the_settings_told_anew_are_the_settings() {
     for settings in ways() {
         let room = settings.capacity().with_own_stages();
         for _ in 0..40 {
-            let mut short = Controller::allocate(PLANT, settings).unwrap();
+            let mut short = Controller::allocate(PENDULUM, settings).unwrap();
             let mut long =
-                Controller::new(PLANT, settings, ControllerMemory::allocate(room)).unwrap();
+                Controller::new(PENDULUM, settings, ControllerMemory::allocate(room)).unwrap();
             let [mut memory, mut other] = [(); 2].map(|()| Workspace::allocate(room));
             let mut x = Vector2::new(rng.uniform(-3.0, 3.0), rng.uniform(-6.0, 6.0));
             let reference = Reference::constant(Vector2::new(rng.uniform(-0.5, 0.5), 0.0));
@@ -293,7 +293,7 @@ fn the_settings_told_anew_are_the_settings() {
                 x: &[settings.x],
                 soft_x: &[settings.soft_x],
                 u: &[settings.u],
-                models: &[PLANT],
+                models: &[PENDULUM],
                 ..Preview::new(reference)
             };
             for _ in 0..3 {
@@ -301,7 +301,7 @@ fn the_settings_told_anew_are_the_settings() {
                 let found = long.step_with(&x, &preview, &mut other);
                 assert_same(found, &expected);
                 assert_eq!(long.problems(), short.problems());
-                x = Rk4 { substeps: 5 }.advance(&PLANT, &x, &expected.u[0], 0.05);
+                x = Rk4 { substeps: 5 }.advance(&PENDULUM, &x, &expected.u[0], 0.05);
             }
         }
     }
@@ -310,7 +310,7 @@ fn the_settings_told_anew_are_the_settings() {
 /// The target of a sample under a disturbance is not that of the next one without.
 #[test]
 fn the_target_is_that_of_its_sample() {
-    let mut controller = Controller::allocate(PLANT, settings()).unwrap();
+    let mut controller = Controller::allocate(PENDULUM, settings()).unwrap();
     let mut workspace = controller.workspace();
     let x = Vector2::new(0.1, 0.0);
     let reference = Reference::constant(Vector2::zeros());

@@ -219,13 +219,13 @@ fn smallest_with_a_general_row() {
 }
 
 #[test]
-fn two_inputs_two_general_rows() {
+fn more_inputs_than_states_two_general_rows() {
     let campaign = Campaign {
         families: &Family::ALL,
         compared: 600,
         more: 2500,
     };
-    campaign.run::<2, 2>(2, 6, 2);
+    campaign.run::<2, 3>(2, 6, 2);
 }
 
 /// The size of the ballbot's problem.
@@ -260,13 +260,13 @@ fn six_states_three_inputs() {
 }
 
 #[test]
-fn eight_states_four_inputs() {
+fn eight_states_two_inputs() {
     let campaign = Campaign {
         families: &Family::ALL,
         compared: 60,
         more: 140,
     };
-    campaign.run::<8, 4>(6, 12, 0);
+    campaign.run::<8, 2>(6, 12, 0);
 }
 
 #[test]

@@ -97,7 +97,7 @@ fn no_feasible_problem_of_an_unstable_model_is_called_infeasible() {
     for seed in 0..1500 {
         let rng = &mut Rng::new(seed);
         let horizon = 2 + rng.index(N - 1);
-        let ocp = feasible::<3, 1>(rng, horizon);
+        let ocp = feasible::<4, 1>(rng, horizon);
         double.add(kind(&judged(&ocp)));
         float.add(kind(&answer(&single(&ocp)).status));
         let ocp = feasible::<4, 2>(rng, horizon);
