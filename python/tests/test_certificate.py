@@ -117,6 +117,60 @@ def test_false_claims_are_refuted(certified):
             lpvmpc.verify(lpvmpc.Certificate(forged(certificate, change)), plant)
 
 
+def masses(count):
+    """As many masses on springs, each tied to its neighbours; the first and the last are pushed."""
+    x, v, u = ca.SX.sym("x", count), ca.SX.sym("v", count), ca.SX.sym("u", 2)
+    forces = []
+    for i in range(count):
+        near = [k for k in (i - 1, i + 1) if 0 <= k < count]
+        forces.append(sum(x[k] - x[i] + 0.5 * (v[k] - v[i]) for k in near) - 2 * x[i])
+    forces[0] += u[0]
+    forces[-1] += u[1]
+    places = [f"place_{i}" for i in range(count)]
+    return lpvmpc.Plant.from_casadi(
+        ca.vertcat(x, v), u, ca.vertcat(v, *forces), name="masses", inputs=["left", "right"],
+        states=[*places, *(f"speed_{i}" for i in range(count))],
+        bounds={**dict.fromkeys(places, (-1, 1)), "left": (-2, 2), "right": (-2, 2)},
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def chain():
+    plant = masses(6)
+    return plant, lpvmpc.certify(plant, 0.1, [1] * 6 + [0.1] * 6, [0.1, 0.1], trials=0)
+
+
+def test_a_plant_of_twelve_states_is_certified(chain):
+    plant, certificate = chain
+    check(plant, certificate, 10)
+    verified = lpvmpc.verify(certificate, plant)
+    assert verified.boxes == certificate.boxes and len(verified.reach) == 12
+    assert (verified.reach <= certificate.state_limits).all()
+    # The set uses the room that the bounds leave, and its motions are within them between the samples, too.
+    assert 0.9 < certificate.state_limits[0] <= 1
+    assert certificate.contains([0.3] * 6 + [0] * 6) and not certificate.contains([1.01] + [0] * 11)
+
+
+def test_false_claims_of_twelve_states_are_refuted(chain):
+    plant, certificate = chain
+
+    def other_sign(content):
+        content["k"] = [[-entry for entry in row] for row in content["k"]]
+
+    def weaker(content):
+        # A cost that is a little too small to pay for the stage cost of one state.
+        content["p"][11][11] *= 0.7
+
+    for change, message in [
+        (lambda c: c.update(level=c["level"] * 1.2), "the set reaches"),
+        (lambda c: c.update(contraction=0.5), "decrease of x'Px is false"),
+        (other_sign, "decrease of x'Px is false|the set reaches"),
+        (weaker, "decrease of x'Px is false|not positive definite|the set reaches"),
+    ]:
+        with pytest.raises(lpvmpc.FalseClaimError, match=message):
+            lpvmpc.verify(lpvmpc.Certificate(forged(certificate, change)), plant)
+
+
 def test_a_guaranteed_loop_reaches_its_equilibrium(certified):
     plant, certificate = certified
     mpc = lpvmpc.Mpc(plant, T_S, 20, [2, 5, 0.1, 0.1], [0.01], terminal=certificate)

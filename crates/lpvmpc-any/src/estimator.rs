@@ -6,8 +6,8 @@ use crate::model::Model;
 use crate::settings::{LinearModels, MpcSettings};
 use crate::target::output_tangent;
 use lpvmpc::{
-    DelayLine, Dual, Estimator, EstimatorSettings as OfEstimator, Gate, LpvModel, Observation,
-    Reading,
+    DelayLine, Dual, Estimator, EstimatorError, EstimatorSettings as OfEstimator, Gate, LpvModel,
+    Observation, Reading,
 };
 use lpvmpc_design::check_offset_free;
 use lpvmpc_plant::Plant;
@@ -44,6 +44,17 @@ pub struct Disturbance {
     pub noise: f64,
     /// Its variance about zero at the start.
     pub initial: f64,
+}
+
+impl Disturbance {
+    /// One that wanders by `noise` per second, with a variance of 1 at the start.
+    pub fn new(on: &str, noise: f64) -> Self {
+        Self {
+            on: on.to_owned(),
+            noise,
+            initial: 1.0,
+        }
+    }
 }
 
 impl EstimatorSettings {
@@ -189,6 +200,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Filter<NX, NU, NS> {
         )?;
         same("state_noise", settings.state_noise.len(), n, "state")?;
         same("initial_state", settings.initial_state.len(), n, "state")?;
+        check_variances(names, settings)?;
         let delay = settings.delay;
         if !(delay >= 0.0 && delay <= 1000.0 * mpc.t_s) {
             let fault = format!("it is {delay} s; it must be from 0 to 1000 samples");
@@ -259,8 +271,11 @@ impl<const NX: usize, const NU: usize, const NS: usize> Filter<NX, NU, NS> {
             Some(start) => names.finite(Axis::States, "estimator, start", start)?,
             None => rest.0,
         };
-        let estimator = Estimator::allocate(sensed, of_estimator, start, 1)
-            .map_err(|error| MpcError::new("estimator", error.to_string()))?;
+        let estimator =
+            Estimator::allocate(sensed, of_estimator, start, 1).map_err(|error| match error {
+                EstimatorError::Gate => MpcError::new(place("gate"), error.to_string()),
+                _ => MpcError::new("estimator", error.to_string()),
+            })?;
         let commands = (delay / mpc.t_s).ceil() as usize + 3;
         Ok(Self {
             settings: settings.clone(),
@@ -375,6 +390,41 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sensed<NX, NU, NS> {
             MpcError::new("estimator, disturbances", error.to_string())
         })
     }
+}
+
+/// Variances that are none, by name; the estimator itself knows them by number.
+fn check_variances(names: &Names, settings: &EstimatorSettings) -> Result<(), MpcError> {
+    let check = |part: &str, name: &str, variance: f64, least: &str, is_right: bool| {
+        if is_right {
+            return Ok(());
+        }
+        let fault = format!("the variance of {name} is {variance}; it must be {least}");
+        Err(MpcError::new(format!("estimator, {part}"), fault))
+    };
+    for (name, variance) in settings.measured.iter().zip(&settings.measurement_noise) {
+        // An infinite one is that of a sensor that the filter does without.
+        let is_right = *variance > 0.0;
+        check("measured", name, *variance, "a positive number", is_right)?;
+    }
+    let of_states = [
+        ("state_noise", &settings.state_noise),
+        ("initial_state", &settings.initial_state),
+    ];
+    let of_states = of_states.into_iter().flat_map(|(part, variances)| {
+        let pairs = names.states.iter().zip(variances);
+        pairs.map(move |(name, variance)| (part, name, *variance))
+    });
+    let of_disturbances = settings.disturbances.iter().flat_map(|one| {
+        [
+            ("disturbances, noise", &one.on, one.noise),
+            ("disturbances, initial", &one.on, one.initial),
+        ]
+    });
+    for (part, name, variance) in of_states.chain(of_disturbances) {
+        let is_right = variance >= 0.0 && variance.is_finite();
+        check(part, name, variance, "a number from 0 on", is_right)?;
+    }
+    Ok(())
 }
 
 /// Where the readings come from.

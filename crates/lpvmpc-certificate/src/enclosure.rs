@@ -17,7 +17,7 @@ mod taylor_model;
 
 pub use elementary::Arithmetic;
 pub(crate) use flow::product;
-pub use flow::{FlowError, Frame, SampleEnclosure, SampledLaw};
+pub use flow::{Ball, FlowError, Frame, SampleEnclosure, SampledLaw};
 pub use interval::Interval;
 pub(crate) use positive::{is_positive_definite, smallest_eigenvalue};
 pub(crate) use runge_kutta::ScaledPlant;

@@ -31,7 +31,8 @@ mod rollout;
 mod terminal;
 
 pub use enclosure::{
-    Arithmetic, FlowError, Frame, Interval, SampleEnclosure, SampledLaw, TaylorMap, TaylorModel,
+    Arithmetic, Ball, FlowError, Frame, Interval, SampleEnclosure, SampledLaw, TaylorMap,
+    TaylorModel,
 };
 pub use rollout::{EnclosedSample, RolloutClaim, RolloutError, RolloutProof};
 pub use terminal::{

@@ -15,6 +15,8 @@ use nalgebra::{DMatrix, SMatrix, SVector};
 const CLAIMED_SHARE: f64 = 0.01;
 /// Limits are met to rounding by the design, and with this by the claim.
 const INSIDE: f64 = 1.0 - 1e-6;
+/// How often a level is lowered because the states go beyond a limit between the samples.
+const MOST_LOWERED: u32 = 3;
 /// Sizes of sets that are tried: the bounds, and halves of them.
 const MOST_HALVINGS: i32 = 8;
 /// What an equilibrium that is not exact is claimed to be known to, at best.
@@ -70,7 +72,7 @@ pub(crate) fn certify<const NX: usize, const NU: usize, const NS: usize>(
     let most_boxes = settings.most_boxes.clamp(1, MOST_BOXES);
     let claim = |size: f64| -> Result<_, CertifyError> {
         let found = design.ingredients(size)?;
-        let claim = SampledClaim {
+        let mut claim = SampledClaim {
             t_s: settings.t_s,
             q: problem.q,
             r: problem.r,
@@ -84,8 +86,21 @@ pub(crate) fn certify<const NX: usize, const NU: usize, const NS: usize>(
             },
             states: n,
         };
-        let proof = claim.prove(&about, most_boxes, progress)?;
-        Ok((claim, proof))
+        let mut lowered = 0;
+        loop {
+            match claim.prove(&about, most_boxes, progress) {
+                Ok(proof) => return Ok((claim, proof)),
+                // The design knows the limits at the samples; between them the states go a little farther. Where they
+                // go grows with the root of the level, roughly.
+                Err(ClaimError::LimitNotShown { reach, limit, .. })
+                    if lowered < MOST_LOWERED && limit < reach && reach.is_finite() =>
+                {
+                    claim.terminal.level *= (limit / reach).powi(2) * INSIDE;
+                    lowered += 1;
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
     };
     let halvings = if design.is_linear() { 0 } else { MOST_HALVINGS };
     let raised = |found| raised(&about, found, settings.trials, most_boxes, progress);

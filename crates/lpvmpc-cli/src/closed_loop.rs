@@ -19,6 +19,10 @@ pub struct Run {
     pub y: Vec<Vec<f64>>,
     /// The references of the states; empty without.
     pub x_ref: Vec<Vec<f64>>,
+    /// The states that were estimated; empty without an estimator.
+    pub estimates: Vec<Vec<f64>>,
+    /// The disturbances that were found, in the order of the estimator's.
+    pub disturbances: Vec<Vec<f64>>,
     /// Time of each step of the controller, s.
     pub step_times: Vec<f64>,
     /// Cost of each plan.
@@ -43,6 +47,8 @@ impl Run {
         } = experiment;
         let mut mpc = Mpc::new(plant, &experiment.proved_settings()?)
             .map_err(|error| experiment.refused("controller", &error))?;
+        mpc.set_estimator(experiment.estimator.as_ref())
+            .map_err(|error| experiment.refused("controller", &error))?;
         let mut world = World::new(real, &experiment.x0, &experiment.world)
             .map_err(|error| experiment.refused("world", &error))?;
         let bar = Progress::new("simulating", experiment.samples);
@@ -53,13 +59,22 @@ impl Run {
         let mut seen = world.state().to_vec();
         for i in 0..experiment.samples {
             let t = i as f64 * settings.t_s;
-            // Where a reading is missing, the last one holds.
-            for (seen, reading) in seen.iter_mut().zip(world.readings()) {
-                *seen = reading.map_or(*seen, |reading| reading.value);
-            }
+            let readings = world.readings().iter();
+            let readings: Vec<Option<f64>> = readings
+                .map(|reading| reading.map(|reading| reading.value))
+                .collect();
             let preview = experiment.ahead(i);
             let start = Instant::now();
-            let plan = mpc.step(&seen, &preview)?;
+            let plan = if experiment.estimator.is_some() {
+                mpc.observe(world.time(), &readings)?;
+                mpc.decide(&preview)?
+            } else {
+                // Where a reading is missing, the last one holds.
+                for (seen, reading) in seen.iter_mut().zip(readings) {
+                    *seen = reading.unwrap_or(*seen);
+                }
+                mpc.step(&seen, &preview)?
+            };
             run.step_times.push(start.elapsed().as_secs_f64());
             let u = plan.first_input();
             // With a certificate, what is not guaranteed is no plan.
@@ -71,8 +86,11 @@ impl Run {
             *run.statuses.entry(word.trim().to_owned()).or_default() += 1;
             run.costs.push(plan.cost);
             run.y.push(real.output(world.state(), &u)?);
-            run.x_ref
-                .extend(preview.x_ref.first().map(|x| x.as_slice().to_vec()));
+            run.x_ref.extend(experiment.reference_at(i, 0.0));
+            if let Some(estimate) = mpc.estimate() {
+                run.estimates.push(estimate.x);
+                run.disturbances.push(estimate.disturbances);
+            }
             world.command(&u)?;
             run.u.push(u);
             world.advance().map_err(|error| {
@@ -95,17 +113,22 @@ impl Run {
 }
 
 impl Experiment {
-    /// The references from the sample `i` to the end of its horizon.
+    /// The reference that holds `later` seconds after a sample.
+    fn reference_at(&self, sample: usize, later: f64) -> Option<Vec<f64>> {
+        // A time that is meant to be that of the sample counts as such.
+        let t = later + (sample as f64 + 1e-9) * self.settings.t_s;
+        let holds = |one: &&Reference| one.time <= t;
+        let holding = self.references.iter().rev().find(holds);
+        holding.map(|one| one.x.clone())
+    }
+
+    /// The references over the horizon of the sample `i`, which begins when its input acts.
     fn ahead(&self, i: usize) -> Preview {
-        let t_s = self.settings.t_s;
-        let at = |sample: usize| {
-            // A time that is meant to be that of the sample counts as such.
-            let holds = |one: &&Reference| one.time <= (sample as f64 + 1e-9) * t_s;
-            self.references.iter().rev().find(holds)
-        };
-        let stages = (i..=i + self.settings.horizon).map_while(at);
+        let delay = self.estimator.as_ref().map_or(0.0, |one| one.delay);
+        let stages = i..=i + self.settings.horizon;
+        let stages = stages.map_while(|stage| self.reference_at(stage, delay));
         Preview {
-            x_ref: stages.map(|one| DVector::from_row_slice(&one.x)).collect(),
+            x_ref: stages.map(DVector::from_vec).collect(),
             ..Preview::default()
         }
     }

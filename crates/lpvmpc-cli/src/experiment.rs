@@ -3,9 +3,10 @@
 use crate::arguments::{Example, ExampleArguments};
 use crate::describe::load;
 use crate::error::CommandError;
+use crate::estimator::EstimatorTable;
 use lpvmpc_any::{
-    Iterations, Limits, LinearModels, MpcError, MpcSettings, Push, Quantity, Sensor, StateBounds,
-    Terminal, WorldSettings,
+    EstimatorSettings, Iterations, Limits, LinearModels, MpcError, MpcSettings, Push, Quantity,
+    Sensor, StateBounds, Terminal, WorldSettings,
 };
 use lpvmpc_plant::{Plant, Signal};
 use lpvmpc_terminal::table::short;
@@ -39,6 +40,8 @@ pub struct Experiment {
     pub settings: MpcSettings,
     /// The file of the certificate with which its loop is guaranteed.
     pub certificate: Option<PathBuf>,
+    /// What is measured in place of the state.
+    pub estimator: Option<EstimatorSettings>,
     /// The world around the plant.
     pub world: WorldSettings,
     /// The state at the start.
@@ -101,6 +104,7 @@ struct Controller {
     max_programs: Option<usize>,
     first_programs: Option<usize>,
     tolerance: Option<f64>,
+    estimator: Option<EstimatorTable>,
 }
 
 #[derive(Deserialize)]
@@ -212,6 +216,9 @@ impl File {
             ));
         }
         let settings = self.controller.settings(&plant)?;
+        let estimator = { self.controller.estimator.as_ref() }
+            .map(|estimator| estimator.settings(data))
+            .transpose()?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let certificate = self.controller.certificate.map(|file| folder.join(file));
         components("x0", &self.x0, &data.states)?;
@@ -262,13 +269,15 @@ impl File {
             let set = real.set_parameter(name, *value);
             set.map_err(|error| format!("world.parameters: {error}"))?;
         }
-        let world = self.world.settings(settings.t_s, &data.states)?;
+        let measured = estimator.as_ref().map(|one| one.measured.as_slice());
+        let world = self.world.settings(settings.t_s, &data.states, measured)?;
         Ok(Experiment {
             path: path.to_owned(),
             name: self.name,
             real,
             settings,
             certificate,
+            estimator,
             world,
             x0: self.x0,
             samples: samples as usize,
@@ -374,23 +383,39 @@ impl Controller {
 }
 
 impl World {
-    fn settings(self, period: f64, states: &[Signal]) -> Result<WorldSettings, String> {
+    /// `measured` are the states and outputs that an estimator reads; without one, it is the states.
+    fn settings(
+        self,
+        period: f64,
+        states: &[Signal],
+        measured: Option<&[String]>,
+    ) -> Result<WorldSettings, String> {
         for (i, jump) in self.jump.iter().enumerate() {
             components(&format!("world.jump {}", i + 1), &jump.change, states)?;
         }
         for (i, load) in self.load.iter().enumerate() {
             components(&format!("world.load {}", i + 1), &load.load, states)?;
         }
+        let states = names(states);
+        let sensed: Vec<&str> = match measured {
+            Some(measured) => measured.iter().map(String::as_str).collect(),
+            None => states.clone(),
+        };
         for name in self.noise.keys() {
-            check_name("world.noise", name, names(states).into_iter())?;
+            check_name("world.noise", name, sensed.iter().copied())?;
         }
-        let sensor = |i: usize| {
-            let row = (0..states.len()).map(|j| if i == j { 1.0 } else { 0.0 });
+        let sensor = |name: &&str| {
+            let row = states.iter().map(|one| if one == name { 1.0 } else { 0.0 });
+            let of = match states.contains(name) {
+                true => Quantity::Row(row.collect()),
+                false => Quantity::Output((*name).to_owned()),
+            };
             Sensor {
-                noise: self.noise.get(&states[i].name).copied().unwrap_or(0.0),
-                ..Sensor::ideal(Quantity::Row(row.collect()))
+                noise: self.noise.get(*name).copied().unwrap_or(0.0),
+                ..Sensor::ideal(of)
             }
         };
+        let is_ideal = measured.is_none() && self.noise.is_empty();
         let jumps = self.jump.into_iter().map(|jump| Push::Jump {
             time: jump.time,
             change: jump.change,
@@ -401,7 +426,7 @@ impl World {
             load: load.load,
         });
         Ok(WorldSettings {
-            sensors: (!self.noise.is_empty()).then(|| (0..states.len()).map(sensor).collect()),
+            sensors: (!is_ideal).then(|| sensed.iter().map(sensor).collect()),
             delay: self.delay,
             pushes: jumps.chain(loads).collect(),
             seed: self.seed,
@@ -410,12 +435,13 @@ impl World {
     }
 }
 
-fn names(signals: &[Signal]) -> Vec<&str> {
+/// Their names.
+pub fn names(signals: &[Signal]) -> Vec<&str> {
     signals.iter().map(|one| one.name.as_str()).collect()
 }
 
 /// One finite number for each signal.
-fn components(place: &str, list: &[f64], signals: &[Signal]) -> Result<(), String> {
+pub fn components(place: &str, list: &[f64], signals: &[Signal]) -> Result<(), String> {
     if list.len() != signals.len() {
         return Err(format!(
             "{place}: {} numbers; it needs {}, for {}",
@@ -471,7 +497,7 @@ fn limits(place: &str, given: &Option<Pairs>, signals: &[Signal]) -> Result<Limi
 }
 
 /// Whether it is one of these names.
-fn check_name<'a>(
+pub fn check_name<'a>(
     place: &str,
     name: &str,
     known: impl Iterator<Item = &'a str>,

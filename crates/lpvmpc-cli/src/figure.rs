@@ -27,6 +27,17 @@ pub fn figure(experiment: &Experiment, run: &Run) -> Figure {
                 Role::Reference,
             ));
         }
+        if !run.estimates.is_empty() {
+            let estimate = column(&run.estimates, i);
+            let dotted = Style::Line(Dash::Dotted);
+            series.push(Series::new(
+                "estimate",
+                samples,
+                &estimate,
+                dotted,
+                Role::Linear,
+            ));
+        }
         panels.push(panel(signal, series, band(&settings.x_bounds, signal, i)));
     }
     for (i, signal) in data.inputs.iter().enumerate() {
@@ -41,6 +52,18 @@ pub fn figure(experiment: &Experiment, run: &Run) -> Figure {
     for (i, signal) in data.outputs.iter().enumerate() {
         let series = vec![line(samples, &column(&run.y, i))];
         panels.push(panel(signal, series, band(&settings.y_bounds, signal, i)));
+    }
+    for (i, signal) in experiment.disturbances().iter().enumerate() {
+        let found = column(&run.disturbances, i);
+        let style = Style::Line(Dash::Solid);
+        let series = vec![Series::new(
+            "estimate",
+            samples,
+            &found,
+            style,
+            Role::Linear,
+        )];
+        panels.push(panel(signal, series, band(&None, signal, i)));
     }
     let end = time.last().copied().unwrap_or(0.0);
     for panel in &mut panels {

@@ -20,6 +20,11 @@ pub fn run(arguments: &FirmwareArguments) -> Result<String, CommandError> {
         let fault = "on a microcontroller it must be left out: there is no guaranteed loop".into();
         return Err(experiment.refused("controller", &MpcError { place, fault }));
     }
+    if experiment.estimator.is_some() {
+        let place = "estimator".to_owned();
+        let fault = "on a microcontroller it must be left out".into();
+        return Err(experiment.refused("controller", &MpcError { place, fault }));
+    }
     let (plant, printed) = lpvmpc_any::firmware(&experiment.plant, &experiment.settings, &shown)
         .map_err(|error| experiment.refused("controller", &error))?;
     let out = &arguments.out;

@@ -11,6 +11,7 @@ mod certificate;
 mod closed_loop;
 mod describe;
 mod error;
+mod estimator;
 mod experiment;
 mod figure;
 mod firmware;

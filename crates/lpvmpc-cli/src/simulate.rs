@@ -14,6 +14,32 @@ use std::path::PathBuf;
 
 const FILES: [&str; 4] = ["trajectory.csv", "summary.json", "figure.svg", "figure.png"];
 
+/// The unit of what adds to a signal's derivative; in discrete time, of what adds to its next value.
+fn per_second(signal: &Signal, period: Option<f64>) -> String {
+    match (period, signal.unit.as_str()) {
+        (Some(_), unit) => unit.to_owned(),
+        (None, "") => "1/s".to_owned(),
+        (None, unit) => format!("{unit}/s"),
+    }
+}
+
+impl Experiment {
+    /// The disturbances that its estimator finds, as signals of their own.
+    pub fn disturbances(&self) -> Vec<Signal> {
+        let data = self.plant.data();
+        let found = self.estimator.iter().flat_map(|one| &one.disturbances);
+        let signal = |on: &String| {
+            let of = |signals: &[Signal]| signals.iter().find(|one| one.name == *on).cloned();
+            // Where an input and a state have one name, it is the input.
+            let unit = of(&data.inputs)
+                .map(|one| one.unit)
+                .or_else(|| of(&data.states).map(|one| per_second(&one, self.plant.period())));
+            Signal::new(&format!("{on} disturbance"), &unit.unwrap_or_default())
+        };
+        found.map(|one| signal(&one.on)).collect()
+    }
+}
+
 /// A bound that is exceeded by less, of a unit, is kept: rounding.
 const KEPT: f64 = 1e-9;
 
@@ -126,7 +152,7 @@ fn summary(experiment: &Experiment, run: &Run) -> Value {
             |(signal, most, samples)| json!({ "signal": signal, "most": most, "samples": samples }),
         )
         .collect();
-    json!({
+    let mut summary = json!({
         "name": experiment.name,
         "plant": experiment.plant.data().name,
         "samples": run.u.len(),
@@ -136,7 +162,14 @@ fn summary(experiment: &Experiment, run: &Run) -> Value {
         "bounds_exceeded": exceeded,
         "statuses": run.statuses,
         "times": times(run),
-    })
+    });
+    if let Some(estimator) = &experiment.estimator {
+        let names = estimator.disturbances.iter().map(|one| one.on.clone());
+        let last = run.disturbances.last().into_iter().flatten();
+        let found: serde_json::Map<_, _> = names.zip(last.map(|one| json!(one))).collect();
+        summary["final_disturbances"] = Value::Object(found);
+    }
+    summary
 }
 
 fn report(experiment: &Experiment, run: &Run, out: &std::path::Path) -> String {
@@ -152,9 +185,19 @@ fn report(experiment: &Experiment, run: &Run, out: &std::path::Path) -> String {
         true => "none".to_owned(),
         false => broken.join("; "),
     };
+    let last = run.disturbances.last().into_iter().flatten();
+    let signals = experiment.disturbances();
+    let found: Vec<String> = { signals.iter().zip(last) }
+        .map(|(signal, value)| format!("{} {} {}", signal.name, short(*value), signal.unit))
+        .map(|text| text.trim_end().to_owned())
+        .collect();
+    let found = match found.is_empty() {
+        true => String::new(),
+        false => format!("  found at the end {}\n", found.join(", ")),
+    };
     format!(
         "{}: {} samples of {} s\n  plans            {}\n  bounds exceeded  {broken}\n  \
-         tracking cost    {}\n\n{}\nWritten: {} with {}\n",
+         tracking cost    {}\n{found}\n{}\nWritten: {} with {}\n",
         experiment.name,
         run.u.len(),
         short(experiment.settings.t_s),
@@ -186,11 +229,16 @@ fn trajectory(experiment: &Experiment, run: &Run) -> String {
     if !run.x_ref.is_empty() {
         add(&data.states, " reference");
     }
+    if !run.estimates.is_empty() {
+        add(&data.states, " estimate");
+    }
+    add(&experiment.disturbances(), "");
     let columns = header.len();
     let mut text = header.join(",") + "\n";
     for (k, x) in run.x.iter().enumerate() {
         let t = k as f64 * experiment.settings.t_s;
-        let rest = [&run.u, &run.y, &run.x_ref];
+        let (estimates, disturbances) = (&run.estimates, &run.disturbances);
+        let rest = [&run.u, &run.y, &run.x_ref, estimates, disturbances];
         let rest = rest.into_iter().filter_map(|rows| rows.get(k)).flatten();
         let cells = std::iter::once(&t).chain(x).chain(rest);
         let mut cells: Vec<String> = cells.map(f64::to_string).collect();

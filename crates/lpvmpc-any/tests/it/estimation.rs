@@ -274,8 +274,15 @@ fn what_makes_no_sense_is_refused() {
         said.contains("2 disturbances cannot be found with 1"),
         "{said}"
     );
-    let said = refused(&|s| s.state_noise[0] = f64::NAN);
-    assert!(said.contains("variance of the state's noise 0"), "{said}");
+    assert_eq!(
+        refused(&|s| s.state_noise[0] = f64::NAN),
+        "estimator, state_noise: the variance of position is NaN; it must be a number from 0 on"
+    );
+    let said = refused(&|s| s.gate.deviations = 0.0);
+    assert!(
+        said.starts_with("estimator, gate: the gate's deviations"),
+        "{said}"
+    );
     // Nothing was measured yet: the answer says so, and sends nothing.
     mpc.set_estimator(Some(&sound)).unwrap();
     let plan = mpc.decide(&Preview::default()).unwrap();

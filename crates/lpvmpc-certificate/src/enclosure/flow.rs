@@ -55,17 +55,66 @@ pub struct Frame<const NX: usize> {
     pub inverse: [[Interval; NX]; NX],
 }
 
-/// What is known of every motion over a sample that starts in a box of y.
+/// What is known of every motion over a sample that starts in a box of y, which `D` coordinates describe.
 #[derive(Debug, Clone)]
-pub struct SampleEnclosure<const NX: usize> {
+pub struct SampleEnclosure<const NX: usize, const D: usize> {
     /// G + E in y(t_s) = (G + E) y(0), over the box: G, affine and without error.
-    pub transition: TaylorMap<NX, NX, NX>,
+    pub transition: TaylorMap<NX, NX, D>,
     /// S, with E'E <= S over the box.
     pub error_square: SMatrix<f64, NX, NX>,
     /// How much G depends on each coordinate of the box, in the Frobenius norm.
-    pub dependence: [f64; NX],
+    pub dependence: [f64; D],
     /// Where the states x are during the sample; of a plant in discrete time at its beginning.
     pub states: [Interval; NX],
+}
+
+/// The y with |y| <= `radius`: where a motion begins. A box around a set of many coordinates reaches much farther than
+/// the set, by the root of their number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ball {
+    /// The radius; infinite for none.
+    pub radius: f64,
+}
+
+impl Ball {
+    /// All of the box.
+    pub const EVERYWHERE: Self = Self {
+        radius: f64::INFINITY,
+    };
+}
+
+/// The part of the box y = `centre` + diag(`half_widths`) z that is in the ball.
+struct Within<'a, const D: usize> {
+    ball: Ball,
+    centre: &'a SVector<f64, D>,
+    half_widths: &'a SVector<f64, D>,
+}
+
+impl<const D: usize> Within<'_, D> {
+    /// The values of a model over that part. Its linear part is g'(y - centre), g its slopes over the half widths: at
+    /// most |g| radius from -g'centre.
+    fn range(&self, model: &TaylorModel<D>) -> Interval {
+        let whole = model.range();
+        if !self.ball.radius.is_finite() {
+            return whole;
+        }
+        let (mut shift, mut square) = (Interval::point(0.0), Interval::point(0.0));
+        for (i, slope) in model.slopes.iter().enumerate() {
+            // Without a width it does not depend on the coordinate.
+            if *slope != 0.0 {
+                let over = Interval::point(self.half_widths[i]).reciprocal();
+                let g = Interval::point(*slope) * over;
+                shift = shift - g * Interval::point(self.centre[i]);
+                square = square + g.square();
+            }
+        }
+        let reach = (square.square_root() * Interval::point(self.ball.radius)).upper;
+        let flat = TaylorModel {
+            slopes: [0.0; D],
+            ..*model
+        };
+        whole.common(flat.range() + shift + Interval::new(-reach, reach))
+    }
 }
 
 /// Coefficients of the power series in time; the remainder is of this order.
@@ -73,7 +122,7 @@ const ORDER: usize = 6;
 const _: () = assert!(ORDER < CAPACITY);
 
 impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
-    /// Encloses the motions from x = T y with |y_i - `centre`_i| <= `half_widths`_i.
+    /// Encloses the motions from x = T y with |y_i - `centre`_i| <= `half_widths`_i, as far as they begin in `ball`.
     ///
     /// A step of the motion is linear in its initial state and input, x+ = Phi x + Gamma u, with
     /// Phi and Gamma that depend on where the motion leads the scheduling. They are enclosed as
@@ -88,16 +137,57 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
         frame: &Frame<NX>,
         centre: &SVector<f64, NX>,
         half_widths: &SVector<f64, NX>,
-    ) -> Result<SampleEnclosure<NX>, FlowError>
+        ball: Ball,
+    ) -> Result<SampleEnclosure<NX, NX>, FlowError>
+    where
+        M: Embedding<NX, NU, NS>,
+    {
+        let symbol = |i: usize| [TaylorModel::symbol(centre[i], half_widths[i], i)];
+        let within = Within {
+            ball,
+            centre,
+            half_widths,
+        };
+        self.enclose_from(model, frame, std::array::from_fn(symbol), &within)
+    }
+
+    /// Encloses the motion from x = T y with y in intervals that are nearly points: faster, since nothing is known
+    /// of how it depends on y.
+    ///
+    /// # Errors
+    /// As of [`Self::enclose`].
+    pub fn enclose_point<M, const NS: usize>(
+        &self,
+        model: &M,
+        frame: &Frame<NX>,
+        y: &[Interval; NX],
+    ) -> Result<SampleEnclosure<NX, 0>, FlowError>
+    where
+        M: Embedding<NX, NU, NS>,
+    {
+        let nowhere = SVector::zeros();
+        let within = Within {
+            ball: Ball::EVERYWHERE,
+            centre: &nowhere,
+            half_widths: &nowhere,
+        };
+        self.enclose_from(model, frame, y.map(|y| [TaylorModel::from(y)]), &within)
+    }
+
+    fn enclose_from<M, const NS: usize, const D: usize>(
+        &self,
+        model: &M,
+        frame: &Frame<NX>,
+        y: [[TaylorModel<D>; 1]; NX],
+        within: &Within<'_, D>,
+    ) -> Result<SampleEnclosure<NX, D>, FlowError>
     where
         M: Embedding<NX, NU, NS>,
     {
         let t = constants(&frame.t);
         let inverse = constants(&frame.inverse);
-        let symbol = |i: usize| TaylorModel::symbol(centre[i], half_widths[i], i);
-        let y: [[TaylorModel<NX>; 1]; NX] = std::array::from_fn(|i| [symbol(i)]);
         let minus_k = matrix(|i, j| TaylorModel::constant(-self.k[(i, j)]));
-        let gain: [[TaylorModel<NX>; NX]; NU] = product(&minus_k, &t);
+        let gain: [[TaylorModel<D>; NX]; NU] = product(&minus_k, &t);
         let u = product(&gain, &y);
         let steps = match model.period() {
             None => 1_u32 << self.halvings,
@@ -122,7 +212,7 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
         let mut states: Option<[Interval; NX]> = None;
         for _ in 0..steps {
             let (end, phi, gamma, during) = match model.period() {
-                None => step.enclose(&x)?,
+                None => step.enclose(&x, within)?,
                 Some(_) => step.jump(&x),
             };
             x = end;
@@ -151,25 +241,26 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
 
 /// One time step. The columns Y = [x, Phi, Gamma] obey Y_dot = A(sigma(x)) Y + B(sigma(x)) W with
 /// the constant W = [u, 0, I], from [x, I, 0] on.
-struct Step<'a, M, const NX: usize, const NU: usize> {
+struct Step<'a, M, const NU: usize, const D: usize> {
     model: &'a M,
-    input: [TaylorModel<NX>; NU],
+    input: [TaylorModel<D>; NU],
     length: f64,
 }
 
 /// The state after the step, Phi, Gamma and where the state is meanwhile.
-type StepEnclosure<const NX: usize, const NU: usize> = (
-    [TaylorModel<NX>; NX],
-    [[TaylorModel<NX>; NX]; NX],
-    [[TaylorModel<NX>; NU]; NX],
+type StepEnclosure<const NX: usize, const NU: usize, const D: usize> = (
+    [TaylorModel<D>; NX],
+    [[TaylorModel<D>; NX]; NX],
+    [[TaylorModel<D>; NU]; NX],
     [Interval; NX],
 );
 
-impl<M, const NX: usize, const NU: usize> Step<'_, M, NX, NU> {
-    fn enclose<const NS: usize>(
+impl<M, const NU: usize, const D: usize> Step<'_, M, NU, D> {
+    fn enclose<const NX: usize, const NS: usize>(
         &self,
-        x: &[TaylorModel<NX>; NX],
-    ) -> Result<StepEnclosure<NX, NU>, FlowError>
+        x: &[TaylorModel<D>; NX],
+        within: &Within<'_, D>,
+    ) -> Result<StepEnclosure<NX, NU, D>, FlowError>
     where
         M: Embedding<NX, NU, NS>,
     {
@@ -180,14 +271,17 @@ impl<M, const NX: usize, const NU: usize> Step<'_, M, NX, NU> {
         let mut inputs = vec![self.input];
         inputs.extend((0..NX).map(|_| std::array::from_fn(|_| unit(false))));
         inputs.extend((0..NU).map(|j| std::array::from_fn(|i| unit(i == j))));
-        let (end, during) = self.advance(&columns, &inputs)?;
+        let (end, during) = self.advance(&columns, &inputs, within)?;
         let phi = std::array::from_fn(|i| std::array::from_fn(|j| end[1 + j][i]));
         let gamma = std::array::from_fn(|i| std::array::from_fn(|j| end[1 + NX + j][i]));
         Ok((end[0], phi, gamma, during))
     }
 
     /// The same of a plant in discrete time, whose state is where it was meanwhile.
-    fn jump<const NS: usize>(&self, x: &[TaylorModel<NX>; NX]) -> StepEnclosure<NX, NU>
+    fn jump<const NX: usize, const NS: usize>(
+        &self,
+        x: &[TaylorModel<D>; NX],
+    ) -> StepEnclosure<NX, NU, D>
     where
         M: Embedding<NX, NU, NS>,
     {
@@ -203,11 +297,12 @@ impl<M, const NX: usize, const NU: usize> Step<'_, M, NX, NU> {
     }
 
     /// The columns a step later, and where the state is during the step.
-    fn advance<const NS: usize>(
+    fn advance<const NX: usize, const NS: usize>(
         &self,
-        columns: &Columns<TaylorModel<NX>, NX>,
-        model_inputs: &Columns<TaylorModel<NX>, NU>,
-    ) -> Result<(Columns<TaylorModel<NX>, NX>, [Interval; NX]), FlowError>
+        columns: &Columns<TaylorModel<D>, NX>,
+        model_inputs: &Columns<TaylorModel<D>, NU>,
+        within: &Within<'_, D>,
+    ) -> Result<(Columns<TaylorModel<D>, NX>, [Interval; NX]), FlowError>
     where
         M: Embedding<NX, NU, NS>,
     {
@@ -237,10 +332,9 @@ impl<M, const NX: usize, const NU: usize> Step<'_, M, NX, NU> {
         });
         let time = Interval::new(0.0, step.upper);
         let path = std::array::from_fn(|i| {
-            let polynomial = series
-                .iter()
-                .rev()
-                .fold(remainder[0][i], |sum, c| sum * time + c[0][i].range());
+            let polynomial = series.iter().rev().fold(remainder[0][i], |sum, c| {
+                sum * time + within.range(&c[0][i])
+            });
             polynomial.common(during[0][i])
         });
         Ok((end.collect(), path))

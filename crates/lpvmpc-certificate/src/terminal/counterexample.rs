@@ -2,6 +2,7 @@
 
 use super::decrease::Decrease;
 use super::normalised::Square;
+use crate::enclosure::Interval;
 use lpvmpc::Embedding;
 use lpvmpc_design::each;
 use nalgebra::{DMatrix, SVector, SymmetricEigen};
@@ -111,7 +112,8 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
     where
         M: Embedding<NX, NU, NS> + Sync,
     {
-        let sample = self.enclose_finely(y, &SVector::zeros())?;
+        let at = std::array::from_fn(|i| Interval::point(y[i]));
+        let sample = self.enclose_finely(&at)?;
         let g = DMatrix::from_column_slice(NX, NX, sample.transition.middle.as_slice());
         let allowed = middles(&self.allowed);
         let excess = g.transpose() * g - allowed;

@@ -33,9 +33,9 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
             return Finding::Outside;
         }
         let frame = &self.normaliser.frame;
-        let sample = self
-            .law
-            .enclose(self.model, frame, &cell.centre, &cell.half_widths);
+        let ball = self.ellipsoid.bounding_ball();
+        let (centre, half_widths) = (&cell.centre, &cell.half_widths);
+        let sample = { self.law }.enclose(self.model, frame, centre, half_widths, ball);
         let Ok(sample) = sample else {
             return Finding::Open {
                 across: cell.half_widths.imax(),
@@ -80,9 +80,7 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
         }
         let x_column: [[Interval; 1]; NX] = from_fn(|i, _| Interval::point(x[i]));
         let y = product(&self.normaliser.frame.inverse, &x_column);
-        let centre = SVector::from_fn(|i, _| y[i][0].middle());
-        let half_widths = SVector::from_fn(|i, _| y[i][0].radius());
-        let sample = self.enclose_finely(&centre, &half_widths)?;
+        let sample = self.enclose_finely(&y.map(|[y]| y))?;
         // y+ = (G + E) y with |E y|^2 <= y'Sy.
         let end = product(&sample.transition.range(), &y);
         let error: Square<NX> = from_fn(|i, j| Interval::point(sample.error_square[(i, j)]));
@@ -99,13 +97,12 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
         (excess > 0.0).then(|| excess / self.ellipsoid.value(x).upper)
     }
 
-    /// The motions from a tiny box, in as many time steps as it takes, within reason: a long sample
+    /// The motion from a point y, in as many time steps as it takes, within reason: a long sample
     /// may have no enclosure in those that suit a proof.
     pub fn enclose_finely<const NS: usize>(
         &self,
-        centre: &SVector<f64, NX>,
-        half_widths: &SVector<f64, NX>,
-    ) -> Option<SampleEnclosure<NX>>
+        y: &[Interval; NX],
+    ) -> Option<SampleEnclosure<NX, 0>>
     where
         M: Embedding<NX, NU, NS> + Sync,
     {
@@ -116,7 +113,7 @@ impl<M, const NX: usize, const NU: usize> Decrease<'_, M, NX, NU> {
                 halvings: self.law.halvings + more,
                 ..self.law
             };
-            law.enclose(self.model, frame, centre, half_widths).ok()
+            law.enclose_point(self.model, frame, y).ok()
         })
     }
 

@@ -2,7 +2,7 @@
 
 use super::normalised::{Normaliser, from_fn, transposed};
 use crate::cover::Cell;
-use crate::enclosure::{Arithmetic, Interval, is_positive_definite, product};
+use crate::enclosure::{Arithmetic, Ball, Interval, is_positive_definite, product};
 use nalgebra::{SMatrix, SVector};
 
 /// The set x'Px <= level, with rigorous answers about it.
@@ -93,13 +93,19 @@ impl<const NX: usize> Ellipsoid<NX> {
         })
     }
 
-    /// A cell of y around the set, x = T y.
+    /// A ball of y around the set, x = T y.
+    pub fn bounding_ball(&self) -> Ball {
+        let square = Interval::point(self.level) * self.normaliser.unit.reciprocal();
+        Ball {
+            radius: square.square_root().upper,
+        }
+    }
+
+    /// A cell of y around that.
     pub fn bounding_cell(&self) -> Cell<NX> {
-        let radius =
-            (Interval::point(self.level) * self.normaliser.unit.reciprocal()).square_root();
         Cell {
             centre: SVector::zeros(),
-            half_widths: SVector::repeat(radius.upper),
+            half_widths: SVector::repeat(self.bounding_ball().radius),
         }
     }
 

@@ -97,16 +97,18 @@ impl<const NX: usize, const NU: usize> SampledClaim<NX, NU> {
             // No motion leads out of the set between two samples.
             Some(_) => SVector::from_fn(|i, _| decrease.ellipsoid.bound(&axis(i))),
         };
-        for i in 0..NX {
-            let limit = self.state_limits[i];
-            let kept = reach[i] <= limit;
-            if !kept {
-                return Err(ClaimError::LimitNotShown {
-                    name: format!("state_limits[{i}], between samples"),
-                    reach: reach[i],
-                    limit,
-                });
-            }
+        let beyond = |i: &usize| {
+            let kept = reach[*i] <= self.state_limits[*i];
+            !kept
+        };
+        let over = |i: &usize| reach[*i] / self.state_limits[*i];
+        let worst = { (0..NX).filter(beyond) }.max_by(|i, j| over(i).total_cmp(&over(j)));
+        if let Some(i) = worst {
+            return Err(ClaimError::LimitNotShown {
+                name: format!("state_limits[{i}], between samples"),
+                reach: reach[i],
+                limit: self.state_limits[i],
+            });
         }
         Ok(Proof {
             boxes: covered.cells,

@@ -1,7 +1,7 @@
 //! Enclosures must contain what they enclose.
 
 use lpvmpc::{Bivariate, Elementary, Embedding, Number, Rk4};
-use lpvmpc_certificate::{FlowError, Frame, Interval, SampledLaw, TaylorMap, TaylorModel};
+use lpvmpc_certificate::{Ball, FlowError, Frame, Interval, SampledLaw, TaylorMap, TaylorModel};
 use nalgebra::{Matrix1x2, Matrix2, Vector1, Vector2};
 use proptest::prelude::*;
 
@@ -163,7 +163,7 @@ proptest! {
         let law = SampledLaw { k, t_s: 0.05, halvings: 3 };
         let half_widths = Vector2::repeat(half_width);
         let centre = Vector2::from(centre);
-        let sample = law.enclose(&Pendulum, &frame, &centre, &half_widths).unwrap();
+        let sample = law.enclose(&Pendulum, &frame, &centre, &half_widths, Ball::EVERYWHERE).unwrap();
         let x = centre + Vector2::new(z[0], z[1]) * half_width;
         let end = Rk4 { substeps: 400 }.advance(&Pendulum, &x, &Vector1::from(-k * x), 0.05);
         let g = Matrix2::from(sample.transition.middle
@@ -174,6 +174,48 @@ proptest! {
         for i in 0..2 {
             prop_assert!(sample.states[i].lower <= end[i] && end[i] <= sample.states[i].upper);
         }
+    }
+
+    #[test]
+    fn motions_that_begin_in_a_ball_stay_where_those_of_its_box_need_not(
+        centre in prop::array::uniform2(-0.1..0.1_f64),
+        half_width in 0.02..0.2_f64,
+        radius in 0.15..0.2_f64,
+        turn in 0.0..6.3_f64,
+    ) {
+        let one = [[Interval::point(1.0), Interval::point(0.4)], [Interval::point(0.0), Interval::point(2.0)]];
+        let inverse = [[Interval::point(1.0), Interval::point(-0.2)], [Interval::point(0.0), Interval::point(0.5)]];
+        let frame = Frame { t: one, inverse };
+        let law = SampledLaw { k: Matrix1x2::new(20.0, 5.0), t_s: 0.05, halvings: 3 };
+        let (centre, half_widths) = (Vector2::from(centre), Vector2::repeat(half_width));
+        let enclose = |ball| law.enclose(&Pendulum, &frame, &centre, &half_widths, ball).unwrap().states;
+        let (in_ball, in_box) = (enclose(Ball { radius }), enclose(Ball::EVERYWHERE));
+        // The farthest point of the box in this direction that is in the ball.
+        let direction = Vector2::new(turn.cos(), turn.sin());
+        let inside = |share: f64| {
+            let y = centre + direction * (share * half_width);
+            (y.norm() <= radius && share * direction.amax() <= 1.0).then_some(y)
+        };
+        let y = (0..=150).rev().find_map(|i| inside(0.01 * f64::from(i)));
+        prop_assume!(y.is_some());
+        let x = Matrix2::new(1.0, 0.4, 0.0, 2.0) * y.unwrap();
+        for part in 0..=8 {
+            let t = 0.05 / 8.0 * f64::from(part);
+            let during = Rk4 { substeps: 100 }.advance(&Pendulum, &x, &Vector1::from(-law.k * x), t.max(1e-9));
+            for i in 0..2 {
+                // What the Runge-Kutta steps and the first nanosecond are off.
+                let slack = Interval::new(-1e-7, 1e-7);
+                prop_assert!((in_ball[i] + slack).contains(Interval::point(during[i])), "{t}: {during} {in_ball:?}");
+            }
+        }
+        for i in 0..2 {
+            prop_assert!(in_box[i].contains(in_ball[i]));
+        }
+        // Of the box around the ball the corners are left out.
+        let around = Vector2::repeat(radius);
+        let whole = |ball| law.enclose(&Pendulum, &frame, &Vector2::zeros(), &around, ball).unwrap().states[0].upper;
+        let (of_ball, of_box) = (whole(Ball { radius }), whole(Ball::EVERYWHERE));
+        prop_assert!(of_ball < 0.95 * of_box);
     }
 }
 
@@ -263,7 +305,7 @@ proptest! {
         let frame = Frame { t: one, inverse: one };
         let law = SampledLaw { k: Vector1::new(gain), t_s: 0.1, halvings: 3 };
         let sizes = (Vector1::new(centre), Vector1::new(half_width));
-        let sample = law.enclose(&Kinked, &frame, &sizes.0, &sizes.1).unwrap();
+        let sample = law.enclose(&Kinked, &frame, &sizes.0, &sizes.1, Ball::EVERYWHERE).unwrap();
         let x = centre + z * half_width;
         let g = sample.transition.middle[0] + sample.transition.slopes[0][0] * z;
         let allowed = sample.error_square[0].sqrt() * x.abs();
@@ -433,7 +475,9 @@ fn a_scheduling_that_depends_on_the_input_is_enclosed() {
     for period in [None, Some(law.t_s)] {
         let wind = false;
         let plant = Strong { wind, period };
-        let sample = law.enclose(&plant, &frame, &centre, &half_widths).unwrap();
+        let sample = law
+            .enclose(&plant, &frame, &centre, &half_widths, Ball::EVERYWHERE)
+            .unwrap();
         for i in -4..=4 {
             for j in -4..=4 {
                 let z = Vector2::new(f64::from(i), f64::from(j)) / 4.0;
@@ -458,7 +502,13 @@ fn a_map_with_another_period_is_refused() {
     let (law, frame) = strong_law();
     let (wind, period) = (false, Some(0.1));
     let small = Vector2::repeat(0.01);
-    let error = law.enclose(&Strong { wind, period }, &frame, &Vector2::zeros(), &small);
+    let error = law.enclose(
+        &Strong { wind, period },
+        &frame,
+        &Vector2::zeros(),
+        &small,
+        Ball::EVERYWHERE,
+    );
     let expected = FlowError::Period {
         t_s: 0.05,
         period: 0.1,
@@ -475,7 +525,7 @@ fn a_plant_with_an_affine_term_is_refused() {
         period: None,
     };
     let small = Vector2::repeat(0.01);
-    let error = law.enclose(&plant, &frame, &Vector2::zeros(), &small);
+    let error = law.enclose(&plant, &frame, &Vector2::zeros(), &small, Ball::EVERYWHERE);
     assert_eq!(error.unwrap_err(), FlowError::AffineTerm);
 }
 

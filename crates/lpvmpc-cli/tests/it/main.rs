@@ -188,7 +188,7 @@ fn what_is_wrong_is_named_and_nothing_is_written() {
         ("time = 0.5", "time = 0.0", vec!["reference 2, time = 0"]),
         ("\"cart-pole\"", "\"../a\"", vec!["it names a folder"]),
         (
-            "# delay = 0.04",
+            "# delay = 0.04                    # from a command",
             "delay = -1 #",
             vec!["world: the delay is -1"],
         ),
@@ -381,14 +381,194 @@ fn a_guaranteed_loop_sees_its_references_ahead() {
     let message = fail(path, &["simulate", "moving.toml", "--out", "moving"]);
     let expected = "speed is 0.5, and the certificate is about 0; elsewhere may be what no formula of the plant reads: position";
     assert!(message.contains(expected), "{message}");
+
+    // From readings the guarantee is the model's. What the certificate says nothing of is refused here, too.
+    let estimator =
+        "estimator = { measured = { position = 1e-6 }, state_noise = 1e-4, initial_state = 1e-6 }";
     let estimated = changed(
         &with,
         "[[reference]]\ntime = 0",
-        "estimator = {}\n[[reference]]\ntime = 0",
+        &format!("{estimator}\n[[reference]]\ntime = 0"),
     );
-    fs::write(path.join("estimated.toml"), estimated).unwrap();
-    let message = fail(path, &["simulate", "estimated.toml"]);
-    assert!(message.contains("estimator"), "{message}");
+    fs::write(path.join("estimated.toml"), &estimated).unwrap();
+    succeed(path, &["simulate", "estimated.toml", "--out", "estimated"]);
+    let moved = "1e-4, disturbances = { speed = { noise = 0.1 } }";
+    let moved = changed(&estimated, "1e-4", moved);
+    fs::write(path.join("moved.toml"), moved).unwrap();
+    let message = fail(path, &["simulate", "moved.toml", "--out", "moved"]);
+    assert!(message.contains("speed is a state"), "{message}");
+}
+
+/// A cart under a load, of which its position is measured: the load is what adds to the force, and the filter finds it.
+#[test]
+fn an_estimator_finds_what_disturbs_the_plant() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let plant = r#"{"schema": 1, "name": "cart", "equilibrium": {"x": [0, 0], "u": [0]},
+        "states": [{"name": "position", "unit": "m"}, {"name": "speed", "unit": "m/s"}],
+        "inputs": [{"name": "force", "unit": "N", "lower": -2, "upper": 2}],
+        "outputs": [{"name": "end"}], "output": [3],
+        "operations": [["state", 1], ["input", 0], ["state", 0], ["add", 2, 2]], "derivative": [0, 1]}"#;
+    fs::write(path.join("cart.json"), plant).unwrap();
+    let text = "name = \"cart\"\nplant = \"cart.json\"\nx0 = [0, 0]\nduration = 20\n\
+                [controller]\nt_s = 0.1\nhorizon = 30\nq = [1, 0.1]\nr = [0.01]\n\
+                [controller.estimator]\nmeasured = { end = 1e-6, position = 1e-6 }\n\
+                state_noise = { speed = 1e-3 }\ndisturbances = { force = { noise = 0.1 } }\ndelay = 0.2\n\
+                [[reference]]\ntime = 0\nx = [0, 0]\n[[reference]]\ntime = 5\nx = [1, 0]\n\
+                [world]\ndelay = 0.2\nnoise = { end = 1e-3 }\n\
+                [[world.load]]\nstart = 0\nend = inf\nload = [0, -0.4]\n";
+    fs::write(path.join("cart.toml"), text).unwrap();
+    let said = succeed(path, &["simulate", "cart.toml"]);
+    assert!(
+        said.contains("found at the end force disturbance -0."),
+        "{said}"
+    );
+    let table = fs::read_to_string(path.join("out/cart/trajectory.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = table
+        .lines()
+        .map(|line| line.split(',').collect())
+        .collect();
+    let header = rows[0].clone();
+    assert_eq!(
+        header[header.len() - 3..],
+        [
+            "position estimate [m]",
+            "speed estimate [m/s]",
+            "force disturbance [N]"
+        ]
+    );
+    let at = |row: usize, name: &str| -> f64 {
+        let column = header.iter().position(|one| *one == name).unwrap();
+        rows[1 + row][column].parse().unwrap()
+    };
+    for row in 180..200 {
+        assert!((at(row, "position [m]") - 1.0).abs() < 0.01);
+        let error = at(row, "speed estimate [m/s]") - at(row, "speed [m/s]");
+        assert!(error.abs() < 0.05, "{error}");
+    }
+    // Of single estimates the noise of the readings makes some hundredths.
+    let found = (100..200).map(|row| at(row, "force disturbance [N]"));
+    let mean = found.sum::<f64>() / 100.0;
+    assert!((mean + 0.4).abs() < 0.02, "{mean}");
+    // The reference that is written down is that of the sample, not of when its input acts.
+    assert_eq!(at(49, "position reference [m]"), 0.0);
+    assert_eq!(at(50, "position reference [m]"), 1.0);
+
+    // The table of the example, whose lines are comments there, is one, too.
+    let example = example();
+    let text_of_example = fs::read_to_string(example.path().join("cart-pole.toml")).unwrap();
+    let (before, rest) = text_of_example
+        .split_once("# [controller.estimator]")
+        .unwrap();
+    let (table, after) = rest.split_once("\n\n").unwrap();
+    let table = table.replace("\n# ", "\n");
+    let whole = format!("{before}[controller.estimator]{table}\n\n{after}");
+    fs::write(example.path().join("cart-pole.toml"), whole).unwrap();
+    let summary = succeed(example.path(), &["simulate", "cart-pole.toml", "--json"]);
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    assert!(
+        summary["final_disturbances"]["force"].is_number(),
+        "{summary}"
+    );
+
+    // Without the disturbance in its model the loop stands aside.
+    let unaware = changed(text, "disturbances", "# disturbances");
+    fs::write(path.join("unaware.toml"), unaware).unwrap();
+    let summary = succeed(path, &["simulate", "unaware.toml", "--json"]);
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    let position = summary["final_state"][0].as_f64().unwrap();
+    assert!((position - 1.0).abs() > 0.05, "{summary}");
+    assert_eq!(summary["final_disturbances"], serde_json::json!({}));
+
+    for (from, to, said) in [
+        (
+            "{ end =",
+            "{ emd =",
+            "controller.estimator.measured: there is no \"emd\"; there are position, speed, end; did you mean \"end\"?",
+        ),
+        (
+            "position = 1e-6",
+            "position = 0",
+            "controller: estimator, measured: the variance of position is 0; it must be a positive number",
+        ),
+        (
+            "measured =",
+            "mesured =",
+            "unknown field `mesured`, expected one of `measured`",
+        ),
+        (
+            "{ noise = 0.1 }",
+            "{ noise = 0.1 }, speed = { noise = 0.1 }",
+            "controller: estimator, disturbances: ",
+        ),
+        (
+            "{ speed = 1e-3 }",
+            "{ sped = 1e-3 }",
+            "controller.estimator.state_noise: there is no \"sped\"; there are position, speed; did you mean",
+        ),
+        (
+            "{ speed = 1e-3 }",
+            "[1e-3]",
+            "controller.estimator.state_noise: 1 numbers; it needs 2, for position, speed",
+        ),
+        (
+            "{ speed = 1e-3 }",
+            "\"much\"",
+            "expected a number, a list of one for each state, or a table by state",
+        ),
+        (
+            "{ speed = 1e-3 }",
+            "nan",
+            "controller: estimator, state_noise: the variance of position is NaN; it must be a number from 0 on",
+        ),
+        (
+            "{ speed = 1e-3 }",
+            "1\ninitial_state = [1, -1]",
+            "controller: estimator, initial_state: the variance of speed is -1",
+        ),
+        (
+            "{ speed = 1e-3 }",
+            "1\nstart = [1]",
+            "controller.estimator.start: 1 numbers; it needs 2",
+        ),
+        (
+            "{ speed = 1e-3 }",
+            "1\ngate = { deviations = 0 }",
+            "controller: estimator, gate: the gate's deviations and longest gap must be positive",
+        ),
+        (
+            "{ speed = 1e-3 }",
+            "1\ngate = { patience = -1 }",
+            "expected a whole number",
+        ),
+        (
+            "{ force = {",
+            "{ wind = {",
+            "controller.estimator.disturbances: there is no \"wind\"; there are force, position, speed",
+        ),
+        (
+            "noise = 0.1",
+            "noise = inf",
+            "estimator, disturbances, noise: the variance of force is inf; it must be a number from 0 on",
+        ),
+        ("{ noise = 0.1 }", "0.1", "expected a table"),
+        (
+            "delay = 0.2",
+            "delay = -0.1",
+            "controller: estimator, delay: it is -0.1 s; it must be from 0 to 1000 samples",
+        ),
+        (
+            "noise = { end",
+            "noise = { speed",
+            "world.noise: there is no \"speed\"; there are end, position",
+        ),
+    ] {
+        fs::write(path.join("bad.toml"), changed(text, from, to)).unwrap();
+        let message = fail(path, &["simulate", "bad.toml", "--out", "bad"]);
+        assert!(message.contains("bad.toml"), "{message}");
+        assert!(message.contains(said), "`{said}` is not in: {message}");
+    }
+    assert!(!path.join("bad").exists());
 }
 
 #[test]
@@ -430,6 +610,10 @@ fn a_controller_is_printed_as_a_program() {
         ("terminal = \"equality\"", "terminal: on a microcontroller"),
         ("r_du = [0.1]", "r_du: on a microcontroller"),
         ("certificate = \"c.json\"", "there is no guaranteed loop"),
+        (
+            "estimator = { measured = { tilt = 1 }, state_noise = 1 }",
+            "controller: estimator: on a microcontroller it must be left out",
+        ),
     ] {
         let changed = changed(&text, "r = [0.1]", &format!("r = [0.1]\n{added}"));
         fs::write(path.join("bad.toml"), changed).unwrap();
