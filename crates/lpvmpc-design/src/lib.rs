@@ -78,7 +78,7 @@ pub use matrix_check::{
     MatrixError, check_positive_definite, check_positive_semidefinite, checked_symmetric,
 };
 pub use modes::{controllability_rank, poles};
-pub use number::number_text;
+pub use number::{number_text, significant_text};
 pub use offset_free::{OffsetFreeError, check_offset_free};
 pub use parallel::{each, each_with};
 pub use ray_nodes::{RayNodes, nodes_along_ray};

@@ -17,16 +17,20 @@ pub fn poles(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, MatrixError> {
     let unit = unit(a);
     let mut balanced = a / unit;
     balance_parlett_reinsch(&mut balanced);
-    let mut eigenvalues: Vec<_> = eigenvalues(&balanced)
+    let eigenvalues = eigenvalues(&balanced)
         // The QR iteration has no exceptional shifts, so a cyclic permutation stands still under
         // it. A similarity by any reflector takes it out of such a fixed point.
         .or_else(|| eigenvalues(&reflected(&balanced)))
         .ok_or(MatrixError::EigenvaluesDidNotConverge { name: NAME })?
         .into_iter()
-        .map(|value| value * unit)
-        .collect();
-    eigenvalues.sort_unstable_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
-    Ok(eigenvalues)
+        .map(|value| value * unit);
+    // Sorted by insertion: they are few, and a general sort is a kilobyte more for a browser to load.
+    let mut sorted = Vec::new();
+    for y in eigenvalues {
+        let below = |x: &Complex<f64>| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)).is_le();
+        sorted.insert(sorted.partition_point(below), y);
+    }
+    Ok(sorted)
 }
 
 /// A pole for a message: six digits, and an imaginary part only where there is one.

@@ -11,7 +11,11 @@ use crate::file::world_table::{PushTable, WorldTable};
 use crate::number::text;
 use crate::prepare::known_robot::KnownRobot;
 use crate::prepare::reference::PhiReference;
+use lpvmpc_design::significant_text;
 use std::f64::consts::{FRAC_PI_2, PI};
+
+/// Of a limit, and of what was meant, as messages tell them.
+const DIGITS: usize = 4;
 
 /// A range of absolute values. Zero and infinity, which stand for none, lie in every range.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,23 +105,18 @@ impl Plausible {
             Some((name, right)) if self.holds(right) => format!(
                 "; were {name} meant? {} {name} are {} {unit}",
                 text(value),
-                text(short(right))
+                significant_text(right, DIGITS)
             ),
             _ => String::new(),
         };
         let expected = format!(
             "{end} than {} {unit} is no ballbot's{question}. If {} {unit} is right, set \
              accept_unusual_values = true at the top of the file",
-            text(short(limit)),
+            significant_text(limit, DIGITS),
             text(value)
         );
         Err(ScenarioError::value(key, value, expected))
     }
-}
-
-/// Four significant digits, none of them a trailing zero.
-fn short(value: f64) -> f64 {
-    format!("{value:.3e}").parse().unwrap_or(value)
 }
 
 impl Scenario {
@@ -180,7 +179,7 @@ pub fn check_robot(key: &str, robot: &KnownRobot) -> Result<(), ScenarioError> {
         ("ball_radius_m", geometry.ball_radius, RADIUS),
         ("wheel_radius_m", geometry.wheel_radius, RADIUS),
         ("gravity_m_s2", geometry.gravity, GRAVITY),
-        ("zenith_angle_deg", short(zenith), ZENITH),
+        ("zenith_angle_deg", zenith, ZENITH),
     ] {
         plausible.check(&format!("{key}.{name}"), value)?;
     }

@@ -1,32 +1,24 @@
 //! How exactly the guaranteed loop's plans are rolled out: the number of Runge-Kutta steps, and what is
 //! known of their error.
 //!
-//! The error of a sample is that of step doubling (Richardson): for a method of order four the
-//! difference of n and 2 n steps is 15/16 of the error of n. Upright without rates and torque there is
-//! none, and it grows with them, so what is bounded is the error per share of the bounds: the largest
-//! of |tilt|, |rate| and |torque| over its bound. The largest value is looked for on a grid of tilts,
-//! rates and torques over their bounds, corners included, among the motions that stay within them;
-//! twice that is taken for what lies between the points. It is an estimate with a safety factor, not a
-//! proof; a test encloses the error at points of the grid by machine. The same goes for how far a state lies
-//! beyond both ends of a step, which is taken as it is.
+//! The number is the smallest whose error, with its factor of safety ([`search`](mod@search)), fits into the margin
+//! along the horizon.
 //!
 //! Deviations from a plan are carried on by the derivatives of the prediction, whose Runge-Kutta steps
 //! are coarser. Their error is that of step doubling on the same grid, and has to be small against the
-//! factor of 2.
+//! factor of safety.
 
+pub mod search;
+
+use self::search::{Search, motions};
 use crate::error::ScenarioError;
 use crate::number::text;
 use ballbot::{Ballbot, ControllerSettings};
-use lpvmpc::{Bounds, LpvModel, Rk4, Rollout, TerminalSet};
+use lpvmpc::{LpvModel, Rk4, Rollout, TerminalSet};
 use nalgebra::{Matrix4, Vector1, Vector4};
 
 /// More steps than this are not tried.
 const MOST_SUBSTEPS: usize = 64;
-/// Points of the grid per state, and of the torque.
-const STATES: usize = 9;
-const TORQUES: usize = 5;
-/// What the grid may miss.
-const SAFETY: f64 = 2.0;
 /// How far the derivatives may be off by which deviations from a plan are carried on, relative to the
 /// largest of the sample.
 const DERIVATIVES: f64 = 0.01;
@@ -34,8 +26,8 @@ const DERIVATIVES: f64 = 0.01;
 /// The coarsest rollout whose error fits into `margin`, or one with as many steps as are `wanted`.
 ///
 /// # Errors
-/// A bound of tilt, rates or torque is infinite, no number of steps suffices, or more steps than are
-/// wanted are needed.
+/// A bound of tilt, rates or torque is infinite, no motion stays within the bounds for a sample, no number of
+/// steps suffices, or more steps than are wanted are needed.
 pub fn accurate(
     ballbot: &Ballbot<f64>,
     plain: &ControllerSettings<f64>,
@@ -56,14 +48,21 @@ pub fn accurate(
             ));
         }
     }
-    let with = |substeps: usize| {
-        let rk4 = Rk4 { substeps };
-        let (error, between) = error(ballbot, plain, rk4);
-        Rollout {
-            rk4,
-            error: error * SAFETY,
-            between: between * SAFETY,
-        }
+    let finest = Rk4 {
+        substeps: MOST_SUBSTEPS,
+    };
+    if motions(ballbot, plain, finest).next().is_none() {
+        return Err(ScenarioError::value(
+            "controller.t_s",
+            plain.t_s,
+            "with a certified terminal set there must be motions that stay within the bounds for so \
+             long; take a shorter sampling time, or wider bounds",
+        ));
+    }
+    let search = Search {
+        ballbot,
+        plain,
+        metric: &terminal.p,
     };
     let fits = |rollout: &Rollout<f64, 4>| {
         let (drift, end) = drift(ballbot, plain, terminal, rollout);
@@ -71,10 +70,19 @@ pub fn accurate(
         let free = |i: usize| drift[i] + rollout.between[i] <= margin * width[i];
         (1..4).all(free) && end <= margin * terminal.level.sqrt()
     };
+    let searched = |substeps: usize| {
+        let rough = search.on_grid(Rk4 { substeps })?;
+        Some(search.between_points(rough).rollout())
+    };
     // Every second number of steps: what comes between saves little.
-    let mut tried = (2..=MOST_SUBSTEPS).step_by(2).map(with);
+    let mut tried = (2..=MOST_SUBSTEPS).step_by(2).filter_map(|substeps| {
+        // What does not fit on the grid alone does not fit.
+        let rough = search.on_grid(Rk4 { substeps })?;
+        fits(&rough.rollout()).then(|| search.between_points(rough).rollout())
+    });
     let Some(coarsest) = tried.find(fits) else {
-        let needed = extrapolated(&with(MOST_SUBSTEPS), fits);
+        let finest = searched(MOST_SUBSTEPS);
+        let needed = finest.and_then(|finest| extrapolated(&finest, fits));
         let needed = needed.map_or_else(|| "more".to_owned(), |needed| format!("about {needed}"));
         return Err(ScenarioError::value(
             "controller.t_s",
@@ -87,18 +95,21 @@ pub fn accurate(
         ));
     };
     let needed = coarsest.rk4.substeps;
-    match wanted {
-        None => Ok(coarsest),
-        Some(wanted) if (needed..=MOST_SUBSTEPS).contains(&wanted) => Ok(with(wanted)),
-        Some(wanted) => Err(ScenarioError::value(
+    let Some(wanted) = wanted else {
+        return Ok(coarsest);
+    };
+    let permitted = (needed..=MOST_SUBSTEPS).contains(&wanted);
+    let finer = permitted.then(|| searched(wanted)).flatten();
+    finer.ok_or_else(|| {
+        ScenarioError::value(
             "controller.terminal.certified.substeps",
             wanted,
             format!(
                 "the guarantee needs {needed} integration steps per sample with these bounds, this \
                  sampling time and horizon; {MOST_SUBSTEPS} are the most"
             ),
-        )),
-    }
+        )
+    })
 }
 
 /// Whether the derivatives of the prediction, with `rk4`, are accurate enough to carry deviations on.
@@ -172,70 +183,6 @@ fn extrapolated(
     finer.next().map(|rollout| rollout.rk4.substeps)
 }
 
-/// The largest error of a sample per share of the bounds, and the largest way beyond both ends of a
-/// step.
-fn error(
-    ballbot: &Ballbot<f64>,
-    plain: &ControllerSettings<f64>,
-    rk4: Rk4,
-) -> (Vector4<f64>, Vector4<f64>) {
-    let fine = Rk4 {
-        substeps: 2 * rk4.substeps,
-    };
-    let steps = rk4.substeps as f64;
-    let (mut error, mut between) = (Vector4::zeros(), Vector4::zeros());
-    for (start, u) in motions(ballbot, plain, fine) {
-        let end = fine.advance(ballbot, &start, &u, plain.t_s);
-        let coarse = rk4.advance(ballbot, &start, &u, plain.t_s);
-        let share = lpvmpc::share_of_bounds(&start, &plain.x, &u, &plain.u);
-        if share > 0.0 {
-            error = error.sup(&((coarse - end).abs() * (16.0 / 15.0 / share)));
-        }
-        let one = Rk4 { substeps: 1 };
-        let mut x = start;
-        for _ in 0..rk4.substeps {
-            let middle = one.advance(ballbot, &x, &u, 0.5 * plain.t_s / steps);
-            let next = one.advance(ballbot, &x, &u, plain.t_s / steps);
-            between = between.sup(&(middle - x.sup(&next)));
-            between = between.sup(&(x.inf(&next) - middle));
-            x = next;
-        }
-    }
-    (error, between)
-}
-
-/// States and torques on a grid over their bounds from which a sample, with `rk4`, ends within the bounds.
-pub fn motions(
-    ballbot: &Ballbot<f64>,
-    plain: &ControllerSettings<f64>,
-    rk4: Rk4,
-) -> impl Iterator<Item = (Vector4<f64>, Vector1<f64>)> {
-    let limits = [&plain.x.lower, &plain.x.upper];
-    let [lower, upper] = limits.map(|limit| Vector4::new(0.0, limit[1], limit[2], limit[3]));
-    let at = |i: usize, lower: f64, upper: f64, points: usize| {
-        lower + (upper - lower) * i as f64 / (points - 1) as f64
-    };
-    let point = move |point: usize| {
-        let places = [
-            point % STATES,
-            point / STATES % STATES,
-            point / STATES.pow(2) % STATES,
-        ];
-        let state = |i: usize| at(places[i - 1], lower[i], upper[i], STATES);
-        let (least, most) = (plain.u.lower[0], plain.u.upper[0]);
-        let torque = at(point / STATES.pow(3), least, most, TORQUES);
-        let start = Vector4::new(0.0, state(1), state(2), state(3));
-        (start, Vector1::new(torque))
-    };
-    let points = (0..STATES.pow(3) * TORQUES).map(point);
-    points.filter(move |(start, u)| stays(&plain.x, &rk4.advance(ballbot, start, u, plain.t_s)))
-}
-
-/// Whether the tilt and the rates are within their bounds.
-fn stays(bounds: &Bounds<f64, 4>, x: &Vector4<f64>) -> bool {
-    (1..4).all(|i| x[i] >= bounds.lower[i] && x[i] <= bounds.upper[i])
-}
-
 /// How far the robot may be from a plan along the whole horizon, upright under the terminal law, and in
 /// the norm of P: what the largest errors add up to, each as long as it lives.
 fn drift(
@@ -250,12 +197,12 @@ fn drift(
     let mut power = Matrix4::identity();
     let (mut total, mut end) = (Vector4::zeros(), 0.0);
     for _ in 0..plain.horizon {
-        let part = power.abs() * rollout.error;
-        total += part;
-        // The corner of the box that is largest in the norm of P is one of its 2^4.
+        let axes: Matrix4<f64> = power * rollout.error;
+        total += axes.abs().column_sum();
+        // The corner of the parallelepiped that is largest in the norm of P is one of its 2^4.
         let corner = |signs: usize| {
             let sign = |i: usize| if signs >> i & 1 == 1 { -1.0 } else { 1.0 };
-            let e: Vector4<f64> = power * Vector4::from_fn(|i, _| sign(i) * rollout.error[i]);
+            let e: Vector4<f64> = axes * Vector4::from_fn(|i, _| sign(i));
             (terminal.p * e).dot(&e).sqrt()
         };
         end += (0..16).map(corner).fold(0.0, f64::max);

@@ -58,7 +58,7 @@ fn controller() -> Guaranteed {
         // The plant of these tests is the rollout itself.
         rollout: Rollout {
             rk4: Rk4 { substeps: 1 },
-            error: Vector2::zeros(),
+            error: Matrix2::zeros(),
             between: Vector2::zeros(),
         },
         weights: Weights { q, r },

@@ -52,7 +52,7 @@ pub fn settings(random: &mut Rng) -> GuaranteedSettings<f64, 3, 1> {
         rk4: Rk4 { substeps: 1 },
         rollout: Rollout {
             rk4: Rk4 { substeps: 2 },
-            error: Vector3::repeat(1e-6),
+            error: Matrix3::from_diagonal_element(1e-6),
             between: Vector3::repeat(1e-3),
         },
         weights: Weights {

@@ -47,9 +47,10 @@ pub struct GuaranteedIterations {
 pub struct Rollout<T, const NX: usize> {
     /// Runge-Kutta steps of a sample.
     pub rk4: Rk4,
-    /// Largest difference of plant and rollout after one sample from (x, u) per
-    /// [`share_of_bounds`] of it, in state units, not negative: without motion there is no error.
-    pub error: SVector<T, NX>,
+    /// W, half axes in its columns: plant and rollout differ after one sample from (x, u) by W v, with |v_j| at most
+    /// [`share_of_bounds`] of it, in state units: without motion there is no error. A diagonal W bounds each
+    /// component by itself; what all errors have in common is for the axes to follow.
+    pub error: SMatrix<T, NX, NX>,
     /// How far a state may lie beyond its values at both ends of a Runge-Kutta step, in state units,
     /// not negative.
     pub between: SVector<T, NX>,
@@ -147,7 +148,7 @@ impl fmt::Display for GuaranteedError {
             Self::Gain => write!(f, "the gain of the terminal law must be finite"),
             Self::Rollout => write!(
                 f,
-                "the rollout needs a step, and bounds that are finite and not negative"
+                "the rollout needs a step, and bounds of its errors that are finite and not negative"
             ),
             Self::Direction => write!(
                 f,
@@ -229,8 +230,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuaranteedSettings<T, NX, NU> 
             error,
             between,
         } = &self.rollout;
-        let mut known = error.iter().chain(between.iter());
-        if rk4.substeps == 0 || !known.all(|v| *v >= T::zero() && v.is_finite()) {
+        let known = error.iter().chain(between.iter()).all(|v| v.is_finite());
+        if rk4.substeps == 0 || !known || between.iter().any(|v| *v < T::zero()) {
             return Err(GuaranteedError::Rollout);
         }
         let [lower, upper] = self.set_points;

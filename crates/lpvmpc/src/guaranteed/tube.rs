@@ -2,7 +2,7 @@
 //! what that changes in the cost.
 //!
 //! The deviation from the plan grows and shrinks by the policy's own closed loop, e+ = (A + B K) e + w
-//! with |w_i| <= error_i, and is enclosed in ellipsoids e'S^-1 e <= 1. The sum of two of them lies in
+//! with w in the parallelepiped of the sample's error, and is enclosed in ellipsoids e'S^-1 e <= 1. The sum of two of them lies in
 //! (1 + 1/c) S_1 + (1 + c) S_2 for every c > 0 (Kurzhanski and Valyi, Ellipsoidal Calculus, 1997);
 //! c is that of the smallest trace. Where the input may be at its bound, it may follow the feedback
 //! or not: the sum of both S holds either. A and B are the derivatives of the prediction along the plan
@@ -87,10 +87,11 @@ where
         (a, b): &Slopes<T, NX, NU>,
         feedback: &SMatrix<T, NU, NX>,
     ) -> SMatrix<T, NX, NX> {
-        // The box lies in the ellipsoid through its corners.
+        // A parallelepiped lies in the ellipsoid through its corners.
         let parts: T = convert(NX as f64);
-        let error = self.error(x, u);
-        let noise = SMatrix::from_diagonal(&error.component_mul(&error)) * parts;
+        let share = self.share(x, u);
+        let axes = &self.settings.rollout.error;
+        let noise = product(axes, &axes.transpose()) * (parts * share * share);
         let mut moved = around(&(a + product(b, feedback)), shape);
         if self.may_saturate(u, &self.reach(feedback, shape)) {
             moved += around(a, shape);
@@ -138,16 +139,22 @@ where
             rest += (q.abs() * drift).dot(drift) + (r.abs() * reach).dot(&reach);
         }
         let first = plan.stages.first();
-        let first = first.map_or_else(SVector::zeros, |stage| self.error(&plan.start, &stage.u));
-        gradient.abs().dot(&first) + rest
+        let share = first.map_or_else(T::zero, |stage| self.share(&plan.start, &stage.u));
+        let along_axes = settings.rollout.error.tr_mul(&gradient);
+        along_axes.abs().sum() * share + rest
     }
 
-    /// The rollout's error over a sample from `x` under `u`, wherever along d that is.
+    /// The smallest box around the rollout's error over a sample from `x` under `u`, wherever along d that is.
     pub(super) fn error(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> SVector<T, NX> {
+        self.settings.rollout.error.abs().column_sum() * self.share(x, u)
+    }
+
+    /// What the motion from `x` under `u` has of the bounds, wherever along d that is.
+    fn share(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> T {
         let settings = &self.settings;
         let d = &settings.direction;
         let moving = x - d * (x.dot(d) / d.norm_squared());
-        settings.rollout.error * share_of_bounds(&moving, &settings.x, u, &settings.u)
+        share_of_bounds(&moving, &settings.x, u, &settings.u)
     }
 
     /// How far the feedback within the ellipsoid `shape` moves the input.

@@ -31,7 +31,7 @@ fn check(cart: Cart, x: Bounds<f64, 2>) -> Result<(), GuaranteedError> {
         rk4: Rk4 { substeps: 1 },
         rollout: Rollout {
             rk4: Rk4 { substeps: 1 },
-            error: Vector2::zeros(),
+            error: Matrix2::zeros(),
             between: Vector2::zeros(),
         },
         weights: Weights {

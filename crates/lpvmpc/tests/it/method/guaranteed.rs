@@ -57,7 +57,7 @@ fn settings() -> Settings {
         // The plant of these tests is the rollout itself.
         rollout: Rollout {
             rk4: RK4,
-            error: Vector4::zeros(),
+            error: Matrix4::zeros(),
             between: Vector4::zeros(),
         },
         weights: base.weights,
