@@ -5,10 +5,16 @@ use ballbot_scenario::{Parameters, Prepared, RunHooks, Scenario, WorldTable};
 use lpvmpc_sim::Recording;
 use std::path::{Path, PathBuf};
 
-const FOLDER: &str = env!("CARGO_TARGET_TMPDIR");
+/// Of each test, since tests run beside each other: their threads have their names.
+fn folder() -> PathBuf {
+    let test = std::thread::current();
+    let name = test.name().expect("a test").replace("::", "-");
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join(name)
+}
 
 fn file(name: &str, content: &str) -> PathBuf {
-    let path = Path::new(FOLDER).join(name);
+    std::fs::create_dir_all(folder()).expect("writable");
+    let path = folder().join(name);
     std::fs::write(&path, content).expect("writable");
     path
 }
@@ -51,11 +57,11 @@ fn scenario(name: &str) -> Scenario {
 }
 
 fn prepare(scenario: &Scenario) -> Prepared {
-    scenario.prepare(Path::new(FOLDER)).expect("valid")
+    scenario.prepare(folder().as_path()).expect("valid")
 }
 
 fn refusal(scenario: &Scenario) -> String {
-    match scenario.prepare(Path::new(FOLDER)) {
+    match scenario.prepare(folder().as_path()) {
         Ok(_) => panic!("accepted"),
         Err(error) => error.to_string(),
     }
