@@ -2,16 +2,15 @@
 
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { expect } from "@playwright/test";
+import { expect, test } from "@playwright/test";
 import { table, type Table } from "./page";
 
 const ballbot = process.env["BALLBOT"] ?? "../target/release/ballbot";
 
 /** What the program writes for a scenario, file by file. */
 export function simulated(toml: string): (file: string) => string {
-  const folder = mkdtempSync(join(tmpdir(), "ballbot-"));
+  const folder = mkdtempSync(test.info().outputPath("program-"));
   const file = join(folder, "scenario.toml");
   writeFileSync(file, toml);
   execFileSync(ballbot, ["simulate", file, "--out", folder], { stdio: "ignore" });
