@@ -9,6 +9,12 @@ use lpvmpc_sim::{Random, Tolerances};
 use nalgebra::{Matrix4, Vector1, Vector4};
 use std::path::Path;
 
+/// Of what counts as the plant's own motion.
+const TOLERANCES: Tolerances = Tolerances {
+    relative: 1e-12,
+    absolute: 1e-12,
+};
+
 /// Whether the tilt and the rates are within their bounds.
 fn stays(bounds: &Bounds<f64, 4>, x: &Vector4<f64>) -> bool {
     (1..4).all(|i| x[i] >= bounds.lower[i] && x[i] <= bounds.upper[i])
@@ -166,10 +172,6 @@ fn the_error_is_within_its_bound() {
         error,
         between,
     } = settings.rollout;
-    let tolerances = Tolerances {
-        relative: 1e-12,
-        absolute: 1e-12,
-    };
     let inverse = error.try_inverse().unwrap();
     let mut random = Random::new(7, 0);
     let (mut largest, mut runs) = (0.0_f64, 0);
@@ -182,7 +184,7 @@ fn the_error_is_within_its_bound() {
         let start = Vector4::from_fn(|i, _| part(i, &mut random));
         let u = Vector1::new(size * random.symmetric() * settings.u.upper[0]);
         let exact = |seconds: f64| {
-            lpvmpc_sim::advance(&prepared.ballbot, &start, &u, seconds, tolerances).unwrap()
+            lpvmpc_sim::advance(&prepared.ballbot, &start, &u, seconds, TOLERANCES).unwrap()
         };
         let end = exact(settings.t_s);
         if !stays(&settings.x, &end) {
@@ -222,10 +224,6 @@ fn the_worst_motions_of_another_search_are_within_the_bounds() {
         error,
         between,
     } = settings.rollout;
-    let tolerances = Tolerances {
-        relative: 1e-12,
-        absolute: 1e-12,
-    };
     let motion = |shares: [f64; 4]| {
         let [theta, phi_dot, theta_dot, torque] = shares;
         let start = Vector4::new(0.0, theta, phi_dot, theta_dot);
@@ -235,7 +233,7 @@ fn the_worst_motions_of_another_search_are_within_the_bounds() {
         (start, settings.u.upper * torque)
     };
     let plant = |start: &Vector4<f64>, u: &Vector1<f64>, seconds: f64| {
-        lpvmpc_sim::advance(&prepared.ballbot, start, u, seconds, tolerances).unwrap()
+        lpvmpc_sim::advance(&prepared.ballbot, start, u, seconds, TOLERANCES).unwrap()
     };
     let inverse = error.try_inverse().unwrap();
     let largest_errors = [
