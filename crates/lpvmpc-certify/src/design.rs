@@ -164,13 +164,19 @@ impl<'a, const NX: usize, const NU: usize, const NS: usize> Design<'a, NX, NU, N
         points
     }
 
-    /// Law, cost and set of largest volume in a box of `size`, without any proof.
-    pub fn ingredients(&self, size: f64) -> Result<TerminalIngredients<NX, NU>, SynthesisError> {
+    /// Law, cost and set of largest volume in a box of `size`, without any proof. Each step of the search begins with
+    /// `at_step`.
+    pub fn ingredients(
+        &self,
+        size: f64,
+        at_step: &dyn Fn(),
+    ) -> Result<TerminalIngredients<NX, NU>, SynthesisError> {
         let (n, m) = self.sizes;
         let mut problem = self.problem.clone();
         problem.state_limits *= size;
         let points = self.points(size);
-        let found = synthesize_terminal_at(self.model, &SVector::zeros(), &points, &problem)?;
+        let found =
+            synthesize_terminal_at(self.model, &SVector::zeros(), &points, &problem, at_step)?;
         // The places left over have nothing to do with the others.
         let k = SMatrix::from_fn(|i, j| if i < m && j < n { found.k[(i, j)] } else { 0.0 });
         let p = SMatrix::from_fn(|i, j| match (i < n && j < n, i == j) {

@@ -78,19 +78,21 @@ pub(super) struct Maximum {
     pub gap: f64,
 }
 
-/// Maximises log det of the first block, with the others positive semidefinite.
+/// Maximises log det of the first block, with the others positive semidefinite. Each step of Newton's method begins with
+/// `at_step`.
 ///
 /// # Errors
 /// No strictly feasible v, or no convergence.
 pub(super) fn maximise_log_det(
     blocks: &[AffineMatrix],
     unknowns: usize,
+    at_step: &dyn Fn(),
 ) -> Result<Maximum, LmiFailure> {
     // An eigenvalue of what is not finite would be looked for without end.
     if !blocks.iter().all(AffineMatrix::is_finite) {
         return Err(LmiFailure::NotConverged);
     }
-    let mut v = strictly_feasible(blocks, unknowns)?;
+    let mut v = strictly_feasible(blocks, unknowns, at_step)?;
     let rows: usize = blocks.iter().skip(1).map(AffineMatrix::rows).sum();
     let mut first_weight = 1.0;
     loop {
@@ -98,6 +100,7 @@ pub(super) fn maximise_log_det(
             blocks,
             linear: DVector::zeros(unknowns),
             first_weight,
+            at_step,
         };
         v = barrier.centre(v, |_| false)?;
         // The multipliers F_j^-1 / first_weight of a centre are dual feasible.
@@ -117,7 +120,11 @@ const CENTRED: f64 = 1e-6;
 const MOST_STEPS: usize = 200;
 
 /// Minimises s over F_j(v) + s I >= 0 until s < 0.
-fn strictly_feasible(blocks: &[AffineMatrix], unknowns: usize) -> Result<DVector<f64>, LmiFailure> {
+fn strictly_feasible(
+    blocks: &[AffineMatrix],
+    unknowns: usize,
+    at_step: &dyn Fn(),
+) -> Result<DVector<f64>, LmiFailure> {
     let mut relaxed: Vec<AffineMatrix> = blocks.iter().map(AffineMatrix::relaxed).collect();
     // Bounded below, or the analytic centre of a feasible set without bound would not exist.
     relaxed.push(AffineMatrix::unknown(unknowns + 1, unknowns, 1.0));
@@ -135,6 +142,7 @@ fn strictly_feasible(blocks: &[AffineMatrix], unknowns: usize) -> Result<DVector
             blocks: &relaxed,
             linear,
             first_weight: 1.0,
+            at_step,
         };
         v = barrier.centre(v, |v| v[unknowns] < 0.0)?;
         if v[unknowns] < 0.0 {
@@ -158,6 +166,7 @@ struct Barrier<'a> {
     blocks: &'a [AffineMatrix],
     linear: DVector<f64>,
     first_weight: f64,
+    at_step: &'a dyn Fn(),
 }
 
 impl Barrier<'_> {
@@ -188,6 +197,7 @@ impl Barrier<'_> {
     ) -> Result<DVector<f64>, LmiFailure> {
         let mut factors = self.factors(&v).ok_or(LmiFailure::NotConverged)?;
         for _ in 0..MOST_STEPS {
+            (self.at_step)();
             let (gradient, hessian) = self.derivatives(&factors);
             let hessian = hessian.cholesky().ok_or(LmiFailure::NotConverged)?;
             let step = -hessian.solve(&gradient);

@@ -47,7 +47,7 @@ where
                 -(closed.transpose() * &p + &p * closed) - &p * (2.0 * rate)
             })
         }));
-        let p = of(&maximise_log_det(&blocks, unknowns).ok()?.v);
+        let p = of(&maximise_log_det(&blocks, unknowns, &|| ()).ok()?.v);
         let entry = |i: usize, j: usize| 0.5 * (p[(i, j)] + p[(j, i)]) / (scale[i] * scale[j]);
         Some((SMatrix::from_fn(entry), rate))
     })

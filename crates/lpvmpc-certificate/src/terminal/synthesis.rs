@@ -123,10 +123,11 @@ where
     M: LpvModel<f64, NX, NU, NS>,
 {
     let points: Vec<_> = grid.points().collect();
-    synthesize_terminal_at(model, &grid.middle(), &points, problem)
+    synthesize_terminal_at(model, &grid.middle(), &points, problem, &|| ())
 }
 
 /// As [`synthesize_terminal`], at any `points` of the scheduling; the regulator at `middle` scales the unknowns.
+/// Each step of the search begins with `at_step`, for callers that tell of it or end it by unwinding.
 ///
 /// # Errors
 /// Numbers out of range, a model that cannot be sampled, or no solution.
@@ -135,6 +136,7 @@ pub fn synthesize_terminal_at<M, const NX: usize, const NU: usize, const NS: usi
     middle: &SVector<f64, NS>,
     points: &[SVector<f64, NS>],
     problem: &TerminalProblem<NX, NU>,
+    at_step: &dyn Fn(),
 ) -> Result<TerminalIngredients<NX, NU>, SynthesisError>
 where
     M: LpvModel<f64, NX, NU, NS>,
@@ -151,13 +153,14 @@ where
     let pairs = points.iter().map(sampled).collect::<Result<Vec<_>, _>>()?;
     let scaling = problem.scaling(&sampled(middle)?)?;
     let blocks = problem.blocks(&scaling, &pairs);
-    let maximum = maximise_log_det(&blocks, unknowns(NX, NU)).map_err(|failure| match failure {
-        LmiFailure::Infeasible { missing } => SynthesisError::Infeasible {
-            points: pairs.len(),
-            missing,
-        },
-        LmiFailure::NotConverged => SynthesisError::NotConverged,
-    })?;
+    let maximum =
+        maximise_log_det(&blocks, unknowns(NX, NU), at_step).map_err(|failure| match failure {
+            LmiFailure::Infeasible { missing } => SynthesisError::Infeasible {
+                points: pairs.len(),
+                missing,
+            },
+            LmiFailure::NotConverged => SynthesisError::NotConverged,
+        })?;
     let (y, l) = split(&maximum.v, NX, NU);
     let y_inverse = y.cholesky().ok_or(SynthesisError::NotConverged)?.inverse();
     let x_inverse = DMatrix::from_diagonal(&scaling.x.map(f64::recip));
