@@ -10,16 +10,17 @@ mod flow;
 mod interval;
 mod motion;
 mod positive;
+mod rows;
 mod runge_kutta;
 mod series;
 mod taylor_map;
 mod taylor_model;
 
 pub use elementary::Arithmetic;
-pub(crate) use flow::product;
 pub use flow::{Ball, FlowError, Frame, SampleEnclosure, SampledLaw};
 pub use interval::Interval;
 pub(crate) use positive::{is_positive_definite, smallest_eigenvalue};
+pub(crate) use rows::{from_fn, product, transposed};
 pub(crate) use runge_kutta::ScaledPlant;
 pub use taylor_map::TaylorMap;
 pub use taylor_model::TaylorModel;

@@ -60,9 +60,9 @@ impl<T: Scalar, const K: usize> Bounds<T, K> {
     /// Whether every component of `value` lies within its bounds; false for NaN.
     #[inline(always)]
     pub(crate) fn hold_at(&self, value: &SVector<T, K>) -> bool {
-        let [lower, upper, value] =
-            [&self.lower, &self.upper, value].map(|vector| &vector.data.0[0]);
+        let (lower, upper) = (&self.lower.data.0[0], &self.upper.data.0[0]);
         let sides = lower.iter().zip(upper);
+        let value = &value.data.0[0];
         // Without early exit, so that the comparisons need no branches.
         value
             .iter()

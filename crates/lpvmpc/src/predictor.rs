@@ -329,13 +329,9 @@ impl Rk4 {
             return follow_periods(x, periods(period, t_s), at);
         }
         let h = self.step_length(t_s);
-        let [half, third, sixth] =
-            [0.5, 1.0 / 3.0, 1.0 / 6.0].map(|part| h * convert::<f64, T>(part));
-        let start = (SVector::zeros(), SMatrix::identity(), SMatrix::zeros());
-        let mut reached = [start; POINTS];
-        for (reached, x) in reached.iter_mut().zip(x) {
-            reached.0 = *x;
-        }
+        let part = |part: f64| h * convert::<f64, T>(part);
+        let (half, third, sixth) = (part(0.5), part(1.0 / 3.0), part(1.0 / 6.0));
+        let mut reached = unmoved(x);
         let mut there = reached;
         for _ in 0..self.substeps {
             let mut next = reached;
@@ -464,6 +460,18 @@ pub(crate) fn over_periods<T: Scalar, const NX: usize, const NU: usize>(
     })
 }
 
+/// Each `x`, from which nothing has moved yet.
+#[inline(always)]
+fn unmoved<T: Scalar, const NX: usize, const NU: usize, const POINTS: usize>(
+    x: &[SVector<T, NX>; POINTS],
+) -> [Tangent<T, NX, NU>; POINTS] {
+    let mut reached = [(SVector::zeros(), SMatrix::identity(), SMatrix::zeros()); POINTS];
+    for (reached, x) in reached.iter_mut().zip(x) {
+        reached.0 = *x;
+    }
+    reached
+}
+
 /// The states after so many periods from each `x`, and the pairs over them along these motions, from the map and its
 /// pairs `at` the states.
 fn follow_periods<T: Scalar, const NX: usize, const NU: usize, const POINTS: usize>(
@@ -471,12 +479,13 @@ fn follow_periods<T: Scalar, const NX: usize, const NU: usize, const POINTS: usi
     periods: usize,
     at: impl Fn(&[SVector<T, NX>; POINTS], &mut [Tangent<T, NX, NU>; POINTS]),
 ) -> [Tangent<T, NX, NU>; POINTS] {
-    let mut reached = x.map(|x| (x, SMatrix::identity(), SMatrix::zeros()));
+    let (mut x, mut reached) = (*x, unmoved(x));
     let mut next = reached;
     for done in 0..periods {
-        at(&reached.map(|(x, ..)| x), &mut next);
-        for ((x, a_d, b_d), (x_next, a, b)) in reached.iter_mut().zip(&next) {
-            *x = *x_next;
+        at(&x, &mut next);
+        let points = x.iter_mut().zip(&mut reached);
+        for ((x, (x_reached, a_d, b_d)), (x_next, a, b)) in points.zip(&next) {
+            (*x, *x_reached) = (*x_next, *x_next);
             (*a_d, *b_d) = match done {
                 0 => (*a, *b),
                 _ => (product(a, a_d), product(a, b_d) + b),

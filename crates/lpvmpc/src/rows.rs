@@ -87,8 +87,11 @@ fn visit_violated<T: Scalar, const K: usize>(
     visit: &mut impl FnMut(Candidate<T>),
 ) {
     // As arrays, whose loop is a fraction of one over the vectors' own iterators.
-    let [lower, upper, value] =
-        [&bounds.lower, &bounds.upper, value].map(|vector| &vector.data.0[0]);
+    let (lower, upper, value) = (
+        &bounds.lower.data.0[0],
+        &bounds.upper.data.0[0],
+        &value.data.0[0],
+    );
     let sides = lower.iter().zip(upper);
     for (index, ((v, (lower, upper)), soft)) in value.iter().zip(sides).zip(soft).enumerate() {
         violated_side(*v, (*lower, *upper), soft, stage, quantity, index, visit);

@@ -5,6 +5,7 @@ use super::composition::{Composition, Uncertain};
 use super::elementary::Arithmetic;
 use super::interval::Interval;
 use super::motion::{a_priori, coefficients, iterated, matrices_during};
+use super::rows::{from_fn, product};
 use super::series::CAPACITY;
 use super::taylor_map::{ROUNDING, TaylorMap};
 use super::taylor_model::TaylorModel;
@@ -186,7 +187,7 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
     {
         let t = constants(&frame.t);
         let inverse = constants(&frame.inverse);
-        let minus_k = matrix(|i, j| TaylorModel::constant(-self.k[(i, j)]));
+        let minus_k = from_fn(|i, j| TaylorModel::constant(-self.k[(i, j)]));
         let gain: [[TaylorModel<D>; NX]; NU] = product(&minus_k, &t);
         let u = product(&gain, &y);
         let steps = match model.period() {
@@ -217,7 +218,7 @@ impl<const NX: usize, const NU: usize> SampledLaw<NX, NU> {
             };
             x = end;
             let phi = uncertain(&inverse, &phi, &t);
-            let unit = matrix(|i, j| TaylorModel::constant(if i == j { 1.0 } else { 0.0 }));
+            let unit = from_fn(|i, j| TaylorModel::constant(if i == j { 1.0 } else { 0.0 }));
             let gamma = uncertain(&inverse, &gamma, &unit);
             transition.advance(&phi, &gamma, &gain);
             states = Some(match states {
@@ -287,7 +288,7 @@ impl<M, const NU: usize, const D: usize> Step<'_, M, NU, D> {
     {
         let (state, input) = (SVector::from(*x), SVector::from(self.input));
         let (a, b) = self.model.matrices(&self.model.scheduling(&state, &input));
-        let (phi, gamma) = (matrix(|i, j| a[(i, j)]), matrix(|i, j| b[(i, j)]));
+        let (phi, gamma) = (from_fn(|i, j| a[(i, j)]), from_fn(|i, j| b[(i, j)]));
         let (of_state, of_input) = (
             product(&phi, &x.map(|one| [one])),
             product(&gamma, &self.input.map(|one| [one])),
@@ -384,23 +385,7 @@ fn uncertain<const D: usize, const N: usize, const K: usize>(
 }
 
 fn constants<const D: usize, const N: usize>(m: &[[Interval; N]; N]) -> [[TaylorModel<D>; N]; N] {
-    m.map(|row| row.map(TaylorModel::from))
-}
-
-fn matrix<T, const R: usize, const C: usize>(f: impl Fn(usize, usize) -> T) -> [[T; C]; R] {
-    std::array::from_fn(|i| std::array::from_fn(|j| f(i, j)))
-}
-
-/// The product of two matrices, given by their rows.
-pub(crate) fn product<T: Arithmetic, const R: usize, const N: usize, const C: usize>(
-    a: &[[T; N]; R],
-    b: &[[T; C]; N],
-) -> [[T; C]; R] {
-    matrix(|i, j| {
-        (0..N).fold(T::constant(0.0), |sum, k| {
-            sum.plus_product(&a[i][k], &b[k][j])
-        })
-    })
+    from_fn(|i, j| TaylorModel::from(m[i][j]))
 }
 
 fn ranges<const D: usize, const N: usize>(

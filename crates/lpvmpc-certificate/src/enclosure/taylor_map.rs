@@ -1,6 +1,7 @@
 //! Matrices over a box, with an error in the Euclidean norm.
 
 use super::interval::Interval;
+use super::rows::from_fn;
 use super::taylor_model::TaylorModel;
 use nalgebra::SMatrix;
 
@@ -29,15 +30,15 @@ impl<const R: usize, const C: usize, const D: usize> TaylorMap<R, C, D> {
         let matrix = |coefficient: &dyn Fn(&TaylorModel<D>) -> f64| {
             SMatrix::from_fn(|i, j| coefficient(&entries[i][j]))
         };
-        Self {
-            middle: matrix(&|entry| entry.middle),
-            slopes: std::array::from_fn(|k| matrix(&|entry| entry.slopes[k])),
-            squares: std::array::from_fn(|k| {
-                std::array::from_fn(|l| matrix(&|entry| entry.squares[k][l]))
-            }),
-            error: frobenius(&errors),
+        let mut map = Self::constant(matrix(&|entry| entry.middle));
+        map.error = frobenius(&errors);
+        for (k, slope) in map.slopes.iter_mut().enumerate() {
+            *slope = matrix(&|entry| entry.slopes[k]);
         }
-        .checked()
+        for (k, l) in map.upper() {
+            map.squares[k][l] = matrix(&|entry| entry.squares[k][l]);
+        }
+        map.checked()
     }
 
     /// Nothing is known of a matrix whose coefficients have overflowed.
@@ -66,15 +67,13 @@ impl<const R: usize, const C: usize, const D: usize> TaylorMap<R, C, D> {
 
     /// Its entries.
     pub fn entries(&self) -> [[TaylorModel<D>; C]; R] {
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| TaylorModel {
-                middle: self.middle[(i, j)],
-                slopes: std::array::from_fn(|k| self.slopes[k][(i, j)]),
-                squares: std::array::from_fn(|k| {
-                    std::array::from_fn(|l| self.squares[k][l][(i, j)])
-                }),
-                error: self.error,
-            })
+        from_fn(|i, j| TaylorModel {
+            error: self.error,
+            ..TaylorModel::polynomial(
+                self.middle[(i, j)],
+                |k| self.slopes[k][(i, j)],
+                |k, l| self.squares[k][l][(i, j)],
+            )
         })
     }
 
@@ -104,7 +103,7 @@ impl<const R: usize, const C: usize, const D: usize> TaylorMap<R, C, D> {
     pub fn times<const N: usize>(&self, other: &TaylorMap<C, N, D>) -> TaylorMap<R, N, D> {
         let (m, n) = (&self.middle, &other.middle);
         let (p, q) = (&self.slopes, &other.slopes);
-        let mut squares = [[SMatrix::zeros(); D]; D];
+        let mut product = TaylorMap::constant(m * n);
         for (i, j) in self.upper() {
             let mixed = p[i] * q[j]
                 + if i == j {
@@ -112,7 +111,10 @@ impl<const R: usize, const C: usize, const D: usize> TaylorMap<R, C, D> {
                 } else {
                     p[j] * q[i]
                 };
-            squares[i][j] = m * other.squares[i][j] + self.squares[i][j] * n + mixed;
+            product.squares[i][j] = m * other.squares[i][j] + self.squares[i][j] * n + mixed;
+        }
+        for (k, slope) in product.slopes.iter_mut().enumerate() {
+            *slope = m * q[k] + p[k] * n;
         }
         let (a, b) = (euclidean(m), euclidean(n));
         let ([a1, a2], [b1, b2]) = (self.parts(euclidean), other.parts(euclidean));
@@ -122,31 +124,24 @@ impl<const R: usize, const C: usize, const D: usize> TaylorMap<R, C, D> {
         let (size, other_size) = (self.size(), other.size());
         let zero = size + self.error == 0.0 || other_size + other.error == 0.0;
         let underflow = if zero { 0.0 } else { UNDERFLOW };
-        TaylorMap {
-            middle: m * n,
-            slopes: std::array::from_fn(|k| m * q[k] + p[k] * n),
-            squares,
-            error: (beyond + errors + ROUNDING * size * other_size + underflow) * (1.0 + ROUNDING),
-        }
-        .checked()
+        product.error =
+            (beyond + errors + ROUNDING * size * other_size + underflow) * (1.0 + ROUNDING);
+        product.checked()
     }
 
     /// The sum.
     pub fn plus(&self, other: &Self) -> Self {
-        let sum = Self {
-            middle: self.middle + other.middle,
-            slopes: std::array::from_fn(|k| self.slopes[k] + other.slopes[k]),
-            squares: std::array::from_fn(|k| {
-                std::array::from_fn(|l| self.squares[k][l] + other.squares[k][l])
-            }),
-            error: 0.0,
-        };
-        let rounding = ROUNDING * sum.size();
-        Self {
-            error: (self.error + other.error + rounding) * (1.0 + ROUNDING),
-            ..sum
+        let mut sum = *self;
+        sum.middle += other.middle;
+        for (slope, other) in sum.slopes.iter_mut().zip(&other.slopes) {
+            *slope += other;
         }
-        .checked()
+        for (i, j) in self.upper() {
+            sum.squares[i][j] += other.squares[i][j];
+        }
+        let rounding = ROUNDING * sum.size();
+        sum.error = (self.error + other.error + rounding) * (1.0 + ROUNDING);
+        sum.checked()
     }
 
     /// A bound of the entries' sizes, each summed over all coefficients.
@@ -179,27 +174,23 @@ impl<const R: usize, const C: usize, const D: usize> TaylorMap<R, C, D> {
 
     /// The linear part at a corner of the box, given by the signs of z, without the error.
     pub fn at(&self, corner: &[f64; D]) -> [[Interval; C]; R] {
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| {
-                let terms = self.slopes.iter().zip(corner);
-                terms.fold(
-                    Interval::point(self.middle[(i, j)]),
-                    |sum, (slope, sign)| sum + Interval::point(slope[(i, j)] * sign),
-                )
-            })
+        from_fn(|i, j| {
+            let terms = self.slopes.iter().zip(corner);
+            terms.fold(
+                Interval::point(self.middle[(i, j)]),
+                |sum, (slope, sign)| sum + Interval::point(slope[(i, j)] * sign),
+            )
         })
     }
 
     /// All values of the linear part over the box, without the error.
     pub fn range(&self) -> [[Interval; C]; R] {
         let sign = Interval::new(-1.0, 1.0);
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| {
-                let middle = Interval::point(self.middle[(i, j)]);
-                let slopes = self.slopes.iter();
-                slopes.fold(middle, |sum, slope| {
-                    sum + Interval::point(slope[(i, j)]) * sign
-                })
+        from_fn(|i, j| {
+            let middle = Interval::point(self.middle[(i, j)]);
+            let slopes = self.slopes.iter();
+            slopes.fold(middle, |sum, slope| {
+                sum + Interval::point(slope[(i, j)]) * sign
             })
         })
     }

@@ -93,7 +93,7 @@ impl<const D: usize> TaylorModel<D> {
     }
 
     /// The polynomial with the given coefficients.
-    fn polynomial(
+    pub(super) fn polynomial(
         middle: f64,
         slope: impl Fn(usize) -> f64,
         square: impl Fn(usize, usize) -> f64,

@@ -1,11 +1,11 @@
 //! Proof that the terminal law decreases the terminal cost over each sample.
 
 use super::ellipsoid::Ellipsoid;
-use super::normalised::{Normaliser, Square, corners, from_fn, transposed};
+use super::normalised::{Normaliser, Square, corners};
 use crate::cover::{Cell, Finding};
 use crate::enclosure::{
-    Arithmetic, Interval, SampleEnclosure, SampledLaw, is_positive_definite, product,
-    smallest_eigenvalue,
+    Arithmetic, Interval, SampleEnclosure, SampledLaw, from_fn, is_positive_definite, product,
+    smallest_eigenvalue, transposed,
 };
 use lpvmpc::Embedding;
 use nalgebra::{DMatrix, SMatrix, SVector, SymmetricEigen};

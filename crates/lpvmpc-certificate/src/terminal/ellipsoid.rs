@@ -1,8 +1,10 @@
 //! The set x'Px <= level.
 
-use super::normalised::{Normaliser, from_fn, transposed};
+use super::normalised::Normaliser;
 use crate::cover::Cell;
-use crate::enclosure::{Arithmetic, Ball, Interval, is_positive_definite, product};
+use crate::enclosure::{
+    Arithmetic, Ball, Interval, from_fn, is_positive_definite, product, transposed,
+};
 use nalgebra::{SMatrix, SVector};
 
 /// The set x'Px <= level, with rigorous answers about it.

@@ -1,6 +1,8 @@
 //! Matrix inequalities against P, in coordinates in which P is nearly the identity.
 
-use crate::enclosure::{Arithmetic, Frame, Interval, is_positive_definite, product};
+use crate::enclosure::{
+    Arithmetic, Frame, Interval, from_fn, is_positive_definite, product, transposed,
+};
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 /// Rows of a square matrix whose entries are known up to intervals.
@@ -100,14 +102,4 @@ pub(super) fn corners<const D: usize>(vary: [bool; D]) -> impl Iterator<Item = [
 /// M - shift I.
 pub(super) fn minus_identity<const N: usize>(m: &Square<N>, shift: Interval) -> Square<N> {
     from_fn(|i, j| if i == j { m[i][j] - shift } else { m[i][j] })
-}
-
-pub(super) fn from_fn<T, const R: usize, const C: usize>(
-    mut f: impl FnMut(usize, usize) -> T,
-) -> [[T; C]; R] {
-    std::array::from_fn(|i| std::array::from_fn(|j| f(i, j)))
-}
-
-pub(super) fn transposed<T: Copy, const R: usize, const C: usize>(m: &[[T; C]; R]) -> [[T; R]; C] {
-    from_fn(|i, j| m[j][i])
 }

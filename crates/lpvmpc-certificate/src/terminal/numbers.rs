@@ -2,9 +2,9 @@
 
 use super::certificate::Certificate;
 use super::claim::ClaimError;
-use super::normalised::{Normaliser, Square, from_fn};
+use super::normalised::{Normaliser, Square};
 use super::sampled::SampledClaim;
-use crate::enclosure::{Interval, is_positive_definite};
+use crate::enclosure::{Interval, from_fn, is_positive_definite};
 use nalgebra::SMatrix;
 use std::ops::RangeInclusive;
 

@@ -1,10 +1,11 @@
 //! Quadratic stability: one P for a scheduling that moves anyhow within a box.
 
 use super::lmi::{AffineMatrix, maximise_log_det};
-use super::normalised::{Normaliser, corners, from_fn, minus_identity, transposed};
+use super::normalised::{Normaliser, corners, minus_identity};
 use crate::cover::{Cell, Covered, Finding, Uncovered, cover};
 use crate::enclosure::{
-    Interval, TaylorMap, TaylorModel, is_positive_definite, product, smallest_eigenvalue,
+    Interval, TaylorMap, TaylorModel, from_fn, is_positive_definite, product, smallest_eigenvalue,
+    transposed,
 };
 use lpvmpc::{Embedding, LpvModel, Number};
 use lpvmpc_design::SchedulingGrid;

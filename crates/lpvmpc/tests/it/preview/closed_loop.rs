@@ -2,6 +2,7 @@
 
 use super::plants::{CART, PENDULUM};
 use super::short_case::settings;
+use crate::pendulum::Pendulum;
 use lpvmpc::{
     Bounds, Controller, ControllerMemory, ControllerSettings, GeneralRow, Iterations, List,
     LpvModel, Predictor, Preview, Reference, Rk4, Status, TerminalIngredient, Weights, Workspace,
@@ -19,15 +20,24 @@ fn rest() -> Reference<'static, f64, 2> {
     Reference::constant(Vector2::zeros())
 }
 
-/// x_dot = f(x, u) + d with the formula of the pendulum, not its embedding, in small steps.
-fn plant_moves(x: &Vector2<f64>, u: f64, push: f64) -> Vector2<f64> {
+/// x_dot = f(x) over `duration` seconds.
+fn in_small_steps(
+    x: &Vector2<f64>,
+    duration: f64,
+    f: &dyn Fn(Vector2<f64>) -> Vector2<f64>,
+) -> Vector2<f64> {
     const STEPS: usize = 200;
-    let h = T_S / STEPS as f64;
-    let f = |x: Vector2<f64>| Vector2::new(x[1], 9.81 * x[0].sin() - 0.1 * x[1] + u + push);
+    let h = duration / STEPS as f64;
     (0..STEPS).fold(*x, |x, _| {
         let middle = x + f(x) * (h / 2.0);
         x + f(middle) * h
     })
+}
+
+/// x_dot = f(x, u) + d over a sample, with the formula of the pendulum, not its embedding.
+fn plant_moves(x: &Vector2<f64>, u: f64, push: f64) -> Vector2<f64> {
+    let f = |x: Vector2<f64>| Vector2::new(x[1], 9.81 * x[0].sin() - 0.1 * x[1] + u + push);
+    in_small_steps(x, T_S, &f)
 }
 
 /// A gust that comes at 1 s, and one from the other side: leaning into it before it comes costs less
@@ -233,32 +243,39 @@ fn both_prices(settings: &Settings) -> [lpvmpc::SoftBounds<f64, 2>; 1] {
     [[Some(price), None]]
 }
 
-/// A spring whose stiffness is a state of its own that stands still: (position, speed, stiffness).
-struct WithState;
+/// A plant with a third state that stands still.
+enum WithState {
+    /// A spring and its stiffness: (position, speed, stiffness).
+    Stiffness,
+    /// [`PENDULUM`] and a push: (angle, rate, push).
+    Push,
+}
 
 impl LpvModel<f64, 3, 1, 1> for WithState {
-    fn scheduling(&self, x: &Vector3<f64>, _: &Vector1<f64>) -> Vector1<f64> {
-        Vector1::new(x[2])
+    fn scheduling(&self, x: &Vector3<f64>, u: &Vector1<f64>) -> Vector1<f64> {
+        match self {
+            Self::Stiffness => Vector1::new(x[2]),
+            Self::Push => PENDULUM.scheduling(&Vector2::new(x[0], x[1]), u),
+        }
     }
 
     fn matrices(&self, s: &Vector1<f64>) -> (Matrix3<f64>, Vector3<f64>) {
-        let a = Matrix3::new(0.0, 1.0, 0.0, -s[0], -0.2, 0.0, 0.0, 0.0, 0.0);
-        (a, Vector3::new(0.0, 1.0, 0.0))
+        let (plant, push) = match self {
+            Self::Stiffness => (SPRING, 0.0),
+            Self::Push => (PENDULUM, 1.0),
+        };
+        let (a, b) = plant.matrices(s);
+        let mut a = a.insert_row(2, 0.0).insert_column(2, 0.0);
+        a[(1, 2)] = push;
+        (a, b.push(0.0))
     }
 }
 
-/// The same spring, whose stiffness is told.
-struct Told;
-
-impl LpvModel<f64, 2, 1, 1> for Told {
-    fn scheduling(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Vector1<f64> {
-        Vector1::zeros()
-    }
-
-    fn matrices(&self, s: &Vector1<f64>) -> (Matrix2<f64>, Vector2<f64>) {
-        (Matrix2::new(0.0, 1.0, -s[0], -0.2), Vector2::new(0.0, 1.0))
-    }
-}
+/// A spring whose stiffness is its scheduling.
+const SPRING: Pendulum<f64> = Pendulum {
+    stiffness: -1.0,
+    damping: 0.2,
+};
 
 /// Scheduling from outside is a plant with that parameter as a state, in a loop along which it changes
 /// from sample to sample.
@@ -297,8 +314,8 @@ fn scheduling_from_outside_is_a_parameter_as_a_state() {
                 force,
             )
         };
-        let mut told = Controller::allocate(Told, told).unwrap();
-        let mut state = Controller::allocate(WithState, state).unwrap();
+        let mut told = Controller::allocate(SPRING, told).unwrap();
+        let mut state = Controller::allocate(WithState::Stiffness, state).unwrap();
         let (mut memory, mut other) = (told.workspace(), state.workspace());
         let mut x = Vector2::new(1.0, -2.0);
         for k in 0..40 {
@@ -321,37 +338,10 @@ fn scheduling_from_outside_is_a_parameter_as_a_state() {
             let error = (found - plan.u[0]).amax();
             assert!(error < tolerance, "{k} {iterations:?}: {error:e}");
             assert_ne!(plan.status, Status::NotFinite);
-            x = Rk4 { substeps: 4 }.advance(&Spring(stiffness), &x, &found, 0.1);
+            let (a, b) = SPRING.matrices(&Vector1::new(stiffness));
+            x = in_small_steps(&x, 0.1, &|x| a * x + b * found);
         }
         assert!(x.amax() < 0.05, "{x}");
-    }
-}
-
-/// The spring itself.
-struct Spring(f64);
-
-impl LpvModel<f64, 2, 1, 1> for Spring {
-    fn scheduling(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Vector1<f64> {
-        Vector1::new(self.0)
-    }
-
-    fn matrices(&self, s: &Vector1<f64>) -> (Matrix2<f64>, Vector2<f64>) {
-        Told.matrices(s)
-    }
-}
-
-/// The pendulum with a push as a state of its own that stands still: (angle, rate, push).
-struct Pushed;
-
-impl LpvModel<f64, 3, 1, 1> for Pushed {
-    fn scheduling(&self, x: &Vector3<f64>, u: &Vector1<f64>) -> Vector1<f64> {
-        PENDULUM.scheduling(&Vector2::new(x[0], x[1]), u)
-    }
-
-    fn matrices(&self, sinc: &Vector1<f64>) -> (Matrix3<f64>, Vector3<f64>) {
-        let k = 9.81 * sinc[0];
-        let a = Matrix3::new(0.0, 1.0, 0.0, k, -0.1, 1.0, 0.0, 0.0, 0.0);
-        (a, Vector3::new(0.0, 1.0, 0.0))
     }
 }
 
@@ -402,7 +392,7 @@ fn a_disturbance_is_a_state_that_stands_still() {
             )
         };
         let mut told = Controller::allocate(PENDULUM, plain).unwrap();
-        let mut state = Controller::allocate(Pushed, state).unwrap();
+        let mut state = Controller::allocate(WithState::Push, state).unwrap();
         let (mut memory, mut other) = (told.workspace(), state.workspace());
         let push = -1.5;
         let mut x = Vector2::new(0.5, -1.0);
