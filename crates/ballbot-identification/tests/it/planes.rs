@@ -227,7 +227,7 @@ fn a_body_that_is_not_symmetric_is_found_out_and_has_two_inertias() {
 fn what_is_wrong_between_the_planes_is_refused_and_named() {
     let short = planes().map(|plane| Laboratory {
         rate: 100.0,
-        duration: 8.0,
+        duration: 6.0,
         // Where the delay is a whole number of rows, chi^2 has a kink, on which a fit may stagnate.
         delay: 0.012,
         ..plane
@@ -386,7 +386,7 @@ fn joint_intervals_cover_the_truth_and_are_no_wider_than_those_of_one_plane() {
     const ALONE: u64 = 20;
     let laboratories = asymmetric().map(|plane| Laboratory {
         rate: 100.0,
-        duration: 5.0,
+        duration: 4.0,
         // The planes' sensors need not be alike.
         noise: plane.noise * if plane.tilt_offset > 0.0 { 1.0 } else { 2.0 },
         ..plane
