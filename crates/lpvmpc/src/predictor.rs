@@ -329,8 +329,8 @@ impl Rk4 {
             return follow_periods(x, periods(period, t_s), at);
         }
         let h = self.step_length(t_s);
-        let part = |part: f64| h * convert::<f64, T>(part);
-        let (half, third, sixth) = (part(0.5), part(1.0 / 3.0), part(1.0 / 6.0));
+        let part_of_h = |part: f64| h * convert::<f64, T>(part);
+        let (half, third, sixth) = (part_of_h(0.5), part_of_h(1.0 / 3.0), part_of_h(1.0 / 6.0));
         let mut reached = unmoved(x);
         let mut there = reached;
         for _ in 0..self.substeps {

@@ -386,7 +386,7 @@ fn joint_intervals_cover_the_truth_and_are_no_wider_than_those_of_one_plane() {
     const ALONE: u64 = 20;
     let laboratories = asymmetric().map(|plane| Laboratory {
         rate: 100.0,
-        duration: 4.0,
+        duration: 5.0,
         // The planes' sensors need not be alike.
         noise: plane.noise * if plane.tilt_offset > 0.0 { 1.0 } else { 2.0 },
         ..plane

@@ -100,9 +100,9 @@ fn the_default_cap_grows_with_the_problem() {
     sweep::<8, 2>(20, 1, 10);
     sweep::<6, 3>(30, 2, 10);
     sweep::<4, 1>(100, 0, 10);
-    sweep::<12, 4>(50, 0, 2);
-    sweep::<8, 2>(100, 1, 2);
-    sweep::<4, 1>(200, 1, 2);
+    sweep::<12, 4>(50, 0, 4);
+    sweep::<8, 2>(100, 1, 3);
+    sweep::<4, 1>(200, 1, 4);
 }
 
 /// A search on 200 stages that a constant for short horizons has cut off.
