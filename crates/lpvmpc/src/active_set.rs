@@ -265,6 +265,11 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         self.max_changes - self.changes
     }
 
+    /// So many of them are for another method.
+    pub fn keep_back(&mut self, changes: usize) {
+        self.max_changes = self.max_changes.saturating_sub(changes);
+    }
+
     /// Counts one more change of the active set.
     pub(crate) fn count_change(&mut self) -> Result<(), Status<T>> {
         if self.changes >= self.max_changes {

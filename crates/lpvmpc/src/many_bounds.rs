@@ -5,6 +5,8 @@
 //! interior-point method that goes on until it can be told which bounds will be active. The program in
 //! which these hold says which of them should not, and which are missing; that takes a few factorisations,
 //! however many bounds there are. Where it finds nothing the dual method begins as if nothing had been.
+//! Where the dual method comes to no end, most of all with few bounds that contradict each other, the
+//! interior-point method has a turn after it.
 
 mod exchange;
 mod interior_point;
@@ -68,6 +70,22 @@ const MOST_FACTORISATIONS: usize = 24;
 /// no answer: one in so many.
 const SHARE: usize = 4;
 
+/// When it has its turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Turn {
+    /// Before the dual method, if there are many bounds.
+    First,
+    /// After it has come to no end.
+    Last,
+}
+
+/// Changes of the active set that are kept back for the last turn of a problem with so many `entries` of state and
+/// input, out of a `cap` for all: none where the dual method would lack them.
+pub(crate) fn work_of_last_turn(cap: usize, entries: usize) -> usize {
+    let work = MOST_FACTORISATIONS * entries;
+    if work <= cap / SHARE { work } else { 0 }
+}
+
 /// Memory of the phase, beside the step that knows it: a solver without it has no machine code for it.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
@@ -83,15 +101,15 @@ pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
     pub keep: fn(&mut Self, &Solution<T, NX, NU>),
 }
 
-/// Solves the problem whose trajectory without bounds is in the solution, or proves that it is infeasible;
-/// counts changes of the active set. `None`, and all as before, if that is for the dual method.
+/// Solves the problem, or proves that it is infeasible; counts changes of the active set. `None` if it does
+/// neither: after the first turn, which begins with the trajectory without bounds in the solution, all is as before.
 type Run<T, const NX: usize, const NU: usize> = fn(
     &mut ManyBounds<T, NX, NU>,
     &mut Solver<T, NX, NU>,
     &Ocp<T, NX, NU>,
     &SolverSettings<T>,
     &mut Solution<T, NX, NU>,
-    &mut usize,
+    (Turn, &mut usize),
 ) -> Option<Result<(), Status<T>>>;
 
 impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
@@ -123,15 +141,22 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         ocp: &Ocp<T, NX, NU>,
         settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU>,
-        spent: &mut usize,
+        (turn, spent): (Turn, &mut usize),
     ) -> Option<Result<(), Status<T>>> {
         let n = ocp.length();
         let fits = n <= self.factors.len().min(self.u.len()).min(self.x.len());
         if !fits || ocp.terminal.equality.is_some() {
             return None;
         }
+        let last_turn = turn == Turn::Last;
+        if last_turn {
+            // Held inputs may have left factors of their own.
+            solver.dual.begin_again();
+            solver.factorize(ocp).ok()?;
+            solver.roll_out(ocp, solution).ok()?;
+        }
         let shift = match settings.warm_start {
-            _ if !solution.status.is_solved() => None,
+            _ if last_turn || !solution.status.is_solved() => None,
             WarmStart::Cold => None,
             WarmStart::Same => Some(0),
             WarmStart::Shifted => Some(1),
@@ -143,13 +168,13 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             inputs += usize::from(matches!(candidate.bound.quantity, Quantity::Input(_)));
         });
         // Those that the regulator saturates are nearly right where a single input moves the states.
-        let saturated = NU == 1 && 2 * inputs > violated && inputs >= MANY_SATURATED;
+        let saturated = !last_turn && NU == 1 && 2 * inputs > violated && inputs >= MANY_SATURATED;
         // Where several inputs act together, general rows that were active are taken over one by one in less time.
         let rows = NU > 1 && mostly_rows(&solution.active);
         let expected = if rows { violated } else { violated.max(known) };
         // No more can hold independently than there are inputs.
         let expected = expected.min(n * NU);
-        let many = expected >= MANY;
+        let many = last_turn || expected >= MANY;
         if !many && !saturated {
             return None;
         }
@@ -161,8 +186,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             violation: solver.dual.tolerance,
             penalty: scale * T::default_epsilon().powf(convert(-0.4)),
         };
-        let cap = MOST_FACTORISATIONS * (NX + NU);
-        let cap = cap.min(solver.dual.changes_left() / SHARE);
+        let work = MOST_FACTORISATIONS * (NX + NU);
+        let cap = match turn {
+            Turn::First => work.min(solver.dual.changes_left() / SHARE),
+            Turn::Last => *spent + work,
+        };
         let mut changes = || {
             let allowed = *spent + NX + NU <= cap;
             *spent += if allowed { NX + NU } else { 0 };

@@ -4,7 +4,7 @@ use crate::pendulum::Pendulum;
 use lpvmpc::{LpvModel, Scalar};
 use nalgebra::{SMatrix, SVector, Vector1};
 
-pub const NX: usize = 3;
+pub const NX: usize = 4;
 pub const NU: usize = 2;
 
 /// x_dot = (A + s A_s) x + B u; with its own scheduling s = 0 it is linear.
