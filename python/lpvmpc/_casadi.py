@@ -134,9 +134,11 @@ def _operation(
         return of[0]
     if code == ca.OP_CEIL:
         return tape.add("neg", tape.add("floor", tape.add("neg", of[0])))
-    known = ", ".join(sorted(_NAMES.values()))
+    known = ", ".join(sorted({*_NAMES.values()}))
+    names = [name for name in dir(ca) if name.startswith("OP_") and getattr(ca, name) == code]
+    called = names[0].removeprefix("OP_").lower() if names else f"number {code}"
     raise PlantError(
-        f"formulas: the operation number {code} of CasADi has no counterpart here; there are {known}"
+        f"formulas: the operation {called} of CasADi has no counterpart here; there are {known}"
     )
 
 

@@ -59,9 +59,10 @@ def lqr(
     Raises
     ------
     SettingError
-        The weights make no sense, or no regulator stabilises the plant there.
+        The weights make no sense, the plant does not stand there, or no regulator stabilises it.
     """
     n, m = len(plant.states), len(plant.inputs)
+    t_s = number("t_s", t_s)
     at = plant.equilibrium or (np.zeros(n), np.zeros(m))
     x_eq = at[0] if x is None else column("x", x, n)
     u_eq = at[1] if u is None else column("u", u, m)
@@ -87,12 +88,13 @@ def certify(
     """A terminal law, cost and set about an equilibrium, proved for the sampled nonlinear plant.
 
     Sets as large as the bounds allow are tried first, then halves of them, and of the first two that are proved the
-    larger one is kept, its level as high as can be shown. Seconds, as a rule; up to 12 states and 4 inputs.
+    larger one is kept, its level as high as can be shown. Seconds, as a rule, of linear plants and of nonlinear ones
+    with up to four states and one input; minutes where more is nonlinear. Up to 12 states and 4 inputs.
 
     Parameters
     ----------
     plant
-        The plant; its formulas must be smooth.
+        The plant; its formulas may have kinks (abs, min, max), but no jumps.
     t_s
         Sampling time, s; of a plant in discrete time its period.
     q, r
@@ -116,7 +118,7 @@ def certify(
     SettingError
         A setting makes no sense, or the equilibrium is at a bound.
     PlantError
-        No proof can be had of a formula: it has a kink, or no exact form is known of it.
+        No proof can be had of a formula: it jumps, or no exact form is known of it.
     CertificateError
         There is no equilibrium nearby, no law, or no proof.
 
@@ -141,7 +143,7 @@ def certify(
         "u_bounds": _limits("u_bounds", u_bounds, plant.inputs),
         "enlargement": number("enlargement", enlargement),
         "most_boxes": _whole("most_boxes", most_boxes),
-        "trials": _whole("trials", trials),
+        "trials": _whole("trials", trials, least=0),
     }
     with reported(progress) as report:
         return Certificate(_lpvmpc.certify(plant._native, asked, report))

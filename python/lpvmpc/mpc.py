@@ -265,7 +265,7 @@ class Mpc:
         self._settings: dict[str, Any] = {
             "t_s": t_s, "horizon": horizon, "q": q, "r": r, "terminal": terminal,
             "x_bounds": x_bounds, "u_bounds": u_bounds, "state_bounds": state_bounds,
-            "u_ref": u_ref, "rows": tuple(rows), "q_y": q_y, "y_bounds": y_bounds,
+            "u_ref": u_ref, "rows": tuple(_listed("rows", rows, "a list of lpvmpc.Row")), "q_y": q_y, "y_bounds": y_bounds,
             "output_bounds": output_bounds, "r_du": r_du, "du_bounds": du_bounds, "linear_models": linear_models, "nodes": nodes,
             "substeps": substeps, "method": method, "max_programs": max_programs, "first_programs": first_programs,
             "tolerance": tolerance, "estimator": estimator,
@@ -317,16 +317,16 @@ class Mpc:
         cross: ArrayLike | None = None,
         linear_x: ArrayLike | None = None,
         linear_u: ArrayLike | None = None,
-        x_bounds: tuple[ArrayLike, ArrayLike] | None = None,
-        u_bounds: tuple[ArrayLike, ArrayLike] | None = None,
+        x_bounds: Limits | None = None,
+        u_bounds: Limits | None = None,
         rows: Sequence[Sequence[Row]] | None = None,
         disturbance: ArrayLike | None = None,
         parameters: ArrayLike | None = None,
         y_ref: ArrayLike | None = None,
         q_y: ArrayLike | None = None,
-        y_bounds: tuple[ArrayLike, ArrayLike] | None = None,
+        y_bounds: Limits | None = None,
         r_du: ArrayLike | None = None,
-        du_bounds: tuple[ArrayLike, ArrayLike] | None = None,
+        du_bounds: Limits | None = None,
         matrices: tuple[ArrayLike, ...] | None = None,
         scheduling: ArrayLike | None = None,
     ) -> Plan:
@@ -352,9 +352,11 @@ class Mpc:
         linear_x, linear_u
             Linear costs, (n,) or (stages, n), and (m,) or (stages, m).
         x_bounds, u_bounds
-            (lower, upper), each (n,) or (stages, n), and (m,) or (stages, m).
+            (lower, upper), each (n,) or (stages, n), and (m,) or (stages, m); or by name for the whole horizon, as of
+            `Mpc`. Those of states are as soft or hard as its `state_bounds` say.
         rows
-            For each stage its linear constraints, in place of those of the settings.
+            For each stage its linear constraints, in place of those of the settings; from where the list ends its
+            last entry holds.
         disturbance
             What is added to f, in state units per second: (n,) or (stages, n).
         parameters
@@ -365,7 +367,7 @@ class Mpc:
         q_y, r_du
             Other weights, where the settings have any: (k,), (k, k) or (stages, k, k), and so on.
         y_bounds, du_bounds
-            (lower, upper) of outputs and of changes, each (k,) or (stages, k), and (m,) or (stages, m).
+            (lower, upper) of outputs and of changes, each (k,) or (stages, k), and (m,) or (stages, m); or by name.
         matrices
             (A, B) or (A, B, c) of x+ = A x + B u + c over the samples, in place of the plant: (n, n) or
             (stages, n, n), and so on.
@@ -420,7 +422,7 @@ class Mpc:
                     )
             given = [readings.get(name) for name in names]
         else:
-            given = list(readings)  # type: ignore[arg-type]
+            given = list(np.atleast_1d(np.asarray(readings, dtype=object)))
         values = [None if one is None else number("readings", one) for one in given]
         missing = [None if one is None or np.isnan(one) else one for one in values]
         verdicts = self._native.observe(number("t", t), missing)
@@ -431,8 +433,8 @@ class Mpc:
         estimated disturbances.
 
         Its first input must be applied (or `set_last_input` say what was): the estimator counts on it. Stage 0 is when it
-        acts, the delay after the last readings. While there is no estimate, the plan's status says so, and its inputs
-        are those nearest to zero within the bounds. With a certificate, `Plan.is_guaranteed` is then said of the model
+        acts, the delay after the last readings. While there is no estimate, before the first readings, the plan's status
+        is ``"not finite"``, and its inputs are those nearest to zero within the bounds. With a certificate, `Plan.is_guaranteed` is then said of the model
         from that state alone.
 
         Parameters
@@ -490,16 +492,16 @@ class Mpc:
         cross: ArrayLike | None,
         linear_x: ArrayLike | None,
         linear_u: ArrayLike | None,
-        x_bounds: tuple[ArrayLike, ArrayLike] | None,
-        u_bounds: tuple[ArrayLike, ArrayLike] | None,
+        x_bounds: Limits | None,
+        u_bounds: Limits | None,
         rows: Sequence[Sequence[Row]] | None,
         disturbance: ArrayLike | None,
         parameters: ArrayLike | None,
         y_ref: ArrayLike | None,
         q_y: ArrayLike | None,
-        y_bounds: tuple[ArrayLike, ArrayLike] | None,
+        y_bounds: Limits | None,
         r_du: ArrayLike | None,
-        du_bounds: tuple[ArrayLike, ArrayLike] | None,
+        du_bounds: Limits | None,
         matrices: tuple[ArrayLike, ...] | None,
         scheduling: ArrayLike | None,
     ) -> dict[str, Any]:
@@ -515,7 +517,8 @@ class Mpc:
             if given is not None:
                 known[name] = by_stage(name, given, size)
         if scheduling is not None:
-            known["scheduling"] = by_stage("scheduling", scheduling, np.shape(scheduling)[-1])
+            size = (np.shape(scheduling) or (1,))[-1]
+            known["scheduling"] = by_stage("scheduling", scheduling, size)
         for name, given, shape in (
             ("q", q, (n, n)), ("r", r, (m, m)), ("cross", cross, (m, n)), ("q_y", q_y, (k, k)),
             ("r_du", r_du, (m, m)),
@@ -526,17 +529,26 @@ class Mpc:
             raise SettingError("q, r: give both or neither")
         if q is not None:
             known["q"], known["r"] = _equally_long(known["q"], known["r"])
-        for name, bounds, size in (
-            ("x", x_bounds, n), ("u", u_bounds, m), ("y", y_bounds, k), ("du", du_bounds, m),
+        plant = self._plant
+        for name, bounds, signals in (
+            ("x", x_bounds, plant.states), ("u", u_bounds, plant.inputs), ("y", y_bounds, plant.outputs),
+            ("du", du_bounds, _changes(plant)),
         ):  # fmt: skip
             if bounds is not None:
+                size = len(signals)
+                if isinstance(bounds, Mapping):
+                    bounds = _limits(f"{name}_bounds", bounds, signals)
                 lower, upper = _pair(f"{name}_bounds", bounds)
                 known[f"{name}_lower"], known[f"{name}_upper"] = _equally_long(
                     by_stage(f"{name}_bounds, lower", _open(lower, -np.inf), size),
                     by_stage(f"{name}_bounds, upper", _open(upper, np.inf), size),
                 )
         if rows is not None:
-            known["rows"] = [[_row(self._plant, row) for row in stage] for stage in rows]
+            stages = _listed("rows", rows, "a list of lists of lpvmpc.Row, one for each stage")
+            known["rows"] = [
+                [_row(plant, row) for row in _listed("rows", stage, "lists, one for each stage")]
+                for stage in stages
+            ]
         if matrices is not None:
             known |= _models(matrices, n, m)
         return known
@@ -670,8 +682,20 @@ def _to_native(plant: Plant, given: Mapping[str, Any]) -> dict[str, Any]:
     states, inputs = plant.states, plant.inputs
     n, m = len(states), len(inputs)
     settings = dict(given)
-    for name in ("horizon", "nodes", "substeps", "max_programs", "first_programs"):
-        settings[name] = _whole(name, given[name])
+    for name, most in (
+        ("horizon", 1000), ("nodes", 16), ("substeps", 10_000), ("max_programs", 1_000_000), ("first_programs", 1_000_000),
+    ):  # fmt: skip
+        settings[name] = _whole(name, given[name], most=most)
+    for name, known in (
+        ("state_bounds", ("soft", "hard")), ("output_bounds", ("soft", "hard")),
+        ("linear_models", ("own", "motion", "ray")), ("method", ("descent", "fixed")),
+    ):  # fmt: skip
+        by_name = name.endswith("bounds") and isinstance(given[name], Mapping)
+        if not by_name and not (isinstance(given[name], str) and given[name] in known):
+            raise SettingError(
+                f"{name}: it is {given[name]!r}; it must be one of {', '.join(map(repr, known))}"
+                + (", or prices by name" if name.endswith("bounds") else "")
+            )
     for name in ("t_s", "tolerance"):
         settings[name] = number(name, given[name])
     settings["q"], settings["r"] = weight("q", given["q"], n), weight("r", given["r"], m)
@@ -690,7 +714,7 @@ def _to_native(plant: Plant, given: Mapping[str, Any]) -> dict[str, Any]:
         if given[name] is not None:
             settings[name] = weight(name, given[name], size)
     settings["y_bounds"] = _limits("y_bounds", given["y_bounds"], outputs)
-    settings["du_bounds"] = _limits("du_bounds", given["du_bounds"], [Signal(i.name) for i in inputs])
+    settings["du_bounds"] = _limits("du_bounds", given["du_bounds"], _changes(plant))
     if isinstance(given["output_bounds"], Mapping):
         settings["output_bounds"] = _prices("output_bounds", given["output_bounds"], outputs)
     settings["rows"] = [_row(plant, row) for row in given["rows"]]
@@ -698,10 +722,22 @@ def _to_native(plant: Plant, given: Mapping[str, Any]) -> dict[str, Any]:
     return settings
 
 
-def _whole(name: str, given: Any) -> int:
-    if isinstance(given, (int, np.integer)) and not isinstance(given, bool) and given >= 0:
+def _whole(name: str, given: Any, least: int = 1, most: int = 2**31) -> int:
+    if isinstance(given, (int, np.integer)) and not isinstance(given, bool) and least <= given <= most:
         return int(given)
-    raise SettingError(f"{name}: it is {given!r}; it must be a whole number from 1 on")
+    raise SettingError(f"{name}: it is {given!r}; it must be a whole number from {least} to {most}")
+
+
+def _listed(place: str, given: Any, what: str) -> list[Any]:
+    """A list that is none of numbers or words."""
+    if isinstance(given, (list, tuple)):
+        return list(given)
+    raise SettingError(f"{place}: {given!r} is not {what}")
+
+
+def _changes(plant: Plant) -> list[Signal]:
+    """What the inputs are called where their changes are meant: these have no bounds of the plant."""
+    return [Signal(one.name) for one in plant.inputs]
 
 
 def _pair(place: str, given: Any) -> tuple[Any, Any]:
@@ -779,10 +815,16 @@ def _row(plant: Plant, row: Row) -> tuple[Any, ...]:
     if not isinstance(row, Row):
         raise SettingError(f"rows: {row!r} is no lpvmpc.Row")
     place = f"rows, {row.name}"
+    of_x = _coefficients(f"{place}, x", row.x, plant.states)
+    of_u = _coefficients(f"{place}, u", row.u, plant.inputs)
+    if not any(of_x + of_u):
+        raise SettingError(f"{place}: it has no coefficient, of a state (x) or of an input (u)")
+    if row.lower is None and row.upper is None:
+        raise SettingError(f"{place}: it has neither a lower nor an upper bound")
     return (
         str(row.name),
-        _coefficients(f"{place}, x", row.x, plant.states),
-        _coefficients(f"{place}, u", row.u, plant.inputs),
+        of_x,
+        of_u,
         -np.inf if row.lower is None else number(f"{place}, lower", row.lower),
         np.inf if row.upper is None else number(f"{place}, upper", row.upper),
         None if row.soft is None else _price(f"{place}, soft", row.soft),

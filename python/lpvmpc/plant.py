@@ -142,7 +142,8 @@ class Plant:
         states, inputs, outputs
             Their names. Without: what the symbols are called, and ``y_0``, ``y_1``, ...
         parameters
-            The values of `p`, by name in the order of `p`, or as a list.
+            The values of `p`: by the names of its symbols, in any order; by other names, which they are to have, in
+            the order of `p`; or as a list.
         units
             Units by name, for messages and figures.
         bounds
@@ -274,7 +275,7 @@ class Plant:
         model
             The object. ``x_labels``, ``u_labels`` and ``name`` are taken where they are set.
         parameters
-            The values of ``p``, by name in its order or as a list.
+            The values of ``p``, as of `from_casadi`.
         units, bounds, equilibrium
             As of `from_casadi`.
         period
@@ -422,8 +423,9 @@ class Plant:
         tape = Tape()
         derivative = _affine(tape, a_matrix, b_matrix, rest)
         output: list[int] = []
-        if c is not None or d is not None:
-            rows = len(np.asarray(c if c is not None else d))
+        given = [table(of, one, PlantError) for of, one in (("c", c), ("d", d)) if one is not None]
+        if given:
+            rows = len(given[0])
             c_matrix = table("c", c if c is not None else np.zeros((rows, n)), PlantError)
             d_matrix = table("d", d if d is not None else np.zeros((rows, m)), PlantError)
             if c_matrix.shape != (rows, n) or d_matrix.shape != (rows, m):
@@ -484,11 +486,14 @@ class Plant:
                 raise PlantError(
                     f"bounds: of {one} they are {bounds[one]!r}; they must be (lower, upper)"
                 ) from None
-            for key, limit in (("lower", lower), ("upper", upper)):
-                if limit is not None and np.isnan(limit):
+            for key, given in (("lower", lower), ("upper", upper)):
+                if given is None:
+                    continue
+                limit = number(f"bounds, {one}, {key}", given, PlantError)
+                if np.isnan(limit):
                     raise PlantError(f"bounds: the {key} one of {one} is NaN")
-                if limit is not None and np.isfinite(limit):
-                    entry[key] = float(limit)
+                if np.isfinite(limit):
+                    entry[key] = limit
             return entry
 
         data: dict[str, Any] = {
@@ -510,7 +515,10 @@ class Plant:
         if output:
             data["output"] = output
         if equilibrium is not None:
-            x, u = equilibrium
+            try:
+                x, u = equilibrium
+            except (TypeError, ValueError):
+                raise PlantError(f"equilibrium: it is {equilibrium!r}; it must be (x, u)") from None
             data["equilibrium"] = {
                 "x": column("equilibrium, x", x, len(states), PlantError).tolist(),
                 "u": column("equilibrium, u", u, len(inputs), PlantError).tolist(),
@@ -571,7 +579,8 @@ class Plant:
         PlantError
             There is no such parameter, or a value is not finite.
         """
-        return Plant(self._native.with_parameters(list(values.items())))
+        known = [(name, number(f"parameters, {name}", value, PlantError)) for name, value in values.items()]
+        return Plant(self._native.with_parameters(known))
 
     # What it does.
 
@@ -641,8 +650,8 @@ class Plant:
     # Where it goes.
 
     def to_json(self) -> str:
-        """The text of its file, which is read as the same plant to the last bit. Its parameters are those with
-        which the plant was made."""
+        """The text of its file, which is read as the same plant to the last bit, with its parameters as they are
+        now."""
         return self._native.to_json()
 
     def save(self, path: str | PathLike[str], overwrite: bool = False) -> None:
@@ -726,15 +735,32 @@ def _named(place: str, given: Sequence[str] | None, usual: list[str]) -> list[st
 def _values(
     given: Mapping[str, float] | Sequence[float] | None, names: list[str]
 ) -> dict[str, float]:
-    """The values of the parameters by name: the keys of a mapping are their names, in order."""
-    values = list(given.values()) if isinstance(given, Mapping) else list(given or [])
+    """The values of the parameters by name. The keys of a mapping are the `names`, or other ones in their order."""
+    called, values = list(names), list(() if given is None else given)
+    if isinstance(given, Mapping):
+        called, values = [str(one) for one in given], list(given.values())
     if len(values) != len(names):
         raise PlantError(
             f"parameters: there are values for {len(values)}, and p has {len(names)} "
             f"({', '.join(names)})"
         )
-    called = [str(one) for one in given] if isinstance(given, Mapping) else names
-    return dict(zip(called, values, strict=True))
+    found = {
+        name: number(f"parameters, {name}", value, PlantError)
+        for name, value in zip(called, values, strict=True)
+    }
+    for name, value in found.items():
+        if not np.isfinite(value):
+            raise PlantError(f"parameters, {name}: it is {value}; it must be finite")
+    strange = [name for name in found if name not in names]
+    if not strange:
+        return {name: found[name] for name in names}
+    if len(strange) < len(names):
+        # By name or by order? Either may be meant.
+        raise PlantError(
+            f"parameters: p has {', '.join(names)}, and no {', '.join(strange)}; give all values by these names, or "
+            "all by other ones in the order of p"
+        )
+    return found
 
 
 def _by_label(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _lpvmpc
-from ._arrays import column, numbers
+from ._arrays import column, number, numbers
 from ._progress import samples_of
 from .errors import MissingPackageError, SettingError, SimulationError
 from .estimator import Estimator
@@ -38,7 +38,8 @@ class Sensor:
     resolution: float = 0.0
     """Step between two readings; 0 for a continuous one."""
     dropout: float = 0.0
-    """Probability that a sample is missing. A controller without an estimator then has the last one."""
+    """Probability that a sample is missing. A controller without an estimator then has the last one, and before the
+    first one the true state."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ class Jump:
     """A jump of the state: a collision."""
 
     time: float
-    """When, s."""
+    """When, s. At 0 it acts just after the first reading."""
     change: ArrayLike
     """Added to the state, shape (n,)."""
 
@@ -127,7 +128,7 @@ class Run:
 
     @property
     def is_solved(self) -> bool:
-        """Whether every sample had a plan."""
+        """Whether every sample of an `Mpc` had a plan; of a function, which has none, True."""
         return all(plan.is_solved for plan in self.plans)
 
     def cost(self, q: ArrayLike, r: ArrayLike, u_ref: ArrayLike = 0.0) -> float:
@@ -297,11 +298,12 @@ def simulate(
     elif t_s is None:
         raise SettingError("t_s: a controller that is a function needs a sampling time")
     else:
-        period = float(t_s)
+        period = number("t_s", t_s)
     if not callable(controller) and mpc is None:
         raise SettingError(f"controller: {type(controller).__name__} is neither an Mpc nor a function")
     if not (np.isfinite(period) and period > 0):
         raise SettingError(f"t_s: it is {period} s; it must be a positive number of seconds")
+    duration = number("duration", duration)
     if not (np.isfinite(duration) and duration > 0):
         raise SettingError(f"duration: it is {duration} s; it must be a positive number of seconds")
     count = int(np.ceil(duration / period - 1e-9))
@@ -318,10 +320,10 @@ def simulate(
             "sensors": _sensors(sensors, plant, estimator),
             "actuators": _actuators(actuators, inputs),
             "delay": _seconds("delay", delay),
-            "pushes": [_push(i, push, n) for i, push in enumerate(disturbances)],
+            "pushes": [_push(i, push, n) for i, push in enumerate(_pushes(disturbances))],
             "seed": _seed(seed),
-            "relative_tolerance": float(relative_tolerance),
-            "absolute_tolerance": float(absolute_tolerance),
+            "relative_tolerance": number("relative_tolerance", relative_tolerance),
+            "absolute_tolerance": number("absolute_tolerance", absolute_tolerance),
         },
     )
     if mpc is not None:
@@ -463,7 +465,11 @@ def _sensors(
         one = (given or {}).get(signal.name, Sensor())
         row = [1.0 if state.name == signal.name else 0.0 for state in states]
         of = row if any(row) else signal.name
-        found.append((of, one.noise, one.bias, one.resolution, one.dropout, 1, 0))
+        errors = [
+            number(f"sensors, {signal.name}, {part}", getattr(one, part))
+            for part in ("noise", "bias", "resolution", "dropout")
+        ]
+        found.append((of, *errors, 1, 0))
     return found
 
 
@@ -473,16 +479,33 @@ def _actuators(
     _by_name("actuators", given, inputs, Actuator)
     if not given:
         return None
-    all_of_them = [given.get(signal.name, Actuator()) for signal in inputs]
-    return [(one.limit, one.dead_zone, one.lag) for one in all_of_them]
+    all_of_them = [(signal.name, given.get(signal.name, Actuator())) for signal in inputs]
+
+    def part(name: str, one: Actuator, part: str) -> float:
+        return number(f"actuators, {name}, {part}", getattr(one, part))
+
+    return [
+        (part(name, one, "limit"), part(name, one, "dead_zone"), part(name, one, "lag"))
+        for name, one in all_of_them
+    ]
+
+
+def _pushes(given: Any) -> list[Load | Jump]:
+    if isinstance(given, (list, tuple)):
+        return list(given)
+    raise SettingError(f"disturbances: {given!r} is no list of lpvmpc.Load and lpvmpc.Jump")
 
 
 def _push(i: int, push: Load | Jump, n: int) -> tuple[Any, ...]:
     place = f"disturbances[{i}]"
     if isinstance(push, Load):
-        return float(push.start), float(push.end), column(place, push.load, n).tolist()
+        begin, end = number(f"{place}, start", push.start), number(f"{place}, end", push.end)
+        return begin, end, column(place, push.load, n).tolist()
     if isinstance(push, Jump):
-        return float(push.time), column(place, push.change, n).tolist()
+        time = number(f"{place}, time", push.time)
+        if not time >= 0:
+            raise SettingError(f"{place}, time: it is {time} s; the run begins at 0 s")
+        return time, column(place, push.change, n).tolist()
     raise SettingError(f"{place}: {push!r} is neither an lpvmpc.Load nor an lpvmpc.Jump")
 
 

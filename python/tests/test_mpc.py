@@ -128,6 +128,22 @@ def test_soft_bounds_are_exceeded_at_their_price():
     assert any(one.exceeded for one in plan.active)
 
 
+def test_bounds_of_a_step_may_be_given_by_name():
+    plant = cart_pole({"force": (-15, 15)})
+    x_ref = [0.5, 0, 0, 0]
+
+    def plan(x_bounds, u_bounds):
+        mpc = lpvmpc.Mpc(plant, T_S, N, Q, R)
+        return mpc.step([0] * 4, x_ref, x_bounds=x_bounds, u_bounds=u_bounds)
+
+    low = [-np.inf] * 4
+    by_name = plan({"position": (None, 0.1)}, {"force": (-4, 4)})
+    by_place = plan((low, [0.1, np.inf, np.inf, np.inf]), ([-4], [4]))
+    assert (by_name.u == by_place.u).all()
+    assert by_name.x[:, 0].max() < 0.1 + 1e-6 and abs(by_name.u).max() <= 4
+    assert plan(None, None).x[:, 0].max() > 0.11
+
+
 def test_a_row_holds():
     plant = double_integrator()
     row = lpvmpc.Row("braking", x={"position": 1, "speed": 1}, upper=0.7)
@@ -278,7 +294,20 @@ def make(**changes):
         (lambda: make(rows=[lpvmpc.Row("a", x={"height": 1})]), "there is no 'height'"),
         (lambda: make(rows=[lpvmpc.Row("a", x=[1, 0, 0, 0], lower=2, upper=1)]), "a"),
         (lambda: make(linear_models="magic"), "linear_models"),
+        (lambda: make(linear_models=None), "linear_models: it is None; it must be one of 'own', 'motion', 'ray'"),
+        (lambda: make(state_bounds=None), "state_bounds: it is None"),
+        (lambda: make(horizon=10**30), "from 1 to 1000"),
         (lambda: make(linear_models="ray", nodes=99), "nodes"),
+        (lambda: make(nodes=0), "nodes: it is 0; it must be a whole number from 1 to 16"),
+        (lambda: make(substeps=10**5), "substeps"),
+        (lambda: make(rows=lpvmpc.Row("a", x=[1, 0, 0, 0], upper=1)), "rows: Row.* is not a list"),
+        (lambda: make(rows=[lpvmpc.Row("a", x=[1, 0, 0, 0])]), "neither a lower nor an upper bound"),
+        (lambda: make(rows=[lpvmpc.Row("a", upper=1)]), "no coefficient"),
+        (lambda: make().step([0] * 4, rows=[lpvmpc.Row("a", x=[1, 0, 0, 0], upper=1)]), "lists, one for each stage"),
+        (lambda: make().step([0] * 4, scheduling=1.0), "scheduling"),
+        (lambda: make().step([0] * 4, x_bounds={"height": (0, 1)}), "there is no 'height'"),
+        (lambda: lpvmpc.lqr(cart_pole(), T_S, Q, R, x=[0, 0.2, 0, 0]), "does not stand at"),
+        (lambda: lpvmpc.lqr(cart_pole(), "fast", Q, R), "t_s: it is 'fast'"),
         (lambda: make(substeps=0), "."),
         (lambda: make(method="newton"), "method"),
         (lambda: make(max_programs=0), "."),

@@ -164,11 +164,31 @@ def test_of_matrices():
         np.testing.assert_allclose(plant.g(x, u), c @ x + d @ u, rtol=1e-13, atol=1e-13)
 
 
+def rod(parameters):
+    """A rod of a mass and a length, symbols with these names."""
+    mass, length = ca.SX.sym("mass"), ca.SX.sym("length")
+    f = ca.vertcat(X[1], 9.81 / length * ca.sin(X[0]) + U / (mass * length**2))
+    return lpvmpc.Plant.from_casadi(X, U, f, p=[mass, length], parameters=parameters)
+
+
+def test_parameters_are_found_by_their_names():
+    by_name = rod({"length": 0.5, "mass": 2.0})
+    assert by_name == rod({"mass": 2.0, "length": 0.5}) == rod(np.array([2.0, 0.5]))
+    assert by_name.parameters == {"mass": 2.0, "length": 0.5}
+    assert by_name.f([0, 0], [1.0]).tolist() == [0.0, 2.0]
+    # Other names are what they are to be called.
+    renamed = rod({"m": 2.0, "l": 0.5})
+    assert renamed.parameters == {"m": 2.0, "l": 0.5}
+    assert renamed.f([0, 0], [1.0]).tolist() == [0.0, 2.0]
+
+
 def test_files_and_pickles_hold_the_same_plant(tmp_path):
     plant = cart_pole()
     plant.save(tmp_path / "plant.json")
     assert lpvmpc.Plant.load(tmp_path / "plant.json") == plant
     other = plant.with_parameters(pole_mass=0.4)
+    other.save(tmp_path / "plant.json", overwrite=True)
+    assert lpvmpc.Plant.load(tmp_path / "plant.json") == other != plant
     again = pickle.loads(pickle.dumps(other))
     assert again == other and again != plant and hash(again) == hash(other)
     assert (again.f([0, 1, 0, 0], [1]) == other.f([0, 1, 0, 0], [1])).all()
@@ -205,6 +225,14 @@ F = ca.vertcat(X[1], U)
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, equilibrium=([0, 1], [0])), "equilibrium"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, equilibrium=([0], [0])), "equilibrium, x"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, parameters={"m": 1}), "parameters"),
+        (lambda: rod({"mass": 2, "long": 0.5}), "p has mass, length, and no long"),
+        (lambda: rod(["a", 1]), "parameters, mass: it is 'a'; it must be a number"),
+        (lambda: rod([np.nan, 1]), "parameters, mass: it is nan; it must be finite"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, F, bounds={"u": ("a", 1)}), "bounds, u, lower: it is 'a'"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, F, equilibrium=[0, 0, 0]), r"it must be \(x, u\)"),
+        (lambda: lpvmpc.Plant.from_matrices([[0]], [[1]], c=1), "c: it has . dimensions"),
+        (lambda: cart_pole().with_parameters(cart_mass="a"), "parameters, cart_mass: it is 'a'"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, ca.vertcat(X[1], ca.fmod(U, 2))), "operation fmod"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F * ca.inf), "not finite"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, ca.vertcat(X[1], ca.erf(U))), "no counterpart"),
         (lambda: lpvmpc.Plant.from_matrices([[0, 1]], [[1]]), "square"),

@@ -1,11 +1,12 @@
 //! The plant near a point, as matrices.
 
+use crate::controller_settings::AT_REST;
 use crate::error::MpcError;
 use crate::mpc::{MOST_INPUTS, MOST_STATES};
 use lpvmpc::{AlongMotion, LpvModel};
 use lpvmpc_design::{Lqr, lqr_discrete, zero_order_hold};
 use lpvmpc_plant::{Plant, PlantError, SizedPlant};
-use nalgebra::{DMatrix, SVector};
+use nalgebra::{DMatrix, DVector, SVector};
 
 /// The derivatives A (n x n) and B (n x m) of f, or of F of a plant in discrete time, at the state `x` and the input `u`.
 ///
@@ -16,17 +17,28 @@ pub fn jacobian(
     x: &[f64],
     u: &[f64],
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), PlantError> {
+    let (_, a, b) = tangent(plant, x, u)?;
+    Ok((a, b))
+}
+
+/// f, and its derivatives.
+fn tangent(
+    plant: &Plant,
+    x: &[f64],
+    u: &[f64],
+) -> Result<(DVector<f64>, DMatrix<f64>, DMatrix<f64>), PlantError> {
     const BOTH: usize = MOST_STATES + MOST_INPUTS;
     // For its checks of the sizes.
     plant.output(x, u)?;
     let placed = SizedPlant::<MOST_STATES, MOST_INPUTS>::new(plant.clone())?;
     let filled = |values: &[f64], i: usize| values.get(i).copied().unwrap_or(0.0);
-    let (a, b) = AlongMotion::<_, BOTH>(placed).jacobian(
+    let (f, a, b) = AlongMotion::<_, BOTH>(placed).tangent(
         &SVector::from_fn(|i, _| filled(x, i)),
         &SVector::from_fn(|i, _| filled(u, i)),
     );
     let (n, m) = (x.len(), u.len());
     Ok((
+        DVector::from_fn(n, |i, _| f[i]),
         DMatrix::from_fn(n, n, |i, j| a[(i, j)]),
         DMatrix::from_fn(n, m, |i, j| b[(i, j)]),
     ))
@@ -36,7 +48,8 @@ pub fn jacobian(
 /// the input held; `q` (n x n) and `r` (m x m) weigh each sample.
 ///
 /// # Errors
-/// A sampling time or a size that does not fit the plant, or there is no such regulator.
+/// A sampling time or a size that does not fit the plant, the plant does not stand there (a state changes by more than
+/// [`AT_REST`] per second or period), or there is no such regulator.
 pub fn lqr(
     plant: &Plant,
     t_s: f64,
@@ -53,7 +66,19 @@ pub fn lqr(
         let fault = format!("it is {t_s} s; the plant is in discrete time, with {period} s");
         return Err(MpcError::new("t_s", fault));
     }
-    let (a, b) = jacobian(plant, x, u)?;
+    let (mut change, a, b) = tangent(plant, x, u)?;
+    let discrete = plant.period().is_some();
+    if discrete {
+        change -= DVector::from_row_slice(x);
+    }
+    if !change.iter().all(|one| one.abs() <= AT_REST) {
+        let largest = change.amax();
+        let fault = format!(
+            "the plant does not stand at {x:?} under {u:?}: a state changes by {largest} per {}",
+            if discrete { "period" } else { "second" }
+        );
+        return Err(MpcError::new("x, u", fault));
+    }
     let refused = |error: &dyn std::fmt::Display| MpcError::new("lqr", error.to_string());
     let (a_d, b_d) = match plant.period() {
         None => zero_order_hold(&a, &b, t_s).map_err(|error| refused(&error))?,

@@ -67,10 +67,14 @@ impl Plan {
         self.u.row(0).iter().copied().collect()
     }
 
-    /// The active bounds in words: "force >= -10 N at stages 0 to 6", or "no active bound".
+    /// The active bounds in words: "force >= -10 N at stages 0 to 6", or "no active bound". One that the plan does not
+    /// keep says so: "position <= 1 m (exceeded) at stage 4".
     pub fn active_bounds(&self) -> String {
-        let pairs = self.active.iter();
-        let words = crate::words::stages(pairs.map(|one| (one.bound.clone(), one.stage)));
+        let pairs = self.active.iter().map(|one| match one.exceeded {
+            true => (format!("{} (exceeded)", one.bound), one.stage),
+            false => (one.bound.clone(), one.stage),
+        });
+        let words = crate::words::stages(pairs);
         match words.is_empty() {
             true => "no active bound".to_owned(),
             false => words.join(", "),

@@ -23,7 +23,7 @@ pub struct Plant {
 impl PartialEq for Plant {
     /// The same formulas with the same parameters.
     fn eq(&self, other: &Self) -> bool {
-        self.data() == other.data() && self.parameters() == other.parameters()
+        self.present_data() == other.present_data()
     }
 }
 
@@ -153,10 +153,18 @@ impl Plant {
         Self::from_json(&file::text(path.as_ref())?)
     }
 
-    /// The text of its file, which is read as the same plant to the last bit. Its parameters are those
-    /// of [`Self::data`].
+    /// The text of its file, which is read as the same plant to the last bit, with the parameters as they are now.
     pub fn to_json(&self) -> String {
-        file::write(self.data())
+        file::write(&self.present_data())
+    }
+
+    /// [`Self::data`] with the parameters as they are now.
+    fn present_data(&self) -> PlantData {
+        let mut data = self.data().clone();
+        for (parameter, value) in data.parameters.iter_mut().zip(self.parameters()) {
+            parameter.value = *value;
+        }
+        data
     }
 
     /// Writes its file.
@@ -178,7 +186,7 @@ impl Plant {
         source::print(self)
     }
 
-    /// What stands in its file: names, units, bounds, formulas.
+    /// What it was made from: names, units, bounds, formulas, and the values that parameters had then.
     pub fn data(&self) -> &PlantData {
         &self.formulas.data
     }

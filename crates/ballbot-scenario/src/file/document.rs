@@ -144,6 +144,7 @@ impl Document {
 
     fn read(&self, tree: &Value, change: &str) -> Result<Scenario, ScenarioError> {
         if let Ok(scenario) = Scenario::deserialize(tree.clone()) {
+            scenario.check_tables(tree)?;
             return Ok(scenario);
         }
         // Once more as a text, whose messages have lines.

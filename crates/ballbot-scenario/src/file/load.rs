@@ -38,10 +38,46 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError::Syntax`] with line and column.
     pub fn parse(text: &str, origin: &str) -> Result<Self, ScenarioError> {
-        toml::from_str(text).map_err(|error| ScenarioError::Syntax {
+        let syntax = |error: toml::de::Error| ScenarioError::Syntax {
             origin: origin.to_owned(),
             message: words::toml_message(&error.to_string()),
-        })
+        };
+        let scenario: Self = toml::from_str(text).map_err(syntax)?;
+        scenario.check_tables(&Value::Table(text.parse().map_err(syntax)?))?;
+        Ok(scenario)
+    }
+
+    /// Where this scenario, as it was `given`, has a list for a table: the entries of a list would be taken for the
+    /// table's keys in the order in which the program has them.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Value`], with the key.
+    pub(crate) fn check_tables(&self, given: &Value) -> Result<(), ScenarioError> {
+        match Value::try_from(self) {
+            Ok(all) => check_tables(given, &all, ""),
+            Err(error) => Err(ScenarioError::value("", "", error.to_string())),
+        }
+    }
+}
+
+fn check_tables(given: &Value, all: &Value, key: &str) -> Result<(), ScenarioError> {
+    let below = |part: &str| match key {
+        "" => part.to_owned(),
+        key => format!("{key}.{part}"),
+    };
+    match (given, all) {
+        (Value::Array(_), Value::Table(table)) => {
+            let keys: Vec<&str> = table.keys().map(String::as_str).collect();
+            let problem = format!("it must be a table with the keys {}", keys.join(", "));
+            Err(ScenarioError::value(key, given.to_string(), problem))
+        }
+        (Value::Table(given), Value::Table(all)) => given
+            .iter()
+            .filter_map(|(part, given)| Some((part, given, all.get(part)?)))
+            .try_for_each(|(part, given, all)| check_tables(given, all, &below(part))),
+        (Value::Array(given), Value::Array(all)) => { given.iter().zip(all).enumerate() }
+            .try_for_each(|(i, (given, all))| check_tables(given, all, &below(&i.to_string()))),
+        _ => Ok(()),
     }
 }
 

@@ -55,6 +55,26 @@ fn what_is_not_given_has_its_default() {
     assert_eq!(document.value("controller.nothing"), None);
 }
 
+/// Whose entries would be taken for the table's keys in the order in which they happen to be declared.
+#[test]
+fn a_list_in_place_of_a_table_is_refused() {
+    let mut document = two_setpoints();
+    let list = Value::Array(vec![Value::Float(0.1); 5]);
+    let of_change = document.set(&[("initial_state", list.clone())]);
+    assert_eq!(document, two_setpoints());
+    let mut table: toml::Table = document.text().parse().unwrap();
+    table.insert("initial_state".to_owned(), list);
+    let of_file = Scenario::parse(&table.to_string(), "a file");
+    for message in [
+        of_change.unwrap_err().to_string(),
+        of_file.unwrap_err().to_string(),
+    ] {
+        for said in ["initial_state", "it must be a table", "theta_rad"] {
+            assert!(message.contains(said), "{message}");
+        }
+    }
+}
+
 #[test]
 fn what_makes_no_scenario_changes_nothing_and_is_told_with_the_nearest_word() {
     let mut document = two_setpoints();

@@ -1,8 +1,8 @@
 //! What a step is told stage by stage.
 
 use crate::plants::{cart_pole, chain};
-use lpvmpc_any::{Limits, LinearModels, Mpc, MpcSettings, Preview};
-use nalgebra::DVector;
+use lpvmpc_any::{Limits, LinearModels, Mpc, MpcSettings, Preview, StateBounds, lqr};
+use nalgebra::{DMatrix, DVector};
 
 fn settings() -> MpcSettings {
     MpcSettings {
@@ -37,6 +37,68 @@ fn a_disturbance_that_is_known_ahead_is_met_before_it_comes() {
         calm.u,
         calm.cost
     );
+}
+
+/// They are as soft as those of the settings: hard, they would leave no plan from outside of them.
+#[test]
+fn bounds_of_states_that_are_told_are_soft_unless_the_settings_say_otherwise() {
+    let told = Preview {
+        x_bounds: vec![Limits {
+            lower: vec![f64::NEG_INFINITY; 4],
+            upper: vec![0.2, f64::INFINITY, f64::INFINITY, f64::INFINITY],
+        }],
+        ..Preview::default()
+    };
+    let outside = [0.5, 0.0, 1.0, 0.0];
+    let mut mpc = Mpc::new(&cart_pole(), &settings()).unwrap();
+    let plan = mpc.step(&outside, &told).unwrap();
+    assert!(plan.is_solved(), "{}", plan.status);
+    let words = plan.active_bounds();
+    assert!(words.contains("position <= 0.2 m (exceeded)"), "{words}");
+    // Where it can be kept, it is kept to rounding.
+    let reachable = Preview {
+        x_ref: Preview::to(&[0.5, 0.0, 0.0, 0.0]).x_ref,
+        ..told.clone()
+    };
+    mpc.reset();
+    let plan = mpc.step(&[0.0; 4], &reachable).unwrap();
+    assert!(plan.is_solved(), "{}", plan.status);
+    assert!(plan.x.column(0).max() <= 0.2 + 1e-6, "{}", plan.x);
+    assert!(plan.x.column(0).max() >= 0.2 - 1e-6, "{}", plan.x);
+    // The same bounds in the settings make the same plan.
+    let set = MpcSettings {
+        x_bounds: Some(told.x_bounds[0].clone()),
+        ..settings()
+    };
+    let mut other = Mpc::new(&cart_pole(), &set).unwrap();
+    let same = other.step(&[0.0; 4], &Preview::to(&[0.5, 0.0, 0.0, 0.0]));
+    assert!((same.unwrap().u - plan.u).amax() < 1e-6);
+
+    let hard = MpcSettings {
+        state_bounds: StateBounds::Hard,
+        ..settings()
+    };
+    let mut mpc = Mpc::new(&cart_pole(), &hard).unwrap();
+    let plan = mpc.step(&outside, &told).unwrap();
+    assert!(!plan.is_solved(), "{}", plan.status);
+}
+
+/// With equal weights, about a state in which the pole leans.
+#[test]
+fn a_regulator_is_about_a_steady_state() {
+    let (q, r) = (DMatrix::identity(4, 4), DMatrix::identity(1, 1));
+    let about = |angle: f64| {
+        lqr(
+            &cart_pole(),
+            0.05,
+            (&q, &r),
+            (&[0.0, angle, 0.0, 0.0], &[0.0]),
+        )
+    };
+    assert!(about(0.0).is_ok());
+    let message = about(0.1).unwrap_err().to_string();
+    assert!(message.contains("does not stand at"), "{message}");
+    assert!(about(f64::NAN).is_err());
 }
 
 #[test]
