@@ -529,24 +529,13 @@ class Mpc:
             raise SettingError("q, r: give both or neither")
         if q is not None:
             known["q"], known["r"] = _equally_long(known["q"], known["r"])
-        plant = self._plant
-        for name, bounds, signals in (
-            ("x", x_bounds, plant.states), ("u", u_bounds, plant.inputs), ("y", y_bounds, plant.outputs),
-            ("du", du_bounds, _changes(plant)),
-        ):  # fmt: skip
+        for name, bounds in (("x", x_bounds), ("u", u_bounds), ("y", y_bounds), ("du", du_bounds)):
             if bounds is not None:
-                size = len(signals)
-                if isinstance(bounds, Mapping):
-                    bounds = _limits(f"{name}_bounds", bounds, signals)
-                lower, upper = _pair(f"{name}_bounds", bounds)
-                known[f"{name}_lower"], known[f"{name}_upper"] = _equally_long(
-                    by_stage(f"{name}_bounds, lower", _open(lower, -np.inf), size),
-                    by_stage(f"{name}_bounds, upper", _open(upper, np.inf), size),
-                )
+                known |= _bounds(self._plant, name, bounds)
         if rows is not None:
             stages = _listed("rows", rows, "a list of lists of lpvmpc.Row, one for each stage")
             known["rows"] = [
-                [_row(plant, row) for row in _listed("rows", stage, "lists, one for each stage")]
+                [_row(self._plant, row) for row in _listed("rows", stage, "lists, one for each stage")]
                 for stage in stages
             ]
         if matrices is not None:
@@ -779,6 +768,22 @@ def _limits(
         column(f"{place}, lower", _open(lower, -np.inf), size).tolist(),
         column(f"{place}, upper", _open(upper, np.inf), size).tolist(),
     )
+
+
+def _bounds(plant: Plant, name: str, given: Limits) -> dict[str, Array]:
+    """Bounds by stage, or by name for all stages, as the native half takes them."""
+    signals = {
+        "x": plant.states, "u": plant.inputs, "y": plant.outputs, "du": _changes(plant),
+    }[name]  # fmt: skip
+    place, size = f"{name}_bounds", len(signals)
+    if isinstance(given, Mapping):
+        given = _limits(place, given, signals) or ([], [])
+    lower, upper = _pair(place, given)
+    lower, upper = _equally_long(
+        by_stage(f"{place}, lower", _open(lower, -np.inf), size),
+        by_stage(f"{place}, upper", _open(upper, np.inf), size),
+    )
+    return {f"{name}_lower": lower, f"{name}_upper": upper}
 
 
 def _price(place: str, price: Any) -> tuple[float, float]:

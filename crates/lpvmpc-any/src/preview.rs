@@ -20,7 +20,7 @@ pub struct Preview {
     pub linear_x: Vec<DVector<f64>>,
     /// Linear costs of the inputs, in cost per unit.
     pub linear_u: Vec<DVector<f64>>,
-    /// Bounds of the states.
+    /// Bounds of the states, as soft or hard as [`MpcSettings::state_bounds`](crate::MpcSettings::state_bounds) says.
     pub x_bounds: Vec<Limits>,
     /// Bounds of the inputs.
     pub u_bounds: Vec<Limits>,
