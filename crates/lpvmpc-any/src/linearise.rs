@@ -21,12 +21,11 @@ pub fn jacobian(
     Ok((a, b))
 }
 
-/// f, and its derivatives.
-fn tangent(
-    plant: &Plant,
-    x: &[f64],
-    u: &[f64],
-) -> Result<(DVector<f64>, DMatrix<f64>, DMatrix<f64>), PlantError> {
+/// f, A and B.
+type Tangent = (DVector<f64>, DMatrix<f64>, DMatrix<f64>);
+
+/// f and its derivatives.
+fn tangent(plant: &Plant, x: &[f64], u: &[f64]) -> Result<Tangent, PlantError> {
     const BOTH: usize = MOST_STATES + MOST_INPUTS;
     // For its checks of the sizes.
     plant.output(x, u)?;
