@@ -43,6 +43,8 @@ def plot_run(run: Run, signals: Sequence[str] | None, figure: Figure | None) -> 
     for name in names:
         if name not in run._names():
             raise SettingError(f"signals: there is no {name!r}; there are {', '.join(run._names())}")
+    if not names:
+        raise SettingError("signals: there are none to be shown")
     figure = new_figure(figure, (7.0, 1.0 + 1.35 * len(names)))
     panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for panel, name in zip(panels, names, strict=True):

@@ -15,7 +15,7 @@ from .mpc import Limits, _limits, _whole
 from .plant import Plant
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lqr:
     """A sampled linear-quadratic regulator, u = u_eq - K (x - x_eq)."""
 
@@ -149,7 +149,7 @@ def certify(
         return Certificate(_lpvmpc.certify(plant._native, asked, report))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Verified:
     """What `verify` has proved, beyond that every claim holds."""
 

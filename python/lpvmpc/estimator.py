@@ -67,7 +67,7 @@ class Estimator:
     """Which readings are not believed; all are, as a rule."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Estimate:
     """What a filter knows at the last readings."""
 

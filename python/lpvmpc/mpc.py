@@ -74,7 +74,7 @@ class ActiveBound:
     """Whether it is a soft bound that is exceeded."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
 class Plan:
     """The plan of a sample: what `Mpc.step` answers.
 

@@ -55,7 +55,7 @@ class Embedding:
     """c(s, p), shape (n,); none without."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SteadyState:
     """Where a plant stands: f(x, u) = 0, or in discrete time f(x, u) = x."""
 

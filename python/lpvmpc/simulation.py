@@ -76,7 +76,7 @@ class Jump:
     """Added to the state, shape (n,)."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Run:
     """A closed loop from beginning to end, K samples long."""
 

@@ -187,6 +187,14 @@ def test_what_makes_no_sense_is_refused(call, error, message):
         call(simulate)
 
 
+def test_runs_and_plans_are_equal_to_themselves():
+    run, other = (lpvmpc.simulate(cart_pole(), controller(), [0] * 4, 0.2) for _ in range(2))
+    assert run == run and run != other and run.plans[0] != other.plans[0]
+    assert len({run, other, run.plans[0]}) == 3
+    with pytest.raises(lpvmpc.SettingError, match="signals: there are none"):
+        run.plot([])
+
+
 def test_controllers_that_make_no_sense():
     plant = double_integrator()
     with pytest.raises(lpvmpc.SettingError, match="for 4 states"):

@@ -18,7 +18,7 @@ from ..errors import ScenarioError, SettingError
 from ._values import pandas, plain
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class CampaignResult:
     """What the runs of a campaign gave."""
 

@@ -28,7 +28,7 @@ Config = Union[str, PathLike[str], Mapping[str, Any]]
 """The path of a configuration (TOML), or its keys and values."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A plane's segments, measured and simulated with the identified robot, one after the other, N rows together."""
 
@@ -46,7 +46,7 @@ class Fit:
     """Number of the log, from 0 on, shape (N,)."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class IdentifiedRobot:
     """A robot that explains logs, and what speaks for and against it."""
 
@@ -165,8 +165,8 @@ def identify(
     SettingError
         The configuration makes no sense.
     """
-    if isinstance(recordings, (str, PathLike, Mapping)):
-        raise SettingError("recordings: it must be a list of recordings")
+    if not isinstance(recordings, (list, tuple)):
+        raise SettingError("recordings: it must be a list of recordings, of one too")
     parts = [_part(i, part, len(recordings)) for i, part in enumerate(leave_out)]
     with TemporaryDirectory(prefix="lpvmpc-") as folder, reported(progress) as report:
         paths = [_path(i, one, folder) for i, one in enumerate(recordings)]
@@ -187,7 +187,7 @@ def identification_example() -> str:
     return _lpvmpc.identification_example()
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Excitation:
     """A torque that makes a robot move so that its log tells the parameters; it is added to that of the loop."""
 

@@ -21,7 +21,7 @@ STATES = ("phi", "theta", "phi_dot", "theta_dot")
 """The columns of a state: turn of the ball and tilt of the body, rad, and their rates, rad/s."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SensorLog:
     """What the sensors of a plane delivered, at their own rate, L rows long."""
 
@@ -37,7 +37,7 @@ class SensorLog:
     """The same as the text of a file, as ``ballbot simulate --log`` writes it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Motors:
     """The three motors of a robot that moves in two planes, M rows long."""
 
@@ -53,7 +53,7 @@ class Motors:
     """Largest torque of a motor, N m, where the planes share them."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class PlaneRun:
     """One plane's closed loop, K samples long."""
 
@@ -118,7 +118,7 @@ class PlaneRun:
         return f"<PlaneRun {self.name!r}: {len(self.input)} samples, {self.t[-1]:g} s>"
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Run:
     """A closed loop of a scenario: of one plane, or of both."""
 
