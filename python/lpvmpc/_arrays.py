@@ -31,6 +31,13 @@ def number(place: str, given: Any, error: type[Exception] = SettingError) -> flo
         raise error(f"{place}: it is {given!r}; it must be a number") from None
 
 
+def listed(place: str, given: Any, what: str) -> list[Any]:
+    """A list, of anything but numbers; `what` it must be is for the message."""
+    if isinstance(given, (list, tuple)):
+        return list(given)
+    raise SettingError(f"{place}: {given!r} is not {what}")
+
+
 def column(
     place: str, given: ArrayLike, size: int, error: type[Exception] = SettingError
 ) -> Array:

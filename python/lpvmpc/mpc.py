@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _lpvmpc
-from ._arrays import by_stage, column, matrices_by_stage, number, weight
+from ._arrays import by_stage, column, listed, matrices_by_stage, number, weight
 from .certificate import Certificate
 from .errors import SettingError
 from .estimator import Estimate, Estimator
@@ -265,7 +265,7 @@ class Mpc:
         self._settings: dict[str, Any] = {
             "t_s": t_s, "horizon": horizon, "q": q, "r": r, "terminal": terminal,
             "x_bounds": x_bounds, "u_bounds": u_bounds, "state_bounds": state_bounds,
-            "u_ref": u_ref, "rows": tuple(_listed("rows", rows, "a list of lpvmpc.Row")), "q_y": q_y, "y_bounds": y_bounds,
+            "u_ref": u_ref, "rows": tuple(listed("rows", rows, "a list of lpvmpc.Row")), "q_y": q_y, "y_bounds": y_bounds,
             "output_bounds": output_bounds, "r_du": r_du, "du_bounds": du_bounds, "linear_models": linear_models, "nodes": nodes,
             "substeps": substeps, "method": method, "max_programs": max_programs, "first_programs": first_programs,
             "tolerance": tolerance, "estimator": estimator,
@@ -533,9 +533,9 @@ class Mpc:
             if bounds is not None:
                 known |= _bounds(self._plant, name, bounds)
         if rows is not None:
-            stages = _listed("rows", rows, "a list of lists of lpvmpc.Row, one for each stage")
+            stages = listed("rows", rows, "a list of lists of lpvmpc.Row, one for each stage")
             known["rows"] = [
-                [_row(self._plant, row) for row in _listed("rows", stage, "lists, one for each stage")]
+                [_row(self._plant, row) for row in listed("rows", stage, "lists, one for each stage")]
                 for stage in stages
             ]
         if matrices is not None:
@@ -715,13 +715,6 @@ def _whole(name: str, given: Any, least: int = 1, most: int = 2**31) -> int:
     if isinstance(given, (int, np.integer)) and not isinstance(given, bool) and least <= given <= most:
         return int(given)
     raise SettingError(f"{name}: it is {given!r}; it must be a whole number from {least} to {most}")
-
-
-def _listed(place: str, given: Any, what: str) -> list[Any]:
-    """A list that is none of numbers or words."""
-    if isinstance(given, (list, tuple)):
-        return list(given)
-    raise SettingError(f"{place}: {given!r} is not {what}")
 
 
 def _changes(plant: Plant) -> list[Signal]:

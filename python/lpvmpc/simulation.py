@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _lpvmpc
-from ._arrays import column, number, numbers
+from ._arrays import column, listed, number, numbers
 from ._progress import samples_of
 from .errors import MissingPackageError, SettingError, SimulationError
 from .estimator import Estimator
@@ -312,6 +312,7 @@ def simulate(
     estimator = None if mpc is None else mpc.estimator
     acts = 0.0 if estimator is None else float(estimator.delay)
     ahead = None if mpc is None else _reference(x_ref, n, count + horizon + 1, period, acts)
+    pushes = listed("disturbances", disturbances, "a list of lpvmpc.Load and lpvmpc.Jump")
     world = _lpvmpc.World(
         plant._native,
         column("x0", x0, n),
@@ -319,8 +320,8 @@ def simulate(
             "period": period,
             "sensors": _sensors(sensors, plant, estimator),
             "actuators": _actuators(actuators, inputs),
-            "delay": _seconds("delay", delay),
-            "pushes": [_push(i, push, n) for i, push in enumerate(_pushes(disturbances))],
+            "delay": number("delay", delay),
+            "pushes": [_push(i, push, n) for i, push in enumerate(pushes)],
             "seed": _seed(seed),
             "relative_tolerance": number("relative_tolerance", relative_tolerance),
             "absolute_tolerance": number("absolute_tolerance", absolute_tolerance),
@@ -479,21 +480,15 @@ def _actuators(
     _by_name("actuators", given, inputs, Actuator)
     if not given:
         return None
-    all_of_them = [(signal.name, given.get(signal.name, Actuator())) for signal in inputs]
-
-    def part(name: str, one: Actuator, part: str) -> float:
-        return number(f"actuators, {name}, {part}", getattr(one, part))
-
+    each = [(signal.name, given.get(signal.name, Actuator())) for signal in inputs]
     return [
-        (part(name, one, "limit"), part(name, one, "dead_zone"), part(name, one, "lag"))
-        for name, one in all_of_them
+        (
+            number(f"actuators, {name}, limit", one.limit),
+            number(f"actuators, {name}, dead_zone", one.dead_zone),
+            number(f"actuators, {name}, lag", one.lag),
+        )
+        for name, one in each
     ]
-
-
-def _pushes(given: Any) -> list[Load | Jump]:
-    if isinstance(given, (list, tuple)):
-        return list(given)
-    raise SettingError(f"disturbances: {given!r} is no list of lpvmpc.Load and lpvmpc.Jump")
 
 
 def _push(i: int, push: Load | Jump, n: int) -> tuple[Any, ...]:
@@ -507,13 +502,6 @@ def _push(i: int, push: Load | Jump, n: int) -> tuple[Any, ...]:
             raise SettingError(f"{place}, time: it is {time} s; the run begins at 0 s")
         return time, column(place, push.change, n).tolist()
     raise SettingError(f"{place}: {push!r} is neither an lpvmpc.Load nor an lpvmpc.Jump")
-
-
-def _seconds(name: str, given: Any) -> float:
-    try:
-        return float(given)
-    except (TypeError, ValueError):
-        raise SettingError(f"{name}: it is {given!r}; it must be a number of seconds") from None
 
 
 def _seed(given: Any) -> int:

@@ -306,7 +306,7 @@ def make(**changes):
         (lambda: make().step([0] * 4, rows=[lpvmpc.Row("a", x=[1, 0, 0, 0], upper=1)]), "lists, one for each stage"),
         (lambda: make().step([0] * 4, scheduling=1.0), "scheduling"),
         (lambda: make().step([0] * 4, x_bounds={"height": (0, 1)}), "there is no 'height'"),
-        (lambda: lpvmpc.lqr(cart_pole(), T_S, Q, R, x=[0, 0.2, 0, 0]), "does not stand at"),
+        (lambda: lpvmpc.lqr(cart_pole(), T_S, Q, R, x=[0, 0.2, 0, 0]), "does not stand where"),
         (lambda: lpvmpc.lqr(cart_pole(), "fast", Q, R), "t_s: it is 'fast'"),
         (lambda: make(substeps=0), "."),
         (lambda: make(method="newton"), "method"),

@@ -175,7 +175,7 @@ def diverging(t, x):
         (lambda s: s([0] * 4, 1.0, relative_tolerance="fine"), lpvmpc.SettingError, "relative_tolerance: it is 'fine'"),
         (lambda s: s([0] * 4, "long"), lpvmpc.SettingError, "duration: it is 'long'"),
         (lambda s: s([0] * 4, 1.0, sensors={"tilt": lpvmpc.Sensor("much")}), lpvmpc.SettingError, "sensors, tilt, noise"),
-        (lambda s: s([0] * 4, 1.0, disturbances=lpvmpc.Jump(1, [0] * 4)), lpvmpc.SettingError, "no list of"),
+        (lambda s: s([0] * 4, 1.0, disturbances=lpvmpc.Jump(1, [0] * 4)), lpvmpc.SettingError, "is not a list of"),
         (lambda s: s([0] * 4, 1.0, disturbances=[lpvmpc.Jump(-1, [0] * 4)]), lpvmpc.SettingError, r"\[0\], time: it is -1"),
     ],
 )  # fmt: skip

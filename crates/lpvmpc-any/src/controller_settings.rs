@@ -137,6 +137,24 @@ pub(crate) fn limits(given: &Option<Limits>, signals: &[Signal]) -> Limits {
     }
 }
 
+/// Refuses a point (`x`, `u`) at which states `change`, per second or per period, by more than [`AT_REST`].
+pub(crate) fn check_rest(
+    change: &[f64],
+    (x, u): (&[f64], &[f64]),
+    discrete: bool,
+) -> Result<(), String> {
+    // A change that is no number is none that is small.
+    let moves = change.iter().find(|one| !(one.abs() <= AT_REST));
+    let Some(moves) = moves else {
+        return Ok(());
+    };
+    let per = if discrete { "period" } else { "second" };
+    Err(format!(
+        "the plant does not stand where its regulator is designed, at {x:?} under {u:?}: a state changes by {moves} \
+         per {per}"
+    ))
+}
+
 /// The cost of the linear-quadratic regulator about the plant's steady state, sampled.
 fn cost_to_go<const NX: usize, const NU: usize, const NS: usize>(
     plant: &Plant,
@@ -148,17 +166,12 @@ fn cost_to_go<const NX: usize, const NU: usize, const NS: usize>(
     let (n, m) = (names.states.len(), names.inputs.len());
     let discrete = model.period().is_some();
     let motion = model.derivative(&x, &u);
-    let largest = if discrete { motion - x } else { motion }.amax();
-    if !(largest <= AT_REST) {
-        let fault = format!(
-            "the plant does not stand where its regulator is designed, at {:?} under {:?}: a state \
-             changes by {largest} per {}. Give a steady state in the plant's file, or a cost",
-            &x.as_slice()[..n],
-            &u.as_slice()[..m],
-            if discrete { "period" } else { "second" }
-        );
-        return Err(MpcError::new("terminal", fault));
-    }
+    let change = if discrete { motion - x } else { motion };
+    let about = (&x.as_slice()[..n], &u.as_slice()[..m]);
+    check_rest(change.as_slice(), about, discrete).map_err(|fault| {
+        let advice = "Give a steady state in the plant's file, or a cost";
+        MpcError::new("terminal", format!("{fault}. {advice}"))
+    })?;
     let (a, b) = model.jacobian(&x, &u);
     let a = DMatrix::from_fn(n, n, |i, j| a[(i, j)]);
     let b = DMatrix::from_fn(n, m, |i, j| b[(i, j)]);

@@ -1,6 +1,6 @@
 //! The plant near a point, as matrices.
 
-use crate::controller_settings::AT_REST;
+use crate::controller_settings::check_rest;
 use crate::error::MpcError;
 use crate::mpc::{MOST_INPUTS, MOST_STATES};
 use lpvmpc::{AlongMotion, LpvModel};
@@ -48,7 +48,7 @@ fn tangent(plant: &Plant, x: &[f64], u: &[f64]) -> Result<Tangent, PlantError> {
 ///
 /// # Errors
 /// A sampling time or a size that does not fit the plant, the plant does not stand there (a state changes by more than
-/// [`AT_REST`] per second or period), or there is no such regulator.
+/// [`AT_REST`](crate::AT_REST) per second or period), or there is no such regulator.
 pub fn lqr(
     plant: &Plant,
     t_s: f64,
@@ -70,14 +70,8 @@ pub fn lqr(
     if discrete {
         change -= DVector::from_row_slice(x);
     }
-    if !change.iter().all(|one| one.abs() <= AT_REST) {
-        let largest = change.amax();
-        let fault = format!(
-            "the plant does not stand at {x:?} under {u:?}: a state changes by {largest} per {}",
-            if discrete { "period" } else { "second" }
-        );
-        return Err(MpcError::new("x, u", fault));
-    }
+    check_rest(change.as_slice(), (x, u), discrete)
+        .map_err(|fault| MpcError::new("x, u", fault))?;
     let refused = |error: &dyn std::fmt::Display| MpcError::new("lqr", error.to_string());
     let (a_d, b_d) = match plant.period() {
         None => zero_order_hold(&a, &b, t_s).map_err(|error| refused(&error))?,

@@ -81,7 +81,7 @@ pub struct Solver<T: 'static, const NX: usize, const NU: usize> {
     pub(crate) dual: DualActiveSet<T, NU>,
     /// None but within [`Solver::search_with_held_inputs`].
     pub(crate) held: HeldInputs<NU>,
-    /// The first phase, if there is memory for it; no entry or one.
+    /// The phase for many bounds, if there is memory for it; no entry or one.
     many_bounds: List<ManyBounds<T, NX, NU>>,
     /// The longest horizon that there is memory for.
     stages: usize,

@@ -97,7 +97,7 @@ fn a_regulator_is_about_a_steady_state() {
     };
     assert!(about(0.0).is_ok());
     let message = about(0.1).unwrap_err().to_string();
-    assert!(message.contains("does not stand at"), "{message}");
+    assert!(message.contains("does not stand where"), "{message}");
     assert!(about(f64::NAN).is_err());
 }
 
