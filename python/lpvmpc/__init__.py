@@ -12,6 +12,7 @@ line, and steps in microseconds:
 
 from . import ballbot
 from .certificate import Certificate
+from .constraints import Penalty, Row
 from .design import Lqr, Verified, certify, lqr, verify
 from .errors import (
     CertificateError,
@@ -25,7 +26,8 @@ from .errors import (
     SimulationError,
 )
 from .estimator import Disturbance, Estimate, Estimator, Gate
-from .mpc import ActiveBound, Mpc, Penalty, Plan, Row
+from .mpc import Mpc
+from .plan import ActiveBound, Plan
 from .plant import Embedding, Plant, Signal, SteadyState
 from .simulation import Actuator, Jump, Load, Run, Sensor, simulate
 

@@ -31,6 +31,13 @@ def number(place: str, given: Any, error: type[Exception] = SettingError) -> flo
         raise error(f"{place}: it is {given!r}; it must be a number") from None
 
 
+def whole(name: str, given: Any, least: int = 1, most: int = 2**31) -> int:
+    """A whole number."""
+    if isinstance(given, (int, np.integer)) and not isinstance(given, bool) and least <= given <= most:
+        return int(given)
+    raise SettingError(f"{name}: it is {given!r}; it must be a whole number from {least} to {most}")
+
+
 def listed(place: str, given: Any, what: str) -> list[Any]:
     """A list, of anything but numbers; `what` it must be is for the message."""
     if isinstance(given, (list, tuple)):
@@ -100,6 +107,17 @@ def matrices_by_stage(place: str, given: ArrayLike, shape: tuple[int, int]) -> A
     raise SettingError(
         f"{place}: its shape is {array.shape}; it must be {shape}, or (stages, {shape[0]}, {shape[1]})"
     )
+
+
+def equally_long(one: Array, other: Array) -> tuple[Array, Array]:
+    """Two lists by stage, the last entry of the shorter one repeated."""
+    stages = max(len(one), len(other))
+
+    def extended(array: Array) -> Array:
+        missing = stages - len(array)
+        return np.concatenate([array, np.repeat(array[-1:], missing, axis=0)]) if missing else array
+
+    return extended(one), extended(other)
 
 
 def _short(given: Any) -> str:

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _lpvmpc
-from ._arrays import column, number, weight
+from ._arrays import column, number, weight, whole
 from ._progress import reported
 from .certificate import Certificate
-from .mpc import Limits, _limits, _whole
+from .constraints import Limits, limits
 from .plant import Plant
 
 
@@ -139,11 +139,11 @@ def certify(
         "q": weight("q", q, n),
         "r": weight("r", r, m),
         "equilibrium": (x_eq.tolist(), u_eq.tolist()),
-        "x_bounds": _limits("x_bounds", x_bounds, plant.states),
-        "u_bounds": _limits("u_bounds", u_bounds, plant.inputs),
+        "x_bounds": limits("x_bounds", x_bounds, plant.states),
+        "u_bounds": limits("u_bounds", u_bounds, plant.inputs),
         "enlargement": number("enlargement", enlargement),
-        "most_boxes": _whole("most_boxes", most_boxes),
-        "trials": _whole("trials", trials, least=0),
+        "most_boxes": whole("most_boxes", most_boxes),
+        "trials": whole("trials", trials, least=0),
     }
     with reported(progress) as report:
         return Certificate(_lpvmpc.certify(plant._native, asked, report))

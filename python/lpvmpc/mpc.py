@@ -3,137 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal, Union
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from . import _lpvmpc
-from ._arrays import by_stage, column, listed, matrices_by_stage, number, weight
-from .certificate import Certificate
+from ._arrays import column, listed, number, whole
+from ._preview import AHEAD
+from ._preview import to_native as preview_to_native
+from ._settings import to_native as settings_to_native
+from .constraints import Limits, Penalty, Row, limits
 from .errors import SettingError
 from .estimator import Estimate, Estimator
 from .estimator import to_native as estimator_to_native
-from .plant import Plant, Signal
-
-Array = NDArray[np.float64]
-
-Limits = Union[
-    "tuple[ArrayLike, ArrayLike]", Mapping[str, "tuple[float | None, float | None]"]
-]
-"""Bounds: (lower, upper), each with a number for every state or input, or by name; None or an
-infinite number where there is no bound."""
-
-
-@dataclass(frozen=True)
-class Penalty:
-    """The price of exceeding a bound by e: ``linear * e + quadratic * e**2``, in units of the cost."""
-
-    linear: float = 0.0
-    quadratic: float = 0.0
-
-
-@dataclass(frozen=True)
-class Row:
-    """A linear constraint lower <= x'x_i + u'u_i <= upper at every stage.
-
-    Parameters
-    ----------
-    name
-        What it is called in messages.
-    x, u
-        The coefficients: by name of a state or an input (others are zero), or one for each.
-    lower, upper
-        Its bounds; None for none.
-    soft
-        The price of exceeding it; hard without.
-    """
-
-    name: str
-    x: Mapping[str, float] | ArrayLike | None = None
-    u: Mapping[str, float] | ArrayLike | None = None
-    lower: float | None = None
-    upper: float | None = None
-    soft: Penalty | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class ActiveBound:
-    """A bound that a plan runs into."""
-
-    stage: int
-    """The stage, from 0 to N."""
-    bound: str
-    """The bound in words: ``"force >= -10 N"``."""
-    multiplier: float
-    """Its Lagrange multiplier, in cost per unit of the quantity."""
-    exceeded: bool
-    """Whether it is a soft bound that is exceeded."""
-
-
-@dataclass(frozen=True, slots=True, repr=False, eq=False)
-class Plan:
-    """The plan of a sample: what `Mpc.step` answers.
-
-    Whatever the status, the inputs are finite and within their bounds; unless `is_solved` they
-    are a fallback, not an optimum.
-    """
-
-    u: Array
-    """The inputs u_0 to u_{N-1}, shape (N, m), in input units."""
-    x: Array
-    """The states x_0 to x_N, shape (N + 1, n), in state units: the measured one, and what the model makes
-    of the inputs."""
-    status: str
-    """``"converged"``, ``"improved"``, ``"no improvement"`` (a descent), ``"solved"`` (a fixed number of
-    programs), and of those that are no plan ``"infeasible"``, ``"inaccurate"``, ``"max changes"``,
-    ``"no memory"``, ``"numerical failure"``, ``"not finite"``, ``"refused"``."""
-    message: str
-    """The status in words, with the plant's names: ``"infeasible: position <= 0.5 m at stage 7 against
-    force >= -10 N at stages 0 to 6"``."""
-    is_solved: bool
-    """Whether the inputs are a plan: an optimum, or a motion of the nonlinear model that the
-    programs confirm or improve."""
-    cost: float
-    """The cost along `x` and `u`, without the prices of bounds."""
-    programs: int
-    """How many quadratic programs were solved."""
-    _active: list[tuple[int, str, float, bool]]
-    active_bounds: str
-    """The bounds that hold with equality or are exceeded, in words: ``"force >= -10 N at stages 0
-    to 6"``, or ``"no active bound"``."""
-    decision: str | None = None
-    """With a certificate, what the first input is backed by: ``"new plan"``, ``"candidate"`` (the rest of the last
-    plan), ``"terminal law"``; and where no plan is known that keeps the bounds and ends in the certified set,
-    ``"soft bounds"`` or ``"saturated LQR"``."""
-
-    @property
-    def is_guaranteed(self) -> bool:
-        """Whether, with a certificate, there will be a plan at every later sample: states at the samples and inputs
-        keep their bounds, and the plan's cost falls by the stage cost while references beyond the horizon stay; while
-        the plant is the model, up to the error of its Runge-Kutta steps, for which a thousandth of the bounds is kept,
-        its state is known exactly and its input acts at once. Of a plan by `Mpc.decide` it is said of the model alone,
-        from the estimated state, under the disturbances beside the inputs as they are estimated then: the plant keeps
-        to it as far as the estimate is right and stays."""
-        return self.decision in ("new plan", "candidate", "terminal law")
-
-    @property
-    def u0(self) -> Array:
-        """The input to apply until the next sample, shape (m,)."""
-        first: Array = self.u[0]
-        return first
-
-    @property
-    def active(self) -> list[ActiveBound]:
-        """The bounds that hold with equality, or are exceeded at a price, by stage."""
-        return [ActiveBound(*one) for one in self._active]
-
-    def __repr__(self) -> str:
-        inputs = ", ".join(f"{one:.6g}" for one in self.u0)
-        return f"<Plan: {self.message}; u0 = [{inputs}], cost {self.cost:.6g}, {self.active_bounds}>"
+from .plan import Plan
+from .plant import Plant
 
 
 class Mpc:
@@ -270,8 +157,8 @@ class Mpc:
             "substeps": substeps, "method": method, "max_programs": max_programs, "first_programs": first_programs,
             "tolerance": tolerance, "estimator": estimator,
         }  # fmt: skip
-        self._n, self._m, self._k = len(plant.states), len(plant.inputs), len(plant.outputs)
-        self._native = _lpvmpc.Mpc(plant._native, _to_native(plant, self._settings))
+        self._n, self._m = len(plant.states), len(plant.inputs)
+        self._native = _lpvmpc.Mpc(plant._native, settings_to_native(plant, self._settings))
         self._set_estimator(estimator)
 
     @property
@@ -302,7 +189,7 @@ class Mpc:
         for name, signals in (
             ("x_bounds", plant.states), ("u_bounds", plant.inputs), ("y_bounds", plant.outputs),
         ):  # fmt: skip
-            lower, upper = _limits(name, self._settings[name] or {}, signals) or ([], [])
+            lower, upper = limits(name, self._settings[name] or {}, signals) or ([], [])
             found |= {one.name: (a, b) for one, a, b in zip(signals, lower, upper, strict=True)}
         return found
 
@@ -384,12 +271,13 @@ class Mpc:
         SettingError
             An array has not the shape that it must have, or an entry that makes no sense.
         """
-        known = self._known(
-            x_ref, u_ref=u_ref, q=q, r=r, cross=cross, linear_x=linear_x, linear_u=linear_u,
-            x_bounds=x_bounds, u_bounds=u_bounds, rows=rows, disturbance=disturbance,
-            parameters=parameters, y_ref=y_ref, q_y=q_y, y_bounds=y_bounds, r_du=r_du,
-            du_bounds=du_bounds, matrices=matrices, scheduling=scheduling,
-        )  # fmt: skip
+        ahead = {
+            "u_ref": u_ref, "q": q, "r": r, "cross": cross, "linear_x": linear_x, "linear_u": linear_u,
+            "x_bounds": x_bounds, "u_bounds": u_bounds, "rows": rows, "disturbance": disturbance,
+            "parameters": parameters, "y_ref": y_ref, "q_y": q_y, "y_bounds": y_bounds, "r_du": r_du,
+            "du_bounds": du_bounds, "matrices": matrices, "scheduling": scheduling,
+        }  # fmt: skip
+        known = preview_to_native(self._plant, x_ref, ahead)
         return Plan(*self._native.step(column("x", x, self._n), known))
 
     def observe(self, t: float, readings: Mapping[str, float | None] | ArrayLike) -> dict[str, str]:
@@ -450,10 +338,10 @@ class Mpc:
             The controller has no estimator; or as `step`.
         """
         for name in ahead:
-            if name not in _AHEAD:
-                raise SettingError(f"{name}: a step takes no such thing; there are {', '.join(_AHEAD)}")
+            if name not in AHEAD:
+                raise SettingError(f"{name}: a step takes no such thing; there are {', '.join(AHEAD)}")
         self._measured()
-        return Plan(*self._native.decide(self._known(x_ref, **dict.fromkeys(_AHEAD) | ahead)))
+        return Plan(*self._native.decide(preview_to_native(self._plant, x_ref, ahead)))
 
     @property
     def estimator(self) -> Estimator | None:
@@ -482,66 +370,6 @@ class Mpc:
         found = None if estimator is None else estimator_to_native(self._plant, estimator)
         self._native.set_estimator(found)
 
-    def _known(
-        self,
-        x_ref: ArrayLike | None,
-        *,
-        u_ref: ArrayLike | None,
-        q: ArrayLike | None,
-        r: ArrayLike | None,
-        cross: ArrayLike | None,
-        linear_x: ArrayLike | None,
-        linear_u: ArrayLike | None,
-        x_bounds: Limits | None,
-        u_bounds: Limits | None,
-        rows: Sequence[Sequence[Row]] | None,
-        disturbance: ArrayLike | None,
-        parameters: ArrayLike | None,
-        y_ref: ArrayLike | None,
-        q_y: ArrayLike | None,
-        y_bounds: Limits | None,
-        r_du: ArrayLike | None,
-        du_bounds: Limits | None,
-        matrices: tuple[ArrayLike, ...] | None,
-        scheduling: ArrayLike | None,
-    ) -> dict[str, Any]:
-        """What a step is told, as the native half takes it."""
-        n, m, k = self._n, self._m, self._k
-        known: dict[str, Any] = {"x_ref": None}
-        for name, given, size in (
-            ("x_ref", x_ref, n), ("u_ref", u_ref, m), ("linear_x", linear_x, n),
-            ("linear_u", linear_u, m), ("disturbance", disturbance, n),
-            ("parameters", parameters, len(self._plant.parameters) if parameters is not None else 0),
-            ("y_ref", y_ref, k),
-        ):  # fmt: skip
-            if given is not None:
-                known[name] = by_stage(name, given, size)
-        if scheduling is not None:
-            size = (np.shape(scheduling) or (1,))[-1]
-            known["scheduling"] = by_stage("scheduling", scheduling, size)
-        for name, given, shape in (
-            ("q", q, (n, n)), ("r", r, (m, m)), ("cross", cross, (m, n)), ("q_y", q_y, (k, k)),
-            ("r_du", r_du, (m, m)),
-        ):  # fmt: skip
-            if given is not None:
-                known[name] = matrices_by_stage(name, given, shape)
-        if (q is None) != (r is None):
-            raise SettingError("q, r: give both or neither")
-        if q is not None:
-            known["q"], known["r"] = _equally_long(known["q"], known["r"])
-        for name, bounds in (("x", x_bounds), ("u", u_bounds), ("y", y_bounds), ("du", du_bounds)):
-            if bounds is not None:
-                known |= _bounds(self._plant, name, bounds)
-        if rows is not None:
-            stages = listed("rows", rows, "a list of lists of lpvmpc.Row, one for each stage")
-            known["rows"] = [
-                [_row(self._plant, row) for row in listed("rows", stage, "lists, one for each stage")]
-                for stage in stages
-            ]
-        if matrices is not None:
-            known |= _models(matrices, n, m)
-        return known
-
     def set(self, **changes: Any) -> None:
         """Other settings from the next step on, by the names of the arguments of `Mpc`.
 
@@ -561,7 +389,7 @@ class Mpc:
         for name in ("t_s", "horizon"):
             if new[name] != self._settings[name]:
                 raise SettingError(f"{name}: it stays; make another controller")
-        native = _to_native(self._plant, new)
+        native = settings_to_native(self._plant, new)
         if "estimator" in changes:
             self._set_estimator(changes["estimator"])
         try:
@@ -640,11 +468,11 @@ class Mpc:
             raise SettingError("estimator: on a microcontroller it must be left out")
         self._plant._native.save_firmware(
             Path(folder),
-            _to_native(self._plant, self._settings),
+            settings_to_native(self._plant, self._settings),
             str(lpvmpc),
             column("x0", x0, self._n),
             None if x_ref is None else column("x_ref", x_ref, self._n),
-            _whole("samples", samples),
+            whole("samples", samples),
         )
 
     def __getstate__(self) -> tuple[Plant, dict[str, Any]]:
@@ -657,197 +485,3 @@ class Mpc:
 
     def __repr__(self) -> str:
         return f"<Mpc of {self._plant.name!r}: {self.horizon} samples of {self.t_s} s>"
-
-
-_AHEAD = (
-    "u_ref", "q", "r", "cross", "linear_x", "linear_u", "x_bounds", "u_bounds", "rows", "disturbance",
-    "parameters", "y_ref", "q_y", "y_bounds", "r_du", "du_bounds", "matrices", "scheduling",
-)  # fmt: skip
-"""What a step may be told besides the reference."""
-
-
-def _to_native(plant: Plant, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings as the native half takes them."""
-    states, inputs = plant.states, plant.inputs
-    n, m = len(states), len(inputs)
-    settings = dict(given)
-    for name, most in (
-        ("horizon", 1000), ("nodes", 16), ("substeps", 10_000), ("max_programs", 1_000_000), ("first_programs", 1_000_000),
-    ):  # fmt: skip
-        settings[name] = _whole(name, given[name], most=most)
-    for name, known in (
-        ("state_bounds", ("soft", "hard")), ("output_bounds", ("soft", "hard")),
-        ("linear_models", ("own", "motion", "ray")), ("method", ("descent", "fixed")),
-    ):  # fmt: skip
-        by_name = name.endswith("bounds") and isinstance(given[name], Mapping)
-        if not by_name and not (isinstance(given[name], str) and given[name] in known):
-            raise SettingError(
-                f"{name}: it is {given[name]!r}; it must be one of {', '.join(map(repr, known))}"
-                + (", or prices by name" if name.endswith("bounds") else "")
-            )
-    for name in ("t_s", "tolerance"):
-        settings[name] = number(name, given[name])
-    settings["q"], settings["r"] = weight("q", given["q"], n), weight("r", given["r"], m)
-    if isinstance(given["terminal"], Certificate):
-        settings["terminal"] = (given["terminal"].to_json(),)
-    elif not isinstance(given["terminal"], str):
-        settings["terminal"] = weight("terminal", given["terminal"], n)
-    settings["x_bounds"] = _limits("x_bounds", given["x_bounds"], states)
-    settings["u_bounds"] = _limits("u_bounds", given["u_bounds"], inputs)
-    if isinstance(given["state_bounds"], Mapping):
-        settings["state_bounds"] = _prices("state_bounds", given["state_bounds"], states)
-    if given["u_ref"] is not None:
-        settings["u_ref"] = column("u_ref", given["u_ref"], m)
-    outputs = plant.outputs
-    for name, size in (("q_y", len(outputs)), ("r_du", m)):
-        if given[name] is not None:
-            settings[name] = weight(name, given[name], size)
-    settings["y_bounds"] = _limits("y_bounds", given["y_bounds"], outputs)
-    settings["du_bounds"] = _limits("du_bounds", given["du_bounds"], _changes(plant))
-    if isinstance(given["output_bounds"], Mapping):
-        settings["output_bounds"] = _prices("output_bounds", given["output_bounds"], outputs)
-    settings["rows"] = [_row(plant, row) for row in given["rows"]]
-    del settings["estimator"]
-    return settings
-
-
-def _whole(name: str, given: Any, least: int = 1, most: int = 2**31) -> int:
-    if isinstance(given, (int, np.integer)) and not isinstance(given, bool) and least <= given <= most:
-        return int(given)
-    raise SettingError(f"{name}: it is {given!r}; it must be a whole number from {least} to {most}")
-
-
-def _changes(plant: Plant) -> list[Signal]:
-    """What the inputs are called where their changes are meant: these have no bounds of the plant."""
-    return [Signal(one.name) for one in plant.inputs]
-
-
-def _pair(place: str, given: Any) -> tuple[Any, Any]:
-    try:
-        lower, upper = given
-    except (TypeError, ValueError):
-        raise SettingError(f"{place}: it must be (lower, upper)") from None
-    return lower, upper
-
-
-def _open(given: Any, infinite: float) -> Any:
-    """Bounds with an infinite one for None."""
-    if isinstance(given, (list, tuple)):
-        return [infinite if one is None else _open(one, infinite) for one in given]
-    return given
-
-
-def _limits(
-    place: str, given: Limits | None, signals: list[Signal]
-) -> tuple[list[float], list[float]] | None:
-    if given is None:
-        return None
-    if isinstance(given, Mapping):
-        names = [signal.name for signal in signals]
-        for name in given:
-            if name not in names:
-                raise SettingError(f"{place}: there is no {name!r}; there are {', '.join(names)}")
-        pairs = [
-            _pair(f"{place}, {signal.name}", given[signal.name])
-            if signal.name in given
-            else (signal.lower, signal.upper)
-            for signal in signals
-        ]
-        lower, upper = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
-    else:
-        lower, upper = _pair(place, given)
-    size = len(signals)
-    return (
-        column(f"{place}, lower", _open(lower, -np.inf), size).tolist(),
-        column(f"{place}, upper", _open(upper, np.inf), size).tolist(),
-    )
-
-
-def _bounds(plant: Plant, name: str, given: Limits) -> dict[str, Array]:
-    """Bounds by stage, or by name for all stages, as the native half takes them."""
-    signals = {
-        "x": plant.states, "u": plant.inputs, "y": plant.outputs, "du": _changes(plant),
-    }[name]  # fmt: skip
-    place, size = f"{name}_bounds", len(signals)
-    if isinstance(given, Mapping):
-        given = _limits(place, given, signals) or ([], [])
-    lower, upper = _pair(place, given)
-    lower, upper = _equally_long(
-        by_stage(f"{place}, lower", _open(lower, -np.inf), size),
-        by_stage(f"{place}, upper", _open(upper, np.inf), size),
-    )
-    return {f"{name}_lower": lower, f"{name}_upper": upper}
-
-
-def _price(place: str, price: Any) -> tuple[float, float]:
-    if not isinstance(price, Penalty):
-        raise SettingError(f"{place}: {price!r} is no Penalty(linear, quadratic)")
-    return number(place, price.linear), number(place, price.quadratic)
-
-
-def _prices(
-    place: str, given: Mapping[str, Penalty], signals: list[Signal]
-) -> list[tuple[float, float] | None]:
-    names = [signal.name for signal in signals]
-    for name in given:
-        if name not in names:
-            raise SettingError(f"{place}: there is no {name!r}; there are {', '.join(names)}")
-    return [_price(f"{place}, {name}", given[name]) if name in given else None for name in names]
-
-
-def _models(given: tuple[ArrayLike, ...], n: int, m: int) -> dict[str, Array]:
-    """(A, B) or (A, B, c) by stage."""
-    if not isinstance(given, (tuple, list)) or len(given) not in (2, 3):
-        raise SettingError("matrices: they must be (A, B) or (A, B, c)")
-    a, b = _equally_long(
-        matrices_by_stage("matrices, A", given[0], (n, n)),
-        matrices_by_stage("matrices, B", given[1], (n, m)),
-    )
-    found = {"a": a, "b": b}
-    if len(given) == 3:
-        found["c"] = by_stage("matrices, c", given[2], n)
-    return found
-
-
-def _row(plant: Plant, row: Row) -> tuple[Any, ...]:
-    if not isinstance(row, Row):
-        raise SettingError(f"rows: {row!r} is no lpvmpc.Row")
-    place = f"rows, {row.name}"
-    of_x = _coefficients(f"{place}, x", row.x, plant.states)
-    of_u = _coefficients(f"{place}, u", row.u, plant.inputs)
-    if not any(of_x + of_u):
-        raise SettingError(f"{place}: it has no coefficient, of a state (x) or of an input (u)")
-    if row.lower is None and row.upper is None:
-        raise SettingError(f"{place}: it has neither a lower nor an upper bound")
-    return (
-        str(row.name),
-        of_x,
-        of_u,
-        -np.inf if row.lower is None else number(f"{place}, lower", row.lower),
-        np.inf if row.upper is None else number(f"{place}, upper", row.upper),
-        None if row.soft is None else _price(f"{place}, soft", row.soft),
-    )
-
-
-def _coefficients(place: str, given: Any, signals: list[Signal]) -> list[float]:
-    if given is None:
-        return [0.0] * len(signals)
-    if isinstance(given, Mapping):
-        names = [signal.name for signal in signals]
-        for name in given:
-            if name not in names:
-                raise SettingError(f"{place}: there is no {name!r}; there are {', '.join(names)}")
-        return [number(place, given.get(name, 0.0)) for name in names]
-    found: list[float] = column(place, given, len(signals)).tolist()
-    return found
-
-
-def _equally_long(one: Array, other: Array) -> tuple[Array, Array]:
-    """Two lists by stage, the last entry of the shorter one repeated."""
-    stages = max(len(one), len(other))
-
-    def extended(array: Array) -> Array:
-        missing = stages - len(array)
-        return np.concatenate([array, np.repeat(array[-1:], missing, axis=0)]) if missing else array
-
-    return extended(one), extended(other)

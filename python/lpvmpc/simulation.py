@@ -14,7 +14,8 @@ from ._arrays import column, listed, number, numbers
 from ._progress import samples_of
 from .errors import MissingPackageError, SettingError, SimulationError
 from .estimator import Estimator
-from .mpc import Mpc, Plan
+from .mpc import Mpc
+from .plan import Plan
 from .plant import Plant, Signal
 
 if TYPE_CHECKING:

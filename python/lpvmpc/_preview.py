@@ -1,0 +1,73 @@
+"""What a step is told of the time ahead, as the native half takes it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._arrays import by_stage, equally_long, listed, matrices_by_stage
+from .constraints import bounds, row
+from .errors import SettingError
+from .plant import Plant
+
+Array = NDArray[np.float64]
+
+AHEAD = (
+    "u_ref", "q", "r", "cross", "linear_x", "linear_u", "x_bounds", "u_bounds", "rows", "disturbance",
+    "parameters", "y_ref", "q_y", "y_bounds", "r_du", "du_bounds", "matrices", "scheduling",
+)  # fmt: skip
+"""What a step may be told besides the reference."""
+
+
+def to_native(plant: Plant, x_ref: ArrayLike | None, ahead: Mapping[str, Any]) -> dict[str, Any]:
+    """What a step is told, of which what is None is left out."""
+    n, m, k = len(plant.states), len(plant.inputs), len(plant.outputs)
+    given = {"x_ref": x_ref, **{name: one for name, one in ahead.items() if one is not None}}
+    known: dict[str, Any] = {"x_ref": None}
+    for name, size in (
+        ("x_ref", n), ("u_ref", m), ("linear_x", n), ("linear_u", m), ("disturbance", n),
+        ("parameters", len(plant.parameters)), ("y_ref", k),
+    ):  # fmt: skip
+        if given.get(name) is not None:
+            known[name] = by_stage(name, given[name], size)
+    if "scheduling" in given:
+        size = (np.shape(given["scheduling"]) or (1,))[-1]
+        known["scheduling"] = by_stage("scheduling", given["scheduling"], size)
+    for name, shape in (
+        ("q", (n, n)), ("r", (m, m)), ("cross", (m, n)), ("q_y", (k, k)), ("r_du", (m, m)),
+    ):  # fmt: skip
+        if name in given:
+            known[name] = matrices_by_stage(name, given[name], shape)
+    if ("q" in given) != ("r" in given):
+        raise SettingError("q, r: give both or neither")
+    if "q" in given:
+        known["q"], known["r"] = equally_long(known["q"], known["r"])
+    for name in ("x", "u", "y", "du"):
+        if f"{name}_bounds" in given:
+            known |= bounds(plant, name, given[f"{name}_bounds"])
+    if "rows" in given:
+        stages = listed("rows", given["rows"], "a list of lists of lpvmpc.Row, one for each stage")
+        known["rows"] = [
+            [row(plant, one) for one in listed("rows", stage, "lists, one for each stage")]
+            for stage in stages
+        ]
+    if "matrices" in given:
+        known |= _models(given["matrices"], n, m)
+    return known
+
+
+def _models(given: tuple[ArrayLike, ...], n: int, m: int) -> dict[str, Array]:
+    """(A, B) or (A, B, c) by stage."""
+    if not isinstance(given, (tuple, list)) or len(given) not in (2, 3):
+        raise SettingError("matrices: they must be (A, B) or (A, B, c)")
+    a, b = equally_long(
+        matrices_by_stage("matrices, A", given[0], (n, n)),
+        matrices_by_stage("matrices, B", given[1], (n, m)),
+    )
+    found = {"a": a, "b": b}
+    if len(given) == 3:
+        found["c"] = by_stage("matrices, c", given[2], n)
+    return found

@@ -1,0 +1,168 @@
+"""Bounds, prices and linear constraints of a controller."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Union
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._arrays import by_stage, column, equally_long, number
+from .errors import SettingError
+from .plant import Plant, Signal
+
+Array = NDArray[np.float64]
+
+Limits = Union[
+    "tuple[ArrayLike, ArrayLike]", Mapping[str, "tuple[float | None, float | None]"]
+]
+"""Bounds: (lower, upper), each with a number for every state or input, or by name; None or an
+infinite number where there is no bound."""
+
+
+@dataclass(frozen=True)
+class Penalty:
+    """The price of exceeding a bound by e: ``linear * e + quadratic * e**2``, in units of the cost."""
+
+    linear: float = 0.0
+    quadratic: float = 0.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """A linear constraint lower <= x'x_i + u'u_i <= upper at every stage.
+
+    Parameters
+    ----------
+    name
+        What it is called in messages.
+    x, u
+        The coefficients: by name of a state or an input (others are zero), or one for each.
+    lower, upper
+        Its bounds; None for none.
+    soft
+        The price of exceeding it; hard without.
+    """
+
+    name: str
+    x: Mapping[str, float] | ArrayLike | None = None
+    u: Mapping[str, float] | ArrayLike | None = None
+    lower: float | None = None
+    upper: float | None = None
+    soft: Penalty | None = None
+
+
+def changes(plant: Plant) -> list[Signal]:
+    """What the inputs are called where their changes are meant: these have no bounds of the plant."""
+    return [Signal(one.name) for one in plant.inputs]
+
+
+def _names(place: str, given: Mapping[str, Any], signals: list[Signal]) -> list[str]:
+    """The names of the signals, of which those that are given must be some."""
+    names = [signal.name for signal in signals]
+    for name in given:
+        if name not in names:
+            raise SettingError(f"{place}: there is no {name!r}; there are {', '.join(names)}")
+    return names
+
+
+def _pair(place: str, given: Any) -> tuple[Any, Any]:
+    try:
+        lower, upper = given
+    except (TypeError, ValueError):
+        raise SettingError(f"{place}: it must be (lower, upper)") from None
+    return lower, upper
+
+
+def _open(given: Any, infinite: float) -> Any:
+    """Bounds with an infinite one for None."""
+    if isinstance(given, (list, tuple)):
+        return [infinite if one is None else _open(one, infinite) for one in given]
+    return given
+
+
+def limits(
+    place: str, given: Limits | None, signals: list[Signal]
+) -> tuple[list[float], list[float]] | None:
+    """Bounds, one for each signal, as the native half takes them."""
+    if given is None:
+        return None
+    if isinstance(given, Mapping):
+        _names(place, given, signals)
+        pairs = [
+            _pair(f"{place}, {signal.name}", given[signal.name])
+            if signal.name in given
+            else (signal.lower, signal.upper)
+            for signal in signals
+        ]
+        lower, upper = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+    else:
+        lower, upper = _pair(place, given)
+    size = len(signals)
+    return (
+        column(f"{place}, lower", _open(lower, -np.inf), size).tolist(),
+        column(f"{place}, upper", _open(upper, np.inf), size).tolist(),
+    )
+
+
+def bounds(plant: Plant, name: str, given: Limits) -> dict[str, Array]:
+    """Bounds by stage, or by name for all stages, as the native half takes them."""
+    signals = {
+        "x": plant.states, "u": plant.inputs, "y": plant.outputs, "du": changes(plant),
+    }[name]  # fmt: skip
+    place, size = f"{name}_bounds", len(signals)
+    if isinstance(given, Mapping):
+        given = limits(place, given, signals) or ([], [])
+    lower, upper = _pair(place, given)
+    lower, upper = equally_long(
+        by_stage(f"{place}, lower", _open(lower, -np.inf), size),
+        by_stage(f"{place}, upper", _open(upper, np.inf), size),
+    )
+    return {f"{name}_lower": lower, f"{name}_upper": upper}
+
+
+def _price(place: str, price: Any) -> tuple[float, float]:
+    if not isinstance(price, Penalty):
+        raise SettingError(f"{place}: {price!r} is no Penalty(linear, quadratic)")
+    return number(place, price.linear), number(place, price.quadratic)
+
+
+def prices(
+    place: str, given: Mapping[str, Penalty], signals: list[Signal]
+) -> list[tuple[float, float] | None]:
+    """Prices by name, one for each signal, as the native half takes them."""
+    names = _names(place, given, signals)
+    return [_price(f"{place}, {name}", given[name]) if name in given else None for name in names]
+
+
+def row(plant: Plant, given: Row) -> tuple[Any, ...]:
+    """A row as the native half takes it."""
+    if not isinstance(given, Row):
+        raise SettingError(f"rows: {given!r} is no lpvmpc.Row")
+    place = f"rows, {given.name}"
+    of_x = _coefficients(f"{place}, x", given.x, plant.states)
+    of_u = _coefficients(f"{place}, u", given.u, plant.inputs)
+    if not any(of_x + of_u):
+        raise SettingError(f"{place}: it has no coefficient, of a state (x) or of an input (u)")
+    if given.lower is None and given.upper is None:
+        raise SettingError(f"{place}: it has neither a lower nor an upper bound")
+    return (
+        str(given.name),
+        of_x,
+        of_u,
+        -np.inf if given.lower is None else number(f"{place}, lower", given.lower),
+        np.inf if given.upper is None else number(f"{place}, upper", given.upper),
+        None if given.soft is None else _price(f"{place}, soft", given.soft),
+    )
+
+
+def _coefficients(place: str, given: Any, signals: list[Signal]) -> list[float]:
+    if given is None:
+        return [0.0] * len(signals)
+    if isinstance(given, Mapping):
+        names = _names(place, given, signals)
+        return [number(place, given.get(name, 0.0)) for name in names]
+    found: list[float] = column(place, given, len(signals)).tolist()
+    return found
