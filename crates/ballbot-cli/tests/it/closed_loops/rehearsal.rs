@@ -3,7 +3,8 @@
 use crate::{assert_says, fail, succeed};
 use ballbot_scenario::{DeviationsTable, Parameters, Prepared, RunHooks, Scenario, WorldTable};
 use lpvmpc_sim::{Termination, Trajectory};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 /// A scenario of the rehearsal, in a world that may be changed.
 fn run(
@@ -43,11 +44,13 @@ fn largest_tilt((_, planes): &(Prepared, Vec<Trajectory<4, 1>>)) -> f64 {
     states.fold(0.0, |most, x| most.max(x[1].abs()))
 }
 
-/// The chain once; everything that it must hold after it.
-#[test]
-fn from_an_excitation_to_a_controller() {
-    let folder = tempfile::tempdir().unwrap();
-    let said = succeed(folder.path(), &["rehearse"]);
+/// The folder of the chain, which is run once for all of these tests.
+static REHEARSED: LazyLock<PathBuf> = LazyLock::new(|| {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rehearsal");
+    // What an earlier run has left.
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir(&folder).unwrap();
+    let said = succeed(&folder, &["rehearse"]);
     let stages = [
         "ballbot excite --config",
         "ballbot simulate out/rehearsal/record.toml",
@@ -57,16 +60,12 @@ fn from_an_excitation_to_a_controller() {
         "good: the robot explains the log",
     ];
     assert_says(&said, &stages);
-    let folder = folder.path().join("out").join("rehearsal");
+    folder.join("out").join("rehearsal")
+});
 
-    identified_within_the_stated_errors(&folder);
-    follows(&folder);
-    stands_with_wrong_parameters(&folder);
-    the_drawing_alone_would_not_do(&folder);
-    files_that_are_there_are_kept(&folder);
-}
-
-fn identified_within_the_stated_errors(folder: &Path) {
+#[test]
+fn identified_within_the_stated_errors() {
+    let folder = &*REHEARSED;
     let read = |name: &str| -> toml::Table {
         let text = std::fs::read_to_string(folder.join(name)).unwrap();
         text.parse().unwrap()
@@ -99,7 +98,9 @@ fn identified_within_the_stated_errors(folder: &Path) {
     }
 }
 
-fn follows(folder: &Path) {
+#[test]
+fn follows() {
+    let folder = &*REHEARSED;
     for seed in 1..=5 {
         let seeded = |scenario: &mut Scenario| world(scenario).seed = seed;
         let error = rms_mm(&run(folder, "move.toml", seeded), 6.0, 10.0);
@@ -120,8 +121,8 @@ fn follows(folder: &Path) {
     }
 }
 
-/// Every corner of b1 to b4 wrong by 20 %, with the push.
-fn stands_with_wrong_parameters(folder: &Path) {
+/// Every corner of b1 to b4 wrong by 20 %: it does not only keep from falling, it follows.
+fn withstands_wrong_parameters(name: &str, (from, until): (f64, f64)) {
     for corner in 0..16 {
         let factor = |bit: u32| if corner & (1 << bit) == 0 { 0.8 } else { 1.2 };
         let wrong = |scenario: &mut Scenario| {
@@ -133,20 +134,29 @@ fn stands_with_wrong_parameters(folder: &Path) {
                 ..DeviationsTable::default()
             };
         };
-        for (name, until) in [("move.toml", 12.0), ("lissajous.toml", 70.0)] {
-            let run = run(folder, name, wrong);
-            let tilt = largest_tilt(&run);
-            assert!(tilt < 0.7, "{name}, corner {corner:04b}: {tilt} rad");
-            // It does not only keep from falling: it follows.
-            let from = if until > 12.0 { 0.0 } else { 6.0 };
-            let error = rms_mm(&run, from, until);
-            assert!(error < 40.0, "{name}, corner {corner:04b}: {error} mm");
-        }
+        let run = run(&REHEARSED, name, wrong);
+        let tilt = largest_tilt(&run);
+        assert!(tilt < 0.7, "{name}, corner {corner:04b}: {tilt} rad");
+        let error = rms_mm(&run, from, until);
+        assert!(error < 40.0, "{name}, corner {corner:04b}: {error} mm");
     }
 }
 
+#[test]
+fn moves_with_wrong_parameters() {
+    withstands_wrong_parameters("move.toml", (6.0, 12.0));
+}
+
+/// With the push.
+#[test]
+fn follows_a_curve_with_wrong_parameters() {
+    withstands_wrong_parameters("lissajous.toml", (0.0, 70.0));
+}
+
 /// The checks above can fail: with the robot of the drawing the curve is missed.
-fn the_drawing_alone_would_not_do(folder: &Path) {
+#[test]
+fn the_drawing_alone_would_not_do() {
+    let folder = &*REHEARSED;
     let record = Scenario::load(folder.join("record.toml").to_str().unwrap()).unwrap();
     assert!(matches!(record.parameters, Parameters::Table(_)));
     let drawing = |scenario: &mut Scenario| scenario.parameters = record.parameters.clone();
@@ -154,10 +164,12 @@ fn the_drawing_alone_would_not_do(folder: &Path) {
     assert!(error > 25.0, "{error} mm");
 }
 
-fn files_that_are_there_are_kept(folder: &Path) {
-    let record = folder.join("record.toml");
+#[test]
+fn files_that_are_there_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = folder.path().join("record.toml");
     std::fs::write(&record, "duration_s = 1.0").unwrap();
-    let said = fail(folder, &["rehearse", "--out", "."], 1);
+    let said = fail(folder.path(), &["rehearse", "--out", "."], 1);
     assert_says(&said, &["record.toml", "missing field"]);
     assert_eq!(std::fs::read_to_string(record).unwrap(), "duration_s = 1.0");
 }
