@@ -6,7 +6,7 @@ use crate::mpc::{MOST_INPUTS, MOST_STATES};
 use crate::tasks::outputs_of_input;
 use lpvmpc::{Dynamics, Reading};
 use lpvmpc_plant::{Plant, SizedPlant};
-use lpvmpc_sim::{Actuator, PlantError, Tolerances};
+use lpvmpc_sim::{Actuator, PlantError, Tolerances, WorldError, WorldPart};
 use nalgebra::SVector;
 
 /// Everything about a [`World`] but its plant and its start. `n` states, `m` inputs.
@@ -200,9 +200,9 @@ impl World {
             },
         );
         Ok(Self {
+            inner: inner.map_err(|error| names.refused(&error, settings.sensors.as_deref()))?,
             names,
             sensors: count,
-            inner: inner.map_err(|error| MpcError::new("world", error.to_string()))?,
         })
     }
 
@@ -241,8 +241,8 @@ impl World {
     /// Its numbers make no sense.
     pub fn push(&mut self, push: &Push) -> Result<(), MpcError> {
         let push = self.names.push("push", push)?;
-        let refused = |error: lpvmpc_sim::WorldError| MpcError::new("world", error.to_string());
-        self.inner.disturb(push).map_err(refused)
+        let disturbed = self.inner.disturb(push);
+        disturbed.map_err(|error| self.names.refused(&error, None))
     }
 
     /// Moves on by one period, and measures.
@@ -323,6 +323,38 @@ fn actuators(names: &Names, settings: &WorldSettings) -> Result<[Actuator; MOST_
 }
 
 impl Names {
+    /// What a world refuses, by the names of what is measured and of the inputs.
+    fn refused(&self, error: &WorldError, sensors: Option<&[Sensor]>) -> MpcError {
+        let WorldError::Setting {
+            part,
+            quantity,
+            value,
+            expected,
+        } = error
+        else {
+            return MpcError::new("world", error.to_string());
+        };
+        let of = |i: usize| match &sensors?.get(i)?.of {
+            Quantity::Output(name) => Some(name.clone()),
+            Quantity::Row(row) => {
+                // Of a single state, by its name.
+                let mut read = (0..row.len()).filter(|i| row[*i] != 0.0);
+                let (first, more) = (read.next()?, read.next());
+                self.states.get(first).filter(|_| more.is_none()).cloned()
+            }
+        };
+        let named =
+            |name: Option<String>| name.map_or_else(String::new, |name| format!(" ({name})"));
+        let place = match *part {
+            WorldPart::World => "world".to_owned(),
+            WorldPart::Sensor(i) => format!("sensors[{i}]{}", named(of(i))),
+            WorldPart::Actuator(j) => {
+                format!("actuators[{j}]{}", named(self.inputs.get(j).cloned()))
+            }
+        };
+        MpcError::new(place, format!("the {quantity} is {value}; {expected}"))
+    }
+
     /// A push in places that were compiled.
     fn push(
         &self,

@@ -58,4 +58,4 @@ pub use guaranteed_loop::{Actuation, GuaranteedLoop};
 pub use plant::{Plant, PlantError, Tolerances, Unloaded, advance};
 pub use random::Random;
 pub use sensor::Sensor;
-pub use world::{World, WorldError, WorldSettings};
+pub use world::{World, WorldError, WorldPart, WorldSettings};

@@ -7,6 +7,7 @@ use crate::sensor::{Channel, Sensor};
 use lpvmpc::{Measurement, Reading};
 use nalgebra::SVector;
 use std::collections::VecDeque;
+use std::fmt;
 use thiserror::Error;
 
 /// Everything about a [`World`] but its plant and its start.
@@ -28,14 +29,35 @@ pub struct WorldSettings<const NX: usize, const NU: usize, const NY: usize, cons
     pub tolerances: Tolerances,
 }
 
+/// What of a world a setting is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WorldPart {
+    /// The world itself.
+    World,
+    /// The sensor with this number, from 0.
+    Sensor(usize),
+    /// The actuator with this number, from 0.
+    Actuator(usize),
+}
+
+impl fmt::Display for WorldPart {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::World => f.write_str("world"),
+            Self::Sensor(i) => write!(f, "sensor {i}"),
+            Self::Actuator(j) => write!(f, "actuator {j}"),
+        }
+    }
+}
+
 /// A world that cannot be.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum WorldError {
     /// A setting out of range.
-    #[error("{place}: the {quantity} is {value}; {expected}")]
+    #[error("{part}: the {quantity} is {value}; {expected}")]
     Setting {
-        /// Sensor or actuator with its number, or the world itself.
-        place: String,
+        /// What it is of.
+        part: WorldPart,
         /// The quantity.
         quantity: &'static str,
         /// Its value.
@@ -104,7 +126,7 @@ impl<const NX: usize, const NU: usize, const NY: usize, const NL: usize>
 {
     fn check(&self) -> Result<(), WorldError> {
         let world = |quantity, value, expected| WorldError::Setting {
-            place: "world".to_owned(),
+            part: WorldPart::World,
             quantity,
             value,
             expected,
@@ -121,18 +143,13 @@ impl<const NX: usize, const NU: usize, const NY: usize, const NL: usize>
         }
         let sensors = self.sensors.iter().map(Sensor::mistake);
         let actuators = self.actuators.iter().map(Actuator::mistake);
-        let named = sensors
-            .enumerate()
-            .map(|(i, mistake)| (format!("sensor {i}"), mistake))
-            .chain(
-                actuators
-                    .enumerate()
-                    .map(|(i, mistake)| (format!("actuator {i}"), mistake)),
-            );
-        for (place, mistake) in named {
+        let sensors = { sensors.enumerate() }.map(|(i, mistake)| (WorldPart::Sensor(i), mistake));
+        let actuators =
+            { actuators.enumerate() }.map(|(j, mistake)| (WorldPart::Actuator(j), mistake));
+        for (part, mistake) in sensors.chain(actuators) {
             if let Some((quantity, value, expected)) = mistake {
                 return Err(WorldError::Setting {
-                    place,
+                    part,
                     quantity,
                     value,
                     expected,

@@ -2,7 +2,9 @@
 
 use crate::plants::{CartPole, cart_pole};
 use lpvmpc::AlongMotion;
-use lpvmpc_any::{Push, Quantity, Sensor, Tolerances, World, WorldSettings, steady_state};
+use lpvmpc_any::{
+    Actuator, Push, Quantity, Sensor, Tolerances, World, WorldSettings, steady_state,
+};
 use lpvmpc_plant::{Matrices, Plant, PlantData};
 use nalgebra::{Vector1, Vector4, dmatrix, dvector};
 
@@ -169,6 +171,51 @@ fn a_plant_in_discrete_time_moves_in_its_own_steps() {
     assert_eq!(
         uneven.unwrap_err().to_string(),
         "world: the period of the sensors is 0.25 s; it must be a whole number of the plant's periods of 0.1 s"
+    );
+}
+
+#[test]
+fn what_is_wrong_with_a_sensor_or_an_actuator_is_said_with_its_name() {
+    let noisy = |coefficients: &[f64]| Sensor {
+        noise: -1.0,
+        ..Sensor::ideal(Quantity::Row(coefficients.to_vec()))
+    };
+    for (sensors, actuators, said) in [
+        (
+            Some(vec![noisy(&[0.0, 1.0, 0.0, 0.0])]),
+            None,
+            "sensors[0] (angle): the noise is -1; it must be finite and not negative",
+        ),
+        (
+            Some(vec![noisy(&[1.0, 1.0, 0.0, 0.0])]),
+            None,
+            "sensors[0]: the noise is -1; it must be finite and not negative",
+        ),
+        (
+            None,
+            Some(vec![Actuator {
+                lag: f64::INFINITY,
+                ..Actuator::default()
+            }]),
+            "actuators[0] (force): the lag is inf; it must be finite and not negative",
+        ),
+    ] {
+        let settings = WorldSettings {
+            sensors,
+            actuators,
+            ..WorldSettings::ideal(0.05)
+        };
+        let refused = World::new(&cart_pole(), &[0.0; 4], &settings).unwrap_err();
+        assert_eq!(refused.to_string(), said);
+    }
+    let late = WorldSettings {
+        delay: -1.0,
+        ..WorldSettings::ideal(0.05)
+    };
+    let refused = World::new(&cart_pole(), &[0.0; 4], &late).unwrap_err();
+    assert_eq!(
+        refused.to_string(),
+        "world: the delay is -1; it must be finite and not negative"
     );
 }
 

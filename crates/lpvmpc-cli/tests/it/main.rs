@@ -190,7 +190,7 @@ fn what_is_wrong_is_named_and_nothing_is_written() {
         (
             "# delay = 0.04                    # from a command",
             "delay = -1 #",
-            vec!["world: the delay is -1"],
+            vec!["bad.toml: world: the delay is -1"],
         ),
     ] {
         fs::write(folder.path().join("bad.toml"), changed(&text, from, to)).unwrap();
