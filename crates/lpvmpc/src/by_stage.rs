@@ -19,9 +19,14 @@ use nalgebra::{SMatrix, SVector};
 
 /// Cost and bounds of stage `i`, from 0 to the end of the horizon; `None`: as the settings have them.
 pub(crate) trait CostByStage<T: Scalar, const NX: usize, const NU: usize>: Copy {
-    /// Whether there may be anything.
+    /// Whether there may be anything, of the plant included.
     const SOME: bool = true;
 
+    /// Whether a stage may have a cost, bounds or rows of its own: without, it is not asked for them.
+    #[inline(always)]
+    fn any(&self) -> bool {
+        false
+    }
     /// Whether a stage may have weights or bounds of its own.
     fn has_own_stages(&self) -> bool {
         false
@@ -67,10 +72,6 @@ pub(crate) trait CostByStage<T: Scalar, const NX: usize, const NU: usize>: Copy 
     }
 }
 
-/// A, B and c of a sample.
-pub(crate) type Sample<T, const NX: usize, const NU: usize> =
-    (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>, SVector<T, NX>);
-
 /// The plant over the sample `i` of the horizon.
 pub(crate) trait PlantByStage<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize>:
     CostByStage<T, NX, NU>
@@ -114,14 +115,14 @@ pub(crate) trait PlantByStage<P, T: Scalar, const NX: usize, const NU: usize, co
         u: &SVector<T, NU>,
     ) -> (SMatrix<T, NX, NX>, SMatrix<T, NX, NU>, SVector<T, NX>);
 
-    /// The same for several samples; `None` where the plant is not the same in all, or the predictor does not follow
-    /// the scheduling.
+    /// The same for several samples, c first; `None` where the plant is not the same in all, or the predictor does not
+    /// follow the scheduling.
     fn predict_each<const POINTS: usize>(
         &self,
         plant: &P,
         settings: &ControllerSettings<T, NX, NU, NS>,
         motion: (&[SVector<T, NX>; POINTS], &[SVector<T, NU>; POINTS]),
-    ) -> Option<[Sample<T, NX, NU>; POINTS]>;
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]>;
 
     /// The steady state of the plant as it is in the last sample of the horizon; `None` where that is
     /// the one that the settings have.
@@ -183,7 +184,7 @@ where
         plant: &P,
         settings: &ControllerSettings<T, NX, NU, NS>,
         motion: (&[SVector<T, NX>; POINTS], &[SVector<T, NU>; POINTS]),
-    ) -> Option<[Sample<T, NX, NU>; POINTS]> {
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
         predicted_each(plant, settings, motion)
     }
 
@@ -229,13 +230,13 @@ where
     (a, b, c.unwrap_or_else(SVector::zeros))
 }
 
-/// The same of several samples, of a predictor that follows the scheduling.
+/// The same of several samples, c first, of a predictor that follows the scheduling.
 #[inline(always)]
 fn predicted_each<P, T, const NX: usize, const NU: usize, const NS: usize, const POINTS: usize>(
     plant: &P,
     settings: &ControllerSettings<T, NX, NU, NS>,
     (x, u): (&[SVector<T, NX>; POINTS], &[SVector<T, NU>; POINTS]),
-) -> Option<[Sample<T, NX, NU>; POINTS]>
+) -> Option<[Tangent<T, NX, NU>; POINTS]>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
@@ -244,17 +245,17 @@ where
     else {
         return None;
     };
-    let reached = rk4.linearize_each(plant, x, u, settings.t_s);
+    let mut reached = rk4.linearize_each(plant, x, u, settings.t_s);
     let has_offset = plant.has_offset();
-    Some(core::array::from_fn(|i| {
-        let (next, a, b) = &reached[i];
-        let c = if has_offset {
-            next - product(a, &x[i]) - product(b, &u[i])
+    for ((next, a, b), (x, u)) in reached.iter_mut().zip(x.iter().zip(u)) {
+        // What was the state that is reached makes room for c.
+        *next = if has_offset {
+            *next - product(a, x) - product(b, u)
         } else {
             SVector::zeros()
         };
-        (*a, *b, c)
-    }))
+    }
+    Some(reached)
 }
 
 impl<T: Scalar, const NS: usize> Scheduling<T, NS> {
@@ -275,6 +276,23 @@ pub(crate) struct Given<'a, P, T, const NX: usize, const NU: usize, const NS: us
     /// What acts on the plant besides the input that is planned. With it that input is a command to
     /// actuators, whose bounds in the settings hold whatever the preview says.
     pub beside: Option<&'a SVector<T, NU>>,
+    /// Whether there are rows, or more in the preview than a reference and what it says of the plant.
+    pub any: bool,
+}
+
+impl<'a, P, T, const NX: usize, const NU: usize, const NS: usize> Given<'a, P, T, NX, NU, NS> {
+    /// The `preview`, beside the controller's own `rows`.
+    pub fn new(
+        preview: &'a Preview<'a, P, T, NX, NU, NS>,
+        rows: &'a [GeneralRow<T, NX, NU>],
+    ) -> Self {
+        Self {
+            preview,
+            rows,
+            beside: None,
+            any: preview.has_costs_or_bounds() || !rows.is_empty(),
+        }
+    }
 }
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize> Clone
@@ -295,6 +313,10 @@ pub(crate) fn entry<V>(list: &[V], i: usize) -> Option<&V> {
 impl<P, T: Scalar, const NX: usize, const NU: usize, const NS: usize> CostByStage<T, NX, NU>
     for Given<'_, P, T, NX, NU, NS>
 {
+    #[inline(always)]
+    fn any(&self) -> bool {
+        self.any
+    }
     fn has_own_stages(&self) -> bool {
         self.preview.has_own_stages()
     }
@@ -416,7 +438,7 @@ where
         plant: &P,
         settings: &ControllerSettings<T, NX, NU, NS>,
         motion: (&[SVector<T, NX>; POINTS], &[SVector<T, NU>; POINTS]),
-    ) -> Option<[Sample<T, NX, NU>; POINTS]> {
+    ) -> Option<[Tangent<T, NX, NU>; POINTS]> {
         predicted_each(&self.everywhere(plant)?, settings, motion)
     }
 

@@ -1,6 +1,6 @@
 //! The LPVMPC controller: Algorithm 2 of the paper for any LPV model.
 
-use crate::by_stage::{CostByStage, PlantByStage, Sample};
+use crate::by_stage::{CostByStage, PlantByStage};
 use crate::changes::FixedRows;
 #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
 use crate::elsewhere::Watch;
@@ -218,7 +218,7 @@ where
         workspace: &mut Workspace<T, NX, NU>,
     ) {
         workspace.pose(&self.settings);
-        if D::SOME {
+        if own.any() {
             workspace.pose_own(&self.settings, &own);
         }
     }
@@ -388,8 +388,14 @@ where
     ) {
         let horizon = self.settings.horizon;
         if P::TOGETHER {
-            let done = self.in_groups(x, inputs, first, ocp.stages.iter_mut(), |motion| {
-                own.predict_each(&self.model, &self.settings, motion)
+            let done = self.in_groups(x, inputs, first, &mut ocp.stages, |motion, stages| {
+                let Some(made) = own.predict_each(&self.model, &self.settings, motion) else {
+                    return false;
+                };
+                for ((c, a, b), stage) in made.iter().zip(stages) {
+                    (stage.a, stage.b, stage.c) = (*a, *b, *c);
+                }
+                true
             });
             let rest = ocp.stages.iter_mut().enumerate().take(horizon);
             for (i, stage) in rest.skip(done) {
@@ -433,27 +439,24 @@ where
         (state, at(inputs, i))
     }
 
-    /// Writes what `samples` makes of states and inputs into the `stages`, in groups, until there is no whole group left or
-    /// it makes nothing of them. The states are those of the rollout from `x`, the `first` of them for the first stage.
+    /// Has the `stages` written from states and inputs, in groups, until there is no whole group left or `write` makes
+    /// nothing of them. The states are those of the rollout from `x`, the `first` of them for the first stage.
     /// Returns how many stages were written.
-    pub(crate) fn in_groups<'a>(
+    pub(crate) fn in_groups(
         &self,
         x: &SVector<T, NX>,
         inputs: &[SVector<T, NU>],
         first: usize,
-        mut stages: impl Iterator<Item = &'a mut Stage<T, NX, NU>>,
-        samples: impl Fn(Group<'_, T, NX, NU>) -> Option<[Sample<T, NX, NU>; GROUP]>,
+        stages: &mut [Stage<T, NX, NU>],
+        write: impl Fn(Group<'_, T, NX, NU>, &mut [Stage<T, NX, NU>; GROUP]) -> bool,
     ) -> usize {
         let mut done = 0;
-        while done + GROUP <= self.settings.horizon {
+        let (groups, _) = stages.as_chunks_mut();
+        for stages in groups.iter_mut().take(self.settings.horizon / GROUP) {
             let expected: [_; GROUP] = from_fn(|k| self.expected(x, inputs, first + done + k));
             let (states, inputs) = (expected.map(|(x, _)| x), expected.map(|(_, u)| u));
-            let Some(made) = samples((&states, &inputs)) else {
+            if !write((&states, &inputs), stages) {
                 break;
-            };
-            // In this order: a zip that ends has taken one more of its first part.
-            for (made, stage) in made.into_iter().zip(&mut stages) {
-                (stage.a, stage.b, stage.c) = made;
             }
             done += GROUP;
         }
@@ -502,7 +505,7 @@ where
         for (i, stage) in stages.take(self.settings.horizon) {
             stage.linear_x = linear_term(&q, aim.at(i));
             stage.linear_u = linear_u;
-            if D::SOME {
+            if aim.own.any() {
                 (stage.linear_x, stage.linear_u) = aim.linear_terms(i, &self.settings.weights);
             }
         }

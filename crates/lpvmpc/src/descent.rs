@@ -234,9 +234,15 @@ where
         ocp.common.r = settings.weights.r + SMatrix::identity() * damping;
         let own = &aim.own;
         let done = if P::TOGETHER {
-            self.in_groups(x, &self.policy.u, 0, ocp.stages.iter_mut(), |motion| {
-                let samples = own.sample_matrices_each(&self.model, settings, motion, along)?;
-                Some(samples.map(|(_, a, b)| (a, b, SVector::zeros())))
+            self.in_groups(x, &self.policy.u, 0, &mut ocp.stages, |motion, stages| {
+                let made = own.sample_matrices_each(&self.model, settings, motion, along);
+                let Some(made) = made else {
+                    return false;
+                };
+                for ((_, a, b), stage) in made.iter().zip(stages) {
+                    (stage.a, stage.b) = (*a, *b);
+                }
+                true
             })
         } else {
             0
@@ -255,7 +261,7 @@ where
             };
             stage.c = next - stage.a * x - stage.b * u;
             stage.linear_u = linear_u - u * damping;
-            if D::SOME {
+            if own.any() {
                 let r = own.weights(i).unwrap_or(&settings.weights).r;
                 stage.linear_u = aim.linear_terms(i, &settings.weights).1 - u * damping;
                 if let Some(common) = ocp.own.get_mut(i) {
@@ -416,7 +422,7 @@ where
         outcome: &Outcome<T>,
     ) {
         let mut least = self.settings.weights.r.amax();
-        if D::SOME {
+        if aim.own.any() {
             let stages = 0..self.settings.horizon;
             let weights = stages.filter_map(|i| aim.own.weights(i));
             least = weights.fold(least, |least, weights| least.max(weights.r.amax()));
@@ -469,7 +475,7 @@ where
         let mut state = *x;
         let mut total = T::zero();
         // No stage costs less than nothing, but for linear costs.
-        let most_before_end = if D::SOME && merit.aim.own.has_linear_costs() {
+        let most_before_end = if merit.aim.own.has_linear_costs() {
             convert(f64::INFINITY)
         } else {
             most

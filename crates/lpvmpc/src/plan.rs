@@ -38,7 +38,12 @@ where
     /// u_ref at stage `i`.
     #[inline(always)]
     pub fn u_ref(&self, i: usize) -> &SVector<T, NU> {
-        self.own.u_ref(i).unwrap_or(&self.u_ref)
+        let own = if self.own.any() {
+            self.own.u_ref(i)
+        } else {
+            None
+        };
+        own.unwrap_or(&self.u_ref)
     }
 
     /// What state and input cost at stage `i`, prices apart, with the `weights` of a stage that has
@@ -53,7 +58,7 @@ where
         let (error, input) = (x - self.at(i), u - self.u_ref(i));
         let Weights { q, r } = self.own.weights(i).unwrap_or(weights);
         let cost = squared(q, &error) + squared(r, &input);
-        if !D::SOME {
+        if !self.own.any() {
             return cost;
         }
         let cross = self.own.cross(i).map(|s| input.dot(&(s * error)));
@@ -236,7 +241,7 @@ where
         about: Option<(&SVector<T, NX>, &SVector<T, NU>)>,
     ) -> T {
         let mut cost = self.aim.cost(i, (x, u), &self.weights);
-        if D::SOME {
+        if self.aim.own.any() {
             cost += self.price_of_rows(i, x, Some(u)) + self.of_outputs(i, (x, Some(u)), about);
         }
         if i > 0 {
@@ -262,7 +267,7 @@ where
             TerminalIngredient::Equality => error.abs().dot(&self.prices.end),
         };
         let cost = cost + self.excess(self.horizon, x);
-        if D::SOME {
+        if self.aim.own.any() {
             let linear = self.aim.linear_cost(self.horizon, x, None);
             let still = SVector::zeros();
             let about = about.map(|about| (about, &still));
@@ -292,7 +297,7 @@ where
         (u, x): (&[SVector<T, NU>], &[SVector<T, NX>]),
         about: (&[SVector<T, NU>], &[SVector<T, NX>]),
     ) -> T {
-        if !D::SOME || self.aim.own.outputs().is_none() {
+        if self.aim.own.outputs().is_none() {
             return self.of(x0, u, x);
         }
         let (mut before, mut planned) = (x0, x0);

@@ -108,6 +108,16 @@ impl<'a, P, T, const NX: usize, const NU: usize, const NS: usize> Preview<'a, P,
         }
     }
 
+    /// Whether there is more than a reference and what is said of the plant.
+    pub(crate) fn has_costs_or_bounds(&self) -> bool {
+        !(self.u_ref.is_empty()
+            && self.linear_x.is_empty()
+            && self.linear_u.is_empty()
+            && self.terminal.is_none()
+            && self.rows.is_empty())
+            || self.has_own_stages()
+    }
+
     /// Whether a stage may have weights or bounds of its own.
     pub(crate) fn has_own_stages(&self) -> bool {
         !(self.weights.is_empty()

@@ -52,11 +52,7 @@ where
         x: &SVector<T, NX>,
         preview: &Preview<'_, P, T, NX, NU, NS>,
     ) -> T {
-        let given = Given {
-            preview,
-            rows: &[],
-            beside: None,
-        };
+        let given = Given::new(preview, &[]);
         self.own_cost(x, &preview.reference, given)
     }
 
@@ -79,11 +75,7 @@ where
             mistake,
         });
         let checked = preview.check(&self.settings.weights, &room).and(fits);
-        let given = Given {
-            preview,
-            rows,
-            beside: None,
-        };
+        let given = Given::new(preview, rows);
         match checked {
             Ok(()) => run(self, given, workspace),
             Err(error) => self.give_up(Status::Refused(error)),
