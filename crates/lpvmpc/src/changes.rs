@@ -51,7 +51,7 @@ where
     }
 
     /// General rows for every stage of every sample from the next one on, unless a preview has others;
-    /// `List::empty()` for none. The workspace needs room for them
+    /// `List::empty()` for none. Workspace and controller need room for them
     /// ([`Capacity::with_general_rows`](crate::Capacity::with_general_rows)).
     ///
     /// # Errors

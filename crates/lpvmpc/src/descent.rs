@@ -138,6 +138,8 @@ where
         let mut status = Status::NoImprovement;
         // Programs in a row that have brought nothing.
         let mut failures = 0;
+        // What was measured; after failures the damping is more than that.
+        let mut measured = self.policy.damping;
         // The longest step that is tried along the embedding. It has no damping to shorten its answers.
         let mut longest_step = T::one();
         while self.problems() < most {
@@ -179,6 +181,7 @@ where
                 }
                 Outcome::Moved { step, gain, .. } => {
                     failures = 0;
+                    measured = self.policy.damping;
                     status = Status::Improved;
                     let little = if self.problems == 1 {
                         tolerance * convert(FIRST)
@@ -208,6 +211,10 @@ where
                     along = along.other(self.policy.far);
                 }
             }
+        }
+        if failures > 0 {
+            // What did not help ends with the sample: the next one would expect as little as it leaves to expect.
+            self.policy.damping = measured;
         }
         status
     }

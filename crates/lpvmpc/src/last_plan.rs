@@ -3,6 +3,7 @@
 use crate::controller::{Controller, next_state};
 use crate::model::{LpvModel, Scalar};
 use crate::plan::at;
+use crate::two_parts::Answered;
 use crate::working_set::copy;
 use nalgebra::SMatrix;
 
@@ -41,6 +42,12 @@ where
             if let Some(place) = self.policy.feedback.get_mut(i) {
                 *place = feedback;
             }
+        }
+        match previous.answered {
+            // The rollout that a feedback has left for later.
+            Some(Answered::At(x)) => self.roll_out(&x, ()),
+            // One that needs a preview is still left for later.
+            later => self.answered = later,
         }
         // Rows that do not fit are found again.
         self.solution.active.copy_from(&previous.solution.active);

@@ -15,7 +15,7 @@ pub struct Capacity {
     /// Stages of the horizon, at least 1.
     pub stages: usize,
     /// Rows of the working set: independent ones, of which `stages * NU` fill the space of the inputs,
-    /// and soft bounds that are exceeded at a quadratic price.
+    /// and soft bounds that are exceeded at a quadratic price. A workspace's memory grows with the square of it.
     pub rows: usize,
     /// Bounds that may be active at once: those rows, soft bounds that are exceeded at a linear price,
     /// and bounds that hold because others do. With a place for every bound there are always enough.
@@ -40,7 +40,8 @@ impl Capacity {
         }
     }
 
-    /// The same with room for a second plan.
+    /// The same with room for a second plan. In a sample without a plan it is of use where
+    /// [`Iterations::Descent`](crate::Iterations::Descent) has a `first` above its `most`.
     #[cfg(feature = "alloc")]
     pub const fn with_second_plan(self) -> Self {
         Self {

@@ -19,6 +19,12 @@ pub struct Penalty<T> {
 }
 
 impl<T: Scalar> Penalty<T> {
+    /// Whether it is a price: finite, and nothing is paid for an excess.
+    pub(crate) fn makes_sense(&self) -> bool {
+        let parts = [self.linear, self.quadratic];
+        { parts.iter() }.all(|part| *part >= T::zero() && part.is_finite())
+    }
+
     /// The price of the excess `s` >= 0.
     pub(crate) fn of(&self, s: T) -> T {
         (self.linear + self.quadratic * s * convert(0.5)) * s

@@ -63,7 +63,7 @@ pub struct Preview<'a, P, T, const NX: usize, const NU: usize, const NS: usize> 
     /// x_dot = f(x, u) + d, constant over each sample; of a model with a period, in state units: x+ = F(x, u) + d.
     pub disturbance: &'a [SVector<T, NX>],
     /// Scheduling from outside, constant over each of the samples 0 to N - 1: the plant is then
-    /// x_dot = A(s_i) x + B(s_i) u + d_i, whatever its state.
+    /// x_dot = A(s_i) x + B(s_i) u + c(s_i) + d_i, whatever its state.
     pub scheduling: &'a [SVector<T, NS>],
     /// The plant over the samples 0 to N - 1, where it changes along the horizon.
     pub models: &'a [P],
@@ -399,11 +399,8 @@ fn ordered<T: Scalar, const K: usize>(bounds: &Bounds<T, K>) -> Result<(), Previ
 }
 
 fn price<T: Scalar>(price: &Option<Penalty<T>>) -> Result<(), PreviewMistake> {
-    let sound = |price: T| price >= T::zero() && price.is_finite();
     match price {
-        Some(Penalty { linear, quadratic }) if !(sound(*linear) && sound(*quadratic)) => {
-            Err(PreviewMistake::Price)
-        }
+        Some(price) if !price.makes_sense() => Err(PreviewMistake::Price),
         _ => Ok(()),
     }
 }

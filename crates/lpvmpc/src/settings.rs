@@ -298,12 +298,14 @@ pub enum ControllerError {
         /// Component, from 0.
         component: usize,
     },
+    /// A price of a state's bounds that is negative or not finite: the component, from 0.
+    Price(usize),
     /// The constant scheduling contains a number that is not finite.
     HeldScheduling,
     /// The given input reference contains a number that is not finite.
     InputReference,
-    /// No quadratic program per sample, or a tolerance of the iteration that is not a positive
-    /// number.
+    /// No quadratic program per sample, or more than 65 535, or a tolerance of the iteration that is not
+    /// a positive number.
     Iterations,
     /// The solver's tolerance is not a positive number.
     Tolerance,
@@ -342,13 +344,18 @@ impl fmt::Display for ControllerError {
                 component,
             } => write!(
                 f,
-                "the lower bound of {quantity} {component} must not exceed its upper bound"
+                "the lower bound of {quantity} {component} must not exceed its upper bound, and neither \
+                 be NaN or infinite on the other's side"
+            ),
+            Self::Price(component) => write!(
+                f,
+                "the price of exceeding the bounds of state {component} must be finite and not negative"
             ),
             Self::HeldScheduling => write!(f, "the held scheduling must be finite"),
             Self::InputReference => write!(f, "the input reference must be finite"),
             Self::Iterations => write!(
                 f,
-                "a sample needs at least one quadratic program, and their tolerance must be a \
+                "a sample needs from 1 to {LARGEST} quadratic programs, and their tolerance must be a \
                  positive number"
             ),
             Self::Tolerance => write!(f, "the solver's tolerance must be a positive number"),
@@ -390,6 +397,12 @@ pub(crate) fn check<T: Scalar, const NX: usize, const NU: usize, const NS: usize
     }
     check_bounds(&settings.x, "state")?;
     check_bounds(&settings.u, "input")?;
+    let mut prices = settings.soft_x.iter();
+    if let Some(component) =
+        prices.position(|price| price.is_some_and(|price| !price.makes_sense()))
+    {
+        return Err(ControllerError::Price(component));
+    }
     if let InputReference::Given(u) = &settings.input_reference
         && !u.iter().all(|entry| entry.is_finite())
     {

@@ -280,7 +280,7 @@ pub enum Status<T> {
     Inaccurate(BoundId),
     /// The cap on changes of the active set ended the search.
     MaxChanges,
-    /// More bounds are active at once than the workspace has places for.
+    /// More bounds are active at once than the workspace or the solution has places for.
     WorkingSetFull,
     /// The problem has more stages than the problem itself, the solver or the solution has memory for.
     HorizonTooLong,
@@ -320,7 +320,9 @@ impl<T: fmt::Display> fmt::Display for Status<T> {
                 write!(f, "inaccurate: rounding keeps the {bound} from being met")
             }
             Self::MaxChanges => write!(f, "the maximum number of active-set changes was reached"),
-            Self::WorkingSetFull => write!(f, "more active bounds than the workspace holds"),
+            Self::WorkingSetFull => {
+                write!(f, "more bounds are active at once than there is memory for")
+            }
             Self::HorizonTooLong => write!(f, "the horizon is longer than the workspace"),
             Self::NumericalFailure { stage, pivot } => write!(
                 f,

@@ -5,7 +5,7 @@ use super::short_case::settings;
 use crate::pendulum::Pendulum;
 use lpvmpc::{
     Bounds, Controller, ControllerError, InputReference, Iterations, Predictor, Preview, Reference,
-    Rk4, TerminalIngredient, Weights,
+    Rk4, Status, TerminalIngredient, Weights,
 };
 use nalgebra::{Matrix1, Matrix2, Vector1, Vector2};
 
@@ -140,5 +140,89 @@ fn a_plan_with_a_preview_is_taken_over() {
             "{} {expected}",
             plan.u[0]
         );
+    }
+}
+
+/// The same between a feedback and the next sample, whose rollout is still to come.
+#[test]
+fn a_plan_is_taken_over_from_a_feedback() {
+    for iterations in [Iterations::Fixed(1), Iterations::default()] {
+        let settings = super::short_case::Settings {
+            iterations,
+            ..settings()
+        };
+        let mut before = Controller::allocate(PENDULUM, settings).unwrap();
+        let mut after = Controller::allocate(PENDULUM, settings).unwrap();
+        let mut workspace = before.workspace();
+        let mut x = Vector2::new(0.4, 0.0);
+        for k in 0..12 {
+            before.prepare(&upright(), &mut workspace);
+            let u = before.feedback(&x, &upright(), &mut workspace).u[0];
+            // A push, so that the plan of the sample before is another one.
+            let push = Vector2::new(0.0, if k % 3 == 0 { 0.4 } else { 0.0 });
+            x = Rk4 { substeps: 2 }.advance(&PENDULUM, &x, &u, 0.05) + push;
+            let mut other = before.clone();
+            after.take_over(&before);
+            let expected = other.step(&x, &upright(), &mut workspace).u[0];
+            let taken = after.step(&x, &upright(), &mut workspace).u[0];
+            assert!((taken - expected).amax() < 1e-12, "{k}: {taken} {expected}");
+        }
+    }
+}
+
+/// A push beyond a hard bound leaves no plan for some samples. What was tried then is over with them: on a linear plant,
+/// whose problem has one optimum, a plan that is called converged is that of a controller without a past.
+#[test]
+fn after_samples_without_a_plan_a_converged_one_is_the_optimum() {
+    let linear = Pendulum {
+        stiffness: 0.0,
+        ..PENDULUM
+    };
+    for (push, horizon) in [(-0.3, 10), (-0.5, 20), (-1.0, 20), (-1.0, 40)] {
+        let mut settings = super::short_case::Settings {
+            horizon,
+            t_s: 0.1,
+            iterations: Iterations::descent(1e-5, 8),
+            terminal: TerminalIngredient::Cost(Matrix2::identity() * 10.0),
+            u: Bounds {
+                lower: Vector1::new(-1.0),
+                upper: Vector1::new(1.0),
+            },
+            x: Bounds {
+                lower: Vector2::new(f64::NEG_INFINITY, -0.5),
+                upper: Vector2::new(f64::INFINITY, 0.5),
+            },
+            soft_x: [None; 2],
+            ..settings()
+        };
+        settings.weights = Weights {
+            q: Matrix2::identity(),
+            r: Matrix1::new(0.1),
+        };
+        let mut controller = Controller::allocate(linear, settings).unwrap();
+        let mut workspace = controller.workspace();
+        let mut x = Vector2::new(4.0, 0.0);
+        let (mut without, mut converged) = (0, 0);
+        for k in 0..40 {
+            if k == 8 {
+                x[1] += push;
+            }
+            let plan = controller.step(&x, &upright(), &mut workspace);
+            let (status, u) = (plan.status, plan.first_input());
+            without += usize::from(!status.is_solved());
+            if status == Status::Converged {
+                let cost = controller.tracking_cost(&x, &upright());
+                let mut fresh = Controller::allocate(linear, settings).unwrap();
+                fresh.step(&x, &upright(), &mut workspace);
+                let least = fresh.tracking_cost(&x, &upright());
+                assert!(
+                    cost <= least * (1.0 + 1e-3),
+                    "{push} {horizon} {k}: {cost} {least}"
+                );
+                converged += 1;
+            }
+            x = Rk4 { substeps: 2 }.advance(&linear, &x, &u, 0.1);
+        }
+        assert!(without > 0 && converged > 20, "{without} {converged}");
     }
 }

@@ -3,7 +3,7 @@
 use super::{settings, tilted};
 use crate::method::plant::CartPole;
 use lpvmpc::{
-    Bounds, Controller, ControllerArrays, ControllerError, ControllerSettings, Predictor,
+    Bounds, Controller, ControllerArrays, ControllerError, ControllerSettings, Penalty, Predictor,
     Reference, Rk4, Scheduling, Status, TerminalIngredient,
 };
 use nalgebra::{Matrix1, Matrix4, SVector, Vector1, Vector2, Vector4};
@@ -103,6 +103,17 @@ fn weights_of_the_wrong_sign() {
         let change = |s: &mut Settings| s.weights.r = Matrix1::new(r);
         let words = ["R", "positive definite"];
         assert_refused(change, ControllerError::WeightSign("R"), &words);
+    }
+}
+
+#[test]
+fn prices_that_are_none() {
+    for price in [-1.0, f64::NAN, f64::INFINITY] {
+        for (linear, quadratic) in [(price, 0.0), (1.0, price)] {
+            let change = |s: &mut Settings| s.soft_x[2] = Some(Penalty { linear, quadratic });
+            let words = ["price", "state 2", "finite and not negative"];
+            assert_refused(change, ControllerError::Price(2), &words);
+        }
     }
 }
 
