@@ -79,6 +79,11 @@ pub(crate) enum Turn {
     Last,
 }
 
+/// The least cap with which a problem with so many `entries` of state and input has a last turn.
+pub(crate) fn cap_with_last_turn(entries: usize) -> usize {
+    SHARE * MOST_FACTORISATIONS * entries
+}
+
 /// Changes of the active set that are kept back for the last turn of a problem with so many `entries` of state and
 /// input, out of a `cap` for all: none where the dual method would lack them.
 pub(crate) fn work_of_last_turn(cap: usize, entries: usize) -> usize {
