@@ -25,13 +25,14 @@ AHEAD = (
 def to_native(plant: Plant, x_ref: ArrayLike | None, ahead: Mapping[str, Any]) -> dict[str, Any]:
     """What a step is told, of which what is None is left out."""
     n, m, k = len(plant.states), len(plant.inputs), len(plant.outputs)
-    given = {"x_ref": x_ref, **{name: one for name, one in ahead.items() if one is not None}}
+    told = {"x_ref": x_ref, **ahead}
+    given = {name: one for name, one in told.items() if one is not None}
     known: dict[str, Any] = {"x_ref": None}
     for name, size in (
         ("x_ref", n), ("u_ref", m), ("linear_x", n), ("linear_u", m), ("disturbance", n),
         ("parameters", len(plant.parameters)), ("y_ref", k),
     ):  # fmt: skip
-        if given.get(name) is not None:
+        if name in given:
             known[name] = by_stage(name, given[name], size)
     if "scheduling" in given:
         size = (np.shape(given["scheduling"]) or (1,))[-1]

@@ -19,7 +19,7 @@ pub struct Penalty<T> {
 }
 
 impl<T: Scalar> Penalty<T> {
-    /// Whether it is a price: finite, and nothing is paid for an excess.
+    /// Whether both parts are finite and not negative.
     pub(crate) fn makes_sense(&self) -> bool {
         let parts = [self.linear, self.quadratic];
         { parts.iter() }.all(|part| *part >= T::zero() && part.is_finite())

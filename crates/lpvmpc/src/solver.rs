@@ -154,7 +154,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             if let Some(at_once) = self.solve_at_once(ocp, settings, solution, first) {
                 return at_once;
             }
-            // Where all bounds at once were not tried, they are before the changes run out.
+            // Where all bounds at once were not tried, they are before the changes run out, or when rounding has ended
+            // the search.
             let untried = spent == 0 && !self.many_bounds.is_empty();
             let kept_back = if untried {
                 work_of_last_turn(cap, NX + NU)

@@ -18,9 +18,9 @@ where
     /// rows, disturbances, scheduling and the plant itself, stage by stage.
     ///
     /// The workspace needs room for rows, and for stages with weights or bounds of their own, where there are any, and the
-    /// controller for those that are active: memory of the same [`Capacity`](crate::Capacity). A preview that makes no sense or does not fit is
-    /// [`Status::Refused`]. The inputs are finite and within the input bounds, those of the preview
-    /// unless it is refused.
+    /// controller for those that are active: memory of the same [`Capacity`](crate::Capacity). A preview that makes no
+    /// sense or does not fit is [`Status::Refused`]. The inputs are finite and within the input bounds, those of the
+    /// preview unless it is refused.
     pub fn step_with(
         &mut self,
         x: &SVector<T, NX>,
