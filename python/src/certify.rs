@@ -21,7 +21,7 @@ pub struct Asked<'py> {
     x_bounds: Pair,
     u_bounds: Pair,
     enlargement: f64,
-    most_boxes: usize,
+    most_boxes: Option<usize>,
     trials: usize,
 }
 

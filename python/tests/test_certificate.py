@@ -117,41 +117,45 @@ def test_false_claims_are_refuted(certified):
             lpvmpc.verify(lpvmpc.Certificate(forged(certificate, change)), plant)
 
 
-def masses(count):
-    """As many masses on springs, each tied to its neighbours; the first and the last are pushed."""
-    x, v, u = ca.SX.sym("x", count), ca.SX.sym("v", count), ca.SX.sym("u", 2)
+def masses(count, pushed):
+    """As many masses on springs, each tied to its neighbours; those named are pushed."""
+    x, v, u = ca.SX.sym("x", count), ca.SX.sym("v", count), ca.SX.sym("u", len(pushed))
     forces = []
     for i in range(count):
         near = [k for k in (i - 1, i + 1) if 0 <= k < count]
         forces.append(sum(x[k] - x[i] + 0.5 * (v[k] - v[i]) for k in near) - 2 * x[i])
-    forces[0] += u[0]
-    forces[-1] += u[1]
-    places = [f"place_{i}" for i in range(count)]
+    for j, i in enumerate(pushed):
+        forces[i] += u[j]
+    places, inputs = ([f"{name}_{i}" for i in of] for name, of in [("place", range(count)), ("push", pushed)])
     return lpvmpc.Plant.from_casadi(
-        ca.vertcat(x, v), u, ca.vertcat(v, *forces), name="masses", inputs=["left", "right"],
+        ca.vertcat(x, v), u, ca.vertcat(v, *forces), name="masses", inputs=inputs,
         states=[*places, *(f"speed_{i}" for i in range(count))],
-        bounds={**dict.fromkeys(places, (-1, 1)), "left": (-2, 2), "right": (-2, 2)},
+        bounds={**dict.fromkeys(places, (-1, 1)), **dict.fromkeys(inputs, (-2, 2))},
     )  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def chain():
-    plant = masses(6)
-    return plant, lpvmpc.certify(plant, 0.1, [1] * 6 + [0.1] * 6, [0.1, 0.1], trials=0)
+@pytest.fixture(scope="module", params=[(6, [0, 5]), (8, [0, 1, 3, 4, 6, 7])], ids=["12 x 2", "16 x 6"])
+def chain(request):
+    count, pushed = request.param
+    plant = masses(count, pushed)
+    q, r = [1] * count + [0.1] * count, [0.1] * len(pushed)
+    return plant, lpvmpc.certify(plant, 0.1, q, r, trials=0)
 
 
-def test_a_plant_of_twelve_states_is_certified(chain):
+def test_a_plant_of_many_states_is_certified(chain):
     plant, certificate = chain
+    n = len(plant.states)
     check(plant, certificate, 10)
     verified = lpvmpc.verify(certificate, plant)
-    assert verified.boxes == certificate.boxes and len(verified.reach) == 12
+    assert verified.boxes == certificate.boxes and len(verified.reach) == n
     assert (verified.reach <= certificate.state_limits).all()
     # The set uses the room that the bounds leave, and its motions are within them between the samples, too.
     assert 0.9 < certificate.state_limits[0] <= 1
-    assert certificate.contains([0.3] * 6 + [0] * 6) and not certificate.contains([1.01] + [0] * 11)
+    inside = [0.3] * (n // 2) + [0] * (n // 2)
+    assert certificate.contains(inside) and not certificate.contains([1.01] + [0] * (n - 1))
 
 
-def test_false_claims_of_twelve_states_are_refuted(chain):
+def test_false_claims_of_many_states_are_refuted(chain):
     plant, certificate = chain
 
     def other_sign(content):
@@ -159,7 +163,7 @@ def test_false_claims_of_twelve_states_are_refuted(chain):
 
     def weaker(content):
         # A cost that is a little too small to pay for the stage cost of one state.
-        content["p"][11][11] *= 0.7
+        content["p"][-1][-1] *= 0.7
 
     for change, message in [
         (lambda c: c.update(level=c["level"] * 1.2), "the set reaches"),

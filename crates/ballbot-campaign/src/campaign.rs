@@ -47,10 +47,11 @@ impl Source {
     /// # Errors
     /// As [`load`](Self::load).
     pub fn parse(text: String, path: &Path) -> Result<Self, CampaignError> {
-        let file: CampaignFile = toml::from_str(&text).map_err(|error| CampaignError::Syntax {
-            path: path.to_owned(),
-            message: words::toml_message(&error.to_string()),
-        })?;
+        let file: CampaignFile =
+            words::from_toml(&text).map_err(|error| CampaignError::Syntax {
+                path: path.to_owned(),
+                message: words::toml_message(&error.to_string()),
+            })?;
         Self::of(path, text, file, Vec::new())
     }
 

@@ -42,6 +42,7 @@ impl Command {
         match self {
             Self::Reproduce(_) => true,
             Self::Excite(arguments) => !arguments.json,
+            Self::Refine(arguments) => arguments.writes_a_file() && !arguments.json,
             Self::Identify(arguments) => !arguments.example && !arguments.json,
             Self::Simulate(arguments) => !(arguments.json || arguments.logs_to_standard_output()),
             Self::Rehearse(arguments) => !arguments.json,

@@ -59,7 +59,7 @@ pub fn read_text(path: &Path) -> Result<String, InputError> {
 /// # Errors
 /// [`InputError::Read`] or [`InputError::Syntax`].
 pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, InputError> {
-    parse(path, |text| toml::from_str(text))
+    parse(path, |text| words::from_toml(text))
 }
 
 /// What `parser` makes of the text of a TOML file.

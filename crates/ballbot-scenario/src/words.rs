@@ -2,7 +2,7 @@
 
 use lpvmpc::{BoundId, Observation, Quantity, Restart, Side, Status, Verdict};
 use lpvmpc_sim::Termination;
-pub use lpvmpc_words::{nearest, toml_message};
+pub use lpvmpc_words::{from_toml, nearest, toml_message};
 
 /// Names of the states, in their order.
 pub const STATES: [&str; 4] = ["phi", "theta", "phi_dot", "theta_dot"];
@@ -88,8 +88,15 @@ pub fn readings(observations: impl Iterator<Item = (f64, Observation<4>)>) -> St
         let told = REFUSED.iter().zip(counts).filter(|(_, count)| *count > 0);
         told.map(move |((_, word), count)| format!("{name} {word} {count} times"))
     });
-    sensors.chain(restarts).collect::<Vec<_>>().join(", ")
+    let more = restarts.len().saturating_sub(MOST_RESTARTS);
+    restarts.truncate(MOST_RESTARTS);
+    let rest = (more > 0).then(|| format!("and {more} times more"));
+    let told = sensors.chain(restarts).chain(rest);
+    told.collect::<Vec<_>>().join(", ")
 }
+
+/// Times at which an estimate began anew that are told one by one.
+const MOST_RESTARTS: usize = 5;
 
 /// Why an estimate began anew; nothing of its first beginning.
 fn restart(cause: Restart) -> Option<&'static str> {

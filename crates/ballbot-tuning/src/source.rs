@@ -29,7 +29,7 @@ impl TuningSource {
             path: path.to_owned(),
             source,
         })?;
-        let file: TuningFile = toml::from_str(&text).map_err(|error| TuningError::Syntax {
+        let file: TuningFile = words::from_toml(&text).map_err(|error| TuningError::Syntax {
             path: path.to_owned(),
             message: words::toml_message(&error.to_string()),
         })?;

@@ -79,8 +79,15 @@ const MOST_CUTS: u32 = 60;
 /// that the result is the same on any number of threads.
 const TOGETHER: usize = 64;
 
-/// Proves a statement on `whole` by looking at `most_cells` cells at most. `progress` hears which
-/// share of it is done.
+/// Cells after which it is looked at whether so many as there may be are enough.
+const FEW: usize = 15;
+/// Points whose cells this is told by, and what cells may be too small by, as halvings. Cells of all sizes but far more than
+/// there may be are rare: four points that lie in none but such cells are no accident.
+const DIVES: u32 = 4;
+const MARGIN: u32 = 3;
+
+/// Proves a statement on `whole` by looking at `most_cells` cells at most; fewer, where it is clear that so many are not
+/// enough. `progress` hears which share of it is done.
 pub(crate) fn cover<const N: usize>(
     whole: Cell<N>,
     most_cells: usize,
@@ -93,7 +100,13 @@ pub(crate) fn cover<const N: usize>(
         spare: f64::INFINITY,
     };
     let (mut examined, mut share) = (0, 0.0);
+    let mut enough = false;
     while !open.is_empty() {
+        if !enough && examined >= FEW {
+            let deepest = most_cells.max(1).ilog2() + MARGIN;
+            examined += dive(&whole, deepest, &examine)?;
+            enough = true;
+        }
         let batch = open.split_off(open.len().saturating_sub(TOGETHER));
         let findings = each(&batch, |_, (cell, _)| examine(cell));
         for ((cell, cuts), finding) in batch.into_iter().zip(findings) {
@@ -128,4 +141,54 @@ pub(crate) fn cover<const N: usize>(
         progress(share);
     }
     Ok(covered)
+}
+
+/// Cuts `whole` towards a few points, to see of what size the cells are on which the statement can be proved: an error
+/// if all of them are cut `deepest` times, or if it fails on the way. Returns how many cells were looked at.
+fn dive<const N: usize>(
+    whole: &Cell<N>,
+    deepest: u32,
+    examine: &(impl Fn(&Cell<N>) -> Finding + Sync),
+) -> Result<usize, Uncovered<N>> {
+    let mut cells: Vec<_> = (0..DIVES)
+        .map(|dive| (*whole, inside(whole, dive)))
+        .collect();
+    let mut looked_at = 0;
+    for _ in 0..deepest {
+        let findings = each(&cells, |_, (cell, _)| examine(cell));
+        looked_at += findings.len();
+        for ((cell, towards), finding) in cells.iter_mut().zip(findings) {
+            let at = cell.centre;
+            match finding {
+                Finding::Fails => return Err(Uncovered::False { at }),
+                Finding::Hopeless => {
+                    return Err(Uncovered::Undecided {
+                        at,
+                        cells: looked_at,
+                    });
+                }
+                Finding::Open { across } => {
+                    let upper = towards[across] > at[across];
+                    *cell = cell.halves(across)[usize::from(upper)];
+                }
+                Finding::Holds { .. } | Finding::Outside => return Ok(looked_at),
+            }
+        }
+    }
+    Err(Uncovered::Undecided {
+        at: cells[0].0.centre,
+        cells: looked_at,
+    })
+}
+
+/// A point of the ellipsoid in the cell, the same each time, another one for every `number`.
+fn inside<const N: usize>(cell: &Cell<N>, number: u32) -> SVector<f64, N> {
+    let mut state = number;
+    let direction = SVector::<f64, N>::from_fn(|_, _| {
+        // The upper bits of a linear congruential generator (Numerical Recipes).
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(state) / f64::from(u32::MAX) - 0.5
+    });
+    let direction = direction / direction.norm().max(f64::MIN_POSITIVE);
+    cell.centre + cell.half_widths.component_mul(&direction) * 0.9
 }

@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         settings.enlargement = enlargement.parse()?;
     }
     if let Some(boxes) = rest.get(1) {
-        settings.most_boxes = boxes.parse()?;
+        settings.most_boxes = Some(boxes.parse()?);
     }
     if let Some(trials) = rest.get(2) {
         settings.trials = trials.parse()?;

@@ -66,29 +66,14 @@ impl<'a, const NX: usize, const NU: usize, const NS: usize> Design<'a, NX, NU, N
         let reach = |limit: f64, square: f64| limit.min((level * square).sqrt());
         let mut problem = problem;
         let mut box_of_motion = SVector::zeros();
-        for i in 0..NX {
-            let left_over = i >= n;
-            let semi_axis = if left_over {
-                1.0
-            } else {
-                reach(problem.state_limits[i], inverse[(i, i)])
-            };
-            problem.state_limits[i] = semi_axis;
-            box_of_motion[i] = if left_over { 0.0 } else { semi_axis };
-            if left_over {
-                problem.q[(i, i)] = 0.01 * level;
-            }
+        for i in 0..n {
+            box_of_motion[i] = reach(problem.state_limits[i], inverse[(i, i)]);
+            problem.state_limits[i] = box_of_motion[i];
         }
-        for i in 0..NU {
-            let left_over = i >= m;
-            let semi_axis = if left_over {
-                1.0
-            } else {
-                reach(problem.input_limits[i], inputs[(i, i)])
-            };
+        for i in 0..m {
+            box_of_motion[NX + i] = reach(problem.input_limits[i], inputs[(i, i)]);
             // What a sampled input cannot exceed in the set, the design may.
-            problem.input_limits[i] = problem.input_limits[i].min(10.0 * semi_axis);
-            box_of_motion[NX + i] = if left_over { 0.0 } else { semi_axis };
+            problem.input_limits[i] = problem.input_limits[i].min(10.0 * box_of_motion[NX + i]);
         }
         let closed = &a - &b * &lqr.k;
         let rate = closed.complex_eigenvalues().map(|one| one.norm()).max();
@@ -171,20 +156,10 @@ impl<'a, const NX: usize, const NU: usize, const NS: usize> Design<'a, NX, NU, N
         size: f64,
         at_step: &dyn Fn(),
     ) -> Result<TerminalIngredients<NX, NU>, SynthesisError> {
-        let (n, m) = self.sizes;
         let mut problem = self.problem.clone();
         problem.state_limits *= size;
-        let points = self.points(size);
-        let found =
-            synthesize_terminal_at(self.model, &SVector::zeros(), &points, &problem, at_step)?;
-        // The places left over have nothing to do with the others.
-        let k = SMatrix::from_fn(|i, j| if i < m && j < n { found.k[(i, j)] } else { 0.0 });
-        let p = SMatrix::from_fn(|i, j| match (i < n && j < n, i == j) {
-            (true, _) => found.p[(i, j)],
-            (false, true) => found.level,
-            (false, false) => 0.0,
-        });
-        Ok(TerminalIngredients { k, p, ..found })
+        let (middle, points) = (SVector::zeros(), self.points(size));
+        synthesize_terminal_at(self.model, &middle, &points, &problem, self.sizes, at_step)
     }
 }
 

@@ -47,9 +47,9 @@ pub use sized::Verified;
 use lpvmpc_plant::Plant;
 
 /// The most states that a plant may have.
-pub const MOST_STATES: usize = 12;
+pub const MOST_STATES: usize = 16;
 /// The most inputs.
-pub const MOST_INPUTS: usize = 4;
+pub const MOST_INPUTS: usize = 6;
 
 /// Calls a function of the smallest size in which a plant has room.
 macro_rules! smallest {
@@ -104,7 +104,7 @@ pub fn certify(
         let fault = format!("it is {}; it must be from 1 to 1e6", settings.enlargement);
         return Err(CertifyError::setting("enlargement", fault));
     }
-    smallest!(plant, certify(plant, settings, progress), 2 1 3, 4 2 6, 6 2 8, 8 4 12, 12 4 16)
+    smallest!(plant, certify(plant, settings, progress), 2 1 3, 4 2 6, 6 2 8, 8 4 12, 16 6 22)
 }
 
 /// Proves every claim of a certificate again, from its numbers and the plant's formulas alone.
@@ -118,7 +118,7 @@ pub fn verify(
 ) -> Result<Verified, CertifyError> {
     certificate.check_plant(plant)?;
     check_period(plant, certificate.t_s)?;
-    smallest!(plant, verify(certificate, plant, progress), 2 1 3, 4 2 6, 6 2 8, 8 4 12, 12 4 16)
+    smallest!(plant, verify(certificate, plant, progress), 2 1 3, 4 2 6, 6 2 8, 8 4 12, 16 6 22)
 }
 
 fn check_period(plant: &Plant, t_s: f64) -> Result<(), CertifyError> {

@@ -22,8 +22,9 @@ pub struct CertifySettings {
     /// How much dearer the terminal cost may be than the regulator's, to have a larger set, at least 1: the level is
     /// this many times that at which the regulator's own ellipsoid meets the first bound.
     pub enlargement: f64,
-    /// Boxes of states that one proof may look at.
-    pub most_boxes: usize,
+    /// Boxes of states that one proof may look at; `None` for 4000 of up to eight states, and 8 of more, of which each
+    /// takes long.
+    pub most_boxes: Option<usize>,
     /// Proofs of larger sets that are tried once there is one.
     pub trials: usize,
     /// Program and version that go into the file.
@@ -42,7 +43,7 @@ impl CertifySettings {
             x_bounds: None,
             u_bounds: None,
             enlargement: 10.0,
-            most_boxes: 4000,
+            most_boxes: None,
             trials: 4,
             written_by: format!("lpvmpc {}", env!("CARGO_PKG_VERSION")),
         }

@@ -21,6 +21,8 @@ const MOST_LOWERED: u32 = 3;
 const MOST_HALVINGS: i32 = 8;
 /// What an equilibrium that is not exact is claimed to be known to, at best.
 const NEARLY: f64 = 1e-15;
+/// Up to so many states a box takes milliseconds, beyond up to a second.
+const FEW_STATES: usize = 8;
 /// A level that is higher by less is not worth a proof.
 const WORTH_IT: f64 = 1.05;
 
@@ -69,7 +71,8 @@ pub(crate) fn certify<const NX: usize, const NU: usize, const NS: usize>(
         level: 1.0,
     };
     let design = Design::new(&about, problem.clone(), (n, m), settings.enlargement)?;
-    let most_boxes = settings.most_boxes.clamp(1, MOST_BOXES);
+    let few = if n > FEW_STATES { 8 } else { 4000 };
+    let most_boxes = settings.most_boxes.unwrap_or(few).clamp(1, MOST_BOXES);
     let claim = |size: f64| -> Result<_, CertifyError> {
         // There is none yet of the proof.
         let found = design.ingredients(size, &|| progress(0.0))?;

@@ -12,13 +12,13 @@ use lpvmpc_terminal::progress::ProofProgress;
 use lpvmpc_terminal::table::short;
 use serde_json::json;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Finds and proves a certificate for the controller of an experiment; its text, or where it was written.
 pub fn certify(arguments: &CertifyArguments) -> Result<String, CommandError> {
     let experiment = Experiment::load(&arguments.experiment)?;
     if let Some(out) = &arguments.out {
-        output::check_writable(out)?;
+        output::check_separate(out, experiment.files().iter().map(PathBuf::as_path))?;
     }
     let settings = &experiment.settings;
     let pair = |limits: &Option<lpvmpc_any::Limits>| {

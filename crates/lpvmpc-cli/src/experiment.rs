@@ -10,7 +10,7 @@ use lpvmpc_any::{
 };
 use lpvmpc_plant::{Plant, Signal};
 use lpvmpc_terminal::table::short;
-use lpvmpc_words::{nearest, toml_message};
+use lpvmpc_words::{from_toml, nearest, toml_message};
 use nalgebra::{DMatrix, DVector};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -30,6 +30,8 @@ pub fn example(arguments: &ExampleArguments) -> &'static str {
 pub struct Experiment {
     /// Its file.
     path: PathBuf,
+    /// That of its plant.
+    plant_file: PathBuf,
     /// Its name, which is that of the folder of its results.
     pub name: String,
     /// The plant that the controller knows.
@@ -179,7 +181,7 @@ impl Experiment {
             path: path.to_owned(),
             fault,
         };
-        let file: File = toml::from_str(&text).map_err(|error| {
+        let file: File = from_toml(&text).map_err(|error| {
             fault(format!(
                 "it is no experiment:\n{}",
                 toml_message(&error.to_string())
@@ -192,6 +194,12 @@ impl Experiment {
 }
 
 impl Experiment {
+    /// The files that it was read from, and that of its certificate.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let read = [self.path.clone(), self.plant_file.clone()];
+        read.into_iter().chain(self.certificate.clone()).collect()
+    }
+
     /// What its controller or its world refuses, in words that name its file.
     pub fn refused(&self, part: &str, error: &MpcError) -> CommandError {
         let MpcError { place, fault } = error;
@@ -273,6 +281,7 @@ impl File {
         let world = self.world.settings(settings.t_s, &data.states, measured)?;
         Ok(Experiment {
             path: path.to_owned(),
+            plant_file: path.parent().unwrap_or(Path::new("")).join(&self.plant),
             name: self.name,
             real,
             settings,

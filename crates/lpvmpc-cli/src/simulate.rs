@@ -7,6 +7,7 @@ use crate::error::CommandError;
 use crate::experiment::Experiment;
 use crate::figure::{band, figure, label};
 use lpvmpc_plant::Signal;
+use lpvmpc_terminal::output;
 use lpvmpc_terminal::results::ResultFolder;
 use lpvmpc_terminal::table::{Table, short};
 use serde_json::{Value, json};
@@ -50,16 +51,19 @@ pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
     let out = arguments.out.clone().unwrap_or_else(usual);
     let folder = ResultFolder::open(PROGRAM, &out, &FILES)?;
     let run = Run::new(&experiment)?;
-    let figure = figure(&experiment, &run);
     let summary = summary(&experiment, &run);
-    let contents = [
-        trajectory(&experiment, &run).into_bytes(),
-        format!("{summary:#}\n").into_bytes(),
-        figure.svg()?.into_bytes(),
-        figure.png(2.0)?,
+    let mut files = vec![
+        (
+            FILES[0].to_owned(),
+            trajectory(&experiment, &run).into_bytes(),
+        ),
+        (FILES[1].to_owned(), format!("{summary:#}\n").into_bytes()),
     ];
-    let names = FILES.iter().map(|name| (*name).to_owned());
-    let files: Vec<(String, Vec<u8>)> = names.zip(contents).collect();
+    // What happened is worth keeping without its picture.
+    match figure(&experiment, &run).files("figure") {
+        Ok(pair) => files.extend(pair),
+        Err(error) => output::warn(&format!("the figure could not be drawn: {error}")),
+    }
     folder.write(&files, &FILES)?;
     if let Some((t, status)) = &run.first_unsolved {
         return Err(CommandError::NoResult(format!(

@@ -167,7 +167,7 @@ pub enum FigureError {
     },
     /// A view that is not a range.
     #[error(
-        "panel \"{panel}\": the {axis} view from {lower} to {upper} must be increasing, positive where the axis is logarithmic, and of a size between 1e-290 and 1e290"
+        "panel \"{panel}\": the {axis} view from {lower:?} to {upper:?} must be increasing, positive where the axis is logarithmic, and of a size between 1e-290 and 1e290"
     )]
     View {
         /// Vertical label of the panel.
@@ -179,8 +179,10 @@ pub enum FigureError {
         /// Upper end.
         upper: f64,
     },
-    /// An allowed range without inside.
-    #[error("panel \"{panel}\": the lower bound {lower} must be below the upper bound {upper}")]
+    /// An allowed range that is none.
+    #[error(
+        "panel \"{panel}\": the lower bound {lower:?} must not be above the upper bound {upper:?}"
+    )]
     Band {
         /// Vertical label of the panel.
         panel: String,
@@ -235,6 +237,17 @@ impl Figure {
     /// As [`Figure::svg`], and a size beyond 20000 pixels.
     pub fn png(&self, scale: f64) -> Result<Vec<u8>, FigureError> {
         png::encode(&layout::scene(self)?, scale)
+    }
+
+    /// The figure as the files `name`.svg and `name`.png, this one at two pixels per CSS pixel.
+    ///
+    /// # Errors
+    /// As [`Figure::svg`].
+    pub fn files(&self, name: &str) -> Result<[(String, Vec<u8>); 2], FigureError> {
+        Ok([
+            (format!("{name}.svg"), self.svg()?.into_bytes()),
+            (format!("{name}.png"), self.png(2.0)?),
+        ])
     }
 }
 

@@ -219,7 +219,12 @@ fn check_panel(panel: &Panel) -> Result<(), FigureError> {
     }
     match panel.band {
         // NaN has no order, and is refused, too.
-        Some(band) if band.lower.partial_cmp(&band.upper) != Some(Ordering::Less) => {
+        Some(band)
+            if band
+                .lower
+                .partial_cmp(&band.upper)
+                .is_none_or(Ordering::is_gt) =>
+        {
             Err(FigureError::Band {
                 panel: panel.y_label.clone(),
                 lower: band.lower,

@@ -328,17 +328,18 @@ fn what_cannot_be_drawn_is_an_error_that_names_the_panel() {
         ..good.clone()
     };
     assert!(matches!(fails(reversed), FigureError::View { .. }));
-    let band = Some(Band {
-        lower: f64::NAN,
-        upper: 1.0,
-    });
-    assert!(matches!(
-        fails(Panel {
-            band,
-            ..good.clone()
-        }),
-        FigureError::Band { .. }
-    ));
+    let bounded = |lower, upper| Panel {
+        band: Some(Band { lower, upper }),
+        ..good.clone()
+    };
+    for (lower, upper) in [(f64::NAN, 1.0), (1.0, 0.0)] {
+        assert!(matches!(
+            fails(bounded(lower, upper)),
+            FigureError::Band { .. }
+        ));
+    }
+    // One value alone is a range: of an input that is switched off.
+    figure(vec![bounded(0.5, 0.5)]).svg().unwrap();
 
     assert!(matches!(
         figure(vec![]).svg(),

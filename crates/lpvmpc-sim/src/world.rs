@@ -356,10 +356,12 @@ where
     /// [`PlantError`] if the motion cannot be integrated, or a command was not finite. The
     /// state and the time then stay as they were.
     pub fn advance(&mut self) -> Result<(), PlantError> {
-        let before = (self.x, self.output);
+        let (x, output, arrived) = (self.x, self.output, self.arrived);
+        let (pending, travelling) = (self.pending.clone(), self.travelling.clone());
         let moved = self.move_on();
         if moved.is_err() {
-            (self.x, self.output) = before;
+            (self.x, self.output, self.arrived) = (x, output, arrived);
+            (self.pending, self.travelling) = (pending, travelling);
         }
         moved
     }

@@ -224,6 +224,30 @@ pub fn check_writable(path: &Path) -> Result<(), FileError> {
     tried.map_err(FileError::at(path))
 }
 
+/// The same of a file that is none of `others`: those that the command reads, or writes besides.
+///
+/// # Errors
+/// As [`check_writable`]; or it is one of them, which would be lost.
+pub fn check_separate<'a>(
+    path: &Path,
+    others: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), FileError> {
+    // One that is not there yet has no other name by which it could be there, its folder apart.
+    let place = |path: &Path| {
+        let folder = path.parent().filter(|above| !above.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new(".")).canonicalize();
+        path.canonicalize()
+            .or_else(|_| Ok::<_, io::Error>(folder?.join(path.file_name().unwrap_or_default())))
+            .ok()
+    };
+    let there = place(path);
+    if there.is_some() && others.into_iter().any(|other| place(other) == there) {
+        let problem = "this command reads or writes it as something else, which would be lost";
+        return Err(FileError::at(path)(io::Error::other(problem)));
+    }
+    check_writable(path)
+}
+
 /// Where a path leads.
 enum Place {
     /// To a file, there or not, which is replaced by one written beside it.
@@ -419,6 +443,22 @@ mod tests {
         assert_eq!(fs::read_to_string(&file).unwrap(), "mine");
         assert!(check_writable(&file.join("below.csv")).is_err());
         assert!(check_writable(folder.path()).is_err());
+    }
+
+    #[test]
+    fn a_file_that_is_read_is_not_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, above) = (folder.path().join("in.toml"), folder.path().join("a"));
+        fs::write(&file, "mine").unwrap();
+        fs::create_dir(&above).unwrap();
+        let roundabout = above.join("..").join("in.toml");
+        let error = check_separate(&roundabout, [file.as_path()]).unwrap_err();
+        assert!(error.to_string().contains("would be lost"), "{error}");
+        let (new, same) = (folder.path().join("out"), above.join("..").join("out"));
+        assert!(check_separate(&new, [same.as_path()]).is_err());
+        check_separate(&new, [file.as_path(), Path::new("single-setpoint")]).unwrap();
+        check_separate(&file, [new.as_path()]).unwrap();
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
     }
 
     #[test]

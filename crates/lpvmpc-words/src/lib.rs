@@ -1,8 +1,22 @@
 //! Messages for people about files that were written by people.
 
+use serde::de::DeserializeOwned;
+
+/// What a TOML text says, whose lists are as long as they must be: the reader by itself leaves out what is behind.
+///
+/// # Errors
+/// As of [`toml::from_str`].
+pub fn from_toml<T: DeserializeOwned>(text: &str) -> Result<T, toml::de::Error> {
+    let content = toml::from_str(text)?;
+    // What this reader says has no line, so it comes second.
+    toml::Value::Table(text.parse()?).try_into::<T>()?;
+    Ok(content)
+}
+
 /// What the reader of a TOML file says, without the types of a programming language.
 pub fn toml_message(message: &str) -> String {
-    const PLAIN: [(&str, &str); 14] = [
+    const PLAIN: [(&str, &str); 15] = [
+        ("expected fewer elements in array", "which is too many here"),
         ("expected usize", "expected a whole number, 0 or more"),
         ("expected u64", "expected a whole number, 0 or more"),
         ("expected f64", "expected a number"),

@@ -40,6 +40,8 @@ pub struct Estimator<
 > {
     model: P,
     settings: EstimatorSettings<T, NX, NU, NY, ND>,
+    /// The state that it begins from, and begins anew from.
+    start: SVector<T, NX>,
     now: Estimate<T, NX, ND>,
     history: History<T, NX, NU, NY, ND>,
     rejected: [usize; NY],
@@ -58,8 +60,8 @@ where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
-    /// An estimator that starts from the state `x` without disturbance, and remembers as many
-    /// instants as there is memory for, at least 1.
+    /// An estimator that starts from the state `x` without disturbance, also when it begins anew
+    /// after a gap, and remembers as many instants as there is memory for, at least 1.
     ///
     /// # Errors
     /// An [`EstimatorError`] names the first setting that makes no sense.
@@ -77,6 +79,7 @@ where
         Ok(Self {
             model,
             settings,
+            start: x,
             now,
             history: History::new(memory.0, now),
             rejected: [0; NY],
@@ -101,7 +104,8 @@ where
         Self::new(model, settings, x, EstimatorMemory::allocate(instants))
     }
 
-    /// Starts again from the state `x`. The clock goes on.
+    /// Starts again from the state `x`, this time: after a gap it is the one that it was made with.
+    /// The clock goes on.
     pub fn reset(&mut self, x: SVector<T, NX>) {
         self.begin(self.settings.initial(x));
         self.heard = [false; NY];
@@ -193,8 +197,8 @@ where
         self.clock.now()
     }
 
-    /// Whether there is no estimate: no reading was believed for longer than
-    /// [`Gate::longest_gap`], or the last estimate became non-finite. It begins anew with the
+    /// Whether there is no estimate: there were measurements but no reading yet, none was believed for
+    /// longer than [`Gate::longest_gap`], or the last estimate became non-finite. It begins anew with the
     /// next measurement that has a reading.
     pub fn is_lost(&self) -> bool {
         self.lost.is_some()
@@ -222,9 +226,10 @@ where
     /// the inputs of `line`, which elapses, and corrects it with the `readings`, whose ages count
     /// from the stamp.
     ///
-    /// Time begins with the first measurement. An estimate that no reading has corrected for
+    /// Time begins with the first measurement, the estimate with the first reading, which corrects
+    /// the state that it starts from. An estimate that no reading has corrected for
     /// longer than [`Gate::longest_gap`], or that is not finite any more, is given up, and begins
-    /// anew with the first measurement that has a reading; so it does when the stamps go back by
+    /// anew, from the state that the estimator was made with, with the first measurement that has a reading; so it does when the stamps go back by
     /// more than that. A measurement out of order changes nothing.
     pub fn observe(
         &mut self,
@@ -247,7 +252,7 @@ where
         let longest_gap = self.settings.gate.longest_gap;
         let mut begins = None;
         match self.clock.tick(stamp) {
-            Tick::First => begins = Some(Restart::Start),
+            Tick::First => self.lost = Some(Restart::Start),
             Tick::Elapsed(duration) => self.elapse(duration, line),
             Tick::Backward(by) if by <= longest_gap => {
                 return Observation::refused(readings, Verdict::Stale);
@@ -264,10 +269,10 @@ where
             if !readings.iter().flatten().any(usable) {
                 return Observation::useless(readings, &self.settings.gate);
             }
-            begins = self.lost;
-        }
-        if begins.is_some() {
-            self.reset(SVector::zeros());
+            begins = self.lost.take();
+            if begins != Some(Restart::Start) {
+                self.reset(self.start);
+            }
         }
         Observation {
             verdicts: self.update(readings),

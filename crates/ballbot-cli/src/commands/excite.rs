@@ -67,7 +67,11 @@ pub struct ExciteArguments {
 pub fn run(arguments: &ExciteArguments) -> Result<String, CommandError> {
     let config = configuration(arguments.config.as_deref())?;
     let task = task(arguments, &config)?;
-    output::check_writable(&arguments.out)?;
+    let given = [&arguments.config, &arguments.parameters];
+    output::check_separate(
+        &arguments.out,
+        given.into_iter().flatten().map(|one| one.as_path()),
+    )?;
     let excitation = task.design()?;
     let csv = excitation.csv();
     output::write_files(&[(&arguments.out, csv.as_bytes())])?;

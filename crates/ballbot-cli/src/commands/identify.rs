@@ -1,7 +1,6 @@
 //! `ballbot identify`.
 
 use super::CommandError;
-use super::simulate::PNG_SCALE;
 use crate::arguments::finite_list;
 use crate::identification::{figures, published, report, summary};
 use crate::input::{self, InputError};
@@ -236,9 +235,7 @@ fn write(
     let mut files: Vec<(String, Vec<u8>)> = texts.collect();
     files.push((REPORT.to_owned(), report.into_bytes()));
     for figure in &figures {
-        let [svg, png] = figure_files(figure.name);
-        files.push((svg, figure.figure.svg()?.into_bytes()));
-        files.push((png, figure.figure.png(PNG_SCALE)?));
+        files.extend(figure.figure.files(figure.name)?);
     }
     // Figures of an earlier run that this one has not, and parameters in place of which there are
     // others now. Where there are none, they are kept, and told of.

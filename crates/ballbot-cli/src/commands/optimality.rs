@@ -1,7 +1,6 @@
 //! `ballbot optimality`.
 
 use super::CommandError;
-use crate::commands::simulate::PNG_SCALE;
 use crate::json;
 use crate::optimality_figure::{CostOverDistance, cost_over_distance, long_horizon};
 use crate::progress::Progress;
@@ -77,7 +76,7 @@ pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
     ]);
     let mut rows = CSV_HEADER.to_owned();
     let mut documents = Vec::new();
-    let mut contents = Vec::new();
+    let mut files = Vec::new();
     for (name, cases) in &sets {
         let outcomes = {
             let progress = Progress::new("running", cases.len());
@@ -90,14 +89,10 @@ pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
             rows += &csv_row(name, case, outcome);
         }
         if *name == "from rest" {
-            contents.extend(figures(cases, &outcomes)?);
+            files.extend(figures(cases, &outcomes)?);
         }
     }
-    contents.push(("optimality.csv", rows.into_bytes()));
-    let files = contents.into_iter();
-    let files: Vec<_> = files
-        .map(|(name, content)| (name.to_owned(), content))
-        .collect();
+    files.push(("optimality.csv".to_owned(), rows.into_bytes()));
     results.write(&files, &RESULTS)?;
     if arguments.json {
         return Ok(json::text(&json!({ "sets": documents })));
@@ -116,10 +111,7 @@ pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
 }
 
 /// Figures of the cases from rest.
-fn figures(
-    cases: &[Case],
-    outcomes: &[Outcome],
-) -> Result<Vec<(&'static str, Vec<u8>)>, CommandError> {
+fn figures(cases: &[Case], outcomes: &[Outcome]) -> Result<Vec<(String, Vec<u8>)>, CommandError> {
     let shown = |case: &&(&Case, &Outcome)| case.0.horizon == 20 && case.0.t_s == 0.05;
     let pairs: Vec<_> = cases.iter().zip(outcomes).collect();
     let shown: Vec<_> = pairs.iter().filter(shown).collect();
@@ -137,17 +129,12 @@ fn figures(
         lpv: over(|_, outcome| outcome.cost),
         guaranteed,
     });
-    let mut files = vec![
-        ("cost-over-distance.svg", costs.svg()?.into_bytes()),
-        ("cost-over-distance.png", costs.png(PNG_SCALE)?),
-    ];
+    let mut files = costs.files("cost-over-distance")?.to_vec();
     let long = pairs
         .iter()
         .find(|(case, _)| case.horizon == 60 && case.distance == 2.5 && case.t_s == 0.05);
     if let Some((case, outcome)) = long {
-        let figure = long_horizon(case, outcome);
-        files.push(("long-horizon.svg", figure.svg()?.into_bytes()));
-        files.push(("long-horizon.png", figure.png(PNG_SCALE)?));
+        files.extend(long_horizon(case, outcome).files("long-horizon")?);
     }
     Ok(files)
 }

@@ -39,6 +39,15 @@ pub struct RefineArguments {
     pub output: Option<PathBuf>,
 }
 
+impl RefineArguments {
+    /// Whether the parameters go into a file.
+    pub fn writes_a_file(&self) -> bool {
+        self.output
+            .as_deref()
+            .is_some_and(|path| path != Path::new("-"))
+    }
+}
+
 /// Refines and reports.
 ///
 /// # Errors
@@ -53,7 +62,9 @@ pub fn run(arguments: &RefineArguments) -> Result<String, CommandError> {
     };
     let output = arguments.output.as_deref();
     let file = output.filter(|path| *path != Path::new("-"));
-    file.map(output::check_writable).transpose()?;
+    let given = arguments.file.as_deref();
+    file.map(|file| output::check_separate(file, given))
+        .transpose()?;
     let refinement = problem.solve()?;
     let table = parameters_toml(&refinement);
     match file {

@@ -1,7 +1,6 @@
 //! `ballbot reproduce`: the paper, in one command.
 
 use super::CommandError;
-use super::simulate::PNG_SCALE;
 use crate::html::CaptionedFigure;
 use crate::progress::Progress;
 use crate::reproduction::tables::{self, Sheet};
@@ -85,9 +84,7 @@ fn write(
         optimum::figure(&reproduction.optimum),
     ];
     for figure in figures.iter().chain(&beyond) {
-        let stem = format!("figures/{}", figure.name);
-        files.push((format!("{stem}.svg"), figure.figure.svg()?.into_bytes()));
-        files.push((format!("{stem}.png"), figure.figure.png(PNG_SCALE)?));
+        files.extend(figure.figure.files(&format!("figures/{}", figure.name))?);
     }
     let beyond = guarantee::sheets(&reproduction.guarantee)
         .into_iter()

@@ -99,8 +99,11 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
         Some(path) => log_paths(path, prepared.planes.len()),
         None => Vec::new(),
     };
+    let parameters = arguments.options.robot.parameters.clone();
+    let results = RESULTS.iter().map(|name| folder.path().join(name));
+    let others: Vec<PathBuf> = results.chain([file.to_owned()]).chain(parameters).collect();
     logs.iter()
-        .try_for_each(|path| output::check_writable(path))?;
+        .try_for_each(|path| output::check_separate(path, others.iter().map(PathBuf::as_path)))?;
     let Record { planes, motors, .. } = record(&prepared)?;
     let (trajectories, rows): (Vec<_>, Vec<_>) = planes
         .into_iter()
@@ -277,8 +280,11 @@ fn write(
         files.push(("motors.csv".to_owned(), text.into_bytes()));
     }
     for (name, figure) in figures(prepared, trajectories, motors) {
-        files.push((format!("{name}.svg"), figure.svg()?.into_bytes()));
-        files.push((format!("{name}.png"), figure.png(PNG_SCALE)?));
+        // What happened is worth keeping without its picture.
+        match figure.files(name) {
+            Ok(pair) => files.extend(pair),
+            Err(error) => output::warn(&format!("{name} could not be drawn: {error}")),
+        }
     }
     Ok(folder.write(&files, &RESULTS)?)
 }
@@ -352,9 +358,6 @@ fn figures(
         }
     }
 }
-
-/// Pixels of a PNG per unit of the figure's size.
-pub const PNG_SCALE: f64 = 2.0;
 
 fn summary(prepared: &Prepared, metrics: &[Metrics], folder: &Path) -> String {
     let planes: &[&str] = if metrics.len() == 1 {

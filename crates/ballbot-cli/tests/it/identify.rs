@@ -333,6 +333,10 @@ fn mistakes_in_a_configuration_are_told_without_the_words_of_a_programming_langu
             &["line 2", "expected a list of length 2"],
         ),
         (
+            "[log]\nleave_out = [[1.0, 2.0, 3.0]]",
+            &["log.leave_out", "invalid length 3", "too many"],
+        ),
+        (
             "[log]\nball_angle = \"floor\"",
             &["line 2", "`inertial`", "`relative_to_body`"],
         ),

@@ -289,3 +289,14 @@ fn a_device_stays_a_device() {
     assert!(!std::fs::metadata("/dev/full").unwrap().is_file());
     assert!(link.is_symlink());
 }
+
+/// The file that is read was once replaced by what it was read for.
+#[test]
+fn what_is_read_is_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let example = text(&["refine", "--example"]);
+    let path = file(&folder, &example);
+    let said = failure(&["refine", name(&path), "-o", name(&path)], 1);
+    assert_says(&said, &["robot.toml", "would be lost"]);
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), example);
+}

@@ -74,7 +74,7 @@ fn in_file(
 }
 
 fn parsed(text: &str) -> Result<ParameterFile, ScenarioError> {
-    toml::from_str(text)
+    words::from_toml(text)
         .map_err(|error| ScenarioError::ParameterFile(words::toml_message(&error.to_string())))
 }
 

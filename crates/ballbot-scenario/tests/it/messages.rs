@@ -162,6 +162,12 @@ fn negative_weight() {
 }
 
 #[test]
+fn a_list_that_is_too_long() {
+    let said = message("q = [200.0, 1.0", "q = [7.0, 200.0, 1.0");
+    assert_says(&said, &["controller.q", "invalid length 5", "too many"]);
+}
+
+#[test]
 fn input_weight_not_positive() {
     assert_says(
         &message("r = 1000.0", "r = 0.0"),

@@ -92,7 +92,7 @@ fn the_robot_does_not_notice_where_it_stands() {
         let torque = Vector1::new(TaylorModel::constant(0.0));
         for entry in Embedding::scheduling(&table, &x, &torque).iter() {
             assert_eq!(
-                (entry.slopes[0], entry.squares[0], entry.error),
+                (entry.slopes()[0], entry.squares()[0], entry.error),
                 (0.0, [0.0; 4], 0.0)
             );
         }

@@ -146,6 +146,22 @@ fn a_reset_forgets_and_a_start_is_where_it_begins() {
     assert_eq!(mpc.estimate().unwrap().x, start);
     mpc.reset();
     assert_eq!(mpc.estimate().unwrap().x, start);
+    // Where it is sure, the first readings change nothing.
+    let sure = EstimatorSettings {
+        initial_state: vec![1e-12; 4],
+        ..begun
+    };
+    mpc.set_estimator(None).unwrap();
+    mpc.set_estimator(Some(&sure)).unwrap();
+    mpc.observe(0.0, &[Some(0.25), Some(0.11)]).unwrap();
+    let found = mpc.estimate().unwrap().x;
+    assert!(
+        found
+            .iter()
+            .zip(&start)
+            .all(|(x, at)| (x - at).abs() < 1e-6),
+        "{found:?}"
+    );
 
     // What was sent moves the estimate: half a newton for a sample, into the speed of the cart.
     let speed = |mpc: &mut Mpc, sent: f64| {

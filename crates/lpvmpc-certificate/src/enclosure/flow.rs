@@ -100,7 +100,7 @@ impl<const D: usize> Within<'_, D> {
             return whole;
         }
         let (mut shift, mut square) = (Interval::point(0.0), Interval::point(0.0));
-        for (i, slope) in model.slopes.iter().enumerate() {
+        for (i, slope) in model.slopes().iter().enumerate() {
             // Without a width it does not depend on the coordinate.
             if *slope != 0.0 {
                 let over = Interval::point(self.half_widths[i]).reciprocal();
@@ -110,10 +110,9 @@ impl<const D: usize> Within<'_, D> {
             }
         }
         let reach = (square.square_root() * Interval::point(self.ball.radius)).upper;
-        let flat = TaylorModel {
-            slopes: [0.0; D],
-            ..*model
-        };
+        let squares = model.squares();
+        let mut flat = TaylorModel::<D>::polynomial(model.middle, |_| 0.0, |i, j| squares[i][j]);
+        flat.error = model.error;
         whole.common(flat.range() + shift + Interval::new(-reach, reach))
     }
 }
@@ -349,12 +348,10 @@ fn uncertain<const D: usize, const N: usize, const K: usize>(
     m: &[[TaylorModel<D>; K]; N],
     right: &[[TaylorModel<D>; K]; K],
 ) -> Uncertain<N, K, D> {
-    let exact = m.map(|row| {
-        row.map(|entry| TaylorModel {
-            error: 0.0,
-            ..entry
-        })
-    });
+    let mut exact = *m;
+    for entry in exact.iter_mut().flatten() {
+        entry.error = 0.0;
+    }
     let column = |j: usize| {
         let entry = |i: usize| -> f64 {
             let terms = inverse[i].iter().zip(m);

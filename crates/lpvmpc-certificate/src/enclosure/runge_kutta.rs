@@ -191,17 +191,24 @@ impl<const D: usize> TaylorModel<D> {
 
     /// What depends on the time, as a polynomial in it: 1, t and t^2.
     fn by_time(self) -> [Self; 3] {
-        let mut parts = [self, Self::constant(0.0), Self::constant(0.0)];
-        let slope = |k: usize| self.squares[k.min(Self::TIME)][k.max(Self::TIME)];
-        for k in 0..Self::TIME {
-            parts[0].squares[k][Self::TIME] = 0.0;
-            parts[1].slopes[k] = slope(k);
-        }
-        parts[0].slopes[Self::TIME] = 0.0;
-        parts[0].squares[Self::TIME][Self::TIME] = 0.0;
-        parts[1].middle = self.slopes[Self::TIME];
-        parts[2].middle = slope(Self::TIME);
-        parts
+        let (slopes, squares) = (self.slopes(), self.squares());
+        let without = |last: usize, value: f64| if last == Self::TIME { 0.0 } else { value };
+        let mut fixed = Self::polynomial(
+            self.middle,
+            |i| without(i, slopes[i]),
+            |i, j| without(j, squares[i][j]),
+        );
+        fixed.error = self.error;
+        let linear = Self::polynomial(
+            slopes[Self::TIME],
+            |i| without(i, squares[i][Self::TIME]),
+            |_, _| 0.0,
+        );
+        [
+            fixed,
+            linear,
+            Self::constant(squares[Self::TIME][Self::TIME]),
+        ]
     }
 
     /// Its mean over the time with the weight `order` (1 - s)^(`order` - 1), s from 0 to 1.

@@ -33,10 +33,10 @@ impl<const R: usize, const C: usize, const D: usize> TaylorMap<R, C, D> {
         let mut map = Self::constant(matrix(&|entry| entry.middle));
         map.error = frobenius(&errors);
         for (k, slope) in map.slopes.iter_mut().enumerate() {
-            *slope = matrix(&|entry| entry.slopes[k]);
+            *slope = matrix(&|entry| entry.slopes()[k]);
         }
         for (k, l) in map.upper() {
-            map.squares[k][l] = matrix(&|entry| entry.squares[k][l]);
+            map.squares[k][l] = matrix(&|entry| entry.squares()[k][l]);
         }
         map.checked()
     }
@@ -67,13 +67,14 @@ impl<const R: usize, const C: usize, const D: usize> TaylorMap<R, C, D> {
 
     /// Its entries.
     pub fn entries(&self) -> [[TaylorModel<D>; C]; R] {
-        from_fn(|i, j| TaylorModel {
-            error: self.error,
-            ..TaylorModel::polynomial(
+        from_fn(|i, j| {
+            let mut entry = TaylorModel::polynomial(
                 self.middle[(i, j)],
                 |k| self.slopes[k][(i, j)],
                 |k, l| self.squares[k][l][(i, j)],
-            )
+            );
+            entry.error = self.error;
+            entry
         })
     }
 

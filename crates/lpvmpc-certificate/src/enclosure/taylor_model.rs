@@ -6,7 +6,7 @@ use lpvmpc::{Bivariate, Elementary, Number};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A quantity over the box -1 <= z_i <= 1: at every z its value is within `error` of
-/// `middle` + sum of `slopes[i]` z_i + sum over i <= j of `squares[i][j]` z_i z_j (Taylor model:
+/// `middle` + sum of [`slopes`](Self::slopes) z_i + sum over i <= j of [`squares`](Self::squares) z_i z_j (Taylor model:
 /// Makino and Berz, Taylor models and other validated functional inclusion methods, 2003). What
 /// it knows of z makes enclosures converge with the third power of the box's width, where
 /// intervals converge with the width.
@@ -14,12 +14,12 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 pub struct TaylorModel<const D: usize> {
     /// The value at z = 0, up to the error.
     pub middle: f64,
-    /// Its linear dependence on z.
-    pub slopes: [f64; D],
-    /// Its quadratic dependence on z; the part below the diagonal is zero.
-    pub squares: [[f64; D]; D],
+    slopes: [f64; D],
+    squares: [[f64; D]; D],
     /// The largest distance from the true value, rounding included; infinite when unknown.
     pub error: f64,
+    /// Otherwise the slopes and squares are zero: known without looking at each of them.
+    varies: bool,
 }
 
 /// Relative error of one rounding.
@@ -52,7 +52,18 @@ impl<const D: usize> TaylorModel<D> {
     pub fn symbol(middle: f64, half_width: f64, symbol: usize) -> Self {
         let mut model = Self::constant(middle);
         model.slopes[symbol] = half_width;
+        model.varies = true;
         model
+    }
+
+    /// Its linear dependence on z.
+    pub fn slopes(&self) -> &[f64; D] {
+        &self.slopes
+    }
+
+    /// Its quadratic dependence on z; the part below the diagonal is zero.
+    pub fn squares(&self) -> &[[f64; D]; D] {
+        &self.squares
     }
 
     /// All its values over the box.
@@ -76,6 +87,9 @@ impl<const D: usize> TaylorModel<D> {
             slopes: 0.0,
             squares: 0.0,
         };
+        if !self.varies {
+            return sizes;
+        }
         for i in 0..D {
             sizes.slopes += self.slopes[i].abs();
             for square in &self.squares[i][i..] {
@@ -86,10 +100,7 @@ impl<const D: usize> TaylorModel<D> {
     }
 
     fn is_zero(&self) -> bool {
-        self.middle == 0.0
-            && self.error == 0.0
-            && self.slopes == [0.0; D]
-            && self.squares == [[0.0; D]; D]
+        self.middle == 0.0 && self.error == 0.0 && !self.varies
     }
 
     /// The polynomial with the given coefficients.
@@ -99,6 +110,7 @@ impl<const D: usize> TaylorModel<D> {
         square: impl Fn(usize, usize) -> f64,
     ) -> Self {
         let mut model = Self::constant(middle);
+        model.varies = true;
         for i in 0..D {
             model.slopes[i] = slope(i);
             for j in i..D {
@@ -143,11 +155,16 @@ impl<const D: usize> Add for TaylorModel<D> {
         if other.is_zero() {
             return self;
         }
-        let sum = Self::polynomial(
-            self.middle + other.middle,
-            |i| self.slopes[i] + other.slopes[i],
-            |i, j| self.squares[i][j] + other.squares[i][j],
-        );
+        let middle = self.middle + other.middle;
+        let sum = match (self.varies, other.varies) {
+            (true, true) => Self::polynomial(
+                middle,
+                |i| self.slopes[i] + other.slopes[i],
+                |i, j| self.squares[i][j] + other.squares[i][j],
+            ),
+            (true, false) => Self { middle, ..self },
+            (false, _) => Self { middle, ..other },
+        };
         let size = sum.sizes().sum();
         sum.within(self.error + other.error + ROUNDINGS * size, size)
     }
@@ -157,13 +174,18 @@ impl<const D: usize> Neg for TaylorModel<D> {
     type Output = Self;
 
     fn neg(self) -> Self {
-        Self {
-            error: self.error,
-            ..Self::polynomial(
+        let negative = if self.varies {
+            Self::polynomial(
                 -self.middle,
                 |i| -self.slopes[i],
                 |i, j| -self.squares[i][j],
             )
+        } else {
+            Self::constant(-self.middle)
+        };
+        Self {
+            error: self.error,
+            ..negative
         }
     }
 }
@@ -190,18 +212,30 @@ impl<const D: usize> Mul for TaylorModel<D> {
         }
         let (p, q) = (&self.slopes, &other.slopes);
         let (a, b) = (self.middle, other.middle);
-        let product = Self::polynomial(
-            a * b,
-            |i| a * q[i] + b * p[i],
-            |i, j| {
-                let mixed = if i == j {
-                    p[i] * q[i]
-                } else {
-                    p[i] * q[j] + p[j] * q[i]
-                };
-                a * other.squares[i][j] + b * self.squares[i][j] + mixed
-            },
-        );
+        let scaled = |factor: f64, model: &Self| {
+            Self::polynomial(
+                a * b,
+                |i| factor * model.slopes[i],
+                |i, j| factor * model.squares[i][j],
+            )
+        };
+        let product = match (self.varies, other.varies) {
+            (true, true) => Self::polynomial(
+                a * b,
+                |i| a * q[i] + b * p[i],
+                |i, j| {
+                    let mixed = if i == j {
+                        p[i] * q[i]
+                    } else {
+                        p[i] * q[j] + p[j] * q[i]
+                    };
+                    a * other.squares[i][j] + b * self.squares[i][j] + mixed
+                },
+            ),
+            (true, false) => scaled(b, &self),
+            (false, true) => scaled(a, &other),
+            (false, false) => Self::constant(a * b),
+        };
         let (a, b) = (self.sizes(), other.sizes());
         // Of order three and four.
         let beyond = a.slopes * b.squares + a.squares * b.slopes + a.squares * b.squares;
@@ -230,6 +264,7 @@ impl<const D: usize> Number for TaylorModel<D> {
             slopes: [0.0; D],
             squares: [[0.0; D]; D],
             error: 0.0,
+            varies: false,
         }
     }
 

@@ -123,11 +123,13 @@ where
     M: LpvModel<f64, NX, NU, NS>,
 {
     let points: Vec<_> = grid.points().collect();
-    synthesize_terminal_at(model, &grid.middle(), &points, problem, &|| ())
+    synthesize_terminal_at(model, &grid.middle(), &points, problem, (NX, NU), &|| ())
 }
 
 /// As [`synthesize_terminal`], at any `points` of the scheduling; the regulator at `middle` scales the unknowns.
-/// Each step of the search begins with `at_step`, for callers that tell of it or end it by unwinding.
+/// Of a plant with fewer states and inputs than places, `sizes`, only these are designed: the places behind them must
+/// have nothing to do with them, K is zero there, and P/level the identity. Each step of the search begins with
+/// `at_step`, for callers that tell of it or end it by unwinding.
 ///
 /// # Errors
 /// Numbers out of range, a model that cannot be sampled, or no solution.
@@ -136,40 +138,46 @@ pub fn synthesize_terminal_at<M, const NX: usize, const NU: usize, const NS: usi
     middle: &SVector<f64, NS>,
     points: &[SVector<f64, NS>],
     problem: &TerminalProblem<NX, NU>,
+    sizes: (usize, usize),
     at_step: &dyn Fn(),
 ) -> Result<TerminalIngredients<NX, NU>, SynthesisError>
 where
     M: LpvModel<f64, NX, NU, NS>,
 {
-    problem.check()?;
+    let (n, m) = (sizes.0.min(NX), sizes.1.min(NU));
+    let asked = problem.of_the_first(n, m);
+    asked.check()?;
     let sampled = |scheduling: &SVector<f64, NS>| {
         let (a, b) = model.matrices(scheduling);
-        let (a, b) = (dynamic(&a), dynamic(&b));
+        let (a, b) = (first(&a, n, n), first(&b, n, m));
         match model.period() {
             None => zero_order_hold(&a, &b, problem.t_s),
             Some(_) => Ok((a, b)),
         }
     };
     let pairs = points.iter().map(sampled).collect::<Result<Vec<_>, _>>()?;
-    let scaling = problem.scaling(&sampled(middle)?)?;
-    let blocks = problem.blocks(&scaling, &pairs);
+    let scaling = asked.scaling(&sampled(middle)?)?;
+    let blocks = asked.blocks(&scaling, &pairs);
     let maximum =
-        maximise_log_det(&blocks, unknowns(NX, NU), at_step).map_err(|failure| match failure {
+        maximise_log_det(&blocks, unknowns(n, m), at_step).map_err(|failure| match failure {
             LmiFailure::Infeasible { missing } => SynthesisError::Infeasible {
                 points: pairs.len(),
                 missing,
             },
             LmiFailure::NotConverged => SynthesisError::NotConverged,
         })?;
-    let (y, l) = split(&maximum.v, NX, NU);
+    let (y, l) = split(&maximum.v, n, m);
     let y_inverse = y.cholesky().ok_or(SynthesisError::NotConverged)?.inverse();
     let x_inverse = DMatrix::from_diagonal(&scaling.x.map(f64::recip));
     let k = DMatrix::from_diagonal(&scaling.u) * l * &y_inverse * &x_inverse;
     let p = &x_inverse * y_inverse * &x_inverse * problem.level;
-    let p = SMatrix::from_fn(|i, j| 0.5 * (p[(i, j)] + p[(j, i)]));
+    let left_over = SMatrix::<f64, NX, NX>::identity() * problem.level;
     Ok(TerminalIngredients {
-        k: SMatrix::from_fn(|i, j| k[(i, j)]),
-        p,
+        k: SMatrix::from_fn(|i, j| k.get((i, j)).copied().unwrap_or(0.0)),
+        p: SMatrix::from_fn(|i, j| match i < n && j < n {
+            true => 0.5 * (p[(i, j)] + p[(j, i)]),
+            false => left_over[(i, j)],
+        }),
         level: problem.level,
         log_det_gap: maximum.gap,
     })
@@ -181,7 +189,38 @@ struct Scaling {
     u: DVector<f64>,
 }
 
+/// A [`TerminalProblem`] of the states and inputs that are there.
+struct Asked {
+    q: DMatrix<f64>,
+    r: DMatrix<f64>,
+    state_limits: DVector<f64>,
+    input_limits: DVector<f64>,
+    contraction: f64,
+    level: f64,
+}
+
 impl<const NX: usize, const NU: usize> TerminalProblem<NX, NU> {
+    fn of_the_first(&self, n: usize, m: usize) -> Asked {
+        Asked {
+            q: first(&self.q, n, n),
+            r: first(&self.r, m, m),
+            state_limits: self.state_limits.rows(0, n).into_owned(),
+            input_limits: self.input_limits.rows(0, m).into_owned(),
+            contraction: self.contraction,
+            level: self.level,
+        }
+    }
+}
+
+impl Asked {
+    fn states(&self) -> usize {
+        self.state_limits.len()
+    }
+
+    fn inputs(&self) -> usize {
+        self.input_limits.len()
+    }
+
     fn check(&self) -> Result<(), SynthesisError> {
         let refuse = |name, value, expected| {
             Err(SynthesisError::Value {
@@ -206,15 +245,15 @@ impl<const NX: usize, const NU: usize> TerminalProblem<NX, NU> {
                 return refuse("input_limits", *limit, "positive and finite");
             }
         }
-        let q = checked_symmetric("Q", &dynamic(&self.q))?;
+        let q = checked_symmetric("Q", &self.q)?;
         check_positive_semidefinite("Q", &q)?;
-        let r = checked_symmetric("R", &dynamic(&self.r))?;
+        let r = checked_symmetric("R", &self.r)?;
         Ok(check_positive_definite("R", &r)?)
     }
 
     /// From the limits, and the semi-axes of the regulator's set where there is no limit.
     fn scaling(&self, (a, b): &(DMatrix<f64>, DMatrix<f64>)) -> Result<Scaling, SynthesisError> {
-        let lqr = lqr_discrete(a, b, &dynamic(&self.q), &dynamic(&self.r))?;
+        let lqr = lqr_discrete(a, b, &self.q, &self.r)?;
         let inverse = lqr
             .p
             .cholesky()
@@ -222,8 +261,8 @@ impl<const NX: usize, const NU: usize> TerminalProblem<NX, NU> {
             .inverse();
         let semi_axis = |i| (self.level * inverse[(i, i)]).sqrt();
         Ok(Scaling {
-            x: DVector::from_fn(NX, |i, _| self.state_limits[i].min(semi_axis(i))),
-            u: DVector::from_column_slice(self.input_limits.as_slice()),
+            x: DVector::from_fn(self.states(), |i, _| self.state_limits[i].min(semi_axis(i))),
+            u: self.input_limits.clone(),
         })
     }
 
@@ -233,33 +272,34 @@ impl<const NX: usize, const NU: usize> TerminalProblem<NX, NU> {
         scaling: &Scaling,
         pairs: &[(DMatrix<f64>, DMatrix<f64>)],
     ) -> Vec<AffineMatrix> {
+        let (n, m) = (self.states(), self.inputs());
         let x = DMatrix::from_diagonal(&scaling.x);
         let u = DMatrix::from_diagonal(&scaling.u);
         let x_inverse = DMatrix::from_diagonal(&scaling.x.map(f64::recip));
         let cost = 1.0 / self.level.sqrt();
-        let q_root = square_root(&dynamic(&self.q)) * &x * cost;
-        let r_root = square_root(&dynamic(&self.r)) * &u * cost;
-        let mut blocks = vec![block(NX, NU, |y, _| y.clone())];
+        let q_root = square_root(&self.q) * &x * cost;
+        let r_root = square_root(&self.r) * &u * cost;
+        let mut blocks = vec![block(n, m, |y, _| y.clone())];
         for (a, b) in pairs {
             let (a, b) = (&x_inverse * a * &x, &x_inverse * b * &u);
-            blocks.push(block(NX, NU, |y, l| {
+            blocks.push(block(n, m, |y, l| {
                 let lower = [&a * y - &b * l, &q_root * y, &r_root * l];
                 decrease(y, (1.0 - self.contraction).sqrt(), lower)
             }));
         }
-        for i in (0..NX).filter(|i| self.state_limits[*i].is_finite()) {
+        for i in (0..n).filter(|i| self.state_limits[*i].is_finite()) {
             let square = (self.state_limits[i] / scaling.x[i]).powi(2);
-            blocks.push(block(NX, NU, |y, _| {
+            blocks.push(block(n, m, |y, _| {
                 DMatrix::from_element(1, 1, square - y[(i, i)])
             }));
         }
-        for i in 0..NU {
-            blocks.push(block(NX, NU, |y, l| {
-                let mut bound = DMatrix::identity(NX + 1, NX + 1);
-                bound.view_mut((1, 1), (NX, NX)).copy_from(y);
-                bound.view_mut((0, 1), (1, NX)).copy_from(&l.row(i));
+        for i in 0..m {
+            blocks.push(block(n, m, |y, l| {
+                let mut bound = DMatrix::identity(n + 1, n + 1);
+                bound.view_mut((1, 1), (n, n)).copy_from(y);
+                bound.view_mut((0, 1), (1, n)).copy_from(&l.row(i));
                 bound
-                    .view_mut((1, 0), (NX, 1))
+                    .view_mut((1, 0), (n, 1))
                     .copy_from(&l.row(i).transpose());
                 bound
             }));
@@ -322,6 +362,11 @@ fn square_root(m: &DMatrix<f64>) -> DMatrix<f64> {
     &eigen.eigenvectors * DMatrix::from_diagonal(&roots) * eigen.eigenvectors.transpose()
 }
 
-fn dynamic<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) -> DMatrix<f64> {
-    DMatrix::from_column_slice(R, C, m.as_slice())
+/// The first rows and columns.
+fn first<const R: usize, const C: usize>(
+    m: &SMatrix<f64, R, C>,
+    rows: usize,
+    columns: usize,
+) -> DMatrix<f64> {
+    m.view((0, 0), (rows, columns)).into_owned()
 }

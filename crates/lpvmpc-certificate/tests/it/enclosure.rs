@@ -53,10 +53,10 @@ fn further_truth(x: f64, y: f64) -> f64 {
 
 /// The polynomial of a Taylor model at z.
 fn at(model: &TaylorModel<2>, z: [f64; 2]) -> f64 {
-    let squares = model.squares;
+    let squares = model.squares();
     model.middle
-        + model.slopes[0] * z[0]
-        + model.slopes[1] * z[1]
+        + model.slopes()[0] * z[0]
+        + model.slopes()[1] * z[1]
         + squares[0][0] * z[0] * z[0]
         + squares[0][1] * z[0] * z[1]
         + squares[1][1] * z[1] * z[1]
@@ -401,7 +401,7 @@ fn every_function_is_enclosed_with_its_curvature() {
             for i in -10..=10 {
                 let z = 0.1 * f64::from(i);
                 let exact = truth(middle + z * half_width);
-                let value = form.middle + form.slopes[0] * z + form.squares[0][0] * z * z;
+                let value = form.middle + form.slopes()[0] * z + form.squares()[0][0] * z * z;
                 assert!(
                     (value - exact).abs() <= form.error + 1e-15,
                     "{function:?} {form:?}"

@@ -188,6 +188,15 @@ fn what_is_wrong_is_named_and_nothing_is_written() {
         ("time = 0.5", "time = 0.0", vec!["reference 2, time = 0"]),
         ("\"cart-pole\"", "\"../a\"", vec!["it names a folder"]),
         (
+            "position = [",
+            "position = [0.0, ",
+            vec![
+                "controller.x_bounds.position",
+                "invalid length 3",
+                "too many",
+            ],
+        ),
+        (
             "# delay = 0.04                    # from a command",
             "delay = -1 #",
             vec!["bad.toml: world: the delay is -1"],
@@ -233,6 +242,10 @@ fn a_plant_in_discrete_time_is_certified_and_proved_again() {
     let experiment = "name = \"a\"\nplant = \"map.json\"\nx0 = [0]\nduration = 1\n\
                       [controller]\nt_s = 0.1\nhorizon = 5\nq = [1]\nr = [1]\n";
     fs::write(folder.path().join("map.toml"), experiment).unwrap();
+    for file in ["map.toml", "map.json"] {
+        let message = fail(folder.path(), &["certify", "map.toml", "--out", file]);
+        assert!(message.contains("would be lost"), "{message}");
+    }
     let arguments = ["certify", "map.toml", "--out", "certificate.json"];
     succeed(folder.path(), &arguments);
     let arguments = ["verify", "certificate.json", "map.json", "--json"];
@@ -246,6 +259,27 @@ fn a_plant_in_discrete_time_is_certified_and_proved_again() {
     .unwrap();
     let message = fail(folder.path(), &["certify", "map.toml"]);
     assert!(message.contains("period of 0.1 s"), "{message}");
+}
+
+/// An input that is switched off has one bound on both sides, which once could not be drawn.
+#[test]
+fn an_input_that_is_switched_off_is_drawn() {
+    let folder = example();
+    let path = folder.path().join("cart-pole.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let bounds = "u_bounds = { force = [";
+    let off = changed(
+        &text,
+        &format!("# {bounds}-10.0, 10.0]"),
+        &format!("{bounds}0, 0]"),
+    );
+    fs::write(&path, off).unwrap();
+    lpvmpc(
+        folder.path(),
+        &["simulate", "cart-pole.toml", "--out", "off"],
+    );
+    assert!(folder.path().join("off").join("trajectory.csv").exists());
+    assert!(folder.path().join("off").join("figure.svg").exists());
 }
 
 #[test]

@@ -116,9 +116,9 @@ fn the_factors_are_the_difference_of_f() {
 fn polynomial(model: &TaylorModel<3>, z: [f64; 3]) -> f64 {
     let mut sum = model.middle;
     for i in 0..3 {
-        sum += model.slopes[i] * z[i];
+        sum += model.slopes()[i] * z[i];
         for j in i..3 {
-            sum += model.squares[i][j] * z[i] * z[j];
+            sum += model.squares()[i][j] * z[i] * z[j];
         }
     }
     sum

@@ -105,9 +105,9 @@ fn enclosures_contain_the_values() {
             let form = &model[i];
             let mut polynomial = form.middle;
             for (j, z_j) in z.iter().enumerate() {
-                polynomial += form.slopes[j] * z_j;
+                polynomial += form.slopes()[j] * z_j;
                 for (k, z_k) in z.iter().enumerate().skip(j) {
-                    polynomial += form.squares[j][k] * z_j * z_k;
+                    polynomial += form.squares()[j][k] * z_j * z_k;
                 }
             }
             assert!((polynomial - value).abs() <= form.error + 1e-13);

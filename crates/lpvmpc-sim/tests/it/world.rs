@@ -369,6 +369,30 @@ fn a_world_that_cannot_move_on_stays_where_it_is() {
 }
 
 #[test]
+fn what_a_failed_advance_met_is_still_to_come() {
+    let mut world = at_rest(ideal());
+    for push in [
+        Disturbance::Jump {
+            time: 0.0,
+            change: Vector2::new(0.0, 1.0),
+        },
+        Disturbance::Impulse {
+            time: 0.25 * PERIOD,
+            impulse: Vector1::new(4.0),
+        },
+    ] {
+        world.disturb(push).unwrap();
+    }
+    world.command(Vector1::new(f64::NAN));
+    world.advance().unwrap_err();
+    world.command(Vector1::zeros());
+    world.advance().unwrap();
+    // 1 m/s at once, and 4 N s / 2 kg after a quarter of the period.
+    assert_near(world.state()[1], 3.0);
+    assert_near(world.state()[0], PERIOD * (1.0 + 0.75 * 2.0));
+}
+
+#[test]
 fn a_sensor_can_measure_a_combination() {
     let mut settings = ideal();
     settings.sensors[0] = Sensor::ideal(Vector2::new(1.0, -0.5));

@@ -35,7 +35,7 @@ impl Verdict {
 /// Why an estimate begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Restart {
-    /// It is the first measurement.
+    /// It is the first reading.
     Start,
     /// No reading was believed for longer than the gate's longest gap.
     Gap,

@@ -134,7 +134,7 @@ pub enum GuaranteedError {
     /// The direction is zero, not finite, or the plant notices where along it it stands: somewhere
     /// within the state bounds A d is not zero, or the scheduling moves with z d.
     Direction,
-    /// The lower set point is above the upper one, or one is NaN.
+    /// No number is between the lower and the upper set point, or one of them is NaN.
     SetPoints,
     /// Without a plan, at least one quadratic program per sample is needed.
     Iterations,
@@ -156,7 +156,7 @@ impl fmt::Display for GuaranteedError {
                  scheduling that is the same at x and x + z d, everywhere within the state bounds"
             ),
             Self::SetPoints => {
-                write!(f, "the lower set point must not exceed the upper one")
+                write!(f, "the set points must have a number between their ends")
             }
             Self::Iterations => write!(
                 f,
@@ -235,7 +235,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> GuaranteedSettings<T, NX, NU> 
             return Err(GuaranteedError::Rollout);
         }
         let [lower, upper] = self.set_points;
-        if !(lower <= upper) {
+        let infinite: T = convert(f64::INFINITY);
+        if !(lower <= upper && lower < infinite && upper > -infinite) {
             return Err(GuaranteedError::SetPoints);
         }
         if self.iterations.unknown == 0 {

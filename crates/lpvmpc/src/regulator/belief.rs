@@ -115,11 +115,11 @@ where
         }
     }
 
-    /// Whether there is no state to decide for.
+    /// Whether there is no state to decide for: before the first measurement, too.
     pub(super) fn is_lost(&self) -> bool {
         match self {
-            Self::Measured { .. } => false,
-            Self::Estimated(filter) => filter.is_lost(),
+            Self::Measured { state, .. } => state.time().is_none(),
+            Self::Estimated(filter) => filter.time().is_none() || filter.is_lost(),
         }
     }
 

@@ -15,7 +15,7 @@ use nalgebra::{SVector, convert, try_convert};
 /// What stands around a planner, besides what knows the state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FeedbackSettings<T, const NU: usize> {
-    /// Time from a measurement to the input that answers it, s.
+    /// Time from a measurement to the input that answers it, s; less than zero, or NaN, counts as zero.
     pub delay: T,
     /// Time from one measurement to the next, s.
     pub period: T,

@@ -3,7 +3,6 @@
 use super::CampaignArguments;
 use crate::campaign_figure::figure;
 use crate::commands::CommandError;
-use crate::commands::simulate::PNG_SCALE;
 use crate::json;
 use crate::progress::Progress;
 use crate::results::ResultFolder;
@@ -47,13 +46,8 @@ pub fn run(arguments: &CampaignArguments) -> Result<String, CommandError> {
     drop(progress);
     let settings = &scenarios.guaranteed.settings;
     let figure = figure(&outcomes, limits(&settings.x, &settings.u).states[1]);
-    let contents = [
-        csv(&outcomes).into_bytes(),
-        figure.svg()?.into_bytes(),
-        figure.png(PNG_SCALE)?,
-    ];
-    let names = RESULTS.map(str::to_owned);
-    let files: Vec<_> = names.into_iter().zip(contents).collect();
+    let mut files = vec![(RESULTS[0].to_owned(), csv(&outcomes).into_bytes())];
+    files.extend(figure.files("campaign")?);
     results.write(&files, &[])?;
     let nominal = outcomes
         .iter()

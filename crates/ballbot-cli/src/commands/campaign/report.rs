@@ -4,7 +4,6 @@ use super::Own;
 use super::whole::{CSV, PARQUET, RowFiles, counted};
 use crate::campaign_figures::{self, Drawing};
 use crate::commands::CommandError;
-use crate::commands::simulate::PNG_SCALE;
 use crate::json;
 use crate::progress::Progress;
 use crate::results::ResultFolder;
@@ -56,8 +55,7 @@ pub(super) fn all(
     document["folder"] = json!(results.path());
     let mut files = vec![(SUMMARY.to_owned(), json::text(&document).into_bytes())];
     for Drawing { name, figure } in campaign_figures::all(campaign, &file, &summary)? {
-        files.push((format!("{name}.svg"), figure.svg()?.into_bytes()));
-        files.push((format!("{name}.png"), figure.png(PNG_SCALE)?));
+        files.extend(figure.files(&name)?);
     }
     drop(file);
     let drafts = vec![(PARQUET, rows.parquet), (CSV, rows.csv)];

@@ -2,7 +2,6 @@
 
 use super::{HeldOut, Own, moved};
 use crate::commands::CommandError;
-use crate::commands::simulate::PNG_SCALE;
 use crate::html::{self, escape};
 use crate::json;
 use crate::results::ResultFolder;
@@ -98,14 +97,7 @@ pub(super) fn write(
         files.push((TUNED.to_owned(), (report.comment() + &text).into_bytes()));
     }
     for figure in &figures {
-        files.push((
-            format!("{}.svg", figure.name),
-            figure.figure.svg()?.into_bytes(),
-        ));
-        files.push((
-            format!("{}.png", figure.name),
-            figure.figure.png(PNG_SCALE)?,
-        ));
+        files.extend(figure.figure.files(figure.name)?);
     }
     results.write(&files, &RESULTS)?;
     match as_json {

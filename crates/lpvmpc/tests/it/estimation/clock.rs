@@ -48,6 +48,35 @@ fn time_begins_with_the_first_measurement() {
     }
 }
 
+/// The state that it is made with counts as much as its variances say, at the beginning and after a gap.
+#[test]
+fn the_estimate_begins_from_the_state_that_it_was_made_with() {
+    let start = Vector2::new(0.3, -1.0);
+    let sure = EstimatorSettings {
+        initial_state: Vector2::repeat(1e-12),
+        ..settings()
+    };
+    let mut estimator = Observer::allocate(PENDULUM, sure, start, INSTANTS).unwrap();
+    let mut line = DelayLine::allocate(4);
+    assert!(!estimator.observe(UNIX, &mut line, &[None]).verdicts[0].is_used());
+    // Nothing was read: there is no estimate yet, and time does not move it.
+    assert!(estimator.is_lost());
+    estimator.observe(UNIX + 0.3, &mut line, &[None]);
+    assert_eq!(estimator.state(), start);
+    for (stamp, cause) in [(UNIX + 0.6, Restart::Start), (UNIX + 9.0, Restart::Gap)] {
+        let seen = estimator.observe(stamp, &mut line, &[Some(Reading::fresh(0.301))]);
+        assert_eq!(seen.restart, Some(cause));
+        assert!(seen.verdicts[0].is_used() && !estimator.is_lost());
+        let error = estimator.state() - start;
+        assert!(error.norm() < 1e-6, "{cause:?}: {error}");
+    }
+    // From where it is put, once.
+    let other = Vector2::new(0.1, 0.5);
+    estimator.begin_at(None, other);
+    estimator.observe(5.0, &mut line, &[Some(Reading::fresh(0.1))]);
+    assert!((estimator.state() - other).norm() < 1e-6);
+}
+
 #[test]
 fn after_a_gap_the_estimate_begins_anew_and_says_so() {
     for gap in [0.6, 30.0, 3600.0, 1e6] {

@@ -352,3 +352,19 @@ fn a_lost_state_commands_nothing() {
     let command = regulator.decide(&target);
     assert!(command.status.is_solved() && command.u[0] != 0.0);
 }
+
+/// Before the first reading there is no state either.
+#[test]
+fn an_unknown_state_commands_nothing() {
+    let mut regulator = held(N);
+    let command = regulator.decide(&target);
+    assert_eq!((command.u[0], command.status), (0.0, Status::NotFinite));
+    let (t, readings) = (7.0, [None]);
+    regulator.observe(&Measurement { t, readings });
+    let command = regulator.decide(&target);
+    assert_eq!((command.u[0], command.status), (0.0, Status::NotFinite));
+    let (t, readings) = (7.02, [Some(Reading::fresh(0.1))]);
+    regulator.observe(&Measurement { t, readings });
+    let command = regulator.decide(&target);
+    assert!(command.status.is_solved() && command.u[0] != 0.0);
+}

@@ -384,10 +384,14 @@ fn settings_that_make_no_sense_are_refused() {
         refused(|s| s.terminal.gain[0] = f64::NAN),
         GuaranteedError::Gain
     );
-    assert_eq!(
+    for none in [
         refused(|s| s.set_points = [1.0, -1.0]),
-        GuaranteedError::SetPoints
-    );
+        refused(|s| s.set_points = [f64::INFINITY; 2]),
+        refused(|s| s.set_points = [f64::NEG_INFINITY; 2]),
+        refused(|s| s.set_points = [0.0, f64::NAN]),
+    ] {
+        assert_eq!(none, GuaranteedError::SetPoints);
+    }
     assert_eq!(
         refused(|s| s.iterations.unknown = 0),
         GuaranteedError::Iterations
