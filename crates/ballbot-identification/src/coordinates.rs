@@ -14,7 +14,8 @@ pub struct Coordinates {
     ball_excess: bool,
     /// b3 is represented by its excess.
     body_excess: bool,
-    /// The gain is the inverse of a mass of which nothing is said: that of a body of this size.
+    /// The gain is the inverse of a mass that is to be found: that of a body of this size, whatever
+    /// is known of it beforehand.
     gain_limited: bool,
 }
 
@@ -48,8 +49,7 @@ impl Coordinates {
             geometry,
             ball_excess: choices[Parameter::B1].is_free(),
             body_excess: choices[Parameter::B3].is_free(),
-            gain_limited: torque_known
-                && matches!(choices[Parameter::TorqueGain], Choice::Free { .. }),
+            gain_limited: torque_known && choices[Parameter::TorqueGain].is_free(),
         }
     }
 

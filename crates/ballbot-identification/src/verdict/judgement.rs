@@ -234,7 +234,7 @@ impl Identification {
                 continue;
             };
             let found = self.estimate.values[parameter];
-            let significance = (found - mean).abs() / standard_deviation;
+            let significance = distance(parameter, found, mean, standard_deviation);
             if exceeds(significance, CONTRADICTED) {
                 verdicts.push(Verdict::PriorContradicted {
                     parameter,
@@ -379,6 +379,19 @@ impl Identification {
                 own: chi_square,
             });
         }
+    }
+}
+
+/// How many standard deviations a parameter is from what was known of it.
+///
+/// The gain is the inverse of a mass. One that is far too small, down to nothing, is never further away
+/// than mean / standard deviation, while the mass goes to infinity. So the distance of the mass counts
+/// where it is the larger one; to first order the mass is known as well as the gain, relative to itself.
+fn distance(parameter: Parameter, found: f64, mean: f64, standard_deviation: f64) -> f64 {
+    let distance = (found - mean).abs() / standard_deviation;
+    match parameter {
+        Parameter::TorqueGain => distance * f64::max(1.0, mean / found),
+        _ => distance,
     }
 }
 

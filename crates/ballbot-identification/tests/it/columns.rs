@@ -90,6 +90,15 @@ fn torque_scaled(factor: f64) -> impl Fn(&mut Record) {
 
 const MASS: &str = "[parameters]\ntorque_gain_1_kg = { fixed = 0.1 }";
 
+/// The body of the laboratory, from a drawing that is known to so much of itself.
+fn drawing(uncertainty: f64) -> String {
+    format!(
+        "[body]\nbody_mass_kg = 10.0\nbody_inertia_kg_m2 = 0.4\nball_mass_kg = 2.0\n\
+         ball_inertia_kg_m2 = 0.0144\nwheel_inertia_kg_m2 = 0.0463\nzenith_angle_deg = 45.0\n\
+         uncertainty = {uncertainty}\n"
+    )
+}
+
 #[test]
 fn the_log_as_it_is_has_parameters() {
     for config in ["", MASS] {
@@ -145,6 +154,28 @@ fn a_torque_in_another_unit() {
     // With the body's mass the unit itself is known.
     refused(MASS, milli, torque_scaled(1e3));
     refused(MASS, kilo, torque_scaled(1e-3));
+}
+
+#[test]
+fn a_torque_in_another_unit_on_a_body_from_a_drawing() {
+    // No body of this size is a thousand times as heavy, however little is known of its mass, or as
+    // light.
+    for uncertainty in [0.3, 0.9] {
+        let drawing = drawing(uncertainty);
+        refused(&drawing, "a body weighs from 0.2641", torque_scaled(1e3));
+    }
+    let kilo = "a thousand times those that are said";
+    refused(&drawing(0.3), kilo, torque_scaled(1e-3));
+    // Some body is a hundred times as heavy, but not this one: it is 330 standard deviations away,
+    // though the gain is not even four.
+    let drawing = drawing(0.3);
+    refused(&drawing, "was expected at 0.1", torque_scaled(100.0));
+    // Twice as heavy is three standard deviations, and no contradiction.
+    let found = outcome(&drawing, torque_scaled(2.0)).unwrap();
+    found.parameter_files().unwrap();
+    let verdicts = found.first().verdicts();
+    let contradicted = |one: &Verdict| matches!(one, Verdict::PriorContradicted { .. });
+    assert!(!verdicts.iter().any(contradicted), "{verdicts:?}");
 }
 
 #[test]
