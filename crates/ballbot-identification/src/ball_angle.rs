@@ -1,13 +1,14 @@
-//! What is the ball angle relative to? Where the body's mass is not known, a log whose ball angle is
-//! relative to the body is nearly explained by another robot whose ball angle is relative to the
-//! floor, and the other way round: four factors of a linear model make four parameters, whatever the
-//! reading. What is left to tell the readings apart is what the parameters may be (friction that takes
-//! energy away, inertias of a rigid body) and how the coupling changes with the tilt.
+//! What is the ball angle relative to? Where the body's mass is found from the log, a log whose ball
+//! angle is relative to the body is nearly explained by another robot whose ball angle is relative to
+//! the floor, and the other way round: four factors of a linear model make four parameters, whatever
+//! the reading. What is left to tell the readings apart is what the parameters may be (friction that
+//! takes energy away, inertias of a rigid body), how the coupling changes with the tilt, and what was
+//! known of the robot beforehand.
 
 use crate::estimate::{Effort, Estimate, EstimateError, Task};
 use crate::joint::Joint;
 use crate::log::BallAngle;
-use crate::parameter::{Choice, Parameter, Values};
+use crate::parameter::{Parameter, Values};
 use crate::segments::{Stretch, spread};
 
 /// The best robot with the other reading of the ball angle, beside the one that was found.
@@ -17,8 +18,8 @@ pub struct OtherReading {
     pub ball_angle: BallAngle,
     /// The robot that fits best with it.
     pub values: Values,
-    /// By how much chi^2 is lower than with the reading that was said, in units of chi^2 per degree
-    /// of freedom; negative where it is higher.
+    /// By how much chi^2, what was known beforehand included, is lower than with the reading that was
+    /// said, in units of chi^2 per degree of freedom; negative where it is higher.
     pub better_by: f64,
 }
 
@@ -46,14 +47,15 @@ impl OtherReading {
 }
 
 impl Task<'_> {
-    /// The fit with the other reading, where nothing but the log decides between the two: not where
-    /// the torque gain is known. `None` too where no robot explains the log with it at all.
+    /// The fit with the other reading, where both readings have a robot: not where the torque gain is
+    /// held. One of which something is known beforehand is not: a log moves it by many standard
+    /// deviations. `None` too where no robot explains the log with it at all.
     pub(crate) fn other_reading(
         &self,
         estimate: &Estimate,
         stretches: &[Stretch],
     ) -> Option<OtherReading> {
-        if !matches!(self.choices[Parameter::TorqueGain], Choice::Free { .. }) {
+        if !self.choices[Parameter::TorqueGain].is_free() {
             return None;
         }
         let noise = estimate.noise;

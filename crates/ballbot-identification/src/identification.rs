@@ -33,7 +33,7 @@ pub struct Identification {
     pub coordinates: Coordinates,
     /// What is wrong with the columns, if no robot explains them as they are.
     pub suspects: Option<Suspects>,
-    /// The best robot with the other reading of the ball angle, if the body's mass is not known.
+    /// The best robot with the other reading of the ball angle, if the torque gain is not held.
     pub other_reading: Option<OtherReading>,
     /// Whether the torque is in N m.
     pub torque_known: bool,

@@ -239,6 +239,30 @@ fn a_ball_angle_relative_to_something_else() {
 }
 
 #[test]
+fn a_ball_angle_relative_to_something_else_on_a_body_from_a_drawing() {
+    let relative = |record: &mut Record| {
+        let outputs = record.run.outputs.iter_mut();
+        outputs.for_each(|row| row[0] -= row[1]);
+    };
+    for uncertainty in [0.1, 0.3] {
+        let drawing = drawing(uncertainty);
+        refused(&drawing, "the ball angle is relative to the body", relative);
+    }
+    // Said rightly, either way, it is a robot's.
+    let (inertial, right) = (
+        drawing(0.3),
+        format!("{}[log]\nball_angle = \"relative_to_body\"", drawing(0.3)),
+    );
+    for found in [outcome(&inertial, |_| ()), outcome(&right, relative)] {
+        let found = found.unwrap();
+        found.parameter_files().unwrap();
+        let other = found.first().other_reading.unwrap();
+        assert!(other.is_worse(), "{other:?}");
+    }
+    refused(&right, "the ball angle is relative to the floor", |_| ());
+}
+
+#[test]
 fn what_the_ball_angle_is_relative_to_is_asked_where_the_log_does_not_tell() {
     let quiet = Laboratory {
         amplitude: 0.05,
