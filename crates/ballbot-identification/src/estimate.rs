@@ -311,6 +311,9 @@ impl Task<'_> {
                 upper,
                 scale: scales[parameter],
                 free,
+                // Where the torque changes at a row or at a step of the integration, the tilt rate there
+                // begins to change at once.
+                kinked: parameter == Parameter::Delay,
             }
         };
         Parameter::ALL.map(unknown).to_vec()

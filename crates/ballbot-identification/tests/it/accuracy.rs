@@ -3,6 +3,7 @@
 use crate::laboratory::{Laboratory, healthy};
 use ballbot_identification::log::BallAngle;
 use ballbot_identification::{Choice, Estimate, Parameter, Split, Tables, Task, Values, noise};
+use lpvmpc_design::ShootingTermination;
 use rayon::prelude::*;
 
 /// What the robot of a laboratory is.
@@ -91,6 +92,38 @@ fn delays_are_found_to_a_millisecond() {
         let laboratory = Laboratory { delay, ..real() };
         let found = estimate(&laboratory, 2).values[Parameter::Delay];
         assert!((found - delay).abs() < 1e-3, "{found} s for {delay} s");
+    }
+}
+
+#[test]
+fn a_delay_of_whole_rows_is_a_minimum_though_chi_square_has_a_kink_there() {
+    let laboratory = Laboratory {
+        rate: 100.0,
+        duration: 8.0,
+        delay: 0.02,
+        ..real()
+    };
+    let truth = truth(&laboratory);
+    // Logs on whose kinks a search for a gradient that vanishes stagnates.
+    let seeds = [13_u64, 23, 38, 56];
+    let estimates: Vec<Estimate> = seeds
+        .par_iter()
+        .map(|seed| estimate(&laboratory, *seed))
+        .collect();
+    for (seed, estimate) in seeds.iter().zip(estimates) {
+        let termination = estimate.fit.termination;
+        assert_eq!(termination, ShootingTermination::Converged, "seed {seed}");
+        let deviation = |parameter: Parameter| {
+            let index = parameter.index();
+            estimate.covariance[(index, index)].sqrt()
+        };
+        // The minimum is the kink itself.
+        let error = (estimate.values[Parameter::Delay] - 0.02).abs();
+        assert!(error < 0.01 * deviation(Parameter::Delay), "seed {seed}");
+        for parameter in [Parameter::B1, Parameter::B2, Parameter::B3] {
+            let error = (estimate.values[parameter] - truth[parameter]).abs();
+            assert!(error < 3.5 * deviation(parameter), "{parameter}: {error}");
+        }
     }
 }
 

@@ -11,7 +11,9 @@ use super::{Reduced, ShootingError, ShootingModel, ShootingProblem, Unknown};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShootingSettings {
     /// Converged when a step can lower chi^2 by no more than this many times chi^2 per value. A
-    /// parameter that is off by 1 % of its standard deviation costs 1e-4 of that. Default 1e-4.
+    /// parameter that is off by 1 % of its standard deviation costs 1e-4 of that. Default 1e-4. At a
+    /// kink (see [`Unknown::kinked`]) a move of that 1 % to either side, or of ten times as much, with
+    /// all else fitted again, lowers chi^2 by no more, either.
     pub reduction_tolerance: f64,
     /// Steps at most. Default 60.
     pub max_iterations: usize,
@@ -80,6 +82,16 @@ impl<const NX: usize> ShootingFit<NX> {
 /// Beyond this damping a step is shorter than rounding.
 const LARGEST_DAMPING: f64 = 1e12;
 
+/// At the beginning of a fit, and where the slopes that it was found for are left.
+const FIRST_DAMPING: f64 = 1e-3;
+
+/// A step with less is one without.
+const SMALLEST_DAMPING: f64 = 1e-12;
+
+/// How far to each side of a kink is looked, in what would cost the tolerance if there were none. That
+/// does not matter; ten times as much is the way back from a kink beside the minimum.
+const BESIDE_KINK: [f64; 4] = [1.0, -1.0, 10.0, -10.0];
+
 /// Added to the unit diagonal, so that parameters that only act together still have a step.
 const ROUNDING: f64 = 1e-14;
 
@@ -110,7 +122,7 @@ where
             initial,
             chi_square,
         };
-        let mut damping = 1e-3;
+        let mut damping = FIRST_DAMPING;
         let mut history = vec![at.chi_square];
         let mut equations = Equations::new(self, &at, &free);
         let termination = loop {
@@ -234,6 +246,21 @@ enum Step<const NX: usize> {
     None,
 }
 
+/// information^-1 right, in a scaling to a unit diagonal: the parameters' units are of no concern. What
+/// nothing tells of is zero.
+fn solved(information: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let scale = information
+        .diagonal()
+        .map(|entry| if entry > 0.0 { 1.0 / entry.sqrt() } else { 0.0 });
+    let scaling = DMatrix::from_diagonal(&scale);
+    let mut scaled = &scaling * information * &scaling;
+    for i in 0..right.len() {
+        scaled[(i, i)] += ROUNDING;
+    }
+    let solution = scaled.cholesky()?.solve(&scale.component_mul(right));
+    Some(scale.component_mul(&solution))
+}
+
 /// The normal equations at an iterate.
 struct Equations<'a, const NX: usize> {
     free: &'a [usize],
@@ -294,18 +321,7 @@ impl<'a, const NX: usize> Equations<'a, NX> {
         let (information, gradient) = self.eliminated(damping);
         let information = information.select_columns(inside).select_rows(inside);
         let gradient = gradient.select_rows(inside);
-        // Scaled to a unit diagonal: the parameters' units are of no concern.
-        // What nothing tells of is not moved.
-        let scale = information
-            .diagonal()
-            .map(|entry| if entry > 0.0 { 1.0 / entry.sqrt() } else { 0.0 });
-        let scaling = DMatrix::from_diagonal(&scale);
-        let mut scaled = &scaling * information * &scaling;
-        for i in 0..inside.len() {
-            scaled[(i, i)] += ROUNDING;
-        }
-        let solved = scaled.cholesky()?.solve(&scale.component_mul(&gradient));
-        let reduced = -scale.component_mul(&solved);
+        let reduced = -solved(&information, &gradient)?;
         let mut step = DVector::zeros(self.free.len());
         for (value, place) in reduced.iter().zip(inside) {
             step[*place] = *value;
@@ -325,23 +341,116 @@ impl<'a, const NX: usize> Equations<'a, NX> {
         let inside = self.inside(problem.unknowns, &at.parameters);
         // What an undamped step of everything would gain, states included.
         let possible = self.newton(&inside, 0.0).map(|(_, gain)| gain);
-        let states: f64 = self.blocks.iter().map(Block::state_gain).sum();
-        if possible.is_some_and(|gain| gain + states <= tolerance) {
+        if possible.is_some_and(|gain| gain + self.state_gain() <= tolerance) {
             return Step::Converged;
         }
+        let next = self.damped_step(problem, at, &inside, damping);
+        let little = next
+            .as_ref()
+            .is_none_or(|next| at.chi_square - next.chi_square <= tolerance);
+        // More was promised.
+        if little && let Some(step) = self.step_at_kink(problem, at, &inside, tolerance) {
+            *damping = FIRST_DAMPING;
+            return step;
+        }
+        next.map_or(Step::None, Step::Better)
+    }
+
+    /// The first step of these places that lowers chi^2, with more and more damping.
+    fn damped_step<M: ShootingModel<NX, NY>, const NY: usize>(
+        &self,
+        problem: &ShootingProblem<'_, M, NX, NY>,
+        at: &Iterate<NX>,
+        places: &[usize],
+        damping: &mut f64,
+    ) -> Option<Iterate<NX>> {
         while *damping < LARGEST_DAMPING {
             let next = self
-                .newton(&inside, *damping)
+                .newton(places, *damping)
                 .map(|(step, _)| self.moved(problem, at, &step, *damping));
             match next {
                 Some(next) if next.chi_square < at.chi_square => {
-                    *damping = (*damping / 10.0).max(1e-12);
-                    return Step::Better(next);
+                    *damping = (*damping / 10.0).max(SMALLEST_DAMPING);
+                    return Some(next);
                 }
                 _ => *damping *= 10.0,
             }
         }
-        Step::None
+        None
+    }
+
+    /// What to do where chi^2 may have a kink. The slopes are those of one side there, and what they
+    /// promise is not to be had on the other: no step follows them, not even from the minimum. So the
+    /// parameters with kinks are held until all else is at its minimum, and are then tried to both
+    /// sides. `None` where no parameter has kinks, or the others do not get to their minimum.
+    fn step_at_kink<M: ShootingModel<NX, NY>, const NY: usize>(
+        &self,
+        problem: &ShootingProblem<'_, M, NX, NY>,
+        at: &Iterate<NX>,
+        inside: &[usize],
+        tolerance: f64,
+    ) -> Option<Step<NX>> {
+        let (kinked, smooth): (Vec<usize>, Vec<usize>) = inside
+            .iter()
+            .partition(|place| problem.unknowns[self.free[**place]].kinked);
+        if kinked.is_empty() {
+            return None;
+        }
+        let better = |next: &Iterate<NX>| at.chi_square - next.chi_square > tolerance;
+        let (_, gain) = self.newton(&smooth, 0.0)?;
+        let at_rest = gain + self.state_gain() <= tolerance;
+        if !at_rest {
+            // Nothing bends here: the whole step is the right one.
+            let mut damping = SMALLEST_DAMPING;
+            let next = self.damped_step(problem, at, &smooth, &mut damping);
+            return next.map(Step::Better);
+        }
+        let mut best: Option<Iterate<NX>> = None;
+        for place in kinked {
+            let little = self.deviation(place, inside)? * tolerance.sqrt();
+            for times in BESIDE_KINK {
+                let next = self.beside(problem, at, (place, times * little), &smooth)?;
+                if best
+                    .as_ref()
+                    .is_none_or(|best| next.chi_square < best.chi_square)
+                {
+                    best = Some(next);
+                }
+            }
+        }
+        Some(best.filter(better).map_or(Step::Converged, Step::Better))
+    }
+
+    /// The standard deviation of the parameter at one of the places `inside`, the others unknown, too.
+    fn deviation(&self, place: usize, inside: &[usize]) -> Option<f64> {
+        let (information, _) = self.eliminated(0.0);
+        let information = information.select_columns(inside).select_rows(inside);
+        let row = inside.iter().position(|one| *one == place)?;
+        let unit = DVector::from_fn(inside.len(), |i, _| if i == row { 1.0 } else { 0.0 });
+        let deviation = solved(&information, &unit)?[row].sqrt();
+        deviation.is_finite().then_some(deviation)
+    }
+
+    /// The iterate with the parameter at one place moved by so much, those of the places `others` and the
+    /// states at their minimum beside it, by the slopes that they have there.
+    fn beside<M: ShootingModel<NX, NY>, const NY: usize>(
+        &self,
+        problem: &ShootingProblem<'_, M, NX, NY>,
+        at: &Iterate<NX>,
+        (place, by): (usize, f64),
+        others: &[usize],
+    ) -> Option<Iterate<NX>> {
+        let mut step = DVector::zeros(self.free.len());
+        step[place] = by;
+        let moved = self.moved(problem, at, &step, 0.0);
+        let there = Self::new(problem, &moved, self.free);
+        let (step, _) = there.newton(others, 0.0)?;
+        Some(there.moved(problem, &moved, &step, 0.0))
+    }
+
+    /// By how much undamped steps of the states alone lower chi^2 of the quadratic model.
+    fn state_gain(&self) -> f64 {
+        self.blocks.iter().map(Block::state_gain).sum()
     }
 
     /// The iterate after a step of the free parameters, cut at the bounds.

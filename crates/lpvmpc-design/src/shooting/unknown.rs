@@ -14,6 +14,10 @@ pub struct Unknown {
     pub scale: f64,
     /// Whether the fit may change it.
     pub free: bool,
+    /// Whether the outputs may have kinks as functions of it: their slopes are then those of one side, and
+    /// a minimum at a kink, where no gradient vanishes, is looked at from both. Such parameters are tried
+    /// one at a time.
+    pub kinked: bool,
 }
 
 /// Knowledge beforehand: `coefficients` . parameters is `mean` with a standard deviation.

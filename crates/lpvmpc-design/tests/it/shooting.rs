@@ -2,8 +2,9 @@
 
 use fastrand::Rng;
 use lpvmpc_design::{
-    LeastSquaresSettings, Prior, ResidualModel, ShootingError, ShootingModel, ShootingProblem,
-    ShootingSettings, Unknown, autocorrelation, cross_correlation, levenberg_marquardt,
+    LeastSquaresSettings, LinearizedOutputs, Prior, ResidualModel, ShootingError, ShootingFit,
+    ShootingModel, ShootingProblem, ShootingSettings, ShootingTermination, Unknown,
+    autocorrelation, cross_correlation, levenberg_marquardt,
 };
 use nalgebra::{DMatrix, DVector, SVector, Vector1, Vector2};
 
@@ -79,6 +80,7 @@ fn unknowns() -> [Unknown; 2] {
         upper: f64::INFINITY,
         scale: 1.0,
         free: true,
+        kinked: false,
     })
 }
 
@@ -256,6 +258,161 @@ fn mistakes_are_named() {
     assert!(
         error.to_string().contains("the scale of parameter 0 is 0"),
         "{error}"
+    );
+}
+
+/// y(k) = x0 + p s(k) + q (k / 40)^2, where s is another on the other side of p = 0.
+struct Bent {
+    measured: Vec<Vector1<f64>>,
+    /// Its derivatives are said to be those of -q.
+    mistaken: bool,
+}
+
+impl Bent {
+    fn slopes(row: usize) -> (f64, f64) {
+        let k = row as f64;
+        ((0.7 * k).sin(), (1.9 * k).cos())
+    }
+
+    /// Measured are `below` times s below zero and `above` times s above it, with an error.
+    fn new(below: f64, above: f64) -> Self {
+        let rows = 0..40;
+        let measured = rows.map(|row| {
+            let (s_below, s_above) = Self::slopes(row);
+            let (k, error) = (row as f64, 0.1 * (row as f64).powi(2).cos());
+            let square = 0.3 * (k / 40.0).powi(2);
+            Vector1::new(1.0 + below * s_below + above * s_above + square + error)
+        });
+        Self {
+            measured: measured.collect(),
+            mistaken: false,
+        }
+    }
+
+    fn unknowns(kinked: bool) -> [Unknown; 2] {
+        [(0.9, kinked), (0.0, false)].map(|(start, kinked)| Unknown {
+            start,
+            lower: f64::NEG_INFINITY,
+            upper: f64::INFINITY,
+            scale: 1.0,
+            free: true,
+            kinked,
+        })
+    }
+
+    fn fit(&self, unknowns: &[Unknown]) -> Result<ShootingFit<1>, ShootingError> {
+        let problem = ShootingProblem {
+            model: self,
+            unknowns,
+            priors: &[],
+            state_scale: Vector1::new(1.0),
+        };
+        let settings = ShootingSettings::default();
+        problem.fit(vec![Vector1::new(0.0)], &settings, &|_| {})
+    }
+}
+
+impl ShootingModel<1, 1> for Bent {
+    fn segments(&self) -> usize {
+        1
+    }
+
+    fn measured(&self, _: usize) -> &[Vector1<f64>] {
+        &self.measured
+    }
+
+    fn noise(&self, _: usize) -> Vector1<f64> {
+        Vector1::new(0.1)
+    }
+
+    fn simulate(
+        &self,
+        _: usize,
+        parameters: &[f64],
+        initial: &SVector<f64, 1>,
+        outputs: &mut Vec<Vector1<f64>>,
+    ) {
+        let linear = self.linearized(0, parameters, initial, &[]);
+        outputs.extend(linear.into_iter().flat_map(|linear| linear.outputs));
+    }
+
+    fn linearized(
+        &self,
+        _: usize,
+        parameters: &[f64],
+        initial: &SVector<f64, 1>,
+        indices: &[usize],
+    ) -> Option<LinearizedOutputs<1>> {
+        let [p, q] = parameters else { return None };
+        let rows = 0..self.measured.len();
+        let (mut outputs, mut slopes) = (Vec::new(), DMatrix::zeros(rows.len(), 1 + indices.len()));
+        for row in rows {
+            let (below, above) = Self::slopes(row);
+            let slope = if *p < 0.0 { below } else { above };
+            let square = (row as f64 / 40.0).powi(2);
+            outputs.push(Vector1::new(initial[0] + p * slope + q * square));
+            slopes[(row, 0)] = 1.0;
+            let by_q = if self.mistaken { -square } else { square };
+            for (column, index) in indices.iter().enumerate() {
+                slopes[(row, 1 + column)] = [slope, by_q][*index];
+            }
+        }
+        Some(LinearizedOutputs { outputs, slopes })
+    }
+}
+
+#[test]
+fn a_minimum_at_a_kink_is_one() {
+    // Each side wants to go to the other.
+    let at_kink = Bent::new(0.1, -0.1);
+    let fit = at_kink.fit(&Bent::unknowns(true)).unwrap();
+    assert_eq!(fit.termination, ShootingTermination::Converged);
+    let deviation = |place: usize| {
+        let covariance = fit.reduced.information.clone().try_inverse();
+        covariance.unwrap()[(place, place)].sqrt()
+    };
+    assert!(fit.parameters[0].abs() < 0.01 * deviation(0), "{fit:?}");
+    // The gradient does not vanish there, and whoever waits for that waits in vain.
+    assert!(fit.reduced.gradient[0].abs() * deviation(0) > 1.0);
+    assert_ne!(
+        at_kink.fit(&Bent::unknowns(false)).unwrap().termination,
+        ShootingTermination::Converged
+    );
+    // To neither side is it lower, all else fitted again.
+    for p in [-1.0, 1.0].map(|side| side * deviation(0)) {
+        let held = Unknown {
+            start: p,
+            free: false,
+            ..Bent::unknowns(true)[0]
+        };
+        let beside = at_kink.fit(&[held, Bent::unknowns(true)[1]]).unwrap();
+        assert!(beside.chi_square > fit.chi_square + 0.1, "{p}: {beside:?}");
+    }
+}
+
+#[test]
+fn a_kink_beside_the_minimum_does_not_end_a_fit() {
+    // From the other side of the kink, on which chi^2 falls towards it.
+    let model = Bent::new(-0.4, -0.1);
+    let fit = model.fit(&Bent::unknowns(true)).unwrap();
+    assert_eq!(fit.termination, ShootingTermination::Converged);
+    let mut same_side = Bent::unknowns(false);
+    same_side[0].start = -0.5;
+    let expected = model.fit(&same_side).unwrap();
+    assert_eq!(expected.termination, ShootingTermination::Converged);
+    assert!((expected.parameters[0] + 0.4).abs() < 0.1, "{expected:?}");
+    for (found, expected) in fit.parameters.iter().zip(&expected.parameters) {
+        assert!((found - expected).abs() < 1e-3, "{found} for {expected}");
+    }
+}
+
+#[test]
+fn a_fit_that_stagnates_elsewhere_has_not_converged_at_a_kink() {
+    let mut wrong = Bent::new(0.1, -0.1);
+    wrong.mistaken = true;
+    assert_eq!(
+        wrong.fit(&Bent::unknowns(true)).unwrap().termination,
+        ShootingTermination::Stagnation
     );
 }
 
