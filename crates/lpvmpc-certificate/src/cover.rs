@@ -81,8 +81,8 @@ const TOGETHER: usize = 64;
 
 /// Cells after which it is looked at whether so many as there may be are enough.
 const FEW: usize = 15;
-/// Points whose cells this is told by, and what cells may be too small by, as halvings. Cells of all sizes but far more than
-/// there may be are rare: four points that lie in none but such cells are no accident.
+/// Points towards which the whole is cut to see that, and by how many halvings their cells may be smaller than equal
+/// cells would be: cells differ in size, and some points lie in the smallest ones.
 const DIVES: u32 = 4;
 const MARGIN: u32 = 3;
 
@@ -181,14 +181,16 @@ fn dive<const N: usize>(
     })
 }
 
-/// A point of the ellipsoid in the cell, the same each time, another one for every `number`.
+/// A point of the ellipsoid in the cell, the same each time, another one for every `number`; they are spread evenly.
 fn inside<const N: usize>(cell: &Cell<N>, number: u32) -> SVector<f64, N> {
     let mut state = number;
-    let direction = SVector::<f64, N>::from_fn(|_, _| {
-        // The upper bits of a linear congruential generator (Numerical Recipes).
+    // A linear congruential generator (Numerical Recipes), from 0 to 1.
+    let mut next = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(state) / f64::from(u32::MAX) - 0.5
-    });
+        f64::from(state) / f64::from(u32::MAX)
+    };
+    let radius = next().powf(1.0 / N as f64);
+    let direction = SVector::<f64, N>::from_fn(|_, _| next() - 0.5);
     let direction = direction / direction.norm().max(f64::MIN_POSITIVE);
-    cell.centre + cell.half_widths.component_mul(&direction) * 0.9
+    cell.centre + cell.half_widths.component_mul(&direction) * radius
 }

@@ -6,8 +6,9 @@
 
 use lpvmpc::{Embedding, LpvModel, Number, Rk4};
 use lpvmpc_certificate::{
-    Certificate, CertificateProblem, CertifyError, ClaimError, MOST_BOXES, SynthesisError,
-    TerminalIngredients, TerminalProblem, certify_terminal, synthesize_terminal,
+    Certificate, CertificateProblem, CertifyError, ClaimError, MOST_BOXES, SampledClaim,
+    SynthesisError, TerminalClaim, TerminalIngredients, TerminalProblem, certify_terminal,
+    synthesize_terminal,
 };
 use lpvmpc_design::{SchedulingGrid, lqr_discrete, zero_order_hold};
 use nalgebra::{DMatrix, Matrix1, Matrix1x2, Matrix2, Vector1, Vector2};
@@ -257,4 +258,59 @@ fn a_plant_with_an_affine_term_has_no_certificate() {
         matches!(error, CertifyError::Claim(ClaimError::AffineTerm)),
         "{error}"
     );
+}
+
+/// x+ = 0.9 (sin^2 + cos^2)(waves x) x: enclosures see that this decreases when a box has less than a wave.
+struct Ripple {
+    waves: f64,
+}
+
+impl Embedding<1, 1, 1> for Ripple {
+    fn period(&self) -> Option<f64> {
+        Some(1.0)
+    }
+
+    fn scheduling<N: Number>(&self, x: &Vector1<N>, _: &Vector1<N>) -> Vector1<N> {
+        let angle = x[0] * N::constant(self.waves);
+        let (sin, cos) = (angle.sin(), angle.cos());
+        Vector1::new(sin * sin + cos * cos)
+    }
+
+    fn matrices<N: Number>(&self, one: &Vector1<N>) -> (Matrix1<N>, Matrix1<N>) {
+        (
+            Matrix1::new(N::constant(0.9) * one[0]),
+            Matrix1::new(N::constant(0.0)),
+        )
+    }
+}
+
+/// A proof that would need far more boxes than it may have does not use them up.
+#[test]
+fn a_proof_that_is_out_of_reach_ends_early() {
+    let claim = SampledClaim {
+        t_s: 1.0,
+        q: Matrix1::new(0.05),
+        r: Matrix1::new(1.0),
+        state_limits: Vector1::new(1.0),
+        input_limits: Vector1::new(1.0),
+        terminal: TerminalClaim {
+            k: Matrix1::new(0.0),
+            p: Matrix1::new(1.0),
+            level: 0.99,
+            contraction: 0.0,
+        },
+        states: 1,
+    };
+    let prove = |waves, most_boxes| claim.prove(&Ripple { waves }, most_boxes, &|_| ());
+    assert_eq!(prove(400.0, 4000).unwrap().boxes, 1024);
+    // It would need 2048.
+    match prove(900.0, 200).unwrap_err() {
+        ClaimError::DecreaseNotShown { boxes, .. } => assert!(boxes < 100, "{boxes}"),
+        error => panic!("{error}"),
+    }
+    // Twice as many as it may have are not out of reach: it tries.
+    match prove(400.0, 1000).unwrap_err() {
+        ClaimError::DecreaseNotShown { boxes, .. } => assert!(boxes >= 1000, "{boxes}"),
+        error => panic!("{error}"),
+    }
 }

@@ -55,7 +55,7 @@ pub(super) fn all(
     document["folder"] = json!(results.path());
     let mut files = vec![(SUMMARY.to_owned(), json::text(&document).into_bytes())];
     for Drawing { name, figure } in campaign_figures::all(campaign, &file, &summary)? {
-        files.extend(figure.files(&name)?);
+        files.extend(figure.files(name)?);
     }
     drop(file);
     let drafts = vec![(PARQUET, rows.parquet), (CSV, rows.csv)];
