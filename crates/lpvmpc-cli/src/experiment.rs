@@ -10,7 +10,7 @@ use lpvmpc_any::{
 };
 use lpvmpc_plant::{Plant, Signal};
 use lpvmpc_terminal::table::short;
-use lpvmpc_words::{from_toml, nearest, toml_message};
+use lpvmpc_words::{nearest, toml_message};
 use nalgebra::{DMatrix, DVector};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -79,7 +79,24 @@ struct File {
 }
 
 /// Bounds by name.
-type Pairs = BTreeMap<String, [f64; 2]>;
+type Pairs = BTreeMap<String, Pair>;
+
+/// Lower and upper bound.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(try_from = "Vec<f64>")]
+struct Pair([f64; 2]);
+
+impl TryFrom<Vec<f64>> for Pair {
+    type Error = String;
+
+    /// A list that is as long as it must be: of a longer one the reader would leave out the rest.
+    fn try_from(list: Vec<f64>) -> Result<Self, String> {
+        let count = list.len();
+        let pair = list.try_into();
+        pair.map(Self)
+            .map_err(|_| format!("there are {count} numbers; there must be two, [lower, upper]"))
+    }
+}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -181,7 +198,7 @@ impl Experiment {
             path: path.to_owned(),
             fault,
         };
-        let file: File = from_toml(&text).map_err(|error| {
+        let file: File = toml::from_str(&text).map_err(|error| {
             fault(format!(
                 "it is no experiment:\n{}",
                 toml_message(&error.to_string())
@@ -482,7 +499,7 @@ fn weights(place: &str, list: &[f64], signals: &[Signal]) -> Result<(), String> 
 
 /// Bounds of each signal: those given by name, else its own.
 fn limits(place: &str, given: &Option<Pairs>, signals: &[Signal]) -> Result<Limits, String> {
-    for (name, [lower, upper]) in given.iter().flatten() {
+    for (name, Pair([lower, upper])) in given.iter().flatten() {
         check_name(place, name, names(signals).into_iter())?;
         if !(lower <= upper) {
             let (lower, upper) = (short(*lower), short(*upper));
@@ -492,7 +509,7 @@ fn limits(place: &str, given: &Option<Pairs>, signals: &[Signal]) -> Result<Limi
         }
     }
     let pair = |signal: &Signal| match given.as_ref().and_then(|given| given.get(&signal.name)) {
-        Some(pair) => *pair,
+        Some(Pair(pair)) => *pair,
         None => [
             signal.lower.unwrap_or(f64::NEG_INFINITY),
             signal.upper.unwrap_or(f64::INFINITY),

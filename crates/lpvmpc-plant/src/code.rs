@@ -228,8 +228,9 @@ fn join_products(steps: &mut [Option<Step>], results: &[usize]) {
 }
 
 impl Leaves {
-    /// Those of the `needed` operations, and the register of each of these.
-    fn new(operations: &[Operation], needed: &[bool]) -> (Self, Vec<u32>) {
+    /// Those of the `needed` operations, and the register of each of these. `whole` lists of what varies have what comes
+    /// before the last one needed, too, so that they are copied at once.
+    fn new(operations: &[Operation], needed: &[bool], whole: bool) -> (Self, Vec<u32>) {
         let mut leaves = Self::default();
         let mut places = vec![Vec::new(); 5];
         for index in (0..operations.len()).filter(|index| needed[*index]) {
@@ -249,8 +250,30 @@ impl Leaves {
             places[kind].push(index);
         }
         let mut register = vec![0; operations.len()];
-        for (place, index) in places.into_iter().flatten().enumerate() {
-            register[index] = place as u32;
+        let mut first = 0;
+        let Self {
+            constants,
+            parameters,
+            states,
+            inputs,
+            scheduling,
+        } = &mut leaves;
+        for count in [constants.len(), parameters.len()] {
+            let places = places.remove(0);
+            places
+                .into_iter()
+                .zip(first..)
+                .for_each(|(index, place)| register[index] = place);
+            first += count as u32;
+        }
+        for (list, places) in [states, inputs, scheduling].into_iter().zip(places) {
+            for (k, index) in places.into_iter().enumerate() {
+                register[index] = first + if whole { list[k] } else { k } as u32;
+            }
+            if whole {
+                *list = (0..list.iter().max().map_or(0, |last| last + 1)).collect();
+            }
+            first += list.len() as u32;
         }
         (leaves, register)
     }
@@ -287,20 +310,21 @@ impl Code {
     /// What the `results` of the program need; every operation refers to earlier ones only.
     pub fn new(operations: &[Operation], results: &[usize]) -> Self {
         let (steps, needed) = steps(operations, results);
-        Self::of_steps(operations, &steps, &needed, results)
+        Self::of_steps(operations, &steps, (&needed, false), results)
     }
 
-    /// The same with products and sums in one instruction, where that is possible: the same numbers in less time.
+    /// The same with products and sums in one instruction, where that is possible, and with whole lists of what varies:
+    /// the same numbers in less time.
     pub fn joined(operations: &[Operation], results: &[usize]) -> Self {
         let (mut steps, needed) = steps(operations, results);
         join_products(&mut steps, results);
-        Self::of_steps(operations, &steps, &needed, results)
+        Self::of_steps(operations, &steps, (&needed, true), results)
     }
 
     fn of_steps(
         operations: &[Operation],
         steps: &[Option<Step>],
-        needed: &[bool],
+        (needed, whole): (&[bool], bool),
         results: &[usize],
     ) -> Self {
         // When a result is read last: the index of that operation, or never again.
@@ -312,7 +336,7 @@ impl Code {
         results
             .iter()
             .for_each(|result| last_read[*result] = usize::MAX);
-        let (leaves, mut register) = Leaves::new(operations, needed);
+        let (leaves, mut register) = Leaves::new(operations, needed, whole);
         let given = leaves.count();
         let partners = sines_and_cosines(steps);
         let mut free: Vec<u32> = Vec::new();
@@ -404,16 +428,19 @@ impl Code {
         }
     }
 
-    /// The same for a kind of number with registers that are kept, and in less time. Where the registers hold the numbers
-    /// that are `fixed` under this `name` already, these are not written again.
+    /// The same of [`joined`](Self::joined) code, for a kind of number with registers that are kept, and in less time.
+    /// There are `counts` of states, of inputs and of scheduling parameters, of which it may need fewer. Where the
+    /// registers hold the numbers that are `fixed` under this `name` already, these are not written again.
     #[inline(always)]
     pub fn evaluate_fast<N: Kept>(
         &self,
         (fixed, name): (&[f64], Name),
+        counts: [usize; 3],
         leaf: impl Fn(Leaf) -> N,
         mut result: impl FnMut(usize, N),
     ) {
-        if self.registers > FEW {
+        // With room for what is not needed.
+        if self.registers + counts.iter().sum::<usize>() > FEW {
             return self.evaluate(fixed, leaf, result);
         }
         N::with(|Registers { numbers, holds }| {
@@ -425,7 +452,14 @@ impl Code {
                 // No instruction has them for a target.
                 *holds = name;
             }
-            self.leaves.fill(&mut numbers[fixed.len()..], leaf);
+            let [states, inputs, scheduling] = counts;
+            // What is not needed comes last of each, and makes way for the next and for what is worked out.
+            let mut first = fixed.len();
+            fill(numbers, first, states, |i| leaf(Leaf::State(i)));
+            first += self.leaves.states.len();
+            fill(numbers, first, inputs, |i| leaf(Leaf::Input(i)));
+            first += self.leaves.inputs.len();
+            fill(numbers, first, scheduling, |i| leaf(Leaf::Scheduling(i)));
             run_short(&self.short, numbers);
             for (place, register) in self.results.iter().enumerate() {
                 result(place, numbers[*register as u8 as usize]);
@@ -449,6 +483,16 @@ impl Code {
         run(&self.instructions, registers);
         for (place, register) in self.results.iter().enumerate() {
             result(place, registers[*register as usize]);
+        }
+    }
+}
+
+/// Puts so many numbers into the registers from the `first` on.
+#[inline(always)]
+fn fill<N>(registers: &mut [N; FEW], first: usize, count: usize, number: impl Fn(usize) -> N) {
+    if let Some(places) = registers.get_mut(first..first + count) {
+        for (i, place) in places.iter_mut().enumerate() {
+            *place = number(i);
         }
     }
 }

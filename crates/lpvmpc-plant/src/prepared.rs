@@ -118,8 +118,9 @@ impl Prepared {
         if TypeId::of::<N>() == TypeId::of::<f64>() {
             let leaf = |of| float(leaf(of));
             let result = |place, value| result(place, N::constant(value));
+            let counts = [x.len(), u.len(), s.len()];
             self.moving
-                .evaluate_fast((&fixed.moving, fixed.name), leaf, result);
+                .evaluate_fast((&fixed.moving, fixed.name), counts, leaf, result);
         } else {
             self.code.evaluate(&fixed.code, leaf, result);
         }
@@ -142,9 +143,8 @@ impl Prepared {
                 Leaf::Scheduling(_) => Lanes([f64::NAN; POINTS]),
             };
             let result = |place, values: Lanes<POINTS>| result(place, values.0.map(N::constant));
-            return self
-                .moving
-                .evaluate_fast((&fixed.moving, fixed.name), leaf, result);
+            let named = (&fixed.moving[..], fixed.name);
+            return self.moving.evaluate_fast(named, [NX, NU, 0], leaf, result);
         }
         if POINTS == 1 {
             let motion = (x[0].as_slice(), u[0].as_slice());

@@ -9,8 +9,16 @@ use serde::de::DeserializeOwned;
 pub fn from_toml<T: DeserializeOwned>(text: &str) -> Result<T, toml::de::Error> {
     let content = toml::from_str(text)?;
     // What this reader says has no line, so it comes second.
-    toml::Value::Table(text.parse()?).try_into::<T>()?;
+    check_lists::<T>(toml::Value::Table(text.parse()?))?;
     Ok(content)
+}
+
+/// Whether the lists of a text that is a `T` are as long as they must be.
+///
+/// # Errors
+/// One is longer.
+pub fn check_lists<T: DeserializeOwned>(text: toml::Value) -> Result<(), toml::de::Error> {
+    text.try_into::<T>().map(drop)
 }
 
 /// What the reader of a TOML file says, without the types of a programming language.

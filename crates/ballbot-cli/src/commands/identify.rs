@@ -200,9 +200,9 @@ pub fn configuration(path: Option<&Path>) -> Result<Config, InputError> {
 const PARAMETERS: [&str; 3] = ["parameters.toml", "parameters_x.toml", "parameters_y.toml"];
 const REPORT: &str = "report.html";
 
-/// The files of the figure `name`, in the folder of the results.
-fn figure_files(name: &str) -> [String; 2] {
-    ["svg", "png"].map(|kind| format!("figures/{name}.{kind}"))
+/// The figure `name` in the folder of the results, without the endings of its files.
+fn figure_path(name: &str) -> String {
+    format!("figures/{name}")
 }
 
 /// The files of all figures that there can be.
@@ -210,7 +210,7 @@ fn all_figure_files() -> Vec<String> {
     figures::NAMES
         .into_iter()
         .flatten()
-        .flat_map(figure_files)
+        .flat_map(|name| ["svg", "png"].map(|kind| format!("{}.{kind}", figure_path(name))))
         .collect()
 }
 
@@ -235,7 +235,7 @@ fn write(
     let mut files: Vec<(String, Vec<u8>)> = texts.collect();
     files.push((REPORT.to_owned(), report.into_bytes()));
     for figure in &figures {
-        files.extend(figure.figure.files(figure.name)?);
+        files.extend(figure.figure.files(&figure_path(figure.name))?);
     }
     // Figures of an earlier run that this one has not, and parameters in place of which there are
     // others now. Where there are none, they are kept, and told of.

@@ -42,8 +42,10 @@ impl Scenario {
             origin: origin.to_owned(),
             message: words::toml_message(&error.to_string()),
         };
-        let scenario: Self = words::from_toml(text).map_err(syntax)?;
-        scenario.check_tables(&Value::Table(text.parse().map_err(syntax)?))?;
+        let scenario: Self = toml::from_str(text).map_err(syntax)?;
+        let given = Value::Table(text.parse().map_err(syntax)?);
+        scenario.check_tables(&given)?;
+        words::check_lists::<Self>(given).map_err(syntax)?;
         Ok(scenario)
     }
 

@@ -190,11 +190,7 @@ fn what_is_wrong_is_named_and_nothing_is_written() {
         (
             "position = [",
             "position = [0.0, ",
-            vec![
-                "controller.x_bounds.position",
-                "invalid length 3",
-                "too many",
-            ],
+            vec!["line 15", "3 numbers", "[lower, upper]"],
         ),
         (
             "# delay = 0.04                    # from a command",
