@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import re
 
 import casadi as ca
 import numpy as np
@@ -94,13 +95,13 @@ def test_a_file_is_the_certificate(certified, tmp_path):
 
 
 def forged(certificate, change):
-    """With its digest made anew, as a forger would."""
-    content = json.loads(certificate.to_json())["certificate"]
-    change(content)
-    digest = 0xCBF29CE484222325
-    for byte in json.dumps(content, separators=(",", ":"), ensure_ascii=False).encode():
-        digest = (digest ^ byte) * 0x100000001B3 % 2**64
-    return json.dumps({"certificate": content, "digest": f"{digest:016x}"})
+    """With the digest that the message asks for, as a forger would."""
+    document = json.loads(certificate.to_json())
+    change(document["certificate"])
+    with pytest.raises(lpvmpc.CertificateError, match="changed after it was written") as refused:
+        lpvmpc.Certificate(json.dumps(document))
+    document["digest"] = re.search("that of the content is ([0-9a-f]{16})", str(refused.value))[1]
+    return json.dumps(document)
 
 
 def test_false_claims_are_refuted(certified):
