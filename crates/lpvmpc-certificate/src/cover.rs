@@ -114,17 +114,9 @@ pub(crate) fn cover<const N: usize>(
             let at = cell.centre;
             match finding {
                 Finding::Fails => return Err(Uncovered::False { at }),
-                Finding::Hopeless => {
-                    return Err(Uncovered::Undecided {
-                        at,
-                        cells: examined,
-                    });
-                }
+                Finding::Hopeless => return Err(undecided(at, examined)),
                 Finding::Open { .. } if cuts == MOST_CUTS || examined >= most_cells => {
-                    return Err(Uncovered::Undecided {
-                        at,
-                        cells: examined,
-                    });
+                    return Err(undecided(at, examined));
                 }
                 Finding::Open { across } => {
                     open.extend(cell.halves(across).map(|half| (half, cuts + 1)));
@@ -161,12 +153,7 @@ fn dive<const N: usize>(
             let at = cell.centre;
             match finding {
                 Finding::Fails => return Err(Uncovered::False { at }),
-                Finding::Hopeless => {
-                    return Err(Uncovered::Undecided {
-                        at,
-                        cells: looked_at,
-                    });
-                }
+                Finding::Hopeless => return Err(undecided(at, looked_at)),
                 Finding::Open { across } => {
                     let upper = towards[across] > at[across];
                     *cell = cell.halves(across)[usize::from(upper)];
@@ -175,10 +162,11 @@ fn dive<const N: usize>(
             }
         }
     }
-    Err(Uncovered::Undecided {
-        at: cells[0].0.centre,
-        cells: looked_at,
-    })
+    Err(undecided(cells[0].0.centre, looked_at))
+}
+
+fn undecided<const N: usize>(at: SVector<f64, N>, cells: usize) -> Uncovered<N> {
+    Uncovered::Undecided { at, cells }
 }
 
 /// A point of the ellipsoid in the cell, the same each time, another one for every `number`; they are spread evenly.
