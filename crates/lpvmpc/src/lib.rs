@@ -88,6 +88,7 @@ mod plan;
 mod policy;
 mod predictor;
 mod preview;
+mod products;
 
 mod ramp;
 mod regulator;

@@ -8,9 +8,10 @@
 
 use crate::model::Scalar;
 use crate::ocp::{Common, Stage};
-use crate::small_matrix::{
-    add_product, add_symmetric_product, mirror, product, transposed, transposed_product,
-};
+#[cfg(feature = "simd")]
+use crate::products::{self, Vectors};
+use crate::products::{Compiled, Products};
+use crate::small_matrix::{add_product, mirror, product, transposed, transposed_product};
 use nalgebra::{SMatrix, SVector};
 
 /// Cost-to-go x'Px/2 + p'x.
@@ -90,7 +91,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> pulp::WithSimd for Elimination
     type Output = Result<(), BadPivot<T>>;
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
+    fn with_simd<S: pulp::Simd>(self, simd: S) -> Self::Output {
         let Self {
             factor,
             stage,
@@ -98,7 +99,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> pulp::WithSimd for Elimination
             cost_to_go,
             adjustment,
         } = self;
-        factor.eliminate_here(stage, weights, cost_to_go, adjustment)
+        factor.eliminate_here(stage, weights, cost_to_go, adjustment, Vectors(simd))
     }
 }
 
@@ -132,7 +133,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         if cfg!(feature = "simd") && NX >= WIDE || !cfg!(feature = "alloc") {
             self.eliminate_adjusted(stage, weights, cost_to_go, None)
         } else {
-            self.eliminate_here(stage, weights, cost_to_go, None)
+            self.eliminate_here(stage, weights, cost_to_go, None, Compiled)
         }
     }
 
@@ -147,7 +148,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     ) -> Result<(), BadPivot<T>> {
         #[cfg(feature = "simd")]
         if NX >= WIDE {
-            return pulp::Arch::new().dispatch(Elimination {
+            return products::in_widest::<NX, _>(Elimination {
                 factor: self,
                 stage,
                 weights,
@@ -155,27 +156,28 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
                 adjustment,
             });
         }
-        self.eliminate_here(stage, weights, cost_to_go, adjustment)
+        self.eliminate_here(stage, weights, cost_to_go, adjustment, Compiled)
     }
 
     #[inline(always)]
-    fn eliminate_here(
+    fn eliminate_here<M: Products>(
         &mut self,
         stage: &Stage<T, NX, NU>,
         weights: &Common<T, NX, NU>,
         cost_to_go: &mut CostToGo<T, NX>,
         adjustment: Option<&dyn Adjustment<T, NX, NU>>,
+        by: M,
     ) -> Result<(), BadPivot<T>> {
         let Stage { a, b, c, .. } = stage;
         let CostToGo { quadratic, linear } = cost_to_go;
-        let p_a = product(quadratic, a);
-        let p_b = product(quadratic, b);
+        let p_a = by.product(quadratic, a);
+        let p_b = by.product(quadratic, b);
         let p_next = *linear + product(quadratic, c);
         let (a, b) = (transposed(a), transposed(b));
 
         let mut minimum = StageMinimum {
-            hessian: weights.r + product(&b, &p_b),
-            g_x: weights.s + product(&b, &p_a),
+            hessian: weights.r + by.product(&b, &p_b),
+            g_x: weights.s + by.product(&b, &p_a),
             g: stage.linear_u + product(&b, &p_next),
             linear_x: stage.linear_x + product(&a, &p_next),
         };
@@ -185,19 +187,19 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         let UnitFactor { inverse, pivots } = UnitFactor::new(&minimum.hessian)?;
         let reciprocals = pivots.map(|pivot| T::one() / pivot);
         // -D^-1 L^-1 of G and g.
-        let l_g_x = product(&inverse, &minimum.g_x);
+        let l_g_x = by.product(&inverse, &minimum.g_x);
         let scaled_g_x = scaled_rows(&l_g_x, &-reciprocals);
         let scaled_g = scaled_rows(&product(&inverse, &minimum.g), &-reciprocals);
         let transposed_inverse = transposed(&inverse);
-        self.feedback = product(&transposed_inverse, &scaled_g_x);
+        self.feedback = by.product(&transposed_inverse, &scaled_g_x);
         self.feedforward = product(&transposed_inverse, &scaled_g);
         self.inverse_factor = scaled_rows(&inverse, &reciprocals.map(|d| d.sqrt()));
 
         // A'P(A + BK) + Q + S'K, and the same for the linear part.
         let l_g_x = transposed(&l_g_x);
         *quadratic = weights.q;
-        add_symmetric_product(quadratic, &a, &p_a);
-        add_symmetric_product(quadratic, &l_g_x, &scaled_g_x);
+        by.add_symmetric_product(quadratic, &a, &p_a);
+        by.add_symmetric_product(quadratic, &l_g_x, &scaled_g_x);
         mirror(quadratic);
         *linear = minimum.linear_x + product(&l_g_x, &scaled_g);
         Ok(())

@@ -1,0 +1,55 @@
+//! How the products of a backward step are worked out: as the compiler has them, or in the machine's widest
+//! vectors, where it has them and matrices are large.
+
+#[cfg(feature = "simd")]
+mod vectors;
+
+use crate::model::Scalar;
+use crate::small_matrix;
+use nalgebra::SMatrix;
+#[cfg(feature = "simd")]
+pub(crate) use vectors::{Vectors, in_widest};
+
+/// The products of a backward step.
+pub(crate) trait Products: Copy {
+    /// A B
+    fn product<T: Scalar, const R: usize, const K: usize, const C: usize>(
+        self,
+        a: &SMatrix<T, R, K>,
+        b: &SMatrix<T, K, C>,
+    ) -> SMatrix<T, R, C>;
+
+    /// out += A B, a product that is symmetric: above the diagonal it may be left as it is, see
+    /// [`mirror`](small_matrix::mirror).
+    fn add_symmetric_product<T: Scalar, const R: usize, const K: usize>(
+        self,
+        out: &mut SMatrix<T, R, R>,
+        a: &SMatrix<T, R, K>,
+        b: &SMatrix<T, K, R>,
+    );
+}
+
+/// As the compiler has them.
+#[derive(Clone, Copy)]
+pub(crate) struct Compiled;
+
+impl Products for Compiled {
+    #[inline(always)]
+    fn product<T: Scalar, const R: usize, const K: usize, const C: usize>(
+        self,
+        a: &SMatrix<T, R, K>,
+        b: &SMatrix<T, K, C>,
+    ) -> SMatrix<T, R, C> {
+        small_matrix::product(a, b)
+    }
+
+    #[inline(always)]
+    fn add_symmetric_product<T: Scalar, const R: usize, const K: usize>(
+        self,
+        out: &mut SMatrix<T, R, R>,
+        a: &SMatrix<T, R, K>,
+        b: &SMatrix<T, K, R>,
+    ) {
+        small_matrix::add_symmetric_product(out, a, b);
+    }
+}
