@@ -39,7 +39,7 @@ const MANY_SATURATED: usize = 8;
 const NEAR: Patience = Patience {
     few: 4,
     guesses: 0,
-    singles: 0,
+    singles: 2,
 };
 /// Of general rows fewer, since each binds inputs and states.
 const NEAR_ROWS: Patience = Patience { few: 8, ..NEAR };
@@ -53,8 +53,8 @@ const FAR: Patience = Patience {
     guesses: 2,
     singles: 4,
 };
-/// Guesses of the interior-point method that are tried.
-const TRIALS: usize = 5;
+/// So many factorisations for each guess of the interior-point method that is tried.
+const TRIAL: usize = 5;
 /// Shorter parts of the way mean that bounds may contradict each other.
 const STUCK: f64 = 0.1;
 /// The roles that a step foretells are tried when one in so many of the active sides, or fewer, has changed
@@ -66,6 +66,9 @@ const FREE: f64 = 0.5;
 const CENTRE: f64 = 0.01;
 /// Factorisations, each as much work as a change of the active set for every state and input.
 const MOST_FACTORISATIONS: usize = 24;
+/// Where many more bounds are expected than these are for, one for so many: the dual method would need longer
+/// than in proportion.
+const BOUNDS: usize = 16;
 /// Part of the changes that there may be, for the dual method has to have enough where this phase has
 /// no answer: one in so many.
 const SHARE: usize = 4;
@@ -191,7 +194,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             violation: solver.dual.tolerance,
             penalty: scale * T::default_epsilon().powf(convert(-0.4)),
         };
-        let work = MOST_FACTORISATIONS * (NX + NU);
+        let factorisations = match turn {
+            Turn::First => MOST_FACTORISATIONS.max(expected / BOUNDS),
+            Turn::Last => MOST_FACTORISATIONS,
+        };
+        let work = factorisations * (NX + NU);
         let cap = match turn {
             Turn::First => work.min(solver.dual.changes_left() / SHARE),
             Turn::Last => *spent + work,
@@ -225,8 +232,16 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             None
         } else {
             newton::measure(ocp, sides, &trajectory(solution));
-            let proof = &mut solution.active;
-            search(&mut program, sides, &tolerances, scale, proof, &mut changes)
+            let (proof, trials) = (&mut solution.active, factorisations.div_ceil(TRIAL));
+            let limits = (scale, trials);
+            search(
+                &mut program,
+                sides,
+                &tolerances,
+                limits,
+                proof,
+                &mut changes,
+            )
         };
         let outcome = match outcome {
             Some(Ok(())) => report(&program, sides, solution).then_some(Ok(())),
@@ -244,19 +259,19 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
     }
 }
 
-/// The interior-point method, until the roles that it foretells are right, or its multipliers prove that the
-/// problem is infeasible.
+/// The interior-point method, until the roles that it foretells are right, which is tried so many times at most, or
+/// its multipliers prove that the problem is infeasible.
 fn search<T: Scalar, const NX: usize, const NU: usize>(
     program: &mut Program<'_, T, NX, NU>,
     sides: &mut [BoundSide<T>],
     tolerances: &Tolerances<T>,
-    scale: T,
+    (scale, mut trials): (T, usize),
     proof: &mut ActiveSet<T>,
     changes: &mut impl FnMut() -> bool,
 ) -> Option<Result<(), Status<T>>> {
     let ocp = program.ocp;
     let mut method = InteriorPoint::new(sides, scale * convert(CENTRE));
-    let (mut part, mut trials) = (T::zero(), TRIALS);
+    let mut part = T::zero();
     while trials > 0 && changes() {
         let predicted = method.predict(ocp, sides, program.factors, (program.u, program.x));
         let Foretold { changed, active } = predicted.ok()?;

@@ -82,16 +82,17 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
         let mut residual = explain(program, sides);
         let mut wrong = reassign(sides, loose, loose * residual.largest);
         if wrong == 0 {
-            if !refine(program, sides, &mut residual, tolerances.violation) {
-                return false;
-            }
+            let near = refine(program, sides, &mut residual, tolerances.violation);
             wrong = reassign(
                 sides,
                 tolerances.violation,
                 tolerances.violation * residual.largest,
             );
+            if wrong == 0 && !near {
+                wrong = release_unmet(sides, tolerances.violation);
+            }
             if wrong == 0 {
-                return true;
+                return near;
             }
         }
         // A guess from near by is right after a few exchanges, each of which leaves fewer sides wrong.
@@ -204,6 +205,25 @@ fn reassign<T: Scalar>(sides: &mut [BoundSide<T>], violation: T, rounding: T) ->
             side.role = role;
             changes += 1;
         }
+    }
+    changes
+}
+
+/// Lets go of held sides that stay where they are not to be, since the other held ones leave nothing that moves them:
+/// what is kept all the same is free, what is soft is exceeded. How many there are.
+fn release_unmet<T: Scalar>(sides: &mut [BoundSide<T>], violation: T) -> usize {
+    let mut changes = 0;
+    for side in sides.iter_mut().filter(|side| side.is_weighted()) {
+        let margin = violation * side.size;
+        let role = if side.distance > margin {
+            Role::Free
+        } else if side.distance < -margin && side.soft.is_some() {
+            Role::Exceeded
+        } else {
+            continue;
+        };
+        side.role = role;
+        changes += 1;
     }
     changes
 }

@@ -205,6 +205,26 @@ fn in_a_loop<const NX: usize, const NU: usize, const N: usize, const M: usize>(k
 }
 
 /// Bounds of states that no inputs meet: the multipliers of the interior-point method prove it.
+/// A state that is held where the held inputs leave nothing that moves it, beyond its soft bound by 1e-10 of it, is
+/// exceeded; as long as it counted as held, the dual method had to find all of them once more.
+#[test]
+fn a_held_state_that_nothing_moves_is_exceeded() {
+    let recipe = Recipe {
+        kind: Kind::Soft,
+        horizon: 50,
+        samples: 12,
+        share: 0.8,
+        seed: 1,
+    };
+    let sequence = recipe.make::<8, 2>().unwrap();
+    for ocp in &sequence.problems {
+        let solution = solve(ocp);
+        assert!(solution.status.is_solved(), "{}", solution.status);
+        assert!(solution.changes <= 240);
+        assert!(kkt_residual(ocp, &solution).largest() < 1e-12);
+    }
+}
+
 #[test]
 fn many_bounds_that_contradict_each_other_are_proved_to() {
     const N: usize = 60;
