@@ -40,17 +40,18 @@ def _names(line):
 
 def read(folder):
     """{(size, horizon, kind, wanted share): (active bounds, {contender: Time})}, lines of the Riccati
-    recursion, the calls that do nothing [(contender, us)], and the largest residual of our answers.
+    recursion, the calls that do nothing {contender: us}, and the largest residual of our answers.
 
     Of several lines for the same contender the fastest median counts: the choices of HPIPM, and our solver,
     which runs in both programs, in that beside HPIPM.
     """
-    files, riccati, overheads, residual = {}, [], [], 0.0
+    files, riccati, overheads, residual = {}, [], {}, 0.0
     for path in sorted(pathlib.Path(folder).glob("*.csv")):
         with path.open() as lines:
             for line in csv.DictReader(lines):
                 if line["variant"] == "overhead":
-                    overheads.append((line["contender"], float(line["median_us"])))
+                    us = overheads.get(line["contender"], float("inf"))
+                    overheads[line["contender"]] = min(us, float(line["median_us"]))
                     continue
                 residual = max(residual, float(line["our_residual"]))
                 if line["variant"] == "no bounds" or line["contender"] == "HPIPM Riccati":

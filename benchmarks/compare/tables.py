@@ -36,13 +36,36 @@ def table(files, names):
     head = ["problems", "active", *names, "ratio"]
     lines = ["| " + " | ".join(head) + " |", "| --- |" + " ---: |" * (len(head) - 1)]
     for (size, horizon, kind, _), (active, times) in files.items():
-        rivals = [time.median for name, time in times.items() if not name.startswith("lpvmpc") and time.exact]
-        own = min(times[name].median for name in ("lpvmpc", "lpvmpc, cold"))
-        ratio = number(min(rivals) / own) if rivals else "–"
+        ratios = rival_to_ours(times)
+        ratio = number(ratios[0]) if ratios else "–"
         cells = [cell(times, name) for name in names]
         row = [f"{size}, N = {horizon}, {kind}", f"{active:.0f}", *cells, ratio]
         lines.append("| " + " | ".join(row) + " |")
     return "\n".join(lines)
+
+
+def rival_to_ours(times):
+    """The shortest median of an exact rival divided by that of our faster start, and the shortest worst time of
+    one divided by that of the same start."""
+    rivals = [time for name, time in times.items() if not name.startswith("lpvmpc") and time.exact]
+    if not rivals:
+        return None
+    own = min((times[name] for name in ("lpvmpc", "lpvmpc, cold")), key=lambda time: time.median)
+    return min(time.median for time in rivals) / own.median, min(time.worst for time in rivals) / own.worst
+
+
+def verdict(files):
+    """How often we are behind, and by how much."""
+    ratios = [ratios for ratios in (rival_to_ours(times) for _, times in files.values()) if ratios]
+    medians, worst = zip(*ratios)
+    behind = [1 / ratio for ratio in medians if ratio < 1]
+    text = f"In {len(ratios) - len(behind)} of {len(ratios)} sequences lpvmpc's median is the shortest"
+    if behind:
+        text += (f", in {len(behind)} that of an exact rival, {sorted(behind)[len(behind) // 2]:.2f} times "
+                 f"shorter in the middle and {max(behind):.2f} times at most")
+    beyond = sum(ratio < 1 / 1.5 for ratio in worst)
+    return text + (f". Its worst time is more than 1.5 times the shortest worst of an exact rival in {beyond}, "
+                   f"{1 / min(worst):.2f} times at most.")
 
 
 def riccati_table(lines):
@@ -68,11 +91,12 @@ def main():
     options = arguments.parse_args()
     files, riccati, overheads, residual = results.read(options.folder)
     present = [name for name in results.CONTENDERS if any(name in times for _, times in files.values())]
-    calls = ", ".join(f"{name} {number(us)}" for name, us in overheads)
+    calls = ", ".join(f"{name} {number(us)}" for name, us in overheads.items())
     about = "\n\n".join(filter(None, [
         options.note,
         f"A call that does next to nothing, part of each time [us]: {calls}. Largest residual of the "
         f"optimality conditions at our answers: {residual:.1e}.",
+        verdict(files),
     ]))
     whole = "\n\n".join([
         "# Solvers on the problem files", "Written by `tables.py`; what is timed is said in README.md.",
