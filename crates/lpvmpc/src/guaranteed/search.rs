@@ -112,7 +112,8 @@ where
             }
         }
         planner.aim_again(wanted, along);
-        improved
+        // From so far away that the cost overflows, it could not be told to fall.
+        improved.filter(|_| along.cost.is_finite())
     }
 
     /// Outside of what is guaranteed: soft bounds, then the saturated terminal law. The answer is the plan

@@ -191,6 +191,24 @@ fn the_nearest_admissible_position_is_reached() {
     }
 }
 
+/// So far away that the cost overflows, no plan is called one that guarantees anything.
+#[test]
+fn what_has_no_finite_cost_is_no_plan() {
+    for far in [1e150, 1e160, 1e300] {
+        let mut everywhere = settings();
+        everywhere.set_points = [f64::NEG_INFINITY, f64::INFINITY];
+        let mut controller = guaranteed(everywhere);
+        let mut memory = controller.workspace::<5>();
+        let x = Vector4::new(far, 0.0, 0.0, 0.0);
+        let step = controller.step(&x, 1.0, &mut memory);
+        assert!(
+            step.cost.is_finite() || !step.decision.is_guaranteed(),
+            "{far}: {step:?}"
+        );
+        assert!(everywhere.u.contains(&step.u, 0.0), "{far}: {step:?}");
+    }
+}
+
 /// The applied plan is the nonlinear rollout: what it promised is what happens.
 #[test]
 fn the_plan_happens() {
