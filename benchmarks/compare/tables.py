@@ -61,8 +61,8 @@ def verdict(files):
     behind = [1 / ratio for ratio in medians if ratio < 1]
     text = f"In {len(ratios) - len(behind)} of {len(ratios)} sequences lpvmpc's median is the shortest"
     if behind:
-        text += (f", in {len(behind)} that of an exact rival, {sorted(behind)[len(behind) // 2]:.2f} times "
-                 f"shorter in the middle and {max(behind):.2f} times at most")
+        text += (f", in {len(behind)} that of an exact rival; there ours is {sorted(behind)[len(behind) // 2]:.2f} "
+                 f"times as long in the middle, {max(behind):.2f} times at most")
     beyond = sum(ratio < 1 / 1.5 for ratio in worst)
     return text + (f". Its worst time is more than 1.5 times the shortest worst of an exact rival in {beyond}, "
                    f"{1 / min(worst):.2f} times at most.")
