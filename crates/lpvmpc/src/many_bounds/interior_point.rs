@@ -16,8 +16,10 @@ use nalgebra::{SVector, convert};
 /// Part of the way to the nearest zero that a step may take.
 const NEARLY: f64 = 0.995;
 
-/// Least slack and excess to begin with, as a part of the bound's size.
+/// Least slack to begin with, as a part of the bound's size; of a soft one, which need not be kept, its slack and its
+/// excess.
 const LEAST: f64 = 1.0;
+const LEAST_SOFT: f64 = 0.2;
 
 /// The program of a Newton step, of one side.
 #[derive(Clone, Copy)]
@@ -149,10 +151,11 @@ impl<T: Scalar> InteriorPoint<T> {
     /// Begins at a trajectory whose distances are known, with products of slack and multiplier of the size
     /// of `cost`.
     pub fn new(sides: &mut [BoundSide<T>], cost: T) -> Self {
-        let least: T = convert(LEAST);
         for side in sides.iter_mut() {
-            let slack = side.distance.max(least * side.size);
-            let excess = (slack - side.distance).max(least * side.size);
+            let least = side.soft.map_or(LEAST, |_| LEAST_SOFT);
+            let least = side.size * convert::<f64, T>(least);
+            let slack = side.distance.max(least);
+            let excess = (slack - side.distance).max(least);
             let multiplier = cost / slack;
             side.interior = match side.soft {
                 None => Interior {
