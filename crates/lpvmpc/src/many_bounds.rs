@@ -233,12 +233,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         } else {
             newton::measure(ocp, sides, &trajectory(solution));
             let (proof, trials) = (&mut solution.active, factorisations.div_ceil(TRIAL));
-            let limits = (scale, trials);
             search(
                 &mut program,
                 sides,
                 &tolerances,
-                limits,
+                (scale, trials),
                 proof,
                 &mut changes,
             )

@@ -204,8 +204,7 @@ fn in_a_loop<const NX: usize, const NU: usize, const N: usize, const M: usize>(k
     }
 }
 
-/// Bounds of states that no inputs meet: the multipliers of the interior-point method prove it.
-/// A state that is held where the held inputs leave nothing that moves it, beyond its soft bound by 1e-10 of it, is
+/// A state that is held where the held inputs leave nothing that moves it, a little beyond its soft bound, is
 /// exceeded; as long as it counted as held, the dual method had to find all of them once more.
 #[test]
 fn a_held_state_that_nothing_moves_is_exceeded() {
@@ -214,7 +213,7 @@ fn a_held_state_that_nothing_moves_is_exceeded() {
         horizon: 50,
         samples: 12,
         share: 0.8,
-        seed: 1,
+        seed: 4,
     };
     let sequence = recipe.make::<8, 2>().unwrap();
     for ocp in &sequence.problems {
@@ -225,6 +224,7 @@ fn a_held_state_that_nothing_moves_is_exceeded() {
     }
 }
 
+/// Bounds of states that no inputs meet: the multipliers of the interior-point method prove it.
 #[test]
 fn many_bounds_that_contradict_each_other_are_proved_to() {
     const N: usize = 60;
