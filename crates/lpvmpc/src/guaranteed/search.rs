@@ -11,8 +11,10 @@ use nalgebra::{SVector, convert};
 
 /// Relative decrease of the cost below which more programs of a sample are not worth their time.
 const WORTHWHILE: f64 = 1e-7;
-/// Fractions of the way to the quadratic program's answer that are tried.
-const FRACTIONS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+/// The shortest part of the way to the quadratic program's answer that a thorough search tries.
+const SHORTEST: f64 = 0.125;
+/// The longest horizon, in samples, over which every search is thorough: it takes little time there.
+const SHORT_HORIZON: usize = 10;
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize> GuaranteedController<P, T, NX, NU, NS>
 where
@@ -42,6 +44,11 @@ where
             Some((Decision::Candidate, _)) => iterations.known,
             _ => iterations.unknown,
         };
+        let long = planner.settings.horizon > SHORT_HORIZON;
+        let effort = match known {
+            Some((Decision::Candidate, _)) if most == 1 && long => Effort::Quick,
+            _ => Effort::Thorough,
+        };
         let mut least = known.map(|(_, cost)| cost);
         let mut improved = None;
         let mut in_vain = 0;
@@ -58,7 +65,7 @@ where
             }
             let outcome = if workspace.solution.status.is_solved() {
                 planner.learn(workspace, along);
-                let outcome = planner.search(along, least, workspace, [trial, nearer]);
+                let outcome = planner.search(along, least, effort, workspace, [trial, nearer]);
                 match &outcome {
                     Outcome::Found(found) if found.feasible => planner.take_drift(trial),
                     _ => planner.learn_drift(along, workspace),
@@ -162,6 +169,7 @@ where
         &mut self,
         along: &Plan<T, NX, NU>,
         least: Option<T>,
+        effort: Effort,
         workspace: &GuaranteedWorkspace<T, NU, NA>,
         [trial, nearer]: [&mut Plan<T, NX, NU>; 2],
     ) -> Outcome<T, NX> {
@@ -171,8 +179,10 @@ where
         let before = self.merit(along);
         let most = least.map(|least| least + self.worthwhile(least));
         let mut near = None;
-        let mut dearer = [T::zero(); 2];
-        for (tried, fraction) in FRACTIONS.into_iter().enumerate() {
+        // How much dearer the whole way is than the plan itself.
+        let mut dearer = T::zero();
+        let mut next = Some(1.0);
+        while let Some(fraction) = next {
             let towards = program::answer(workspace, &origin);
             self.go_between(along, towards, convert(fraction), most, trial);
             // What is too dear need not be judged, which takes longer than its rollout.
@@ -194,15 +204,16 @@ where
                 swap(trial, nearer);
                 near = Some(found);
             }
-            // The parabola through the whole way, half of it and the plan itself rises from there on.
-            if let Some(dearer) = dearer.get_mut(tried) {
-                *dearer = trial.cost - along.cost;
+            let rise = trial.cost - along.cost;
+            if fraction == 1.0 {
+                dearer = rise;
             }
-            let [whole, half] = dearer;
-            let rises = half * convert(4.0) - whole >= T::zero() && half.is_finite();
-            if tried == 1 && rises && least.is_some_and(|least| along.cost >= least) {
+            // The parabola through the plan, half of the way and the whole of it rises from there on.
+            let rises = rise * convert(4.0) - dearer >= T::zero() && rise.is_finite();
+            if fraction == 0.5 && rises && least.is_some_and(|least| along.cost >= least) {
                 break;
             }
+            next = effort.after(fraction, trial.cost.is_finite());
         }
         if near.is_some() {
             swap(trial, nearer);
@@ -259,6 +270,26 @@ where
         workspace
             .solver
             .solve(&workspace.ocp, &settings, &mut workspace.solution);
+    }
+}
+
+/// How many parts of the way to a program's answer are tried.
+#[derive(Clone, Copy)]
+enum Effort {
+    /// Halves of halves: there is no plan as good as the last one, or more than one program to spend time on.
+    Thorough,
+    /// Two: the samples that would try more are those that take longest, and damping brings the next answer nearer.
+    Quick,
+}
+
+impl Effort {
+    /// The part that is tried after this `fraction`, whose rollout came to its end or left the bounds.
+    fn after(self, fraction: f64, came_to_end: bool) -> Option<f64> {
+        match self {
+            Self::Thorough => (fraction > SHORTEST).then_some(fraction * 0.5),
+            Self::Quick if fraction == 1.0 => Some(if came_to_end { 0.5 } else { 0.3 }),
+            Self::Quick => None,
+        }
     }
 }
 
