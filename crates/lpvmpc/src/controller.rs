@@ -503,7 +503,7 @@ where
         let linear_u = -product(&self.settings.weights.r, &aim.u_ref);
         let stages = ocp.stages.iter_mut().enumerate();
         for (i, stage) in stages.take(self.settings.horizon) {
-            stage.linear_x = linear_term(&q, aim.at(i));
+            stage.linear_x = product(&q, aim.at(i));
             stage.linear_u = linear_u;
             if aim.own.any() {
                 (stage.linear_x, stage.linear_u) = aim.linear_terms(i, &self.settings.weights);
@@ -515,7 +515,7 @@ where
             TerminalIngredient::Equality => (SMatrix::zeros(), Some(x_ref)),
         };
         ocp.terminal.p = p;
-        ocp.terminal.linear_x = -linear_term(&p, &x_ref);
+        ocp.terminal.linear_x = -product(&p, &x_ref);
         if D::SOME
             && let Some(price) = aim.own.linear_x(self.settings.horizon)
         {
@@ -610,14 +610,4 @@ where
     P: LpvModel<T, NX, NU, NS>,
 {
     settings.predictor.rk4().advance(model, x, u, settings.t_s)
-}
-
-/// W x, the linear term that a reference leaves in the cost.
-#[cfg_attr(target_arch = "arm", inline(never))]
-#[cfg_attr(not(target_arch = "arm"), inline(always))]
-fn linear_term<T: Scalar, const NX: usize>(
-    weight: &SMatrix<T, NX, NX>,
-    x: &SVector<T, NX>,
-) -> SVector<T, NX> {
-    product(weight, x)
 }

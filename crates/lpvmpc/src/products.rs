@@ -12,12 +12,25 @@ pub(crate) use vectors::{Vectors, in_widest};
 
 /// The products of a backward step.
 pub(crate) trait Products: Copy {
+    /// out = A B
+    fn set_product<T: Scalar, const R: usize, const K: usize, const C: usize>(
+        self,
+        out: &mut SMatrix<T, R, C>,
+        a: &SMatrix<T, R, K>,
+        b: &SMatrix<T, K, C>,
+    );
+
     /// A B
+    #[inline(always)]
     fn product<T: Scalar, const R: usize, const K: usize, const C: usize>(
         self,
         a: &SMatrix<T, R, K>,
         b: &SMatrix<T, K, C>,
-    ) -> SMatrix<T, R, C>;
+    ) -> SMatrix<T, R, C> {
+        let mut out = SMatrix::zeros();
+        self.set_product(&mut out, a, b);
+        out
+    }
 
     /// out += A B, a product that is symmetric: above the diagonal it may be left as it is, see
     /// [`mirror`](small_matrix::mirror).
@@ -35,12 +48,13 @@ pub(crate) struct Compiled;
 
 impl Products for Compiled {
     #[inline(always)]
-    fn product<T: Scalar, const R: usize, const K: usize, const C: usize>(
+    fn set_product<T: Scalar, const R: usize, const K: usize, const C: usize>(
         self,
+        out: &mut SMatrix<T, R, C>,
         a: &SMatrix<T, R, K>,
         b: &SMatrix<T, K, C>,
-    ) -> SMatrix<T, R, C> {
-        small_matrix::product(a, b)
+    ) {
+        small_matrix::set_product(out, a, b);
     }
 
     #[inline(always)]

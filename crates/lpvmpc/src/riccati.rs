@@ -170,7 +170,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     ) -> Result<(), BadPivot<T>> {
         let Stage { a, b, c, .. } = stage;
         let CostToGo { quadratic, linear } = cost_to_go;
-        let p_a = by.product(quadratic, a);
+        // Begun as any matrix of its size: where registers are few, zeros would be stored first.
+        let mut p_a = *quadratic;
+        by.set_product(&mut p_a, quadratic, a);
         let p_b = by.product(quadratic, b);
         let p_next = *linear + product(quadratic, c);
         let (a, b) = (transposed(a), transposed(b));

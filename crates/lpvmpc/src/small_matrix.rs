@@ -13,7 +13,18 @@ pub(crate) fn product<T: Scalar, const R: usize, const K: usize, const C: usize>
     a: &SMatrix<T, R, K>,
     b: &SMatrix<T, K, C>,
 ) -> SMatrix<T, R, C> {
-    let mut out = SMatrix::<T, R, C>::zeros();
+    let mut out = SMatrix::zeros();
+    set_product(&mut out, a, b);
+    out
+}
+
+/// out = A B
+#[inline(always)]
+pub(crate) fn set_product<T: Scalar, const R: usize, const K: usize, const C: usize>(
+    out: &mut SMatrix<T, R, C>,
+    a: &SMatrix<T, R, K>,
+    b: &SMatrix<T, K, C>,
+) {
     for (out, b) in out.data.0.iter_mut().zip(&b.data.0) {
         // The first term is assigned, not added to zero: that addition could not be left out.
         let mut terms = a.data.0.iter().zip(b);
@@ -28,7 +39,6 @@ pub(crate) fn product<T: Scalar, const R: usize, const K: usize, const C: usize>
             }
         }
     }
-    out
 }
 
 /// out += A B

@@ -15,7 +15,7 @@ use crate::riccati::{CostToGo, StageFactor};
 use crate::rows::Trajectory;
 use crate::small_matrix::product;
 use crate::solution::{ActiveRow, ActiveSet, Quantity, Solution, Status};
-use crate::working_set::first;
+use crate::working_set::{first, first_mut};
 use nalgebra::{SVector, convert};
 
 /// Settings of the solver.
@@ -301,8 +301,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             quadratic: ocp.terminal.p,
             linear: ocp.terminal.linear_x,
         };
-        let stages = ocp.stages.iter().zip(self.factors.iter_mut());
-        for (stage, (data, factor)) in stages.enumerate().take(ocp.length()).rev() {
+        let n = ocp.length();
+        let stages = first(&ocp.stages, n)
+            .iter()
+            .zip(first_mut(&mut self.factors, n));
+        for (stage, (data, factor)) in stages.enumerate().rev() {
             let weights = ocp.common_at(stage);
             match self.held.of(stage) {
                 None => factor.eliminate(data, weights, &mut cost_to_go),

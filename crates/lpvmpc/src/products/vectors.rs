@@ -40,21 +40,20 @@ const TOO_FEW: usize = 2;
 
 impl<S: Simd> Products for Vectors<S> {
     #[inline(always)]
-    fn product<T: Scalar, const R: usize, const K: usize, const C: usize>(
+    fn set_product<T: Scalar, const R: usize, const K: usize, const C: usize>(
         self,
+        out: &mut SMatrix<T, R, C>,
         a: &SMatrix<T, R, K>,
         b: &SMatrix<T, K, C>,
-    ) -> SMatrix<T, R, C> {
-        let mut out = SMatrix::zeros();
+    ) {
         if fills::<S>(R)
             && C > TOO_FEW
-            && let Some((out, a, b)) = in_f64(&mut out, a, b)
+            && let Some((out, a, b)) = in_f64(out, a, b)
         {
             multiply(self.0, out, a, b);
         } else {
-            out = small_matrix::product(a, b);
+            small_matrix::set_product(out, a, b);
         }
-        out
     }
 
     #[inline(always)]

@@ -178,6 +178,8 @@ fn many_bounds_of_every_kind_take_fewer_changes() {
     }
 }
 
+// Not inlined: optimised, several of them at once take more stack than a test has.
+#[inline(never)]
 fn in_a_loop<const NX: usize, const NU: usize, const N: usize, const M: usize>(kind: Kind) {
     let recipe = Recipe {
         kind,
