@@ -98,15 +98,36 @@ pub(crate) fn work_of_last_turn(cap: usize, entries: usize) -> usize {
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
 pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
-    /// The factors of the problem with the sides' costs.
-    factors: List<StageFactor<T, NX, NU>>,
-    /// A trajectory.
-    u: List<SVector<T, NU>>,
-    x: List<SVector<T, NX>>,
+    /// Where a Newton step is kept while a guess is tried, and where the guess is.
+    places: [ManyBoundsPlace<T, NX, NU>; 2],
     sides: List<BoundSide<T>>,
     pub run: Run<T, NX, NU>,
     /// Takes down the last answer, before it is overwritten.
     pub keep: fn(&mut Self, &Solution<T, NX, NU>),
+}
+
+/// Places for the factors of the problem with the sides' costs, and for a trajectory.
+#[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Clone))]
+pub(crate) struct ManyBoundsPlace<T: 'static, const NX: usize, const NU: usize> {
+    pub factors: List<StageFactor<T, NX, NU>>,
+    pub u: List<SVector<T, NU>>,
+    pub x: List<SVector<T, NX>>,
+}
+
+impl<T, const NX: usize, const NU: usize> ManyBoundsPlace<T, NX, NU> {
+    pub fn empty() -> Self {
+        Self {
+            factors: List::empty(),
+            u: List::empty(),
+            x: List::empty(),
+        }
+    }
+
+    /// The longest horizon that there is room for.
+    fn stages(&self) -> usize {
+        self.factors.len().min(self.u.len()).min(self.x.len())
+    }
 }
 
 /// Solves the problem, or proves that it is infeasible; counts changes of the active set. `None` if it does
@@ -121,15 +142,9 @@ type Run<T, const NX: usize, const NU: usize> = fn(
 ) -> Option<Result<(), Status<T>>>;
 
 impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
-    pub fn new(
-        factors: List<StageFactor<T, NX, NU>>,
-        (u, x): (List<SVector<T, NU>>, List<SVector<T, NX>>),
-        sides: List<BoundSide<T>>,
-    ) -> Self {
+    pub fn new(places: [ManyBoundsPlace<T, NX, NU>; 2], sides: List<BoundSide<T>>) -> Self {
         Self {
-            factors,
-            u,
-            x,
+            places,
             sides,
             run: Self::solve,
             keep: Self::keep_states,
@@ -139,7 +154,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
     /// The states of the last answer, if bounds are active in it, as long as nothing else needs the place.
     fn keep_states(&mut self, last: &Solution<T, NX, NU>) {
         if !last.active.is_empty() {
-            copy(&mut self.x, &last.x);
+            let [place, _] = &mut self.places;
+            copy(&mut place.x, &last.x);
         }
     }
 
@@ -152,7 +168,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         (turn, spent): (Turn, &mut usize),
     ) -> Option<Result<(), Status<T>>> {
         let n = ocp.length();
-        let fits = n <= self.factors.len().min(self.u.len()).min(self.x.len());
+        let fits = self.places.iter().all(|place| n <= place.stages());
         if !fits || ocp.terminal.equality.is_some() {
             return None;
         }
@@ -208,12 +224,14 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             *spent += if allowed { NX + NU } else { 0 };
             allowed
         };
+        let [place, spare] = &mut self.places;
         let mut program = Program {
             ocp,
-            factors: &mut self.factors,
             v: &mut solver.dual.v,
-            u: &mut self.u,
-            x: &mut self.x,
+            factors: &mut place.factors,
+            u: &mut place.u,
+            x: &mut place.x,
+            spare: (&mut spare.factors, &mut spare.u, &mut spare.x),
         };
         let mut found = shift.filter(|_| many && known > 0).is_some_and(|shift| {
             guess_again(sides, &solution.active, shift);
@@ -276,12 +294,13 @@ fn search<T: Scalar, const NX: usize, const NU: usize>(
         let Foretold { changed, active } = predicted.ok()?;
         if part > convert(FREE) && CERTAIN * changed <= active {
             trials -= 1;
+            program.change_places();
             if exchange(program, sides, tolerances, NEAR, &mut *changes) {
                 return Some(Ok(()));
             }
-            // The prediction once more, for its factors.
-            let again = method.predict(ocp, sides, program.factors, (program.u, program.x));
-            again.ok()?;
+            program.change_places();
+            let (x, u) = (&*program.x, &*program.u);
+            method.predict_again(ocp, sides, &Trajectory { x, u });
         }
         part = method.correct(
             ocp,

@@ -1,7 +1,7 @@
 //! The memory of solver and controller: how much of it a horizon takes, and where it comes from.
 
 use crate::list::List;
-use crate::many_bounds::{BoundSide, ManyBounds};
+use crate::many_bounds::{BoundSide, ManyBounds, ManyBoundsPlace};
 use crate::model::Scalar;
 use crate::ocp::{Common, GeneralRow, Stage};
 use crate::riccati::StageFactor;
@@ -157,11 +157,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
             #[cfg(not(target_arch = "wasm32"))]
             many_bounds: List::repeat(
                 ManyBounds::new(
-                    List::repeat(StageFactor::zeros(), stages),
-                    (
-                        List::repeat(SVector::zeros(), stages),
-                        List::repeat(SVector::zeros(), stages),
-                    ),
+                    core::array::from_fn(|_| ManyBoundsPlace {
+                        factors: List::repeat(StageFactor::zeros(), stages),
+                        u: List::repeat(SVector::zeros(), stages),
+                        x: List::repeat(SVector::zeros(), stages),
+                    }),
                     List::repeat(BoundSide::empty(), sides_of::<NX, NU>(capacity)),
                 ),
                 1,
@@ -178,18 +178,16 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
         arrays: &'static mut ManyBoundsArrays<T, NX, NU, N, B>,
     ) -> Self {
         let ManyBoundsArrays {
-            factors,
-            u,
-            x,
+            places,
             sides,
             phase,
         } = arrays;
-        let trajectory = (List::Static(u), List::Static(x));
-        *phase = [ManyBounds::new(
-            List::Static(factors),
-            trajectory,
-            List::Static(sides),
-        )];
+        let places = places.each_mut().map(|(factors, u, x)| ManyBoundsPlace {
+            factors: List::Static(factors),
+            u: List::Static(u),
+            x: List::Static(x),
+        });
+        *phase = [ManyBounds::new(places, List::Static(sides))];
         Self {
             many_bounds: List::Static(phase),
             ..self
@@ -209,13 +207,18 @@ pub struct ManyBoundsArrays<
     const N: usize,
     const B: usize,
 > {
-    factors: [StageFactor<T, NX, NU>; N],
-    u: [SVector<T, NU>; N],
-    x: [SVector<T, NX>; N],
+    places: [Place<T, NX, NU, N>; 2],
     sides: [BoundSide<T>; B],
     /// What is made of the others once they are lent.
     phase: [ManyBounds<T, NX, NU>; 1],
 }
+
+/// Factors and a trajectory, inputs and states.
+type Place<T, const NX: usize, const NU: usize, const N: usize> = (
+    [StageFactor<T, NX, NU>; N],
+    [SVector<T, NU>; N],
+    [SVector<T, NX>; N],
+);
 
 impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const B: usize> Default
     for ManyBoundsArrays<T, NX, NU, N, B>
@@ -223,13 +226,14 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const B: usize
     #[inline(always)]
     fn default() -> Self {
         Self {
-            factors: [StageFactor::zeros(); N],
-            u: [SVector::zeros(); N],
-            x: [SVector::zeros(); N],
+            places: [(
+                [StageFactor::zeros(); N],
+                [SVector::zeros(); N],
+                [SVector::zeros(); N],
+            ); 2],
             sides: [BoundSide::empty(); B],
             phase: [ManyBounds::new(
-                List::empty(),
-                (List::empty(), List::empty()),
+                core::array::from_fn(|_| ManyBoundsPlace::empty()),
                 List::empty(),
             )],
         }

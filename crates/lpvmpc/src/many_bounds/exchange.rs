@@ -11,6 +11,7 @@ use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
 use crate::rows::Trajectory;
+use core::mem::swap;
 use nalgebra::{SVector, convert};
 
 /// So few sides that are wrong may be exchanged one by one.
@@ -31,11 +32,30 @@ pub(super) struct Tolerances<T> {
 /// What the search works on.
 pub(super) struct Program<'a, T: 'static, const NX: usize, const NU: usize> {
     pub ocp: &'a Ocp<T, NX, NU>,
-    pub factors: &'a mut [StageFactor<T, NX, NU>],
     pub v: &'a mut [SVector<T, NU>],
+    pub factors: &'a mut [StageFactor<T, NX, NU>],
     pub u: &'a mut [SVector<T, NU>],
     pub x: &'a mut [SVector<T, NX>],
+    /// Other places for factors and trajectory.
+    pub spare: Places<'a, T, NX, NU>,
 }
+
+impl<T, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
+    /// Goes on in the other places, so that what is in these is kept.
+    pub fn change_places(&mut self) {
+        let (factors, u, x) = &mut self.spare;
+        swap(&mut self.factors, factors);
+        swap(&mut self.u, u);
+        swap(&mut self.x, x);
+    }
+}
+
+/// Places for the factors of a program, its inputs and its states.
+pub(super) type Places<'a, T, const NX: usize, const NU: usize> = (
+    &'a mut [StageFactor<T, NX, NU>],
+    &'a mut [SVector<T, NU>],
+    &'a mut [SVector<T, NX>],
+);
 
 /// How long a guess is exchanged.
 #[derive(Clone, Copy)]

@@ -197,8 +197,8 @@ impl<T: Scalar> InteriorPoint<T> {
         }
     }
 
-    /// A Newton step towards complementarity zero, on the way to `trajectory`: leaves the trajectory that it
-    /// leads to there, and in every side the role that it foretells.
+    /// A Newton step towards complementarity zero: leaves its factors, the trajectory that it leads to, and in every
+    /// side the role that it foretells.
     pub fn predict<const NX: usize, const NU: usize>(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
@@ -206,14 +206,30 @@ impl<T: Scalar> InteriorPoint<T> {
         factors: &mut [StageFactor<T, NX, NU>],
         (u, x): (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
     ) -> Result<Foretold, BadPivot<T>> {
-        for side in sides.iter_mut() {
-            side.last_role = side.role;
-            side.role = Role::Free;
-            (side.base, side.weight) = Linear::new(side, Target::zero()).multiplier();
-        }
+        weigh(sides);
         newton::factorize(ocp, sides, factors)?;
         newton::roll_out(ocp, factors, (u, x));
-        newton::measure(ocp, sides, &Trajectory { x, u });
+        Ok(self.foretell(ocp, sides, &Trajectory { x, u }))
+    }
+
+    /// The same once more where its factors and its `trajectory` have been kept, but the sides have changed since.
+    pub fn predict_again<const NX: usize, const NU: usize>(
+        &mut self,
+        ocp: &Ocp<T, NX, NU>,
+        sides: &mut [BoundSide<T>],
+        trajectory: &Trajectory<'_, T, NX, NU>,
+    ) {
+        weigh(sides);
+        self.foretell(ocp, sides, trajectory);
+    }
+
+    fn foretell<const NX: usize, const NU: usize>(
+        &mut self,
+        ocp: &Ocp<T, NX, NU>,
+        sides: &mut [BoundSide<T>],
+        trajectory: &Trajectory<'_, T, NX, NU>,
+    ) -> Foretold {
+        newton::measure(ocp, sides, trajectory);
         let mut foretold = Foretold {
             changed: 0,
             active: 0,
@@ -236,7 +252,7 @@ impl<T: Scalar> InteriorPoint<T> {
             foretold.active += usize::from(side.role != Role::Free);
         }
         self.prediction = prediction;
-        Ok(foretold)
+        foretold
     }
 
     /// The corrector: the trajectory of the prediction moves on, and the sides' unknowns go towards it as far
@@ -276,6 +292,15 @@ impl<T: Scalar> InteriorPoint<T> {
         }
         self.complementarity = sum / self.count;
         part.shortest()
+    }
+}
+
+/// Gives every side the cost that it has in a Newton step towards complementarity zero.
+fn weigh<T: Scalar>(sides: &mut [BoundSide<T>]) {
+    for side in sides {
+        side.last_role = side.role;
+        side.role = Role::Free;
+        (side.base, side.weight) = Linear::new(side, Target::zero()).multiplier();
     }
 }
 
