@@ -362,3 +362,76 @@ fn along<T: Scalar>(at: &Interior<T>, to: &Interior<T>, part: Part<T>) -> Interi
         rest: between(at.rest, to.rest, dual),
     }
 }
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use crate::many_bounds::side;
+    use crate::ocp::{Bounds, Penalty};
+    use alloc::vec;
+    use nalgebra::{Matrix2, Vector1, Vector2};
+
+    const N: usize = 12;
+
+    /// A double integrator pushed against the bounds of its input and, softly, of its speed.
+    fn problem() -> Ocp<f64, 2, 1> {
+        let mut ocp = Ocp::allocate(N);
+        ocp.x0 = Vector2::new(9.0, -1.0);
+        for stage in ocp.stages.iter_mut() {
+            stage.a = Matrix2::new(1.0, 0.2, 0.0, 1.0);
+            stage.b = Vector2::new(0.02, 0.2);
+        }
+        ocp.common.q = Matrix2::identity();
+        ocp.common.r[(0, 0)] = 0.1;
+        ocp.common.u = Bounds {
+            lower: Vector1::new(-1.0),
+            upper: Vector1::new(1.0),
+        };
+        ocp.common.x.lower[1] = -1.5;
+        ocp.common.soft_x[1] = Some(Penalty {
+            linear: 1.0,
+            quadratic: 10.0,
+        });
+        ocp.terminal.p = Matrix2::identity();
+        ocp
+    }
+
+    /// After other roles and costs have been tried in the sides, on a trajectory of another place, the step is what it
+    /// was, and leads to where it led.
+    #[test]
+    fn a_step_predicted_again_is_the_step() {
+        let ocp = problem();
+        let mut sides = vec![BoundSide::empty(); 6 * (N + 1)];
+        let count = side::collect(&ocp, &mut sides).unwrap();
+        sides.truncate(count);
+        let mut factors = vec![StageFactor::zeros(); N];
+        let (mut u, mut x) = (vec![Vector1::zeros(); N], vec![Vector2::zeros(); N]);
+        let mut v = u.clone();
+        newton::factorize(&ocp, &sides, &mut factors).unwrap();
+        newton::roll_out(&ocp, &factors, (&mut u, &mut x));
+        newton::measure(&ocp, &mut sides, &Trajectory { x: &x, u: &u });
+        let mut method = InteriorPoint::new(&mut sides, 1.0);
+        for _ in 0..3 {
+            method
+                .predict(&ocp, &mut sides, &mut factors, (&mut u, &mut x))
+                .unwrap();
+            let (before, step) = (sides.clone(), method.prediction);
+            let roles = [Role::Held, Role::Free, Role::Exceeded];
+            for (side, role) in sides.iter_mut().zip(roles.into_iter().cycle()) {
+                (side.role, side.base, side.weight) = (role, 7.0, 3.0);
+                (side.distance, side.estimate) = (-5.0, 2.0);
+            }
+            method.predict_again(&ocp, &mut sides, &Trajectory { x: &x, u: &u });
+            for (side, before) in sides.iter().zip(&before) {
+                let of = |side: &BoundSide<f64>| {
+                    let numbers = [side.base, side.weight, side.distance, side.estimate];
+                    (side.role, numbers, side.target.slack, side.target.excess)
+                };
+                assert_eq!(of(side), of(before));
+            }
+            assert_eq!(method.prediction.change(), step.change());
+            method.correct(&ocp, &mut sides, &factors, &mut v, (&mut u, &mut x));
+        }
+        assert!(sides.iter().any(|side| side.role != Role::Free));
+    }
+}
