@@ -9,6 +9,7 @@
 //! interior-point method has a turn after it.
 
 mod exchange;
+mod guess;
 mod interior_point;
 mod newton;
 mod side;
@@ -43,10 +44,6 @@ const NEAR: Patience = Patience {
 };
 /// Of general rows fewer, since each binds inputs and states.
 const NEAR_ROWS: Patience = Patience { few: 8, ..NEAR };
-/// One stage in so many is at the end of the horizon, of which the regulator tells more than the last answer.
-const TAIL: usize = 8;
-/// And where several inputs act together no more than these.
-const LONGEST_TAIL: usize = 4;
 /// Saturated inputs may all be wrong, and twice no better.
 const FAR: Patience = Patience {
     few: 1,
@@ -194,7 +191,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         // Those that the regulator saturates are nearly right where a single input moves the states.
         let saturated = !last_turn && NU == 1 && 2 * inputs > violated && inputs >= MANY_SATURATED;
         // Where several inputs act together, general rows that were active are taken over one by one in less time.
-        let rows = NU > 1 && mostly_rows(&solution.active);
+        let rows = NU > 1 && guess::mostly_rows(&solution.active);
         let expected = if rows { violated } else { violated.max(known) };
         // No more can hold independently than there are inputs.
         let expected = expected.min(n * NU);
@@ -234,14 +231,14 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             spare: (&mut spare.factors, &mut spare.u, &mut spare.x),
         };
         let mut found = shift.filter(|_| many && known > 0).is_some_and(|shift| {
-            guess_again(sides, &solution.active, shift);
-            guess_tail(ocp, &solver.factors, sides, (program.x, shift));
+            guess::again(sides, &solution.active, shift);
+            guess::tail(ocp, &solver.factors, sides, (program.x, shift));
             let patience = if rows { NEAR_ROWS } else { NEAR };
             exchange(&mut program, sides, &tolerances, patience, &mut changes)
         });
         if !found && saturated {
             sides.iter_mut().for_each(|side| side.role = Role::Free);
-            guess_saturated(ocp, &solver.factors, sides, (0, ocp.x0));
+            guess::saturated(ocp, &solver.factors, sides, (0, ocp.x0));
             found = exchange(&mut program, sides, &tolerances, FAR, &mut changes);
         }
         let outcome = if found {
@@ -341,82 +338,6 @@ fn list_multipliers<T: Scalar>(sides: &[BoundSide<T>], list: &mut ActiveSet<T>) 
                 multiplier: multiplier / largest,
                 exceeded: false,
             });
-        }
-    }
-}
-
-/// The inputs of the stages from `begin` on that the regulator without bounds drives into them from `x`, when
-/// they are bounded. Of all sides there.
-fn guess_saturated<T: Scalar, const NX: usize, const NU: usize>(
-    ocp: &Ocp<T, NX, NU>,
-    factors: &[StageFactor<T, NX, NU>],
-    mut sides: &mut [BoundSide<T>],
-    (begin, mut x): (usize, SVector<T, NX>),
-) {
-    let at_rest = SVector::zeros();
-    let stages = ocp.stages.iter().zip(factors).enumerate();
-    for (i, (stage, factor)) in stages.take(ocp.length()).skip(begin) {
-        let mut u = factor.policy(&x, &at_rest);
-        for side in side::split_first_mut(&mut sides, i) {
-            if let Some(j) = side.input() {
-                side.role = Role::Free;
-                if side.distance_of(u[j]) < T::zero() {
-                    side.role = Role::Held;
-                    u[j] = side.limit;
-                }
-            }
-        }
-        x = stage.next(&x, &u);
-    }
-}
-
-/// The inputs at the end of the horizon, of which the last answer knows least: those that the regulator
-/// saturates from where that answer's states, `shift` stages earlier, lead to.
-fn guess_tail<T: Scalar, const NX: usize, const NU: usize>(
-    ocp: &Ocp<T, NX, NU>,
-    factors: &[StageFactor<T, NX, NU>],
-    mut sides: &mut [BoundSide<T>],
-    (last, shift): (&[SVector<T, NX>], usize),
-) {
-    let longest = if NU == 1 { usize::MAX } else { LONGEST_TAIL };
-    let begin = ocp.length() - (ocp.length() / TAIL).min(longest);
-    let before = (begin + shift).checked_sub(1);
-    if let Some(x) = before.and_then(|before| last.get(before)) {
-        let end = side::split_off_mut(&mut sides, begin);
-        guess_saturated(ocp, factors, end, (begin, *x));
-    }
-}
-
-/// Whether most of the bounds that were active are of general rows.
-fn mostly_rows<T: Scalar>(before: &ActiveSet<T>) -> bool {
-    let of_row = |row: &ActiveRow<T>| matches!(row.bound.quantity, Quantity::Row(_));
-    2 * before.iter().filter(of_row).count() > before.len()
-}
-
-/// The roles of the rows that were active before, `shift` stages earlier.
-fn guess_again<T: Scalar>(sides: &mut [BoundSide<T>], before: &ActiveSet<T>, shift: usize) {
-    for side in sides.iter_mut() {
-        side.role = Role::Free;
-        side.estimate = T::zero();
-    }
-    for row in before.iter() {
-        let Some(stage) = row.bound.stage.checked_sub(shift) else {
-            continue;
-        };
-        let begin = sides.partition_point(|side| side.bound.stage < stage);
-        let here = sides.iter_mut().skip(begin);
-        let mut here = here.take_while(|side| side.bound.stage == stage);
-        let same = |side: &&mut BoundSide<T>| {
-            side.bound.quantity == row.bound.quantity && side.bound.side == row.bound.side
-        };
-        if let Some(side) = here.find(same) {
-            let exceeded = row.part == Part::Quadratic || row.exceeded;
-            if exceeded && side.soft.is_some() {
-                side.role = Role::Exceeded;
-            } else if side.role == Role::Free {
-                side.role = Role::Held;
-                side.estimate = row.multiplier.min(side.price());
-            }
         }
     }
 }
