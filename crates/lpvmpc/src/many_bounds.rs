@@ -291,13 +291,9 @@ fn search<T: Scalar, const NX: usize, const NU: usize>(
         let Foretold { changed, active } = predicted.ok()?;
         if part > convert(FREE) && CERTAIN * changed <= active {
             trials -= 1;
-            program.change_places();
-            if exchange(program, sides, tolerances, NEAR, &mut *changes) {
+            if method.try_foretold(program, sides, tolerances, &mut *changes) {
                 return Some(Ok(()));
             }
-            program.change_places();
-            let (x, u) = (&*program.x, &*program.u);
-            method.predict_again(ocp, sides, &Trajectory { x, u });
         }
         part = method.correct(
             ocp,

@@ -5,8 +5,9 @@
 //! Newton step towards slack * multiplier = target is a linear-quadratic program in which each side acts
 //! with a multiplier that is linear in its distance.
 
-use super::newton;
+use super::exchange::{Program, Tolerances, exchange};
 use super::side::{BoundSide, Interior, Role, Target};
+use super::{NEAR, newton};
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::riccati::{BadPivot, StageFactor};
@@ -212,15 +213,24 @@ impl<T: Scalar> InteriorPoint<T> {
         Ok(self.foretell(ocp, sides, &Trajectory { x, u }))
     }
 
-    /// The same once more where its factors and its `trajectory` have been kept, but the sides have changed since.
-    pub fn predict_again<const NX: usize, const NU: usize>(
+    /// Tries the roles that the prediction in `program` foretells, in its other places; whether they, or what they are
+    /// exchanged for, are right. Where they are not, program and sides are again those of the prediction.
+    pub fn try_foretold<const NX: usize, const NU: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU>,
+        program: &mut Program<'_, T, NX, NU>,
         sides: &mut [BoundSide<T>],
-        trajectory: &Trajectory<'_, T, NX, NU>,
-    ) {
+        tolerances: &Tolerances<T>,
+        count: impl FnMut() -> bool,
+    ) -> bool {
+        program.change_places();
+        if exchange(program, sides, tolerances, NEAR, count) {
+            return true;
+        }
+        program.change_places();
         weigh(sides);
-        self.foretell(ocp, sides, trajectory);
+        let (x, u) = (&*program.x, &*program.u);
+        self.foretell(program.ocp, sides, &Trajectory { x, u });
+        false
     }
 
     fn foretell<const NX: usize, const NU: usize>(
@@ -369,6 +379,7 @@ mod tests {
     use crate::many_bounds::side;
     use crate::ocp::{Bounds, Penalty};
     use alloc::vec;
+    use alloc::vec::Vec;
     use nalgebra::{Matrix2, Vector1, Vector2};
 
     const N: usize = 12;
@@ -396,42 +407,66 @@ mod tests {
         ocp
     }
 
-    /// After other roles and costs have been tried in the sides, on a trajectory of another place, the step is what it
-    /// was, and leads to where it led.
+    /// Factors, trajectory and sides of a Newton step are what they were after its guess has been tried in vain.
     #[test]
-    fn a_step_predicted_again_is_the_step() {
+    fn a_guess_in_vain_leaves_the_step_as_it_was() {
         let ocp = problem();
         let mut sides = vec![BoundSide::empty(); 6 * (N + 1)];
         let count = side::collect(&ocp, &mut sides).unwrap();
         sides.truncate(count);
-        let mut factors = vec![StageFactor::zeros(); N];
-        let (mut u, mut x) = (vec![Vector1::zeros(); N], vec![Vector2::zeros(); N]);
+        let tolerances = Tolerances {
+            violation: 1e-10,
+            penalty: 1e6,
+        };
+        let place = || {
+            (
+                vec![StageFactor::zeros(); N],
+                vec![Vector1::zeros(); N],
+                vec![Vector2::zeros(); N],
+            )
+        };
+        let ((mut factors, mut u, mut x), mut spare) = (place(), place());
         let mut v = u.clone();
         newton::factorize(&ocp, &sides, &mut factors).unwrap();
         newton::roll_out(&ocp, &factors, (&mut u, &mut x));
         newton::measure(&ocp, &mut sides, &Trajectory { x: &x, u: &u });
         let mut method = InteriorPoint::new(&mut sides, 1.0);
-        for _ in 0..3 {
+        let mut program = Program {
+            ocp: &ocp,
+            v: &mut v,
+            factors: &mut factors,
+            u: &mut u,
+            x: &mut x,
+            spare: (&mut spare.0, &mut spare.1, &mut spare.2),
+        };
+        for _ in 0..2 {
             method
-                .predict(&ocp, &mut sides, &mut factors, (&mut u, &mut x))
+                .predict(&ocp, &mut sides, program.factors, (program.u, program.x))
                 .unwrap();
-            let (before, step) = (sides.clone(), method.prediction);
-            let roles = [Role::Held, Role::Free, Role::Exceeded];
-            for (side, role) in sides.iter_mut().zip(roles.into_iter().cycle()) {
-                (side.role, side.base, side.weight) = (role, 7.0, 3.0);
-                (side.distance, side.estimate) = (-5.0, 2.0);
-            }
-            method.predict_again(&ocp, &mut sides, &Trajectory { x: &x, u: &u });
-            for (side, before) in sides.iter().zip(&before) {
-                let of = |side: &BoundSide<f64>| {
-                    let numbers = [side.base, side.weight, side.distance, side.estimate];
-                    (side.role, numbers, side.target.slack, side.target.excess)
-                };
-                assert_eq!(of(side), of(before));
-            }
-            assert_eq!(method.prediction.change(), step.change());
-            method.correct(&ocp, &mut sides, &factors, &mut v, (&mut u, &mut x));
+            let of = |side: &BoundSide<f64>| {
+                let numbers = [side.base, side.weight, side.distance, side.estimate];
+                (side.role, numbers, side.target.slack, side.target.excess)
+            };
+            let step = |program: &Program<'_, f64, 2, 1>, sides: &[BoundSide<f64>]| {
+                let policies = program.factors.iter();
+                let policies = policies.map(|f| (f.feedback, f.feedforward, f.inverse_factor));
+                (
+                    policies.collect::<Vec<_>>(),
+                    (program.u.to_vec(), program.x.to_vec()),
+                    sides.iter().map(of).collect::<Vec<_>>(),
+                )
+            };
+            let (before, change) = (step(&program, &sides), method.prediction.change());
+            // One factorisation, which shows that the guess is wrong, and no more to exchange it.
+            let mut left = 1;
+            let count = || core::mem::replace(&mut left, 0) > 0;
+            assert!(!method.try_foretold(&mut program, &mut sides, &tolerances, count));
+            assert_eq!(left, 0);
+            assert_ne!(program.spare.1.to_vec(), before.1.0);
+            assert_eq!(step(&program, &sides), before);
+            assert_eq!(method.prediction.change(), change);
+            let trajectory = (&mut *program.u, &mut *program.x);
+            method.correct(&ocp, &mut sides, program.factors, program.v, trajectory);
         }
-        assert!(sides.iter().any(|side| side.role != Role::Free));
     }
 }
