@@ -11,7 +11,7 @@ use crate::ocp::{Common, Ocp, Stage};
 use crate::riccati::{Adjustment, BadPivot, CostToGo, StageFactor, StageMinimum};
 use crate::rows::Trajectory;
 use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
-use crate::solver::{Solver, SolverSettings, WarmStart};
+use crate::solver::Solver;
 
 /// Searches with held inputs; two are enough in `f64`, more than ten are rare in `f32`.
 const MOST_SEARCHES: usize = 20;
@@ -174,7 +174,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     pub(crate) fn search_with_held_inputs(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
-        settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU>,
         bound: BoundId,
         spent: &mut usize,
@@ -182,7 +181,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         self.held.take_in(self.dual.active());
         let inaccurate = Status::Inaccurate(bound);
         let outcome = match self.factorize(ocp) {
-            Ok(()) => self.exchange_held_inputs(ocp, settings, solution, inaccurate, spent),
+            Ok(()) => self.exchange_held_inputs(ocp, solution, inaccurate, spent),
             Err(_) => Err(inaccurate),
         };
         // Whoever follows the plan needs the regulator of the problem itself.
@@ -199,7 +198,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     pub(crate) fn exchange_held_inputs(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
-        settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU>,
         inaccurate: Status<T>,
         spent: &mut usize,
@@ -210,7 +208,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             if search > 0 && self.factorize(ocp).is_err() {
                 return inaccurate;
             }
-            outcome = self.search_again(ocp, settings, solution, spent);
+            outcome = self.search_again(ocp, solution, spent);
             let point = Trajectory {
                 x: &solution.x,
                 u: &solution.u,
@@ -258,15 +256,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     fn search_again(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
-        settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU>,
         spent: &mut usize,
     ) -> Result<(), Status<T>> {
-        let settings = SolverSettings {
-            warm_start: WarmStart::Same,
-            ..*settings
-        };
-        solution.status = Status::Solved;
         solution.active.clear();
         for row in self.dual.active() {
             if !matches!(row.bound.quantity, Quantity::Input(_)) {
@@ -275,7 +267,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         }
         self.dual.begin_again();
         let begun = self.roll_out(ocp, solution);
-        let outcome = begun.and_then(|()| self.search(ocp, &settings, solution));
+        let outcome = begun.and_then(|()| self.search(ocp, Some(0), solution));
         *spent += self.dual.changes;
         outcome
     }

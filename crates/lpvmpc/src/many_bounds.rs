@@ -22,9 +22,7 @@ use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
 use crate::rows::{self, Trajectory};
 use crate::solution::{ActiveRow, ActiveSet, Part, Quantity, Solution, Status};
-use crate::solver::{
-    Solver, SolverSettings, WarmStart, clip_inputs, cost, infeasible, roll_forward, trajectory,
-};
+use crate::solver::{Solver, clip_inputs, cost, infeasible, roll_forward, trajectory};
 use crate::working_set::{copy, first, first_mut};
 use exchange::{Patience, Program, Tolerances, exchange};
 use interior_point::{Foretold, InteriorPoint};
@@ -50,6 +48,8 @@ const FAR: Patience = Patience {
     guesses: 2,
     singles: 4,
 };
+/// Where fewer bounds were active before than one for so many that are violated, they tell little of what to expect.
+const LITTLE: usize = 2;
 /// So many factorisations for each guess of the interior-point method that is tried.
 const TRIAL: usize = 5;
 /// Shorter parts of the way mean that bounds may contradict each other.
@@ -77,6 +77,18 @@ pub(crate) enum Turn {
     First,
     /// After it has come to no end.
     Last,
+}
+
+/// What comes of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum AtOnce<T> {
+    /// It was not tried, and nothing has changed.
+    Untried,
+    /// The solution, or the proof that there is none.
+    Done(Result<(), Status<T>>),
+    /// Neither: the trajectory without bounds is in the solution, and the active rows are those of the last one at
+    /// their new stages, if they are to be begun with.
+    InVain,
 }
 
 /// The least cap with which a problem with so many `entries` of state and input has a last turn.
@@ -127,16 +139,17 @@ impl<T, const NX: usize, const NU: usize> ManyBoundsPlace<T, NX, NU> {
     }
 }
 
-/// Solves the problem, or proves that it is infeasible; counts changes of the active set. `None` if it does
-/// neither: after the first turn, which begins with the trajectory without bounds in the solution, all is as before.
+/// Solves the problem, or proves that it is infeasible; counts changes of the active set. The first turn begins with
+/// the trajectory without bounds in the solution, and where the active rows of the last one are to be begun with,
+/// they are so many stages later.
 type Run<T, const NX: usize, const NU: usize> = fn(
     &mut ManyBounds<T, NX, NU>,
     &mut Solver<T, NX, NU>,
     &Ocp<T, NX, NU>,
-    &SolverSettings<T>,
+    Option<usize>,
     &mut Solution<T, NX, NU>,
     (Turn, &mut usize),
-) -> Option<Result<(), Status<T>>>;
+) -> AtOnce<T>;
 
 impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
     pub fn new(places: [ManyBoundsPlace<T, NX, NU>; 2], sides: List<BoundSide<T>>) -> Self {
@@ -160,28 +173,24 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         &mut self,
         solver: &mut Solver<T, NX, NU>,
         ocp: &Ocp<T, NX, NU>,
-        settings: &SolverSettings<T>,
+        shift: Option<usize>,
         solution: &mut Solution<T, NX, NU>,
         (turn, spent): (Turn, &mut usize),
-    ) -> Option<Result<(), Status<T>>> {
+    ) -> AtOnce<T> {
         let n = ocp.length();
         let fits = self.places.iter().all(|place| n <= place.stages());
         if !fits || ocp.terminal.equality.is_some() {
-            return None;
+            return AtOnce::Untried;
         }
         let last_turn = turn == Turn::Last;
         if last_turn {
             // Held inputs may have left factors of their own.
             solver.dual.begin_again();
-            solver.factorize(ocp).ok()?;
-            solver.roll_out(ocp, solution).ok()?;
+            let begun = solver.factorize(ocp);
+            if begun.and_then(|()| solver.roll_out(ocp, solution)).is_err() {
+                return AtOnce::Untried;
+            }
         }
-        let shift = match settings.warm_start {
-            _ if last_turn || !solution.status.is_solved() => None,
-            WarmStart::Cold => None,
-            WarmStart::Same => Some(0),
-            WarmStart::Shifted => Some(1),
-        };
         let known = shift.map_or(0, |_| solution.active.len());
         let (mut violated, mut inputs) = (0, 0);
         rows::violated_bounds(ocp, &trajectory(solution), &mut |candidate| {
@@ -192,14 +201,21 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         let saturated = !last_turn && NU == 1 && 2 * inputs > violated && inputs >= MANY_SATURATED;
         // Where several inputs act together, general rows that were active are taken over one by one in less time.
         let rows = NU > 1 && guess::mostly_rows(&solution.active);
-        let expected = if rows { violated } else { violated.max(known) };
+        // As a rule most of those that are known hold again, and others are violated only as long as they do not.
+        let expected = if rows || LITTLE * known < violated {
+            violated
+        } else {
+            known
+        };
         // No more can hold independently than there are inputs.
         let expected = expected.min(n * NU);
         let many = last_turn || expected >= MANY;
         if !many && !saturated {
-            return None;
+            return AtOnce::Untried;
         }
-        let count = side::collect(ocp, &mut self.sides)?;
+        let Some(count) = side::collect(ocp, &mut self.sides) else {
+            return AtOnce::Untried;
+        };
         let sides = first_mut(&mut self.sides, count);
         newton::measure(ocp, sides, &trajectory(solution));
         let scale = largest_cost(ocp, solution);
@@ -230,12 +246,15 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             x: &mut place.x,
             spare: (&mut spare.factors, &mut spare.u, &mut spare.x),
         };
-        let mut found = shift.filter(|_| many && known > 0).is_some_and(|shift| {
+        let mut found = false;
+        if let Some(shift) = shift.filter(|_| known > 0) {
             guess::again(sides, &solution.active, shift);
-            guess::tail(ocp, &solver.factors, sides, (program.x, shift));
-            let patience = if rows { NEAR_ROWS } else { NEAR };
-            exchange(&mut program, sides, &tolerances, patience, &mut changes)
-        });
+            if many {
+                guess::tail(ocp, &solver.factors, sides, (program.x, shift));
+                let patience = if rows { NEAR_ROWS } else { NEAR };
+                found = exchange(&mut program, sides, &tolerances, patience, &mut changes);
+            }
+        }
         if !found && saturated {
             sides.iter_mut().for_each(|side| side.role = Role::Free);
             guess::saturated(ocp, &solver.factors, sides, (0, ocp.x0));
@@ -262,14 +281,16 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             other => other,
         };
         solver.dual.v.fill(SVector::zeros());
-        if outcome.is_none() {
-            solution.active.clear();
-            let left = solver.dual.changes_left().saturating_sub(*spent);
-            solver.dual.reset(solver.dual.tolerance, left);
-            // What it was made from was finite.
-            solver.roll_out(ocp, solution).ok();
+        if let Some(outcome) = outcome {
+            return AtOnce::Done(outcome);
         }
-        outcome
+        let left = solver.dual.changes_left().saturating_sub(*spent);
+        solver.dual.reset(solver.dual.tolerance, left);
+        // What it was made from was finite.
+        solver.roll_out(ocp, solution).ok();
+        guess::known(sides);
+        list(sides, &mut solution.active);
+        AtOnce::InVain
     }
 }
 
@@ -286,6 +307,7 @@ fn search<T: Scalar, const NX: usize, const NU: usize>(
     let ocp = program.ocp;
     let mut method = InteriorPoint::new(sides, scale * convert(CENTRE));
     let mut part = T::zero();
+    let mut stuck = 0_usize;
     while trials > 0 && changes() {
         let predicted = method.predict(ocp, sides, program.factors, (program.u, program.x));
         let Foretold { changed, active } = predicted.ok()?;
@@ -303,12 +325,17 @@ fn search<T: Scalar, const NX: usize, const NU: usize>(
             (program.u, program.x),
         );
         if part < convert(STUCK) {
-            // Where no point satisfies all bounds, multipliers grow until they are a proof of it.
-            list_multipliers(sides, proof);
-            if let Some(infeasible) = infeasible(ocp, proof) {
-                return Some(Err(infeasible));
+            stuck += 1;
+            let ended = !(part > convert(1e-6));
+            // Where no point satisfies all bounds, multipliers grow until they are a proof of it. To look whether
+            // they are takes as long as a step.
+            if ended || stuck.is_power_of_two() {
+                list_multipliers(sides, proof);
+                if let Some(infeasible) = infeasible(ocp, proof) {
+                    return Some(Err(infeasible));
+                }
             }
-            if !(part > convert(1e-6)) {
+            if ended {
                 return None;
             }
         }

@@ -5,7 +5,7 @@ use crate::active_set::DualActiveSet;
 use crate::farkas::infeasibility_margin;
 use crate::held_inputs::{HeldInputs, eliminate_held};
 use crate::list::List;
-use crate::many_bounds::{ManyBounds, Turn, cap_with_last_turn, work_of_last_turn};
+use crate::many_bounds::{AtOnce, ManyBounds, Turn, cap_with_last_turn, work_of_last_turn};
 #[cfg(feature = "alloc")]
 use crate::memory::Capacity;
 use crate::memory::SolverMemory;
@@ -148,11 +148,13 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             let keep = phase.keep;
             keep(phase, solution);
         }
+        let mut shift = shift_of_last(settings, solution);
         let begun = factorized.and_then(|()| self.roll_out(ocp, solution));
         let outcome = begun.and_then(|()| {
-            let first = (Turn::First, &mut spent);
-            if let Some(at_once) = self.solve_at_once(ocp, settings, solution, first) {
-                return at_once;
+            match self.solve_at_once(ocp, shift, solution, (Turn::First, &mut spent)) {
+                AtOnce::Done(outcome) => return outcome,
+                AtOnce::InVain => shift = Some(0),
+                AtOnce::Untried => {}
             }
             // Where all bounds at once were not tried, they are before the changes run out, or when rounding has ended
             // the search.
@@ -163,13 +165,14 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 0
             };
             self.dual.keep_back(kept_back);
-            let one_by_one = self.solve_one_by_one(ocp, settings, solution, &mut spent);
+            let one_by_one = self.solve_one_by_one(ocp, shift, solution, &mut spent);
             if kept_back > 0
                 && matches!(one_by_one, Err(Status::MaxChanges | Status::Inaccurate(_)))
             {
                 let last = (Turn::Last, &mut spent);
-                let at_once = self.solve_at_once(ocp, settings, solution, last);
-                return at_once.unwrap_or(one_by_one);
+                if let AtOnce::Done(outcome) = self.solve_at_once(ocp, None, solution, last) {
+                    return outcome;
+                }
             }
             one_by_one
         });
@@ -186,20 +189,20 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         };
     }
 
-    /// What the phase for many bounds, if there is memory for one, makes of the problem; `None` if it has
-    /// no answer. In its first turn the trajectory without bounds is in the solution.
+    /// What the phase for many bounds, if there is memory for one, makes of the problem. In its first turn the
+    /// trajectory without bounds is in the solution.
     #[inline(never)]
     fn solve_at_once(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
-        settings: &SolverSettings<T>,
+        shift: Option<usize>,
         solution: &mut Solution<T, NX, NU>,
         turn: (Turn, &mut usize),
-    ) -> Option<Result<(), Status<T>>> {
+    ) -> AtOnce<T> {
         let mut phase = core::mem::replace(&mut self.many_bounds, List::empty());
-        let outcome = phase.first_mut().and_then(|phase| {
+        let outcome = phase.first_mut().map_or(AtOnce::Untried, |phase| {
             let run = phase.run;
-            run(phase, self, ocp, settings, solution, turn)
+            run(phase, self, ocp, shift, solution, turn)
         });
         self.many_bounds = phase;
         outcome
@@ -210,25 +213,25 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     fn solve_one_by_one(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
-        settings: &SolverSettings<T>,
+        shift: Option<usize>,
         solution: &mut Solution<T, NX, NU>,
         spent: &mut usize,
     ) -> Result<(), Status<T>> {
-        let warm = settings.warm_start != WarmStart::Cold && !solution.active.is_empty();
-        let mut outcome = self.search(ocp, settings, solution);
+        let warm = shift.is_some() && !solution.active.is_empty();
+        let mut outcome = self.search(ocp, shift, solution);
         *spent += self.dual.changes;
         if warm && matches!(outcome, Err(Status::Inaccurate(_))) {
             // A start must not decide whether there is an answer.
             solution.active.clear();
             self.dual.begin_again();
             let begun = self.roll_out(ocp, solution);
-            outcome = begun.and_then(|()| self.search(ocp, settings, solution));
+            outcome = begun.and_then(|()| self.search(ocp, None, solution));
             *spent += self.dual.changes;
         }
         match outcome {
             Err(Status::Inaccurate(bound)) => match self.prove(ocp, &mut solution.active) {
                 Some(infeasible) => Err(infeasible),
-                None => self.search_with_held_inputs(ocp, settings, solution, bound, spent),
+                None => self.search_with_held_inputs(ocp, solution, bound, spent),
             },
             known => known,
         }
@@ -254,11 +257,12 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         verdict
     }
 
-    /// The dual method, from the trajectory of the deviations as they are.
+    /// The dual method, from the trajectory of the deviations as they are, and, with a `shift`, the active rows of
+    /// the solution so many stages earlier.
     pub(crate) fn search(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
-        settings: &SolverSettings<T>,
+        shift: Option<usize>,
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
         if ocp.terminal.equality.is_some() {
@@ -267,7 +271,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 .impose_terminal_equality(ocp, &self.factors, &x_n)?;
             self.roll_out(ocp, solution)?;
         }
-        self.warm_start(ocp, settings, solution)?;
+        self.warm_start(ocp, shift, solution)?;
 
         loop {
             let trajectory = trajectory(solution);
@@ -343,17 +347,13 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     fn warm_start(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
-        settings: &SolverSettings<T>,
+        shift: Option<usize>,
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
-        let shift = match settings.warm_start {
-            WarmStart::Cold => return Ok(()),
-            WarmStart::Same => 0,
-            WarmStart::Shifted => 1,
+        let Some(shift) = shift else {
+            return Ok(());
         };
-        // After a failure the active rows are none, or a proof.
-        let needed = solution.status.is_solved()
-            && !solution.active.is_empty()
+        let needed = !solution.active.is_empty()
             && self
                 .dual
                 .most_violated(ocp, &trajectory(solution))
@@ -365,6 +365,20 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             self.roll_out(ocp, solution)?;
         }
         Ok(())
+    }
+}
+
+/// How many stages earlier the active rows of the last solution are expected, if they are to be begun with.
+fn shift_of_last<T: Scalar, const NX: usize, const NU: usize>(
+    settings: &SolverSettings<T>,
+    last: &Solution<T, NX, NU>,
+) -> Option<usize> {
+    match settings.warm_start {
+        // After a failure the active rows are none, or a proof.
+        _ if !last.status.is_solved() => None,
+        WarmStart::Cold => None,
+        WarmStart::Same => Some(0),
+        WarmStart::Shifted => Some(1),
     }
 }
 

@@ -80,6 +80,8 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
     let active = sides.iter().filter(|side| side.role != Role::Free).count();
     let mut most = (active / patience.few).max(2);
     let mut last = usize::MAX;
+    // Rounding may have grown along the horizon until what follows from a trajectory as it is goes in circles.
+    let mut careful = false;
     let loose: T = convert(1e-6);
     let loose = tolerances.violation.max(loose);
     while count() {
@@ -100,9 +102,13 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
             side.base = side.multiplier_at(side.distance);
         }
         let mut residual = explain(program, sides);
+        if careful && residual.rest > loose * residual.largest {
+            refine(program, sides, &mut residual, (loose, loose));
+        }
         let mut wrong = reassign(sides, loose, loose * residual.largest);
         if wrong == 0 {
-            let near = refine(program, sides, &mut residual, tolerances.violation);
+            let last = (T::default_epsilon() * convert(16.0), tolerances.violation);
+            let near = refine(program, sides, &mut residual, last);
             wrong = reassign(
                 sides,
                 tolerances.violation,
@@ -128,6 +134,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
             patience.singles -= 1;
             keep_first_change(sides);
         }
+        careful |= wrong >= last;
         last = wrong;
     }
     false
@@ -163,13 +170,13 @@ fn explain<T: Scalar, const NX: usize, const NU: usize>(
     newton::explain(program.ocp, sides, &trajectory, program.v)
 }
 
-/// Moves to the minimum with the sides as they are, to rounding, from a point whose `residual` is known;
-/// whether that is near enough.
+/// Moves to the minimum with the sides as they are, until what is left is `enough` or does not shrink, from a point
+/// whose `residual` is known; whether it is within the `tolerance`.
 fn refine<T: Scalar, const NX: usize, const NU: usize>(
     program: &mut Program<'_, T, NX, NU>,
     sides: &mut [BoundSide<T>],
     residual: &mut newton::Residual<T>,
-    tolerance: T,
+    (enough, tolerance): (T, T),
 ) -> bool {
     let mut last: T = convert(f64::INFINITY);
     for _ in 0..REFINEMENTS {
@@ -179,7 +186,7 @@ fn refine<T: Scalar, const NX: usize, const NU: usize>(
         });
         let unexplained = residual.rest / residual.largest.max(T::default_epsilon());
         let worst = missed.max(unexplained);
-        if worst <= T::default_epsilon() * convert(16.0) {
+        if worst <= enough {
             return true;
         }
         if !(worst < last * convert(0.5)) {

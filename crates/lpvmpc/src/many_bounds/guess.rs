@@ -83,6 +83,14 @@ pub(super) fn again<T: Scalar>(sides: &mut [BoundSide<T>], before: &ActiveSet<T>
                 side.role = Role::Held;
                 side.estimate = row.multiplier.min(side.price());
             }
+            side.known_role = side.role;
         }
+    }
+}
+
+/// The roles that the rows had before, again, after others were tried.
+pub(super) fn known<T: Scalar>(sides: &mut [BoundSide<T>]) {
+    for side in sides {
+        side.role = side.known_role;
     }
 }

@@ -31,6 +31,8 @@ pub(crate) struct BoundSide<T> {
     pub role: Role,
     /// The role that the interior-point method foretold a step before.
     pub last_role: Role,
+    /// The role that it had in the last solution, where that is begun with.
+    pub known_role: Role,
     /// Multiplier at d = 0, and how fast it falls with d.
     pub base: T,
     pub weight: T,
@@ -112,6 +114,7 @@ impl<T: Scalar> BoundSide<T> {
             soft,
             role: Role::Free,
             last_role: Role::Free,
+            known_role: Role::Free,
             base: T::zero(),
             weight: T::zero(),
             distance: T::zero(),
