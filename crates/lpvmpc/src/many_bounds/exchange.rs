@@ -18,7 +18,7 @@ use nalgebra::{SVector, convert};
 const A_FEW: usize = 4;
 
 /// Passes that refine an answer.
-const REFINEMENTS: usize = 6;
+const REFINEMENTS: usize = 10;
 
 /// Numbers that the search goes by.
 #[derive(Clone, Copy)]
