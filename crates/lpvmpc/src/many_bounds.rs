@@ -50,6 +50,8 @@ const FAR: Patience = Patience {
 };
 /// Where fewer bounds were active before than one for so many that are violated, they tell little of what to expect.
 const LITTLE: usize = 2;
+/// The last sample's bounds are tried again after 0, 0, 1, 3 and then 7 samples without, the more often they were in vain.
+const MISSES: u32 = 5;
 /// So many factorisations for each guess of the interior-point method that is tried.
 const TRIAL: usize = 5;
 /// Shorter parts of the way mean that bounds may contradict each other.
@@ -110,6 +112,9 @@ pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
     /// Where a Newton step is kept while a guess is tried, and where the guess is.
     places: [ManyBoundsPlace<T, NX, NU>; 2],
     sides: List<BoundSide<T>>,
+    /// How often in a row the last sample's bounds were a guess in vain, and how often they are not tried for that.
+    misses: u32,
+    pause: u32,
     pub run: Run<T, NX, NU>,
     /// Takes down the last answer, before it is overwritten.
     pub keep: fn(&mut Self, &Solution<T, NX, NU>),
@@ -156,6 +161,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         Self {
             places,
             sides,
+            misses: 0,
+            pause: 0,
             run: Self::solve,
             keep: Self::keep_states,
         }
@@ -249,10 +256,18 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         let mut found = false;
         if let Some(shift) = shift.filter(|_| known > 0) {
             guess::again(sides, &solution.active, shift);
-            if many {
+            if many && self.pause > 0 {
+                self.pause -= 1;
+            } else if many {
                 guess::tail(ocp, &solver.factors, sides, (program.x, shift));
                 let patience = if rows { NEAR_ROWS } else { NEAR };
                 found = exchange(&mut program, sides, &tolerances, patience, &mut changes);
+                self.misses = if found {
+                    0
+                } else {
+                    (self.misses + 1).min(MISSES)
+                };
+                self.pause = ((1 << self.misses) / 4_u32).saturating_sub(1);
             }
         }
         if !found && saturated {
