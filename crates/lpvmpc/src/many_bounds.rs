@@ -52,6 +52,8 @@ const FAR: Patience = Patience {
 const LITTLE: usize = 2;
 /// The last sample's bounds are tried again after 0, 0, 1, 3 and then 7 samples without, the more often they were in vain.
 const MISSES: u32 = 5;
+/// Or as soon as no more of them would have been wrong.
+const ALMOST: usize = 4;
 /// So many factorisations for each guess of the interior-point method that is tried.
 const TRIAL: usize = 5;
 /// Shorter parts of the way mean that bounds may contradict each other.
@@ -292,7 +294,12 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             )
         };
         let outcome = match outcome {
-            Some(Ok(())) => report(&program, sides, solution).then_some(Ok(())),
+            Some(Ok(())) => {
+                if self.pause > 0 && guess::wrong(sides) <= ALMOST {
+                    (self.misses, self.pause) = (0, 0);
+                }
+                report(&program, sides, solution).then_some(Ok(()))
+            }
             other => other,
         };
         solver.dual.v.fill(SVector::zeros());

@@ -94,3 +94,9 @@ pub(super) fn known<T: Scalar>(sides: &mut [BoundSide<T>]) {
         side.role = side.known_role;
     }
 }
+
+/// How many sides have another role than that which is known.
+pub(super) fn wrong<T: Scalar>(sides: &[BoundSide<T>]) -> usize {
+    let wrong = |side: &&BoundSide<T>| side.role != side.known_role;
+    sides.iter().filter(wrong).count()
+}
