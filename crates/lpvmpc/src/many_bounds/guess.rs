@@ -47,7 +47,11 @@ pub(super) fn tail<T: Scalar, const NX: usize, const NU: usize>(
     let longest = if NU == 1 { usize::MAX } else { LONGEST_TAIL };
     let begin = ocp.length() - (ocp.length() / TAIL).min(longest);
     let before = (begin + shift).checked_sub(1);
-    if let Some(x) = before.and_then(|before| last.get(before)) {
+    // Of the same horizon the last answer knows the end, too.
+    if let Some(x) = before
+        .filter(|_| shift > 0)
+        .and_then(|before| last.get(before))
+    {
         let end = side::split_off_mut(&mut sides, begin);
         saturated(ocp, factors, end, (begin, *x));
     }
