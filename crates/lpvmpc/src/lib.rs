@@ -64,6 +64,7 @@ mod by_stage;
 mod changes;
 mod clock;
 mod controller;
+mod cost;
 mod delay;
 mod descent;
 #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
@@ -108,6 +109,7 @@ mod workspace;
 
 pub use clock::{Clock, Tick};
 pub use controller::{Controller, Reference};
+pub use cost::cost;
 pub use delay::DelayLine;
 pub use embedding::{Dynamics, Embedding, Tangent, tangent_by_duals};
 pub use estimator::{
@@ -150,7 +152,7 @@ pub use shaping::{Motion, MoveLimits, SmoothMove};
 pub use solution::{
     ActiveRow, ActiveSet, BoundId, PackedRow, Part, Quantity, Side, Solution, Status,
 };
-pub use solver::{Solver, SolverSettings, WarmStart, cost};
+pub use solver::{Solver, SolverSettings, WarmStart};
 pub use steady_state::{SteadyState, SteadyStateProblem};
 pub use workspace::Workspace;
 

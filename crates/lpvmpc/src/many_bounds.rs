@@ -16,13 +16,14 @@ mod side;
 
 pub(crate) use side::BoundSide;
 
+use crate::cost::cost;
 use crate::list::List;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
 use crate::rows::{self, Trajectory};
 use crate::solution::{ActiveRow, ActiveSet, Part, Quantity, Solution, Status};
-use crate::solver::{Solver, clip_inputs, cost, infeasible, roll_forward, trajectory};
+use crate::solver::{Solver, clip_inputs, infeasible, roll_forward, trajectory};
 use crate::working_set::{copy, first, first_mut};
 use exchange::{Patience, Program, Tolerances, exchange};
 use interior_point::{Foretold, InteriorPoint};

@@ -2,6 +2,7 @@
 
 use crate::by_stage::CostByStage;
 use crate::controller::Reference;
+use crate::cost::{excess, price};
 use crate::list::List;
 use crate::model::Scalar;
 use crate::ocp::{Bounds, SoftBounds};
@@ -9,7 +10,6 @@ use crate::outputs;
 use crate::settings::{ControllerSettings, TerminalIngredient, Weights};
 use crate::small_matrix::product;
 use crate::solution::{ActiveSet, Quantity, Side};
-use crate::solver::{excess, price};
 use nalgebra::{SMatrix, SVector, convert};
 
 /// What a sample's cost draws state and input to.
