@@ -4,7 +4,7 @@
 //! all rows before it. Here all of them are guessed at once. A guess comes from the last sample, or from an
 //! interior-point method that goes on until it can be told which bounds will be active. The program in
 //! which these hold says which of them should not, and which are missing; that takes a few factorisations,
-//! however many bounds there are. Where it finds nothing the dual method begins as if nothing had been.
+//! however many bounds there are. Where it finds nothing the dual method begins as it would have without it.
 //! Where the dual method comes to no end, most of all with few bounds that contradict each other, the
 //! interior-point method has a turn after it.
 
@@ -12,6 +12,7 @@ mod exchange;
 mod guess;
 mod interior_point;
 mod newton;
+mod retries;
 mod side;
 
 pub(crate) use side::BoundSide;
@@ -28,6 +29,7 @@ use crate::working_set::{copy, first, first_mut};
 use exchange::{Patience, Program, Tolerances, exchange};
 use interior_point::{Foretold, InteriorPoint};
 use nalgebra::{SVector, convert};
+use retries::Retries;
 use side::Role;
 
 /// With so many violated bounds a few factorisations cost less than a pass for each bound.
@@ -51,10 +53,6 @@ const FAR: Patience = Patience {
 };
 /// Where fewer bounds were active before than one for so many that are violated, they tell little of what to expect.
 const LITTLE: usize = 2;
-/// The last sample's bounds are tried again after 0, 0, 1, 3 and then 7 samples without, the more often they were in vain.
-const MISSES: u32 = 5;
-/// Or as soon as no more of them would have been wrong.
-const ALMOST: usize = 4;
 /// So many factorisations for each guess of the interior-point method that is tried.
 const TRIAL: usize = 5;
 /// Shorter parts of the way mean that bounds may contradict each other.
@@ -115,9 +113,7 @@ pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
     /// Where a Newton step is kept while a guess is tried, and where the guess is.
     places: [ManyBoundsPlace<T, NX, NU>; 2],
     sides: List<BoundSide<T>>,
-    /// How often in a row the last sample's bounds were a guess in vain, and how often they are not tried for that.
-    misses: u32,
-    pause: u32,
+    retries: Retries,
     pub run: Run<T, NX, NU>,
     /// Takes down the last answer, before it is overwritten.
     pub keep: fn(&mut Self, &Solution<T, NX, NU>),
@@ -164,8 +160,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         Self {
             places,
             sides,
-            misses: 0,
-            pause: 0,
+            retries: Retries::default(),
             run: Self::solve,
             keep: Self::keep_states,
         }
@@ -259,18 +254,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         let mut found = false;
         if let Some(shift) = shift.filter(|_| known > 0) {
             guess::again(sides, &solution.active, shift);
-            if many && self.pause > 0 {
-                self.pause -= 1;
-            } else if many {
+            if many && self.retries.are_due() {
                 guess::tail(ocp, &solver.factors, sides, (program.x, shift));
                 let patience = if rows { NEAR_ROWS } else { NEAR };
                 found = exchange(&mut program, sides, &tolerances, patience, &mut changes);
-                self.misses = if found {
-                    0
-                } else {
-                    (self.misses + 1).min(MISSES)
-                };
-                self.pause = ((1 << self.misses) / 4_u32).saturating_sub(1);
+                self.retries.learn(found);
             }
         }
         if !found && saturated {
@@ -296,9 +284,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         };
         let outcome = match outcome {
             Some(Ok(())) => {
-                if self.pause > 0 && guess::wrong(sides) <= ALMOST {
-                    (self.misses, self.pause) = (0, 0);
-                }
+                self.retries.learn_wrong(guess::wrong(sides));
                 report(&program, sides, solution).then_some(Ok(()))
             }
             other => other,

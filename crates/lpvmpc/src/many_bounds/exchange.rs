@@ -107,8 +107,8 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
         }
         let mut wrong = reassign(sides, loose, loose * residual.largest);
         if wrong == 0 {
-            let last = (T::default_epsilon() * convert(16.0), tolerances.violation);
-            let near = refine(program, sides, &mut residual, last);
+            let to_rounding = (T::default_epsilon() * convert(16.0), tolerances.violation);
+            let near = refine(program, sides, &mut residual, to_rounding);
             wrong = reassign(
                 sides,
                 tolerances.violation,

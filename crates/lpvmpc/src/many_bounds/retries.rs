@@ -1,0 +1,74 @@
+//! When the last sample's bounds are worth a guess: not each time, where they come to nothing time and again.
+
+/// They are tried after 0, 0, 1, 3 and then 7 samples without, the more often in a row they were in vain.
+const MISSES: u32 = 5;
+/// Or as soon as no more of them would have been wrong.
+const ALMOST: usize = 4;
+
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Retries {
+    /// How often in a row they were in vain.
+    misses: u32,
+    /// For how many samples they are not tried.
+    pause: u32,
+}
+
+impl Retries {
+    /// Whether they are tried in this sample.
+    pub fn are_due(&mut self) -> bool {
+        let due = self.pause == 0;
+        self.pause = self.pause.saturating_sub(1);
+        due
+    }
+
+    /// Whether they, tried, have led to the answer.
+    pub fn learn(&mut self, found: bool) {
+        self.misses = if found { 0 } else { self.misses + 1 }.min(MISSES);
+        self.pause = ((1 << self.misses) / 4_u32).saturating_sub(1);
+    }
+
+    /// How many of them are not as in the answer.
+    pub fn learn_wrong(&mut self, wrong: usize) {
+        if self.pause > 0 && wrong <= ALMOST {
+            *self = Self::default();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Samples without a guess before the next one.
+    fn pause(retries: &mut Retries) -> usize {
+        core::iter::repeat_with(|| retries.are_due())
+            .take_while(|due| !due)
+            .count()
+    }
+
+    #[test]
+    fn guesses_in_vain_become_rare() {
+        let mut retries = Retries::default();
+        let pauses = [(); 8].map(|()| {
+            let pause = pause(&mut retries);
+            retries.learn(false);
+            pause
+        });
+        assert_eq!(pauses, [0, 0, 0, 1, 3, 7, 7, 7]);
+        assert_eq!(pause(&mut retries), 7);
+        retries.learn(true);
+        assert_eq!(pause(&mut retries), 0);
+    }
+
+    #[test]
+    fn what_would_have_done_is_tried_at_once() {
+        let mut retries = Retries::default();
+        (0..5).for_each(|_| retries.learn(false));
+        retries.learn_wrong(ALMOST + 1);
+        assert!(!retries.are_due());
+        retries.learn_wrong(ALMOST);
+        assert!(retries.are_due());
+        retries.learn(false);
+        assert_eq!(pause(&mut retries), 0);
+    }
+}
