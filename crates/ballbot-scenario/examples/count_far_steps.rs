@@ -1,5 +1,5 @@
 //! Drives the guaranteed loop of `far-setpoints`, with one program per sample, to set points that are far apart,
-//! for `.ci/instructions.sh` to count the instructions of each step.
+//! for `.ci/instructions.sh` to count the instructions of each step. Another horizon, in samples, may be given.
 
 use ballbot::{GuaranteedController, GuaranteedWorkspace};
 use ballbot_scenario::Scenario;
@@ -19,6 +19,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         known: 1,
         ..settings.iterations
     };
+    if let Some(horizon) = std::env::args().nth(1) {
+        settings.horizon = horizon.parse()?;
+    }
     let plant = Rk4 { substeps: 24 };
     let mut controller = GuaranteedController::allocate(prepared.ballbot, settings)?;
     let mut workspace = controller.workspace();
