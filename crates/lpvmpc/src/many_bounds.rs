@@ -37,20 +37,22 @@ const MANY: usize = 32;
 /// And so many inputs that the regulator saturates, where there is one of each stage.
 const MANY_SATURATED: usize = 8;
 /// Of a guess that is to be exchanged, one active side in so many may be wrong, and each must be better than
-/// the one before: from farther away it is a shorter way to begin anew.
+/// the one before, but for a few that go in circles: from farther away it is a shorter way to begin anew.
 const NEAR: Patience = Patience {
     few: 4,
-    guesses: 0,
-    singles: 2,
+    guesses: 2,
+    wrong: 4,
 };
 /// Of general rows fewer, since each binds inputs and states.
 const NEAR_ROWS: Patience = Patience { few: 8, ..NEAR };
-/// Saturated inputs may all be wrong, and twice no better.
-const FAR: Patience = Patience {
-    few: 1,
+/// Of the last sample's inputs and states, held, more, since no step of the interior-point method is lost for them.
+const KNOWN: Patience = Patience {
+    few: 2,
     guesses: 2,
-    singles: 4,
+    wrong: usize::MAX,
 };
+/// Saturated inputs may all be wrong.
+const FAR: Patience = Patience { few: 1, ..KNOWN };
 /// Where fewer bounds were active before than one for so many that are violated, they tell little of what to expect.
 const LITTLE: usize = 2;
 /// So many factorisations for each guess of the interior-point method that is tried.
@@ -58,8 +60,9 @@ const TRIAL: usize = 5;
 /// Shorter parts of the way mean that bounds may contradict each other.
 const STUCK: f64 = 0.1;
 /// The roles that a step foretells are tried when one in so many of the active sides, or fewer, has changed
-/// its since the step before.
-const CERTAIN: usize = 10;
+/// its since the step before; of three roles, where bounds are soft, it is harder to foretell the right one.
+const CERTAIN: usize = 8;
+const CERTAIN_SOFT: usize = 10;
 /// And when that step went so far.
 const FREE: f64 = 0.5;
 /// Where the products of slack and multiplier begin, as a part of the largest cost of a stage.
@@ -256,7 +259,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             guess::again(sides, &solution.active, shift);
             if many && self.retries.are_due() {
                 guess::tail(ocp, &solver.factors, sides, (program.x, shift));
-                let patience = if rows { NEAR_ROWS } else { NEAR };
+                let patience = match (rows, side::any_soft(sides)) {
+                    (true, _) => NEAR_ROWS,
+                    (_, true) => NEAR,
+                    _ => KNOWN,
+                };
                 found = exchange(&mut program, sides, &tolerances, patience, &mut changes);
                 self.retries.learn(found);
             }
@@ -314,13 +321,17 @@ fn search<T: Scalar, const NX: usize, const NU: usize>(
     changes: &mut impl FnMut() -> bool,
 ) -> Option<Result<(), Status<T>>> {
     let ocp = program.ocp;
+    let certain = match side::any_soft(sides) {
+        true => CERTAIN_SOFT,
+        false => CERTAIN,
+    };
     let mut method = InteriorPoint::new(sides, scale * convert(CENTRE));
     let mut part = T::zero();
     let mut stuck = 0_usize;
     while trials > 0 && changes() {
         let predicted = method.predict(ocp, sides, program.factors, (program.u, program.x));
         let Foretold { changed, active } = predicted.ok()?;
-        if part > convert(FREE) && CERTAIN * changed <= active {
+        if part > convert(FREE) && certain * changed <= active {
             trials -= 1;
             if method.try_foretold(program, sides, tolerances, &mut *changes) {
                 return Some(Ok(()));

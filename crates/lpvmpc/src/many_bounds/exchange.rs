@@ -14,9 +14,6 @@ use crate::rows::Trajectory;
 use core::mem::swap;
 use nalgebra::{SVector, convert};
 
-/// So few sides that are wrong may be exchanged one by one.
-const A_FEW: usize = 4;
-
 /// Passes that refine an answer.
 const REFINEMENTS: usize = 10;
 
@@ -62,10 +59,10 @@ pub(super) type Places<'a, T, const NX: usize, const NU: usize> = (
 pub(super) struct Patience {
     /// One active side in so many may be wrong at first.
     pub few: usize,
-    /// So many guesses may be hardly better than the one before.
+    /// So many guesses may be hardly better than the one before,
     pub guesses: usize,
-    /// So often the first of a few sides that are wrong is exchanged alone.
-    pub singles: usize,
+    /// as long as no more sides than these are wrong.
+    pub wrong: usize,
 }
 
 /// Exchanges sides until the guess is right, whose trajectory and multipliers (`estimate`) then are the
@@ -122,17 +119,15 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
             }
         }
         // A guess from near by is right after a few exchanges, each of which leaves fewer sides wrong.
-        let alone = wrong <= A_FEW && wrong >= last && patience.singles > 0;
         if wrong <= most {
             most = wrong - wrong / 4;
-        } else if patience.guesses > 0 {
+        } else if patience.guesses > 0 && wrong <= patience.wrong {
             patience.guesses -= 1;
-        } else if !alone {
+        } else {
             break;
         }
-        if alone {
-            patience.singles -= 1;
-            keep_first_change(sides);
+        if wrong >= last {
+            keep_last_changes(sides, wrong.div_ceil(2));
         }
         careful |= wrong >= last;
         last = wrong;
@@ -236,30 +231,38 @@ fn reassign<T: Scalar>(sides: &mut [BoundSide<T>], violation: T, rounding: T) ->
     changes
 }
 
-/// Lets go of held sides that stay where they are not to be, since the other held ones leave nothing that moves them:
-/// what is kept all the same is free, what is soft is exceeded. How many there are.
+/// Lets go of a held side that stays where it is not to be, since the other held ones leave nothing that moves it, of
+/// several the one that is farthest away: what is kept all the same is free, what is soft is exceeded. How many
+/// there are.
 fn release_unmet<T: Scalar>(sides: &mut [BoundSide<T>], violation: T) -> usize {
-    let mut changes = 0;
+    let mut farthest = violation;
+    let mut unmet = None;
     for side in sides.iter_mut().filter(|side| side.is_weighted()) {
-        let margin = violation * side.size;
-        let role = if side.distance > margin {
+        let distance = side.distance / side.size;
+        let role = if distance > farthest {
             Role::Free
-        } else if side.distance < -margin && side.soft.is_some() {
+        } else if distance < -farthest && side.soft.is_some() {
             Role::Exceeded
         } else {
             continue;
         };
-        side.role = role;
-        changes += 1;
+        farthest = distance.abs();
+        unmet = Some((side, role));
     }
-    changes
+    match unmet {
+        Some((side, role)) => {
+            side.role = role;
+            1
+        }
+        None => 0,
+    }
 }
 
-/// Takes back all changes of roles but that of the first side. Exchanged at once a few sides may go in circles;
-/// the first alone, in a fixed order, cannot where inputs are all that is bounded (Murty 1974).
-fn keep_first_change<T: Scalar>(sides: &mut [BoundSide<T>]) {
+/// Takes back all changes of roles but the last `count`: exchanged at once sides may go in circles, and those
+/// towards the end of the horizon do not wait for what comes of the others.
+fn keep_last_changes<T: Scalar>(sides: &mut [BoundSide<T>], count: usize) {
     let changed = sides.iter_mut().filter(|side| side.role != side.last_role);
-    for side in changed.skip(1) {
+    for side in changed.rev().skip(count) {
         side.role = side.last_role;
     }
 }

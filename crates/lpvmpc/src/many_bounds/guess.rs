@@ -7,10 +7,10 @@ use crate::riccati::StageFactor;
 use crate::solution::{ActiveRow, ActiveSet, Part, Quantity};
 use nalgebra::SVector;
 
-/// One stage in so many is at the end of the horizon, of which the regulator tells more than the last answer.
+/// Of a single input, one stage in so many is at the end of the horizon, of which the regulator tells more than the
+/// last answer.
 const TAIL: usize = 8;
-/// And where several inputs act together no more than these.
-const LONGEST_TAIL: usize = 4;
+
 /// The inputs of the stages from `begin` on that the regulator without bounds drives into them from `x`, when
 /// they are bounded. Of all sides there.
 pub(super) fn saturated<T: Scalar, const NX: usize, const NU: usize>(
@@ -36,16 +36,18 @@ pub(super) fn saturated<T: Scalar, const NX: usize, const NU: usize>(
     }
 }
 
-/// The inputs at the end of the horizon, of which the last answer knows least: those that the regulator
-/// saturates from where that answer's states, `shift` stages earlier, lead to.
+/// The inputs at the end of the horizon, of which the last answer knows least (of several inputs, that act together,
+/// where it knows nothing): those that the regulator saturates from where that answer's states, `shift` stages
+/// earlier, lead to.
 pub(super) fn tail<T: Scalar, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
     factors: &[StageFactor<T, NX, NU>],
     mut sides: &mut [BoundSide<T>],
     (last, shift): (&[SVector<T, NX>], usize),
 ) {
-    let longest = if NU == 1 { usize::MAX } else { LONGEST_TAIL };
-    let begin = ocp.length() - (ocp.length() / TAIL).min(longest);
+    let n = ocp.length();
+    let length = if NU == 1 { n / TAIL } else { shift };
+    let begin = n.saturating_sub(length);
     let before = (begin + shift).checked_sub(1);
     // Of the same horizon the last answer knows the end, too.
     if let Some(x) = before

@@ -237,6 +237,11 @@ pub(super) fn collect<T: Scalar, const NX: usize, const NU: usize>(
     Some(count)
 }
 
+/// Whether one of them may be exceeded.
+pub(super) fn any_soft<T>(sides: &[BoundSide<T>]) -> bool {
+    sides.iter().any(|side| side.soft.is_some())
+}
+
 /// Takes the sides of the last stages, from `stage` on, off the list.
 pub(super) fn split_off<'a, T>(sides: &mut &'a [BoundSide<T>], stage: usize) -> &'a [BoundSide<T>] {
     let before = sides.iter().rposition(|side| side.bound.stage < stage);

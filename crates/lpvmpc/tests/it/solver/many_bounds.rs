@@ -394,6 +394,42 @@ fn known_bounds_are_begun_with_after_a_first_phase_in_vain() {
     assert!(tried > 15, "{tried}");
 }
 
+/// A solver and its answer for sequences of up to `stages` stages.
+struct Loop<const NX: usize, const NU: usize> {
+    solver: Solver<f64, NX, NU>,
+    solution: Solution<f64, NX, NU>,
+}
+
+impl<const NX: usize, const NU: usize> Loop<NX, NU> {
+    fn new(stages: usize) -> Self {
+        let active = 2 * stages * NU;
+        let room = Capacity {
+            stages,
+            rows: active,
+            active,
+            ..Capacity::default()
+        };
+        Self {
+            solver: Solver::allocate(room),
+            solution: Solution::allocate(room),
+        }
+    }
+
+    /// Changes of the active set of all problems, one after the other.
+    fn changes(&mut self, warm_start: WarmStart, problems: &[Ocp<f64, NX, NU>]) -> usize {
+        let settings = SolverSettings {
+            warm_start,
+            ..cold()
+        };
+        let changes = problems.iter().map(|ocp| {
+            self.solver.solve(ocp, &settings, &mut self.solution);
+            assert!(self.solution.status.is_solved(), "{}", self.solution.status);
+            self.solution.changes
+        });
+        changes.sum()
+    }
+}
+
 /// Where the last sample's bounds come to nothing time and again, they are tried less and less often, until they would
 /// have done.
 #[test]
@@ -407,34 +443,45 @@ fn guesses_in_vain_are_not_tried_each_time() {
         seed: 1,
     };
     let sequence = recipe.make::<12, 4>().unwrap();
-    let room = Capacity {
-        stages: N,
-        rows: 400,
-        active: 400,
-        ..Capacity::default()
-    };
-    let mut solver = Solver::allocate(room);
-    let mut solution = Solution::allocate(room);
-    let mut changes = |warm_start, problems: &[Ocp<f64, 12, 4>]| {
-        let settings = SolverSettings {
-            warm_start,
-            ..cold()
-        };
-        let changes = problems.iter().map(|ocp| {
-            solver.solve(ocp, &settings, &mut solution);
-            assert!(solution.status.is_solved(), "{}", solution.status);
-            solution.changes
-        });
-        changes.sum::<usize>()
-    };
-    let without = changes(WarmStart::Cold, &sequence.problems);
-    let with = changes(WarmStart::Shifted, &sequence.problems);
+    let mut both = Loop::new(N);
+    let without = both.changes(WarmStart::Cold, &sequence.problems);
+    let with = both.changes(WarmStart::Shifted, &sequence.problems);
     // At worst every eighth sample takes two factorisations more; tried each time the guess makes it 1.23 times as many.
     assert!(with < without + without / 10, "{with} for {without}");
     let last = &sequence.problems[59..];
-    let again = [(); 3].map(|()| changes(WarmStart::Same, last));
+    let again = [(); 3].map(|()| both.changes(WarmStart::Same, last));
     // What is known is right: one factorisation, as much as a change for each state and input.
     assert_eq!(again[2], 12 + 4, "{again:?}");
+}
+
+/// Where most inputs are saturated, those of the last sample, exchanged, save a fifth of the work.
+#[test]
+fn known_saturated_inputs_save_a_fifth() {
+    /// Factorisations of a sequence, from the last answer and from nothing.
+    fn both<const NX: usize, const NU: usize>(horizon: usize, share: f64) -> [usize; 2] {
+        let recipe = Recipe {
+            kind: Kind::Inputs,
+            horizon,
+            samples: 12,
+            share,
+            seed: 1,
+        };
+        let sequence = recipe.make::<NX, NU>().unwrap();
+        let mut both = Loop::new(horizon);
+        let counts = [WarmStart::Shifted, WarmStart::Cold]
+            .map(|warm_start| both.changes(warm_start, &sequence.problems) / (NX + NU));
+        println!("{NX} {NU} {horizon} {share}: {counts:?}");
+        counts
+    }
+    let counts = [
+        both::<8, 2>(100, 0.8),
+        both::<12, 4>(20, 0.6),
+        both::<12, 4>(50, 0.8),
+        both::<16, 6>(20, 0.6),
+        both::<16, 6>(50, 0.8),
+    ];
+    let [with, without] = [0, 1].map(|i| counts.iter().map(|of| of[i]).sum::<usize>());
+    assert!(5 * with < 4 * without, "{with} for {without}");
 }
 
 /// Memory of the first phase for shorter horizons changes nothing for longer ones.
