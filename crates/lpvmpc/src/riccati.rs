@@ -11,7 +11,9 @@ use crate::ocp::{Common, Stage};
 #[cfg(feature = "simd")]
 use crate::products::{self, Vectors};
 use crate::products::{Compiled, Products};
-use crate::small_matrix::{add_product, mirror, product, transposed, transposed_product};
+use crate::small_matrix::{
+    add_product, mirror, product, transposed, transposed_product, transposed_times,
+};
 use nalgebra::{SMatrix, SVector};
 
 /// Cost-to-go x'Px/2 + p'x.
@@ -100,6 +102,33 @@ impl<T: Scalar, const NX: usize, const NU: usize> pulp::WithSimd for Elimination
             adjustment,
         } = self;
         factor.eliminate_here(stage, weights, cost_to_go, adjustment, Vectors(simd))
+    }
+}
+
+/// A backward step with a constant input, as a piece of work that is compiled for several kinds of vectors.
+#[cfg(feature = "simd")]
+struct Passage<'a, T, const NX: usize, const NU: usize> {
+    factor: &'a mut StageFactor<T, NX, NU>,
+    stage: &'a Stage<T, NX, NU>,
+    weights: &'a Common<T, NX, NU>,
+    cost_to_go: &'a mut CostToGo<T, NX>,
+    input: &'a SVector<T, NU>,
+}
+
+#[cfg(feature = "simd")]
+impl<T: Scalar, const NX: usize, const NU: usize> pulp::WithSimd for Passage<'_, T, NX, NU> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
+        let Self {
+            factor,
+            stage,
+            weights,
+            cost_to_go,
+            input,
+        } = self;
+        factor.pass_here(stage, weights, cost_to_go, input, Vectors(simd));
     }
 }
 
@@ -205,6 +234,52 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         mirror(quadratic);
         *linear = minimum.linear_x + product(&l_g_x, &scaled_g);
         Ok(())
+    }
+
+    /// The backward step of a stage whose `input` is a constant: the same as if each of them were held.
+    #[inline(never)]
+    pub(crate) fn pass(
+        &mut self,
+        stage: &Stage<T, NX, NU>,
+        weights: &Common<T, NX, NU>,
+        cost_to_go: &mut CostToGo<T, NX>,
+        input: &SVector<T, NU>,
+    ) {
+        #[cfg(feature = "simd")]
+        if NX >= WIDE {
+            return products::in_widest::<NX, _>(Passage {
+                factor: self,
+                stage,
+                weights,
+                cost_to_go,
+                input,
+            });
+        }
+        self.pass_here(stage, weights, cost_to_go, input, Compiled);
+    }
+
+    #[inline(always)]
+    fn pass_here<M: Products>(
+        &mut self,
+        stage: &Stage<T, NX, NU>,
+        weights: &Common<T, NX, NU>,
+        cost_to_go: &mut CostToGo<T, NX>,
+        input: &SVector<T, NU>,
+        by: M,
+    ) {
+        let Stage { a, b, c, .. } = stage;
+        let CostToGo { quadratic, linear } = cost_to_go;
+        let p_a = by.product(quadratic, a);
+        let p_next = *linear + product(quadratic, &(c + product(b, input)));
+        let a = transposed(a);
+        *linear = stage.linear_x + product(&a, &p_next) + transposed_times(&weights.s, input);
+        *quadratic = weights.q;
+        by.add_symmetric_product(quadratic, &a, &p_a);
+        mirror(quadratic);
+        *self = Self {
+            feedforward: *input,
+            ..Self::zeros()
+        };
     }
 
     /// The input at the state `x` with the normalised deviation `v`.

@@ -146,6 +146,28 @@ pub(crate) fn transposed_times<T: Scalar, const R: usize, const C: usize>(
     out
 }
 
+/// |A'| |v|: the sizes of what adds up to A' v.
+#[inline(always)]
+pub(crate) fn transposed_sizes<T: Scalar, const R: usize, const C: usize>(
+    a: &SMatrix<T, R, C>,
+    v: &SVector<T, R>,
+) -> SVector<T, C> {
+    let mut out = SVector::zeros();
+    for (out, column) in out.data.0[0].iter_mut().zip(&a.data.0) {
+        for (a, v) in column.iter().zip(&v.data.0[0]) {
+            *out += (*a * *v).abs();
+        }
+    }
+    out
+}
+
+/// The size of the largest entry.
+#[inline(always)]
+pub(crate) fn largest<T: Scalar, const R: usize>(v: &SVector<T, R>) -> T {
+    let sizes = v.data.0[0].iter().map(|entry| entry.abs());
+    sizes.fold(T::zero(), |most, size| most.max(size))
+}
+
 /// A'
 #[inline(always)]
 pub(crate) fn transposed<T: Scalar, const R: usize, const C: usize>(

@@ -7,7 +7,8 @@ use crate::ocp::{Common, Ocp, Stage};
 use crate::riccati::{Adjustment, BadPivot, CostToGo, StageFactor, StageMinimum};
 use crate::rows::Trajectory;
 use crate::small_matrix::{
-    add_outer_product, add_scaled, product, transposed_product, transposed_times,
+    add_outer_product, add_scaled, largest, product, transposed_product, transposed_sizes,
+    transposed_times,
 };
 use crate::solution::{BoundId, Quantity};
 use nalgebra::SVector;
@@ -43,6 +44,10 @@ fn eliminate<T: Scalar, const NX: usize, const NU: usize>(
     factor: &mut StageFactor<T, NX, NU>,
     cost_to_go: &mut CostToGo<T, NX>,
 ) -> Result<(), BadPivot<T>> {
+    if let Some(input) = constant_input(sides) {
+        factor.pass(stage, ocp.common_at(i), cost_to_go, &input);
+        return Ok(());
+    }
     let costs = Costs { ocp, sides };
     factor.eliminate_adjusted(stage, ocp.common_at(i), cost_to_go, Some(&costs))?;
     for side in sides {
@@ -51,6 +56,24 @@ fn eliminate<T: Scalar, const NX: usize, const NU: usize>(
         }
     }
     Ok(())
+}
+
+/// The input of a stage, if all of it is held and nothing else of it is bounded.
+fn constant_input<T: Scalar, const NU: usize>(sides: &[BoundSide<T>]) -> Option<SVector<T, NU>> {
+    let mut held = 0;
+    let mut input = SVector::zeros();
+    for side in sides.iter().rev() {
+        match side.bound.quantity {
+            Quantity::Input(j) if side.role == Role::Held => {
+                held += 1;
+                input[j] = side.limit;
+            }
+            Quantity::Input(_) => {}
+            Quantity::Row(_) => return None,
+            Quantity::State(_) => break,
+        }
+    }
+    (held == NU).then_some(input)
 }
 
 /// The costs of a stage's sides.
@@ -326,18 +349,18 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
         let Common { q, r, s, .. } = ocp.common_at(i);
         let through = transposed_times(&stage.b, &costate);
         let mut slope = product(r, &u) + product(s, &x) + stage.linear_u + through + slope_u;
-        let terms = transposed_times(&stage.b.abs(), &sizes);
-        residual.largest = residual.largest.max(terms.amax()).max(slope_u.amax());
+        let terms = largest(&transposed_sizes(&stage.b, &sizes));
+        residual.largest = residual.largest.max(terms).max(largest(&slope_u));
         for side in here.iter_mut().filter(|side| side.role == Role::Held) {
             side.estimate = match side.input() {
                 None => side.base,
                 Some(j) => side.sign() * core::mem::replace(&mut slope[j], T::zero()),
             };
         }
-        residual.rest = residual.rest.max(slope.amax());
+        residual.rest = residual.rest.max(largest(&slope));
         costate = transposed_times(&stage.a, &costate)
             + product(q, &x)
-            + transposed_product(s, &u)
+            + transposed_times(s, &u)
             + stage.linear_x;
         sizes = costate.abs() + slope_x.abs();
         costate += slope_x;
@@ -356,5 +379,74 @@ pub(super) fn descend<T: Scalar, const NX: usize, const NU: usize>(
     let stages = ocp.stages.iter().zip(factors).zip(v.iter_mut());
     for ((stage, factor), v) in stages.take(ocp.length()).rev() {
         *v = step_back(stage, factor, v, &mut costate);
+    }
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use crate::many_bounds::side;
+    use alloc::vec;
+    use lpvmpc_testkit::rng::Rng;
+    use nalgebra::SMatrix;
+
+    /// Where all inputs of a stage are held, the step is the one that holds each of them.
+    fn compare<const NX: usize, const NU: usize>() {
+        let mut random = Rng::new(7);
+        let mut ocp = Ocp::<f64, NX, NU>::allocate(3);
+        for stage in ocp.stages.iter_mut() {
+            stage.a = SMatrix::from_fn(|_, _| random.uniform(-1.0, 1.0));
+            stage.b = SMatrix::from_fn(|_, _| random.uniform(-1.0, 1.0));
+            stage.c = SVector::from_fn(|_, _| random.uniform(-1.0, 1.0));
+            stage.linear_x = SVector::from_fn(|_, _| random.uniform(-1.0, 1.0));
+        }
+        (ocp.common.q, ocp.common.r) = (SMatrix::identity(), SMatrix::identity());
+        ocp.common.s = SMatrix::from_fn(|_, _| random.uniform(-0.1, 0.1));
+        ocp.common.u.lower.fill(-1.0);
+        ocp.common.u.upper.fill(2.0);
+        let mut sides = vec![BoundSide::empty(); 8 * (NX + NU)];
+        let count = side::collect(&ocp, &mut sides).unwrap();
+        sides.truncate(count);
+        sides.retain(|side| side.bound.stage == 1 && side.input().is_some());
+        assert_eq!(sides.len(), 2 * NU);
+        for (j, pair) in sides.chunks_mut(2).enumerate() {
+            pair[j % 2].role = Role::Held;
+        }
+        let (stage, weights) = (&ocp.stages[1], ocp.common_at(1));
+        let root = SMatrix::<f64, NX, NX>::from_fn(|_, _| random.uniform(-1.0, 1.0));
+        let before = CostToGo {
+            quadratic: root.transpose() * root,
+            linear: SVector::from_fn(|_, _| random.uniform(-1.0, 1.0)),
+        };
+        let [mut found, mut expected] = [StageFactor::<f64, NX, NU>::zeros(); 2];
+        let (mut passed, mut held) = (before, before);
+        eliminate(&ocp, 1, stage, &sides, &mut found, &mut passed).unwrap();
+        let costs = Costs {
+            ocp: &ocp,
+            sides: &sides,
+        };
+        expected
+            .eliminate_adjusted(stage, weights, &mut held, Some(&costs))
+            .unwrap();
+        let input = SVector::<f64, NU>::from_fn(|j, _| [-1.0, 2.0][j % 2]);
+        assert_eq!(found.feedforward, input);
+        assert!(found.inverse_factor.iter().all(|entry| *entry == 0.0));
+        assert_eq!(found.feedback, expected.feedback);
+        assert!((found.feedforward - expected.feedforward).amax() < 1e-12);
+        let size = 1.0 + held.quadratic.amax() + held.linear.amax();
+        assert!((passed.quadratic - held.quadratic).amax() < 1e-14 * size);
+        assert!((passed.linear - held.linear).amax() < 1e-13 * size);
+        // One that is not held is left to the minimum.
+        sides[0].role = Role::Free;
+        eliminate(&ocp, 1, stage, &sides, &mut found, &mut before.clone()).unwrap();
+        assert!(found.feedback.amax() > 0.0);
+    }
+
+    #[test]
+    fn a_stage_whose_inputs_are_all_held_is_passed() {
+        compare::<4, 1>();
+        compare::<5, 3>();
+        compare::<8, 2>();
+        compare::<16, 6>();
     }
 }
