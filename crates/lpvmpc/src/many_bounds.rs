@@ -45,7 +45,8 @@ const NEAR: Patience = Patience {
 };
 /// Of general rows fewer, since each binds inputs and states.
 const NEAR_ROWS: Patience = Patience { few: 8, ..NEAR };
-/// Of the last sample's inputs and states, held, more, since no step of the interior-point method is lost for them.
+/// Of the last sample's inputs and states, held, more where several inputs act together, since no step of the
+/// interior-point method is lost for them.
 const KNOWN: Patience = Patience {
     few: 2,
     guesses: 2,
@@ -259,7 +260,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             guess::again(sides, &solution.active, shift);
             if many && self.retries.are_due() {
                 guess::tail(ocp, &solver.factors, sides, (program.x, shift));
-                let patience = match (rows, side::any_soft(sides)) {
+                let patience = match (rows, NU == 1 || side::any_soft(sides)) {
                     (true, _) => NEAR_ROWS,
                     (_, true) => NEAR,
                     _ => KNOWN,
