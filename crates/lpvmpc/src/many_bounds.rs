@@ -33,7 +33,12 @@ use retries::Retries;
 use side::Role;
 
 /// With so many violated bounds a few factorisations cost less than a pass for each bound.
-const MANY: usize = 32;
+const MANY: usize = 24;
+/// Where some are soft, which takes more factorisations, or those of a single input are known, of which more hold again.
+const MANY_AT_LEAST: usize = 32;
+/// So many of several inputs, and states, that were held by the last answer are worth a guess, which is right more often
+/// than not.
+const FAMILIAR: usize = 20;
 /// And so many inputs that the regulator saturates, where there is one of each stage.
 const MANY_SATURATED: usize = 8;
 /// Of a guess that is to be exchanged, one active side in so many may be wrong, and each must be better than
@@ -202,24 +207,29 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         }
         let known = shift.map_or(0, |_| solution.active.len());
         let (mut violated, mut inputs) = (0, 0);
+        let mut enough = if NU == 1 && known > 0 {
+            MANY_AT_LEAST
+        } else {
+            MANY
+        };
         rows::violated_bounds(ocp, &trajectory(solution), &mut |candidate| {
             violated += 1;
             inputs += usize::from(matches!(candidate.bound.quantity, Quantity::Input(_)));
+            if candidate.soft.is_some() {
+                enough = MANY_AT_LEAST;
+            }
         });
         // Those that the regulator saturates are nearly right where a single input moves the states.
         let saturated = !last_turn && NU == 1 && 2 * inputs > violated && inputs >= MANY_SATURATED;
         // Where several inputs act together, general rows that were active are taken over one by one in less time.
         let rows = NU > 1 && guess::mostly_rows(&solution.active);
         // As a rule most of those that are known hold again, and others are violated only as long as they do not.
-        let expected = if rows || LITTLE * known < violated {
-            violated
-        } else {
-            known
-        };
+        let tells = !rows && LITTLE * known >= violated;
         // No more can hold independently than there are inputs.
-        let expected = expected.min(n * NU);
-        let many = last_turn || expected >= MANY;
-        if !many && !saturated {
+        let expected = if tells { known } else { violated }.min(n * NU);
+        let many = last_turn || expected >= enough;
+        let familiar = tells && enough == MANY && known >= FAMILIAR;
+        if !(many || familiar || saturated) {
             return AtOnce::Untried;
         }
         let Some(count) = side::collect(ocp, &mut self.sides) else {
@@ -258,7 +268,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         let mut found = false;
         if let Some(shift) = shift.filter(|_| known > 0) {
             guess::again(sides, &solution.active, shift);
-            if many && self.retries.are_due() {
+            if (many || familiar) && self.retries.are_due() {
                 guess::tail(ocp, &solver.factors, sides, (program.x, shift));
                 let patience = match (rows, NU == 1 || side::any_soft(sides)) {
                     (true, _) => NEAR_ROWS,
