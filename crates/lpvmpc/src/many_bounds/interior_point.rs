@@ -22,69 +22,48 @@ const NEARLY: f64 = 0.995;
 const LEAST: f64 = 1.0;
 const LEAST_SOFT: f64 = 0.2;
 
-/// The program of a Newton step, of one side.
-#[derive(Clone, Copy)]
-struct Linear<T> {
-    /// Multiplier of d + s at zero, and its slope; the same of s.
-    of_slack: (T, T),
-    of_excess: (T, T),
-    /// Linear price, and the slope of d(cost)/ds with all of its terms; none for a hard side.
-    soft: Option<(T, T)>,
+/// Multiplier of a side at d = 0 in a Newton step towards `target`, and how fast it falls with d.
+#[inline(always)]
+fn multiplier<T: Scalar>(side: &BoundSide<T>, target: Target<T>) -> (T, T) {
+    let at = &side.interior;
+    let of = |value: T, multiplier: T, target: T| {
+        let inverse = T::one() / value;
+        (multiplier + target * inverse, multiplier * inverse)
+    };
+    let (base, weight) = of(at.slack, at.multiplier, target.slack);
+    let Some(price) = side.soft else {
+        return (base, weight);
+    };
+    let (base_of_rest, weight_of_rest) = of(at.excess, at.rest, target.excess);
+    let rest = price.quadratic + weight_of_rest;
+    let share = weight / (weight + rest);
+    (
+        base - share * (base + base_of_rest - price.linear),
+        share * rest,
+    )
 }
 
-impl<T: Scalar> Linear<T> {
-    fn new(side: &BoundSide<T>, target: Target<T>) -> Self {
-        let at = &side.interior;
-        let of = |value: T, multiplier: T, target: T| {
-            let inverse = T::one() / value;
-            (multiplier + target * inverse, multiplier * inverse)
+/// What a side comes to in that step at its distance, where its multiplier at d = 0 is `base`.
+#[inline(always)]
+fn step_to<T: Scalar>(side: &BoundSide<T>, base: T, target: Target<T>) -> Interior<T> {
+    let at = &side.interior;
+    let multiplier = base - side.weight * side.distance;
+    let Some(price) = side.soft else {
+        return Interior {
+            slack: side.distance,
+            multiplier,
+            excess: T::zero(),
+            rest: T::zero(),
         };
-        let of_slack = of(at.slack, at.multiplier, target.slack);
-        let (of_excess, soft) = match side.soft {
-            None => ((T::zero(), T::zero()), None),
-            Some(price) => {
-                let of_excess = of(at.excess, at.rest, target.excess);
-                let slope = price.quadratic + of_slack.1 + of_excess.1;
-                (of_excess, Some((price.linear, slope)))
-            }
-        };
-        Self {
-            of_slack,
-            of_excess,
-            soft,
-        }
-    }
-
-    /// Multiplier at d = 0, and how fast it falls with d.
-    fn multiplier(&self) -> (T, T) {
-        let (base, weight) = self.of_slack;
-        match self.soft {
-            None => (base, weight),
-            Some((price, slope)) => {
-                let share = weight / slope;
-                let rest = slope - weight;
-                (
-                    base - share * (base + self.of_excess.0 - price),
-                    share * rest,
-                )
-            }
-        }
-    }
-
-    /// What the side comes to at the distance d.
-    fn at(&self, distance: T) -> Interior<T> {
-        let (base, weight) = self.of_slack;
-        let excess = match self.soft {
-            None => T::zero(),
-            Some((price, slope)) => (base + self.of_excess.0 - price - weight * distance) / slope,
-        };
-        let slack = distance + excess;
-        Interior {
-            slack,
-            multiplier: base - weight * slack,
-            excess,
-            rest: self.of_excess.0 - self.of_excess.1 * excess,
-        }
+    };
+    // The products' linearisation, and how slack and excess, and both multipliers, belong together.
+    let slack = at.slack + (target.slack - at.slack * multiplier) / at.multiplier;
+    let excess = slack - side.distance;
+    Interior {
+        slack,
+        multiplier,
+        excess,
+        rest: price.linear + price.quadratic * excess - multiplier,
     }
 }
 
@@ -247,7 +226,7 @@ impl<T: Scalar> InteriorPoint<T> {
         let mut prediction = Prediction::begin();
         for side in sides.iter_mut() {
             let at = &side.interior;
-            let to = Linear::new(side, Target::zero()).at(side.distance);
+            let to = step_to(side, side.base, Target::zero());
             // What goes to zero first, relative to where it is.
             let holds = to.slack * at.multiplier < to.multiplier * at.slack;
             let exceeded = side.soft.is_some() && to.rest * at.excess < to.excess * at.rest;
@@ -284,12 +263,12 @@ impl<T: Scalar> InteriorPoint<T> {
                 slack: center - side.target.slack,
                 excess: center - side.target.excess,
             };
-            let (base, _) = Linear::new(side, side.target).multiplier();
+            let (base, _) = multiplier(side, side.target);
             side.estimate = base - side.base;
         }
         newton::shift(ocp, factors, sides, |side| side.estimate, v, (u, x));
         newton::measure(ocp, sides, &Trajectory { x, u });
-        let corrected = |side: &BoundSide<T>| Linear::new(side, side.target).at(side.distance);
+        let corrected = |side: &BoundSide<T>| step_to(side, side.base + side.estimate, side.target);
         let mut part = Part::far();
         for side in sides.iter() {
             part.keep_above_zero(&side.interior, &corrected(side), side.soft.is_some());
@@ -310,7 +289,7 @@ fn weigh<T: Scalar>(sides: &mut [BoundSide<T>]) {
     for side in sides {
         side.last_role = side.role;
         side.role = Role::Free;
-        (side.base, side.weight) = Linear::new(side, Target::zero()).multiplier();
+        (side.base, side.weight) = multiplier(side, Target::zero());
     }
 }
 
