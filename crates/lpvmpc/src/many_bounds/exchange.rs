@@ -59,7 +59,7 @@ pub(super) type Places<'a, T, const NX: usize, const NU: usize> = (
 pub(super) struct Patience {
     /// One active side in so many may be wrong at first.
     pub few: usize,
-    /// So many guesses may be hardly better than the one before, or up to twice as bad,
+    /// So many guesses may be hardly better than the one before,
     pub guesses: usize,
     /// as long as no more sides than these are wrong.
     pub wrong: usize,
@@ -121,7 +121,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
         // A guess from near by is right after a few exchanges, each of which leaves fewer sides wrong.
         if wrong <= most {
             most = wrong - wrong / 4;
-        } else if patience.guesses > 0 && wrong <= patience.wrong && wrong / 2 <= last {
+        } else if patience.guesses > 0 && wrong <= patience.wrong {
             patience.guesses -= 1;
         } else {
             break;

@@ -484,6 +484,27 @@ fn known_saturated_inputs_save_a_fifth() {
     assert!(5 * with < 4 * without, "{with} for {without}");
 }
 
+/// Inputs that go in circles, exchanged all at once, are exchanged by halves: no sample takes long. All at once, two
+/// of these take 11 and 12 factorisations.
+#[test]
+fn inputs_that_go_in_circles_are_exchanged_by_halves() {
+    for seed in 1..9 {
+        let recipe = Recipe {
+            kind: Kind::Inputs,
+            horizon: 20,
+            samples: 12,
+            share: 0.8,
+            seed,
+        };
+        let sequence = recipe.make::<12, 4>().unwrap();
+        let mut warm = Loop::new(20);
+        for ocp in &sequence.problems {
+            let changes = warm.changes(WarmStart::Shifted, core::slice::from_ref(ocp));
+            assert!(changes < 10 * (12 + 4), "{seed}: {changes}");
+        }
+    }
+}
+
 /// Memory of the first phase for shorter horizons changes nothing for longer ones.
 #[test]
 fn too_little_memory_for_bounds_at_once_is_none() {
