@@ -58,19 +58,18 @@ fn eliminate<T: Scalar, const NX: usize, const NU: usize>(
     Ok(())
 }
 
-/// The input of a stage, if all of it is held and nothing else of it is bounded.
+/// The input of a stage, if all of it is held and there are no rows.
 fn constant_input<T: Scalar, const NU: usize>(sides: &[BoundSide<T>]) -> Option<SVector<T, NU>> {
     let mut held = 0;
     let mut input = SVector::zeros();
-    for side in sides.iter().rev() {
-        match side.bound.quantity {
-            Quantity::Input(j) if side.role == Role::Held => {
+    for bound in sides.chunk_by(is_same_quantity) {
+        match bound.first()?.bound.quantity {
+            Quantity::Input(j) => {
+                input[j] = bound.iter().find(|side| side.role == Role::Held)?.limit;
                 held += 1;
-                input[j] = side.limit;
             }
-            Quantity::Input(_) => {}
             Quantity::Row(_) => return None,
-            Quantity::State(_) => break,
+            Quantity::State(_) => {}
         }
     }
     (held == NU).then_some(input)
@@ -436,11 +435,16 @@ mod tests {
         let size = 1.0 + held.quadratic.amax() + held.linear.amax();
         assert!((passed.quadratic - held.quadratic).amax() < 1e-14 * size);
         assert!((passed.linear - held.linear).amax() < 1e-13 * size);
-        // One that is not held is left to the minimum.
-        sides[0].role = Role::Free;
+        // One that is not held is left to the minimum, though another be held on both sides.
+        for side in &mut sides {
+            side.role = match side.input() {
+                Some(0) => Role::Free,
+                _ => Role::Held,
+            };
+        }
         let eliminated = eliminate(&ocp, 1, stage, &sides, &mut found, &mut before.clone());
         assert_eq!(eliminated, Ok(()));
-        assert!(found.feedback.amax() > 0.0);
+        assert!(found.feedback.row(0).amax() > 0.0);
     }
 
     #[test]
