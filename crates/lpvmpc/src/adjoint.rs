@@ -3,6 +3,7 @@
 use crate::model::Scalar;
 use crate::ocp::{Common, Ocp};
 use crate::rows::{self, Trajectory};
+use crate::small_matrix::transposed_sizes;
 use crate::solution::ActiveSet;
 use nalgebra::SVector;
 
@@ -71,7 +72,7 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> Adjoint<'a, T, NX, NU> {
             stage: self.stage,
             costate,
             gradient,
-            dynamics: stage.b.abs().tr_mul(&costate.abs()),
+            dynamics: transposed_sizes(&stage.b, &costate),
             rows: rows_u,
         })
     }

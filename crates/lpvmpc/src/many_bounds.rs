@@ -34,8 +34,9 @@ use side::Role;
 
 /// With so many violated bounds a few factorisations cost less than a pass for each bound.
 const MANY: usize = 24;
-/// Where some are soft, which takes more factorisations, or those of a single input are known, of which more hold again.
-const MANY_AT_LEAST: usize = 32;
+/// So many where some are soft, which takes more factorisations, or those of a single input are known, with which the
+/// dual method begins.
+const MORE: usize = 32;
 /// So many of several inputs, and states, that were held by the last answer are worth a guess, which is right more often
 /// than not.
 const FAMILIAR: usize = 20;
@@ -207,16 +208,12 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         }
         let known = shift.map_or(0, |_| solution.active.len());
         let (mut violated, mut inputs) = (0, 0);
-        let mut enough = if NU == 1 && known > 0 {
-            MANY_AT_LEAST
-        } else {
-            MANY
-        };
+        let mut enough = if NU == 1 && known > 0 { MORE } else { MANY };
         rows::violated_bounds(ocp, &trajectory(solution), &mut |candidate| {
             violated += 1;
             inputs += usize::from(matches!(candidate.bound.quantity, Quantity::Input(_)));
             if candidate.soft.is_some() {
-                enough = MANY_AT_LEAST;
+                enough = MORE;
             }
         });
         // Those that the regulator saturates are nearly right where a single input moves the states.

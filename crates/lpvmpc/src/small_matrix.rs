@@ -161,7 +161,7 @@ pub(crate) fn transposed_sizes<T: Scalar, const R: usize, const C: usize>(
     out
 }
 
-/// The size of the largest entry.
+/// The size of the largest entry. nalgebra's own, with its `abs`, takes a tenth of the time of a guess with 16 states.
 #[inline(always)]
 pub(crate) fn largest<T: Scalar, const R: usize>(v: &SVector<T, R>) -> T {
     let sizes = v.data.0[0].iter().map(|entry| entry.abs());
