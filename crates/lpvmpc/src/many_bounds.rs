@@ -11,9 +11,11 @@
 mod exchange;
 mod guess;
 mod interior_point;
+mod last_answer;
 mod newton;
 mod retries;
 mod side;
+mod span;
 
 pub(crate) use side::BoundSide;
 
@@ -28,9 +30,11 @@ use crate::solver::{Solver, clip_inputs, infeasible, roll_forward, trajectory};
 use crate::working_set::{copy, first, first_mut};
 use exchange::{Patience, Program, Tolerances, exchange};
 use interior_point::{Foretold, InteriorPoint};
+use last_answer::{Kind, LastAnswer};
 use nalgebra::{SVector, convert};
 use retries::Retries;
 use side::Role;
+use span::Span;
 
 /// With so many violated bounds a few factorisations cost less than a pass for each bound.
 const MANY: usize = 24;
@@ -49,8 +53,6 @@ const NEAR: Patience = Patience {
     guesses: 2,
     wrong: 4,
 };
-/// Of general rows fewer, since each binds inputs and states.
-const NEAR_ROWS: Patience = Patience { few: 8, ..NEAR };
 /// Of the last sample's inputs and states, held, more where several inputs act together, since no step of the
 /// interior-point method is lost for them.
 const KNOWN: Patience = Patience {
@@ -233,29 +235,36 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             return AtOnce::Untried;
         };
         let sides = first_mut(&mut self.sides, count);
-        newton::measure(ocp, sides, &trajectory(solution));
+        let whole = Span::whole(ocp);
+        newton::measure(&whole, sides, &trajectory(solution));
         let scale = largest_cost(ocp, solution);
         let tolerances = Tolerances {
             violation: solver.dual.tolerance,
+            scale,
             penalty: scale * T::default_epsilon().powf(convert(-0.4)),
         };
         let factorisations = match turn {
             Turn::First => MOST_FACTORISATIONS.max(expected / BOUNDS),
             Turn::Last => MOST_FACTORISATIONS,
         };
+        let trials = factorisations.div_ceil(TRIAL);
         let work = factorisations * (NX + NU);
         let cap = match turn {
             Turn::First => work.min(solver.dual.changes_left() / SHARE),
             Turn::Last => *spent + work,
         };
-        let mut changes = || {
-            let allowed = *spent + NX + NU <= cap;
-            *spent += if allowed { NX + NU } else { 0 };
+        let (before, mut factorised) = (*spent, 0);
+        let mut count = |stages: usize| {
+            let with_these = before + ((NX + NU) * (factorised + stages)).div_ceil(n);
+            let allowed = with_these <= cap;
+            if allowed {
+                (factorised, *spent) = (factorised + stages, with_these);
+            }
             allowed
         };
         let [place, spare] = &mut self.places;
         let mut program = Program {
-            ocp,
+            span: whole,
             v: &mut solver.dual.v,
             factors: &mut place.factors,
             u: &mut place.u,
@@ -266,36 +275,34 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         if let Some(shift) = shift.filter(|_| known > 0) {
             guess::again(sides, &solution.active, shift);
             if (many || familiar) && self.retries.are_due() {
-                guess::tail(ocp, &solver.factors, sides, (program.x, shift));
-                let patience = match (rows, NU == 1 || side::any_soft(sides)) {
-                    (true, _) => NEAR_ROWS,
-                    (_, true) => NEAR,
-                    _ => KNOWN,
+                let last = LastAnswer {
+                    kind: match (rows, NU > 1 && side::any_soft(sides)) {
+                        (true, _) => Kind::Rows,
+                        (false, true) => Kind::Soft,
+                        (false, false) => Kind::Simple,
+                    },
+                    shift,
+                    trials,
                 };
-                found = exchange(&mut program, sides, &tolerances, patience, &mut changes);
+                let factors = &solver.factors;
+                let proof = &mut solution.active;
+                found = last.repeat(&mut program, sides, &tolerances, factors, proof, &mut count);
                 self.retries.learn(found);
             }
         }
         if !found && saturated {
             sides.iter_mut().for_each(|side| side.role = Role::Free);
             guess::saturated(ocp, &solver.factors, sides, (0, ocp.x0));
-            found = exchange(&mut program, sides, &tolerances, FAR, &mut changes);
+            found = exchange(&mut program, sides, &tolerances, FAR, || count(n));
         }
         let outcome = if found {
             Some(Ok(()))
         } else if !many {
             None
         } else {
-            newton::measure(ocp, sides, &trajectory(solution));
-            let (proof, trials) = (&mut solution.active, factorisations.div_ceil(TRIAL));
-            search(
-                &mut program,
-                sides,
-                &tolerances,
-                (scale, trials),
-                proof,
-                &mut changes,
-            )
+            newton::measure(&whole, sides, &trajectory(solution));
+            let proof = &mut solution.active;
+            search(&mut program, sides, &tolerances, trials, proof, || count(n))
         };
         let outcome = match outcome {
             Some(Ok(())) => {
@@ -324,29 +331,29 @@ fn search<T: Scalar, const NX: usize, const NU: usize>(
     program: &mut Program<'_, T, NX, NU>,
     sides: &mut [BoundSide<T>],
     tolerances: &Tolerances<T>,
-    (scale, mut trials): (T, usize),
+    mut trials: usize,
     proof: &mut ActiveSet<T>,
-    changes: &mut impl FnMut() -> bool,
+    mut count: impl FnMut() -> bool,
 ) -> Option<Result<(), Status<T>>> {
-    let ocp = program.ocp;
+    let span = program.span;
     let certain = match side::any_soft(sides) {
         true => CERTAIN_SOFT,
         false => CERTAIN,
     };
-    let mut method = InteriorPoint::new(sides, scale * convert(CENTRE));
+    let mut method = InteriorPoint::new(sides, tolerances.scale * convert(CENTRE));
     let mut part = T::zero();
     let mut stuck = 0_usize;
-    while trials > 0 && changes() {
-        let predicted = method.predict(ocp, sides, program.factors, (program.u, program.x));
+    while trials > 0 && count() {
+        let predicted = method.predict(&span, sides, program.factors, (program.u, program.x));
         let Foretold { changed, active } = predicted.ok()?;
         if part > convert(FREE) && certain * changed <= active {
             trials -= 1;
-            if method.try_foretold(program, sides, tolerances, &mut *changes) {
+            if method.try_foretold(program, sides, tolerances, &mut count) {
                 return Some(Ok(()));
             }
         }
         part = method.correct(
-            ocp,
+            &span,
             sides,
             program.factors,
             program.v,
@@ -359,7 +366,7 @@ fn search<T: Scalar, const NX: usize, const NU: usize>(
             // they are takes as long as a step.
             if ended || stuck.is_power_of_two() {
                 list_multipliers(sides, proof);
-                if let Some(infeasible) = infeasible(ocp, proof) {
+                if let Some(infeasible) = infeasible(span.ocp, proof) {
                     return Some(Err(infeasible));
                 }
             }
@@ -399,7 +406,7 @@ fn report<T: Scalar, const NX: usize, const NU: usize>(
     sides: &[BoundSide<T>],
     solution: &mut Solution<T, NX, NU>,
 ) -> bool {
-    let ocp = program.ocp;
+    let ocp = program.span.ocp;
     let n = ocp.length();
     let listed = list(sides, &mut solution.active);
     copy(first_mut(&mut solution.u, n), program.u);

@@ -7,8 +7,8 @@
 
 use super::newton;
 use super::side::{BoundSide, Role};
+use super::span::Span;
 use crate::model::Scalar;
-use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
 use crate::rows::Trajectory;
 use core::mem::swap;
@@ -22,13 +22,15 @@ const REFINEMENTS: usize = 10;
 pub(super) struct Tolerances<T> {
     /// Relative violation that counts as none.
     pub violation: T,
+    /// The size of a stage's cost.
+    pub scale: T,
     /// Weight of the distance of a side that is held, in cost per square of its size.
     pub penalty: T,
 }
 
 /// What the search works on.
 pub(super) struct Program<'a, T: 'static, const NX: usize, const NU: usize> {
-    pub ocp: &'a Ocp<T, NX, NU>,
+    pub span: Span<'a, T, NX, NU>,
     pub v: &'a mut [SVector<T, NU>],
     pub factors: &'a mut [StageFactor<T, NX, NU>],
     pub u: &'a mut [SVector<T, NU>],
@@ -90,10 +92,10 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
                 Role::Exceeded => (side.price(), side.curvature()),
             };
         }
-        if newton::factorize(program.ocp, sides, program.factors).is_err() {
+        if newton::factorize(&program.span, sides, program.factors).is_err() {
             return false;
         }
-        newton::roll_out(program.ocp, program.factors, (program.u, program.x));
+        newton::roll_out(&program.span, program.factors, (program.u, program.x));
         measure(program, sides);
         for side in sides.iter_mut().filter(|side| side.is_weighted()) {
             side.base = side.multiplier_at(side.distance);
@@ -121,7 +123,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
         // A guess from near by is right after a few exchanges, each of which leaves fewer sides wrong.
         if wrong <= most {
             most = wrong - wrong / 4;
-        } else if patience.guesses > 0 && wrong <= patience.wrong {
+        } else if last < usize::MAX && patience.guesses > 0 && wrong <= patience.wrong {
             patience.guesses -= 1;
         } else {
             break;
@@ -145,7 +147,7 @@ fn measure<T: Scalar, const NX: usize, const NU: usize>(
         x: program.x,
         u: program.u,
     };
-    newton::measure(program.ocp, sides, &trajectory);
+    newton::measure(&program.span, sides, &trajectory);
     let rounding = T::default_epsilon() * convert(8.0);
     for side in sides.iter_mut().filter(|side| side.role == Role::Held) {
         if side.distance.abs() <= rounding * side.size {
@@ -162,7 +164,7 @@ fn explain<T: Scalar, const NX: usize, const NU: usize>(
         x: program.x,
         u: program.u,
     };
-    newton::explain(program.ocp, sides, &trajectory, program.v)
+    newton::explain(&program.span, sides, &trajectory, program.v)
 }
 
 /// Moves to the minimum with the sides as they are, until what is left is `enough` or does not shrink, from a point
@@ -174,6 +176,7 @@ fn refine<T: Scalar, const NX: usize, const NU: usize>(
     (enough, tolerance): (T, T),
 ) -> bool {
     let mut last: T = convert(f64::INFINITY);
+    let mut stalled = false;
     for _ in 0..REFINEMENTS {
         let held = sides.iter().filter(|side| side.role == Role::Held);
         let missed = held.fold(T::zero(), |most, side| {
@@ -184,13 +187,16 @@ fn refine<T: Scalar, const NX: usize, const NU: usize>(
         if worst <= enough {
             return true;
         }
-        if !(worst < last * convert(0.5)) {
+        let shrinks = worst < last * convert(0.5);
+        // Rounding may hide what one pass has done, not what two have.
+        if !shrinks && stalled {
             return worst <= tolerance;
         }
+        stalled = !shrinks;
         last = worst;
         let trajectory = (&mut *program.u, &mut *program.x);
-        newton::descend(program.ocp, program.factors, program.v);
-        newton::deviate(program.ocp, program.factors, program.v, trajectory, sides);
+        newton::descend(&program.span, program.factors, program.v);
+        newton::deviate(&program.span, program.factors, program.v, trajectory, sides);
         measure(program, sides);
         *residual = explain(program, sides);
     }

@@ -7,9 +7,8 @@ use crate::riccati::StageFactor;
 use crate::solution::{ActiveRow, ActiveSet, Part, Quantity};
 use nalgebra::SVector;
 
-/// Of a single input, one stage in so many is at the end of the horizon, of which the regulator tells more than the
-/// last answer.
-const TAIL: usize = 8;
+/// One stage in so many is at the end of the horizon, of which the last answer knows least.
+pub(super) const TAIL: usize = 8;
 
 /// The inputs of the stages from `begin` on that the regulator without bounds drives into them from `x`, when
 /// they are bounded. Of all sides there.

@@ -7,9 +7,9 @@
 
 use super::exchange::{Program, Tolerances, exchange};
 use super::side::{BoundSide, Interior, Role, Target};
+use super::span::Span;
 use super::{NEAR, newton};
 use crate::model::Scalar;
-use crate::ocp::Ocp;
 use crate::riccati::{BadPivot, StageFactor};
 use crate::rows::Trajectory;
 use nalgebra::{SVector, convert};
@@ -181,15 +181,15 @@ impl<T: Scalar> InteriorPoint<T> {
     /// side the role that it foretells.
     pub fn predict<const NX: usize, const NU: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU>,
+        span: &Span<'_, T, NX, NU>,
         sides: &mut [BoundSide<T>],
         factors: &mut [StageFactor<T, NX, NU>],
         (u, x): (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
     ) -> Result<Foretold, BadPivot<T>> {
         weigh(sides);
-        newton::factorize(ocp, sides, factors)?;
-        newton::roll_out(ocp, factors, (u, x));
-        Ok(self.foretell(ocp, sides, &Trajectory { x, u }))
+        newton::factorize(span, sides, factors)?;
+        newton::roll_out(span, factors, (u, x));
+        Ok(self.foretell(span, sides, &Trajectory { x, u }))
     }
 
     /// Tries the roles that the prediction in `program` foretells, in its other places; whether they, or what they are
@@ -208,17 +208,17 @@ impl<T: Scalar> InteriorPoint<T> {
         program.change_places();
         weigh(sides);
         let (x, u) = (&*program.x, &*program.u);
-        self.foretell(program.ocp, sides, &Trajectory { x, u });
+        self.foretell(&program.span, sides, &Trajectory { x, u });
         false
     }
 
     fn foretell<const NX: usize, const NU: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU>,
+        span: &Span<'_, T, NX, NU>,
         sides: &mut [BoundSide<T>],
         trajectory: &Trajectory<'_, T, NX, NU>,
     ) -> Foretold {
-        newton::measure(ocp, sides, trajectory);
+        newton::measure(span, sides, trajectory);
         let mut foretold = Foretold {
             changed: 0,
             active: 0,
@@ -248,7 +248,7 @@ impl<T: Scalar> InteriorPoint<T> {
     /// as they stay above zero. Returns that part of the way.
     pub fn correct<const NX: usize, const NU: usize>(
         &mut self,
-        ocp: &Ocp<T, NX, NU>,
+        span: &Span<'_, T, NX, NU>,
         sides: &mut [BoundSide<T>],
         factors: &[StageFactor<T, NX, NU>],
         v: &mut [SVector<T, NU>],
@@ -266,8 +266,8 @@ impl<T: Scalar> InteriorPoint<T> {
             let (base, _) = multiplier(side, side.target);
             side.estimate = base - side.base;
         }
-        newton::shift(ocp, factors, sides, |side| side.estimate, v, (u, x));
-        newton::measure(ocp, sides, &Trajectory { x, u });
+        newton::shift(span, factors, sides, |side| side.estimate, v, (u, x));
+        newton::measure(span, sides, &Trajectory { x, u });
         let corrected = |side: &BoundSide<T>| step_to(side, side.base + side.estimate, side.target);
         let mut part = Part::far();
         for side in sides.iter() {
@@ -356,7 +356,7 @@ fn along<T: Scalar>(at: &Interior<T>, to: &Interior<T>, part: Part<T>) -> Interi
 mod tests {
     use super::*;
     use crate::many_bounds::side;
-    use crate::ocp::{Bounds, Penalty};
+    use crate::ocp::{Bounds, Ocp, Penalty};
     use alloc::vec;
     use alloc::vec::Vec;
     use nalgebra::{Matrix2, Vector1, Vector2};
@@ -395,6 +395,7 @@ mod tests {
         sides.truncate(count);
         let tolerances = Tolerances {
             violation: 1e-10,
+            scale: 1.0,
             penalty: 1e6,
         };
         let place = || {
@@ -406,12 +407,13 @@ mod tests {
         };
         let ((mut factors, mut u, mut x), mut spare) = (place(), place());
         let mut v = u.clone();
-        newton::factorize(&ocp, &sides, &mut factors).unwrap();
-        newton::roll_out(&ocp, &factors, (&mut u, &mut x));
-        newton::measure(&ocp, &mut sides, &Trajectory { x: &x, u: &u });
+        let span = Span::whole(&ocp);
+        newton::factorize(&span, &sides, &mut factors).unwrap();
+        newton::roll_out(&span, &factors, (&mut u, &mut x));
+        newton::measure(&span, &mut sides, &Trajectory { x: &x, u: &u });
         let mut method = InteriorPoint::new(&mut sides, 1.0);
         let mut program = Program {
-            ocp: &ocp,
+            span,
             v: &mut v,
             factors: &mut factors,
             u: &mut u,
@@ -420,7 +422,7 @@ mod tests {
         };
         for _ in 0..2 {
             method
-                .predict(&ocp, &mut sides, program.factors, (program.u, program.x))
+                .predict(&span, &mut sides, program.factors, (program.u, program.x))
                 .unwrap();
             let of = |side: &BoundSide<f64>| {
                 let numbers = [side.base, side.weight, side.distance, side.estimate];
@@ -445,7 +447,7 @@ mod tests {
             assert_eq!(step(&program, &sides), before);
             assert_eq!(method.prediction.change(), change);
             let trajectory = (&mut *program.u, &mut *program.x);
-            method.correct(&ocp, &mut sides, program.factors, program.v, trajectory);
+            method.correct(&span, &mut sides, program.factors, program.v, trajectory);
         }
     }
 }

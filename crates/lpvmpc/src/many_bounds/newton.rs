@@ -2,6 +2,7 @@
 //! trajectory, and what is missing for a minimum.
 
 use super::side::{BoundSide, Role, split_first_mut, split_off, split_off_mut};
+use super::span::Span;
 use crate::model::Scalar;
 use crate::ocp::{Common, Ocp, Stage};
 use crate::riccati::{Adjustment, BadPivot, CostToGo, StageFactor, StageMinimum};
@@ -15,19 +16,20 @@ use nalgebra::SVector;
 
 /// The factors of the problem with the cost of every side's multiplier; inputs that are held are constants.
 pub(super) fn factorize<T: Scalar, const NX: usize, const NU: usize>(
-    ocp: &Ocp<T, NX, NU>,
+    span: &Span<'_, T, NX, NU>,
     sides: &[BoundSide<T>],
     factors: &mut [StageFactor<T, NX, NU>],
 ) -> Result<(), BadPivot<T>> {
-    let n = ocp.length();
+    let ocp = span.ocp;
     let mut cost_to_go = CostToGo {
         quadratic: ocp.terminal.p,
         linear: ocp.terminal.linear_x,
     };
     let mut before = sides;
-    add_to_cost(ocp, split_off(&mut before, n), &mut cost_to_go);
-    let stages = ocp.stages.iter().zip(factors.iter_mut());
-    for (i, (stage, factor)) in stages.enumerate().take(n).rev() {
+    let end = split_off(&mut before, ocp.length());
+    add_to_cost(ocp, end, &mut cost_to_go);
+    let stages = span.stages().zip(span.of_mut(factors));
+    for ((i, stage), factor) in stages.rev() {
         let here = split_off(&mut before, i);
         eliminate(ocp, i, stage, here, factor, &mut cost_to_go)?;
         add_to_cost(ocp, here, &mut cost_to_go);
@@ -169,15 +171,15 @@ fn weight_and_pull<T: Scalar>(sides: &[BoundSide<T>]) -> (T, T) {
 
 /// The trajectory of the factors' policies, and the distance of every side on it.
 pub(super) fn roll_out<T: Scalar, const NX: usize, const NU: usize>(
-    ocp: &Ocp<T, NX, NU>,
+    span: &Span<'_, T, NX, NU>,
     factors: &[StageFactor<T, NX, NU>],
     (u, x): (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
 ) {
     let at_rest = SVector::zeros();
-    let mut state = ocp.x0;
-    let places = u.iter_mut().zip(x.iter_mut());
-    let stages = ocp.stages.iter().zip(factors).zip(places);
-    for ((stage, factor), (u, x)) in stages.take(ocp.length()) {
+    let mut state = span.start;
+    let places = span.of_mut(u).iter_mut().zip(span.of_mut(x));
+    let stages = span.stages().zip(span.of(factors)).zip(places);
+    for (((_, stage), factor), (u, x)) in stages {
         *u = factor.policy(&state, &at_rest);
         state = stage.next(&state, u);
         *x = state;
@@ -186,12 +188,13 @@ pub(super) fn roll_out<T: Scalar, const NX: usize, const NU: usize>(
 
 /// The distances of all sides on a trajectory.
 pub(super) fn measure<T: Scalar, const NX: usize, const NU: usize>(
-    ocp: &Ocp<T, NX, NU>,
+    span: &Span<'_, T, NX, NU>,
     sides: &mut [BoundSide<T>],
     trajectory: &Trajectory<'_, T, NX, NU>,
 ) {
+    let ocp = span.ocp;
     let n = ocp.length();
-    let (mut at, mut x) = (0, ocp.x0);
+    let (mut at, mut x) = (span.begin, &span.start);
     for sides in sides.chunk_by_mut(is_same_quantity) {
         let Some(side) = sides.first() else {
             continue;
@@ -199,10 +202,10 @@ pub(super) fn measure<T: Scalar, const NX: usize, const NU: usize>(
         let stage = side.bound.stage;
         if stage != at {
             at = stage;
-            x = trajectory.state(ocp, stage);
+            x = span.state(trajectory, stage);
         }
         let u = trajectory.u.get(stage).filter(|_| stage < n);
-        let value = side.value(ocp, &x, u);
+        let value = side.value(ocp, x, u);
         for side in sides {
             side.distance = side.distance_of(value);
         }
@@ -235,23 +238,24 @@ fn gradient<T: Scalar, const NX: usize, const NU: usize>(
 
 /// Adds to the trajectory what `change` of the sides' multipliers makes of its minimum.
 pub(super) fn shift<T: Scalar, const NX: usize, const NU: usize>(
-    ocp: &Ocp<T, NX, NU>,
+    span: &Span<'_, T, NX, NU>,
     factors: &[StageFactor<T, NX, NU>],
     sides: &[BoundSide<T>],
     change: impl Fn(&BoundSide<T>) -> T,
     v: &mut [SVector<T, NU>],
     trajectory: (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
 ) {
-    let n = ocp.length();
+    let ocp = span.ocp;
     let mut before = sides;
-    let (mut costate, _) = gradient(ocp, split_off(&mut before, n), &change);
-    let stages = ocp.stages.iter().zip(factors).zip(v.iter_mut());
-    for (i, ((stage, factor), v)) in stages.enumerate().take(n).rev() {
+    let end = split_off(&mut before, ocp.length());
+    let (mut costate, _) = gradient(ocp, end, &change);
+    let stages = span.stages().zip(span.of(factors)).zip(span.of_mut(v));
+    for (((i, stage), factor), v) in stages.rev() {
         let (slope_x, slope_u) = gradient(ocp, split_off(&mut before, i), &change);
         *v = step_back(stage, factor, &slope_u, &mut costate);
         costate += slope_x;
     }
-    deviate(ocp, factors, v, trajectory, &mut []);
+    deviate(span, factors, v, trajectory, &mut []);
 }
 
 /// The deviation that takes the gradient `slope` in the input, and what the costate means for it, away; the
@@ -272,17 +276,17 @@ fn step_back<T: Scalar, const NX: usize, const NU: usize>(
 /// up what their weight makes of the distance after it: of the change itself, since the change of a sum is
 /// lost in rounding.
 pub(super) fn deviate<T: Scalar, const NX: usize, const NU: usize>(
-    ocp: &Ocp<T, NX, NU>,
+    span: &Span<'_, T, NX, NU>,
     factors: &[StageFactor<T, NX, NU>],
     v: &[SVector<T, NU>],
     (u, x): (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
     mut sides: &mut [BoundSide<T>],
 ) {
-    let n = ocp.length();
+    let ocp = span.ocp;
     let mut change = SVector::zeros();
-    let places = u.iter_mut().zip(x.iter_mut());
-    let stages = ocp.stages.iter().zip(factors).zip(v).zip(places);
-    for (i, (((stage, factor), v), (u, x))) in stages.enumerate().take(n) {
+    let places = span.of_mut(u).iter_mut().zip(span.of_mut(x));
+    let stages = span.stages().zip(span.of(factors));
+    for ((((i, stage), factor), v), (u, x)) in stages.zip(span.of(v)).zip(places) {
         let input =
             product(&factor.feedback, &change) + transposed_product(&factor.inverse_factor, v);
         take_up(ocp, split_first_mut(&mut sides, i), &change, Some(&input));
@@ -317,11 +321,12 @@ pub(super) struct Residual<T> {
 /// distances: gives every held input its multiplier, and leaves in `slopes` what is left of the gradient in
 /// the inputs.
 pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
-    ocp: &Ocp<T, NX, NU>,
+    span: &Span<'_, T, NX, NU>,
     sides: &mut [BoundSide<T>],
     trajectory: &Trajectory<'_, T, NX, NU>,
     slopes: &mut [SVector<T, NU>],
 ) -> Residual<T> {
+    let ocp = span.ocp;
     let n = ocp.length();
     let mut residual = Residual {
         rest: T::zero(),
@@ -335,19 +340,18 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
     let end = split_off_mut(&mut before, n);
     let (mut costate, _) = gradient(ocp, end, of_rows);
     end.iter_mut().for_each(|side| side.estimate = side.base);
-    let of_cost = ocp.terminal.p * trajectory.state(ocp, n) + ocp.terminal.linear_x;
+    let of_cost = ocp.terminal.p * span.state(trajectory, n) + ocp.terminal.linear_x;
     // The sizes of what adds up to the costate, and cancels where the sides decide.
     let mut sizes = costate.abs() + of_cost.abs();
     costate += of_cost;
-    let stages = ocp.stages.iter().zip(slopes.iter_mut());
-    for (i, (stage, left)) in stages.enumerate().take(n).rev() {
+    for ((i, stage), left) in span.stages().zip(span.of_mut(slopes)).rev() {
         let here = split_off_mut(&mut before, i);
         let (slope_x, slope_u) = gradient(ocp, here, of_rows);
-        let (x, u) = (trajectory.state(ocp, i), trajectory.u.get(i));
+        let (x, u) = (span.state(trajectory, i), trajectory.u.get(i));
         let u = u.copied().unwrap_or_else(SVector::zeros);
         let Common { q, r, s, .. } = ocp.common_at(i);
         let through = transposed_times(&stage.b, &costate);
-        let mut slope = product(r, &u) + product(s, &x) + stage.linear_u + through + slope_u;
+        let mut slope = product(r, &u) + product(s, x) + stage.linear_u + through + slope_u;
         let terms = largest(&transposed_sizes(&stage.b, &sizes));
         residual.largest = residual.largest.max(terms).max(largest(&slope_u));
         for side in here.iter_mut().filter(|side| side.role == Role::Held) {
@@ -358,7 +362,7 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
         }
         residual.rest = residual.rest.max(largest(&slope));
         costate = transposed_times(&stage.a, &costate)
-            + product(q, &x)
+            + product(q, x)
             + transposed_times(s, &u)
             + stage.linear_x;
         sizes = costate.abs() + slope_x.abs();
@@ -370,13 +374,13 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
 
 /// Makes of a gradient in the inputs, in `v`, the deviations that take it away.
 pub(super) fn descend<T: Scalar, const NX: usize, const NU: usize>(
-    ocp: &Ocp<T, NX, NU>,
+    span: &Span<'_, T, NX, NU>,
     factors: &[StageFactor<T, NX, NU>],
     v: &mut [SVector<T, NU>],
 ) {
     let mut costate = SVector::zeros();
-    let stages = ocp.stages.iter().zip(factors).zip(v.iter_mut());
-    for ((stage, factor), v) in stages.take(ocp.length()).rev() {
+    let stages = span.stages().zip(span.of(factors)).zip(span.of_mut(v));
+    for (((_, stage), factor), v) in stages.rev() {
         *v = step_back(stage, factor, v, &mut costate);
     }
 }

@@ -12,3 +12,4 @@ mod regressions;
 mod relations;
 mod single_precision;
 mod verdicts;
+mod warm_starts;
