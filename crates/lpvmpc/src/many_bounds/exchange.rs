@@ -6,7 +6,7 @@
 //! the multipliers remove what rounding has left in the optimality conditions.
 
 use super::newton;
-use super::side::{BoundSide, Role};
+use super::side::{self, BoundSide, Role};
 use super::span::Span;
 use crate::model::Scalar;
 use crate::riccati::StageFactor;
@@ -79,8 +79,9 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
     let active = sides.iter().filter(|side| side.role != Role::Free).count();
     let mut most = (active / patience.few).max(2);
     let mut last = usize::MAX;
-    // Rounding may have grown along the horizon until what follows from a trajectory as it is goes in circles.
-    let mut careful = false;
+    // Of soft bounds the multipliers decide whether they hold or are exceeded. And rounding may have grown along the
+    // horizon until what follows from a trajectory as it is goes in circles.
+    let mut careful = side::any_soft(sides);
     let loose: T = convert(1e-6);
     let loose = tolerances.violation.max(loose);
     while count() {
