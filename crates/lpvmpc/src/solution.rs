@@ -107,6 +107,8 @@ impl<T: Scalar> ActiveRow<T> {
 pub struct ActiveSet<T: 'static> {
     rows: List<PackedRow<T>>,
     len: usize,
+    /// For so many solves more its rows are not expected to be active again unless they are violated.
+    pub(crate) doubted: u8,
 }
 
 impl<T: Scalar> PartialEq for ActiveSet<T> {
@@ -185,7 +187,11 @@ impl<T: Scalar> PackedRow<T> {
 impl<T: Scalar> ActiveSet<T> {
     /// An empty set in this memory.
     pub fn new(rows: List<PackedRow<T>>) -> Self {
-        Self { rows, len: 0 }
+        Self {
+            rows,
+            len: 0,
+            doubted: 0,
+        }
     }
 
     /// An empty set for so many bounds.
@@ -198,6 +204,7 @@ impl<T: Scalar> ActiveSet<T> {
     pub fn copy_from(&mut self, other: &Self) {
         copy(&mut self.rows, &other.rows);
         self.len = other.len.min(self.rows.len());
+        self.doubted = other.doubted;
     }
 
     /// The active rows, in no particular order.

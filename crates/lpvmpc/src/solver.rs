@@ -43,7 +43,9 @@ fn default_cap<T: Scalar, const NX: usize, const NU: usize>(ocp: &Ocp<T, NX, NU>
     by_rows.max(cap_with_last_turn(NX + NU))
 }
 
-/// Where the search for the active set begins. It changes the time, never the answer.
+/// Where the search for the active set begins. It changes the time, never the answer. Where the previous active set has
+/// been of little use, the next few searches begin with those of its rows alone that the trajectory without bounds
+/// violates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WarmStart {
     /// From nothing.
@@ -56,6 +58,10 @@ pub enum WarmStart {
 
 /// Changes of the active set for every state, input and general row of a stage, by default.
 const CHANGES_PER_ROW: usize = 10;
+/// Up to one change in vain for so many known rows is few. After more of them the known rows are doubted
+const FEW_WASTED: usize = 4;
+/// for so many solves.
+const DOUBT: u8 = 8;
 
 #[inline(never)]
 pub(crate) fn default_tolerance<T: Scalar>() -> T {
@@ -288,9 +294,17 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         if !solution.cost.is_finite() {
             return Err(Status::NotFinite);
         }
+        let known = shift.map_or(0, |_| solution.active.len());
         if !self.dual.report(&mut solution.active) {
             return Err(Status::WorkingSetFull);
         }
+        // A row that had to go again counts twice.
+        let wasted = self.dual.changes.saturating_sub(solution.active.len());
+        let doubted = &mut solution.active.doubted;
+        *doubted = match known > 0 && FEW_WASTED * wasted > known {
+            true => DOUBT,
+            false => doubted.saturating_sub(1),
+        };
         Ok(())
     }
 

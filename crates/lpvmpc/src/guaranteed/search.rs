@@ -267,6 +267,8 @@ where
             warm_start,
             ..self.settings.solver
         };
+        // The plan is followed: what was active in it is active again.
+        workspace.solution.active.doubted = 0;
         workspace
             .solver
             .solve(&workspace.ocp, &settings, &mut workspace.solution);

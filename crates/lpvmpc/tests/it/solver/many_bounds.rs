@@ -87,24 +87,29 @@ impl<const NX: usize, const NU: usize> Both<NX, NU> {
     }
 }
 
+/// What `count` problems show, from nothing; a little later, from the answer; and from a start that is wrong, since no
+/// stage is another one's.
 fn sweep<const NX: usize, const NU: usize, const N: usize, const M: usize>(
     count: u64,
     problem: fn(u64) -> Ocp<f64, NX, NU>,
-) -> Findings {
+) -> [Findings; 3] {
     let mut both = Both::<NX, NU>::new::<N, M>();
-    let mut findings = Findings::default();
+    let mut all = [(); 3].map(|()| Findings::default());
+    let [from_nothing, again, from_wrong] = &mut all;
     for seed in 0..count {
         let mut ocp = problem(seed);
-        both.solve(&ocp, WarmStart::Cold, &mut findings);
-        // A little later.
+        both.solve(&ocp, WarmStart::Cold, from_nothing);
         ocp.x0 *= 0.98;
-        both.solve(&ocp, WarmStart::Shifted, &mut findings);
+        both.solve(&ocp, WarmStart::Same, again);
+        both.solve(&ocp, WarmStart::Shifted, from_wrong);
     }
-    println!("{NX} {NU} {N}: {findings:?}");
-    assert!(findings.many > 20, "{findings:?}");
-    assert!(findings.worst_residual < 1e-8, "{findings:?}");
-    assert!(findings.worst_input < 1e-6, "{findings:?}");
-    findings
+    println!("{NX} {NU} {N}: {all:?}");
+    for findings in &all {
+        assert!(findings.many > 10, "{findings:?}");
+        assert!(findings.worst_residual < 1e-8, "{findings:?}");
+        assert!(findings.worst_input < 1e-6, "{findings:?}");
+    }
+    all
 }
 
 /// Unstable plants with hardly any room; one in three has soft state bounds, one hard ones.
@@ -155,17 +160,20 @@ fn bounds_found_at_once_are_those_found_one_by_one() {
     sweep::<12, 4, 25, 240>(30, hard::<12, 4, 25>);
 }
 
-/// Where the inputs alone are bounded, at least a quarter of the work is saved, a fifth with 8 states and 2
-/// inputs; a guess counts as NX + NU changes, which takes as long.
+/// Where the inputs alone are bounded, at least two fifths of the work are saved, a third with 8 states and 2 inputs; a
+/// guess counts as NX + NU changes, which takes as long. From a start that is wrong it takes up to a third more than from
+/// nothing.
 #[test]
 fn many_inputs_at_once_take_fewer_changes() {
-    let saved = |part: (usize, usize), found: Findings| {
-        let most = found.one_by_one * part.0 / part.1;
-        assert!(found.at_once < most, "{found:?}");
+    let saved = |part: (usize, usize), [from_nothing, again, from_wrong]: [Findings; 3]| {
+        let at_once = from_nothing.at_once + again.at_once;
+        let one_by_one = from_nothing.one_by_one + again.one_by_one;
+        assert!(part.1 * at_once < part.0 * one_by_one);
+        assert!(3 * from_wrong.at_once < 4 * from_nothing.at_once);
     };
-    saved((3, 4), sweep::<4, 1, 60, 240>(40, narrow::<4, 1, 60>));
-    saved((4, 5), sweep::<8, 2, 50, 240>(40, narrow::<8, 2, 50>));
-    saved((3, 4), sweep::<6, 3, 40, 240>(40, narrow::<6, 3, 40>));
+    saved((3, 5), sweep::<4, 1, 60, 240>(40, narrow::<4, 1, 60>));
+    saved((2, 3), sweep::<8, 2, 50, 240>(40, narrow::<8, 2, 50>));
+    saved((3, 5), sweep::<6, 3, 40, 240>(40, narrow::<6, 3, 40>));
 }
 
 /// Sequences of problems as in a loop, four fifths of the bounds active: states, rows, soft states beside
