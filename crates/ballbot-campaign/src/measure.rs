@@ -14,7 +14,7 @@ use std::fmt;
 pub enum Measure {
     /// When the run ended, s.
     EndS,
-    /// Samples without a plan that keeps all bounds.
+    /// Samples whose quadratic program has no answer; a guaranteed loop has a plan all the same.
     Infeasible,
     /// Samples at which the state was outside its bounds.
     Violations,

@@ -124,3 +124,150 @@ impl LastAnswer {
         matches!(answer, Some(Ok(())))
     }
 }
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use crate::list::List;
+    use crate::many_bounds::exchange::Tolerances;
+    use crate::many_bounds::side::{self, Role};
+    use crate::memory::Capacity;
+    use crate::ocp::{Bounds, GeneralRow};
+    use crate::solution::{BoundId, Solution};
+    use crate::solver::{Solver, SolverSettings};
+    use alloc::vec;
+    use lpvmpc_testkit::rng::Rng;
+    use nalgebra::{Matrix2, Vector1, Vector2};
+
+    const N: usize = 14;
+    const BEGIN: usize = 8;
+
+    /// A double integrator with weights, bounds and a row of its own at every stage.
+    fn problem(random: &mut Rng) -> Ocp<f64, 2, 1> {
+        let mut ocp = Ocp::<f64, 2, 1>::allocate(N);
+        ocp.own = List::repeat(ocp.common, N);
+        ocp.rows = List::repeat(GeneralRow::default(), N + 1);
+        ocp.rows_per_stage = 1;
+        for (stage, own) in ocp.stages.iter_mut().zip(ocp.own.iter_mut()) {
+            stage.a = Matrix2::new(1.0, random.uniform(0.1, 0.3), 0.0, 1.0);
+            stage.b = Vector2::new(0.02, random.uniform(0.1, 0.3));
+            stage.linear_x = Vector2::from_fn(|_, _| random.uniform(-3.0, 3.0));
+            own.q = Matrix2::identity() * random.uniform(0.5, 2.0);
+            own.r[(0, 0)] = random.uniform(0.05, 0.2);
+            let limit = random.uniform(0.5, 1.0);
+            own.u = Bounds {
+                lower: Vector1::new(-limit),
+                upper: Vector1::new(limit),
+            };
+            own.x.upper[1] = random.uniform(0.3, 0.6);
+        }
+        for row in ocp.rows.iter_mut() {
+            row.x = Vector2::new(0.3, random.uniform(-1.0, -0.5));
+            row.u[0] = 0.1;
+            row.upper = random.uniform(0.3, 0.5);
+        }
+        ocp.terminal.p = Matrix2::identity();
+        ocp.terminal.x.upper[0] = 0.5;
+        ocp
+    }
+
+    /// The last stages, as a problem that knows nothing of the others.
+    fn shorter(ocp: &Ocp<f64, 2, 1>, start: Vector2<f64>) -> Ocp<f64, 2, 1> {
+        let length = N - BEGIN;
+        let mut end = Ocp::<f64, 2, 1>::allocate(length);
+        end.x0 = start;
+        end.stages.copy_from_slice(&ocp.stages[BEGIN..]);
+        end.own = List::repeat(ocp.common, length);
+        end.own.copy_from_slice(&ocp.own[BEGIN..]);
+        end.rows = List::repeat(GeneralRow::default(), length + 1);
+        end.rows.copy_from_slice(&ocp.rows[BEGIN..]);
+        end.rows_per_stage = 1;
+        end.terminal = ocp.terminal;
+        end
+    }
+
+    /// The end of a horizon has the active bounds of the problem that it is by itself, as the dual method finds them.
+    #[test]
+    fn the_end_is_the_shorter_problem() {
+        let room = Capacity {
+            stages: N,
+            rows: 40,
+            active: 40,
+            ..Capacity::default()
+        };
+        let mut active = 0;
+        for seed in 0..40 {
+            let mut random = Rng::new(seed);
+            let ocp = problem(&mut random);
+            let start = Vector2::new(random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2));
+            let mut expected = Solution::allocate(room);
+            let shorter = shorter(&ocp, start);
+            Solver::allocate(room).solve(&shorter, &SolverSettings::default(), &mut expected);
+            assert!(expected.status.is_solved(), "{seed}: {}", expected.status);
+            let mut sides = vec![BoundSide::empty(); 16 * (N + 1)];
+            let count = side::collect(&ocp, &mut sides).unwrap();
+            sides.truncate(count);
+            let span = Span {
+                ocp: &ocp,
+                begin: BEGIN,
+                start,
+            };
+            let place = || {
+                (
+                    vec![StageFactor::zeros(); N],
+                    vec![Vector1::zeros(); N],
+                    vec![Vector2::zeros(); N],
+                )
+            };
+            let [free, mut one, mut other] = [place(), place(), place()];
+            let (mut factors, mut v) = (free.0, free.1);
+            newton::factorize(&span, &[], &mut factors).unwrap();
+            let mut program = Program {
+                span,
+                v: &mut v,
+                factors: &mut one.0,
+                u: &mut one.1,
+                x: &mut one.2,
+                spare: (&mut other.0, &mut other.1, &mut other.2),
+            };
+            let tolerances = Tolerances {
+                violation: 1e-10,
+                scale: 1.0,
+                penalty: 1e6,
+            };
+            let answer = LastAnswer {
+                kind: Kind::Rows,
+                shift: 1,
+                trials: 10,
+            };
+            let mut proof = ActiveSet::with_capacity(40);
+            let end = span.sides(&mut sides);
+            let mut stages = 0;
+            let count = || {
+                stages += N - BEGIN;
+                stages < 100 * N
+            };
+            assert!(
+                answer.solve(&mut program, end, &tolerances, &factors, &mut proof, count),
+                "{seed}"
+            );
+            let held = || end.iter().filter(|side| side.role == Role::Held);
+            assert_eq!(held().count(), expected.active.len(), "{seed}");
+            for BoundId {
+                stage,
+                quantity,
+                side,
+            } in expected.active.iter().map(|row| row.bound)
+            {
+                let bound = BoundId {
+                    stage: stage + BEGIN,
+                    quantity,
+                    side,
+                };
+                assert!(held().any(|side| side.bound == bound), "{seed}: {bound}");
+            }
+            active += expected.active.len();
+        }
+        assert!(active > 80, "{active}");
+    }
+}
