@@ -404,6 +404,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solution<T, NX, NU> {
         self.cost = T::zero();
         self.status = Status::Solved;
         self.active.clear();
+        self.active.doubted = 0;
         self.changes = 0;
     }
 
@@ -415,5 +416,18 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solution<T, NX, NU> {
             List::repeat(SVector::zeros(), stages),
             List::repeat(PackedRow::empty(), active),
         )
+    }
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_solution_of_nothing_yet_doubts_nothing() {
+        let mut solution = Solution::<f64, 2, 1>::allocate(Capacity::default());
+        solution.active.doubted = 3;
+        solution.clear();
+        assert_eq!(solution.active.doubted, 0);
     }
 }
