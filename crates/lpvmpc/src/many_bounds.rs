@@ -64,6 +64,9 @@ const KNOWN: Patience = Patience {
 const FAR: Patience = Patience { few: 1, ..KNOWN };
 /// Where fewer bounds were active before than one for so many that are violated, they tell little of what to expect.
 const LITTLE: usize = 2;
+/// Of a single input a bound that is met keeps others: while a speed stays at its limit only half of what is violated
+/// becomes active.
+const LITTLE_OF_ONE: usize = 4;
 /// So many factorisations for each guess of the interior-point method that is tried.
 const TRIAL: usize = 5;
 /// Shorter parts of the way mean that bounds may contradict each other.
@@ -74,13 +77,17 @@ const CERTAIN: usize = 8;
 const CERTAIN_SOFT: usize = 10;
 /// And when that step went so far.
 const FREE: f64 = 0.5;
+/// Once they were wrong, again when the products of slack and multiplier are this part of what they were.
+const NEARER: f64 = 0.01;
 /// Where the products of slack and multiplier begin, as a part of the largest cost of a stage.
 const CENTRE: f64 = 0.01;
 /// Factorisations, each as much work as a change of the active set for every state and input.
 const MOST_FACTORISATIONS: usize = 24;
-/// Where many more bounds are expected than these are for, one for so many: the dual method would need longer
-/// than in proportion.
-const BOUNDS: usize = 16;
+/// Where many more bounds are expected than these are for, one for so many, since the dual method would need longer
+/// than in proportion,
+const BOUNDS: usize = 2;
+/// up to so many.
+const MOST_FOR_MANY: usize = 60;
 /// Part of the changes that there may be, for the dual method has to have enough where this phase has
 /// no answer: one in so many.
 const SHARE: usize = 4;
@@ -118,6 +125,17 @@ pub(crate) fn work_of_last_turn(cap: usize, entries: usize) -> usize {
     if work <= cap / SHARE { work } else { 0 }
 }
 
+/// What has come to nothing in the solves before.
+#[derive(Clone, Copy, Debug, Default)]
+struct AllRetries {
+    /// The last answer's bounds, once more.
+    repeats: Retries,
+    /// The inputs that the regulator saturates.
+    saturations: Retries,
+    /// The phase as a whole.
+    turns: Retries,
+}
+
 /// Memory of the phase, beside the step that knows it: a solver without it has no machine code for it.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
@@ -125,7 +143,7 @@ pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
     /// Where a Newton step is kept while a guess is tried, and where the guess is.
     places: [ManyBoundsPlace<T, NX, NU>; 2],
     sides: List<BoundSide<T>>,
-    retries: Retries,
+    retries: AllRetries,
     pub run: Run<T, NX, NU>,
     /// Takes down the last answer, before it is overwritten.
     pub keep: fn(&mut Self, &Solution<T, NX, NU>),
@@ -172,7 +190,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         Self {
             places,
             sides,
-            retries: Retries::default(),
+            retries: AllRetries::default(),
             run: Self::solve,
             keep: Self::keep_states,
         }
@@ -200,6 +218,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             return AtOnce::Untried;
         }
         let last_turn = turn == Turn::Last;
+        if !last_turn && shift.is_none() {
+            // Without an answer to go on from, nothing is known of the solves before.
+            self.retries = AllRetries::default();
+        }
         if last_turn {
             // Held inputs may have left factors of their own.
             solver.dual.begin_again();
@@ -219,16 +241,25 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             }
         });
         // Those that the regulator saturates are nearly right where a single input moves the states.
-        let saturated = !last_turn && NU == 1 && 2 * inputs > violated && inputs >= MANY_SATURATED;
+        let saturated = !last_turn
+            && NU == 1
+            && 2 * inputs > violated
+            && inputs >= MANY_SATURATED
+            && self.retries.saturations.are_due();
         // Where several inputs act together, general rows that were active are taken over one by one in less time.
         let rows = NU > 1 && guess::mostly_rows(&solution.active);
         // As a rule most of those that are known hold again, and others are violated only as long as they do not.
-        let tells = !rows && LITTLE * known >= violated;
+        let little = if NU == 1 { LITTLE_OF_ONE } else { LITTLE };
+        let tells = !rows && little * known >= violated;
         // No more can hold independently than there are inputs.
         let expected = if tells { known } else { violated }.min(n * NU);
         let many = last_turn || expected >= enough;
         let familiar = tells && enough == MANY && known >= FAMILIAR;
         if !(many || familiar || saturated) {
+            return AtOnce::Untried;
+        }
+        let is_turn = last_turn || saturated || self.retries.turns.are_due();
+        if !is_turn {
             return AtOnce::Untried;
         }
         let Some(count) = side::collect(ocp, &mut self.sides) else {
@@ -241,10 +272,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         let tolerances = Tolerances {
             violation: solver.dual.tolerance,
             scale,
-            penalty: scale * T::default_epsilon().powf(convert(-0.4)),
+            penalty: scale * T::default_epsilon().powf(convert(-0.45)),
         };
         let factorisations = match turn {
-            Turn::First => MOST_FACTORISATIONS.max(expected / BOUNDS),
+            Turn::First => (expected / BOUNDS).clamp(MOST_FACTORISATIONS, MOST_FOR_MANY),
             Turn::Last => MOST_FACTORISATIONS,
         };
         let trials = factorisations.div_ceil(TRIAL);
@@ -274,7 +305,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         let mut found = false;
         if let Some(shift) = shift.filter(|_| known > 0) {
             guess::again(sides, &solution.active, shift);
-            if (many || familiar) && self.retries.are_due() {
+            if (many || familiar) && self.retries.repeats.are_due() {
                 let last = LastAnswer {
                     kind: match (rows, NU > 1 && side::any_soft(sides)) {
                         (true, _) => Kind::Rows,
@@ -287,13 +318,14 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
                 let factors = &solver.factors;
                 let proof = &mut solution.active;
                 found = last.repeat(&mut program, sides, &tolerances, factors, proof, &mut count);
-                self.retries.learn(found);
+                self.retries.repeats.learn(found);
             }
         }
         if !found && saturated {
             sides.iter_mut().for_each(|side| side.role = Role::Free);
             guess::saturated(ocp, &solver.factors, sides, (0, ocp.x0));
             found = exchange(&mut program, sides, &tolerances, FAR, || count(n));
+            self.retries.saturations.learn(found);
         }
         let outcome = if found {
             Some(Ok(()))
@@ -306,11 +338,22 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         };
         let outcome = match outcome {
             Some(Ok(())) => {
-                self.retries.learn_wrong(guess::wrong(sides));
+                self.retries.repeats.learn_wrong(guess::wrong(sides));
                 report(&program, sides, solution).then_some(Ok(()))
             }
             other => other,
         };
+        if !last_turn && !saturated {
+            // Of a single input the dual method needs a change for each bound, half as many more for soft ones.
+            let most = match (NU > 1, enough == MORE && side::any_soft(sides)) {
+                (true, _) => usize::MAX,
+                (false, true) => expected + expected / 2,
+                (false, false) => expected,
+            };
+            self.retries
+                .turns
+                .learn(outcome.is_some() && *spent - before <= most);
+        }
         solver.dual.v.fill(SVector::zeros());
         if let Some(outcome) = outcome {
             return AtOnce::Done(outcome);
@@ -341,12 +384,16 @@ fn search<T: Scalar, const NX: usize, const NU: usize>(
         false => CERTAIN,
     };
     let mut method = InteriorPoint::new(sides, tolerances.scale * convert(CENTRE));
+    let smallest = method.complementarity() * T::default_epsilon().powf(convert(0.6));
+    let mut near_enough = convert(f64::INFINITY);
     let mut part = T::zero();
     let mut stuck = 0_usize;
     while trials > 0 && count() {
         let predicted = method.predict(&span, sides, program.factors, (program.u, program.x));
         let Foretold { changed, active } = predicted.ok()?;
-        if part > convert(FREE) && certain * changed <= active {
+        let near = method.complementarity() <= near_enough;
+        if near && part > convert(FREE) && certain * changed <= active {
+            near_enough = method.complementarity() * convert(NEARER);
             trials -= 1;
             if method.try_foretold(program, sides, tolerances, &mut count) {
                 return Some(Ok(()));
@@ -359,6 +406,10 @@ fn search<T: Scalar, const NX: usize, const NU: usize>(
             program.v,
             (program.u, program.x),
         );
+        if part < convert(FREE) && method.complementarity() < smallest {
+            // Rounding decides now.
+            return None;
+        }
         if part < convert(STUCK) {
             stuck += 1;
             let ended = !(part > convert(1e-6));

@@ -79,7 +79,7 @@ impl<T: Scalar> Default for SolverSettings<T> {
 }
 
 /// The solver with its memory, for `NX` states and `NU` inputs. No answer depends on the solves
-/// before, but how often the last active set is tried at once does; one solver serves any number of problems. Where a problem needs more places for active bounds than
+/// before, but how often many bounds are tried at once does; one solver serves any number of problems. Where a problem needs more places for active bounds than
 /// there are, the answer says [`Status::WorkingSetFull`].
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]

@@ -11,11 +11,14 @@ use super::span::Span;
 use crate::model::Scalar;
 use crate::riccati::StageFactor;
 use crate::rows::Trajectory;
+use crate::working_set::first;
 use core::mem::swap;
 use nalgebra::{SVector, convert};
 
 /// Passes that refine an answer.
-const REFINEMENTS: usize = 10;
+const REFINEMENTS: usize = 20;
+/// Distances of held sides that are rounding, in units of the smallest number beside one.
+const ROUNDING: f64 = 8.0;
 
 /// Numbers that the search goes by.
 #[derive(Clone, Copy)]
@@ -97,18 +100,18 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
             return false;
         }
         newton::roll_out(&program.span, program.factors, (program.u, program.x));
-        measure(program, sides);
+        measure(program, sides, rounding());
         for side in sides.iter_mut().filter(|side| side.is_weighted()) {
             side.base = side.multiplier_at(side.distance);
         }
         let mut residual = explain(program, sides);
         if careful && residual.rest > loose * residual.largest {
-            refine(program, sides, &mut residual, (loose, loose));
+            refine(program, sides, &mut residual, tolerances, (loose, loose));
         }
         let mut wrong = reassign(sides, loose, loose * residual.largest);
         if wrong == 0 {
             let to_rounding = (T::default_epsilon() * convert(16.0), tolerances.violation);
-            let near = refine(program, sides, &mut residual, to_rounding);
+            let near = refine(program, sides, &mut residual, tolerances, to_rounding);
             wrong = reassign(
                 sides,
                 tolerances.violation,
@@ -118,7 +121,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
                 wrong = release_unmet(sides, tolerances.violation);
             }
             if wrong == 0 {
-                return near;
+                return near && is_finite(program);
             }
         }
         // A guess from near by is right after a few exchanges, each of which leaves fewer sides wrong.
@@ -138,18 +141,38 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
     false
 }
 
-/// Measures the sides on the trajectory. Of what is held, rounding is no distance: the weight would make
+/// Whether the trajectory consists of numbers: of others no comparison says that a side is wrong. One of them spreads to
+/// the last state or its input.
+fn is_finite<T: Scalar, const NX: usize, const NU: usize>(
+    program: &Program<'_, T, NX, NU>,
+) -> bool {
+    let span = &program.span;
+    let n = span.ocp.length();
+    let inputs = span.of(first(program.u, n)).iter().flatten();
+    let end = span.of(first(program.x, n)).last().into_iter().flatten();
+    inputs.chain(end).all(|entry| entry.is_finite())
+}
+
+fn rounding<T: Scalar>() -> T {
+    T::default_epsilon() * convert(ROUNDING)
+}
+
+/// Measures the sides on the trajectory. Of what is held, `rounding` is no distance: the weight would make
 /// much of it.
 fn measure<T: Scalar, const NX: usize, const NU: usize>(
     program: &Program<'_, T, NX, NU>,
     sides: &mut [BoundSide<T>],
+    rounding: T,
 ) {
     let trajectory = Trajectory {
         x: program.x,
         u: program.u,
     };
     newton::measure(&program.span, sides, &trajectory);
-    let rounding = T::default_epsilon() * convert(8.0);
+    drop_rounding(sides, rounding);
+}
+
+fn drop_rounding<T: Scalar>(sides: &mut [BoundSide<T>], rounding: T) {
     for side in sides.iter_mut().filter(|side| side.role == Role::Held) {
         if side.distance.abs() <= rounding * side.size {
             side.distance = T::zero();
@@ -170,14 +193,21 @@ fn explain<T: Scalar, const NX: usize, const NU: usize>(
 
 /// Moves to the minimum with the sides as they are, until what is left is `enough` or does not shrink, from a point
 /// whose `residual` is known; whether it is within the `tolerance`.
+///
+/// Held sides come nearer from pass to pass, and until they have come to rest the gradient is not zero. A side that no
+/// input moves stays where it is: of so small a distance the weight makes more and more, until it counts as rounding.
 fn refine<T: Scalar, const NX: usize, const NU: usize>(
     program: &mut Program<'_, T, NX, NU>,
     sides: &mut [BoundSide<T>],
     residual: &mut newton::Residual<T>,
+    tolerances: &Tolerances<T>,
     (enough, tolerance): (T, T),
 ) -> bool {
-    let mut last: T = convert(f64::INFINITY);
+    let infinity: T = convert(f64::INFINITY);
+    let (mut last, mut last_missed) = (infinity, infinity);
     let mut stalled = false;
+    let mut rounding = rounding::<T>();
+    let mut waits = true;
     for _ in 0..REFINEMENTS {
         let held = sides.iter().filter(|side| side.role == Role::Held);
         let missed = held.fold(T::zero(), |most, side| {
@@ -188,17 +218,24 @@ fn refine<T: Scalar, const NX: usize, const NU: usize>(
         if worst <= enough {
             return true;
         }
-        let shrinks = worst < last * convert(0.5);
+        let half: T = convert(0.5);
+        let shrinks = worst < last * half || missed < last_missed * half;
         // Rounding may hide what one pass has done, not what two have.
-        if !shrinks && stalled {
-            return worst <= tolerance;
+        let at_rest = !shrinks && stalled;
+        if at_rest {
+            if !(waits && missed <= tolerances.violation) {
+                return worst <= tolerance;
+            }
+            waits = false;
+            rounding = rounding.max(missed * convert(2.0));
+            drop_rounding(sides, rounding);
         }
-        stalled = !shrinks;
-        last = worst;
+        stalled = !shrinks && !at_rest;
+        (last, last_missed) = (worst, missed);
         let trajectory = (&mut *program.u, &mut *program.x);
         newton::descend(&program.span, program.factors, program.v);
         newton::deviate(&program.span, program.factors, program.v, trajectory, sides);
-        measure(program, sides);
+        measure(program, sides, rounding);
         *residual = explain(program, sides);
     }
     last <= tolerance

@@ -21,6 +21,13 @@ const NEARLY: f64 = 0.995;
 /// excess.
 const LEAST: f64 = 1.0;
 const LEAST_SOFT: f64 = 0.2;
+/// And as a part of the largest violation, each in its bound's size: from far beyond their bounds steps that begin with
+/// little slack are short.
+const LEAST_OF_WORST: f64 = 0.1;
+/// The products begin so many times the largest violation larger, between once and
+const PER_VIOLATION: f64 = 0.3;
+/// so many times.
+const LARGEST: f64 = 100.0;
 
 /// Multiplier of a side at d = 0 in a Newton step towards `target`, and how fast it falls with d.
 #[inline(always)]
@@ -129,11 +136,17 @@ impl<T: Scalar> Prediction<T> {
 
 impl<T: Scalar> InteriorPoint<T> {
     /// Begins at a trajectory whose distances are known, with products of slack and multiplier of the size
-    /// of `cost`.
+    /// of `cost`, larger where bounds are violated by several times their size.
     pub fn new(sides: &mut [BoundSide<T>], cost: T) -> Self {
+        let worst = sides.iter().fold(T::zero(), |worst, side| {
+            worst.max(-side.distance / side.size)
+        });
+        let times = worst * convert(PER_VIOLATION);
+        let cost = cost * times.max(T::one()).min(convert(LARGEST));
+        let least_of_hard = convert::<f64, T>(LEAST).max(worst * convert(LEAST_OF_WORST));
         for side in sides.iter_mut() {
-            let least = side.soft.map_or(LEAST, |_| LEAST_SOFT);
-            let least = side.size * convert::<f64, T>(least);
+            let least = side.soft.map_or(least_of_hard, |_| convert(LEAST_SOFT));
+            let least = side.size * least;
             let slack = side.distance.max(least);
             let excess = (slack - side.distance).max(least);
             let multiplier = cost / slack;
@@ -158,6 +171,11 @@ impl<T: Scalar> InteriorPoint<T> {
             };
         }
         Self::at(sides)
+    }
+
+    /// Mean of slack * multiplier.
+    pub fn complementarity(&self) -> T {
+        self.complementarity
     }
 
     /// Where the sides' unknowns are.

@@ -1,33 +1,33 @@
-//! When the last sample's bounds are worth a guess: not each time, where they come to nothing time and again.
+//! When something is worth a try: not each time, where it comes to nothing time and again.
 
-/// They are tried after 0, 0, 1, 3 and then 7 samples without, the more often in a row they were in vain.
+/// It is tried after 0, 0, 1, 3 and then 7 samples without, the more often in a row it was in vain.
 const MISSES: u32 = 5;
-/// Or as soon as no more of them would have been wrong.
+/// Or as soon as no more bounds of a guess would have been wrong.
 const ALMOST: usize = 4;
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Retries {
-    /// How often in a row they were in vain.
+    /// How often in a row it was in vain.
     misses: u32,
-    /// For how many samples they are not tried.
+    /// For how many samples it is not tried.
     pause: u32,
 }
 
 impl Retries {
-    /// Whether they are tried in this sample.
+    /// Whether it is tried in this sample.
     pub fn are_due(&mut self) -> bool {
         let due = self.pause == 0;
         self.pause = self.pause.saturating_sub(1);
         due
     }
 
-    /// Whether they, tried, have led to the answer.
+    /// Whether it, tried, has led to the answer, and not at too great a cost.
     pub fn learn(&mut self, found: bool) {
         self.misses = if found { 0 } else { self.misses + 1 }.min(MISSES);
         self.pause = ((1 << self.misses) / 4_u32).saturating_sub(1);
     }
 
-    /// How many of them are not as in the answer.
+    /// How many bounds of the guess are not as in the answer.
     pub fn learn_wrong(&mut self, wrong: usize) {
         if self.pause > 0 && wrong <= ALMOST {
             *self = Self::default();

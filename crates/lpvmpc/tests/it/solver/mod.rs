@@ -7,6 +7,7 @@ mod changes;
 mod fuzz;
 mod many_bounds;
 mod memory;
+mod motion_limits;
 mod optimality;
 mod regressions;
 mod relations;
