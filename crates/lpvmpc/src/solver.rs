@@ -155,6 +155,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             keep(phase, solution);
         }
         let mut shift = shift_of_last(settings, solution);
+        if shift.is_none() {
+            // Nothing is known that could be doubted.
+            solution.active.doubted = 0;
+        }
         let begun = factorized.and_then(|()| self.roll_out(ocp, solution));
         let outcome = begun.and_then(|()| {
             match self.solve_at_once(ocp, shift, solution, (Turn::First, &mut spent)) {

@@ -89,14 +89,15 @@ pub(super) fn again<T: Scalar>(sides: &mut [BoundSide<T>], before: &ActiveSet<T>
                 side.estimate = row.multiplier.min(side.price());
             }
             side.known_role = side.role;
+            side.nearest_role = side.role;
         }
     }
 }
 
-/// The roles that the rows had before, again, after others were tried.
-pub(super) fn known<T: Scalar>(sides: &mut [BoundSide<T>]) {
+/// The roles that are nearest to right, again, after others were tried.
+pub(super) fn nearest<T: Scalar>(sides: &mut [BoundSide<T>]) {
     for side in sides {
-        side.role = side.known_role;
+        side.role = side.nearest_role;
     }
 }
 

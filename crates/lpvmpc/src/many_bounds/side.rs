@@ -33,6 +33,9 @@ pub(crate) struct BoundSide<T> {
     pub last_role: Role,
     /// The role that it had in the last solution, where that is begun with.
     pub known_role: Role,
+    /// The role that the dual method begins with where nothing is found: the known one, or that of the last guess that was
+    /// nearly right.
+    pub nearest_role: Role,
     /// Multiplier at d = 0, and how fast it falls with d.
     pub base: T,
     pub weight: T,
@@ -115,6 +118,7 @@ impl<T: Scalar> BoundSide<T> {
             role: Role::Free,
             last_role: Role::Free,
             known_role: Role::Free,
+            nearest_role: Role::Free,
             base: T::zero(),
             weight: T::zero(),
             distance: T::zero(),

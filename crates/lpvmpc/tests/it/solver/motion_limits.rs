@@ -103,3 +103,11 @@ fn points_with_limits_take_few_factorisations() {
     assert!(2 * at_once < one_by_one, "{at_once} for {one_by_one}");
     assert!(most <= 40, "{most}");
 }
+
+/// Where a guess is nearly right when the factorisations are spent, the dual method begins with it: it then takes little
+/// more than a change for each bound.
+#[test]
+fn what_is_nearly_right_is_begun_with() {
+    let [at_once, one_by_one, _] = changes::<3, 1, 100, 300>(57);
+    assert!(3 * at_once < one_by_one, "{at_once} for {one_by_one}");
+}
