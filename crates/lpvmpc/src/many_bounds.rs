@@ -32,7 +32,7 @@ use exchange::{Patience, Program, Tolerances, exchange};
 use interior_point::{Foretold, InteriorPoint};
 use last_answer::{Kind, LastAnswer};
 use nalgebra::{SVector, convert};
-use retries::Retries;
+use retries::AllRetries;
 use side::Role;
 use span::Span;
 
@@ -123,17 +123,6 @@ pub(crate) fn cap_with_last_turn(entries: usize) -> usize {
 pub(crate) fn work_of_last_turn(cap: usize, entries: usize) -> usize {
     let work = MOST_FACTORISATIONS * entries;
     if work <= cap / SHARE { work } else { 0 }
-}
-
-/// What has come to nothing in the solves before.
-#[derive(Clone, Copy, Debug, Default)]
-struct AllRetries {
-    /// The last answer's bounds, once more.
-    repeats: Retries,
-    /// The inputs that the regulator saturates.
-    saturations: Retries,
-    /// The phase as a whole.
-    turns: Retries,
 }
 
 /// Memory of the phase, beside the step that knows it: a solver without it has no machine code for it.

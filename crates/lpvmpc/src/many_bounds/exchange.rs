@@ -18,7 +18,7 @@ use nalgebra::{SVector, convert};
 /// Passes that refine an answer.
 const REFINEMENTS: usize = 40;
 /// Held sides come nearer when what is left of their distances is at most this part.
-const NEARER: f64 = 0.8;
+const COMES_NEARER: f64 = 0.8;
 /// With so many wrong sides a guess is a better beginning for the dual method than any other.
 const NEARLY_RIGHT: usize = 2;
 /// Distances of held sides that are rounding, in units of the smallest number beside one.
@@ -228,7 +228,7 @@ fn refine<T: Scalar, const NX: usize, const NU: usize>(
             return true;
         }
         let half: T = convert(0.5);
-        let shrinks = worst < last * half || missed < last_missed * convert(NEARER);
+        let shrinks = worst < last * half || missed < last_missed * convert(COMES_NEARER);
         // Rounding may hide what one pass has done, not what two have.
         let at_rest = !shrinks && stalled;
         if at_rest {

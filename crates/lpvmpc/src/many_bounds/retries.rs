@@ -5,6 +5,17 @@ const MISSES: u32 = 5;
 /// Or as soon as no more bounds of a guess would have been wrong.
 const ALMOST: usize = 4;
 
+/// What has come to nothing in the solves before.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct AllRetries {
+    /// The last answer's bounds, once more.
+    pub repeats: Retries,
+    /// The inputs that the regulator saturates.
+    pub saturations: Retries,
+    /// The phase as a whole.
+    pub turns: Retries,
+}
+
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Retries {
     /// How often in a row it was in vain.

@@ -88,9 +88,9 @@ fn changes<const NX: usize, const NU: usize, const N: usize, const M: usize>(
     sums
 }
 
-/// All bounds at once take less than half of the changes, and no sample takes more than 40 factorisations. The interior-point
-/// method once began with so little slack that its steps were short, its first guesses used up the trials, and what
-/// had been found was thrown away: the sum was larger than one by one.
+/// All bounds at once take less than half of the changes, and no sample takes more than 40 factorisations. The
+/// interior-point method once began with so little slack that its steps were short, and its first guesses used up the
+/// trials: the sum was larger than one by one.
 #[test]
 fn points_with_limits_take_few_factorisations() {
     let mut sums = [0; 3];
