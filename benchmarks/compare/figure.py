@@ -26,7 +26,8 @@ STYLES = {
     "OSQP": ("#7F7F7F", "P", "-", "OSQP"),
     "Clarabel": ("#E69F00", "X", "-", "Clarabel"),
 }
-KINDS = {"inputs": "input bounds", "states": "state bounds", "rows": "general rows", "soft": "input and soft state bounds"}
+KINDS = {"inputs": "input bounds", "states": "state bounds", "rows": "general rows", "soft": "input and soft state bounds",
+         "motion": "points with limits"}
 
 
 def draw(axes, points, name):
@@ -46,7 +47,7 @@ def main():
     files = {key: value for key, value in files.items() if key[1] == horizon}
     sizes = list(dict.fromkeys(key[0] for key in files))
     plt.rcParams.update({"font.family": "serif", "font.size": 9, "axes.linewidth": 0.6, "mathtext.fontset": "dejavuserif"})
-    figure, grid = plt.subplots(len(sizes), len(KINDS), figsize=(9.5, 2.3 * len(sizes) + 0.9), sharey="row",
+    figure, grid = plt.subplots(len(sizes), len(KINDS), figsize=(11.5, 2.3 * len(sizes) + 0.9), sharey="row",
                                 squeeze=False)
     for row, size in zip(grid, sizes):
         for axes, (kind, title) in zip(row, KINDS.items()):

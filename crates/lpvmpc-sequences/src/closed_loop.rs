@@ -3,10 +3,8 @@
 use crate::limits::Limits;
 use crate::plant::Plant;
 use crate::{Recipe, SequenceError};
-use lpvmpc::{
-    Capacity, Common, Ocp, Penalty, Quantity, Solution, Solver, SolverSettings, Terminal, WarmStart,
-};
-use nalgebra::{SMatrix, SVector};
+use lpvmpc::{Capacity, Ocp, Penalty, Quantity, Solution, Solver, SolverSettings, WarmStart};
+use nalgebra::SVector;
 use std::collections::BTreeSet;
 
 /// States are multiples of this, which is far above rounding.
@@ -59,8 +57,8 @@ fn each_soft<const NX: usize, const NU: usize>(
 /// [`SequenceError::NotSolved`].
 pub fn needed<const NX: usize, const NU: usize>(
     recipe: &Recipe,
-    plant: &Plant<NX, NU>,
-) -> Result<Limits<NU>, SequenceError> {
+    plant: &impl Plant<NX, NU>,
+) -> Result<Limits<NX, NU>, SequenceError> {
     let mut limits = Limits::zero();
     close(
         recipe,
@@ -83,12 +81,12 @@ pub fn needed<const NX: usize, const NU: usize>(
 /// [`SequenceError::NotSolved`].
 pub fn within<const NX: usize, const NU: usize>(
     recipe: &Recipe,
-    plant: &Plant<NX, NU>,
-    limits: &Limits<NU>,
+    plant: &impl Plant<NX, NU>,
+    limits: &Limits<NX, NU>,
 ) -> Result<Sequence<NX, NU>, SequenceError> {
     let mut problems = Vec::with_capacity(recipe.samples);
     let mut active = 0;
-    let impose = |ocp: &mut _| limits.impose(recipe.kind, ocp);
+    let impose = |ocp: &mut _| limits.impose(recipe.kind, plant, ocp);
     close(recipe, plant, impose, |ocp, solution| {
         problems.push(ocp.clone());
         active += active_bounds(solution);
@@ -101,13 +99,13 @@ pub fn within<const NX: usize, const NU: usize>(
 }
 
 /// Closes the loop, and shows each problem with its solution.
-fn close<const NX: usize, const NU: usize>(
+fn close<const NX: usize, const NU: usize, P: Plant<NX, NU>>(
     recipe: &Recipe,
-    plant: &Plant<NX, NU>,
+    plant: &P,
     impose: impl Fn(&mut Ocp<f64, NX, NU>),
     mut show: impl FnMut(&Ocp<f64, NX, NU>, &Solution<f64, NX, NU>),
 ) -> Result<(), SequenceError> {
-    let mut x = SVector::zeros();
+    let mut x = plant.start();
     let mut memory: Option<(Solver<f64, NX, NU>, Solution<f64, NX, NU>)> = None;
     // Where rounding decides which bounds are active, those of a cold start do not depend on the samples
     // before.
@@ -116,7 +114,7 @@ fn close<const NX: usize, const NU: usize>(
         ..SolverSettings::default()
     };
     for sample in 0..recipe.samples {
-        let mut ocp = problem(recipe, plant, sample, x);
+        let mut ocp = plant.problem(sample, x, recipe.horizon);
         impose(&mut ocp);
         let (solver, solution) = memory.get_or_insert_with(|| {
             let room = working_memory(std::slice::from_ref(&ocp));
@@ -129,7 +127,7 @@ fn close<const NX: usize, const NU: usize>(
         }
         show(&ocp, solution);
         let now = &ocp.stages[0];
-        x = now.a * x + now.b * solution.first_input();
+        x = (now.a * x + now.b * solution.first_input()) * P::KEPT;
         x.apply(|entry| *entry = (*entry / STATE_STEP).round() * STATE_STEP);
     }
     Ok(())
@@ -147,31 +145,4 @@ fn active_bounds<const NX: usize, const NU: usize>(solution: &Solution<f64, NX, 
         .map(|row| (row.bound.stage, place(row.bound.quantity)))
         .collect();
     bounds.len()
-}
-
-/// The problem without bounds at sample `k`, from `x0`: all states follow their waves.
-fn problem<const NX: usize, const NU: usize>(
-    recipe: &Recipe,
-    plant: &Plant<NX, NU>,
-    k: usize,
-    x0: SVector<f64, NX>,
-) -> Ocp<f64, NX, NU> {
-    let mut ocp = Ocp {
-        x0,
-        common: Common {
-            q: SMatrix::identity(),
-            r: SMatrix::identity() * 0.1,
-            ..Common::default()
-        },
-        terminal: Terminal {
-            p: SMatrix::identity() * 5.0,
-            linear_x: plant.reference(k + recipe.horizon) * -5.0,
-            ..Terminal::default()
-        },
-        ..Ocp::allocate(recipe.horizon)
-    };
-    for (i, stage) in ocp.stages.iter_mut().enumerate() {
-        *stage = plant.stage(k + i);
-    }
-    ocp
 }

@@ -1,19 +1,26 @@
 //! Sequences of quadratic programs: the samples of a receding-horizon loop on a made-up linear
 //! time-varying plant, of any size, with a wanted share of active bounds. Solvers are timed on them.
+//! There are two plants: oscillators that follow waves, and points that go far away.
 //!
 //! The plant comes from a seed, by arithmetic that rounds in the same way on every machine. The loop is
 //! closed by the solver of `lpvmpc`, and its states are rounded, so that a solver that adds in another
 //! order meets the same problems.
 
+mod chains;
 mod closed_loop;
 mod error;
 mod limits;
+mod oscillators;
 mod plant;
 mod share;
 
 pub use closed_loop::{Sequence, working_memory};
 pub use error::SequenceError;
 pub use limits::Kind;
+
+use chains::Chains;
+use oscillators::Oscillators;
+use plant::Plant;
 
 /// What a sequence is like.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,7 +50,10 @@ impl Recipe {
         &self,
     ) -> Result<Sequence<NX, NU>, SequenceError> {
         self.check::<NX, NU>()?;
-        share::with_share(self)
+        match self.kind {
+            Kind::Motion => share::with_share(self, &Chains::new(self.seed)),
+            _ => share::with_share(self, &Oscillators::new(self.seed)),
+        }
     }
 
     fn check<const NX: usize, const NU: usize>(&self) -> Result<(), SequenceError> {

@@ -18,11 +18,11 @@ const BISECTIONS: usize = 16;
 /// As [`Recipe::make`].
 pub fn with_share<const NX: usize, const NU: usize>(
     recipe: &Recipe,
+    plant: &impl Plant<NX, NU>,
 ) -> Result<Sequence<NX, NU>, SequenceError> {
-    let plant = Plant::new(recipe.seed);
-    let limits = needed(recipe, &plant)?;
+    let limits = needed(recipe, plant)?;
     if recipe.share == 0.0 {
-        return within(recipe, &plant, &limits.scaled(FAR));
+        return within(recipe, plant, &limits.scaled(FAR));
     }
     // Nothing is active at a scale of 1, but for where bounds change the loop.
     let (mut tight, mut wide) = (0.0, 1.0);
@@ -30,7 +30,7 @@ pub fn with_share<const NX: usize, const NU: usize>(
     let distance = |sequence: &Sequence<NX, NU>| (sequence.share - recipe.share).abs();
     for _ in 0..BISECTIONS {
         let scale = 0.5 * (tight + wide);
-        let found = within(recipe, &plant, &limits.scaled(scale))?;
+        let found = within(recipe, plant, &limits.scaled(scale))?;
         if found.share > recipe.share {
             tight = scale;
         } else {
