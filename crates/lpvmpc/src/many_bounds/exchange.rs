@@ -5,10 +5,12 @@
 //! large weight on their distance, and multipliers that take up what it leaves. The same passes that find
 //! the multipliers remove what rounding has left in the optimality conditions.
 
+use super::guess;
 use super::newton;
 use super::side::{self, BoundSide, Role};
 use super::span::Span;
 use crate::model::Scalar;
+use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
 use crate::rows::Trajectory;
 use crate::working_set::first;
@@ -19,8 +21,9 @@ use nalgebra::{SVector, convert};
 const REFINEMENTS: usize = 40;
 /// Held sides come nearer when what is left of their distances is at most this part.
 const COMES_NEARER: f64 = 0.8;
-/// With so many wrong sides a guess is a better beginning for the dual method than any other.
-const NEARLY_RIGHT: usize = 2;
+/// With so many wrong sides a guess is nearly right: worth a closer look, and a better beginning for the dual method
+/// than any other.
+const NEARLY_RIGHT: usize = 6;
 /// Distances of held sides that are rounding, in units of the smallest number beside one.
 const ROUNDING: f64 = 8.0;
 
@@ -33,6 +36,59 @@ pub(super) struct Tolerances<T> {
     pub scale: T,
     /// Weight of the distance of a side that is held, in cost per square of its size.
     pub penalty: T,
+}
+
+impl<T: Scalar> Tolerances<T> {
+    /// For a problem whose trajectory without bounds is known, and the relative violation that counts as none.
+    pub fn new<const NX: usize, const NU: usize>(
+        ocp: &Ocp<T, NX, NU>,
+        trajectory: &Trajectory<'_, T, NX, NU>,
+        violation: T,
+    ) -> Self {
+        let scale = largest_cost(ocp, trajectory);
+        Self {
+            violation,
+            scale,
+            penalty: scale * T::default_epsilon().powf(convert(-0.45)),
+        }
+    }
+}
+
+/// The largest cost of a stage on the trajectory without bounds, in magnitudes: the size that multiplied
+/// distances have.
+fn largest_cost<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    trajectory: &Trajectory<'_, T, NX, NU>,
+) -> T {
+    let of =
+        |weight: T, value: T, linear: T| value.abs() * (weight.abs() * value.abs() + linear.abs());
+    let mut largest = T::zero();
+    let Trajectory { x, u } = *trajectory;
+    let mut state = &ocp.x0;
+    for (i, ((stage, u), next)) in ocp
+        .stages
+        .iter()
+        .zip(u)
+        .zip(x)
+        .enumerate()
+        .take(ocp.length())
+    {
+        let common = ocp.common_at(i);
+        let mut sum = T::zero();
+        for j in 0..NX {
+            sum += of(common.q[(j, j)], state[j], stage.linear_x[j]);
+        }
+        for j in 0..NU {
+            sum += of(common.r[(j, j)], u[j], stage.linear_u[j]);
+        }
+        largest = largest.max(sum);
+        state = next;
+    }
+    let mut sum = T::zero();
+    for j in 0..NX {
+        sum += of(ocp.terminal.p[(j, j)], state[j], ocp.terminal.linear_x[j]);
+    }
+    largest.max(sum)
 }
 
 /// What the search works on.
@@ -72,6 +128,39 @@ pub(super) struct Patience {
     pub guesses: usize,
     /// as long as no more sides than these are wrong.
     pub wrong: usize,
+    /// From one that is nearly right, so many exchanges of one stage alone: where states and inputs that are held bind
+    /// each other, what is wrong at later stages may follow from what is wrong at the first of them.
+    pub steps: usize,
+}
+
+impl Patience {
+    /// Of a guess that is to be exchanged, one active side in so many may be wrong, and each must be better than
+    /// the one before, but for a few that go in circles: from farther away it is a shorter way to begin anew.
+    pub const NEAR: Self = Self {
+        few: 4,
+        guesses: 2,
+        wrong: 4,
+        steps: 0,
+    };
+    /// Of the last sample's inputs and states where these bind each other.
+    pub const BINDING: Self = Self {
+        guesses: 0,
+        steps: 4,
+        ..Self::NEAR
+    };
+    /// Of the last sample's inputs and states, held, more where several inputs act together, since no step of the
+    /// interior-point method is lost for them.
+    pub const KNOWN: Self = Self {
+        few: 2,
+        guesses: 2,
+        wrong: usize::MAX,
+        steps: 0,
+    };
+    /// Saturated inputs may all be wrong.
+    pub const FAR: Self = Self {
+        few: 1,
+        ..Self::KNOWN
+    };
 }
 
 /// Exchanges sides until the guess is right, whose trajectory and multipliers (`estimate`) then are the
@@ -86,6 +175,8 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
     let active = sides.iter().filter(|side| side.role != Role::Free).count();
     let mut most = (active / patience.few).max(2);
     let mut last = usize::MAX;
+    let closely = side::are_mixed(sides);
+    let (mut nearly, mut one_by_one) = (false, false);
     // Of soft bounds the multipliers decide whether they hold or are exceeded. And rounding may have grown along the
     // horizon until what follows from a trajectory as it is goes in circles.
     let mut careful = side::any_soft(sides);
@@ -113,6 +204,13 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
             refine(program, sides, &mut residual, tolerances, (loose, loose));
         }
         let mut wrong = reassign(sides, loose, loose * residual.largest);
+        let unexplained = residual.rest > loose * residual.largest;
+        if closely && !careful && unexplained && (1..=NEARLY_RIGHT).contains(&wrong) {
+            // What is as near may be right, and its multipliers not yet.
+            take_back(sides);
+            refine(program, sides, &mut residual, tolerances, (loose, loose));
+            wrong = reassign(sides, loose, loose * residual.largest);
+        }
         if wrong == 0 {
             let to_rounding = (T::default_epsilon() * convert(16.0), tolerances.violation);
             let near = refine(program, sides, &mut residual, tolerances, to_rounding);
@@ -128,11 +226,20 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
                 return near && is_finite(program);
             }
         }
+        if one_by_one && wrong <= NEARLY_RIGHT && patience.steps > 0 {
+            patience.steps -= 1;
+            keep_first_changes(sides);
+            continue;
+        }
         // A guess from near by is right after a few exchanges, each of which leaves fewer sides wrong.
-        if wrong <= most {
+        if wrong <= most && !one_by_one {
             most = wrong - wrong / 4;
         } else if last < usize::MAX && patience.guesses > 0 && wrong <= patience.wrong {
             patience.guesses -= 1;
+        } else if nearly && patience.steps > 0 && !one_by_one {
+            one_by_one = true;
+            guess::nearest(sides);
+            continue;
         } else {
             break;
         }
@@ -142,8 +249,13 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
         careful |= wrong >= last;
         last = wrong;
         if wrong <= NEARLY_RIGHT {
+            nearly = true;
+            let first = first_change(sides);
             for side in sides.iter_mut() {
-                side.nearest_role = side.role;
+                side.nearest_role = match Some(side.bound.stage) == first {
+                    true => side.role,
+                    false => side.last_role,
+                };
             }
         }
     }
@@ -213,26 +325,28 @@ fn refine<T: Scalar, const NX: usize, const NU: usize>(
     (enough, tolerance): (T, T),
 ) -> bool {
     let infinity: T = convert(f64::INFINITY);
-    let (mut last, mut last_missed) = (infinity, infinity);
+    let (mut least, mut last_missed) = (infinity, infinity);
     let mut stalled = false;
     let mut rounding = rounding::<T>();
     let mut waits = true;
-    for _ in 0..REFINEMENTS {
+    let mut left = REFINEMENTS;
+    loop {
         let held = sides.iter().filter(|side| side.role == Role::Held);
         let missed = held.fold(T::zero(), |most, side| {
             most.max(side.distance.abs() / side.size)
         });
         let unexplained = residual.rest / residual.largest.max(T::default_epsilon());
         let worst = missed.max(unexplained);
-        if worst <= enough {
-            return true;
+        if worst <= enough || left == 0 {
+            return worst <= tolerance;
         }
         let half: T = convert(0.5);
-        let shrinks = worst < last * half || missed < last_missed * convert(COMES_NEARER);
+        let shrinks = worst < least * half || missed < last_missed * convert(COMES_NEARER);
         // Rounding may hide what one pass has done, not what two have.
         let at_rest = !shrinks && stalled;
         if at_rest {
-            if !(waits && missed <= tolerances.violation) {
+            let may_be_rounding = missed > T::zero() && missed <= tolerances.violation;
+            if !(waits && may_be_rounding) {
                 return worst <= tolerance;
             }
             waits = false;
@@ -240,14 +354,14 @@ fn refine<T: Scalar, const NX: usize, const NU: usize>(
             drop_rounding(sides, rounding);
         }
         stalled = !shrinks && !at_rest;
-        (last, last_missed) = (worst, missed);
+        (least, last_missed) = (least.min(worst), missed);
+        left -= 1;
         let trajectory = (&mut *program.u, &mut *program.x);
         newton::descend(&program.span, program.factors, program.v);
         newton::deviate(&program.span, program.factors, program.v, trajectory, sides);
         measure(program, sides, rounding);
         *residual = explain(program, sides);
     }
-    last <= tolerance
 }
 
 /// Gives every side the role that follows from its distance and multiplier; how many change.
@@ -308,6 +422,27 @@ fn release_unmet<T: Scalar>(sides: &mut [BoundSide<T>], violation: T) -> usize {
             1
         }
         None => 0,
+    }
+}
+
+/// Takes back all changes of roles.
+fn take_back<T: Scalar>(sides: &mut [BoundSide<T>]) {
+    keep_last_changes(sides, 0);
+}
+
+/// The first stage at which a role has changed.
+fn first_change<T: Scalar>(sides: &[BoundSide<T>]) -> Option<usize> {
+    let mut changed = sides.iter().filter(|side| side.role != side.last_role);
+    changed.next().map(|side| side.bound.stage)
+}
+
+/// Takes back all changes of roles but those at the first stage at which there are any.
+fn keep_first_changes<T: Scalar>(sides: &mut [BoundSide<T>]) {
+    let first = first_change(sides);
+    for side in sides {
+        if Some(side.bound.stage) != first {
+            side.role = side.last_role;
+        }
     }
 }
 

@@ -94,6 +94,13 @@ pub(super) fn again<T: Scalar>(sides: &mut [BoundSide<T>], before: &ActiveSet<T>
     }
 }
 
+/// The roles that are known, again, after others were tried.
+pub(super) fn known<T: Scalar>(sides: &mut [BoundSide<T>]) {
+    for side in sides {
+        side.role = side.known_role;
+    }
+}
+
 /// The roles that are nearest to right, again, after others were tried.
 pub(super) fn nearest<T: Scalar>(sides: &mut [BoundSide<T>]) {
     for side in sides {

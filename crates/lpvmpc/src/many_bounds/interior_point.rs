@@ -5,10 +5,10 @@
 //! Newton step towards slack * multiplier = target is a linear-quadratic program in which each side acts
 //! with a multiplier that is linear in its distance.
 
-use super::exchange::{Program, Tolerances, exchange};
+use super::exchange::{Patience, Program, Tolerances, exchange};
+use super::newton;
 use super::side::{BoundSide, Interior, Role, Target};
 use super::span::Span;
-use super::{NEAR, newton};
 use crate::model::Scalar;
 use crate::riccati::{BadPivot, StageFactor};
 use crate::rows::Trajectory;
@@ -220,7 +220,7 @@ impl<T: Scalar> InteriorPoint<T> {
         count: impl FnMut() -> bool,
     ) -> bool {
         program.change_places();
-        if exchange(program, sides, tolerances, NEAR, count) {
+        if exchange(program, sides, tolerances, Patience::NEAR, count) {
             return true;
         }
         program.change_places();
@@ -281,8 +281,10 @@ impl<T: Scalar> InteriorPoint<T> {
                 slack: center - side.target.slack,
                 excess: center - side.target.excess,
             };
-            let (base, _) = multiplier(side, side.target);
-            side.estimate = base - side.base;
+            side.estimate = match side.soft {
+                None => side.target.slack / side.interior.slack,
+                Some(_) => multiplier(side, side.target).0 - side.base,
+            };
         }
         newton::shift(span, factors, sides, |side| side.estimate, v, (u, x));
         newton::measure(span, sides, &Trajectory { x, u });

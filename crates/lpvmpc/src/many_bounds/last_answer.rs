@@ -1,11 +1,13 @@
 //! The last answer, a sample or more later: most of its bounds are active again, and what has changed is at the end of
 //! the horizon. That is solved by itself first, at little cost, and the whole of it with what comes of it.
 
-use super::exchange::{Program, Tolerances, exchange};
+use super::exchange::{Patience, Program, Tolerances, exchange};
 use super::guess::{self, TAIL};
-use super::side::BoundSide;
+use super::newton;
+use super::retries::Retries;
+use super::search::search;
+use super::side::{self, BoundSide};
 use super::span::Span;
-use super::{KNOWN, NEAR, newton, search};
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
@@ -27,8 +29,25 @@ pub(super) enum Kind {
     Rows,
     /// Some are soft, where there are several inputs.
     Soft,
-    /// Neither.
+    /// Inputs and states are bounded.
+    Mixed,
+    /// Either are.
     Simple,
+}
+
+impl Kind {
+    /// Of the `sides` of all bounds; `rows`: whether most that were active are of rows that bind several inputs.
+    pub fn new<T, const NU: usize>(sides: &[BoundSide<T>], rows: bool) -> Self {
+        if rows {
+            Self::Rows
+        } else if NU > 1 && side::any_soft(sides) {
+            Self::Soft
+        } else if side::are_mixed(sides) {
+            Self::Mixed
+        } else {
+            Self::Simple
+        }
+    }
 }
 
 /// How the last answer is used.
@@ -49,8 +68,8 @@ impl LastAnswer {
         program: &mut Program<'_, T, NX, NU>,
         sides: &mut [BoundSide<T>],
         tolerances: &Tolerances<T>,
-        factors: &[StageFactor<T, NX, NU>],
-        proof: &mut ActiveSet<T>,
+        (factors, proof): (&[StageFactor<T, NX, NU>], &mut ActiveSet<T>),
+        without_end: &mut Retries,
         mut count: impl FnMut(usize) -> bool,
     ) -> bool {
         let whole = program.span;
@@ -61,16 +80,28 @@ impl LastAnswer {
         if end.is_none() && self.shift > 0 && self.kind == Kind::Soft {
             return false;
         }
-        let patience = match NU > 1 && (end.is_some() || self.kind == Kind::Simple) {
-            true => KNOWN,
-            false => NEAR,
+        let patience = match self.kind {
+            Kind::Simple if NU > 1 => Patience::KNOWN,
+            Kind::Rows | Kind::Soft if NU > 1 && end.is_some() => Patience::KNOWN,
+            Kind::Mixed => Patience::BINDING,
+            _ => Patience::NEAR,
         };
+        // Of a short horizon the end is a large part, and as a rule there is nothing new in it.
+        if self.kind == Kind::Mixed && n / TAIL < SHORTEST && end.is_some() && without_end.are_due()
+        {
+            let found = exchange(program, sides, tolerances, Patience::BINDING, || count(n));
+            without_end.learn(found);
+            if found {
+                return true;
+            }
+            guess::known(sides);
+        }
         if let Some(end) = end {
             program.span = end;
             let sides = end.sides(sides);
             let mut count = || count(n - end.begin);
             // Of the end most may have changed; where bounds bind each other, exchanges come to nothing.
-            let solved = self.kind == Kind::Simple
+            let solved = matches!(self.kind, Kind::Simple | Kind::Mixed)
                 && exchange(program, sides, tolerances, patience, &mut count)
                 || self.solve(program, sides, tolerances, factors, proof, count);
             program.span = whole;
@@ -92,6 +123,7 @@ impl LastAnswer {
         let length = match self.kind {
             Kind::Rows => (n / TAIL).max(SHORTEST),
             Kind::Soft => (n / TAIL).max((n / TAIL_SOFT).min(LONGEST_SOFT)),
+            Kind::Mixed => (n / TAIL).max(SHORTEST),
             Kind::Simple => n / TAIL,
         };
         // Of the same horizon the last answer knows the end, too.

@@ -1,7 +1,9 @@
 //! The linear-quadratic program that the sides of the bounds make of the problem: its factors, its
 //! trajectory, and what is missing for a minimum.
 
-use super::side::{BoundSide, Role, split_first_mut, split_off, split_off_mut};
+use super::side::{
+    BoundSide, Role, by_bound, split_first_mut, split_off, split_off_mut, split_states,
+};
 use super::span::Span;
 use crate::model::Scalar;
 use crate::ocp::{Common, Ocp, Stage};
@@ -11,7 +13,7 @@ use crate::small_matrix::{
     add_outer_product, add_scaled, largest, product, transposed_product, transposed_sizes,
     transposed_times,
 };
-use crate::solution::{BoundId, Quantity};
+use crate::solution::Quantity;
 use nalgebra::SVector;
 
 /// The factors of the problem with the cost of every side's multiplier; inputs that are held are constants.
@@ -26,13 +28,15 @@ pub(super) fn factorize<T: Scalar, const NX: usize, const NU: usize>(
         linear: ocp.terminal.linear_x,
     };
     let mut before = sides;
-    let end = split_off(&mut before, ocp.length());
-    add_to_cost(ocp, end, &mut cost_to_go);
+    let (of_states, of_rows) = split_states(split_off(&mut before, ocp.length()));
+    add_states(of_states, &mut cost_to_go);
+    add_rows(ocp, of_rows, &mut cost_to_go);
     let stages = span.stages().zip(span.of_mut(factors));
     for ((i, stage), factor) in stages.rev() {
-        let here = split_off(&mut before, i);
-        eliminate(ocp, i, stage, here, factor, &mut cost_to_go)?;
-        add_to_cost(ocp, here, &mut cost_to_go);
+        let (of_states, others) = split_states(split_off(&mut before, i));
+        eliminate(ocp, i, stage, others, factor, &mut cost_to_go)?;
+        add_states(of_states, &mut cost_to_go);
+        add_rows(ocp, others, &mut cost_to_go);
     }
     Ok(())
 }
@@ -64,7 +68,7 @@ fn eliminate<T: Scalar, const NX: usize, const NU: usize>(
 fn constant_input<T: Scalar, const NU: usize>(sides: &[BoundSide<T>]) -> Option<SVector<T, NU>> {
     let mut held = 0;
     let mut input = SVector::zeros();
-    for bound in sides.chunk_by(is_same_quantity) {
+    for bound in by_bound(sides) {
         match bound.first()?.bound.quantity {
             Quantity::Input(j) => {
                 input[j] = bound.iter().find(|side| side.role == Role::Held)?.limit;
@@ -86,7 +90,7 @@ struct Costs<'a, T: 'static, const NX: usize, const NU: usize> {
 impl<T: Scalar, const NX: usize, const NU: usize> Adjustment<T, NX, NU> for Costs<'_, T, NX, NU> {
     #[inline(always)]
     fn adjust(&self, minimum: &mut StageMinimum<T, NX, NU>) {
-        for bound in self.sides.chunk_by(is_same_quantity) {
+        for bound in by_bound(self.sides) {
             add_to_minimum(self.ocp, bound, minimum);
         }
     }
@@ -106,13 +110,13 @@ fn add_to_minimum<T: Scalar, const NX: usize, const NU: usize>(
         Quantity::Input(j) => match sides.iter().find(|side| side.role == Role::Held) {
             Some(held) => minimum.hold(j, held.limit),
             None => {
-                let (weight, pull) = weight_and_pull(sides);
+                let (weight, pull) = sum_of_weights_and_pulls(sides);
                 minimum.hessian[(j, j)] += weight;
                 minimum.g[j] -= pull;
             }
         },
         Quantity::Row(j) => {
-            let (weight, pull) = weight_and_pull(sides);
+            let (weight, pull) = sum_of_weights_and_pulls(sides);
             if let Some(row) = ocp.row(side.bound.stage, j) {
                 add_outer_product(&mut minimum.hessian, &row.u, weight, &row.u);
                 add_outer_product(&mut minimum.g_x, &row.u, weight, &row.x);
@@ -123,49 +127,55 @@ fn add_to_minimum<T: Scalar, const NX: usize, const NU: usize>(
     }
 }
 
-/// The parts of the sides' costs that have to do with the state alone.
-fn add_to_cost<T: Scalar, const NX: usize, const NU: usize>(
-    ocp: &Ocp<T, NX, NU>,
-    sides: &[BoundSide<T>],
-    cost: &mut CostToGo<T, NX>,
-) {
-    for sides in sides.chunk_by(is_same_quantity) {
-        let Some(BoundId {
-            stage, quantity, ..
-        }) = sides.first().map(|side| side.bound)
-        else {
-            continue;
-        };
-        match quantity {
-            Quantity::State(j) => {
-                let (weight, pull) = weight_and_pull(sides);
-                cost.quadratic[(j, j)] += weight;
-                cost.linear[j] -= pull;
-            }
-            Quantity::Row(j) => {
-                let (weight, pull) = weight_and_pull(sides);
-                if let Some(row) = ocp.row(stage, j) {
-                    add_outer_product(&mut cost.quadratic, &row.x, weight, &row.x);
-                    add_scaled(&mut cost.linear, &row.x, -pull);
-                }
-            }
-            Quantity::Input(_) => {}
+/// The costs of a stage's sides of states.
+fn add_states<T: Scalar, const NX: usize>(sides: &[BoundSide<T>], cost: &mut CostToGo<T, NX>) {
+    for side in sides {
+        if let Quantity::State(j) = side.bound.quantity {
+            let (weight, pull) = weight_and_pull(side);
+            cost.quadratic[(j, j)] += weight;
+            cost.linear[j] -= pull;
         }
     }
 }
 
-/// Whether two sides bound the same quantity of a stage.
-fn is_same_quantity<T>(a: &BoundSide<T>, b: &BoundSide<T>) -> bool {
-    a.bound.quantity == b.bound.quantity && a.bound.stage == b.bound.stage
+/// The parts of the costs of a stage's rows that have to do with the state alone.
+fn add_rows<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    sides: &[BoundSide<T>],
+    cost: &mut CostToGo<T, NX>,
+) {
+    if ocp.rows_per_stage == 0 {
+        return;
+    }
+    for bound in by_bound(sides) {
+        let row = bound.first().map(|side| side.bound);
+        let row = row.and_then(|bound| match bound.quantity {
+            Quantity::Row(j) => ocp.row(bound.stage, j),
+            _ => None,
+        });
+        if let Some(row) = row {
+            let (weight, pull) = sum_of_weights_and_pulls(bound);
+            add_outer_product(&mut cost.quadratic, &row.x, weight, &row.x);
+            add_scaled(&mut cost.linear, &row.x, -pull);
+        }
+    }
 }
 
-/// The cost of a bound's sides is weight * value^2 / 2 - pull * value.
-fn weight_and_pull<T: Scalar>(sides: &[BoundSide<T>]) -> (T, T) {
-    sides.iter().fold((T::zero(), T::zero()), |sum, side| {
-        (
-            sum.0 + side.weight,
-            sum.1 + (side.sign() * side.base + side.weight * side.limit),
-        )
+/// The cost of a side is weight * value^2 / 2 - pull * value.
+#[inline(always)]
+fn weight_and_pull<T: Scalar>(side: &BoundSide<T>) -> (T, T) {
+    (
+        side.weight,
+        side.sign * side.base + side.weight * side.limit,
+    )
+}
+
+/// The same of all sides of a bound.
+#[inline(always)]
+fn sum_of_weights_and_pulls<T: Scalar>(sides: &[BoundSide<T>]) -> (T, T) {
+    let each = sides.iter().map(weight_and_pull);
+    each.fold((T::zero(), T::zero()), |sum, (weight, pull)| {
+        (sum.0 + weight, sum.1 + pull)
     })
 }
 
@@ -194,21 +204,18 @@ pub(super) fn measure<T: Scalar, const NX: usize, const NU: usize>(
 ) {
     let ocp = span.ocp;
     let n = ocp.length();
-    let (mut at, mut x) = (span.begin, &span.start);
-    for sides in sides.chunk_by_mut(is_same_quantity) {
-        let Some(side) = sides.first() else {
-            continue;
-        };
+    let input = |stage| trajectory.u.get(stage).filter(|_| stage < n);
+    let (mut at, mut x, mut u) = (span.begin, &span.start, input(span.begin));
+    let mut value = T::zero();
+    for side in sides {
         let stage = side.bound.stage;
         if stage != at {
-            at = stage;
-            x = span.state(trajectory, stage);
+            (at, x, u) = (stage, span.state(trajectory, stage), input(stage));
         }
-        let u = trajectory.u.get(stage).filter(|_| stage < n);
-        let value = side.value(ocp, x, u);
-        for side in sides {
-            side.distance = side.distance_of(value);
+        if !side.is_second {
+            value = side.value(ocp, x, u);
         }
+        side.distance = side.distance_of(value);
     }
 }
 
@@ -221,7 +228,12 @@ fn gradient<T: Scalar, const NX: usize, const NU: usize>(
 ) -> (SVector<T, NX>, SVector<T, NU>) {
     let mut sum = (SVector::zeros(), SVector::zeros());
     for side in sides {
-        let slope = -side.sign() * multiplier(side);
+        let multiplier = multiplier(side);
+        // As a rule most sides are free.
+        if multiplier == T::zero() {
+            continue;
+        }
+        let slope = -side.sign * multiplier;
         match side.bound.quantity {
             Quantity::State(j) => sum.0[j] += slope,
             Quantity::Input(j) => sum.1[j] += slope,
@@ -304,7 +316,7 @@ fn take_up<T: Scalar, const NX: usize, const NU: usize>(
     change_u: Option<&SVector<T, NU>>,
 ) {
     for side in sides.iter_mut().filter(|side| side.is_weighted()) {
-        let change = side.value(ocp, change_x, change_u) * side.sign();
+        let change = side.value(ocp, change_x, change_u) * side.sign;
         side.base -= side.weight * (side.distance + change);
     }
 }
@@ -333,8 +345,8 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
         largest: T::zero(),
     };
     let of_rows = |side: &BoundSide<T>| match side.input() {
-        None => side.multiplier_at(side.distance),
-        Some(_) => T::zero(),
+        None if side.role != Role::Free => side.multiplier_at(side.distance),
+        _ => T::zero(),
     };
     let mut before = sides;
     let end = split_off_mut(&mut before, n);
@@ -357,7 +369,7 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
         for side in here.iter_mut().filter(|side| side.role == Role::Held) {
             side.estimate = match side.input() {
                 None => side.base,
-                Some(j) => side.sign() * core::mem::replace(&mut slope[j], T::zero()),
+                Some(j) => side.sign * core::mem::replace(&mut slope[j], T::zero()),
             };
         }
         residual.rest = residual.rest.max(largest(&slope));

@@ -10,6 +10,8 @@ const ALMOST: usize = 4;
 pub(super) struct AllRetries {
     /// The last answer's bounds, once more.
     pub repeats: Retries,
+    /// The same, without a solution of the end of the horizon by itself.
+    pub without_end: Retries,
     /// The inputs that the regulator saturates.
     pub saturations: Retries,
     /// The phase as a whole.

@@ -24,6 +24,10 @@ pub(crate) enum Role {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoundSide<T> {
     pub bound: BoundId,
+    /// Whether the side in front of it is the other one of the same bound.
+    pub is_second: bool,
+    /// 1 for a lower bound, -1 for an upper one: the derivative of d in the bounded quantity.
+    pub sign: T,
     pub limit: T,
     /// The size against which a violation is measured.
     pub size: T,
@@ -112,6 +116,11 @@ impl<T: Scalar> BoundSide<T> {
     fn new(bound: BoundId, limit: T, size: T, soft: Option<Penalty<T>>) -> Self {
         Self {
             bound,
+            is_second: false,
+            sign: match bound.side {
+                Side::Upper => -T::one(),
+                _ => T::one(),
+            },
             limit,
             size,
             soft,
@@ -141,15 +150,8 @@ impl<T: Scalar> BoundSide<T> {
         self.role == Role::Held && self.input().is_none()
     }
 
-    /// 1 for a lower bound, -1 for an upper one: the derivative of d in the bounded quantity.
-    pub fn sign(&self) -> T {
-        match self.bound.side {
-            Side::Upper => -T::one(),
-            _ => T::one(),
-        }
-    }
-
     /// The bounded quantity at these values of the stage.
+    #[inline(always)]
     pub fn value<const NX: usize, const NU: usize>(
         &self,
         ocp: &Ocp<T, NX, NU>,
@@ -167,8 +169,9 @@ impl<T: Scalar> BoundSide<T> {
     }
 
     /// d where the quantity has this value.
+    #[inline(always)]
     pub fn distance_of(&self, value: T) -> T {
-        (value - self.limit) * self.sign()
+        (value - self.limit) * self.sign
     }
 
     /// The multiplier at the distance d.
@@ -209,7 +212,9 @@ pub(super) fn collect<T: Scalar, const NX: usize, const NU: usize>(
                     quantity,
                     side,
                 };
-                *sides.get_mut(count)? = BoundSide::new(bound, limit, size, soft);
+                let place = sides.get_mut(count)?;
+                *place = BoundSide::new(bound, limit, size, soft);
+                place.is_second = side == Side::Upper && lower.is_finite();
                 count += 1;
             }
         }
@@ -241,9 +246,27 @@ pub(super) fn collect<T: Scalar, const NX: usize, const NU: usize>(
     Some(count)
 }
 
+/// The sides of a stage: first those of its states, then those of its inputs and rows.
+pub(super) fn split_states<T>(sides: &[BoundSide<T>]) -> (&[BoundSide<T>], &[BoundSide<T>]) {
+    let is_state = |side: &BoundSide<T>| matches!(side.bound.quantity, Quantity::State(_));
+    sides.split_at(sides.iter().take_while(|side| is_state(side)).count())
+}
+
+/// The sides, one or both of each bound together.
+pub(super) fn by_bound<T>(sides: &[BoundSide<T>]) -> impl Iterator<Item = &[BoundSide<T>]> {
+    sides.chunk_by(|_, next| next.is_second)
+}
+
 /// Whether one of them may be exceeded.
 pub(super) fn any_soft<T>(sides: &[BoundSide<T>]) -> bool {
     sides.iter().any(|side| side.soft.is_some())
+}
+
+/// Whether there are hard ones of inputs and of states.
+pub(super) fn are_mixed<T>(sides: &[BoundSide<T>]) -> bool {
+    let of_input = |side: &BoundSide<T>| matches!(side.bound.quantity, Quantity::Input(_));
+    let of_state = |side: &BoundSide<T>| matches!(side.bound.quantity, Quantity::State(_));
+    sides.iter().any(of_input) && sides.iter().any(of_state) && !any_soft(sides)
 }
 
 /// Takes the sides of the last stages, from `stage` on, off the list.

@@ -394,8 +394,9 @@ fn known_bounds_are_begun_with_after_a_first_phase_in_vain() {
             solution.changes
         };
         let (changes, one_by_one) = (solve(&mut both.at_once), solve(&mut both.one_by_one));
+        // What the factorisation has shown may be a better beginning.
         assert!(
-            [0, 8 + 2].contains(&(changes - one_by_one)),
+            (one_by_one..=one_by_one + 8 + 2).contains(&changes),
             "{changes} for {one_by_one}"
         );
         tried += usize::from(changes > one_by_one);

@@ -1,0 +1,90 @@
+//! How many bounds the answer may have, and whether that is worth the phase.
+
+use super::guess;
+use super::retries::AllRetries;
+use crate::model::Scalar;
+use crate::ocp::Ocp;
+use crate::rows;
+use crate::solution::{Quantity, Solution};
+use crate::solver::trajectory;
+
+/// With so many violated bounds a few factorisations cost less than a pass for each bound.
+const MANY: usize = 24;
+/// So many where some are soft, which takes more factorisations, or those of a single input are known, with which the
+/// dual method begins.
+const MORE: usize = 32;
+/// So many of several inputs, and states, that were held by the last answer are worth a guess, which is right more often
+/// than not.
+const FAMILIAR: usize = 20;
+/// And so many inputs that the regulator saturates, where there is one of each stage.
+const MANY_SATURATED: usize = 8;
+/// Where fewer bounds were active before than one for so many that are violated, they tell little of what to expect.
+const LITTLE: usize = 2;
+/// Of a single input a bound that is met keeps others: while a speed stays at its limit only half of what is violated
+/// becomes active.
+const LITTLE_OF_ONE: usize = 4;
+
+/// What can be told from the trajectory without bounds, and from the last answer.
+pub(super) struct Expected {
+    /// How many bounds.
+    pub bounds: usize,
+    /// Whether these are many enough for the interior-point method.
+    pub many: bool,
+    /// Whether the last answer is worth a guess, although they are fewer.
+    pub familiar: bool,
+    /// Whether the inputs that the regulator saturates are worth a guess.
+    pub saturated: bool,
+    /// Whether most of the bounds of the last answer are of rows that bind several inputs.
+    pub rows: bool,
+    /// Whether one that is violated is soft, or of a single input many are known.
+    takes_more: bool,
+}
+
+impl Expected {
+    /// Of the trajectory in `solution`, and of its active rows if the first `known` of them are of use.
+    pub fn new<T: Scalar, const NX: usize, const NU: usize>(
+        ocp: &Ocp<T, NX, NU>,
+        solution: &Solution<T, NX, NU>,
+        known: usize,
+    ) -> Self {
+        let (mut violated, mut inputs) = (0, 0);
+        let mut takes_more = NU == 1 && known > 0;
+        rows::violated_bounds(ocp, &trajectory(solution), &mut |candidate| {
+            violated += 1;
+            inputs += usize::from(matches!(candidate.bound.quantity, Quantity::Input(_)));
+            takes_more |= candidate.soft.is_some();
+        });
+        // Where several inputs act together, general rows that were active are taken over one by one in less time.
+        let rows = NU > 1 && guess::mostly_rows(&solution.active);
+        // As a rule most of those that are known hold again, and others are violated only as long as they do not.
+        let little = if NU == 1 { LITTLE_OF_ONE } else { LITTLE };
+        let tells = !rows && little * known >= violated;
+        // No more can hold independently than there are inputs.
+        let bounds = if tells { known } else { violated }.min(ocp.length() * NU);
+        Self {
+            bounds,
+            many: bounds >= if takes_more { MORE } else { MANY },
+            familiar: tells && !takes_more && known >= FAMILIAR,
+            // Those are nearly right where a single input moves the states.
+            saturated: NU == 1 && 2 * inputs > violated && inputs >= MANY_SATURATED,
+            rows,
+            takes_more,
+        }
+    }
+
+    /// Whether it is worth a try now.
+    pub fn is_due(&mut self, retries: &mut AllRetries) -> bool {
+        self.saturated = self.saturated && retries.saturations.are_due();
+        self.saturated || (self.many || self.familiar) && retries.turns.are_due()
+    }
+
+    /// More changes than these the phase is not worth: of a single input the dual method needs one for each bound, half
+    /// as many more for soft ones.
+    pub fn worth<const NU: usize>(&self, any_soft: bool) -> usize {
+        match (NU > 1, self.takes_more && any_soft) {
+            (true, _) => usize::MAX,
+            (false, true) => self.bounds + self.bounds / 2,
+            (false, false) => self.bounds,
+        }
+    }
+}

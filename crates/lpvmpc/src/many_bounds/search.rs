@@ -1,0 +1,105 @@
+//! The way of the interior-point method to a guess that is right, or to a proof that there is no point within all bounds.
+
+use super::exchange::{Program, Tolerances};
+use super::interior_point::{Foretold, InteriorPoint};
+use super::side::{self, BoundSide};
+use crate::model::Scalar;
+use crate::solution::{ActiveRow, ActiveSet, Part, Status};
+use crate::solver::infeasible;
+use nalgebra::convert;
+
+/// Shorter parts of the way mean that bounds may contradict each other.
+const STUCK: f64 = 0.1;
+/// The roles that a step foretells are tried when one in so many of the active sides, or fewer, has changed
+/// its since the step before; of three roles, where bounds are soft, it is harder to foretell the right one.
+const CERTAIN: usize = 8;
+const CERTAIN_SOFT: usize = 10;
+/// And when that step went so far.
+const FREE: f64 = 0.5;
+/// Once they were wrong, again when the products of slack and multiplier are this part of what they were.
+const NEARER: f64 = 0.01;
+/// Where the products of slack and multiplier begin, as a part of the largest cost of a stage.
+const CENTRE: f64 = 0.01;
+
+/// The interior-point method, until the roles that it foretells are right, which is tried so many times at most, or
+/// its multipliers prove that the problem is infeasible.
+pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
+    program: &mut Program<'_, T, NX, NU>,
+    sides: &mut [BoundSide<T>],
+    tolerances: &Tolerances<T>,
+    mut trials: usize,
+    proof: &mut ActiveSet<T>,
+    mut count: impl FnMut() -> bool,
+) -> Option<Result<(), Status<T>>> {
+    let span = program.span;
+    let certain = match side::any_soft(sides) {
+        true => CERTAIN_SOFT,
+        false => CERTAIN,
+    };
+    let mut method = InteriorPoint::new(sides, tolerances.scale * convert(CENTRE));
+    let smallest = method.complementarity() * T::default_epsilon().powf(convert(0.6));
+    let mut near_enough = convert(f64::INFINITY);
+    let mut part = T::zero();
+    let mut stuck = 0_usize;
+    while trials > 0 && count() {
+        let predicted = method.predict(&span, sides, program.factors, (program.u, program.x));
+        let Foretold { changed, active } = predicted.ok()?;
+        let near = method.complementarity() <= near_enough;
+        if near && part > convert(FREE) && certain * changed <= active {
+            near_enough = method.complementarity() * convert(NEARER);
+            trials -= 1;
+            if method.try_foretold(program, sides, tolerances, &mut count) {
+                return Some(Ok(()));
+            }
+        }
+        part = method.correct(
+            &span,
+            sides,
+            program.factors,
+            program.v,
+            (program.u, program.x),
+        );
+        if part < convert(FREE) && method.complementarity() < smallest {
+            // Rounding decides now.
+            return None;
+        }
+        if part < convert(STUCK) {
+            stuck += 1;
+            let ended = !(part > convert(1e-6));
+            // Where no point satisfies all bounds, multipliers grow until they are a proof of it. To look whether
+            // they are takes as long as a step.
+            if ended || stuck.is_power_of_two() {
+                list_multipliers(sides, proof);
+                if let Some(infeasible) = infeasible(span.ocp, proof) {
+                    return Some(Err(infeasible));
+                }
+            }
+            if ended {
+                return None;
+            }
+        }
+    }
+    None
+}
+
+/// Lists the hard bounds of states and rows with the multipliers of the interior-point method, as far as
+/// there are places and they count.
+fn list_multipliers<T: Scalar>(sides: &[BoundSide<T>], list: &mut ActiveSet<T>) {
+    list.clear();
+    let decide = |side: &&BoundSide<T>| side.input().is_none() && side.soft.is_none();
+    let multipliers = sides.iter().filter(decide);
+    let multipliers = multipliers.map(|side| (side.bound, side.interior.multiplier));
+    let largest = multipliers
+        .clone()
+        .fold(T::zero(), |most, (_, multiplier)| most.max(multiplier));
+    for (bound, multiplier) in multipliers {
+        if multiplier > largest * T::default_epsilon().sqrt() {
+            list.push(ActiveRow {
+                bound,
+                part: Part::Hard,
+                multiplier: multiplier / largest,
+                exceeded: false,
+            });
+        }
+    }
+}
