@@ -4,7 +4,7 @@
 #   run.sh SCRATCH [HPIPM_SOURCES]
 #
 # SCRATCH is a folder for the problem files (about 1 GB), builds and measurements. HPIPM_SOURCES holds `blasfeo`
-# and `hpipm`; without it HPIPM is left out. Takes about eight minutes once the files are there.
+# and `hpipm`; without it HPIPM is left out. Takes about 25 minutes once the files are there.
 set -euo pipefail
 mkdir -p "$1"
 scratch=$(realpath "$1")
