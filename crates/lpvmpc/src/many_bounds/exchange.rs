@@ -13,7 +13,7 @@ use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
 use crate::rows::Trajectory;
-use crate::working_set::first;
+use crate::small_matrix::{largest, product};
 use core::mem::swap;
 use nalgebra::{SVector, convert};
 
@@ -223,7 +223,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
                 wrong = release_unmet(sides, tolerances.violation);
             }
             if wrong == 0 {
-                return near && is_finite(program);
+                return near && is_of_the_plant(program, tolerances.violation);
             }
         }
         if one_by_one && wrong <= NEARLY_RIGHT && patience.steps > 0 {
@@ -262,16 +262,27 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
     false
 }
 
-/// Whether the trajectory consists of numbers: of others no comparison says that a side is wrong. One of them spreads to
-/// the last state or its input.
-fn is_finite<T: Scalar, const NX: usize, const NU: usize>(
+/// Whether the trajectory is one of the plant, and so of numbers: of others no comparison says that a side is wrong.
+/// Refining adds up its changes; where some were many times larger than what is left, the states no longer follow from
+/// the inputs.
+fn is_of_the_plant<T: Scalar, const NX: usize, const NU: usize>(
     program: &Program<'_, T, NX, NU>,
+    tolerance: T,
 ) -> bool {
     let span = &program.span;
-    let n = span.ocp.length();
-    let inputs = span.of(first(program.u, n)).iter().flatten();
-    let end = span.of(first(program.x, n)).last().into_iter().flatten();
-    inputs.chain(end).all(|entry| entry.is_finite())
+    let inputs = span.of(program.u).iter();
+    let mut state = &span.start;
+    span.stages()
+        .zip(inputs.zip(span.of(program.x)))
+        .all(|((_, stage), (u, x))| {
+            let terms = [product(&stage.a, state), product(&stage.b, u), stage.c, -*x];
+            let size = terms
+                .iter()
+                .fold(T::zero(), |sum, term| sum + largest(term));
+            let rest = terms.iter().fold(SVector::zeros(), |sum, term| sum + term);
+            state = x;
+            size.is_finite() && rest.iter().all(|entry| entry.abs() <= tolerance * size)
+        })
 }
 
 fn rounding<T: Scalar>() -> T {

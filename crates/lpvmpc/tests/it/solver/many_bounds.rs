@@ -404,6 +404,39 @@ fn known_bounds_are_begun_with_after_a_first_phase_in_vain() {
     assert_eq!(tried, 7);
 }
 
+/// A problem that is infeasible by rounding has multipliers of 1e20; begun with them, the next one was refined from so far
+/// away that its states no longer followed from its inputs, and it was called solved.
+#[test]
+fn states_follow_from_inputs_after_multipliers_without_meaning() {
+    let family = Family::Degenerate;
+    let mut largest = 0.0_f64;
+    for seed in [16, 282, 316, 318, 334, 338, 367] {
+        let mut random = Rng::new(seed << 40 | family as u64);
+        let rows = usize::from(seed % 2 == 1);
+        let mut ocp = problem::<4, 2>(&mut random, family, 30, rows);
+        let x0 = ocp.x0;
+        let mut both = Both::<4, 2>::new::<30, 200>();
+        let settings = SolverSettings {
+            warm_start: WarmStart::Same,
+            ..SolverSettings::default()
+        };
+        for size in [0.0, 1e-9, 1e-6, 1e-3, 0.1] {
+            if size > 0.0 {
+                ocp.x0 = x0 + SVector::from_fn(|_, _| size * random.normal());
+            }
+            let (solver, solution) = &mut both.at_once;
+            solver.solve(&ocp, &settings, solution);
+            if solution.status.is_solved() {
+                let residual = kkt_residual(&ocp, solution).largest();
+                assert!(residual < 1e-8, "{seed}, {size:e}: {residual:e}");
+                let multipliers = solution.active.iter().map(|row| row.multiplier);
+                largest = multipliers.fold(largest, f64::max);
+            }
+        }
+    }
+    assert!(largest > 1e15, "{largest:e}");
+}
+
 /// Where the factorisations of a guess overflow, no comparison says that it is wrong. It was called solved.
 #[test]
 fn what_is_no_number_is_no_answer() {
