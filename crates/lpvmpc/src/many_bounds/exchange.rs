@@ -207,7 +207,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
         let unexplained = residual.rest > loose * residual.largest;
         if closely && !careful && unexplained && (1..=NEARLY_RIGHT).contains(&wrong) {
             // What is as near may be right, and its multipliers not yet.
-            take_back(sides);
+            keep_last_changes(sides, 0);
             refine(program, sides, &mut residual, tolerances, (loose, loose));
             wrong = reassign(sides, loose, loose * residual.largest);
         }
@@ -434,11 +434,6 @@ fn release_unmet<T: Scalar>(sides: &mut [BoundSide<T>], violation: T) -> usize {
         }
         None => 0,
     }
-}
-
-/// Takes back all changes of roles.
-fn take_back<T: Scalar>(sides: &mut [BoundSide<T>]) {
-    keep_last_changes(sides, 0);
 }
 
 /// The first stage at which a role has changed.

@@ -36,12 +36,13 @@ pub(super) struct Expected {
     pub saturated: bool,
     /// Whether most of the bounds of the last answer are of rows that bind several inputs.
     pub rows: bool,
-    /// Whether one that is violated is soft, or of a single input many are known.
+    /// Whether one that is violated is soft, or some of a single input are known.
     takes_more: bool,
 }
 
 impl Expected {
-    /// Of the trajectory in `solution`, and of its active rows if the first `known` of them are of use.
+    /// Of the trajectory without bounds in `solution`, whose active rows are those of the last answer: `known` of them, or
+    /// 0 if they are not to be begun with.
     pub fn new<T: Scalar, const NX: usize, const NU: usize>(
         ocp: &Ocp<T, NX, NU>,
         solution: &Solution<T, NX, NU>,

@@ -29,9 +29,9 @@ pub(super) enum Kind {
     Rows,
     /// Some are soft, where there are several inputs.
     Soft,
-    /// Inputs and states are bounded.
+    /// Neither, but bounds of inputs and of states bind each other.
     Mixed,
-    /// Either are.
+    /// None of these.
     Simple,
 }
 
@@ -94,6 +94,7 @@ impl LastAnswer {
             if found {
                 return true;
             }
+            // Of the end, which is solved next, nothing else is known.
             guess::known(sides);
         }
         if let Some(end) = end {
@@ -121,9 +122,8 @@ impl LastAnswer {
     ) -> Option<Span<'a, T, NX, NU>> {
         let n = ocp.length();
         let length = match self.kind {
-            Kind::Rows => (n / TAIL).max(SHORTEST),
+            Kind::Rows | Kind::Mixed => (n / TAIL).max(SHORTEST),
             Kind::Soft => (n / TAIL).max((n / TAIL_SOFT).min(LONGEST_SOFT)),
-            Kind::Mixed => (n / TAIL).max(SHORTEST),
             Kind::Simple => n / TAIL,
         };
         // Of the same horizon the last answer knows the end, too.

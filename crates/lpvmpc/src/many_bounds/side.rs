@@ -37,8 +37,9 @@ pub(crate) struct BoundSide<T> {
     pub last_role: Role,
     /// The role that it had in the last solution, where that is begun with.
     pub known_role: Role,
-    /// The role that the dual method begins with where nothing is found: the known one, or that of the last guess that was
-    /// nearly right.
+    /// The role that is nearest to right: the known one, or that of the last guess that was nearly right, with what was
+    /// wrong at its first stage exchanged. Exchanges go back to it, and the dual method begins with it where nothing is
+    /// found.
     pub nearest_role: Role,
     /// Multiplier at d = 0, and how fast it falls with d.
     pub base: T,
