@@ -68,8 +68,8 @@ pub(crate) enum AtOnce<T> {
     Untried,
     /// The solution, or the proof that there is none.
     Done(Result<(), Status<T>>),
-    /// Neither: the trajectory without bounds is in the solution, and the active rows are those to begin with: of a guess
-    /// that was nearly right, or else of the last solution at their new stages, if they are to be begun with.
+    /// Neither: the trajectory without bounds is in the solution, and the active rows are those to begin with: of the last
+    /// solution at their new stages, if they are to be begun with.
     InVain,
 }
 
@@ -279,7 +279,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         solver.dual.reset(solver.dual.tolerance, left);
         // What it was made from was finite.
         solver.roll_out(ocp, solution).ok();
-        guess::nearest(sides);
+        guess::known(sides);
         list(sides, &mut solution.active);
         AtOnce::InVain
     }

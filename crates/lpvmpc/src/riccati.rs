@@ -51,8 +51,8 @@ pub struct StageFactor<T, const NX: usize, const NU: usize> {
 pub(crate) struct StageMinimum<T, const NX: usize, const NU: usize> {
     /// H, symmetric; its lower triangle is read.
     pub hessian: SMatrix<T, NU, NU>,
-    /// G.
-    pub g_x: SMatrix<T, NU, NX>,
+    /// G', whose columns are as long as the state.
+    pub g_x: SMatrix<T, NX, NU>,
     pub g: SVector<T, NU>,
     pub linear_x: SVector<T, NX>,
 }
@@ -60,8 +60,8 @@ pub(crate) struct StageMinimum<T, const NX: usize, const NU: usize> {
 impl<T: Scalar, const NX: usize, const NU: usize> StageMinimum<T, NX, NU> {
     /// Makes input `j` a constant. An unknown of its own stands in its place, at the same value.
     pub fn hold(&mut self, j: usize, value: T) {
-        self.linear_x += self.g_x.row(j).transpose() * value;
-        self.g_x.row_mut(j).fill(T::zero());
+        self.linear_x += self.g_x.column(j) * value;
+        self.g_x.column_mut(j).fill(T::zero());
         self.g += self.hessian.column(j) * value;
         self.g[j] = -value;
         self.hessian.row_mut(j).fill(T::zero());
@@ -208,29 +208,30 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
 
         let mut minimum = StageMinimum {
             hessian: weights.r + by.product(&b, &p_b),
-            g_x: weights.s + by.product(&b, &p_a),
+            g_x: transposed(&weights.s) + by.product(&a, &p_b),
             g: stage.linear_u + product(&b, &p_next),
             linear_x: stage.linear_x + product(&a, &p_next),
         };
         if let Some(adjustment) = adjustment {
             adjustment.adjust(&mut minimum);
         }
-        let UnitFactor { inverse, pivots } = UnitFactor::new(&minimum.hessian)?;
-        let reciprocals = pivots.map(|pivot| T::one() / pivot);
-        // -D^-1 L^-1 of G and g.
-        let l_g_x = by.product(&inverse, &minimum.g_x);
-        let scaled_g_x = scaled_rows(&l_g_x, &-reciprocals);
-        let scaled_g = scaled_rows(&product(&inverse, &minimum.g), &-reciprocals);
+        let UnitFactor {
+            inverse,
+            reciprocals,
+        } = UnitFactor::new(&minimum.hessian)?;
+        // L^-1 of G and g, transposed, and -D^-1 of it.
         let transposed_inverse = transposed(&inverse);
-        self.feedback = by.product(&transposed_inverse, &scaled_g_x);
+        let l_g_x = by.product(&minimum.g_x, &transposed_inverse);
+        let scaled_g_x = scaled_columns(&l_g_x, &-reciprocals);
+        let scaled_g = scaled_rows(&product(&inverse, &minimum.g), &-reciprocals);
+        self.feedback = transposed(&by.product(&scaled_g_x, &inverse));
         self.feedforward = product(&transposed_inverse, &scaled_g);
         self.inverse_factor = scaled_rows(&inverse, &reciprocals.map(|d| d.sqrt()));
 
         // A'P(A + BK) + Q + S'K, and the same for the linear part.
-        let l_g_x = transposed(&l_g_x);
         *quadratic = weights.q;
         by.add_symmetric_product(quadratic, &a, &p_a);
-        by.add_symmetric_product(quadratic, &l_g_x, &scaled_g_x);
+        by.add_symmetric_product(quadratic, &l_g_x, &transposed(&scaled_g_x));
         mirror(quadratic);
         *linear = minimum.linear_x + product(&l_g_x, &scaled_g);
         Ok(())
@@ -307,10 +308,25 @@ fn scaled_rows<T: Scalar, const R: usize, const C: usize>(
     out
 }
 
-/// L^-1 and D of the factorisation L D L' with unit lower triangular L.
+/// `m` diag(`factors`)
+#[inline(always)]
+fn scaled_columns<T: Scalar, const R: usize, const C: usize>(
+    m: &SMatrix<T, R, C>,
+    factors: &SVector<T, C>,
+) -> SMatrix<T, R, C> {
+    let mut out = *m;
+    for (column, factor) in out.data.0.iter_mut().zip(&factors.data.0[0]) {
+        for entry in column {
+            *entry *= *factor;
+        }
+    }
+    out
+}
+
+/// L^-1 and D^-1 of the factorisation L D L' with unit lower triangular L.
 struct UnitFactor<T, const K: usize> {
     inverse: SMatrix<T, K, K>,
-    pivots: SVector<T, K>,
+    reciprocals: SVector<T, K>,
 }
 
 impl<T: Scalar, const K: usize> UnitFactor<T, K> {
@@ -319,6 +335,7 @@ impl<T: Scalar, const K: usize> UnitFactor<T, K> {
     fn new(m: &SMatrix<T, K, K>) -> Result<Self, BadPivot<T>> {
         let mut l = *m;
         let mut pivots = SVector::<T, K>::zeros();
+        let mut reciprocals = SVector::<T, K>::zeros();
         for j in 0..K {
             let mut pivot = l[(j, j)];
             for k in 0..j {
@@ -328,12 +345,13 @@ impl<T: Scalar, const K: usize> UnitFactor<T, K> {
                 return Err(BadPivot(pivot));
             }
             pivots[j] = pivot;
+            reciprocals[j] = T::one() / pivot;
             for i in j + 1..K {
                 let mut entry = l[(i, j)];
                 for k in 0..j {
                     entry -= l[(i, k)] * l[(j, k)] * pivots[k];
                 }
-                l[(i, j)] = entry / pivot;
+                l[(i, j)] = entry * reciprocals[j];
             }
         }
         let mut inverse = SMatrix::<T, K, K>::identity();
@@ -346,6 +364,9 @@ impl<T: Scalar, const K: usize> UnitFactor<T, K> {
                 inverse[(i, j)] = entry;
             }
         }
-        Ok(Self { inverse, pivots })
+        Ok(Self {
+            inverse,
+            reciprocals,
+        })
     }
 }

@@ -21,8 +21,7 @@ use nalgebra::{SVector, convert};
 const REFINEMENTS: usize = 40;
 /// Held sides come nearer when what is left of their distances is at most this part.
 const COMES_NEARER: f64 = 0.8;
-/// With so many wrong sides a guess is nearly right: worth a closer look, and a better beginning for the dual method
-/// than any other.
+/// With so many wrong sides a guess is nearly right, and worth a closer look.
 const NEARLY_RIGHT: usize = 6;
 /// Distances of held sides that are rounding, in units of the smallest number beside one.
 const ROUNDING: f64 = 8.0;

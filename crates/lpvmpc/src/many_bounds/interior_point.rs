@@ -29,6 +29,10 @@ const PER_VIOLATION: f64 = 0.3;
 /// so many times.
 const LARGEST: f64 = 100.0;
 
+/// Between the parts of its slack and of its multiplier that a step leaves there is less than this where it does not say
+/// clearly which of them goes to zero.
+const UNDECIDED: f64 = 0.4;
+
 /// Multiplier of a side at d = 0 in a Newton step towards `target`, and how fast it falls with d.
 #[inline(always)]
 fn multiplier<T: Scalar>(side: &BoundSide<T>, target: Target<T>) -> (T, T) {
@@ -80,6 +84,8 @@ pub(super) struct Foretold {
     pub changed: usize,
     /// How many sides are active.
     pub active: usize,
+    /// Of how many the step does not say clearly whether they are.
+    pub undecided: usize,
 }
 
 /// Where the method stands.
@@ -240,13 +246,18 @@ impl<T: Scalar> InteriorPoint<T> {
         let mut foretold = Foretold {
             changed: 0,
             active: 0,
+            undecided: 0,
         };
         let mut prediction = Prediction::begin();
+        let undecided: T = convert(UNDECIDED);
         for side in sides.iter_mut() {
             let at = &side.interior;
             let to = step_to(side, side.base, Target::zero());
-            // What goes to zero first, relative to where it is.
-            let holds = to.slack * at.multiplier < to.multiplier * at.slack;
+            // What goes to zero first, relative to where it is: both parts add up to one.
+            let (slack, multiplier) = (to.slack * at.multiplier, to.multiplier * at.slack);
+            let holds = slack < multiplier;
+            let gap = (slack - multiplier).abs();
+            foretold.undecided += usize::from(gap < undecided * at.slack * at.multiplier);
             let exceeded = side.soft.is_some() && to.rest * at.excess < to.excess * at.rest;
             side.role = match (exceeded, holds) {
                 (true, _) => Role::Exceeded,

@@ -119,7 +119,7 @@ fn add_to_minimum<T: Scalar, const NX: usize, const NU: usize>(
             let (weight, pull) = sum_of_weights_and_pulls(sides);
             if let Some(row) = ocp.row(side.bound.stage, j) {
                 add_outer_product(&mut minimum.hessian, &row.u, weight, &row.u);
-                add_outer_product(&mut minimum.g_x, &row.u, weight, &row.x);
+                add_outer_product(&mut minimum.g_x, &row.x, weight, &row.u);
                 add_scaled(&mut minimum.g, &row.u, -pull);
             }
         }

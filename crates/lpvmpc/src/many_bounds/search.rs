@@ -14,6 +14,9 @@ const STUCK: f64 = 0.1;
 /// its since the step before; of three roles, where bounds are soft, it is harder to foretell the right one.
 const CERTAIN: usize = 8;
 const CERTAIN_SOFT: usize = 10;
+/// Where states and inputs are bounded, when of no more than one in so many the step does not say clearly whether they are
+/// active, too.
+const CLEAR: usize = 8;
 /// And when that step went so far.
 const FREE: f64 = 0.5;
 /// Once they were wrong, again when the products of slack and multiplier are this part of what they were.
@@ -36,16 +39,26 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
         true => CERTAIN_SOFT,
         false => CERTAIN,
     };
+    // Where inputs and states bind each other, one wrong side makes many others seem so.
+    let clear = if side::are_mixed(sides) { CLEAR } else { 0 };
     let mut method = InteriorPoint::new(sides, tolerances.scale * convert(CENTRE));
     let smallest = method.complementarity() * T::default_epsilon().powf(convert(0.6));
+    let mut untried = true;
     let mut near_enough = convert(f64::INFINITY);
     let mut part = T::zero();
     let mut stuck = 0_usize;
     while trials > 0 && count() {
         let predicted = method.predict(&span, sides, program.factors, (program.u, program.x));
-        let Foretold { changed, active } = predicted.ok()?;
+        let Foretold {
+            changed,
+            active,
+            undecided,
+        } = predicted.ok()?;
         let near = method.complementarity() <= near_enough;
-        if near && part > convert(FREE) && certain * changed <= active {
+        untried |= changed > 0;
+        let likely = certain * changed <= active && clear * undecided <= active;
+        if untried && near && likely && part > convert(FREE) {
+            untried = false;
             near_enough = method.complementarity() * convert(NEARER);
             trials -= 1;
             if method.try_foretold(program, sides, tolerances, &mut count) {

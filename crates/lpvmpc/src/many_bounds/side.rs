@@ -38,8 +38,7 @@ pub(crate) struct BoundSide<T> {
     /// The role that it had in the last solution, where that is begun with.
     pub known_role: Role,
     /// The role that is nearest to right: the known one, or that of the last guess that was nearly right, with what was
-    /// wrong at its first stage exchanged. Exchanges go back to it, and the dual method begins with it where nothing is
-    /// found.
+    /// wrong at its first stage exchanged. Exchanges go back to it.
     pub nearest_role: Role,
     /// Multiplier at d = 0, and how fast it falls with d.
     pub base: T,

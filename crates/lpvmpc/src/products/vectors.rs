@@ -1,5 +1,6 @@
 //! Products in vectors, block by block: the sums of a block stay in registers, and are so many that none waits
-//! for the one before it. A sum has the terms of [`small_matrix`] in the same order, and the same roundings.
+//! for the one before it. A sum has the terms of [`small_matrix`] in the same order; where the machine multiplies and
+//! adds in one instruction, a term is rounded once, not twice.
 
 use super::Products;
 use crate::model::Scalar;
@@ -191,7 +192,7 @@ fn add_block<S: Simd, const M: usize, const N: usize, const R: usize, const K: u
         for (sums, b) in sums.iter_mut().zip(b) {
             let factor = simd.splat_f64s(b[k]);
             for (sum, a) in sums.iter_mut().zip(a) {
-                *sum = simd.add_f64s(*sum, simd.mul_f64s(*a, factor));
+                *sum = simd.mul_add_e_f64s(*a, factor, *sum);
             }
         }
     }
@@ -220,11 +221,10 @@ mod tests {
             let mut number = || random.uniform(-2.0, 2.0);
             let a = SMatrix::<f64, R, K>::from_fn(|_, _| number());
             let b = SMatrix::<f64, K, C>::from_fn(|_, _| number());
-            assert_eq!(
-                Vectors(simd).product(&a, &b),
-                small_matrix::product(&a, &b),
-                "{R} x {K} x {C}"
-            );
+            // Each of K terms, of 4 at most, is rounded with the sum so far.
+            let rounding = 4.0 * (K * K) as f64 * f64::EPSILON;
+            let rest = Vectors(simd).product(&a, &b) - small_matrix::product(&a, &b);
+            assert!(rest.amax() <= rounding, "{R} x {K} x {C}: {}", rest.amax());
             let (a_32, b_32) = (a.map(|a| a as f32), b.map(|b| b as f32));
             assert_eq!(
                 Vectors(simd).product(&a_32, &b_32),
@@ -238,7 +238,8 @@ mod tests {
             }
             small_matrix::mirror(&mut found);
             small_matrix::mirror(&mut expected);
-            assert_eq!(found, expected, "{R} x {K} x {R}, symmetric");
+            let rest = (found - expected).amax();
+            assert!(rest <= 4.0 * rounding, "{R} x {K} x {R}, symmetric: {rest}");
         }
     }
 
@@ -250,7 +251,7 @@ mod tests {
 
     /// Whatever the machine's vectors, and however the columns fill them.
     #[test]
-    fn they_are_those_of_the_compiler_to_the_last_bit() {
+    fn they_are_those_of_the_compiler_but_for_rounding() {
         compare::<6, 6, 2>();
         compare::<8, 8, 2>();
         compare::<8, 8, 8>();

@@ -88,9 +88,9 @@ fn changes<const NX: usize, const NU: usize, const N: usize, const M: usize>(
     sums
 }
 
-/// All bounds at once take less than half of the changes, and no sample takes more than 40 factorisations. The
+/// All bounds at once take less than two fifths of the changes, and no sample takes more than 40 factorisations. The
 /// interior-point method once began with so little slack that its steps were short, and its first guesses used up the
-/// trials: the sum was larger than one by one.
+/// trials: the sum was larger than one by one. Of roles that a step does not say clearly it made guesses in vain.
 #[test]
 fn points_with_limits_take_few_factorisations() {
     let mut sums = [0; 3];
@@ -100,14 +100,6 @@ fn points_with_limits_take_few_factorisations() {
     }
     println!("{sums:?}");
     let [at_once, one_by_one, most] = sums;
-    assert!(2 * at_once < one_by_one, "{at_once} for {one_by_one}");
+    assert!(13 * at_once < 5 * one_by_one, "{at_once} for {one_by_one}");
     assert!(most <= 40, "{most}");
-}
-
-/// Where a guess is nearly right when the factorisations are spent, the dual method begins with it: it then takes little
-/// more than a change for each bound.
-#[test]
-fn what_is_nearly_right_is_begun_with() {
-    let [at_once, one_by_one, _] = changes::<3, 1, 100, 300>(57);
-    assert!(3 * at_once < one_by_one, "{at_once} for {one_by_one}");
 }
