@@ -22,7 +22,7 @@ const REFINEMENTS: usize = 40;
 /// Held sides come nearer when what is left of their distances is at most this part.
 const COMES_NEARER: f64 = 0.8;
 /// With so many wrong sides a guess is nearly right, and worth a closer look.
-const NEARLY_RIGHT: usize = 6;
+const NEARLY_RIGHT: usize = 8;
 /// Distances of held sides that are rounding, in units of the smallest number beside one.
 const ROUNDING: f64 = 8.0;
 
@@ -144,7 +144,7 @@ impl Patience {
     /// Of the last sample's inputs and states where these bind each other.
     pub const BINDING: Self = Self {
         guesses: 0,
-        steps: 4,
+        steps: 6,
         ..Self::NEAR
     };
     /// Of the last sample's inputs and states, held, more where several inputs act together, since no step of the

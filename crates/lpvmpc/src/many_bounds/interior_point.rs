@@ -54,11 +54,11 @@ fn multiplier<T: Scalar>(side: &BoundSide<T>, target: Target<T>) -> (T, T) {
     )
 }
 
-/// What a side comes to in that step at its distance, where its multiplier at d = 0 is `base`.
+/// What a side comes to in that step at its distance.
 #[inline(always)]
-fn step_to<T: Scalar>(side: &BoundSide<T>, base: T, target: Target<T>) -> Interior<T> {
+fn step_to<T: Scalar>(side: &BoundSide<T>, target: Target<T>) -> Interior<T> {
     let at = &side.interior;
-    let multiplier = base - side.weight * side.distance;
+    let multiplier = side.multiplier_at(side.distance);
     let Some(price) = side.soft else {
         return Interior {
             slack: side.distance,
@@ -175,6 +175,8 @@ impl<T: Scalar> InteriorPoint<T> {
                     }
                 }
             };
+            side.role = Role::Free;
+            weigh(side);
         }
         Self::at(sides)
     }
@@ -202,7 +204,7 @@ impl<T: Scalar> InteriorPoint<T> {
     }
 
     /// A Newton step towards complementarity zero: leaves its factors, the trajectory that it leads to, and in every
-    /// side the role that it foretells.
+    /// side, as `last_role`, the role that it foretells.
     pub fn predict<const NX: usize, const NU: usize>(
         &mut self,
         span: &Span<'_, T, NX, NU>,
@@ -210,7 +212,6 @@ impl<T: Scalar> InteriorPoint<T> {
         factors: &mut [StageFactor<T, NX, NU>],
         (u, x): (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
     ) -> Result<Foretold, BadPivot<T>> {
-        weigh(sides);
         newton::factorize(span, sides, factors)?;
         newton::roll_out(span, factors, (u, x));
         Ok(self.foretell(span, sides, &Trajectory { x, u }))
@@ -226,11 +227,15 @@ impl<T: Scalar> InteriorPoint<T> {
         count: impl FnMut() -> bool,
     ) -> bool {
         program.change_places();
+        sides.iter_mut().for_each(|side| side.role = side.last_role);
         if exchange(program, sides, tolerances, Patience::NEAR, count) {
             return true;
         }
         program.change_places();
-        weigh(sides);
+        for side in sides.iter_mut() {
+            side.role = Role::Free;
+            weigh(side);
+        }
         let (x, u) = (&*program.x, &*program.u);
         self.foretell(&program.span, sides, &Trajectory { x, u });
         false
@@ -242,7 +247,6 @@ impl<T: Scalar> InteriorPoint<T> {
         sides: &mut [BoundSide<T>],
         trajectory: &Trajectory<'_, T, NX, NU>,
     ) -> Foretold {
-        newton::measure(span, sides, trajectory);
         let mut foretold = Foretold {
             changed: 0,
             active: 0,
@@ -250,25 +254,26 @@ impl<T: Scalar> InteriorPoint<T> {
         };
         let mut prediction = Prediction::begin();
         let undecided: T = convert(UNDECIDED);
-        for side in sides.iter_mut() {
+        newton::measure_each(span, sides, trajectory, |side| {
             let at = &side.interior;
-            let to = step_to(side, side.base, Target::zero());
+            let to = step_to(side, Target::zero());
             // What goes to zero first, relative to where it is: both parts add up to one.
             let (slack, multiplier) = (to.slack * at.multiplier, to.multiplier * at.slack);
             let holds = slack < multiplier;
             let gap = (slack - multiplier).abs();
             foretold.undecided += usize::from(gap < undecided * at.slack * at.multiplier);
             let exceeded = side.soft.is_some() && to.rest * at.excess < to.excess * at.rest;
-            side.role = match (exceeded, holds) {
+            let role = match (exceeded, holds) {
                 (true, _) => Role::Exceeded,
                 (false, true) => Role::Held,
                 (false, false) => Role::Free,
             };
             side.estimate = to.multiplier.max(T::zero());
             side.target = prediction.add(at, &to, side.soft.is_some());
-            foretold.changed += usize::from(side.role != side.last_role);
-            foretold.active += usize::from(side.role != Role::Free);
-        }
+            foretold.changed += usize::from(role != side.last_role);
+            foretold.active += usize::from(role != Role::Free);
+            side.last_role = role;
+        });
         self.prediction = prediction;
         foretold
     }
@@ -286,42 +291,41 @@ impl<T: Scalar> InteriorPoint<T> {
         let sum = self.complementarity * self.count;
         let ratio = ((sum + self.prediction.change()) / sum).max(T::zero());
         let center = ratio * ratio * ratio * self.complementarity;
-        for side in sides.iter_mut() {
+        let change = |side: &mut BoundSide<T>| {
             // The center, less what the prediction's own products add.
             side.target = Target {
                 slack: center - side.target.slack,
                 excess: center - side.target.excess,
             };
-            side.estimate = match side.soft {
+            let change = match side.soft {
                 None => side.target.slack / side.interior.slack,
                 Some(_) => multiplier(side, side.target).0 - side.base,
             };
-        }
-        newton::shift(span, factors, sides, |side| side.estimate, v, (u, x));
-        newton::measure(span, sides, &Trajectory { x, u });
-        let corrected = |side: &BoundSide<T>| step_to(side, side.base + side.estimate, side.target);
+            side.base += change;
+            change
+        };
+        newton::shift(span, factors, sides, change, v, (u, x));
         let mut part = Part::far();
-        for side in sides.iter() {
-            part.keep_above_zero(&side.interior, &corrected(side), side.soft.is_some());
-        }
+        newton::measure_each(span, sides, &Trajectory { x, u }, |side| {
+            let corrected = step_to(side, side.target);
+            part.keep_above_zero(&side.interior, &corrected, side.soft.is_some());
+        });
         let part = part.shortened(convert(NEARLY));
         let mut sum = T::zero();
         for side in sides.iter_mut() {
-            side.interior = along(&side.interior, &corrected(side), part);
+            side.interior = along(&side.interior, &step_to(side, side.target), part);
             sum += side.interior.product();
+            weigh(side);
         }
         self.complementarity = sum / self.count;
         part.shortest()
     }
 }
 
-/// Gives every side the cost that it has in a Newton step towards complementarity zero.
-fn weigh<T: Scalar>(sides: &mut [BoundSide<T>]) {
-    for side in sides {
-        side.last_role = side.role;
-        side.role = Role::Free;
-        (side.base, side.weight) = multiplier(side, Target::zero());
-    }
+/// Gives the side the cost that it has in a Newton step towards complementarity zero.
+#[inline(always)]
+fn weigh<T: Scalar>(side: &mut BoundSide<T>) {
+    (side.base, side.weight) = multiplier(side, Target::zero());
 }
 
 /// Parts of a way.
@@ -457,7 +461,8 @@ mod tests {
                 .unwrap();
             let of = |side: &BoundSide<f64>| {
                 let numbers = [side.base, side.weight, side.distance, side.estimate];
-                (side.role, numbers, side.target.slack, side.target.excess)
+                let roles = (side.role, side.last_role);
+                (roles, numbers, side.target.slack, side.target.excess)
             };
             let step = |program: &Program<'_, f64, 2, 1>, sides: &[BoundSide<f64>]| {
                 let policies = program.factors.iter();

@@ -202,6 +202,17 @@ pub(super) fn measure<T: Scalar, const NX: usize, const NU: usize>(
     sides: &mut [BoundSide<T>],
     trajectory: &Trajectory<'_, T, NX, NU>,
 ) {
+    measure_each(span, sides, trajectory, |_| {});
+}
+
+/// The same, and what follows from it for `each` side.
+#[inline(always)]
+pub(super) fn measure_each<T: Scalar, const NX: usize, const NU: usize>(
+    span: &Span<'_, T, NX, NU>,
+    sides: &mut [BoundSide<T>],
+    trajectory: &Trajectory<'_, T, NX, NU>,
+    mut each: impl FnMut(&mut BoundSide<T>),
+) {
     let ocp = span.ocp;
     let n = ocp.length();
     let input = |stage| trajectory.u.get(stage).filter(|_| stage < n);
@@ -216,6 +227,7 @@ pub(super) fn measure<T: Scalar, const NX: usize, const NU: usize>(
             value = side.value(ocp, x, u);
         }
         side.distance = side.distance_of(value);
+        each(side);
     }
 }
 
@@ -223,8 +235,8 @@ pub(super) fn measure<T: Scalar, const NX: usize, const NU: usize>(
 /// multipliers.
 fn gradient<T: Scalar, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
-    sides: &[BoundSide<T>],
-    multiplier: impl Fn(&BoundSide<T>) -> T,
+    sides: &mut [BoundSide<T>],
+    mut multiplier: impl FnMut(&mut BoundSide<T>) -> T,
 ) -> (SVector<T, NX>, SVector<T, NU>) {
     let mut sum = (SVector::zeros(), SVector::zeros());
     for side in sides {
@@ -252,18 +264,18 @@ fn gradient<T: Scalar, const NX: usize, const NU: usize>(
 pub(super) fn shift<T: Scalar, const NX: usize, const NU: usize>(
     span: &Span<'_, T, NX, NU>,
     factors: &[StageFactor<T, NX, NU>],
-    sides: &[BoundSide<T>],
-    change: impl Fn(&BoundSide<T>) -> T,
+    sides: &mut [BoundSide<T>],
+    mut change: impl FnMut(&mut BoundSide<T>) -> T,
     v: &mut [SVector<T, NU>],
     trajectory: (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
 ) {
     let ocp = span.ocp;
     let mut before = sides;
-    let end = split_off(&mut before, ocp.length());
-    let (mut costate, _) = gradient(ocp, end, &change);
+    let end = split_off_mut(&mut before, ocp.length());
+    let (mut costate, _) = gradient(ocp, end, &mut change);
     let stages = span.stages().zip(span.of(factors)).zip(span.of_mut(v));
     for (((i, stage), factor), v) in stages.rev() {
-        let (slope_x, slope_u) = gradient(ocp, split_off(&mut before, i), &change);
+        let (slope_x, slope_u) = gradient(ocp, split_off_mut(&mut before, i), &mut change);
         *v = step_back(stage, factor, &slope_u, &mut costate);
         costate += slope_x;
     }
@@ -344,7 +356,7 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
         rest: T::zero(),
         largest: T::zero(),
     };
-    let of_rows = |side: &BoundSide<T>| match side.input() {
+    let of_rows = |side: &mut BoundSide<T>| match side.input() {
         None if side.role != Role::Free => side.multiplier_at(side.distance),
         _ => T::zero(),
     };

@@ -33,7 +33,7 @@ pub(crate) struct BoundSide<T> {
     pub size: T,
     pub soft: Option<Penalty<T>>,
     pub role: Role,
-    /// The role that the interior-point method foretold a step before.
+    /// The role that the interior-point method foretells, or that of the guess before.
     pub last_role: Role,
     /// The role that it had in the last solution, where that is begun with.
     pub known_role: Role,
