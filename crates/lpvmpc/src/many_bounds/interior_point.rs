@@ -84,7 +84,7 @@ pub(super) struct Foretold {
     pub changed: usize,
     /// How many sides are active.
     pub active: usize,
-    /// Of how many the step does not say clearly whether they are.
+    /// Of how many sides the step does not say clearly whether they are active.
     pub undecided: usize,
 }
 

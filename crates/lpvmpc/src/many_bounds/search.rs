@@ -14,8 +14,8 @@ const STUCK: f64 = 0.1;
 /// its since the step before; of three roles, where bounds are soft, it is harder to foretell the right one.
 const CERTAIN: usize = 8;
 const CERTAIN_SOFT: usize = 10;
-/// Where states and inputs are bounded, when of no more than one in so many the step does not say clearly whether they are
-/// active, too.
+/// Where states and inputs are bounded, only when the step also leaves no more than one side undecided for so many that are
+/// active.
 const CLEAR: usize = 8;
 /// And when that step went so far.
 const FREE: f64 = 0.5;
