@@ -247,7 +247,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
         }
         careful |= wrong >= last;
         last = wrong;
-        if wrong <= NEARLY_RIGHT {
+        if wrong <= NEARLY_RIGHT && patience.steps > 0 {
             nearly = true;
             let first = first_change(sides);
             for side in sides.iter_mut() {

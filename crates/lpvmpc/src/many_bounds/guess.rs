@@ -89,7 +89,6 @@ pub(super) fn again<T: Scalar>(sides: &mut [BoundSide<T>], before: &ActiveSet<T>
                 side.estimate = row.multiplier.min(side.price());
             }
             side.known_role = side.role;
-            side.nearest_role = side.role;
         }
     }
 }

@@ -88,7 +88,8 @@ pub(super) struct Foretold {
     pub undecided: usize,
 }
 
-/// Where the method stands.
+/// Where the method stands. Between its calls every side is free, and has the cost of a Newton step towards
+/// complementarity zero.
 pub(super) struct InteriorPoint<T> {
     /// Mean of slack * multiplier.
     complementarity: T,
@@ -257,7 +258,7 @@ impl<T: Scalar> InteriorPoint<T> {
         newton::measure_each(span, sides, trajectory, |side| {
             let at = &side.interior;
             let to = step_to(side, Target::zero());
-            // What goes to zero first, relative to where it is: both parts add up to one.
+            // What goes to zero first, relative to where it is: both parts add up to the product.
             let (slack, multiplier) = (to.slack * at.multiplier, to.multiplier * at.slack);
             let holds = slack < multiplier;
             let gap = (slack - multiplier).abs();

@@ -14,11 +14,11 @@ const STUCK: f64 = 0.1;
 /// its since the step before; of three roles, where bounds are soft, it is harder to foretell the right one.
 const CERTAIN: usize = 8;
 const CERTAIN_SOFT: usize = 10;
-/// Where states and inputs are bounded, only when the step also leaves no more than one side undecided for so many that are
-/// active.
-const CLEAR: usize = 8;
 /// And when that step went so far.
 const FREE: f64 = 0.5;
+/// Where states and inputs are bounded, and none softly, only when it also leaves no more than one side undecided for so many
+/// that are active, or one.
+const CLEAR: usize = 8;
 /// Once they were wrong, again when the products of slack and multiplier are this part of what they were.
 const NEARER: f64 = 0.01;
 /// Where the products of slack and multiplier begin, as a part of the largest cost of a stage.
@@ -55,8 +55,9 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
             undecided,
         } = predicted.ok()?;
         let near = method.complementarity() <= near_enough;
+        // The same roles, wrong, are as a rule wrong again.
         untried |= changed > 0;
-        let likely = certain * changed <= active && clear * undecided <= active;
+        let likely = certain * changed <= active && clear * undecided <= active.max(clear);
         if untried && near && likely && part > convert(FREE) {
             untried = false;
             near_enough = method.complementarity() * convert(NEARER);

@@ -37,15 +37,15 @@ pub(crate) struct BoundSide<T> {
     pub last_role: Role,
     /// The role that it had in the last solution, where that is begun with.
     pub known_role: Role,
-    /// The role that is nearest to right: the known one, or that of the last guess that was nearly right, with what was
-    /// wrong at its first stage exchanged. Exchanges go back to it.
+    /// The role in the last guess that was nearly right, with what was wrong at its first stage exchanged: exchanges stage
+    /// by stage begin with it.
     pub nearest_role: Role,
     /// Multiplier at d = 0, and how fast it falls with d.
     pub base: T,
     pub weight: T,
     /// d on the trajectory at hand.
     pub distance: T,
-    /// Multiplier of the guess, or a change of the base.
+    /// Multiplier of the guess.
     pub estimate: T,
     /// Of the interior-point method.
     pub interior: Interior<T>,
