@@ -141,8 +141,13 @@ test("a slider does what its number does", async ({ page }) => {
   await expect(push).toHaveValue("400");
   const number = page.locator(".panel").getByLabel("Push", { exact: true });
   await expect(number).toHaveValue("400");
+  // It stays when something else changes.
+  await fill(page, "Horizon N", "40");
+  await expect(number).toHaveValue("400");
   await fill(page, "Push", "");
   await expect(number).toHaveValue("400");
+  await page.locator(".panel").getByLabel("Units", { exact: true }).selectOption("radians");
+  await expect(number).toHaveValue("6.9813");
 });
 
 test("a tighter bound is kept while the robot goes on", async ({ page }) => {

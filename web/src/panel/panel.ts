@@ -92,7 +92,7 @@ export class Panel {
     const spec: NumberSpec = { label: "Push", quantity: "tiltRate", title: "Change of the tilt rate at once", min: 0, max: 40 };
     const strength = this.form.measured(spec, numberField(spec, (value) => {
       if (value > 0) this.pushBy = value;
-      else strength.set(this.pushBy);
+      strength.set(this.pushBy);
     }));
     strength.set(this.pushBy);
     const push = (text: string, title: string, x: number, y: number) =>
