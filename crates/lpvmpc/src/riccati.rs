@@ -206,9 +206,16 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         let p_next = *linear + product(quadratic, c);
         let (a, b) = (transposed(a), transposed(b));
 
+        // Of several inputs, A'(PB) has the longer columns; of one, (B'(PA))' takes as long, and in f32 torques come out
+        // a third nearer to those in f64.
+        let g_x = if NU == 1 {
+            transposed(&(weights.s + by.product(&b, &p_a)))
+        } else {
+            transposed(&weights.s) + by.product(&a, &p_b)
+        };
         let mut minimum = StageMinimum {
             hessian: weights.r + by.product(&b, &p_b),
-            g_x: transposed(&weights.s) + by.product(&a, &p_b),
+            g_x,
             g: stage.linear_u + product(&b, &p_next),
             linear_x: stage.linear_x + product(&a, &p_next),
         };
