@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ._tape import Tape
 from .errors import MissingPackageError, PlantError
+
+if TYPE_CHECKING:
+    from .plant import Embedding
 
 
 def casadi() -> Any:
@@ -152,3 +155,37 @@ def _truth(tape: Tape, place: int) -> int:
 def _last_line(error: Exception) -> str:
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return lines[-1] if lines else "nothing"
+
+
+def embedding(
+    tape: Tape, given: Embedding, groups: list[tuple[str, list[Any]]], sizes: tuple[int, int]
+) -> dict[str, Any]:
+    """An embedding as a file has it: the places of sigma, of the rows of A and B, and of c."""
+    n, m = sizes
+    (scheduling,) = take(tape, groups, [column(given.sigma)])
+    own = [("scheduling", symbols("embedding, s", given.s)), groups[-1]]
+    formulas = []
+    for name, matrix, columns in (("a", given.a, n), ("b", given.b, m)):
+        if tuple(getattr(matrix, "shape", ())) != (n, columns):
+            raise PlantError(f"embedding, {name}: it must be an expression of shape ({n}, {columns})")
+        formulas.append(column(matrix.T))  # row by row
+    if given.c is not None:
+        formulas.append(column(given.c))
+    a, b, *c = take(tape, own, formulas)
+    found: dict[str, Any] = {
+        "scheduling": scheduling,
+        "a": [a[i * n : (i + 1) * n] for i in range(n)],
+        "b": [b[i * m : (i + 1) * m] for i in range(n)],
+    }
+    if c:
+        found["c"] = c[0]
+    return found
+
+
+def labels(structure: Any) -> list[str]:
+    """What the entries of a structure of do-mpc are called; it may have empty ones."""
+    found: list[str] = []
+    for key in structure.keys():
+        count = structure[key].numel()
+        found += [key] if count == 1 else [f"{key}_{i}" for i in range(count)]
+    return found

@@ -140,3 +140,8 @@ def _condition(sp: Any, tape: Tape, of: Any, condition: Any) -> int:
     if name == "Not":
         return tape.add("eq", _condition(sp, tape, of, condition.args[0]), tape.constant(0.0))
     raise PlantError(f"formulas: the condition {condition} has no counterpart here")
+
+
+def name(symbol: Any) -> str:
+    """What a symbol, or a function of time, is called."""
+    return str(getattr(symbol, "func", symbol) if getattr(symbol, "args", ()) else symbol)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 Operation = list[str | int | float]
 
 
@@ -39,3 +43,19 @@ class Tape:
         for term in terms[1:]:
             total = self.add("add", total, term)
         return total
+
+    def affine(self, a: Array, b: Array, rest: Array) -> list[int]:
+        """The places of the rows of a x + b u + rest."""
+        places = []
+        for a_row, b_row, constant in zip(a, b, rest, strict=True):
+            terms = []
+            for leaf, row in (("state", a_row), ("input", b_row)):
+                for i, entry in enumerate(row):
+                    if entry == 1.0:
+                        terms.append(self.add(leaf, i))
+                    elif entry != 0.0:
+                        terms.append(self.add("mul", self.constant(entry), self.add(leaf, i)))
+            if constant != 0.0:
+                terms.append(self.constant(constant))
+            places.append(self.sum(terms))
+        return places

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _casadi, _lpvmpc, _sympy
+from . import _casadi, _lpvmpc, _plant_file, _sympy
 from ._files import save
 from ._arrays import column, number, table
 from ._tape import Tape
@@ -184,21 +183,22 @@ class Plant:
         tape = Tape()
         results = _casadi.take(tape, groups, formulas)
         sizes = (sum(one.numel() for one in xs), sum(one.numel() for one in us))
-        return cls._assemble(
+        text = _plant_file.text(
             tape,
             derivative=results[0],
             output=results[1] if y is not None else [],
             name=name,
-            states=_named("states", states, _casadi.names(xs)),
-            inputs=_named("inputs", inputs, _casadi.names(us)),
+            states=_plant_file.names("states", states, _casadi.names(xs)),
+            inputs=_plant_file.names("inputs", inputs, _casadi.names(us)),
             outputs=outputs,
-            parameters=_values(parameters, _casadi.names(ps)),
+            parameters=_plant_file.values(parameters, _casadi.names(ps)),
             units=units,
             bounds=bounds,
             equilibrium=equilibrium,
-            embedding=None if embedding is None else _embedding(tape, embedding, groups, sizes),
+            embedding=None if embedding is None else _casadi.embedding(tape, embedding, groups, sizes),
             period=period,
         )
+        return cls.from_json(text)
 
     @classmethod
     def from_do_mpc(
@@ -247,9 +247,9 @@ class Plant:
             model._rhs,  # what setup() has made of set_rhs()
             p=[model._p.cat, model._tvp.cat],
             name="do-mpc",
-            states=_labels(model._x),
-            inputs=_labels(model._u),
-            parameters=_by_label(parameters, _labels(model._p) + _labels(model._tvp)),
+            states=_casadi.labels(model._x),
+            inputs=_casadi.labels(model._u),
+            parameters=_plant_file.by_label(parameters, _casadi.labels(model._p) + _casadi.labels(model._tvp)),
             units=units,
             bounds=bounds,
             equilibrium=equilibrium,
@@ -359,20 +359,21 @@ class Plant:
         rates, output = list(xdot), list(y) if y is not None else []
         tape = Tape()
         places = _sympy.take(tape, leaves, rates + output)
-        return cls._assemble(
+        text = _plant_file.text(
             tape,
             derivative=places[: len(rates)],
             output=places[len(rates) :],
             name=name,
-            states=_named("states", states, [_symbol_name(symbol) for symbol in x]),
-            inputs=_named("inputs", inputs, [_symbol_name(symbol) for symbol in u]),
+            states=_plant_file.names("states", states, [_sympy.name(symbol) for symbol in x]),
+            inputs=_plant_file.names("inputs", inputs, [_sympy.name(symbol) for symbol in u]),
             outputs=outputs,
-            parameters={_symbol_name(symbol): value for symbol, value in values.items()},
+            parameters={_sympy.name(symbol): value for symbol, value in values.items()},
             units=units,
             bounds=bounds,
             equilibrium=equilibrium,
             period=period,
         )
+        return cls.from_json(text)
 
     @classmethod
     def from_matrices(
@@ -421,7 +422,7 @@ class Plant:
         m = b_matrix.shape[1]
         rest = np.zeros(n) if offset is None else column("offset", offset, n, PlantError)
         tape = Tape()
-        derivative = _affine(tape, a_matrix, b_matrix, rest)
+        derivative = tape.affine(a_matrix, b_matrix, rest)
         output: list[int] = []
         given = [table(of, one, PlantError) for of, one in (("c", c), ("d", d)) if one is not None]
         if given:
@@ -433,14 +434,14 @@ class Plant:
                     f"c is {_shape(c_matrix)} and d {_shape(d_matrix)}; they must be {rows} x {n} and "
                     f"{rows} x {m}"
                 )
-            output = _affine(tape, c_matrix, d_matrix, np.zeros(rows))
-        return cls._assemble(
+            output = tape.affine(c_matrix, d_matrix, np.zeros(rows))
+        text = _plant_file.text(
             tape,
             derivative=derivative,
             output=output,
             name=name,
-            states=_named("states", states, [f"x_{i}" for i in range(n)]),
-            inputs=_named("inputs", inputs, [f"u_{i}" for i in range(m)]),
+            states=_plant_file.names("states", states, [f"x_{i}" for i in range(n)]),
+            inputs=_plant_file.names("inputs", inputs, [f"u_{i}" for i in range(m)]),
             outputs=outputs,
             parameters={},
             units=units,
@@ -448,90 +449,8 @@ class Plant:
             equilibrium=equilibrium,
             period=period,
         )
-
-    @classmethod
-    def _assemble(
-        cls,
-        tape: Tape,
-        *,
-        derivative: list[int],
-        output: list[int],
-        name: str,
-        states: Sequence[str],
-        inputs: Sequence[str],
-        outputs: Sequence[str] | None,
-        parameters: Mapping[str, float],
-        units: Mapping[str, str] | None,
-        bounds: Mapping[str, tuple[float | None, float | None]] | None,
-        equilibrium: tuple[ArrayLike, ArrayLike] | None,
-        period: float | None,
-        embedding: dict[str, Any] | None = None,
-    ) -> Plant:
-        called = _named("outputs", outputs, [f"y_{i}" for i in range(len(output))])
-        units, bounds = dict(units or {}), dict(bounds or {})
-        known = [*states, *inputs, *called, *parameters]
-        for place, given in (("units", units), ("bounds", bounds)):
-            for unknown in given:
-                if unknown not in known:
-                    raise PlantError(f"{place}: there is no {unknown!r}; there are {', '.join(known)}")
-        for bounded in bounds:
-            if bounded in parameters:
-                raise PlantError(f"bounds: {bounded!r} is a parameter, and has none")
-
-        def signal(one: str) -> dict[str, Any]:
-            entry: dict[str, Any] = {"name": str(one), "unit": str(units.get(one, ""))}
-            try:
-                lower, upper = bounds.get(one, (None, None))
-            except (TypeError, ValueError):
-                raise PlantError(
-                    f"bounds: of {one} they are {bounds[one]!r}; they must be (lower, upper)"
-                ) from None
-            for key, given in (("lower", lower), ("upper", upper)):
-                if given is None:
-                    continue
-                limit = number(f"bounds, {one}, {key}", given, PlantError)
-                if np.isnan(limit):
-                    raise PlantError(f"bounds: the {key} one of {one} is NaN")
-                if np.isfinite(limit):
-                    entry[key] = limit
-            return entry
-
-        data: dict[str, Any] = {
-            "schema": 1,
-            "name": name,
-            "states": [signal(one) for one in states],
-            "inputs": [signal(one) for one in inputs],
-            "parameters": [
-                {"name": one, "unit": str(units.get(one, "")), "value": float(value)}
-                for one, value in parameters.items()
-            ],
-            "outputs": [signal(one) for one in called],
-            "operations": tape.operations,
-        }
-        if period is None:
-            data["derivative"] = derivative
-        else:
-            data |= {"period": number("period", period, PlantError), "next": derivative}
-        if output:
-            data["output"] = output
-        if equilibrium is not None:
-            try:
-                x, u = equilibrium
-            except (TypeError, ValueError):
-                raise PlantError(f"equilibrium: it is {equilibrium!r}; it must be (x, u)") from None
-            data["equilibrium"] = {
-                "x": column("equilibrium, x", x, len(states), PlantError).tolist(),
-                "u": column("equilibrium, u", u, len(inputs), PlantError).tolist(),
-            }
-        if embedding is not None:
-            data["embedding"] = embedding
-        try:
-            text = json.dumps(data, allow_nan=False)
-        except ValueError:
-            raise PlantError(
-                "formulas: they contain a number that is not finite (a division by zero, an overflow)"
-            ) from None
         return cls.from_json(text)
+
 
     # What a plant is.
 
@@ -697,114 +616,6 @@ class Plant:
             return ", ".join(f"{s.name} [{s.unit}]" if s.unit else s.name for s in signals)
 
         return f"<Plant {self.name!r}: states {listed(self.states)}; inputs {listed(self.inputs)}>"
-
-
-def _embedding(
-    tape: Tape, given: Embedding, groups: list[tuple[str, list[Any]]], sizes: tuple[int, int]
-) -> dict[str, Any]:
-    """An embedding as a file has it: the places of sigma, of the rows of A and B, and of c."""
-    n, m = sizes
-    (scheduling,) = _casadi.take(tape, groups, [_casadi.column(given.sigma)])
-    own = [("scheduling", _casadi.symbols("embedding, s", given.s)), groups[-1]]
-    formulas = []
-    for name, matrix, columns in (("a", given.a, n), ("b", given.b, m)):
-        if tuple(getattr(matrix, "shape", ())) != (n, columns):
-            raise PlantError(f"embedding, {name}: it must be an expression of shape ({n}, {columns})")
-        formulas.append(_casadi.column(matrix.T))  # row by row
-    if given.c is not None:
-        formulas.append(_casadi.column(given.c))
-    a, b, *c = _casadi.take(tape, own, formulas)
-    found: dict[str, Any] = {
-        "scheduling": scheduling,
-        "a": [a[i * n : (i + 1) * n] for i in range(n)],
-        "b": [b[i * m : (i + 1) * m] for i in range(n)],
-    }
-    if c:
-        found["c"] = c[0]
-    return found
-
-
-def _named(place: str, given: Sequence[str] | None, usual: list[str]) -> list[str]:
-    if given is None:
-        return usual
-    if isinstance(given, str) or len(given) != len(usual):
-        raise PlantError(f"{place}: {given!r} are not {len(usual)} names")
-    return [str(one) for one in given]
-
-
-def _values(
-    given: Mapping[str, float] | Sequence[float] | None, names: list[str]
-) -> dict[str, float]:
-    """The values of the parameters by name. The keys of a mapping are the `names`, or other ones in their order."""
-    called, values = list(names), list(() if given is None else given)
-    if isinstance(given, Mapping):
-        called, values = [str(one) for one in given], list(given.values())
-    if len(values) != len(names):
-        raise PlantError(
-            f"parameters: there are values for {len(values)}, and p has {len(names)} "
-            f"({', '.join(names)})"
-        )
-    found = {
-        name: number(f"parameters, {name}", value, PlantError)
-        for name, value in zip(called, values, strict=True)
-    }
-    for name, value in found.items():
-        if not np.isfinite(value):
-            raise PlantError(f"parameters, {name}: it is {value}; it must be finite")
-    strange = [name for name in found if name not in names]
-    if not strange:
-        return {name: found[name] for name in names}
-    if len(strange) < len(names):
-        # By name or by order? Either may be meant.
-        raise PlantError(
-            f"parameters: p has {', '.join(names)}, and no {', '.join(strange)}; give all values by these names, or "
-            "all by other ones in the order of p"
-        )
-    return found
-
-
-def _by_label(
-    given: Mapping[str, float] | Sequence[float] | None, labels: list[str]
-) -> Mapping[str, float]:
-    """The values of the parameters that are called `labels`, in that order."""
-    if not isinstance(given, Mapping):
-        return _values(given, labels)
-    if set(given) != set(labels):
-        raise PlantError(
-            f"parameters: there are values for {', '.join(given) or 'none'}; the model has "
-            f"{', '.join(labels) or 'none'}"
-        )
-    return {label: given[label] for label in labels}
-
-
-def _labels(structure: Any) -> list[str]:
-    """What the entries of a structure of do-mpc are called; it may have empty ones."""
-    found: list[str] = []
-    for key in structure.keys():
-        count = structure[key].numel()
-        found += [key] if count == 1 else [f"{key}_{i}" for i in range(count)]
-    return found
-
-
-def _symbol_name(symbol: Any) -> str:
-    return str(getattr(symbol, "func", symbol) if getattr(symbol, "args", ()) else symbol)
-
-
-def _affine(tape: Tape, a: Array, b: Array, rest: Array) -> list[int]:
-    """The places of the rows of a x + b u + rest."""
-    places = []
-    for a_row, b_row, constant in zip(a, b, rest, strict=True):
-        terms = []
-        for leaf, row in (("state", a_row), ("input", b_row)):
-            for i, entry in enumerate(row):
-                if entry == 1.0:
-                    terms.append(tape.add(leaf, i))
-                elif entry != 0.0:
-                    terms.append(tape.add("mul", tape.constant(entry), tape.add(leaf, i)))
-        if constant != 0.0:
-            terms.append(tape.constant(constant))
-        places.append(tape.sum(terms))
-    return places
 
 
 def _shape(matrix: Array) -> str:
