@@ -140,6 +140,10 @@ impl<S: Scalar + Number> Embedding<4, 1, 3> for Ballbot<S> {
         problem: &SteadyStateProblem<T, 4, 1>,
     ) -> Option<SteadyState<T, 4, 1>> {
         let zero = T::zero();
+        // Beside what is no number there is no nearest one.
+        if !problem.x_ref.iter().all(|entry| entry.is_finite()) {
+            return None;
+        }
         let upright = Vector4::new(problem.x_ref[0], zero, zero, zero);
         let (x, u) = (
             problem.x.project(&upright),

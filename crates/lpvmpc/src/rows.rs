@@ -399,11 +399,14 @@ pub(crate) fn subtract<
     }
 }
 
-/// The price of exceeding `bound`, if it is soft.
+/// The price of exceeding `bound`, if it is soft; a terminal equality is not, whatever the bound of its state is.
 pub(crate) fn soft_price<T: Scalar, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
     bound: &BoundId,
 ) -> Option<Penalty<T>> {
+    if bound.side == Side::Equality {
+        return None;
+    }
     let at_end = bound.stage >= ocp.length();
     match bound.quantity {
         Quantity::State(j) if at_end => ocp.terminal.soft_x.get(j).copied().flatten(),

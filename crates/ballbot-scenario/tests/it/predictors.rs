@@ -133,3 +133,29 @@ fn one_program_per_sample_closes_the_gap_along_the_loop() {
     assert!(controller.gap().amax() < 1e-6, "{}", controller.gap());
     assert!((x[0] - 1.0).abs() < 1e-3, "{x}");
 }
+
+/// A set point that is no number is told, not taken for 0, where the robot would drive to.
+#[test]
+fn a_set_point_that_is_no_number_is_no_set_point() {
+    let scenario = Scenario::load("single-setpoint").unwrap();
+    let prepared = scenario.prepare(Path::new(".")).unwrap();
+    for iterations in [Iterations::Fixed(1), Iterations::default()] {
+        let settings = ControllerSettings {
+            iterations,
+            ..prepared.settings
+        };
+        for (place, value) in [(0, f64::NAN), (0, f64::INFINITY), (2, f64::NAN)] {
+            let mut controller = Loop::allocate(prepared.ballbot, settings).unwrap();
+            let mut workspace = controller.workspace();
+            let mut wanted = Vector4::zeros();
+            wanted[place] = value;
+            let x = Vector4::new(5.0, 0.0, 0.0, 0.0);
+            let told = Reference::constant(wanted);
+            let solution = controller.step(&x, &told, &mut workspace);
+            let status = solution.status;
+            assert!(!status.is_solved(), "{wanted:?}, {iterations:?}: {status}");
+            assert!(solution.u.iter().all(|u| u[0].is_finite()));
+            assert_eq!(controller.target(), None);
+        }
+    }
+}

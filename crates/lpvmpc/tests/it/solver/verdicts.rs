@@ -5,8 +5,8 @@ use super::support::census::Counts;
 use super::support::precision::single;
 use super::support::{kind, solve, solve_with};
 use lpvmpc::{
-    ActiveSet, Bounds, Common, List, Ocp, Scalar, Solution, SolverSettings, Status, WarmStart,
-    infeasibility_margin, kkt_residual,
+    ActiveSet, Bounds, Common, List, Ocp, Penalty, Scalar, Solution, SolverSettings, Status,
+    WarmStart, infeasibility_margin, kkt_residual,
 };
 use lpvmpc_testkit::rng::Rng;
 use nalgebra::{DMatrix, SMatrix, SVector};
@@ -163,4 +163,33 @@ fn the_earliest_cause_is_named_and_proved() {
     assert!(infeasibility_margin(&ocp, &solution.active) <= 0.0);
     assert!(infeasibility_margin(&ocp, &ActiveSet::with_capacity(0)) <= 0.0);
     assert_eq!(kind(&solve(&ocp).status), "solved");
+}
+
+/// A soft bound of a state makes no terminal equality of it soft: what cannot be reached is proved to be out of reach.
+#[test]
+fn a_soft_bound_leaves_a_terminal_equality_as_hard_as_it_is() {
+    for soft in [[false, false], [true, false], [false, true], [true, true]] {
+        let mut ocp = Ocp::<f64, 2, 1>::allocate(1);
+        ocp.stages[0].a = SMatrix::zeros();
+        ocp.stages[0].b = SVector::from([1.0, 0.0]);
+        ocp.common.r[(0, 0)] = 1.0;
+        ocp.common.u = Bounds {
+            lower: SVector::from([-1.0]),
+            upper: SVector::from([1.0]),
+        };
+        ocp.terminal.equality = Some(SVector::from([0.0, 1.0]));
+        for (price, soft) in ocp.terminal.soft_x.iter_mut().zip(soft) {
+            *price = soft.then_some(Penalty {
+                linear: 1.0,
+                quadratic: 0.0,
+            });
+        }
+        let solution = solve(&ocp);
+        assert!(
+            matches!(solution.status, Status::Infeasible(_)),
+            "{soft:?}: {}",
+            solution.status
+        );
+        assert!(infeasibility_margin(&ocp, &solution.active) > 0.0);
+    }
 }
