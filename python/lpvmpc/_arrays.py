@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+from dataclasses import is_dataclass
 from typing import Any
 
 import numpy as np
@@ -107,6 +109,17 @@ def matrices_by_stage(place: str, given: ArrayLike, shape: tuple[int, int]) -> A
     raise SettingError(
         f"{place}: its shape is {array.shape}; it must be {shape}, or (stages, {shape[0]}, {shape[1]})"
     )
+
+
+def copied(given: Any) -> Any:
+    """The same with arrays, lists and dictionaries of its own: what a user changes later changes nothing here."""
+    if isinstance(given, dict):
+        return {key: copied(value) for key, value in given.items()}
+    if isinstance(given, (list, tuple)):
+        return type(given)(copied(value) for value in given)
+    if isinstance(given, np.ndarray) or is_dataclass(given):
+        return deepcopy(given)
+    return given
 
 
 def equally_long(one: Array, other: Array) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _lpvmpc
-from ._arrays import numbers
+from ._arrays import column, numbers
 from ._files import save
 from .errors import SettingError
 
@@ -157,7 +157,7 @@ class Certificate:
 
     def __call__(self, t: float, x: ArrayLike) -> Array:
         """The law at the state `x`: as a controller of `simulate`, which tells the time `t`, too."""
-        found: Array = self.u - self.k @ (np.asarray(x, dtype=np.float64) - self.x)
+        found: Array = self.u - self.k @ (column("x", x, len(self.x)) - self.x)
         return found
 
     def _array(self, name: str) -> Array:

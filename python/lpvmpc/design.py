@@ -12,6 +12,7 @@ from ._arrays import column, number, weight, whole
 from ._progress import reported
 from .certificate import Certificate
 from .constraints import Limits, limits
+from .errors import SettingError
 from .plant import Plant
 
 
@@ -30,7 +31,7 @@ class Lqr:
 
     def __call__(self, t: float, x: ArrayLike) -> NDArray[np.float64]:
         """The input at the state `x`: as a controller of `simulate`, which tells the time `t`, too."""
-        error = np.asarray(x, dtype=np.float64) - self.x
+        error = column("x", x, len(self.x)) - self.x
         found: NDArray[np.float64] = self.u - self.k @ error
         return found
 
@@ -66,6 +67,9 @@ def lqr(
     at = plant.equilibrium or (np.zeros(n), np.zeros(m))
     x_eq = at[0] if x is None else column("x", x, n)
     u_eq = at[1] if u is None else column("u", u, m)
+    for place, given in (("x", x_eq), ("u", u_eq)):
+        if not np.isfinite(given).all():
+            raise SettingError(f"{place}: it has an entry that is not finite")
     k, p = _lpvmpc.lqr(plant._native, t_s, weight("q", q, n), weight("r", r, m), x_eq, u_eq)
     return Lqr(k=k, p=p, x=x_eq, u=u_eq)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _lpvmpc
-from ._arrays import column, listed, number, whole
+from ._arrays import column, copied, listed, number, whole
 from ._preview import AHEAD
 from ._preview import to_native as preview_to_native
 from ._settings import to_native as settings_to_native
@@ -149,17 +149,17 @@ class Mpc:
         if not isinstance(plant, Plant):
             raise SettingError(f"plant: {type(plant).__name__} is no lpvmpc.Plant")
         self._plant = plant
-        self._settings: dict[str, Any] = {
+        self._settings: dict[str, Any] = copied({
             "t_s": t_s, "horizon": horizon, "q": q, "r": r, "terminal": terminal,
             "x_bounds": x_bounds, "u_bounds": u_bounds, "state_bounds": state_bounds,
             "u_ref": u_ref, "rows": tuple(listed("rows", rows, "a list of lpvmpc.Row")), "q_y": q_y, "y_bounds": y_bounds,
             "output_bounds": output_bounds, "r_du": r_du, "du_bounds": du_bounds, "linear_models": linear_models, "nodes": nodes,
             "substeps": substeps, "method": method, "max_programs": max_programs, "first_programs": first_programs,
             "tolerance": tolerance, "estimator": estimator,
-        }  # fmt: skip
+        })  # fmt: skip
         self._n, self._m = len(plant.states), len(plant.inputs)
         self._native = _lpvmpc.Mpc(plant._native, settings_to_native(plant, self._settings))
-        self._set_estimator(estimator)
+        self._native.set_estimator(self._filter(estimator))
 
     @property
     def plant(self) -> Plant:
@@ -179,7 +179,8 @@ class Mpc:
     @property
     def settings(self) -> dict[str, Any]:
         """The settings as they were given, by the names of the arguments."""
-        return dict(self._settings)
+        found: dict[str, Any] = copied(self._settings)
+        return found
 
     @property
     def bounds(self) -> dict[str, tuple[float, float]]:
@@ -294,7 +295,8 @@ class Mpc:
         -------
         dict
             What became of each reading: ``"used"``, ``"used after a blow"`` (after outliers in a row, or the first
-            one of a sensor), ``"missing"``, ``"stale"``, ``"repeated"``, ``"outlier"``, ``"not finite"``.
+            one of a sensor), ``"missing"``, ``"stale"``, ``"repeated"``, ``"outlier"``, ``"not finite"``, ``"not needed"``
+            (its variance is infinite).
 
         Raises
         ------
@@ -366,9 +368,8 @@ class Mpc:
             raise SettingError("estimator: the controller has none; give it one, or call step")
         return list(estimator.measured)
 
-    def _set_estimator(self, estimator: Estimator | None) -> None:
-        found = None if estimator is None else estimator_to_native(self._plant, estimator)
-        self._native.set_estimator(found)
+    def _filter(self, estimator: Estimator | None) -> Any:
+        return None if estimator is None else estimator_to_native(self._plant, estimator)
 
     def set(self, **changes: Any) -> None:
         """Other settings from the next step on, by the names of the arguments of `Mpc`.
@@ -385,30 +386,28 @@ class Mpc:
                 raise SettingError(
                     f"{name}: there is no such setting; there are {', '.join(self._settings)}"
                 )
-        new = {**self._settings, **changes}
+        new = {**self._settings, **copied(changes)}
         for name in ("t_s", "horizon"):
             if new[name] != self._settings[name]:
                 raise SettingError(f"{name}: it stays; make another controller")
         native = settings_to_native(self._plant, new)
-        if "estimator" in changes:
-            self._set_estimator(changes["estimator"])
-        try:
-            self._native.set_settings(native)
-        except SettingError:
-            self._set_estimator(self._settings["estimator"])
-            raise
+        self._native.set(native, self._filter(new["estimator"]))
         self._settings = new
 
     def set_parameters(self, **values: float) -> None:
-        """Other values of the plant's parameters from the next step on.
+        """Other values of the plant's parameters from the next step on, all or none. The terminal cost stays what it
+        was.
 
         Raises
         ------
         PlantError
-            There is no such parameter, or a value is not finite; the controller is then as it was.
+            There is no such parameter, or a value is not finite.
+        SettingError
+            With these values the steps of the prediction are too long, or the readings do not tell the disturbances; or
+            the controller has a certificate, which is for the parameters as they are.
         """
         plant = self._plant.with_parameters(**values)
-        self._native.set_parameters({name: float(value) for name, value in values.items()})
+        self._native.set_parameters([(name, float(value)) for name, value in values.items()])
         self._plant = plant
 
     def set_last_input(self, u: ArrayLike) -> None:
@@ -425,7 +424,7 @@ class Mpc:
         self._native.set_last_input(column("u", u, self._m))
 
     def reset(self) -> None:
-        """Forgets the last plan and what was estimated: the next step is as the first."""
+        """Forgets the last plan, the last input and what was estimated: the next step is as the first."""
         self._native.reset()
 
     def save_firmware(

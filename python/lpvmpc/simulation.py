@@ -132,7 +132,7 @@ class Run:
         """Whether every sample of an `Mpc` had a plan; of a function, which has none, True."""
         return all(plan.is_solved for plan in self.plans)
 
-    def cost(self, q: ArrayLike, r: ArrayLike, u_ref: ArrayLike = 0.0) -> float:
+    def cost(self, q: ArrayLike, r: ArrayLike, u_ref: ArrayLike | None = None) -> float:
         """The closed-loop cost: the sum over the samples of (x - x_ref)'Q (x - x_ref) +
         (u - u_ref)'R (u - u_ref).
 
@@ -141,14 +141,22 @@ class Run:
         q, r
             The weights: diagonals, (n,) and (m,), or whole.
         u_ref
-            The input that costs nothing, (m,).
+            The input that costs nothing, (m,), or sample by sample, (samples, m); zero without.
+
+        Raises
+        ------
+        SettingError
+            A shape does not fit.
         """
-        from ._arrays import weight
+        from ._arrays import by_stage, weight
 
         n, m = self.x.shape[1], self.u.shape[1]
         q_matrix, r_matrix = weight("q", q, n), weight("r", r, m)
         e = self.x[:-1] - (0.0 if self.x_ref is None else self.x_ref)
-        v = self.u - np.asarray(u_ref)
+        known = np.zeros((1, m)) if u_ref is None else by_stage("u_ref", u_ref, m)
+        if len(known) not in (1, len(self.u)):
+            raise SettingError(f"u_ref: it has {len(known)} rows; the run has {len(self.u)} samples")
+        v = self.u - known
         return float(np.einsum("ki,ij,kj", e, q_matrix, e) + np.einsum("ki,ij,kj", v, r_matrix, v))
 
     def to_dataframe(self) -> Any:

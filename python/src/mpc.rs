@@ -11,7 +11,6 @@ use lpvmpc_any::{
 use lpvmpc_certify::Certificate;
 use nalgebra::{DMatrix, DVector};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
 /// A linear row: name, coefficients of x and u, bounds, linear and quadratic price.
 type RowTuple = (String, Vec<f64>, Vec<f64>, f64, f64, Option<(f64, f64)>);
@@ -392,19 +391,17 @@ impl Mpc {
         Some((estimate.x, estimate.disturbances))
     }
 
-    fn set_settings(&mut self, settings: Settings<'_>) -> PyResult<()> {
+    fn set(&mut self, settings: Settings<'_>, estimator: Option<Estimator>) -> PyResult<()> {
         let settings = settings.build(self.inner.plant())?;
-        self.inner.set_settings(&settings).map_err(of_setting)
+        let estimator = estimator.map(EstimatorSettings::from);
+        self.inner
+            .set(&settings, estimator.as_ref())
+            .map_err(of_setting)
     }
 
-    fn set_parameters(&mut self, values: &Bound<'_, PyDict>) -> PyResult<()> {
-        for (name, value) in values {
-            let name: String = name.extract()?;
-            self.inner
-                .set_parameter(&name, value.extract()?)
-                .map_err(of_setting)?;
-        }
-        Ok(())
+    fn set_parameters(&mut self, values: Vec<(String, f64)>) -> PyResult<()> {
+        let values = values.iter().map(|(name, value)| (name.as_str(), *value));
+        self.inner.set_parameters(values).map_err(of_setting)
     }
 
     fn set_last_input(&mut self, u: Vec<f64>) -> PyResult<()> {

@@ -103,6 +103,14 @@ def test_an_estimator_comes_and_goes_and_is_pickled():
     with pytest.raises(lpvmpc.SettingError, match="q"):
         mpc.set(estimator=None, q=[1, 2])
     assert mpc.estimate is not None
+    mpc.observe(0.0, [0.3, 0.1])
+    before = mpc.estimate.x.tolist()
+    # What only the compiled half refuses.
+    with pytest.raises(lpvmpc.SettingError, match="r"):
+        mpc.set(estimator=None, r=[-1])
+    assert mpc.estimate.x.tolist() == before
+    mpc.set(du_bounds=([-4], [4]), substeps=2)
+    assert mpc.estimate.x.tolist() == before
     mpc.set(estimator=None)
     assert mpc.estimate is None and mpc.estimator is None
 

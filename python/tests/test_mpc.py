@@ -414,3 +414,31 @@ def test_matrices_by_stage_take_the_place_of_the_plant():
         mpc.step([1, 0], matrices=(np.eye(3), b))
     with pytest.raises(lpvmpc.SettingError, match=r"\(A, B\) or \(A, B, c\)"):
         mpc.step([1, 0], matrices=(a,))
+
+
+def test_what_was_given_may_change():
+    plant = lpvmpc.Plant.from_matrices([[0, 1], [0, 0]], [[0], [1]], states=["place", "speed"])
+    q, bounds = np.array([1.0, 0.1]), {"speed": (-0.5, 0.5)}
+    mpc = lpvmpc.Mpc(plant, 0.1, 10, q, [0.01], u_bounds=([-2], [2]), x_bounds=bounds)
+    untouched = lpvmpc.Mpc(plant, 0.1, 10, [1.0, 0.1], [0.01], u_bounds=([-1], [1]), x_bounds={"speed": (-0.5, 0.5)})
+    q[0] = 99.0
+    bounds["speed"] = (-0.1, 0.1)
+    mpc.settings["q"][0] = 50.0
+    mpc.set(u_bounds=([-1], [1]))
+    assert mpc.bounds == untouched.bounds
+    assert mpc.step([0.1, 0.0]).u0 == untouched.step([0.1, 0.0]).u0
+
+
+def test_laws_and_costs_take_vectors_of_their_size():
+    plant = lpvmpc.Plant.from_matrices([[0, 1], [0, 0]], [[0], [1]])
+    law = lpvmpc.lqr(plant, 0.1, [1, 1], [1])
+    for wrong in (np.ones((2, 2)), [1, 2, 3], 1.0):
+        with pytest.raises(lpvmpc.SettingError, match="x: its shape"):
+            law(0.0, wrong)
+    with pytest.raises(lpvmpc.SettingError, match="x: it has an entry"):
+        lpvmpc.lqr(plant, 0.1, [1, 1], [1], x=[np.nan, 0])
+    run = lpvmpc.simulate(plant, law, [0.1, 0.0], t_s=0.1, duration=1.0)
+    assert run.cost([1, 1], [1], u_ref=[0.5]) != run.cost([1, 1], [1])
+    for wrong in ([1, 1, 1], np.ones((3, 1))):
+        with pytest.raises(lpvmpc.SettingError, match="u_ref"):
+            run.cost([1, 1], [1], u_ref=wrong)

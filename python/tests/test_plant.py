@@ -10,6 +10,7 @@ import pytest
 import sympy as sp
 
 import lpvmpc
+from lpvmpc._files import save
 from plants import cart_pole, cart_pole_formulas
 
 
@@ -189,6 +190,15 @@ def test_files_and_pickles_hold_the_same_plant(tmp_path):
     other = plant.with_parameters(pole_mass=0.4)
     other.save(tmp_path / "plant.json", overwrite=True)
     assert lpvmpc.Plant.load(tmp_path / "plant.json") == other != plant
+    with pytest.raises(FileExistsError):
+        plant.save(tmp_path / "plant.json")
+    with pytest.raises(UnicodeEncodeError):
+        save("\ud800", tmp_path / "plant.json", overwrite=True)
+    with pytest.raises(UnicodeEncodeError):
+        save("\ud800", tmp_path / "new.json", overwrite=False)
+    # What could not be written whole has changed nothing.
+    assert [file.name for file in tmp_path.iterdir()] == ["plant.json"]
+    assert lpvmpc.Plant.load(tmp_path / "plant.json") == other
     again = pickle.loads(pickle.dumps(other))
     assert again == other and again != plant and hash(again) == hash(other)
     assert (again.f([0, 1, 0, 0], [1]) == other.f([0, 1, 0, 0], [1])).all()

@@ -304,8 +304,9 @@ impl Config {
                 .ok_or_else(|| ConfigError::UnknownParameter { key: key.clone() })?;
             choices[parameter] = table.choice(&format!("parameters.{key}"))?;
         }
-        if let Choice::Fixed(delay) | Choice::Free { start: Some(delay) } =
-            choices[Parameter::Delay]
+        if let Choice::Fixed(delay)
+        | Choice::Free { start: Some(delay) }
+        | Choice::Prior { mean: delay, .. } = choices[Parameter::Delay]
         {
             let longest = crate::coordinates::LONGEST_DELAY;
             within("parameters.delay_s", delay, 0.0, longest, "from 0 to 0.1 s")?;

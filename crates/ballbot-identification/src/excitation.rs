@@ -28,7 +28,7 @@ pub struct ExcitationTask {
     pub choices: Values<Choice>,
     /// Lowest and highest frequency, Hz.
     pub band: (f64, f64),
-    /// Number of harmonics, at most.
+    /// Number of harmonics, at most; at least 2.
     pub harmonics: usize,
     /// Largest torque of the excitation wanted, N m.
     pub amplitude: f64,
@@ -172,6 +172,11 @@ const LEAST_LEFT: f64 = 0.02;
 
 /// An expected standard deviation relative to the value from which on a log is not worth recording.
 const LEAST_PRECISE: f64 = 0.5;
+
+/// An hour at 1 kHz has 3.6 million rows.
+const MOST_ROWS: f64 = 4e6;
+/// Cosines of all rows: some seconds' work.
+const MOST_TERMS: f64 = 1e9;
 
 /// Fading in and out, s: no jump of the torque.
 const FADE: f64 = 1.0;
@@ -352,17 +357,23 @@ impl ExcitationTask {
         within(
             "the number of harmonics",
             self.harmonics as f64,
-            1.0,
+            2.0,
             1e4,
-            "from 1 to 10000".to_owned(),
+            "from 2 to 10000".to_owned(),
         )?;
-        within("the torque", self.amplitude, 1e-6, 1e6, positive())?;
         within(
-            "the tilt limit",
-            self.tilt_limit,
-            1e-3,
-            1.0,
-            "from 0.06 to 57 degrees".to_owned(),
+            "the torque",
+            self.amplitude,
+            1e-6,
+            1e6,
+            "from 1e-6 to 1e6 N m".to_owned(),
+        )?;
+        within(
+            "the tilt limit in degrees",
+            self.tilt_limit.to_degrees(),
+            0.06,
+            57.0,
+            "from 0.06 to 57".to_owned(),
         )?;
         within(
             "the length",
@@ -370,7 +381,26 @@ impl ExcitationTask {
             shortest,
             3600.0,
             format!("from {shortest:.1} s (two periods of the lowest frequency) to an hour"),
+        )?;
+        within(
+            "the number of rows, length times rate,",
+            self.rows() as f64,
+            1.0,
+            MOST_ROWS,
+            format!("at most {MOST_ROWS}: a shorter length or a lower rate"),
+        )?;
+        within(
+            "the number of rows times that of the harmonics",
+            self.rows() as f64 * self.harmonics as f64,
+            1.0,
+            MOST_TERMS,
+            format!("at most {MOST_TERMS}: fewer harmonics, a shorter length or a lower rate"),
         )
+    }
+
+    /// Rows of the whole length.
+    fn rows(&self) -> usize {
+        (self.duration * self.rate).round() as usize
     }
 
     /// An LQR of this robot that reacts in about a second.
@@ -389,8 +419,8 @@ impl ExcitationTask {
     /// Harmonics of the whole length, evenly spread over the band on a logarithmic scale.
     fn frequencies(&self) -> Vec<f64> {
         let (low, high) = self.band;
-        let last = (self.harmonics.max(2) - 1) as f64;
-        let places = (0..self.harmonics.max(2)).map(|i| i as f64 / last);
+        let last = (self.harmonics - 1) as f64;
+        let places = (0..self.harmonics).map(|i| i as f64 / last);
         let frequencies = places.map(|place| low * (high / low).powf(place));
         let numbers = frequencies.map(|frequency| (frequency * self.duration).round().max(1.0));
         let mut numbers: Vec<f64> = numbers.collect();
@@ -404,7 +434,7 @@ impl ExcitationTask {
     /// The sum of the harmonics with phases that keep its peaks low (Schroeder 1970), faded in and
     /// out; its largest value is 1.
     fn shape(&self, frequencies: &[f64]) -> Vec<f64> {
-        let rows = (self.duration * self.rate).round() as usize;
+        let rows = self.rows();
         let count = frequencies.len() as f64;
         let values = (0..rows).map(|row| {
             let time = row as f64 / self.rate;

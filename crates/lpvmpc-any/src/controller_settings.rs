@@ -59,12 +59,7 @@ pub(crate) fn controller_settings<const NX: usize, const NU: usize, const NS: us
         x: names.bounds(Axis::States, "x_bounds", &x)?,
         u: names.bounds(Axis::Inputs, "u_bounds", &u)?,
     };
-    if plant.period().is_none() {
-        let (n, (x, u)) = (data.states.len(), rest);
-        let (a, _) = model.jacobian(&x, &u);
-        let a = DMatrix::from_fn(n, n, |i, j| a[(i, j)]);
-        check_substeps(&a, t_s, settings.substeps)?;
-    }
+    check_prediction(plant, settings, model, &rest)?;
     let weights = names.weights("settings", &settings.q, &settings.r)?;
     let terminal = match &settings.terminal {
         Terminal::Equality => TerminalIngredient::Equality,
@@ -304,4 +299,20 @@ pub(crate) fn output_prices<const NX: usize, const NU: usize, const NS: usize>(
             prices.collect()
         }
     }
+}
+
+/// Refuses Runge-Kutta steps that are too long for the plant where it stands.
+pub(crate) fn check_prediction<const NX: usize, const NU: usize, const NS: usize>(
+    plant: &Plant,
+    settings: &MpcSettings,
+    model: &Model<NX, NU, NS>,
+    (x, u): &(SVector<f64, NX>, SVector<f64, NU>),
+) -> Result<(), MpcError> {
+    if plant.period().is_some() {
+        return Ok(());
+    }
+    let n = plant.data().states.len();
+    let (a, _) = model.jacobian(x, u);
+    let a = DMatrix::from_fn(n, n, |i, j| a[(i, j)]);
+    check_substeps(&a, settings.t_s, settings.substeps)
 }

@@ -4,20 +4,22 @@ use crate::check::{Axis, Names};
 use crate::error::MpcError;
 use crate::model::Model;
 use crate::settings::{LinearModels, MpcSettings};
+use crate::size::{smallest, too_many};
 use crate::target::output_tangent;
 use lpvmpc::{
     DelayLine, Dual, Estimator, EstimatorError, EstimatorSettings as OfEstimator, Gate, LpvModel,
-    Observation, Reading,
+    Reading, Verdict,
 };
 use lpvmpc_design::check_offset_free;
-use lpvmpc_plant::Plant;
+use lpvmpc_plant::{Plant, SizedPlant};
 use nalgebra::{DMatrix, SMatrix, SVector};
+use std::any::Any;
 
 /// An extended Kalman filter that finds state and disturbances, and the delay of the input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EstimatorSettings {
     /// What is measured: names of states or of outputs that do not depend on the input, in the order of the
-    /// readings. No more than the controller has places for states.
+    /// readings. No more than the smallest of 2, 4, 6, 8, 12 and 16 that is at least the number of states.
     pub measured: Vec<String>,
     /// Variances of the readings, in squared units, positive.
     pub measurement_noise: Vec<f64>,
@@ -155,31 +157,82 @@ fn push<const NX: usize, const NS: usize>(w: &SVector<f64, NS>) -> SVector<f64, 
     SVector::from_fn(|i, _| w[NS - NX + i])
 }
 
-fn joint<const NX: usize, const NU: usize, const NS: usize>(
-    u: &SVector<f64, NU>,
-    push: &SVector<f64, NX>,
-) -> SVector<f64, NS> {
-    SVector::from_fn(|i, _| match i.checked_sub(NU) {
-        None => u[i],
-        Some(i) => push[i],
+/// What acts on the inputs and on the states as one input.
+fn joint<const NU: usize, const NS: usize>(u: &[f64], push: &[f64]) -> SVector<f64, NS> {
+    SVector::from_fn(|i, _| {
+        let entry = match i.checked_sub(NU) {
+            None => u.get(i),
+            Some(i) => push.get(i),
+        };
+        entry.copied().unwrap_or(0.0)
     })
 }
 
-/// A filter and the inputs on their way.
-pub(crate) struct Filter<const NX: usize, const NU: usize, const NS: usize> {
-    pub settings: EstimatorSettings,
+/// A filter in the smallest size with places for the plant's states, whatever the controller adds to them.
+///
+/// # Errors
+/// The setting that makes no sense.
+pub(crate) fn filter(
+    plant: &Plant,
+    mpc: &MpcSettings,
+    settings: &EstimatorSettings,
+) -> Result<Box<dyn AnyFilter>, MpcError> {
+    let data = plant.data();
+    let places = (data.states.len(), data.inputs.len());
+    smallest!(places, filter_of_size(plant, mpc, settings))
+        .unwrap_or_else(|| Err(too_many(places, 0)))
+}
+
+fn filter_of_size<const NX: usize, const NU: usize, const NS: usize>(
+    plant: &Plant,
+    mpc: &MpcSettings,
+    settings: &EstimatorSettings,
+) -> Result<Box<dyn AnyFilter>, MpcError> {
+    Ok(Box::new(Filter::<NX, NU, NS>::new(plant, mpc, settings)?))
+}
+
+/// A filter whose size nobody sees, and the inputs on their way; its vectors have the plant's sizes.
+pub(crate) trait AnyFilter: Any + Send + Sync {
+    fn settings(&self) -> &EstimatorSettings;
+    /// Starts again, without a reading and without inputs on their way.
+    fn reset(&mut self);
+    /// Goes on from where `previous` stands, a filter of the same plant with other settings or parameters.
+    fn take_over(&mut self, previous: &dyn AnyFilter);
+    /// Takes in readings: what became of each, and whether the filter has begun anew.
+    fn observe(
+        &mut self,
+        t: f64,
+        readings: &[Option<f64>],
+    ) -> Result<(Vec<Verdict>, bool), MpcError>;
+    /// The state when the next input will act; not a number where there is no estimate.
+    fn ahead(&self) -> Vec<f64>;
+    /// What acts beside the input, and on the states.
+    fn disturbance(&self) -> (Vec<f64>, Vec<f64>);
+    /// The input `u` was sent, and the disturbance `d` on the states is known to act with it.
+    fn send(&mut self, u: &[f64], d: &[f64]);
+    /// The input `u` was sent in place of the last one; before the first one it acts already.
+    fn correct(&mut self, u: &[f64]);
+    fn estimate(&self) -> Estimate;
+}
+
+struct Filter<const NX: usize, const NU: usize, const NS: usize> {
+    settings: EstimatorSettings,
+    /// The plant's states and inputs.
+    sizes: (usize, usize),
     estimator: Estimator<Sensed<NX, NU, NS>, f64, NX, NS, NS, NX, NX>,
     line: DelayLine<f64, NS>,
     start: SVector<f64, NX>,
 }
 
 impl<const NX: usize, const NU: usize, const NS: usize> Filter<NX, NU, NS> {
-    pub fn new(
+    fn new(
         plant: &Plant,
-        names: &Names,
-        (mpc, settings): (&MpcSettings, &EstimatorSettings),
-        rest: (SVector<f64, NX>, SVector<f64, NU>),
+        mpc: &MpcSettings,
+        settings: &EstimatorSettings,
     ) -> Result<Self, MpcError> {
+        let names = &Names::new(plant);
+        let equilibrium = SizedPlant::<NX, NU>::new(plant.clone())?.equilibrium();
+        let rest = equilibrium.unwrap_or((SVector::zeros(), SVector::zeros()));
         let place = |part: &str| format!("estimator, {part}");
         let measured = sources(plant, names, settings, NX)?;
         let count = measured.len();
@@ -242,8 +295,6 @@ impl<const NX: usize, const NU: usize, const NS: usize> Filter<NX, NU, NS> {
             measured,
         };
         sensed.check_observable(settings, (n, m), rest, &offset)?;
-        let filled =
-            |entries: &[f64]| SVector::from_fn(|i, _| entries.get(i).copied().unwrap_or(0.0));
         let of_disturbances = |of: &dyn Fn(&Disturbance) -> f64| {
             let all: Vec<f64> = settings.disturbances.iter().map(of).collect();
             filled(&all)
@@ -279,29 +330,37 @@ impl<const NX: usize, const NU: usize, const NS: usize> Filter<NX, NU, NS> {
         let commands = (delay / mpc.t_s).ceil() as usize + 3;
         Ok(Self {
             settings: settings.clone(),
+            sizes: (n, m),
             estimator,
             line: DelayLine::allocate(commands),
             start,
         })
     }
+}
 
-    /// Starts again, without a reading and without inputs on their way.
-    pub fn reset(&mut self) {
+impl<const NX: usize, const NU: usize, const NS: usize> AnyFilter for Filter<NX, NU, NS> {
+    fn settings(&self) -> &EstimatorSettings {
+        &self.settings
+    }
+
+    fn reset(&mut self) {
         self.estimator.begin_at(None, self.start);
         self.line.clear();
     }
 
-    /// Goes on from where `previous` stands.
-    pub fn take_over(&mut self, previous: &Self) {
-        self.estimator.take_over(&previous.estimator);
-        self.line.copy_from(&previous.line);
+    fn take_over(&mut self, previous: &dyn AnyFilter) {
+        let previous: &dyn Any = previous;
+        if let Some(previous) = previous.downcast_ref::<Self>() {
+            self.estimator.take_over(&previous.estimator);
+            self.line.copy_from(&previous.line);
+        }
     }
 
-    pub fn observe(
+    fn observe(
         &mut self,
         t: f64,
         readings: &[Option<f64>],
-    ) -> Result<Observation<NX>, MpcError> {
+    ) -> Result<(Vec<Verdict>, bool), MpcError> {
         let count = self.settings.measured.len();
         if readings.len() != count {
             let names = self.settings.measured.join(", ");
@@ -315,45 +374,53 @@ impl<const NX: usize, const NU: usize, const NS: usize> Filter<NX, NU, NS> {
             let reading = readings.get(i).copied().flatten();
             reading.map(Reading::fresh)
         });
-        Ok(self.estimator.observe(t, &mut self.line, &readings))
+        let observation = self.estimator.observe(t, &mut self.line, &readings);
+        let verdicts = observation.verdicts[..count].to_vec();
+        Ok((verdicts, observation.restart.is_some()))
     }
 
-    /// The state when the next input will act; not a number where there is no estimate.
-    pub fn ahead(&self) -> SVector<f64, NX> {
+    fn ahead(&self) -> Vec<f64> {
+        let states = self.sizes.0;
         if self.estimator.time().is_none() || self.estimator.is_lost() {
-            return SVector::repeat(f64::NAN);
+            return vec![f64::NAN; states];
         }
         let mut z = *self.estimator.model_state();
         self.line.for_each(self.settings.delay, |duration, w| {
             z = self.estimator.predict(&z, w, duration);
         });
-        z
+        z.as_slice()[..states].to_vec()
     }
 
-    /// What acts beside the input, and on the states.
-    pub fn disturbance(&self) -> (SVector<f64, NU>, SVector<f64, NX>) {
+    fn disturbance(&self) -> (Vec<f64>, Vec<f64>) {
         let w = self.estimator.input_disturbance();
-        (input(&w), push(&w))
+        let (states, inputs) = self.sizes;
+        (
+            w.as_slice()[..inputs].to_vec(),
+            w.as_slice()[NU..][..states].to_vec(),
+        )
     }
 
-    /// The input `u` was sent, and the disturbance `d` is known to act with it.
-    pub fn send(&mut self, u: &SVector<f64, NU>, d: &SVector<f64, NX>) {
-        self.line.command(joint(u, d), self.settings.delay);
+    fn send(&mut self, u: &[f64], d: &[f64]) {
+        let sent = joint::<NU, NS>(u, d);
+        self.line.command(sent, self.settings.delay);
     }
 
-    /// The input `u` was sent in place of the last one; before the first one it acts already.
-    pub fn correct(&mut self, u: &SVector<f64, NU>) {
-        let unpushed = SVector::<f64, NX>::zeros();
-        self.line.correct(joint(u, &unpushed));
+    fn correct(&mut self, u: &[f64]) {
+        self.line.correct(joint::<NU, NS>(u, &[]));
     }
 
-    pub fn estimate(&self, states: usize) -> Estimate {
+    fn estimate(&self) -> Estimate {
         let d = self.estimator.disturbance();
         Estimate {
-            x: self.estimator.state().as_slice()[..states].to_vec(),
+            x: self.estimator.state().as_slice()[..self.sizes.0].to_vec(),
             disturbances: d.as_slice()[..self.settings.disturbances.len()].to_vec(),
         }
     }
+}
+
+/// The entries, with zero in the places that are left over.
+fn filled<const K: usize>(entries: &[f64]) -> SVector<f64, K> {
+    SVector::from_fn(|i, _| entries.get(i).copied().unwrap_or(0.0))
 }
 
 impl<const NX: usize, const NU: usize, const NS: usize> Sensed<NX, NU, NS> {

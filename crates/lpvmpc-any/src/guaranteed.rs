@@ -29,7 +29,7 @@ use crate::error::MpcError;
 use crate::plan::{Plan, Target};
 use crate::preview::Preview;
 use crate::settings::{Limits, MpcSettings, Terminal, TerminalSet};
-use crate::sized::AnySize;
+use crate::sized::{Acting, AnySize};
 use aims::{Aims, Targets};
 pub(crate) use checks::check_estimator;
 use lpvmpc::{Decision, Status};
@@ -133,9 +133,13 @@ impl Guarantee {
         let names = Names::new(controller.plant());
         let aims = self.targets.aims(&names, self.horizon, preview)?;
         let mut sample = self.sample(x, beside, aims);
+        let acting = beside.map(|on_inputs| Acting {
+            on_inputs,
+            on_states: &[],
+        });
         if x.len() != names.states.len() || x.iter().any(|value| !value.is_finite()) {
             let told = self.told(&sample, &sample.aims.end, Way::AsWanted);
-            let mut plan = controller.step(x, beside, &told)?;
+            let mut plan = controller.step(x, acting, &told)?;
             self.last = None;
             plan.decision = Some(Decision::SoftBounds);
             plan.status = format!("not guaranteed: {}", plan.status);
@@ -170,7 +174,7 @@ impl Guarantee {
                 true => Way::AsWanted,
                 false => Way::Straight,
             };
-            let mut plan = controller.step(x, beside, &self.told(sample, &target, way))?;
+            let mut plan = controller.step(x, acting, &self.told(sample, &target, way))?;
             let inputs = plan.u.row_iter().map(|u| u.transpose() + &sample.beside);
             let inputs: Vec<_> = inputs.collect();
             let motion = self.roll_out(controller.plant(), sample, &target, &|i, _| {
@@ -193,7 +197,7 @@ impl Guarantee {
             refused = Some(plan);
         }
         let Some(mut plan) = refused else {
-            return controller.step(x, beside, &self.told(sample, wanted, Way::AsWanted));
+            return controller.step(x, acting, &self.told(sample, wanted, Way::AsWanted));
         };
         if let Some((decision, motion)) = known {
             plan.kind = Status::NoImprovement;
@@ -207,7 +211,7 @@ impl Guarantee {
             // What the controller does without a set is better than what it does towards one that it cannot reach; and
             // where it is now it finds a plan sooner than on a long way.
             controller.reset();
-            plan = controller.step(x, beside, &self.told(sample, &from, Way::Straight))?;
+            plan = controller.step(x, acting, &self.told(sample, &from, Way::Straight))?;
         }
         plan.decision = Some(Decision::SoftBounds);
         if !plan.is_solved() {

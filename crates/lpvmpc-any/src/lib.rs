@@ -65,6 +65,7 @@ mod plan;
 mod preview;
 mod sampling;
 mod settings;
+mod size;
 mod sized;
 mod stage_lists;
 mod steady_state;
@@ -80,11 +81,13 @@ pub use firmware::{Demonstration, firmware};
 pub use linearise::{jacobian, lqr};
 pub use lpvmpc::{Decision, Gate, Iterations, Penalty, Reading, Verdict};
 pub use lpvmpc_sim::{Actuator, Tolerances};
-pub use mpc::{MOST_INPUTS, MOST_STATES, Mpc};
+pub use model::USUAL_NODES;
+pub use mpc::Mpc;
 pub use plan::{ActiveBound, Plan, Target};
 pub use preview::{Preview, StageMatrices};
 pub use settings::{
     FIRST_PROGRAMS, Limits, LinearModels, MpcSettings, Row, StateBounds, Terminal, TerminalSet,
 };
+pub use size::{MOST_INPUTS, MOST_STATES};
 pub use steady_state::{SteadyState, steady_state};
 pub use world::{Push, Quantity, Sensor, World, WorldSettings};

@@ -2,7 +2,7 @@
 
 use crate::controller_settings::check_rest;
 use crate::error::MpcError;
-use crate::mpc::{MOST_INPUTS, MOST_STATES};
+use crate::size::{MOST_INPUTS, MOST_STATES};
 use lpvmpc::{AlongMotion, LpvModel};
 use lpvmpc_design::{Lqr, lqr_discrete, zero_order_hold};
 use lpvmpc_plant::{Plant, PlantError, SizedPlant};

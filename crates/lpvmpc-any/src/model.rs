@@ -155,7 +155,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Embedding<NX, NU, NS>
 /// Nodes along a ray where none are asked for: of a cart-pole's closed loops from 200 random starts
 /// fewest were dearer than the best known (`cargo run --release -p lpvmpc-any --example
 /// linear_models`).
-const USUAL_NODES: usize = 2;
+pub const USUAL_NODES: usize = 2;
 
 /// A plant with its linear models.
 #[derive(Debug, Clone)]

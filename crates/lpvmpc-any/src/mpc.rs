@@ -2,19 +2,16 @@
 
 use crate::check::Names;
 use crate::error::MpcError;
-use crate::estimator::{Estimate, EstimatorSettings};
+use crate::estimator::{AnyFilter, Estimate, EstimatorSettings, filter};
 use crate::guaranteed::{Guarantee, check_estimator};
 use crate::plan::Plan;
 use crate::preview::Preview;
+use crate::sampling::check_count;
 use crate::settings::MpcSettings;
-use crate::sized::{AnySize, Sized};
+use crate::size::{smallest, too_many};
+use crate::sized::{Acting, AnySize, controller_of_size};
 use lpvmpc::Verdict;
 use lpvmpc_plant::Plant;
-
-/// The most states that a plant may have.
-pub const MOST_STATES: usize = 16;
-/// The most inputs.
-pub const MOST_INPUTS: usize = 6;
 
 /// The LPV MPC controller of a plant that is data.
 pub struct Mpc {
@@ -22,29 +19,7 @@ pub struct Mpc {
     states: usize,
     /// With a certified terminal set.
     guarantee: Option<Guarantee>,
-}
-
-/// The first of these sizes, smallest first, in which a plant has room.
-macro_rules! smallest {
-    ($plant:expr, $settings:expr, $($nx:literal $nu:literal $ns:literal),+) => {{
-        let (n, m) = places($plant, $settings);
-        $(if n <= $nx && m <= $nu {
-            return Ok(Box::new(Sized::<$nx, $nu, $ns>::new($plant, $settings)?));
-        })+
-        let states = $plant.data().states.len();
-        let fault = match n == states {
-            true => format!(
-                "there are {n} states and {m} inputs; a controller has at most {MOST_STATES} and \
-                 {MOST_INPUTS}"
-            ),
-            false => format!(
-                "there are {states} states and {m} inputs; where changes of the inputs cost \
-                 something or are bounded, the last inputs count as states, of which a controller \
-                 has at most {MOST_STATES}, beside at most {MOST_INPUTS} inputs"
-            ),
-        };
-        Err(MpcError::new("plant", fault))
-    }};
+    filter: Option<Box<dyn AnyFilter>>,
 }
 
 /// The states, with the last inputs where they are among them, and the inputs.
@@ -56,7 +31,10 @@ fn places(plant: &Plant, settings: &MpcSettings) -> (usize, usize) {
 
 /// A controller in the smallest size.
 fn sized(plant: &Plant, settings: &MpcSettings) -> Result<Box<dyn AnySize>, MpcError> {
-    smallest!(plant, settings, 2 1 3, 4 1 5, 4 2 6, 6 2 8, 8 4 12, 12 4 16, 16 6 22)
+    let places = places(plant, settings);
+    let last_inputs = places.0 - plant.data().states.len();
+    smallest!(places, controller_of_size(plant, settings))
+        .unwrap_or_else(|| Err(too_many(places, last_inputs)))
 }
 
 impl Mpc {
@@ -68,11 +46,13 @@ impl Mpc {
         if plant.data().inputs.is_empty() {
             return Err(MpcError::new("plant", "it has no input to control it with"));
         }
+        check_count(settings.substeps)?;
         let guarantee = Guarantee::new(plant, settings)?;
         Ok(Self {
             sized: sized(plant, settings)?,
             states: plant.data().states.len(),
             guarantee,
+            filter: None,
         })
     }
 
@@ -100,39 +80,73 @@ impl Mpc {
     /// # Errors
     /// As [`new`](Self::new); the controller is as it was then.
     pub fn set_settings(&mut self, settings: &MpcSettings) -> Result<(), MpcError> {
-        let guarantee = Guarantee::new(self.sized.plant(), settings)?;
-        if let (Some(_), Some(estimator)) = (&guarantee, self.sized.estimator()) {
-            check_estimator(&Names::new(self.sized.plant()), estimator)?;
-        }
-        if places(self.sized.plant(), settings).0 <= self.sized.places() {
+        let estimator = self.estimator().cloned();
+        self.set(settings, estimator.as_ref())
+    }
+
+    /// Other settings, and of the estimator: as [`set_settings`](Self::set_settings) and
+    /// [`set_estimator`](Self::set_estimator), both or none.
+    ///
+    /// # Errors
+    /// As these; all is as it was then.
+    pub fn set(
+        &mut self,
+        settings: &MpcSettings,
+        estimator: Option<&EstimatorSettings>,
+    ) -> Result<(), MpcError> {
+        check_count(settings.substeps)?;
+        let plant = self.sized.plant();
+        let guarantee = Guarantee::new(plant, settings)?;
+        let filter = self.filter(plant, (settings, guarantee.is_some()), estimator)?;
+        if places(plant, settings).0 <= self.sized.places() {
             self.sized.set_settings(settings)?;
-            self.guarantee = guarantee;
-            return Ok(());
+        } else {
+            let before = self.sized.settings();
+            if (settings.horizon, settings.t_s) != (before.horizon, before.t_s) {
+                let error = lpvmpc::ControllerError::Another;
+                return Err(MpcError::new("settings", error.to_string()));
+            }
+            // The last inputs need more places.
+            let mut larger = sized(plant, settings)?;
+            larger.set_last_input(&self.sized.last_input())?;
+            self.sized = larger;
         }
-        let before = self.sized.settings();
-        if (settings.horizon, settings.t_s) != (before.horizon, before.t_s) {
-            let error = lpvmpc::ControllerError::Another;
-            return Err(MpcError::new("settings", error.to_string()));
-        }
-        // The last inputs need more places: the next step is as the first.
-        let mut larger = sized(self.sized.plant(), settings)?;
-        larger.set_last_input(&self.sized.last_input())?;
-        larger.set_estimator(self.sized.estimator())?;
-        self.sized = larger;
-        self.guarantee = guarantee;
+        (self.guarantee, self.filter) = (guarantee, filter);
         Ok(())
     }
 
-    /// Another value of a parameter of the plant from the next step on.
+    /// Another value of a parameter of the plant from the next step on. The terminal cost stays what it was.
     ///
     /// # Errors
-    /// There is no such parameter, or the value is not finite.
+    /// As [`set_parameters`](Self::set_parameters).
     pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), MpcError> {
-        if self.guarantee.is_some() {
-            let fault = "the certificate of the terminal set is for the parameters as they are";
-            return Err(MpcError::new(name, fault));
+        self.set_parameters([(name, value)])
+    }
+
+    /// Other values of parameters of the plant from the next step on, all or none. The terminal cost stays what it was.
+    ///
+    /// # Errors
+    /// There is no such parameter, or the value is not finite; with these values the prediction's steps are too
+    /// long, or the readings do not tell the disturbances; there is a certified terminal set, which is for the parameters
+    /// as they are. All is as it was then.
+    pub fn set_parameters<'a>(
+        &mut self,
+        values: impl IntoIterator<Item = (&'a str, f64)>,
+    ) -> Result<(), MpcError> {
+        let mut plant = self.sized.plant().clone();
+        for (name, value) in values {
+            if self.guarantee.is_some() {
+                let fault = "the certificate of the terminal set is for the parameters as they are";
+                return Err(MpcError::new(name, fault));
+            }
+            plant.set_parameter(name, value)?;
         }
-        self.sized.set_parameter(name, value)
+        // The filter predicts with the same plant.
+        let of_controller = (self.sized.settings(), self.guarantee.is_some());
+        let filter = self.filter(&plant, of_controller, self.estimator())?;
+        self.sized.set_plant(&plant)?;
+        self.filter = filter;
+        Ok(())
     }
 
     /// The input that was really applied last, where that is another than the last plan's first one; before the first
@@ -142,7 +156,11 @@ impl Mpc {
     /// # Errors
     /// It has not the plant's sizes, or is not finite.
     pub fn set_last_input(&mut self, u: &[f64]) -> Result<(), MpcError> {
-        self.sized.set_last_input(u)
+        self.sized.set_last_input(u)?;
+        if let Some(filter) = &mut self.filter {
+            filter.correct(u);
+        }
+        Ok(())
     }
 
     /// From now on the state is estimated from readings, and inputs act after a delay: see [`Self::observe`] and
@@ -152,10 +170,34 @@ impl Mpc {
     /// The setting that makes no sense; a disturbance that the readings cannot tell; with a certified terminal set one on
     /// a state, which moves the equilibrium that the certificate is about. All is as it was then.
     pub fn set_estimator(&mut self, settings: Option<&EstimatorSettings>) -> Result<(), MpcError> {
-        if let (Some(_), Some(settings)) = (&self.guarantee, settings) {
-            check_estimator(&Names::new(self.sized.plant()), settings)?;
+        let of_controller = (self.sized.settings(), self.guarantee.is_some());
+        self.filter = self.filter(self.sized.plant(), of_controller, settings)?;
+        Ok(())
+    }
+
+    /// A filter for the `plant` and the controller, which may have a certified terminal set, that goes on from where the one
+    /// before stands; none without settings.
+    fn filter(
+        &self,
+        plant: &Plant,
+        (settings, is_guaranteed): (&MpcSettings, bool),
+        estimator: Option<&EstimatorSettings>,
+    ) -> Result<Option<Box<dyn AnyFilter>>, MpcError> {
+        let Some(estimator) = estimator else {
+            return Ok(None);
+        };
+        if is_guaranteed {
+            check_estimator(&Names::new(plant), estimator)?;
         }
-        self.sized.set_estimator(settings)
+        let mut filter = filter(plant, settings, estimator)?;
+        if let Some(previous) = &self.filter {
+            filter.take_over(previous.as_ref());
+        }
+        Ok(Some(filter))
+    }
+
+    fn estimator(&self) -> Option<&EstimatorSettings> {
+        Some(self.filter.as_ref()?.settings())
     }
 
     /// Takes in the readings of the time `t` (s, on any clock), in the order of
@@ -165,7 +207,13 @@ impl Mpc {
     /// # Errors
     /// There is no estimator, or not as many readings.
     pub fn observe(&mut self, t: f64, readings: &[Option<f64>]) -> Result<Vec<Verdict>, MpcError> {
-        self.sized.observe(t, readings)
+        let filter = self.filter.as_mut().ok_or_else(no_estimator)?;
+        let (verdicts, begins_anew) = filter.observe(t, readings)?;
+        if begins_anew {
+            // The plan belongs to the state before.
+            self.sized.forget_plan();
+        }
+        Ok(verdicts)
     }
 
     /// One sample from the last readings: as [`Self::step`], from the estimated state when the input will act, under
@@ -181,25 +229,43 @@ impl Mpc {
     /// # Errors
     /// There is no estimator; or as [`Self::step`].
     pub fn decide(&mut self, preview: &Preview) -> Result<Plan, MpcError> {
-        let Some(guarantee) = &mut self.guarantee else {
-            return self.sized.decide(preview);
+        let filter = self.filter.as_mut().ok_or_else(no_estimator)?;
+        let (x, (on_inputs, on_states)) = (filter.ahead(), filter.disturbance());
+        let plan = match &mut self.guarantee {
+            Some(guarantee) => {
+                let looked_for = !filter.settings().disturbances.is_empty();
+                let beside = looked_for.then_some(&on_inputs[..]);
+                let plan = guarantee.step(self.sized.as_mut(), &x, beside, preview)?;
+                self.sized.apply(&plan.first_input());
+                plan
+            }
+            None => {
+                let acting = Acting {
+                    on_inputs: &on_inputs,
+                    on_states: &on_states,
+                };
+                self.sized.step(&x, Some(acting), preview)?
+            }
         };
-        let ahead = self.sized.ahead()?;
-        let beside = ahead.beside.as_deref();
-        let plan = guarantee.step(self.sized.as_mut(), &ahead.x, beside, preview)?;
-        self.sized.apply(&plan.first_input());
-        self.sized.send();
+        let known = preview.disturbance.first();
+        filter.send(
+            &self.sized.last_input(),
+            known.map_or(&[], |d| d.as_slice()),
+        );
         Ok(plan)
     }
 
     /// The estimate at the last readings; `None` without an estimator.
     pub fn estimate(&self) -> Option<Estimate> {
-        self.sized.estimate()
+        Some(self.filter.as_ref()?.estimate())
     }
 
     /// Forgets the last plan, the last input and what was estimated: the next step is as the first.
     pub fn reset(&mut self) {
         self.sized.reset();
+        if let Some(filter) = &mut self.filter {
+            filter.reset();
+        }
         if let Some(guarantee) = &mut self.guarantee {
             guarantee.reset();
         }
@@ -214,4 +280,8 @@ impl Mpc {
     pub fn states(&self) -> usize {
         self.states
     }
+}
+
+fn no_estimator() -> MpcError {
+    MpcError::new("estimator", "there is none: see `set_estimator`")
 }

@@ -9,6 +9,16 @@ const ROUNDING: f64 = 1e-9;
 /// More steps in a sample than this are none that are waited for.
 const MOST: usize = 10_000;
 
+/// Refuses a number of Runge-Kutta steps in a sample that is none, or more than are waited for.
+pub(crate) fn check_count(substeps: usize) -> Result<(), MpcError> {
+    if (1..=MOST).contains(&substeps) {
+        return Ok(());
+    }
+    let fault =
+        format!("there are {substeps} sub-steps in a sample; there must be from 1 to {MOST}");
+    Err(MpcError::new("substeps", fault))
+}
+
 /// Refuses `substeps` of the `t_s` seconds of a sample under which the prediction of a mode that decays would grow. `a` is
 /// the derivative of f where the plant stands; one that is not finite says nothing.
 pub(crate) fn check_substeps(a: &DMatrix<f64>, t_s: f64, substeps: usize) -> Result<(), MpcError> {

@@ -2,9 +2,8 @@
 
 use crate::answers::Said;
 use crate::check::{Axis, Names};
-use crate::controller_settings::{StageBounds, controller_settings};
+use crate::controller_settings::{StageBounds, check_prediction, controller_settings};
 use crate::error::MpcError;
-use crate::estimator::{Estimate, EstimatorSettings, Filter};
 use crate::last_input::{LastInput, Sampled};
 use crate::model::Model;
 use crate::plan::{Plan, Target};
@@ -13,28 +12,30 @@ use crate::settings::{MpcSettings, StateBounds};
 use crate::stage_lists::StageLists;
 use lpvmpc::{
     Bounds, Controller, GeneralRow, List, Penalty, Reference, Rk4, SoftBounds, TerminalIngredient,
-    Verdict, Workspace, exact_prices_at,
+    Workspace, exact_prices_at,
 };
 use lpvmpc_plant::{Plant, SizedPlant};
 use nalgebra::SVector;
 
 /// A controller whose size nobody sees.
 pub(crate) trait AnySize: Send + Sync {
-    /// See [`crate::Mpc::step`]; `beside` is added to the input, if it is there.
+    /// See [`crate::Mpc::step`]; what is `acting` beside the input, and on the states, is there besides.
     fn step(
         &mut self,
         x: &[f64],
-        beside: Option<&[f64]>,
+        acting: Option<Acting<'_>>,
         preview: &Preview,
     ) -> Result<Plan, MpcError>;
-    /// See [`crate::Mpc::set_settings`].
+    /// See [`crate::Mpc::set_settings`]; they fit into the places.
     fn set_settings(&mut self, settings: &MpcSettings) -> Result<(), MpcError>;
-    /// See [`crate::Mpc::set_parameter`].
-    fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), MpcError>;
+    /// The same plant with other parameters: see [`crate::Mpc::set_parameters`].
+    fn set_plant(&mut self, plant: &Plant) -> Result<(), MpcError>;
     /// See [`crate::Mpc::set_last_input`].
     fn set_last_input(&mut self, u: &[f64]) -> Result<(), MpcError>;
     /// See [`crate::Mpc::reset`].
     fn reset(&mut self);
+    /// Forgets the last plan.
+    fn forget_plan(&mut self);
     /// The plant, with its parameters as they are now.
     fn plant(&self) -> &Plant;
     /// The input that was applied last.
@@ -43,30 +44,17 @@ pub(crate) trait AnySize: Send + Sync {
     fn settings(&self) -> &MpcSettings;
     /// The places for states.
     fn places(&self) -> usize;
-    /// See [`crate::Mpc::set_estimator`].
-    fn set_estimator(&mut self, settings: Option<&EstimatorSettings>) -> Result<(), MpcError>;
-    /// See [`crate::Mpc::observe`].
-    fn observe(&mut self, t: f64, readings: &[Option<f64>]) -> Result<Vec<Verdict>, MpcError>;
-    /// See [`crate::Mpc::decide`].
-    fn decide(&mut self, preview: &Preview) -> Result<Plan, MpcError>;
-    /// Where the next input will act, of which there is no disturbance on a state.
-    fn ahead(&self) -> Result<Ahead, MpcError>;
     /// The input `u`, of the plant's size, is applied in place of the last plan's.
     fn apply(&mut self, u: &[f64]);
-    /// The applied input was sent: an estimator counts on it.
-    fn send(&mut self);
-    /// See [`crate::Mpc::estimate`].
-    fn estimate(&self) -> Option<Estimate>;
-    /// The settings of the estimator.
-    fn estimator(&self) -> Option<&EstimatorSettings>;
 }
 
-/// What an estimator says of when the next input will act.
-pub(crate) struct Ahead {
-    /// The state; not a number where there is no estimate.
-    pub x: Vec<f64>,
-    /// What acts beside the input; `None` where no disturbance is looked for.
-    pub beside: Option<Vec<f64>>,
+/// What acts on a plant besides its input.
+#[derive(Clone, Copy)]
+pub(crate) struct Acting<'a> {
+    /// Beside the input.
+    pub on_inputs: &'a [f64],
+    /// On the states; nothing where there are none.
+    pub on_states: &'a [f64],
 }
 
 type Planner<const NX: usize, const NU: usize, const NS: usize> =
@@ -88,7 +76,6 @@ pub(crate) struct Sized<const NX: usize, const NU: usize, const NS: usize> {
     pub last_input: Option<LastInput>,
     /// The input that was applied last.
     pub applied: SVector<f64, NU>,
-    filter: Option<Filter<NX, NU, NS>>,
 }
 
 /// What is made of settings.
@@ -127,6 +114,14 @@ impl<const NX: usize, const NU: usize, const NS: usize> Made<NX, NU, NS> {
     }
 }
 
+/// A controller for `plant` in so many places.
+pub(crate) fn controller_of_size<const NX: usize, const NU: usize, const NS: usize>(
+    plant: &Plant,
+    settings: &MpcSettings,
+) -> Result<Box<dyn AnySize>, MpcError> {
+    Ok(Box::new(Sized::<NX, NU, NS>::new(plant, settings)?))
+}
+
 /// Memory for a step: every stage may have weights and bounds of its own and so many general rows, and there is room for a
 /// second plan.
 fn workspace<const NX: usize, const NU: usize, const NS: usize>(
@@ -139,7 +134,7 @@ fn workspace<const NX: usize, const NU: usize, const NS: usize>(
 
 impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
     /// A controller for `plant`, which fits into the places.
-    pub fn new(plant: &Plant, settings: &MpcSettings) -> Result<Self, MpcError> {
+    fn new(plant: &Plant, settings: &MpcSettings) -> Result<Self, MpcError> {
         let names = Names::new(plant);
         let sized = SizedPlant::<NX, NU>::new(plant.clone())?;
         let rest = sized
@@ -165,13 +160,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             room,
             last_input,
             applied: rest.1,
-            filter: None,
         })
-    }
-
-    fn filter_with(&self, settings: &EstimatorSettings) -> Result<Filter<NX, NU, NS>, MpcError> {
-        let settings = (&self.settings, settings);
-        Filter::new(&self.plant, &self.names, settings, self.rest)
     }
 
     /// The prices of the states' bounds, which may be `told` by stage, where they are above those of the settings so far
@@ -282,66 +271,72 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
     fn step(
         &mut self,
         x: &[f64],
-        beside: Option<&[f64]>,
+        acting: Option<Acting<'_>>,
         preview: &Preview,
     ) -> Result<Plan, MpcError> {
         let x = self.names.vector(Axis::States, "x", x)?;
-        let beside = match beside {
-            Some(beside) => Some(self.names.vector(Axis::Inputs, "disturbance", beside)?),
+        let vector = |of, entries: &[f64]| self.names.vector::<NX>(of, "disturbance", entries);
+        let acting = match acting {
+            Some(Acting {
+                on_inputs,
+                on_states,
+            }) => Some((
+                self.names.vector(Axis::Inputs, "disturbance", on_inputs)?,
+                match on_states {
+                    [] => SVector::zeros(),
+                    some => vector(Axis::States, some)?,
+                },
+            )),
             None => None,
         };
-        let acting = beside.map(|beside| (beside, SVector::zeros()));
         self.plan_from(x, acting, preview)
     }
 
     fn set_settings(&mut self, settings: &MpcSettings) -> Result<(), MpcError> {
         let made = Made::new(&self.plant, &self.names, settings, self.rest)?;
         let refused = |error: lpvmpc::ControllerError| MpcError::new("settings", error.to_string());
-        self.controller
+        // A part of the changes may be refused after another one was made.
+        let mut controller = self.controller.clone();
+        controller
             .set_settings(made.of_controller)
             .map_err(refused)?;
-        self.controller
+        controller
             .set_rows(List::Owned(made.rows.into_boxed_slice()))
             .map_err(refused)?;
         let last_input = made.model.last_input;
-        self.controller.set_model(made.model);
+        controller.set_model(made.model);
         if last_input != self.last_input {
             // The plan's states are others.
-            self.controller.reset();
-            self.last_input = last_input;
+            controller.reset();
         }
         self.room = settings.rows.len();
-        self.workspace = workspace(self.controller.settings(), self.room);
+        self.workspace = workspace(controller.settings(), self.room);
+        (self.controller, self.last_input) = (controller, last_input);
         (self.settings, self.bounds) = (settings.clone(), made.bounds);
         Ok(())
     }
 
-    fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), MpcError> {
-        let mut plant = self.plant.clone();
-        plant.set_parameter(name, value)?;
-        let model = Model::new(&plant, self.settings.linear_models, self.rest)?;
+    fn set_plant(&mut self, plant: &Plant) -> Result<(), MpcError> {
+        let model = Model::new(plant, self.settings.linear_models, self.rest)?;
+        check_prediction(plant, &self.settings, &model, &self.rest)?;
         self.controller
             .set_model(Sampled::new(model, self.last_input));
-        self.plant = plant;
-        // The filter predicts with the same plant.
-        let settings = self.estimator().cloned();
-        self.set_estimator(settings.as_ref())
+        self.plant = plant.clone();
+        Ok(())
     }
 
     fn set_last_input(&mut self, u: &[f64]) -> Result<(), MpcError> {
         self.applied = self.names.finite(Axis::Inputs, "last input", u)?;
-        if let Some(filter) = &mut self.filter {
-            filter.correct(&self.applied);
-        }
         Ok(())
     }
 
     fn reset(&mut self) {
         self.controller.reset();
         self.applied = self.rest.1;
-        if let Some(filter) = &mut self.filter {
-            filter.reset();
-        }
+    }
+
+    fn forget_plan(&mut self) {
+        self.controller.reset();
     }
 
     fn plant(&self) -> &Plant {
@@ -360,73 +355,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
         NX
     }
 
-    fn set_estimator(&mut self, settings: Option<&EstimatorSettings>) -> Result<(), MpcError> {
-        let mut filter = match settings {
-            Some(settings) => Some(self.filter_with(settings)?),
-            None => None,
-        };
-        if let (Some(filter), Some(previous)) = (&mut filter, &self.filter) {
-            filter.take_over(previous);
-        }
-        self.filter = filter;
-        Ok(())
-    }
-
-    fn observe(&mut self, t: f64, readings: &[Option<f64>]) -> Result<Vec<Verdict>, MpcError> {
-        let filter = self.filter.as_mut().ok_or_else(no_estimator)?;
-        let observation = filter.observe(t, readings)?;
-        if observation.restart.is_some() {
-            // The plan belongs to the state before.
-            self.controller.reset();
-        }
-        Ok(observation.verdicts[..readings.len()].to_vec())
-    }
-
-    fn decide(&mut self, preview: &Preview) -> Result<Plan, MpcError> {
-        let filter = self.filter.as_ref().ok_or_else(no_estimator)?;
-        let (x, acting) = (filter.ahead(), filter.disturbance());
-        let known = self
-            .names
-            .vectors(Axis::States, "disturbance", &preview.disturbance)?;
-        let plan = self.plan_from(x, Some(acting), preview)?;
-        let known = known.first().copied().unwrap_or_else(SVector::zeros);
-        if let Some(filter) = &mut self.filter {
-            filter.send(&self.applied, &known);
-        }
-        Ok(plan)
-    }
-
-    fn ahead(&self) -> Result<Ahead, MpcError> {
-        let filter = self.filter.as_ref().ok_or_else(no_estimator)?;
-        let looked_for = !filter.settings.disturbances.is_empty();
-        let (x, (beside, _)) = (filter.ahead(), filter.disturbance());
-        let beside = &beside.as_slice()[..self.names.inputs.len()];
-        Ok(Ahead {
-            x: x.as_slice()[..self.names.states.len()].to_vec(),
-            beside: looked_for.then(|| beside.to_vec()),
-        })
-    }
-
     fn apply(&mut self, u: &[f64]) {
         self.applied = SVector::from_fn(|j, _| u.get(j).copied().unwrap_or(0.0));
     }
-
-    fn send(&mut self) {
-        if let Some(filter) = &mut self.filter {
-            filter.send(&self.applied, &SVector::zeros());
-        }
-    }
-
-    fn estimate(&self) -> Option<Estimate> {
-        let filter = self.filter.as_ref()?;
-        Some(filter.estimate(self.names.states.len()))
-    }
-
-    fn estimator(&self) -> Option<&EstimatorSettings> {
-        Some(&self.filter.as_ref()?.settings)
-    }
-}
-
-fn no_estimator() -> MpcError {
-    MpcError::new("estimator", "there is none: see `set_estimator`")
 }

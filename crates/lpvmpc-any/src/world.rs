@@ -2,7 +2,7 @@
 
 use crate::check::{Axis, Names};
 use crate::error::MpcError;
-use crate::mpc::{MOST_INPUTS, MOST_STATES};
+use crate::size::{MOST_INPUTS, MOST_STATES};
 use crate::tasks::outputs_of_input;
 use lpvmpc::{Dynamics, Reading};
 use lpvmpc_plant::{Plant, SizedPlant};

@@ -6,7 +6,7 @@ use crate::error::CommandError;
 use crate::estimator::EstimatorTable;
 use lpvmpc_any::{
     EstimatorSettings, Iterations, Limits, LinearModels, MpcError, MpcSettings, Push, Quantity,
-    Sensor, StateBounds, Terminal, WorldSettings,
+    Sensor, StateBounds, Terminal, USUAL_NODES, WorldSettings,
 };
 use lpvmpc_plant::{Plant, Signal};
 use lpvmpc_terminal::table::short;
@@ -378,7 +378,7 @@ impl Controller {
             None | Some(ModelsName::Own) => LinearModels::Own,
             Some(ModelsName::Motion) => LinearModels::AlongMotion,
             Some(ModelsName::Ray) => LinearModels::AlongRay {
-                nodes: self.nodes.unwrap_or(2),
+                nodes: self.nodes.unwrap_or(USUAL_NODES),
             },
         })
     }
@@ -416,11 +416,19 @@ impl World {
         states: &[Signal],
         measured: Option<&[String]>,
     ) -> Result<WorldSettings, String> {
+        let begins = |place: &str, key: &str, time: f64| match time < 0.0 {
+            true => Err(format!("{place}.{key} = {time}: the run begins at 0 s")),
+            false => Ok(()),
+        };
         for (i, jump) in self.jump.iter().enumerate() {
-            components(&format!("world.jump {}", i + 1), &jump.change, states)?;
+            let place = format!("world.jump {}", i + 1);
+            components(&place, &jump.change, states)?;
+            begins(&place, "time", jump.time)?;
         }
         for (i, load) in self.load.iter().enumerate() {
-            components(&format!("world.load {}", i + 1), &load.load, states)?;
+            let place = format!("world.load {}", i + 1);
+            components(&place, &load.load, states)?;
+            begins(&place, "end", load.end)?;
         }
         let states = names(states);
         let sensed: Vec<&str> = match measured {

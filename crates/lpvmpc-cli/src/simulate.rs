@@ -134,7 +134,8 @@ fn time_table(run: &Run) -> Table {
     table
 }
 
-/// Sum over the samples of (x - x_ref)'Q (x - x_ref), without the inputs; zero references where none are given.
+/// Sum over the samples of (x - x_ref)'Q (x - x_ref), without the inputs; where no reference is given, it is the plant's
+/// equilibrium, or zero.
 fn tracking_cost(experiment: &Experiment, run: &Run) -> f64 {
     let (rest, _) = experiment.plant.data().operating_point();
     let q = experiment.settings.q.diagonal();

@@ -3,7 +3,6 @@
 use crate::error::PlantError;
 use crate::plant::Plant;
 use crate::source::{text, type_name};
-use std::io::ErrorKind;
 use std::path::Path;
 
 /// What the controller of a printed program is set to. All numbers are in the units of the plant.
@@ -181,25 +180,40 @@ impl Plant {
     ) -> Result<(), PlantError> {
         let files = self.to_firmware(settings)?;
         let folder = folder.as_ref();
-        let failed = |path: &Path, error: std::io::Error| {
-            PlantError::new(path.display().to_string(), error.to_string())
-        };
-        std::fs::create_dir(folder).map_err(|error| match error.kind() {
-            ErrorKind::AlreadyExists => {
-                let fault = "it is there already; a program goes into a new folder";
-                PlantError::new(folder.display().to_string(), fault)
-            }
-            _ => failed(folder, error),
-        })?;
-        for (path, content) in files {
-            let path = folder.join(path);
-            if let Some(parent) = path.parent() {
-                std::fs::create_dir_all(parent).map_err(|error| failed(parent, error))?;
-            }
-            std::fs::write(&path, content).map_err(|error| failed(&path, error))?;
+        if folder.symlink_metadata().is_ok() {
+            let fault = "it is there already; a program goes into a new folder";
+            return Err(PlantError::new(folder.display().to_string(), fault));
         }
-        Ok(())
+        // Whole or not at all: written beside its place.
+        let mut name = folder.file_name().unwrap_or_default().to_owned();
+        name.push(format!(".{}.part", std::process::id()));
+        let beside = folder.with_file_name(name);
+        let written = write(&beside, &files).and_then(|()| {
+            std::fs::rename(&beside, folder).map_err(|error| failed(folder, &error))
+        });
+        if written.is_err() {
+            // What is left over is in nobody's way.
+            let _ = std::fs::remove_dir_all(&beside);
+        }
+        written
     }
+}
+
+/// Writes the files into a new `folder`.
+fn write(folder: &Path, files: &Files) -> Result<(), PlantError> {
+    std::fs::create_dir(folder).map_err(|error| failed(folder, &error))?;
+    for (path, content) in files {
+        let path = folder.join(path);
+        if let Some(parent) = path.parent() {
+            std::fs::create_dir_all(parent).map_err(|error| failed(parent, &error))?;
+        }
+        std::fs::write(&path, content).map_err(|error| failed(&path, &error))?;
+    }
+    Ok(())
+}
+
+fn failed(path: &Path, error: &std::io::Error) -> PlantError {
+    PlantError::new(path.display().to_string(), error.to_string())
 }
 
 /// `count` numbers that are finite in `f32`, too.

@@ -41,7 +41,7 @@ pub struct Sample<const NX: usize, const NU: usize> {
 pub enum Termination {
     /// After all samples.
     Complete,
-    /// The controller had no plan: time, state, and why. No input was applied any more.
+    /// The controller had no plan: time, and why. No input was applied any more.
     NoPlan {
         /// Time of the sample, s.
         t: f64,

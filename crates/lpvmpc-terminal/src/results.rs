@@ -75,6 +75,20 @@ impl ResultFolder {
         )))
     }
 
+    /// Lists files of these names, which the program is about to write one by one.
+    ///
+    /// # Errors
+    /// One of them is there and not this program's, or the list cannot be written.
+    pub fn claim(&self, names: &[&str]) -> Result<(), FileError> {
+        for name in names {
+            self.check(name)?;
+        }
+        let mut list = self.ours.clone();
+        list.extend(names.iter().map(|name| (*name).to_owned()));
+        let path = self.path.join(list_of(self.program));
+        output::write_files(&[(&path, lines(list.iter().map(String::as_str)).as_bytes())])
+    }
+
     /// Writes all files or none, in place of what an earlier run left under `stale` names, and
     /// keeps the list.
     ///
@@ -108,7 +122,7 @@ impl ResultFolder {
             .filter(|name| !is_stale(name))
             .chain(written.iter().copied());
         let list: BTreeSet<&str> = kept.collect();
-        let list: String = list.iter().map(|name| format!("{name}\n")).collect();
+        let list = lines(list.into_iter());
         let mut paths: Vec<PathBuf> = files.iter().map(|(name, _)| self.path.join(name)).collect();
         paths.push(self.path.join(list_of(self.program)));
         let contents = files.iter().map(|(_, content)| content.as_slice());
@@ -127,6 +141,10 @@ impl ResultFolder {
         }
         Ok(())
     }
+}
+
+fn lines<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    names.map(|name| format!("{name}\n")).collect()
 }
 
 #[cfg(test)]

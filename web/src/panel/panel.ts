@@ -1,5 +1,6 @@
 // The set-up: every number of the scenario that a person may want to turn while it runs.
 
+import { CAPACITY } from "../history";
 import { ROBOTS } from "../robots";
 import type { Scenario } from "../scenario";
 import { TERMS } from "../terms";
@@ -67,7 +68,7 @@ export class Panel {
     return buttons(
       button("Open\u2026", "Open a set-up (TOML) or recorded runs (trajectory.csv); or drop them on the page", () => actions.openFiles()),
       button("Save TOML", "The set-up as a file for `ballbot simulate`", () => actions.saveToml()),
-      button("Save CSV", "The run so far: the last 60 000 samples", () => actions.saveCsv()),
+      button("Save CSV", `The run so far: the last ${CAPACITY} samples`, () => actions.saveCsv()),
       button("Copy link", "An address that holds the whole set-up", () => actions.copyLink()),
     );
   }

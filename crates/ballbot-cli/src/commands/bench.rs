@@ -53,7 +53,13 @@ pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
     };
     let file = arguments.json.as_deref();
     let file = file.filter(|path| *path != Path::new("-"));
-    file.map(output::check_writable).transpose()?;
+    if let Some(path) = file {
+        let read = match &arguments.scenario {
+            Some(name) => arguments.options.files(name)?,
+            None => Vec::new(),
+        };
+        output::check_separate(path, read.iter().map(PathBuf::as_path))?;
+    }
     let start = Instant::now();
     let clock = || start.elapsed();
     let watch = Stopwatch {

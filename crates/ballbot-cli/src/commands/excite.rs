@@ -35,7 +35,7 @@ pub struct ExciteArguments {
     #[arg(long, value_name = "LOW,HIGH", value_parser = finite_list::<2>)]
     pub band: Option<[f64; 2]>,
     /// Number of harmonics
-    #[arg(long, default_value_t = ExcitationTask::HARMONICS, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=10_000))]
+    #[arg(long, default_value_t = ExcitationTask::HARMONICS, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(2..=10_000))]
     pub harmonics: usize,
     /// Largest torque of the excitation, N m
     #[arg(long, value_parser = positive, default_value_t = ExcitationTask::AMPLITUDE)]

@@ -5,6 +5,7 @@ use super::simulate::{self, Simulated};
 use crate::arguments::{Arguments, Command};
 use crate::json;
 use crate::output;
+use crate::results::ResultFolder;
 use crate::table::{Table, number};
 use ballbot::Ballbot;
 use ballbot_scenario::{Parameters, PhiReference, Plane};
@@ -55,6 +56,9 @@ const FILES: [(&str, &str); 5] = [
     file!("lissajous.toml"),
 ];
 
+/// What the stages write beside these; the rest is in folders of its own.
+const LOOSE: [&str; 2] = ["excitation.csv", "log.csv"];
+
 /// The stages as command lines; what begins with @ is in the folder.
 const STAGES: [&[&str]; 5] = [
     &[
@@ -92,6 +96,7 @@ const STAGES: [&[&str]; 5] = [
 /// A file cannot be written, or a stage has no result.
 pub fn run(arguments: &RehearseArguments) -> Result<String, CommandError> {
     let folder = &arguments.out;
+    let results = ResultFolder::open(crate::PROGRAM, folder, &LOOSE)?;
     let missing = FILES.map(|(name, text)| (folder.join(name), text));
     let missing: Vec<(&Path, &[u8])> = missing
         .iter()
@@ -99,6 +104,7 @@ pub fn run(arguments: &RehearseArguments) -> Result<String, CommandError> {
         .map(|(path, text)| (path.as_path(), text.as_bytes()))
         .collect();
     output::write_files(&missing)?;
+    results.claim(&LOOSE)?;
 
     let mut text = String::new();
     let mut runs = Vec::new();

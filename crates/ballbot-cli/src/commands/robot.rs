@@ -68,6 +68,16 @@ impl ScenarioOptions {
         Ok(loaded.prepare(files)?)
     }
 
+    /// The files that are read for a scenario with these options: its own, if it has one, and those that it names.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn files(&self, scenario: &str) -> Result<Vec<PathBuf>, CommandError> {
+        let (loaded, folder) = self.load(scenario)?;
+        let named = loaded.files().map(|file| folder.join(file));
+        Ok(named.chain([PathBuf::from(scenario)]).collect())
+    }
+
     /// A scenario with these options, and the folder for files that it names; not checked yet.
     ///
     /// # Errors

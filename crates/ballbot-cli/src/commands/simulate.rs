@@ -42,7 +42,7 @@ pub struct SimulateArguments {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
-    /// Write what the robot's sensors delivered, as CSV; for two planes FILE-x and FILE-y. - for
+    /// Write what the robot's sensors delivered, as CSV; of two planes log-x.csv and log-y.csv for log.csv. - for
     /// standard output, in place of the summary; for one plane only
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
@@ -99,9 +99,9 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
         Some(path) => log_paths(path, prepared.planes.len()),
         None => Vec::new(),
     };
-    let parameters = arguments.options.robot.parameters.clone();
     let results = RESULTS.iter().map(|name| folder.path().join(name));
-    let others: Vec<PathBuf> = results.chain([file.to_owned()]).chain(parameters).collect();
+    let read = arguments.options.files(&arguments.scenario)?;
+    let others: Vec<PathBuf> = results.chain(read).collect();
     logs.iter()
         .try_for_each(|path| output::check_separate(path, others.iter().map(PathBuf::as_path)))?;
     let Record { planes, motors, .. } = record(&prepared)?;

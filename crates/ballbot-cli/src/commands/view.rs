@@ -84,7 +84,8 @@ pub fn run(arguments: &ViewArguments) -> Result<String, CommandError> {
     }
     for stream in listener.incoming().flatten() {
         // Who goes away before the answer is complete does not need it.
-        thread::spawn(move || answer(&stream));
+        // Nor is it answered while the system has no thread left.
+        let _ = thread::Builder::new().spawn(move || answer(&stream));
     }
     Ok(String::new())
 }
@@ -149,7 +150,13 @@ fn respond(request: &Request) -> Vec<u8> {
     let with_content = match method {
         Some("GET") => true,
         Some("HEAD") => false,
-        _ => return plain("405 Method Not Allowed", "only GET and HEAD are answered\n"),
+        _ => {
+            return plain(
+                "405 Method Not Allowed",
+                "only GET and HEAD are answered\n",
+                true,
+            );
+        }
     };
     let path = target.unwrap_or("/").split(['?', '#']).next();
     let name = match path {
@@ -157,7 +164,7 @@ fn respond(request: &Request) -> Vec<u8> {
         Some(path) => path.trim_start_matches('/'),
     };
     let Some(content) = file(name) else {
-        return plain("404 Not Found", "there is no such file\n");
+        return plain("404 Not Found", "there is no such file\n", with_content);
     };
     let offered = PACKED
         .iter()
@@ -183,9 +190,9 @@ fn respond(request: &Request) -> Vec<u8> {
     response("200 OK", &about, content, with_content)
 }
 
-fn plain(status: &str, text: &str) -> Vec<u8> {
+fn plain(status: &str, text: &str, with_content: bool) -> Vec<u8> {
     let about = "Content-Type: text/plain; charset=utf-8\r\n";
-    response(status, about, text.as_bytes(), true)
+    response(status, about, text.as_bytes(), with_content)
 }
 
 /// `about` are the headers that tell of the content.

@@ -163,7 +163,7 @@ pub enum Problem {
         factor: f64,
     },
     /// A row of another length.
-    #[error("line {line} has {found} fields; the header in line {header_line} has {expected}")]
+    #[error("line {line} has {found} fields; the header {} has {expected}", header_place(*header_line))]
     FieldCount {
         /// Line.
         line: usize,
@@ -171,8 +171,8 @@ pub enum Problem {
         found: usize,
         /// The header's.
         expected: usize,
-        /// The header's line.
-        header_line: usize,
+        /// The header's line; none where the configuration has it.
+        header_line: Option<usize>,
     },
     /// The header once more.
     #[error(
@@ -285,6 +285,13 @@ pub enum Problem {
         /// The column that jumps most, and how often.
         jumps: Option<(String, usize)>,
     },
+}
+
+fn header_place(line: Option<usize>) -> String {
+    line.map_or_else(
+        || "of the configuration".to_owned(),
+        |line| format!("in line {line}"),
+    )
 }
 
 fn delimiter_hint(suspected: Option<char>) -> String {

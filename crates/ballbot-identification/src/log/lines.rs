@@ -6,6 +6,9 @@ use std::io::{BufRead, Read};
 /// The longest line that is taken for one, bytes.
 const LONGEST: usize = 64 * 1024;
 
+/// The byte order mark, as text.
+const MARK: &str = "\u{feff}";
+
 /// Lines with their number, counted from 1.
 pub(super) struct Lines<R> {
     reader: R,
@@ -48,7 +51,12 @@ impl<R: BufRead> Lines<R> {
         Ok(read > 0)
     }
 
-    /// The line without its end.
+    /// Whether the line is the first one and begins with a byte order mark.
+    pub(super) fn is_marked(&self) -> bool {
+        self.number == 1 && self.buffer.starts_with(MARK.as_bytes())
+    }
+
+    /// The line without its end, and without a byte order mark.
     pub(super) fn text(&self) -> Result<&str, Problem> {
         let Self { buffer, number, .. } = self;
         if *number == 1 && (buffer.starts_with(&[0xff, 0xfe]) || buffer.starts_with(&[0xfe, 0xff]))
@@ -65,6 +73,10 @@ impl<R: BufRead> Lines<R> {
             line: *number,
             column: error.valid_up_to() + 1,
         })?;
+        let line = match number {
+            1 => line.strip_prefix(MARK).unwrap_or(line),
+            _ => line,
+        };
         Ok(line.trim_end_matches(['\n', '\r']))
     }
 }

@@ -131,13 +131,15 @@ fn rows(
     progress: &dyn Fn(u64),
     take: &mut TakeRow<'_>,
 ) -> Result<(), Problem> {
-    let header_line = lines.number;
+    // None where the configuration has it.
+    let header_line = Some(lines.number).filter(|line| *line > 0);
     let mut reported = 0;
     while lines.advance()? {
         if lines.bytes >= reported + REPORT {
             reported = lines.bytes;
             progress(reported);
         }
+        note_mark(lines, findings);
         let (number, line) = (lines.number, lines.text()?);
         if skipped(line) {
             continue;
@@ -163,6 +165,13 @@ fn rows(
         take(&fields, number)?;
     }
     Ok(())
+}
+
+/// Reports the byte order mark of the line, if it has one.
+fn note_mark(lines: &Lines<impl BufRead>, findings: &mut Vec<Finding>) {
+    if lines.is_marked() {
+        findings.push(Finding::ByteOrderMark);
+    }
 }
 
 /// A blank line or a comment.
@@ -205,14 +214,10 @@ fn header(
         if !lines.advance()? {
             return Err(Problem::Empty);
         }
+        note_mark(lines, findings);
         let line = lines.text()?;
-        let without_mark = line.trim_start_matches('\u{feff}');
-        let (marked, text) = (without_mark.len() < line.len(), without_mark.to_owned());
-        if marked {
-            findings.push(Finding::ByteOrderMark);
-        }
-        if !skipped(&text) {
-            break text;
+        if !skipped(line) {
+            break line.to_owned();
         }
     };
     let header: Vec<String> = split(&text, columns.delimiter).map(str::to_owned).collect();

@@ -115,6 +115,19 @@ fn what_cannot_be_done_is_said() {
     );
     let message = refused(|task| task.amplitude = f64::NAN).to_string();
     assert!(message.contains("the torque is NaN"), "{message}");
+    let message = refused(|task| task.harmonics = 1).to_string();
+    assert!(message.contains("harmonics is 1"), "{message}");
+    // Hundreds of millions of rows, or of cosines, are no mistake that memory or patience should tell.
+    let message = refused(|task| (task.rate, task.duration) = (1e5, 3600.0)).to_string();
+    assert!(
+        message.contains("rows") && message.contains("4000000"),
+        "{message}"
+    );
+    let many = |task: &mut ExcitationTask| {
+        (task.rate, task.duration, task.harmonics) = (1e3, 3600.0, 1000);
+    };
+    let message = refused(many).to_string();
+    assert!(message.contains("fewer harmonics"), "{message}");
     let unstable = refused(|task| task.gain = Some(Vector4::zeros()));
     assert!(
         matches!(unstable, ExcitationError::UnstableLoop { .. }),

@@ -170,6 +170,21 @@ fn fields() {
 #[test]
 fn harmless_oddities_are_read_and_said() {
     found(format!("\u{feff}{}", good()), &["byte order mark"]);
+    // Below a header that the configuration has, too; what it says of a row names no line of the file.
+    let (header, rows) = good()
+        .split_once('\n')
+        .map(|(a, b)| (a.to_owned(), b.to_owned()))
+        .unwrap();
+    let named: Vec<String> = header.split(',').map(|name| format!("{name:?}")).collect();
+    let config = format!("[log]\nheader = [{}]", named.join(", "));
+    let read = read_with(format!("\u{feff}{rows}").as_bytes(), &config).unwrap();
+    assert_eq!(read.run.time.len(), 300);
+    let message = read_with(format!("1,2\n{rows}").as_bytes(), &config).unwrap_err();
+    let message = message.to_string();
+    assert!(
+        message.contains("the header of the configuration"),
+        "{message}"
+    );
     let windows = good().replace('\n', "\r\n");
     assert_eq!(
         read_with(windows.as_bytes(), "").unwrap().run.time.len(),

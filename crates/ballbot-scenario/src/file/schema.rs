@@ -7,6 +7,7 @@ use crate::file::parameters::Parameters;
 use crate::file::world_table::WorldTable;
 use lpvmpc::Iterations;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// A closed-loop experiment, as written in a TOML file. Units are part of the key names.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,6 +55,29 @@ impl Scenario {
             self.controller.terminal = TerminalTable::default();
         }
         self
+    }
+
+    /// The files that it names, as they stand in it: relative to the scenario's file.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let world = self.world.as_ref();
+        let robots = [
+            Some(&self.parameters),
+            world.and_then(|world| world.parameters.as_ref()),
+        ];
+        let robots = robots.into_iter().flatten().filter_map(|of| match of {
+            Parameters::File(file) => Some(file.as_path()),
+            Parameters::Table(_) => None,
+        });
+        let certificate = match &self.controller.terminal {
+            TerminalTable::Certified(table) => table.certificate.as_deref().map(Path::new),
+            _ => None,
+        };
+        let excitation = world.and_then(|world| world.excitation.as_deref());
+        let references = self.reference.files().into_iter().map(Path::new);
+        robots
+            .chain(certificate)
+            .chain(excitation)
+            .chain(references)
     }
 }
 
@@ -361,6 +385,17 @@ pub struct SineTable {
     /// Mean value, rad.
     #[serde(default)]
     pub offset_rad: f64,
+}
+
+impl ReferenceTable {
+    /// The files of its planes.
+    fn files(&self) -> Vec<&str> {
+        match self {
+            Self::Csv(table) => vec![&table.path],
+            Self::Planes { x, y } => [x.files(), y.files()].concat(),
+            _ => Vec::new(),
+        }
+    }
 }
 
 /// A reference file.

@@ -100,6 +100,52 @@ fn a_loop_tracks_without_offset_behind_a_delay() {
     assert!((without - 0.4).abs() > 0.02, "{without}");
 }
 
+/// Bounds of what the input changes, which need more places for states than the controller has, and finer steps leave the
+/// estimate and the inputs on their way as they are; so do settings and parameters that are refused.
+#[test]
+fn other_settings_leave_the_estimate_as_it_is() {
+    let mut mpc = Mpc::new(&cart_pole(), &settings(false)).unwrap();
+    mpc.set_estimator(Some(&estimator(0.08, force()))).unwrap();
+    let to = Preview::to(&[0.4, 0.0, 0.0, 0.0]);
+    let run = |mpc: &mut Mpc, samples: core::ops::Range<i32>| {
+        for k in samples {
+            let readings = [Some(0.3 + 0.01 * f64::from(k)), Some(0.05)];
+            mpc.observe(0.04 * f64::from(k), &readings).unwrap();
+            assert!(mpc.decide(&to).unwrap().is_solved(), "{k}");
+        }
+    };
+    run(&mut mpc, 0..8);
+    let before = mpc.estimate();
+    let finer = MpcSettings {
+        substeps: 3,
+        ..settings(true)
+    };
+    for other in [&settings(true), &finer] {
+        mpc.set_settings(other).unwrap();
+        assert_eq!(mpc.estimate(), before);
+        // Without another reading.
+        let ahead = mpc.decide(&to).unwrap();
+        assert!(ahead.is_solved(), "{}", ahead.status);
+    }
+    let (known, unknown) = (("pole_mass", 0.36), ("mass_of_nothing", 1.0));
+    assert!(mpc.set_parameters([known, unknown]).is_err());
+    assert_eq!(*mpc.plant(), cart_pole());
+    let refused = MpcSettings {
+        r: -DMatrix::identity(1, 1),
+        ..settings(true)
+    };
+    assert!(mpc.set(&refused, None).is_err());
+    assert!(
+        mpc.set(
+            &settings(true),
+            Some(&EstimatorSettings::new(&[], &[], &[]))
+        )
+        .is_err()
+    );
+    assert_eq!(mpc.estimate(), before);
+    run(&mut mpc, 8..12);
+}
+
 /// A loop that was reset is the same loop once more, with another parameter, too; a filter that begins elsewhere, or
 /// that knows what was sent in place of a plan's input, finds the state from there.
 #[test]

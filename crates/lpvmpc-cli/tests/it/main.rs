@@ -185,6 +185,11 @@ fn what_is_wrong_is_named_and_nothing_is_written() {
             vec!["controller: horizon: it is 0"],
         ),
         ("duration = 1.0", "duration = inf", vec!["duration = inf"]),
+        (
+            "duration = 1.0",
+            "duration = 1.0\n[[world.jump]]\ntime = -3.0\nchange = [0, 0, 0, 0]",
+            vec!["world.jump 1.time = -3", "begins at 0 s"],
+        ),
         ("time = 0.5", "time = 0.0", vec!["reference 2, time = 0"]),
         ("\"cart-pole\"", "\"../a\"", vec!["it names a folder"]),
         (

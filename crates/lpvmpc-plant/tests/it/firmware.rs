@@ -117,4 +117,10 @@ fn a_folder_that_is_there_is_left_alone() {
     let again: Result<(), PlantError> = write();
     assert!(again.is_err() && !folder.join("memory.x").exists());
     std::fs::remove_dir_all(&folder).unwrap();
+    // Where its folder is not there, or a file, nothing is left beside it.
+    let above = folder.with_extension("above");
+    std::fs::write(&above, "").unwrap();
+    let below = plant("cart-pole").save_firmware(&settings(4, 1), above.join("robot"));
+    assert!(below.is_err() && above.is_file());
+    std::fs::remove_file(&above).unwrap();
 }

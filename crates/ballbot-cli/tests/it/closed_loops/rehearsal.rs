@@ -173,3 +173,24 @@ fn files_that_are_there_are_kept() {
     assert_says(&said, &["record.toml", "missing field"]);
     assert_eq!(std::fs::read_to_string(record).unwrap(), "duration_s = 1.0");
 }
+
+/// What lies in the folder under the name of a result, and is none, stays; a rehearsal's own is made anew.
+#[test]
+fn a_log_of_the_users_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["log.csv", "excitation.csv"] {
+        let file = folder.path().join(name);
+        std::fs::write(&file, "mine").unwrap();
+        let message = fail(folder.path(), &["rehearse", "--out", "."], 1);
+        assert_says(&message, &[name, "--out"]);
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        std::fs::remove_file(&file).unwrap();
+    }
+    let list = REHEARSED.join(".ballbot-files");
+    let listed = std::fs::read_to_string(list).unwrap();
+    assert_eq!(
+        listed.lines().collect::<Vec<_>>(),
+        ["excitation.csv", "log.csv"]
+    );
+}

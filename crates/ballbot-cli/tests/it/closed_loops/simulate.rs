@@ -376,3 +376,42 @@ fn times_are_written_without_the_rounding_of_a_sum() {
         }
     }
 }
+
+/// A log that would take the place of what the run reads or writes is refused, and nothing has changed.
+#[test]
+fn a_log_takes_the_place_of_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    succeed(
+        folder.path(),
+        &["excite", "--length", "12", "--out", "torque.csv"],
+    );
+    let shown = shown("single-setpoint");
+    let start = shown.find("[parameters]").unwrap();
+    let end = start + shown[start..].find("\n\n").unwrap();
+    std::fs::write(at("robot.toml"), &shown[start..end]).unwrap();
+    let named = format!(
+        "parameters = \"robot.toml\"\n{}{}",
+        &shown[..start],
+        &shown[end..]
+    );
+    let scenario = named + "\n[world]\nexcitation = \"torque.csv\"\n";
+    std::fs::write(at("my.toml"), scenario).unwrap();
+    let before = files(folder.path());
+    for log in [
+        "my.toml",
+        "robot.toml",
+        "torque.csv",
+        "./torque.csv",
+        "out/my/trajectory.csv",
+    ] {
+        let message = fail(folder.path(), &["simulate", "my.toml", "--log", log], 1);
+        assert_says(&message, &[log, "would be lost"]);
+    }
+    for times in ["my.toml", "robot.toml", "torque.csv"] {
+        let bench = ["bench", "my.toml", "--passes", "1", "--json", times];
+        assert_says(&fail(folder.path(), &bench, 1), &[times, "would be lost"]);
+    }
+    assert_eq!(files(folder.path()), before);
+    succeed(folder.path(), &["simulate", "my.toml", "--log", "log.csv"]);
+}
