@@ -232,13 +232,22 @@ pub fn check_separate<'a>(
     path: &Path,
     others: impl IntoIterator<Item = &'a Path>,
 ) -> Result<(), FileError> {
-    // One that is not there yet has no other name by which it could be there, its folder apart.
+    // One that is not there yet has no other name by which it could be there, the folders above it apart.
     let place = |path: &Path| {
-        let folder = path.parent().filter(|above| !above.as_os_str().is_empty());
-        let folder = folder.unwrap_or(Path::new(".")).canonicalize();
-        path.canonicalize()
-            .or_else(|_| Ok::<_, io::Error>(folder?.join(path.file_name().unwrap_or_default())))
-            .ok()
+        let whole = std::path::absolute(path).ok()?;
+        let mut missing = Vec::new();
+        for above in whole.ancestors() {
+            if let Ok(real) = above.canonicalize() {
+                return Some(
+                    missing
+                        .into_iter()
+                        .rev()
+                        .fold(real, |path, name| path.join(name)),
+                );
+            }
+            missing.push(above.file_name()?);
+        }
+        None
     };
     let there = place(path);
     if there.is_some() && others.into_iter().any(|other| place(other) == there) {
@@ -456,6 +465,9 @@ mod tests {
         assert!(error.to_string().contains("would be lost"), "{error}");
         let (new, same) = (folder.path().join("out"), above.join("..").join("out"));
         assert!(check_separate(&new, [same.as_path()]).is_err());
+        // In a folder that is still to be made.
+        let below = folder.path().join("new").join("log.csv");
+        assert!(check_separate(&below, [below.as_path()]).is_err());
         check_separate(&new, [file.as_path(), Path::new("single-setpoint")]).unwrap();
         check_separate(&file, [new.as_path()]).unwrap();
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
