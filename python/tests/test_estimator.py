@@ -106,7 +106,7 @@ def test_an_estimator_comes_and_goes_and_is_pickled():
     mpc.observe(0.0, [0.3, 0.1])
     before = mpc.estimate.x.tolist()
     # What only the compiled half refuses.
-    with pytest.raises(lpvmpc.SettingError, match="r"):
+    with pytest.raises(lpvmpc.SettingError, match="R is not positive definite"):
         mpc.set(estimator=None, r=[-1])
     assert mpc.estimate.x.tolist() == before
     mpc.set(du_bounds=([-4], [4]), substeps=2)
