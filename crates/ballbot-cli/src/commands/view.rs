@@ -244,6 +244,18 @@ mod tests {
     }
 
     #[test]
+    fn a_head_has_no_content() {
+        for (target, status) in [("/", "200"), ("/nothing", "404")] {
+            let answer = text(&format!("HEAD {target} HTTP/1.1"));
+            assert!(
+                answer.starts_with(&format!("HTTP/1.1 {status}")),
+                "{answer}"
+            );
+            assert!(answer.ends_with("\r\n\r\n"), "{answer}");
+        }
+    }
+
+    #[test]
     fn what_the_browser_has_already_is_not_sent_again() {
         let first = text("GET / HTTP/1.1");
         let tag = first.lines().find_map(|line| line.strip_prefix("ETag: "));
@@ -287,11 +299,6 @@ mod tests {
         let (gzip, short) = head("gzip");
         assert_eq!([plain.as_str(), &brotli, &gzip], ["", "br", "gzip"]);
         assert!(shortest < short && short < whole);
-    }
-
-    #[test]
-    fn a_head_has_no_content() {
-        assert!(text("HEAD / HTTP/1.1").ends_with("\r\n\r\n"));
     }
 
     #[test]

@@ -113,6 +113,10 @@ fn what_cannot_be_done_is_said() {
         message.contains("the length is 5") && message.contains("10.0 s"),
         "{message}"
     );
+    let message = refused(|task| task.tilt_limit = 1.6).to_string();
+    assert!(message.contains("degrees is 91.67"), "{message}");
+    let message = refused(|task| task.amplitude = 1e300).to_string();
+    assert!(message.contains("1e6 N m"), "{message}");
     let message = refused(|task| task.amplitude = f64::NAN).to_string();
     assert!(message.contains("the torque is NaN"), "{message}");
     let message = refused(|task| task.harmonics = 1).to_string();

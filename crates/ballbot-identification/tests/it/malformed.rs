@@ -607,3 +607,16 @@ fn three_torques_are_those_of_both_planes() {
         assert!((y.torque[row] - (0.1 * row as f64).cos()).abs() < 1e-12);
     }
 }
+
+#[test]
+fn a_delay_out_of_range_is_refused_however_it_is_given() {
+    for given in [
+        "{ fixed = 3.0 }",
+        "{ start = 3.0 }",
+        "{ prior = { mean = 3.0, standard_deviation = 0.01 } }",
+    ] {
+        let refused = Config::parse(&format!("[parameters]\ndelay_s = {given}")).unwrap_err();
+        let message = refused.to_string();
+        assert!(message.contains("parameters.delay_s"), "{given}: {message}");
+    }
+}
