@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import is_dataclass
 from typing import Any
@@ -113,10 +114,12 @@ def matrices_by_stage(place: str, given: ArrayLike, shape: tuple[int, int]) -> A
 
 def copied(given: Any) -> Any:
     """The same with arrays, lists and dictionaries of its own: what a user changes later changes nothing here."""
-    if isinstance(given, dict):
+    if isinstance(given, Mapping):
         return {key: copied(value) for key, value in given.items()}
-    if isinstance(given, (list, tuple)):
-        return type(given)(copied(value) for value in given)
+    if isinstance(given, list):
+        return [copied(value) for value in given]
+    if isinstance(given, tuple):  # of named ones, too, the values
+        return tuple(copied(value) for value in given)
     if isinstance(given, np.ndarray) or is_dataclass(given):
         return deepcopy(given)
     return given

@@ -1,6 +1,7 @@
 """Controllers, against programs that share no code with them."""
 
 import pickle
+from collections import namedtuple
 from concurrent.futures import ThreadPoolExecutor
 
 import casadi as ca
@@ -421,6 +422,8 @@ def test_what_was_given_may_change():
     q, bounds = np.array([1.0, 0.1]), {"speed": (-0.5, 0.5)}
     mpc = lpvmpc.Mpc(plant, 0.1, 10, q, [0.01], u_bounds=([-2], [2]), x_bounds=bounds)
     untouched = lpvmpc.Mpc(plant, 0.1, 10, [1.0, 0.1], [0.01], u_bounds=([-1], [1]), x_bounds={"speed": (-0.5, 0.5)})
+    # A named tuple is a tuple.
+    mpc.set(u_bounds=namedtuple("Limits", "lower upper")([-2], [2]))
     q[0] = 99.0
     bounds["speed"] = (-0.1, 0.1)
     mpc.settings["q"][0] = 50.0

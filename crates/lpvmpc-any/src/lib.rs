@@ -53,6 +53,7 @@ mod check;
 mod controller_settings;
 mod error;
 mod estimator;
+mod filter;
 mod firmware;
 mod guaranteed;
 mod horizon;

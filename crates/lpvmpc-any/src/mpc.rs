@@ -2,7 +2,8 @@
 
 use crate::check::Names;
 use crate::error::MpcError;
-use crate::estimator::{AnyFilter, Estimate, EstimatorSettings, filter};
+use crate::estimator::{Estimate, EstimatorSettings};
+use crate::filter::{AnyFilter, filter};
 use crate::guaranteed::{Guarantee, check_estimator};
 use crate::plan::Plan;
 use crate::preview::Preview;
