@@ -80,6 +80,7 @@ impl Recording {
             },
             u: Bounds { lower, upper },
             soft_x: [None; 4],
+            raise_prices: false,
             input_reference: InputReference::SteadyState,
             scheduling: Scheduling::Predicted,
             iterations: Iterations::Fixed(1),
@@ -107,6 +108,7 @@ impl Recording {
                     quadratic: 0.0,
                 })
             }),
+            raise_prices: true,
             iterations: Iterations::descent(tolerance, most),
             ..self.settings()
         }

@@ -94,7 +94,7 @@ class Problem:
 
     def prices_from(self, x: Array, x_ref: Array) -> Array:
         """The prices of a sample at `x` whose references end at `x_ref`: far away they are higher. Written down once more from
-        the documentation of `lpvmpc::exact_prices_at`, for a plan that stands still."""
+        the documentation of `lpvmpc::ControllerSettings::raise_prices`."""
         e = x - x_ref
         still = e @ (self.p + self.horizon * self.q) @ e
         diagonal = np.diag(self.p)

@@ -4,7 +4,7 @@ import math
 import casadi as ca
 import numpy as np
 
-from model import STATE_BOUND, TORQUE_BOUND, Design, plant, stage_cost
+from model import plant, stage_cost
 from program import Problem, best, cold_starts
 
 # All cold starts come with the first sample and with every one that did not converge; some of them
@@ -58,17 +58,18 @@ class Nonlinear(Controller):
 class Linear(Controller):
     """Linear MPC: the same program with the sampled pair of the upright equilibrium throughout."""
 
-    def __init__(self, design, horizon):
+    def __init__(self, design, horizon, **options):
         x, u = ca.SX.sym("x", 4), ca.SX.sym("u")
         predict = ca.Function("linear", [x, u], [ca.mtimes(design.a, x) + design.b * u])
-        super().__init__(design, predict, horizon)
+        super().__init__(design, predict, horizon, **options)
 
     def regulated(self, e):
         """Whether the regulator keeps all bounds over the horizon; then it is the optimum."""
         for _ in range(self.horizon):
             u = -self.design.k @ e
             e = self.design.a @ e + self.design.b[:, 0] * u
-            if abs(u) > TORQUE_BOUND or (np.abs(e[1:]) > STATE_BOUND).any():
+            bounds = self.design
+            if abs(u) > bounds.torque_bound or (np.abs(e[1:]) > bounds.state_bound).any():
                 return False
         return True
 
@@ -84,6 +85,7 @@ class Loop:
 
     def __init__(self, controller, start, goal, duration):
         t_s, p = controller.design.t_s, controller.design.p
+        state_bound = controller.design.state_bound
         x = np.array(start, dtype=float)
         self.cost, self.outside, self.largest_excess, self.fell = 0.0, 0, 0.0, False
         # The regulator's cost to go over the cost so far.
@@ -97,7 +99,7 @@ class Loop:
             if self.fell:
                 self.cost = math.inf
                 break
-            excess = float(np.max(np.abs(x[1:]) / STATE_BOUND)) - 1
+            excess = float(np.max(np.abs(x[1:]) / state_bound)) - 1
             self.outside += int(excess > OUTSIDE)
             self.largest_excess = max(self.largest_excess, excess)
             remaining = (x - goal) @ p @ (x - goal) / self.cost
@@ -107,11 +109,10 @@ class Loop:
         self.better_cold = int(controller.better_cold)
 
 
-def both(horizon, t_s, start, goal, duration):
+def both(design, horizon, start, goal, duration, **options):
     """The loops of nonlinear and of linear MPC."""
-    design = Design(t_s)
     return tuple(
-        Loop(make(design, horizon), start, goal, duration) for make in (Nonlinear, Linear)
+        Loop(make(design, horizon, **options), start, goal, duration) for make in (Nonlinear, Linear)
     )
 
 

@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 from closed_loop import COLUMNS, both, values
-from model import R_BALL
+from model import R_BALL, Design
 
 DURATION = 12.0
 CASES = [
@@ -22,7 +22,7 @@ if __name__ == "__main__":
                 for distance in distances:
                     begin = time.monotonic()
                     goal = np.array([distance / R_BALL, 0.0, 0.0, 0.0])
-                    loops = both(horizon, t_s, np.zeros(4), goal, DURATION)
+                    loops = both(Design(t_s), horizon, np.zeros(4), goal, DURATION)
                     row = (horizon, t_s, distance, DURATION, *values(*loops))
                     print(*map(repr, row), sep=",", file=table, flush=True)
                     taken = time.monotonic() - begin

@@ -18,6 +18,8 @@ TORQUE_BOUND = 1.5
 STATE_BOUND = np.array([math.pi / 3, 10 * math.pi, 2 * math.pi])
 # Price of a state bound per unit of excess, over P_jj times the width of the bound.
 PRICE_FACTOR = 20.0
+# The same far away, over the root of P_jj times the cost of a plan that stands still.
+PRICE_OF_WAY = 4.0
 
 # Modulus of the fastest eigenvalue at the upright equilibrium, and how much of it one step may take.
 FASTEST_POLE = 51.8017
@@ -74,10 +76,10 @@ def plant():
 
 
 class Design:
-    """What belongs to a sampling time: predictor, linear model, terminal cost, regulator, prices."""
+    """What belongs to a sampling time and bounds: predictor, linear model, terminal cost, regulator, prices."""
 
-    def __init__(self, t_s):
-        self.t_s = t_s
+    def __init__(self, t_s, state_bound=STATE_BOUND, torque_bound=TORQUE_BOUND):
+        self.t_s, self.state_bound, self.torque_bound = t_s, np.array(state_bound), torque_bound
         self.predict = sampled(t_s)
         x, u = ca.SX.sym("x", 4), ca.SX.sym("u")
         y = self.predict(x, u)
@@ -88,17 +90,23 @@ class Design:
         # The regulator is u = -k (x - x_ref), its curvature r + b'pb.
         self.curvature = (R + self.b.T @ self.p @ self.b).item()
         self.k = (self.b.T @ self.p @ self.a / self.curvature).ravel()
-        self.price = PRICE_FACTOR * np.diag(self.p)[1:] * 2 * STATE_BOUND
+        self.price = PRICE_FACTOR * np.diag(self.p)[1:] * 2 * self.state_bound
 
-    def objective(self, x, u, goal):
+    def raised_price(self, x, goal, horizon):
+        """The prices from a state on, where they rise with the way."""
+        e = x - goal
+        still = e @ self.p @ e + horizon * Q_DIAGONAL @ e**2
+        return np.maximum(self.price, PRICE_OF_WAY * np.sqrt(np.diag(self.p)[1:] * still))
+
+    def objective(self, x, u, goal, price):
         """Cost of a trajectory (x: 4 by N+1, u: N), the price of the state bounds included."""
         e = x - goal[:, None]
-        excess = np.maximum(0.0, np.abs(x[1:, 1:]) - STATE_BOUND[:, None])
+        excess = np.maximum(0.0, np.abs(x[1:, 1:]) - self.state_bound[:, None])
         return (
             Q_DIAGONAL @ (e[:, :-1] ** 2).sum(axis=1)
             + R * u @ u
             + e[:, -1] @ self.p @ e[:, -1]
-            + self.price @ excess.sum(axis=1)
+            + price @ excess.sum(axis=1)
         )
 
 

@@ -2,7 +2,7 @@
 import casadi as ca
 import numpy as np
 
-from model import Q_DIAGONAL, R, STATE_BOUND, TORQUE_BOUND
+from model import Q_DIAGONAL, R
 
 OPTIONS = {
     "print_time": 0,
@@ -47,12 +47,12 @@ class Problem:
     """The optimal control problem of one horizon and one sampling time.
 
     The variables of stage i are u_i, x_{i+1} and, with soft bounds, the excess e+ and e- of theta,
-    phi_dot and theta_dot over their upper and lower bounds.
+    phi_dot and theta_dot over their upper and lower bounds. Its price is the design's, `raised` with the way.
     """
 
-    def __init__(self, design, predict, horizon, soft=True, tolerance=1e-8):
-        self.design, self.horizon, self.soft = design, horizon, soft
-        x0, goal = ca.SX.sym("x0", 4), ca.SX.sym("goal", 4)
+    def __init__(self, design, predict, horizon, soft=True, raised=False, tolerance=1e-8):
+        self.design, self.horizon, self.soft, self.raised = design, horizon, soft, raised
+        x0, goal, price = ca.SX.sym("x0", 4), ca.SX.sym("goal", 4), ca.SX.sym("price", 3)
         x, variables, rows, cost = x0, [], [], 0
         for i in range(horizon):
             e = x - goal
@@ -65,22 +65,22 @@ class Problem:
                 over, under = ca.SX.sym(f"over{i}", 3), ca.SX.sym(f"under{i}", 3)
                 variables += [over, under]
                 rows.append(x[1:] - over + under)
-                cost += ca.dot(design.price, over + under)
+                cost += ca.dot(price, over + under)
         e = x - goal
         cost += ca.bilin(design.p, e, e)
         problem = {
             "x": ca.vertcat(*variables),
-            "p": ca.vertcat(x0, goal),
+            "p": ca.vertcat(x0, goal, price),
             "f": cost,
             "g": ca.vertcat(*rows),
         }
         # Of the variables and of the rows of one stage.
         if soft:
-            upper = np.concatenate([[TORQUE_BOUND], np.full(10, np.inf)])
+            upper = np.concatenate([[design.torque_bound], np.full(10, np.inf)])
             lower = np.concatenate([-upper[:5], np.zeros(6)])
-            row = np.concatenate([np.zeros(4), STATE_BOUND])
+            row = np.concatenate([np.zeros(4), design.state_bound])
         else:
-            upper = np.concatenate([[TORQUE_BOUND, np.inf], STATE_BOUND])
+            upper = np.concatenate([[design.torque_bound, np.inf], design.state_bound])
             lower = -upper
             row = np.zeros(4)
         self.limits = {
@@ -102,13 +102,17 @@ class Problem:
         """The variables of a trajectory."""
         stages = [u[None], x[:, 1:]]
         if self.soft:
-            bound = STATE_BOUND[:, None]
+            bound = self.design.state_bound[:, None]
             stages += [np.maximum(0, x[1:, 1:] - bound), np.maximum(0, -x[1:, 1:] - bound)]
         return np.vstack(stages).T.ravel()
 
     def solve(self, x0, goal, start, previous=None):
         """The plan from the trajectory `start`; warm where that is the plan `previous` moved on."""
-        arguments = {"x0": self.pack(*start), "p": np.concatenate([x0, goal]), **self.limits}
+        price = self.design.price
+        if self.raised:
+            price = self.design.raised_price(x0, goal, self.horizon)
+        parameters = np.concatenate([x0, goal, price])
+        arguments = {"x0": self.pack(*start), "p": parameters, **self.limits}
         solver = self.cold
         if previous is not None:
             solver = self.warm
@@ -117,9 +121,9 @@ class Problem:
         raw = solver(**arguments)
         stats = solver.stats()
         stages = raw["x"].full().reshape(self.horizon, -1).T
-        u = np.clip(stages[0], -TORQUE_BOUND, TORQUE_BOUND)
+        u = np.clip(stages[0], -self.design.torque_bound, self.design.torque_bound)
         x = np.hstack([x0[:, None], stages[1:5]])
-        objective = self.design.objective(x, u, goal)
+        objective = self.design.objective(x, u, goal, price)
         return Plan(x, u, objective, stats["return_status"] == CONVERGED, stats["iter_count"], raw)
 
 
@@ -129,12 +133,12 @@ def shifted(values, horizon):
     return np.vstack([stages[1:], stages[-1:]]).ravel()
 
 
-def rollout(predict, k, aim, x0, horizon):
+def rollout(predict, design, aim, x0, horizon):
     """The predictor under the regulator towards `aim`, clipped; None where it runs away."""
     x, u = np.empty((4, horizon + 1)), np.empty(horizon)
     x[:, 0] = x0
     for i in range(horizon):
-        u[i] = np.clip(-k @ (x[:, i] - aim), -TORQUE_BOUND, TORQUE_BOUND)
+        u[i] = np.clip(-design.k @ (x[:, i] - aim), -design.torque_bound, design.torque_bound)
         x[:, i + 1] = predict(x[:, i], u[i]).full().ravel()
         if not np.abs(x[1:, i + 1]).max() < RUNAWAY:
             return None
@@ -147,7 +151,7 @@ def cold_starts(design, predict, x0, goal, horizon, every=True):
     # On the spot, towards points part of the way, and towards the target.
     for share in (0.0, 0.1, 0.3, 1.0) if every else (0.0, 0.3, 1.0):
         aim = np.array([x0[0] + share * (goal[0] - x0[0]), 0.0, 0.0, 0.0])
-        starts.append(rollout(predict, design.k, aim, x0, horizon))
+        starts.append(rollout(predict, design, aim, x0, horizon))
     if every:
         # Straight lines to a stand on the spot and at the target; they are no motions of the robot.
         for end in (np.array([x0[0], 0.0, 0.0, 0.0]), goal):

@@ -13,7 +13,7 @@ import time
 import numpy as np
 
 from closed_loop import COLUMNS, both, values
-from model import R_BALL
+from model import R_BALL, Design
 
 SEED = 20251
 COUNT = 1000
@@ -59,7 +59,7 @@ if __name__ == "__main__":
             begin = time.monotonic()
             horizon, t_s, distance, *start = case
             goal = np.array([distance / R_BALL, 0.0, 0.0, 0.0])
-            loops = both(horizon, t_s, np.array([0.0, *start]), goal, DURATION)
+            loops = both(Design(t_s), horizon, np.array([0.0, *start]), goal, DURATION)
             row = (index, *case, DURATION, *values(*loops))
             print(*map(repr, row), sep=",", file=table, flush=True)
             print(f"{index} {horizon} {t_s}: {time.monotonic() - begin:.1f} s", file=sys.stderr)

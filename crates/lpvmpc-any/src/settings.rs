@@ -152,8 +152,8 @@ pub struct Limits {
 /// What becomes of a plan that cannot keep the bounds of the states, or of the outputs.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StateBounds {
-    /// They are exceeded as little as possible, at the price of [`lpvmpc::exact_prices`], far from the end of the references at
-    /// that of [`lpvmpc::exact_prices_at`] for a plan that stands still; of outputs at one
+    /// They are exceeded as little as possible, at the price of [`lpvmpc::exact_prices`], far from the end of the references
+    /// [raised](lpvmpc::ControllerSettings::raise_prices); of outputs at one
     /// that is made in the same way of their derivatives where the plant stands.
     Soft,
     /// It is infeasible.

@@ -11,8 +11,7 @@ use crate::preview::Preview;
 use crate::settings::{MpcSettings, StateBounds};
 use crate::stage_lists::StageLists;
 use lpvmpc::{
-    Bounds, Controller, GeneralRow, List, Penalty, Reference, Rk4, SoftBounds, TerminalIngredient,
-    Workspace, exact_prices_at,
+    Bounds, Controller, GeneralRow, List, Penalty, Reference, Rk4, SoftBounds, Workspace,
 };
 use lpvmpc_plant::{Plant, SizedPlant};
 use nalgebra::SVector;
@@ -163,29 +162,16 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         })
     }
 
-    /// The prices of the states' bounds, which may be `told` by stage, where they are above those of the settings so far
-    /// (`way`) from where the plan has to go: those of a plan that stands still, than which a good one costs no more.
-    fn prices_from(
-        &self,
-        way: &SVector<f64, NX>,
-        told: &[Bounds<f64, NX>],
-    ) -> Option<SoftBounds<f64, NX>> {
+    /// The prices of the states' bounds where those that are `told` by stage are dearer than those of the settings.
+    fn prices_of(&self, told: &[Bounds<f64, NX>]) -> Option<SoftBounds<f64, NX>> {
         let settings = self.controller.settings();
         if self.settings.state_bounds != StateBounds::Soft {
             return None;
         }
-        let samples = settings.horizon as f64;
-        let (cost, still) = match &settings.terminal {
-            TerminalIngredient::Cost(p) if p.amax() > 0.0 => {
-                let still = way.dot(&(p * way + settings.weights.q * way * samples));
-                (*p, still)
-            }
-            _ => (settings.weights.q * samples, 0.0),
-        };
         let mut prices = settings.soft_x;
         // A state has one price, that of its dearest bound.
-        for bounds in told.iter().chain([&settings.x]) {
-            for (price, one) in prices.iter_mut().zip(exact_prices_at(&cost, bounds, still)) {
+        for bounds in told {
+            for (price, one) in prices.iter_mut().zip(settings.soft_bounds(*bounds).soft_x) {
                 let dearer =
                     |one: &Penalty<f64>| price.is_none_or(|price| one.linear > price.linear);
                 *price = one.filter(dearer).or(*price);
@@ -220,7 +206,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             self.workspace = workspace(self.controller.settings(), most);
         }
         let terminal = lists.x_ref.last().copied().unwrap_or(self.rest.0);
-        let prices = self.prices_from(&(x - terminal), &lists.x_bounds);
+        let prices = self.prices_of(&lists.x_bounds);
         let rows: Vec<&[GeneralRow<f64, NX, NU>]> = lists.rows.iter().map(Vec::as_slice).collect();
         let outputs = tasks
             .as_ref()

@@ -17,6 +17,7 @@ use crate::settings::{
     check, check_period,
 };
 use crate::small_matrix::product;
+use crate::soft_bounds::SoftPrices;
 use crate::solution::{Solution, Status};
 use crate::solver::{SolverSettings, WarmStart};
 use crate::steady_state::{SteadyState, SteadyStateProblem};
@@ -77,6 +78,8 @@ pub struct Controller<P, T: 'static, const NX: usize, const NU: usize, const NS:
     pub(crate) watch: Watch<T>,
     /// Rolled-out minus predicted state at the end of the horizon.
     pub(crate) gap: SVector<T, NX>,
+    /// Of soft state bounds in the sample.
+    pub(crate) soft: SoftPrices<T, NX>,
     pub(crate) initialised: bool,
     /// Quadratic programs that the last step solved.
     pub(crate) problems: u16,
@@ -130,6 +133,7 @@ where
             #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
             watch: Watch::new(),
             gap: SVector::zeros(),
+            soft: SoftPrices::given(&settings.soft_x),
             initialised: false,
             problems: 0,
             aimed_at: None,
@@ -193,33 +197,48 @@ where
             return self.give_up(Status::HorizonTooLong);
         }
         self.make_up(own);
-        self.pose(own, workspace);
         let aim = &self.aim(reference, own);
+        self.pose(x, aim, workspace);
         if let Iterations::Descent { tolerance, .. } = self.settings.iterations {
             return self.descend(x, aim, tolerance, workspace);
         }
+        self.solve_scheduled(x, aim, workspace);
+        self.roll_out(x, own);
+        self.iterate(x, aim, workspace);
+    }
+
+    /// Algorithm 2 from the state to the answer of the sample's first program.
+    pub(crate) fn solve_scheduled<D: PlantByStage<P, T, NX, NU, NS>>(
+        &mut self,
+        x: &SVector<T, NX>,
+        aim: &Aim<'_, T, NX, NU, D>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) {
         let Workspace { ocp, solver, .. } = workspace;
         self.initialise_scheduling(x);
-        self.predict(x, own, ocp);
+        self.predict(x, aim.own, ocp);
         self.track(aim, ocp);
         if D::SOME {
             self.pose_outputs((x, &self.solution.u), 1, (aim, T::zero()), ocp);
         }
         solver.solve(ocp, &self.settings.solver, &mut self.solution);
-        self.roll_out(x, own);
-        self.iterate(x, aim, workspace);
+        self.problems = 1;
     }
 
-    /// Weights, bounds and rows of the program.
+    /// Weights, bounds and rows of the program, and the prices of soft bounds from `x` on.
     #[inline(always)]
     pub(crate) fn pose<D: CostByStage<T, NX, NU>>(
-        &self,
-        own: D,
+        &mut self,
+        x: &SVector<T, NX>,
+        aim: &Aim<'_, T, NX, NU, D>,
         workspace: &mut Workspace<T, NX, NU>,
     ) {
-        workspace.pose(&self.settings);
+        let (settings, own) = (&self.settings, &aim.own);
+        let terminal = own.terminal().unwrap_or(&settings.terminal);
+        self.soft = SoftPrices::new(settings, terminal, &(x - aim.end()));
+        workspace.pose(settings, &self.soft);
         if own.any() {
-            workspace.pose_own(&self.settings, &own);
+            workspace.pose_own(settings, &self.soft, own);
         }
     }
 
@@ -471,7 +490,6 @@ where
         aim: &Aim<'_, T, NX, NU, D>,
         workspace: &mut Workspace<T, NX, NU>,
     ) {
-        self.problems = 1;
         let own = aim.own;
         let Workspace { ocp, solver, .. } = workspace;
         let settings = SolverSettings {

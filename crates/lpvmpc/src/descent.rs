@@ -17,6 +17,7 @@
 use crate::by_stage::{CostByStage, PlantByStage};
 use crate::controller::Controller;
 use crate::embedding::Tangent;
+use crate::first_plan::First;
 use crate::model::{LpvModel, Scalar};
 use crate::plan::{Aim, Merit, Prices, Trial, at};
 use crate::policy::input_at;
@@ -113,9 +114,13 @@ where
         #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
         let last = self.initialised.then_some(self.policy.cost);
         let mut prices = Prices::none();
-        let found = self
-            .first_plan(x, aim, workspace)
-            .then(|| self.search(x, aim, (along, most, tolerance), &mut prices, workspace));
+        let first = self.first_plan(x, aim, workspace);
+        if first == First::Regulator && !self.keeps_bounds(aim) {
+            self.hold_matrices(x, aim, tolerance, &mut prices, workspace);
+        }
+        let begun = first != First::Nothing;
+        let found =
+            begun.then(|| self.search(x, aim, (along, most, tolerance), &mut prices, workspace));
         #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
         let found = self.look_elsewhere(x, aim, (last, tolerance), (found, prices), workspace);
         match found {
@@ -310,7 +315,7 @@ where
 
     /// Moves the plan towards the answer of the last program, by no more than the `longest` step, if that
     /// lowers its merit.
-    fn improve<D: PlantByStage<P, T, NX, NU, NS>>(
+    pub(crate) fn improve<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
         x: &SVector<T, NX>,
         aim: &Aim<'_, T, NX, NU, D>,
@@ -463,7 +468,7 @@ where
         aim: &'a Aim<'a, T, NX, NU, D>,
         prices: Prices<T, NX>,
     ) -> Merit<'a, T, NX, NU, D> {
-        Merit::new(&self.settings, aim, prices)
+        Merit::new(&self.settings, &self.soft, aim, prices)
     }
 
     /// Rolls the nonlinear model out from `x` into `trial`, with the inputs that `input` gives for a

@@ -1,4 +1,5 @@
-//! What a descent begins with: the rest of the last plan, or the regulator's own closed loops.
+//! What a descent begins with: the rest of the last plan, the regulator's own closed loops, or the answer of a program
+//! with the matrices of the present state.
 
 use crate::by_stage::PlantByStage;
 use crate::controller::Controller;
@@ -19,19 +20,30 @@ const REGULATOR: usize = 20;
 /// A plan that costs more by so many times what the last one did is no longer the only candidate.
 const JUMP: f64 = 1.0;
 
+/// What a plan begins with.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum First {
+    /// The rest of the last plan.
+    Rest,
+    /// There is none, or it has become dear: the best of it and the regulator's closed loops.
+    Regulator,
+    /// None of them is finite.
+    Nothing,
+}
+
 impl<P, T, const NX: usize, const NU: usize, const NS: usize> Controller<P, T, NX, NU, NS>
 where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
     /// The rest of the last plan from `x`; where there is none, or it has become dear, the best of
-    /// the regulator's own closed loops if that is cheaper. `false` if nothing is finite.
+    /// the regulator's own closed loops if that is cheaper.
     pub(crate) fn first_plan<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
         x: &SVector<T, NX>,
         aim: &Aim<'_, T, NX, NU, D>,
         workspace: &mut Workspace<T, NX, NU>,
-    ) -> bool {
+    ) -> First {
         let last = self.policy.cost;
         let merit = self.merit(aim, Prices::none());
         let mut best = None;
@@ -46,10 +58,48 @@ where
             });
             self.take_if_some(best, &workspace.trial);
         }
-        if best.is_none_or(|cost| cost - last > last.abs() * convert(JUMP)) {
-            best = self.regulate(x, aim, best, workspace);
+        let dear = best.is_none_or(|cost| cost - last > last.abs() * convert(JUMP));
+        match dear.then(|| self.regulate(x, aim, best, workspace)) {
+            None => First::Rest,
+            Some(None) => First::Nothing,
+            Some(Some(_)) => First::Regulator,
         }
-        best.is_some()
+    }
+
+    /// Whether the plan keeps the bounds of the states.
+    pub(crate) fn keeps_bounds<D: PlantByStage<P, T, NX, NU, NS>>(
+        &self,
+        aim: &Aim<'_, T, NX, NU, D>,
+    ) -> bool {
+        let mut states = self.rollout.iter().enumerate();
+        states.all(|(i, x)| aim.own.x(i + 1).unwrap_or(&self.settings.x).hold_at(x))
+    }
+
+    /// One program with the matrices of `x` at all stages, as one program per sample begins, too. The plan moves towards its
+    /// answer as far as that is better.
+    ///
+    /// The regulator knows of no state bounds: where its loops exceed them, all of them may lie in a valley that no
+    /// plan within the bounds is in.
+    #[inline(never)]
+    pub(crate) fn hold_matrices<D: PlantByStage<P, T, NX, NU, NS>>(
+        &mut self,
+        x: &SVector<T, NX>,
+        aim: &Aim<'_, T, NX, NU, D>,
+        tolerance: T,
+        prices: &mut Prices<T, NX>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) {
+        self.initialised = false;
+        self.solve_scheduled(x, aim, workspace);
+        self.take_feedback(workspace);
+        // The states of the plan were in the way of that.
+        let merit = self.merit(aim, *prices);
+        let unlimited = convert(f64::INFINITY);
+        let cost = self.roll_out_plan(x, &merit, unlimited, &mut workspace.trial, &|i, _| {
+            at(&self.policy.u, i)
+        });
+        self.take_if_some(cost, &workspace.trial);
+        self.improve(x, aim, (tolerance, T::one()), prices, workspace);
     }
 
     /// The regulator's closed loops towards the set point and towards points on the way to it, from the
@@ -85,7 +135,7 @@ where
                 self.policy.damping = T::zero();
                 self.policy.far = true;
                 found_one = true;
-            } else if found_one {
+            } else if found_one && self.keeps_bounds(aim) {
                 break;
             }
             if away.amax() == T::zero() || parts.len() == 0 {

@@ -98,6 +98,7 @@ mod rows;
 mod settings;
 mod shaping;
 mod small_matrix;
+mod soft_bounds;
 mod solution;
 mod solve_working_set;
 mod solver;
@@ -146,9 +147,10 @@ pub use regulator::{
 pub use regulator::{GuaranteedFeedback, StateFeedback};
 pub use settings::{
     ControllerError, ControllerSettings, InputReference, Iterations, Scheduling,
-    TerminalIngredient, Weights, exact_prices, exact_prices_at,
+    TerminalIngredient, Weights,
 };
 pub use shaping::{Motion, MoveLimits, SmoothMove};
+pub use soft_bounds::exact_prices;
 pub use solution::{
     ActiveRow, ActiveSet, BoundId, PackedRow, Part, Quantity, Side, Solution, Status,
 };

@@ -5,10 +5,11 @@ use crate::controller::Reference;
 use crate::cost::{excess, price};
 use crate::list::List;
 use crate::model::Scalar;
-use crate::ocp::{Bounds, SoftBounds};
+use crate::ocp::Bounds;
 use crate::outputs;
 use crate::settings::{ControllerSettings, TerminalIngredient, Weights};
 use crate::small_matrix::product;
+use crate::soft_bounds::SoftPrices;
 use crate::solution::{ActiveSet, Quantity, Side};
 use nalgebra::{SMatrix, SVector, convert};
 
@@ -195,7 +196,7 @@ pub(crate) struct Merit<'a, T, const NX: usize, const NU: usize, D> {
     weights: Weights<T, NX, NU>,
     terminal: TerminalIngredient<T, NX>,
     bounds: Bounds<T, NX>,
-    soft: SoftBounds<T, NX>,
+    soft: SoftPrices<T, NX>,
     horizon: usize,
     pub aim: &'a Aim<'a, T, NX, NU, D>,
     prices: Prices<T, NX>,
@@ -208,6 +209,7 @@ where
 {
     pub fn new<const NS: usize>(
         settings: &ControllerSettings<T, NX, NU, NS>,
+        soft: &SoftPrices<T, NX>,
         aim: &'a Aim<'a, T, NX, NU, D>,
         prices: Prices<T, NX>,
     ) -> Self {
@@ -215,7 +217,7 @@ where
             weights: settings.weights,
             terminal: *aim.own.terminal().unwrap_or(&settings.terminal),
             bounds: settings.x,
-            soft: settings.soft_x,
+            soft: *soft,
             horizon: settings.horizon,
             aim,
             prices,
@@ -357,8 +359,8 @@ where
     #[inline(never)]
     fn price_of_excess(&self, i: usize, x: &SVector<T, NX>) -> T {
         let bounds = self.bounds(i);
-        let soft = self.aim.own.soft_x(i).unwrap_or(&self.soft);
-        let mut total = price(soft, x, bounds);
+        let soft = self.soft.of(self.aim.own.soft_x(i));
+        let mut total = price(&soft, x, bounds);
         let sides = bounds.lower.iter().zip(bounds.upper.iter());
         let values = soft.iter().zip(x.iter()).zip(sides);
         for (((soft, v), (lower, upper)), price) in values.zip(self.prices.bounds.iter()) {
@@ -384,7 +386,12 @@ where
 }
 
 /// v'Wv
-#[inline(always)]
-fn squared<T: Scalar, const K: usize>(weight: &SMatrix<T, K, K>, v: &SVector<T, K>) -> T {
+// Once in the machine code of a microcontroller, for its flash.
+#[cfg_attr(target_arch = "arm", inline(never))]
+#[cfg_attr(not(target_arch = "arm"), inline(always))]
+pub(crate) fn squared<T: Scalar, const K: usize>(
+    weight: &SMatrix<T, K, K>,
+    v: &SVector<T, K>,
+) -> T {
     product(weight, v).dot(v)
 }

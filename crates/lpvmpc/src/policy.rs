@@ -9,7 +9,9 @@ use nalgebra::{SMatrix, SVector};
 /// The input at the state `x` of a stage that is `planned` to be at (x_planned, u_planned):
 /// u_planned + K (x - x_planned), moved into its bounds. K is `feedback`, `NU` x `NX`; a
 /// *gain*, as of an LQR or a terminal law, has the other sign, u = -K x.
-#[inline(always)]
+// Once in the machine code of a microcontroller, for its flash.
+#[cfg_attr(target_arch = "arm", inline(never))]
+#[cfg_attr(not(target_arch = "arm"), inline(always))]
 pub(crate) fn input_at<T: Scalar, const NX: usize, const NU: usize>(
     x: &SVector<T, NX>,
     (x_planned, u_planned): (&SVector<T, NX>, &SVector<T, NU>),

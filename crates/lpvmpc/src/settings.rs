@@ -2,9 +2,10 @@
 
 use crate::memory::Capacity;
 use crate::model::Scalar;
-use crate::ocp::{Bounds, Penalty, SoftBounds};
+use crate::ocp::{Bounds, SoftBounds};
 use crate::predictor::{Predictor, Rk4, periods};
 use crate::preview::PreviewMistake;
+use crate::soft_bounds::exact_prices;
 use crate::solver::SolverSettings;
 use core::fmt;
 use nalgebra::{Cholesky, Const, SMatrix, SVector, convert};
@@ -139,6 +140,11 @@ pub struct ControllerSettings<T, const NX: usize, const NU: usize, const NS: usi
     pub x: Bounds<T, NX>,
     /// Which state bounds may be exceeded, and at what price in the unit of the cost.
     pub soft_x: SoftBounds<T, NX>,
+    /// Whether far from the end of the reference these prices, and those of a preview, are raised to what the way ahead may
+    /// make of a bound's multiplier: in each sample the linear price of state j is at least 4 (P_jj V)^(1/2), where
+    /// V = w'(P + N Q)w is the cost of a plan that stands still, w before its goal. With a terminal equality, and
+    /// without a terminal cost, they stay as they are.
+    pub raise_prices: bool,
     /// Input bounds, at the stages 0 to N - 1.
     pub u: Bounds<T, NU>,
     /// Where the scheduling comes from.
@@ -174,6 +180,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
             terminal,
             x: Bounds::none(),
             soft_x: [None; NX],
+            raise_prices: false,
             u,
             scheduling: Scheduling::Predicted,
             input_reference: InputReference::SteadyState,
@@ -201,7 +208,8 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
     /// has a plan. With hard bounds the same start is infeasible.
     ///
     /// The prices are [`exact_prices`] of the terminal cost, which is to be that of an infinite horizon
-    /// (of the LQR), or of Q, sample by sample, with a terminal equality.
+    /// (of the LQR), or of Q, sample by sample, with a terminal equality; far from the end of the reference they are
+    /// [raised](Self::raise_prices).
     pub fn soft_bounds(self, x: Bounds<T, NX>) -> Self {
         let samples: T = convert(self.horizon as f64);
         let cost = match &self.terminal {
@@ -211,64 +219,10 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
         Self {
             x,
             soft_x: exact_prices(&cost, &x),
+            raise_prices: true,
             ..self
         }
     }
-}
-
-/// Price of a state bound exceeded by its width, in terminal costs of a state at that width: of a
-/// ballbot's plans from rest to set points up to 10 m away no multiplier of a bound was larger
-/// (`testdata/nonlinear-mpc/multipliers.py`).
-const PRICE_OF_WIDTH: f64 = 20.0;
-
-/// Price of an excess along a plan of some cost, in roots of that cost times P_jj: twice the slope that x'Px has
-/// anywhere at that cost.
-const PRICE_OF_COST: f64 = 4.0;
-
-/// Prices of soft state bounds, high enough to be exact as a rule, from the cost x'Px of a state
-/// from there on (`cost` is P): 20 P_jj times the width of the bound per unit of excess, in the unit
-/// of the cost.
-///
-/// Exact means that a bound is exceeded only where it cannot be kept: the price is above the
-/// multiplier of the hard bound. That one is about the slope of the cost, 2 P_jj x_j, at the bound.
-pub fn exact_prices<T: Scalar, const NX: usize>(
-    cost: &SMatrix<T, NX, NX>,
-    x: &Bounds<T, NX>,
-) -> SoftBounds<T, NX> {
-    exact_prices_at(cost, x, T::zero())
-}
-
-/// The same for plans that cost up to `value`: far away the multiplier of a bound is that of the way ahead, and no longer
-/// that of the bound's own width. Where x'Px is `value`, its slope along a state is at most 2 (P_jj `value`)^(1/2)
-/// (Cauchy and Schwarz); no price is below twice as much.
-pub fn exact_prices_at<T: Scalar, const NX: usize>(
-    cost: &SMatrix<T, NX, NX>,
-    x: &Bounds<T, NX>,
-    value: T,
-) -> SoftBounds<T, NX> {
-    let sides = x.lower.iter().zip(x.upper.iter());
-    let mut prices = [None; NX];
-    for (j, (place, (lower, upper))) in prices.iter_mut().zip(sides).enumerate() {
-        let width = match (lower.is_finite(), upper.is_finite()) {
-            (true, true) => *upper - *lower,
-            (true, false) => lower.abs(),
-            (false, true) => upper.abs(),
-            (false, false) => continue,
-        };
-        // A bound of no width, or at zero, is as dear as one of a unit; a state that costs nothing,
-        // as the dearest one.
-        let width = if width > T::zero() { width } else { T::one() };
-        let own = cost.get((j, j)).copied().unwrap_or_else(T::zero);
-        let slope = if own > T::zero() { own } else { cost.amax() };
-        let of_width = convert::<f64, T>(PRICE_OF_WIDTH) * slope * width;
-        let of_cost = convert::<f64, T>(PRICE_OF_COST) * (slope * value).sqrt();
-        *place = Some(Penalty {
-            // Of a value that is no number, the first.
-            linear: of_width.max(of_cost),
-            quadratic: T::zero(),
-        });
-    }
-    prices
 }
 
 /// A mistake in the [`ControllerSettings`].
@@ -448,14 +402,23 @@ pub(crate) fn check_weight<T: Scalar, const K: usize>(
     name: &'static str,
     shift: T,
 ) -> Result<(), ControllerError> {
-    let size = weight.amax();
     let roundings: T = convert::<f64, T>(10.0 * K as f64);
-    // Half before the sum, which could overflow.
-    let half = weight * convert::<f64, T>(0.5);
-    let mut symmetric = half + half.transpose();
-    let asymmetry = (weight - symmetric).amax() * convert(2.0);
-    let finite = weight.iter().all(|entry| entry.is_finite());
-    if !(finite && asymmetry <= roundings * T::default_epsilon() * size) {
+    let half: T = convert(0.5);
+    let (mut size, mut asymmetry) = (T::zero(), T::zero());
+    let mut symmetric = *weight;
+    for i in 0..K {
+        for j in 0..=i {
+            let (lower, upper) = (weight[(i, j)], weight[(j, i)]);
+            if !(lower.is_finite() && upper.is_finite()) {
+                return Err(ControllerError::WeightEntries(name));
+            }
+            size = largest(size, largest(lower.abs(), upper.abs()));
+            asymmetry = largest(asymmetry, (lower - upper).abs());
+            // Half before the sum, which could overflow.
+            symmetric[(i, j)] = lower * half + upper * half;
+        }
+    }
+    if asymmetry > roundings * T::default_epsilon() * size {
         return Err(ControllerError::WeightEntries(name));
     }
     // Semidefinite up to rounding: a tiny multiple of the identity makes it definite.
@@ -467,6 +430,10 @@ pub(crate) fn check_weight<T: Scalar, const K: usize>(
         Some(_) => Ok(()),
         None => Err(ControllerError::WeightSign(name)),
     }
+}
+
+fn largest<T: Scalar>(a: T, b: T) -> T {
+    if a > b { a } else { b }
 }
 
 pub(crate) fn check_bounds<T: Scalar, const K: usize>(

@@ -4,6 +4,7 @@
 use crate::by_stage::PlantByStage;
 use crate::controller::{Controller, Reference, next_state};
 use crate::descent::{Along, Outcome, States};
+use crate::first_plan::First;
 use crate::model::{LpvModel, Scalar};
 use crate::plan::{Aim, Prices, at};
 use crate::preview::Preview;
@@ -54,8 +55,8 @@ where
         if !workspace.holds(self.settings.horizon) {
             return;
         }
-        self.pose(own, workspace);
         let aim = &self.aim(reference, own);
+        self.pose(&at(&self.rollout, 0), aim, workspace);
         if let Iterations::Descent { .. } = self.settings.iterations {
             let answered = self.answered.take();
             if !self.initialised || !self.prepare_descent(answered, aim, workspace) {
@@ -146,7 +147,7 @@ where
             Some(Answered::Before(x)) => x,
             None => at(&self.rollout, 0),
         };
-        if !self.first_plan(&x, aim, workspace) {
+        if self.first_plan(&x, aim, workspace) == First::Nothing {
             return false;
         }
         if answered.is_some() && self.solution.status.is_solved() {

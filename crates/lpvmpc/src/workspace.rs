@@ -13,6 +13,7 @@ use crate::outputs;
 use crate::plan::Trial;
 use crate::preview::Room;
 use crate::settings::{ControllerSettings, Weights};
+use crate::soft_bounds::SoftPrices;
 use crate::solver::Solver;
 use nalgebra::{SMatrix, convert};
 
@@ -85,10 +86,14 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
         horizon <= self.ocp.stages.len()
     }
 
-    /// Writes weights and bounds into the program.
-    pub(crate) fn pose<const NS: usize>(&mut self, settings: &ControllerSettings<T, NX, NU, NS>) {
+    /// Writes weights and bounds into the program, with the prices of `soft` ones.
+    pub(crate) fn pose<const NS: usize>(
+        &mut self,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        soft: &SoftPrices<T, NX>,
+    ) {
         let ControllerSettings { weights, x, u, .. } = settings;
-        let soft_x = halved(&settings.soft_x);
+        let soft_x = halved(&soft.of(None));
         self.ocp.terminal.soft_x = soft_x;
         if core::mem::take(&mut self.by_stage) {
             self.forget_own();
@@ -127,6 +132,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
     pub(crate) fn pose_own<D: CostByStage<T, NX, NU>, const NS: usize>(
         &mut self,
         settings: &ControllerSettings<T, NX, NU, NS>,
+        soft: &SoftPrices<T, NX>,
         own: &D,
     ) {
         let end = settings.horizon;
@@ -135,7 +141,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
             core::mem::swap(&mut self.ocp.own, &mut self.own);
         }
         let ocp = &mut self.ocp;
-        let soft_at = |i| halved(own.soft_x(i).unwrap_or(&settings.soft_x));
+        let soft_at = |i| halved(&soft.of(own.soft_x(i)));
         for (i, common) in ocp.own.iter_mut().enumerate().take(end) {
             let Weights { q, r } = *own.weights(i).unwrap_or(&settings.weights);
             *common = Common {

@@ -8,7 +8,8 @@ use crate::results::ResultFolder;
 use crate::table::Table;
 use ballbot_studies::StudyError;
 use ballbot_studies::optimality::{
-    Case, Outcome, Summary, distances, guaranteed_cost, quantile, random_starts, run_all,
+    Case, Outcome, Summary, distances, guaranteed_cost, narrow_bounds, quantile, random_starts,
+    run_all,
 };
 use clap::Args;
 use lpvmpc::Iterations;
@@ -24,10 +25,11 @@ Examples:
   ballbot optimality --programs 4    with at most four quadratic programs per sample
 
 The LPV controller with its defaults, from rest and from random starts, with set points from 0.2 m to
-10 m away that are given at t = 0, horizons of 10 to 80 samples and sampling times of 10 to 50 ms. Its
-closed-loop costs are divided by those of nonlinear MPC on the same problem, which another program
-(testdata/nonlinear-mpc, IPOPT) has solved to convergence at every sample. Writes a row per case and
-figures.")]
+10 m away that are given at t = 0, horizons of 10 to 80 samples and sampling times of 10 to 50 ms, and
+from rest within narrower bounds. Its closed-loop costs are divided by those of nonlinear MPC on the same
+problem, which another program (testdata/nonlinear-mpc, IPOPT) has solved to convergence at every sample.
+In the first two sets the prices of state bounds are the same everywhere; in scenarios and within the
+narrower bounds they rise with the way. Writes a row per case and figures.")]
 pub struct OptimalityArguments {
     /// Most quadratic programs per sample [default: that of scenarios]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
@@ -60,6 +62,7 @@ pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
     let sets = [
         ("from rest", distances()?),
         ("random starts", random_starts()?),
+        ("narrow bounds", narrow_bounds()?),
     ];
     let mut table = Table::new([
         "cost / cost of nonlinear MPC",
@@ -172,13 +175,17 @@ fn document(name: &str, summary: &Summary) -> serde_json::Value {
 }
 
 const CSV_HEADER: &str = "set,horizon,t_s_s,distance_m,theta0_rad,phi_dot0_rad_s,theta_dot0_rad_s,\
+                          theta_bound_rad,phi_dot_bound_rad_s,theta_dot_bound_rad_s,torque_bound_nm,\
                           cost,cost_nonlinear,cost_linear,programs_mean,programs_most,\
                           without_plan,largest_excess,largest_excess_nonlinear\n";
 
 fn csv_row(set: &str, case: &Case, run: &Outcome) -> String {
     let [_, theta, phi_dot, theta_dot] = case.start.into();
+    let [_, theta_bound, phi_dot_bound, theta_dot_bound] = run.x.upper.into();
+    let torque_bound = run.u.upper[0];
     format!(
-        "{set},{},{},{},{theta},{phi_dot},{theta_dot},{},{},{},{:.4},{},{},{},{}\n",
+        "{set},{},{},{},{theta},{phi_dot},{theta_dot},\
+         {theta_bound},{phi_dot_bound},{theta_dot_bound},{torque_bound},{},{},{},{:.4},{},{},{},{}\n",
         case.horizon,
         case.t_s,
         case.distance,

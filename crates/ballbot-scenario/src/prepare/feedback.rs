@@ -237,6 +237,7 @@ impl TorqueRateTable {
             },
             // The torque's bounds are the motors' own.
             soft_x: [0, 1, 2, 3, 4].map(|i| plain.soft_x.get(i).copied().flatten()),
+            raise_prices: plain.raise_prices,
             input_reference: InputReference::SteadyState,
             scheduling: plain.scheduling,
             iterations: plain.iterations,

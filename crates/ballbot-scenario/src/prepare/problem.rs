@@ -127,6 +127,7 @@ impl ControllerTable {
             terminal,
             x,
             soft_x,
+            raise_prices: true,
             u,
             input_reference: InputReference::SteadyState,
             scheduling,

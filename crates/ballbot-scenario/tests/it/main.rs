@@ -7,6 +7,7 @@
 )]
 
 mod document;
+mod far_within_bounds;
 mod forged_certificates;
 mod guarantee;
 mod guaranteed_optimum;

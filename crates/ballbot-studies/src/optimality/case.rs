@@ -5,9 +5,10 @@ use nalgebra::Vector4;
 
 const DISTANCES: &str = include_str!("../../../../testdata/nonlinear-mpc/distances.csv");
 const RANDOM_STARTS: &str = include_str!("../../../../testdata/nonlinear-mpc/random-starts.csv");
+const NARROW_BOUNDS: &str = include_str!("../../../../testdata/nonlinear-mpc/narrow-bounds.csv");
 
-/// A closed loop to a set point that is given at t = 0 without preview, with the weights, the bounds
-/// and the terminal cost of `testdata/nonlinear-mpc`.
+/// A closed loop to a set point that is given at t = 0 without preview, with the weights and the
+/// terminal cost of `testdata/nonlinear-mpc`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Case {
     /// Samples of the horizon.
@@ -20,6 +21,9 @@ pub struct Case {
     pub start: Vector4<f64>,
     /// Duration of the loop, s.
     pub duration: f64,
+    /// Bounds of theta, phi_dot and theta_dot either way and of the torque, rad, rad/s and N m, at prices that rise with the
+    /// way; without them those of `single-setpoint`, at prices that are the same everywhere.
+    pub bounds: Option<[f64; 4]>,
     /// Closed-loop cost of nonlinear MPC.
     pub nonlinear: f64,
     /// Closed-loop cost of linear MPC.
@@ -50,6 +54,14 @@ pub fn random_starts() -> Result<Vec<Case>, StudyError> {
     read(RANDOM_STARTS)
 }
 
+/// From rest, within bounds that are narrower.
+///
+/// # Errors
+/// None should occur, as there is no input.
+pub fn narrow_bounds() -> Result<Vec<Case>, StudyError> {
+    read(NARROW_BOUNDS)
+}
+
 fn read(text: &str) -> Result<Vec<Case>, StudyError> {
     let mut lines = text.lines();
     let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
@@ -67,6 +79,19 @@ fn read(text: &str) -> Result<Vec<Case>, StudyError> {
         };
         // From rest, where there are no columns of the state.
         let start = |name| optional(name).flatten().unwrap_or(0.0);
+        let bound = |name| optional(name).flatten();
+        let bounds = [
+            bound("theta_bound_rad"),
+            bound("phi_dot_bound_rad_s"),
+            bound("theta_dot_bound_rad_s"),
+            bound("torque_bound_nm"),
+        ];
+        let bounds = match bounds {
+            [Some(theta), Some(phi_dot), Some(theta_dot), Some(torque)] => {
+                Some([theta, phi_dot, theta_dot, torque])
+            }
+            _ => None,
+        };
         Ok(Case {
             horizon: value("horizon")? as usize,
             t_s: value("t_s_s")?,
@@ -78,6 +103,7 @@ fn read(text: &str) -> Result<Vec<Case>, StudyError> {
                 start("theta_dot0_rad_s"),
             ),
             duration: value("duration_s")?,
+            bounds,
             nonlinear: value("cost_nonlinear")?,
             linear: value("cost_linear")?,
             nonlinear_fell: value("fell_nonlinear")? > 0.0,

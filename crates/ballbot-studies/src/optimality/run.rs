@@ -45,6 +45,14 @@ fn scenario(case: &Case) -> Result<Scenario, ScenarioError> {
     scenario.controller.horizon = case.horizon;
     scenario.controller.t_s = case.t_s;
     scenario.duration_s = case.duration;
+    if let Some([theta, phi_dot, theta_dot, torque]) = case.bounds {
+        let within = |limit: f64| [-limit, limit];
+        let bounds = &mut scenario.bounds;
+        bounds.theta_rad = within(theta);
+        bounds.phi_dot_rad_s = within(phi_dot);
+        bounds.theta_dot_rad_s = within(theta_dot);
+        bounds.torque_nm = within(torque);
+    }
     let robot = scenario.prepare(Path::new("."))?.ballbot;
     let phi_rad = robot.geometry.ball_angle(case.distance);
     scenario.reference = ReferenceTable::SetPoints {
@@ -89,6 +97,8 @@ pub fn run(case: &Case, iterations: Iterations<f64>) -> Result<Outcome, StudyErr
         ..
     } = prepared;
     settings.iterations = iterations;
+    // As in the reference's problem.
+    settings.raise_prices = case.bounds.is_some();
     let controller = Controller::allocate(ballbot, settings);
     let mut controller = controller.map_err(ScenarioError::from)?;
     let mut workspace = controller.workspace();

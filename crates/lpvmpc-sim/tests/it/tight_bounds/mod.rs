@@ -155,6 +155,7 @@ fn controller(x: [f64; 3], u: f64, terminal: TerminalIngredient<f64, NX>) -> Loo
             upper: u,
         },
         soft_x: [None; 4],
+        raise_prices: false,
         input_reference: InputReference::SteadyState,
         scheduling: Scheduling::Predicted,
         iterations: Iterations::Fixed(1),

@@ -63,6 +63,7 @@ fn rate_and_input_stay_within_bounds() {
             upper: Vector1::new(rate_limit),
         },
         soft_x: [None; 3],
+        raise_prices: false,
         input_reference: InputReference::SteadyState,
         scheduling: Scheduling::Predicted,
         iterations: Iterations::Fixed(1),

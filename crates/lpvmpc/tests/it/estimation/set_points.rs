@@ -27,6 +27,7 @@ fn settings(iterations: Iterations<f64>) -> ControllerSettings<f64, 2, 1, 1> {
         terminal: TerminalIngredient::Cost(Matrix2::identity() * 20.0),
         x: Bounds::none(),
         soft_x: [None; 2],
+        raise_prices: false,
         u: Bounds {
             lower: Vector1::new(-TORQUE),
             upper: Vector1::new(TORQUE),
@@ -160,6 +161,7 @@ fn a_ramped_torque_holds_the_pendulum_too() {
             upper: Vector3::new(unlimited, unlimited, TORQUE),
         },
         soft_x: [None; 3],
+        raise_prices: false,
         u: Bounds {
             lower: Vector1::new(-40.0),
             upper: Vector1::new(40.0),

@@ -184,6 +184,7 @@ fn a_hard_bound_that_cannot_be_kept_is_named_with_its_first_stage() {
     let soft = regulator::settings(&plant, 0.4, Scheduling::Predicted).unwrap();
     let hard = ControllerSettings {
         soft_x: [None; 4],
+        raise_prices: false,
         ..soft
     };
     for (s, side) in [

@@ -281,6 +281,7 @@ fn single_precision_is_close_to_the_optimum() {
                 terminal: TerminalIngredient::Cost(SMatrix::identity()),
                 x: bounds(&of_double.x),
                 soft_x: of_double.soft_x.each_ref().map(price),
+                raise_prices: false,
                 u: bounds(&of_double.u),
                 scheduling: lpvmpc::Scheduling::Predicted,
                 iterations,

@@ -200,6 +200,7 @@ fn single(settings: &ControllerSettings<f64, 4, 1, 2>) -> ControllerSettings<f32
             upper: settings.u.upper.cast(),
         },
         soft_x: [None; 4],
+        raise_prices: false,
         input_reference: InputReference::SteadyState,
         scheduling: Scheduling::Predicted,
         iterations: Iterations::Fixed(1),

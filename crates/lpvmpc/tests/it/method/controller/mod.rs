@@ -6,6 +6,7 @@ mod failures;
 mod memory;
 mod run_time_bounds;
 mod settings;
+mod soft_bounds;
 
 use crate::method::plant::CartPole;
 use crate::method::regulator::{self, Regulator};
@@ -18,6 +19,7 @@ fn settings(horizon: usize) -> ControllerSettings<f64, 4, 1, 2> {
     ControllerSettings {
         horizon,
         soft_x: [None; 4],
+        raise_prices: false,
         ..regulator::settings(&plant, 2.4, Scheduling::Predicted).unwrap()
     }
 }

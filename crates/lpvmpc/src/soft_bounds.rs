@@ -1,0 +1,130 @@
+//! What soft state bounds cost, so that they are exceeded only where they cannot be kept.
+//!
+//! A price is exact where it is above the multiplier of the hard bound. Near the goal that is a matter of the bound's own
+//! width: how much of the cost lies beyond it. Far away it is a matter of the way ahead: how much sooner the plant is at
+//! its goal if it exceeds the bound.
+
+use crate::model::Scalar;
+use crate::ocp::{Bounds, Penalty, SoftBounds};
+use crate::plan::squared;
+use crate::settings::{ControllerSettings, TerminalIngredient};
+use nalgebra::{SMatrix, SVector, convert};
+
+/// Price of a state bound exceeded by its width, in terminal costs of a state at that width: of a
+/// ballbot's plans from rest to set points up to 10 m away no multiplier of a bound of `single-setpoint` was larger
+/// (`testdata/nonlinear-mpc/multipliers.py`).
+const PRICE_OF_WIDTH: f64 = 20.0;
+
+/// Price of an excess far from the goal, in roots of P_jj times the cost of a plan that stands still: twice the slope that
+/// x'Px has anywhere at that cost. Of bounds of any width no multiplier was larger (`multipliers.py`: 3.2).
+const PRICE_OF_WAY: f64 = 4.0;
+
+/// Prices of soft state bounds, high enough to be exact as a rule, from the cost x'Px of a state
+/// from there on (`cost` is P): 20 P_jj times the width of the bound per unit of excess, in the unit
+/// of the cost.
+///
+/// Exact means that a bound is exceeded only where it cannot be kept: the price is above the
+/// multiplier of the hard bound. Close to the goal that one is about the slope of the cost, 2 P_jj x_j, at the bound. Far
+/// away it is that of the way ahead: see [`ControllerSettings::raise_prices`].
+pub fn exact_prices<T: Scalar, const NX: usize>(
+    cost: &SMatrix<T, NX, NX>,
+    x: &Bounds<T, NX>,
+) -> SoftBounds<T, NX> {
+    let sides = x.lower.iter().zip(x.upper.iter());
+    let mut prices = [None; NX];
+    for (j, (place, (lower, upper))) in prices.iter_mut().zip(sides).enumerate() {
+        let width = match (lower.is_finite(), upper.is_finite()) {
+            (true, true) => *upper - *lower,
+            (true, false) => lower.abs(),
+            (false, true) => upper.abs(),
+            (false, false) => continue,
+        };
+        // A bound of no width, or at zero, is as dear as one of a unit.
+        let width = if width > T::zero() { width } else { T::one() };
+        *place = Some(Penalty {
+            linear: convert::<f64, T>(PRICE_OF_WIDTH) * own_cost(cost, j) * width,
+            quadratic: T::zero(),
+        });
+    }
+    prices
+}
+
+/// The prices of a sample.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SoftPrices<T, const NX: usize> {
+    /// Where a stage has none of its own.
+    common: SoftBounds<T, NX>,
+    /// The least linear price of each state.
+    least: SVector<T, NX>,
+}
+
+impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
+    /// Those of the settings.
+    pub fn given(soft_x: &SoftBounds<T, NX>) -> Self {
+        Self {
+            common: *soft_x,
+            least: SVector::zeros(),
+        }
+    }
+
+    /// Those of a sample whose goal is `way` from where the state is: those of the settings, raised where they are to be.
+    #[inline(never)]
+    pub fn new<const NU: usize, const NS: usize>(
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        terminal: &TerminalIngredient<T, NX>,
+        way: &SVector<T, NX>,
+    ) -> Self {
+        let mut prices = Self::given(&settings.soft_x);
+        if settings.raise_prices
+            && let TerminalIngredient::Cost(p) = terminal
+        {
+            let samples: T = convert(settings.horizon as f64);
+            // Of a plan that stands still, than which a good one costs no more.
+            let value = squared(p, way) + squared(&settings.weights.q, way) * samples;
+            for (j, least) in prices.least.iter_mut().enumerate() {
+                *least = price_of_way(p, j, value);
+            }
+            prices.common = prices.at_least(&settings.soft_x);
+        }
+        prices
+    }
+
+    /// Those of a stage that may have `own` ones.
+    #[inline(always)]
+    pub fn of(&self, own: Option<&SoftBounds<T, NX>>) -> SoftBounds<T, NX> {
+        own.map_or(self.common, |own| self.at_least(own))
+    }
+
+    /// The prices, none below the least.
+    fn at_least(&self, soft: &SoftBounds<T, NX>) -> SoftBounds<T, NX> {
+        let mut raised = *soft;
+        for (price, least) in raised.iter_mut().zip(self.least.iter()) {
+            if let Some(price) = price
+                && *least > price.linear
+            {
+                price.linear = *least;
+            }
+        }
+        raised
+    }
+}
+
+/// Of state `j`, where a plan that stands still costs `value`; nothing where that is too much for the number type.
+// Once in the machine code of a microcontroller, for its flash.
+#[cfg_attr(target_arch = "arm", inline(never))]
+fn price_of_way<T: Scalar, const NX: usize>(cost: &SMatrix<T, NX, NX>, j: usize, value: T) -> T {
+    let price = (own_cost(cost, j) * value).sqrt() * convert(PRICE_OF_WAY);
+    if price.is_finite() { price } else { T::zero() }
+}
+
+/// P_jj; of a state that costs nothing, the largest entry of P, which is one of its diagonal.
+fn own_cost<T: Scalar, const NX: usize>(cost: &SMatrix<T, NX, NX>, j: usize) -> T {
+    let own = cost[(j, j)];
+    if own > T::zero() {
+        return own;
+    }
+    (0..NX).fold(T::zero(), |largest, i| {
+        let own = cost[(i, i)];
+        if own > largest { own } else { largest }
+    })
+}
