@@ -52,6 +52,21 @@ pub enum SearchError {
         /// What would be right.
         expected: &'static str,
     },
+    /// A bound of which the set would be a share is infinite.
+    #[error(
+        "bounds.{key} = [{lower}, {upper}]: the set of a certificate is a share of it, so it needs a finite number on \
+         either side, such as --set bounds.{key}=[-{usual},{usual}]"
+    )]
+    Unbounded {
+        /// The bound's key in a scenario.
+        key: &'static str,
+        /// Its lower side.
+        lower: f64,
+        /// Its upper side.
+        upper: f64,
+        /// A number that fits many robots.
+        usual: f64,
+    },
     /// No set could be proved.
     #[error("no certificate: {0}")]
     Certify(#[from] CertifyError),
@@ -100,6 +115,18 @@ impl CertificateSearch<'_> {
     }
 
     fn check(&self) -> Result<(), SearchError> {
+        let Bounds { lower, upper } = &self.prepared.settings.x;
+        for (key, j, usual) in [("theta_rad", 1, 0.5), ("theta_dot_rad_s", 3, 4.0)] {
+            let (lower, upper) = (lower[j], upper[j]);
+            if !(lower.is_finite() && upper.is_finite()) {
+                return Err(SearchError::Unbounded {
+                    key,
+                    lower,
+                    upper,
+                    usual,
+                });
+            }
+        }
         let share = "a share, above 0 and at most 1";
         let right = |value: f64| value > 0.0 && value <= 1.0;
         let boxes = (1..=MOST_BOXES).contains(&self.boxes);

@@ -96,7 +96,7 @@ pub struct SimulateArguments {
     /// The experiment, TOML
     pub experiment: PathBuf,
     /// Folder of the results [default: out/ and the name of the experiment]
-    #[arg(long)]
+    #[arg(short, long)]
     pub out: Option<PathBuf>,
     /// Print the summary as JSON
     #[arg(long)]
@@ -110,7 +110,7 @@ pub struct CertifyArguments {
     /// The experiment, TOML
     pub experiment: PathBuf,
     /// File of the certificate [default: standard output]
-    #[arg(long)]
+    #[arg(short, long)]
     pub out: Option<PathBuf>,
 }
 
@@ -128,7 +128,7 @@ pub struct FirmwareArguments {
     #[arg(long)]
     pub lpvmpc: PathBuf,
     /// A new folder for the program
-    #[arg(long)]
+    #[arg(short, long)]
     pub out: PathBuf,
 }
 

@@ -260,6 +260,12 @@ impl File {
                 ));
             }
         }
+        if !(settings.t_s > 0.0 && settings.t_s.is_finite()) {
+            let t_s = short(settings.t_s);
+            return Err(format!(
+                "controller: t_s: it is {t_s}; it must be a positive number of seconds"
+            ));
+        }
         let samples = (self.duration / settings.t_s - 1e-9).ceil();
         if !(self.duration > 0.0 && samples <= MOST_SAMPLES) {
             return Err(format!(

@@ -115,12 +115,17 @@ where
         let last = self.initialised.then_some(self.policy.cost);
         let mut prices = Prices::none();
         let first = self.first_plan(x, aim, workspace);
-        if first == First::Regulator && !self.keeps_bounds(aim) {
-            self.hold_matrices(x, aim, tolerance, &mut prices, workspace);
-        }
+        let moved = first == First::Regulator
+            && !self.keeps_bounds(aim)
+            && self.hold_matrices(x, aim, tolerance, &mut prices, workspace);
         let begun = first != First::Nothing;
-        let found =
-            begun.then(|| self.search(x, aim, (along, most, tolerance), &mut prices, workspace));
+        let found = begun.then(|| {
+            match self.search(x, aim, (along, most, tolerance), &mut prices, workspace) {
+                Status::Converged => Status::Converged,
+                _ if moved => Status::Improved,
+                status => status,
+            }
+        });
         #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
         let found = self.look_elsewhere(x, aim, (last, tolerance), (found, prices), workspace);
         match found {
@@ -522,6 +527,8 @@ where
     fn publish(&mut self, status: Status<T>) {
         copy(&mut self.solution.u, &self.policy.u);
         copy(&mut self.solution.x, &self.rollout);
+        // The last program's is not that of this plan.
+        self.solution.cost = self.policy.cost * convert(0.5);
         self.solution.status = status;
     }
 

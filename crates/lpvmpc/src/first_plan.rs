@@ -3,7 +3,7 @@
 
 use crate::by_stage::PlantByStage;
 use crate::controller::Controller;
-use crate::descent::Along;
+use crate::descent::{Along, Outcome};
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Ocp, Stage};
 use crate::outputs;
@@ -76,7 +76,7 @@ where
     }
 
     /// One program with the matrices of `x` at all stages, as one program per sample begins, too. The plan moves towards its
-    /// answer as far as that is better.
+    /// answer as far as that is better; whether it does is the answer.
     ///
     /// The regulator knows of no state bounds: where its loops exceed them, all of them may lie in a valley that no
     /// plan within the bounds is in.
@@ -88,7 +88,7 @@ where
         tolerance: T,
         prices: &mut Prices<T, NX>,
         workspace: &mut Workspace<T, NX, NU>,
-    ) {
+    ) -> bool {
         self.initialised = false;
         self.solve_scheduled(x, aim, workspace);
         self.take_feedback(workspace);
@@ -99,7 +99,8 @@ where
             at(&self.policy.u, i)
         });
         self.take_if_some(cost, &workspace.trial);
-        self.improve(x, aim, (tolerance, T::one()), prices, workspace);
+        let outcome = self.improve(x, aim, (tolerance, T::one()), prices, workspace);
+        matches!(outcome, Outcome::Moved { .. })
     }
 
     /// The regulator's closed loops towards the set point and towards points on the way to it, from the

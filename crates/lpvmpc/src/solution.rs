@@ -350,10 +350,11 @@ impl<T: fmt::Display> fmt::Display for Status<T> {
 pub struct Solution<T: 'static, const NX: usize, const NU: usize> {
     /// u_0 to u_{N-1}.
     pub u: List<SVector<T, NU>>,
-    /// x_1 to x_N, predicted by the problem's linear dynamics.
+    /// x_1 to x_N, predicted by the problem's linear dynamics; of a descent, by the nonlinear model.
     pub x: List<SVector<T, NX>>,
     /// Optimal value of the problem's cost, with the factor 1/2 of [`crate::Stage`] and the
-    /// price of exceeded soft bounds.
+    /// price of exceeded soft bounds. Of a descent, half of the cost J of the plan (with its constant terms) and of the price
+    /// of what it exceeds.
     pub cost: T,
     /// What the answer is worth.
     pub status: Status<T>,

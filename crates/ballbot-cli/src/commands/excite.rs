@@ -53,7 +53,12 @@ pub struct ExciteArguments {
     #[arg(long, value_parser = finite_list::<4>, allow_hyphen_values = true, value_name = "K1,K2,K3,K4")]
     pub gain: Option<[f64; 4]>,
     /// Where to write the torque
-    #[arg(long, value_name = "FILE.csv", default_value = "out/excitation.csv")]
+    #[arg(
+        short,
+        long,
+        value_name = "FILE.csv",
+        default_value = "out/excitation.csv"
+    )]
     pub out: PathBuf,
     /// Print JSON
     #[arg(long)]

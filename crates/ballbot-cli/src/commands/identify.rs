@@ -35,7 +35,7 @@ pub struct IdentifyArguments {
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "out/identification")]
+    #[arg(short, long, value_name = "DIR", default_value = "out/identification")]
     pub out: PathBuf,
     /// Leave out a part of a log, in seconds since its first row; 2:FROM,TO for the second log
     #[arg(long, value_name = "[LOG:]FROM,TO", value_parser = part)]

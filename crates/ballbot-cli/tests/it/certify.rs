@@ -155,6 +155,20 @@ fn what_cannot_be_proved_is_not_written() {
 }
 
 /// What is designed for a box of tilts holds in a larger set.
+/// A robot whose tilt rate has no bound: the key is named, and what would be right.
+#[test]
+fn a_bound_that_a_set_needs_is_asked_for_by_its_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("certificate");
+    let message = failure(&["certify", "one-metre", "--out", out.to_str().unwrap()], 1);
+    let expected = [
+        "bounds.theta_dot_rad_s = [-inf, inf]",
+        "--set bounds.theta_dot_rad_s=[-4,4]",
+    ];
+    assert_says(&message, &expected);
+    assert!(!out.exists());
+}
+
 #[test]
 fn the_level_is_raised_after_the_design() {
     let folder = tempfile::tempdir().unwrap();

@@ -148,7 +148,7 @@ fn a_log_becomes_parameters_a_report_and_words() {
         "50",
         "--tilt-limit",
         "5",
-        "--out",
+        "-o",
         name(&torque),
     ]);
     assert_says(&words, &["the tilt limits it", "delay_s", "Cramer-Rao"]);
@@ -192,7 +192,7 @@ fn what_cannot_be_used_is_named() {
     );
     let message = failure(&["identify", name(&short)], 1);
     assert_says(&message, &["no stretch of 1 s"]);
-    let message = failure(&["excite", "--length", "3", "--out", name(&empty)], 1);
+    let message = failure(&["excite", "--length", "3", "-o", name(&empty)], 1);
     assert_says(&message, &["the length is 3", "10.0 s"]);
 }
 

@@ -1,13 +1,15 @@
-//! Set points from afar within the bounds of `tight-bounds`, as a descent and as one program per sample.
+//! Set points from afar within the bounds of `tight-bounds`, as a descent.
 
+use ballbot::Controller;
 use ballbot_scenario::{
-    PointTable, ReferenceTable, RunHooks, Scenario, StateBounds, TerminalTable,
+    PointTable, Prepared, ReferenceTable, RunHooks, Scenario, StateBounds, TerminalTable,
 };
+use lpvmpc::{Iterations, Reference, Status};
+use nalgebra::Vector4;
 use std::path::Path;
 
-/// The largest tilt at a sample, and the samples without a plan, of `tight-bounds` with the default predictor and
-/// terminal cost on the way from rest to `phi_rad`.
-fn way_to(phi_rad: f64, horizon: usize, state_bounds: StateBounds) -> (f64, usize) {
+/// `tight-bounds` with the default predictor and terminal cost, to `phi_rad` from rest.
+fn way_to(phi_rad: f64, horizon: usize, state_bounds: StateBounds) -> Prepared {
     let mut scenario = Scenario::load("tight-bounds").unwrap();
     scenario.controller.predictor = None;
     scenario.controller.terminal = TerminalTable::default();
@@ -20,8 +22,12 @@ fn way_to(phi_rad: f64, horizon: usize, state_bounds: StateBounds) -> (f64, usiz
     scenario.reference = ReferenceTable::SetPoints {
         points: vec![point],
     };
-    let prepared = scenario.prepare(Path::new(".")).unwrap();
-    let runs = prepared.run(&RunHooks::NONE).unwrap();
+    scenario.prepare(Path::new(".")).unwrap()
+}
+
+/// The largest tilt at a sample, and the samples without a plan.
+fn tilt_on(way: &Prepared) -> (f64, usize) {
+    let runs = way.run(&RunHooks::NONE).unwrap();
     let samples = || runs.iter().flat_map(|run| &run.samples);
     let tilt = samples().map(|sample| sample.x[1].abs());
     let without = samples().filter(|sample| !sample.status.is_solved());
@@ -32,12 +38,28 @@ fn way_to(phi_rad: f64, horizon: usize, state_bounds: StateBounds) -> (f64, usiz
 #[test]
 fn the_bounds_are_kept_and_there_is_always_a_plan() {
     for (horizon, phi_rad) in [(20, 83.0), (40, 33.0), (60, 28.0), (60, 60.0), (80, 83.0)] {
-        let (tilt, without_plan) = way_to(phi_rad, horizon, StateBounds::Hard);
+        let (tilt, without_plan) = tilt_on(&way_to(phi_rad, horizon, StateBounds::Hard));
         assert_eq!(without_plan, 0, "{horizon} {phi_rad}");
         // As far as the prediction is the plant.
         assert!(tilt < 0.3 + 1e-4, "{horizon} {phi_rad}: {tilt}");
-        let (tilt, without_plan) = way_to(phi_rad, horizon, StateBounds::Soft);
+        let (tilt, without_plan) = tilt_on(&way_to(phi_rad, horizon, StateBounds::Soft));
         assert_eq!(without_plan, 0, "{horizon} {phi_rad}");
         assert!(tilt < 0.3 + 1e-3, "{horizon} {phi_rad}: {tilt}");
+    }
+}
+
+/// The program along the present state is one of those that a sample may have, and what it improves is improved.
+#[test]
+fn a_single_program_is_enough_for_an_improvement() {
+    for state_bounds in [StateBounds::Soft, StateBounds::Hard] {
+        let way = way_to(60.0, 60, state_bounds);
+        let mut settings = way.settings;
+        settings.iterations = Iterations::descent(Iterations::<f64>::TOLERANCE, 1);
+        let mut controller = Controller::<f64>::allocate(way.ballbot, settings).unwrap();
+        let mut workspace = controller.workspace();
+        let reference = Reference::constant(way.planes[0].state_reference(0.0));
+        let plan = controller.step(&Vector4::zeros(), &reference, &mut workspace);
+        assert_eq!(plan.status, Status::Improved);
+        assert_eq!(controller.problems(), 1);
     }
 }

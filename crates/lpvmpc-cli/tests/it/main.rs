@@ -184,6 +184,12 @@ fn what_is_wrong_is_named_and_nothing_is_written() {
             "horizon = 0",
             vec!["controller: horizon: it is 0"],
         ),
+        ("t_s = 0.04", "t_s = 0.0", vec!["controller: t_s: it is 0"]),
+        (
+            "t_s = 0.04",
+            "t_s = nan",
+            vec!["controller: t_s: it is NaN"],
+        ),
         ("duration = 1.0", "duration = inf", vec!["duration = inf"]),
         (
             "duration = 1.0",
@@ -247,7 +253,7 @@ fn a_plant_in_discrete_time_is_certified_and_proved_again() {
         let message = fail(folder.path(), &["certify", "map.toml", "--out", file]);
         assert!(message.contains("would be lost"), "{message}");
     }
-    let arguments = ["certify", "map.toml", "--out", "certificate.json"];
+    let arguments = ["certify", "map.toml", "-o", "certificate.json"];
     succeed(folder.path(), &arguments);
     let arguments = ["verify", "certificate.json", "map.json", "--json"];
     let verified: Value = serde_json::from_str(&succeed(folder.path(), &arguments)).unwrap();
@@ -275,10 +281,7 @@ fn an_input_that_is_switched_off_is_drawn() {
         &format!("{bounds}0, 0]"),
     );
     fs::write(&path, off).unwrap();
-    lpvmpc(
-        folder.path(),
-        &["simulate", "cart-pole.toml", "--out", "off"],
-    );
+    lpvmpc(folder.path(), &["simulate", "cart-pole.toml", "-o", "off"]);
     assert!(folder.path().join("off").join("trajectory.csv").exists());
     assert!(folder.path().join("off").join("figure.svg").exists());
 }

@@ -115,7 +115,14 @@ fn the_plan_is_a_rollout() {
     for _ in 0..50 {
         let x = random_state(&mut rng);
         let mut tried = controller(descent(8));
-        let plan = tried.step(&x, &set_point(1.0), &mut memory);
+        let reference = set_point(1.0);
+        let plan = tried.step(&x, &reference, &mut memory);
+        let merit = merit(&x, &plan.u, &reference);
+        assert!(
+            (2.0 * plan.cost / merit - 1.0).abs() < 1e-9,
+            "{} {merit}",
+            plan.cost
+        );
         let mut state = x;
         for (u, planned) in plan.u.iter().zip(&plan.x) {
             state = RK4.advance(&CartPole::laboratory(), &state, u, descent(8).t_s);
