@@ -408,14 +408,17 @@ pub(crate) fn check_weight<T: Scalar, const K: usize>(
     let mut symmetric = *weight;
     for i in 0..K {
         for j in 0..=i {
-            let (lower, upper) = (weight[(i, j)], weight[(j, i)]);
+            let entry = |at: (usize, usize)| weight.get(at).copied().unwrap_or_else(T::zero);
+            let (lower, upper) = (entry((i, j)), entry((j, i)));
             if !(lower.is_finite() && upper.is_finite()) {
                 return Err(ControllerError::WeightEntries(name));
             }
             size = largest(size, largest(lower.abs(), upper.abs()));
             asymmetry = largest(asymmetry, (lower - upper).abs());
             // Half before the sum, which could overflow.
-            symmetric[(i, j)] = lower * half + upper * half;
+            if let Some(place) = symmetric.get_mut((i, j)) {
+                *place = lower * half + upper * half;
+            }
         }
     }
     if asymmetry > roundings * T::default_epsilon() * size {

@@ -119,12 +119,13 @@ fn price_of_way<T: Scalar, const NX: usize>(cost: &SMatrix<T, NX, NX>, j: usize,
 
 /// P_jj; of a state that costs nothing, the largest entry of P, which is one of its diagonal.
 fn own_cost<T: Scalar, const NX: usize>(cost: &SMatrix<T, NX, NX>, j: usize) -> T {
-    let own = cost[(j, j)];
+    let on_diagonal = |i: usize| cost.get((i, i)).copied().unwrap_or_else(T::zero);
+    let own = on_diagonal(j);
     if own > T::zero() {
         return own;
     }
     (0..NX).fold(T::zero(), |largest, i| {
-        let own = cost[(i, i)];
+        let own = on_diagonal(i);
         if own > largest { own } else { largest }
     })
 }
