@@ -7,7 +7,7 @@
 use crate::model::Scalar;
 use crate::ocp::{Bounds, Penalty, SoftBounds};
 use crate::plan::squared;
-use crate::settings::{ControllerSettings, TerminalIngredient};
+use crate::settings::{ControllerSettings, TerminalIngredient, largest};
 use nalgebra::{SMatrix, SVector, convert};
 
 /// Price of a state bound exceeded by its width, in terminal costs of a state at that width: of a
@@ -68,6 +68,7 @@ impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
     }
 
     /// Those of a sample whose goal is `way` from where the state is: those of the settings, raised where they are to be.
+    // Of its own, not within the step, whose registers it would take.
     #[inline(never)]
     pub fn new<const NU: usize, const NS: usize>(
         settings: &ControllerSettings<T, NX, NU, NS>,
@@ -124,8 +125,5 @@ fn own_cost<T: Scalar, const NX: usize>(cost: &SMatrix<T, NX, NX>, j: usize) -> 
     if own > T::zero() {
         return own;
     }
-    (0..NX).fold(T::zero(), |largest, i| {
-        let own = on_diagonal(i);
-        if own > largest { own } else { largest }
-    })
+    (0..NX).map(on_diagonal).fold(T::zero(), largest)
 }
