@@ -1,5 +1,6 @@
 //! Drives the guaranteed loop of `far-setpoints`, with one program per sample, to set points that are far apart,
-//! for `.ci/instructions.sh` to count the instructions of each step. Another horizon, in samples, may be given.
+//! for `.ci/instructions.sh` to count the instructions of each step. Another horizon, in samples, may be given, and
+//! after it a tilt, a speed and a tilt rate: then it is the first step from there alone.
 
 use ballbot::{GuaranteedController, GuaranteedWorkspace};
 use ballbot_scenario::Scenario;
@@ -19,13 +20,22 @@ fn main() -> Result<(), Box<dyn Error>> {
         known: 1,
         ..settings.iterations
     };
-    if let Some(horizon) = std::env::args().nth(1) {
+    let mut arguments = std::env::args().skip(1);
+    if let Some(horizon) = arguments.next() {
         settings.horizon = horizon.parse()?;
     }
+    let start: Vec<f64> = arguments
+        .map(|number| number.parse())
+        .collect::<Result<_, _>>()?;
     let plant = Rk4 { substeps: 24 };
     let mut controller = GuaranteedController::allocate(prepared.ballbot, settings)?;
     let mut workspace = controller.workspace();
     let mut x = Vector4::zeros();
+    if let [theta, phi_dot, theta_dot] = start[..] {
+        x = Vector4::new(0.0, theta, phi_dot, theta_dot);
+        counted_step(&mut controller, &x, 0.0, &mut workspace);
+        return Ok(());
+    }
     for wanted in SET_POINTS {
         for _ in 0..SAMPLES {
             let u = counted_step(&mut controller, &x, wanted, &mut workspace);

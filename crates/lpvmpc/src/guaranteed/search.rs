@@ -13,6 +13,9 @@ use nalgebra::{SVector, convert};
 const WORTHWHILE: f64 = 1e-7;
 /// The shortest part of the way to the quadratic program's answer that a thorough search tries.
 const SHORTEST: f64 = 0.125;
+/// Programs without an answer, while no plan is known, after which all others of the sample have soft bounds at once:
+/// what leaves the one none leaves the next one none, and to prove it can take a hundred times as long as to answer.
+const HOPELESS: usize = 3;
 /// The longest horizon, in samples, over which every search is thorough: it takes little time there.
 const SHORT_HORIZON: usize = 10;
 
@@ -51,15 +54,19 @@ where
         };
         let mut least = known.map(|(_, cost)| cost);
         let mut improved = None;
-        let mut in_vain = 0;
+        let (mut unanswered, mut in_vain) = (0, 0);
         let mut served = planner.damping;
         // What is aimed at, while a first plan is looked for without it.
         let mut wanted = None;
         for _ in 0..most {
             planner.pose(along, &mut workspace.ocp);
-            planner.solve(workspace, warm_start);
+            let hopeless = least.is_none() && unanswered == HOPELESS;
+            if !hopeless {
+                planner.solve(workspace, warm_start);
+            }
             warm_start = WarmStart::Same;
-            if least.is_none() && !workspace.solution.status.is_solved() {
+            if hopeless || least.is_none() && !workspace.solution.status.is_solved() {
+                unanswered = HOPELESS.min(unanswered + 1);
                 planner.soften(&mut workspace.ocp);
                 planner.solve(workspace, WarmStart::Cold);
             }
