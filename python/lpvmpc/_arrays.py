@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import is_dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import SettingError
 
 Array = NDArray[np.float64]
+Kind = TypeVar("Kind")
 
 
 def numbers(place: str, given: ArrayLike, error: type[Exception] = SettingError) -> Array:
@@ -46,6 +47,20 @@ def listed(place: str, given: Any, what: str) -> list[Any]:
     if isinstance(given, (list, tuple)):
         return list(given)
     raise SettingError(f"{place}: {given!r} is not {what}")
+
+
+def by_name(place: str, given: Any, what: str) -> Mapping[str, Any]:
+    """A dictionary with names as its keys; `what` it must be is for the message."""
+    if isinstance(given, Mapping):
+        return given
+    raise SettingError(f"{place}: {given!r} is not {what}")
+
+
+def instance(place: str, given: Any, kind: type[Kind], name: str | None = None) -> Kind:
+    """Something of this package's own; `name` is where it is found, if not in `lpvmpc` itself."""
+    if isinstance(given, kind):
+        return given
+    raise SettingError(f"{place}: {type(given).__name__} is no {name or f'lpvmpc.{kind.__name__}'}")
 
 
 def column(

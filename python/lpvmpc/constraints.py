@@ -9,7 +9,7 @@ from typing import Any, Union
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import by_stage, column, equally_long, number
+from ._arrays import by_stage, column, equally_long, instance, number
 from .errors import SettingError
 from .plant import Plant, Signal
 
@@ -124,8 +124,7 @@ def bounds(plant: Plant, name: str, given: Limits) -> dict[str, Array]:
 
 
 def _price(place: str, price: Any) -> tuple[float, float]:
-    if not isinstance(price, Penalty):
-        raise SettingError(f"{place}: {price!r} is no Penalty(linear, quadratic)")
+    instance(place, price, Penalty)
     return number(place, price.linear), number(place, price.quadratic)
 
 
@@ -139,8 +138,7 @@ def prices(
 
 def row(plant: Plant, given: Row) -> tuple[Any, ...]:
     """A row as the native half takes it."""
-    if not isinstance(given, Row):
-        raise SettingError(f"rows: {given!r} is no lpvmpc.Row")
+    instance("rows", given, Row)
     place = f"rows, {given.name}"
     of_x = _coefficients(f"{place}, x", given.x, plant.states)
     of_u = _coefficients(f"{place}, u", given.u, plant.inputs)

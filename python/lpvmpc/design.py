@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _lpvmpc
-from ._arrays import column, number, weight, whole
+from ._arrays import column, instance, number, weight, whole
 from ._progress import reported
 from .certificate import Certificate
 from .constraints import Limits, limits
@@ -182,7 +182,11 @@ def verify(certificate: Certificate, plant: Plant, *, progress: bool = False) ->
         A claim is false; the message has a state that shows it.
     CertificateError
         A claim could not be shown, and may be true; or the certificate is of another plant.
+    SettingError
+        What is given is no certificate or no plant.
     """
+    instance("certificate", certificate, Certificate)
+    instance("plant", plant, Plant)
     with reported(progress) as report:
         boxes, reach = _lpvmpc.verify(certificate.to_json(), plant._native, report)
     return Verified(boxes=boxes, reach=np.array(reach))

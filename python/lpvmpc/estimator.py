@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import column, number
+from ._arrays import by_name, column, instance, number
 from .errors import SettingError
 from .plant import Plant, Signal
 
@@ -79,24 +79,20 @@ class Estimate:
 
 def to_native(plant: Plant, given: Estimator) -> dict[str, Any]:
     """An estimator as the native half takes it."""
-    if not isinstance(given, Estimator):
-        raise SettingError(f"estimator: {given!r} is no lpvmpc.Estimator")
+    instance("estimator", given, Estimator)
     states = plant.states
     place = "estimator"
-    if not isinstance(given.measured, Mapping):
-        raise SettingError(f"{place}, measured: it must be variances by name")
-    for name, one in given.disturbances.items():
-        if not isinstance(one, Disturbance):
-            raise SettingError(f"{place}, disturbances, {name}: {one!r} is no lpvmpc.Disturbance")
-    gate = given.gate
-    if not isinstance(gate, Gate):
-        raise SettingError(f"{place}, gate: {gate!r} is no lpvmpc.Gate")
+    measured = by_name(f"{place}, measured", given.measured, "variances by name")
+    disturbances = by_name(f"{place}, disturbances", given.disturbances, "lpvmpc.Disturbance by name")
+    for name, one in disturbances.items():
+        instance(f"{place}, disturbances, {name}", one, Disturbance)
+    gate = instance(f"{place}, gate", given.gate, Gate)
     if isinstance(gate.patience, bool) or not isinstance(gate.patience, int) or gate.patience < 0:
         raise SettingError(f"{place}, gate, patience: {gate.patience!r} is no whole number from 0 on")
     return {
-        "measured": list(given.measured),
+        "measured": list(measured),
         "measurement_noise": [
-            number(f"{place}, measured, {name}", one) for name, one in given.measured.items()
+            number(f"{place}, measured, {name}", one) for name, one in measured.items()
         ],
         "state_noise": _by_state(f"{place}, state_noise", given.state_noise, states, 0.0),
         "start": None
@@ -109,7 +105,7 @@ def to_native(plant: Plant, given: Estimator) -> dict[str, Any]:
                 number(f"{place}, disturbances, {name}, noise", one.noise),
                 number(f"{place}, disturbances, {name}, initial", one.initial),
             )
-            for name, one in given.disturbances.items()
+            for name, one in disturbances.items()
         ],
         "delay": number(f"{place}, delay", given.delay),
         "gate": (

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _lpvmpc
-from ._arrays import column, copied, listed, number, whole
+from ._arrays import column, copied, instance, listed, number, whole
 from ._preview import AHEAD
 from ._preview import to_native as preview_to_native
 from ._settings import to_native as settings_to_native
@@ -34,6 +34,9 @@ class Mpc:
 
     over the motion of the nonlinear plant, sampled by Runge-Kutta steps with the input held, within the bounds.
     Each sample solves a few quadratic programs, each an improvement of the plan.
+
+    One thread at a time may use a controller; a call during another's raises ``RuntimeError``. Several controllers work
+    side by side in threads of their own.
 
     Parameters
     ----------
@@ -146,8 +149,7 @@ class Mpc:
         tolerance: float = 1e-5,
         estimator: Estimator | None = None,
     ) -> None:
-        if not isinstance(plant, Plant):
-            raise SettingError(f"plant: {type(plant).__name__} is no lpvmpc.Plant")
+        instance("plant", plant, Plant)
         self._plant = plant
         self._settings: dict[str, Any] = copied({
             "t_s": t_s, "horizon": horizon, "q": q, "r": r, "terminal": terminal,

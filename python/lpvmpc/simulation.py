@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any, TypeVar, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _lpvmpc
-from ._arrays import column, listed, number, numbers
+from ._arrays import by_name, column, instance, listed, number, numbers
 from ._progress import samples_of
 from .errors import MissingPackageError, SettingError, SimulationError
 from .estimator import Estimator
@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+Kind = TypeVar("Kind")
+
+MOST_SAMPLES = 10_000_000
+"""The longest run; it has to fit into memory."""
 
 Reference = Union[ArrayLike, Callable[[float], ArrayLike], None]
 """A constant reference (n,), one by sample (samples, n) whose last row holds from its end, or a
@@ -293,6 +297,7 @@ def simulate(
     >>> float(run["position"][-1].round(3)), run.is_solved
     (1.0, True)
     """
+    instance("plant", plant, Plant)
     states, inputs = plant.states, plant.inputs
     n, m = len(states), len(inputs)
     mpc = controller if isinstance(controller, Mpc) else None
@@ -316,6 +321,10 @@ def simulate(
     if not (np.isfinite(duration) and duration > 0):
         raise SettingError(f"duration: it is {duration} s; it must be a positive number of seconds")
     count = int(np.ceil(duration / period - 1e-9))
+    if count > MOST_SAMPLES:
+        raise SettingError(
+            f"duration: {duration} s are {count:.4g} samples of {period} s; there is room for {MOST_SAMPLES}"
+        )
     horizon = mpc.horizon if mpc is not None else 0
     reference = _reference(x_ref, n, count, period)
     estimator = None if mpc is None else mpc.estimator
@@ -447,13 +456,16 @@ def _reference(
     )
 
 
-def _by_name(place: str, given: Mapping[str, Any] | None, signals: list[Signal], kind: type) -> None:
+def _by_name(
+    place: str, given: Mapping[str, Kind] | None, signals: list[Signal], kind: type[Kind]
+) -> Mapping[str, Kind]:
     names = [signal.name for signal in signals]
-    for name, one in (given or {}).items():
+    one_each = by_name(place, {} if given is None else given, f"lpvmpc.{kind.__name__} by name")
+    for name, one in one_each.items():
         if name not in names:
             raise SettingError(f"{place}: there is no {name!r}; there are {', '.join(names)}")
-        if not isinstance(one, kind):
-            raise SettingError(f"{place}, {name}: {one!r} is no lpvmpc.{kind.__name__}")
+        instance(f"{place}, {name}", one, kind)
+    return one_each
 
 
 def _sensors(
@@ -467,12 +479,12 @@ def _sensors(
             if name not in known:
                 raise SettingError(f"plant: it has no {name!r}, which the controller measures")
         measured = [known[name] for name in estimator.measured]
-    _by_name("sensors", given, measured, Sensor)
-    if not given and estimator is None:
+    sensors = _by_name("sensors", given, measured, Sensor)
+    if not sensors and estimator is None:
         return None
     found = []
     for signal in measured:
-        one = (given or {}).get(signal.name, Sensor())
+        one = sensors.get(signal.name, Sensor())
         row = [1.0 if state.name == signal.name else 0.0 for state in states]
         of = row if any(row) else signal.name
         errors = [
@@ -486,10 +498,10 @@ def _sensors(
 def _actuators(
     given: Mapping[str, Actuator] | None, inputs: list[Signal]
 ) -> list[tuple[float, float, float]] | None:
-    _by_name("actuators", given, inputs, Actuator)
-    if not given:
+    actuators = _by_name("actuators", given, inputs, Actuator)
+    if not actuators:
         return None
-    each = [(signal.name, given.get(signal.name, Actuator())) for signal in inputs]
+    each = [(signal.name, actuators.get(signal.name, Actuator())) for signal in inputs]
     return [
         (
             number(f"actuators, {name}, limit", one.limit),

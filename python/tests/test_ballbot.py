@@ -206,10 +206,22 @@ def test_what_cannot_be_identified_is_told(tmp_path: Path) -> None:
         ballbot.identify("log.csv")
     with pytest.raises(lpvmpc.SettingError, match=r"leave_out\[0\]"):
         ballbot.identify(["log.csv"], leave_out=[(2, 0.0, 1.0)])
+    wrong: Any
+    for wrong in ("all", (1.0,), ("a", 1.0)):
+        with pytest.raises(lpvmpc.SettingError, match=r"leave_out\[0\]: "):
+            ballbot.identify(["log.csv"], leave_out=[wrong])
+    wrong = 3
+    with pytest.raises(lpvmpc.SettingError, match="leave_out: 3 is not a list"):
+        ballbot.identify(["log.csv"], leave_out=wrong)
+    with pytest.raises(lpvmpc.SettingError, match="recordings: it is empty"):
+        ballbot.identify([])
     with pytest.raises(lpvmpc.SettingError, match="did you mean `geometry`"):
         ballbot.identify(["log.csv"], {"geometri": {}})
     with pytest.raises(lpvmpc.IdentificationError, match="harmonics"):
         ballbot.excite(harmonics=0)
+    for asked in ({"band": 3}, {"band": ("a", 2)}, {"harmonics": 2.5}, {"amplitude": "much"}, {"gain": [1]}):
+        with pytest.raises(lpvmpc.SettingError, match=next(iter(asked))):
+            ballbot.excite(**asked)
     with pytest.raises(lpvmpc.IdentificationError, match="torque"):
         ballbot.excite(amplitude=float("nan"))
     (tmp_path / "my.toml").write_text(ballbot.identification_example(), encoding="utf-8")
@@ -230,6 +242,13 @@ def test_a_certificate_that_claims_too_much_is_refused(
     (tmp_path / "more.json").write_text(text.replace('"level"', '"levle"', 1), encoding="utf-8")
     with pytest.raises(lpvmpc.CertificateError):
         ballbot.verify(tmp_path / "more.json")
+    with pytest.raises(FileNotFoundError, match="none.json"):
+        ballbot.verify(tmp_path / "none.json")
+    wrong: Any = "large"
+    with pytest.raises(lpvmpc.SettingError, match="size: it is 'large'"):
+        ballbot.certify(scenario, size=wrong)
+    with pytest.raises(lpvmpc.SettingError, match="scenario: str is no lpvmpc.ballbot.Scenario"):
+        ballbot.certify(wrong)
     at = text.index(str(proved.level))
     claimed = text[:at] + str(100 * proved.level) + text[at + len(str(proved.level)) :]
     (tmp_path / "false.json").write_text(claimed, encoding="utf-8")

@@ -85,6 +85,8 @@ def test_a_file_is_the_certificate(certified, tmp_path):
     loaded = lpvmpc.Certificate.load(tmp_path / "certificate.json")
     assert loaded == certificate == pickle.loads(pickle.dumps(certificate))
     verified = lpvmpc.verify(loaded, plant)
+    with pytest.raises(lpvmpc.SettingError, match="certificate: str is no lpvmpc.Certificate"):
+        lpvmpc.verify("certificate.json", plant)
     assert (verified.reach <= loaded.state_limits).all()
     assert repr(loaded).startswith("<Certificate of 'cart-pole', 0.05 s: level ")
     assert loaded.k.shape == (1, 4) and loaded.u.shape == (1,) and not loaded.contains([0, 2, 0, 0])

@@ -129,6 +129,7 @@ def test_an_estimator_comes_and_goes_and_is_pickled():
         ({"delay": -1.0}, "estimator, delay: it is -1 s"),
         ({"disturbances": {"wind": lpvmpc.Disturbance(1.0)}}, '"wind" is no input or state'),
         ({"disturbances": {"force": 1.0}}, "is no lpvmpc.Disturbance"),
+        ({"disturbances": 1.0}, "disturbances: 1.0 is not lpvmpc.Disturbance by name"),
         ({"gate": 3.0}, "is no lpvmpc.Gate"),
         ({"gate": lpvmpc.Gate(patience=-1)}, "gate, patience"),
     ],

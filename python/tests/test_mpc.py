@@ -289,7 +289,7 @@ def make(**changes):
         (lambda: make(u_bounds={"torque": (0, 1)}), "there is no 'torque'; there are force"),
         (lambda: make(x_bounds=([0], [1])), r"x_bounds, lower: its shape is \(1,\)"),
         (lambda: make(state_bounds="firm"), "state_bounds"),
-        (lambda: make(state_bounds={"tilt": 3.0}), "no Penalty"),
+        (lambda: make(state_bounds={"tilt": 3.0}), "no lpvmpc.Penalty"),
         (lambda: make(state_bounds={"tilt": lpvmpc.Penalty(-1.0)}), "not negative"),
         (lambda: make(rows=["a"]), "no lpvmpc.Row"),
         (lambda: make(rows=[lpvmpc.Row("a", x={"height": 1})]), "there is no 'height'"),

@@ -169,6 +169,9 @@ def diverging(t, x):
         (lambda s: s([0] * 4, 1.0, sensors={"height": lpvmpc.Sensor()}), lpvmpc.SettingError, "height"),
         (lambda s: s([0] * 4, 1.0, sensors={"tilt": 0.1}), lpvmpc.SettingError, "no lpvmpc.Sensor"),
         (lambda s: s([0] * 4, 1.0, sensors={"tilt": lpvmpc.Sensor(noise=-1)}), lpvmpc.SettingError, "noise"),
+        (lambda s: s([0] * 4, 1.0, sensors="good"), lpvmpc.SettingError, "sensors: 'good' is not lpvmpc.Sensor by name"),
+        (lambda s: s([0] * 4, 1.0, actuators=[1]), lpvmpc.SettingError, "actuators: .* is not lpvmpc.Actuator by name"),
+        (lambda s: s([0] * 4, 1e12), lpvmpc.SettingError, "duration: .* there is room for 10000000"),
         (lambda s: s([0] * 4, 1.0, disturbances=["wind"]), lpvmpc.SettingError, r"disturbances\[0\]"),
         (lambda s: s([0] * 4, 1.0, disturbances=[lpvmpc.Load(1, 0, [0] * 4)]), lpvmpc.SettingError, "disturbance 0"),
         (lambda s: s([0] * 4, 1.0, relative_tolerance=0.0), lpvmpc.SettingError, "tolerances"),
@@ -197,6 +200,8 @@ def test_runs_and_plans_are_equal_to_themselves():
 
 def test_controllers_that_make_no_sense():
     plant = double_integrator()
+    with pytest.raises(lpvmpc.SettingError, match="plant: int is no lpvmpc.Plant"):
+        lpvmpc.simulate(3, lambda t, x: [0.0], [0, 0], 1.0, t_s=0.1)
     with pytest.raises(lpvmpc.SettingError, match="for 4 states"):
         lpvmpc.simulate(plant, controller(), [0, 0], 1)
     with pytest.raises(lpvmpc.SettingError, match="needs a sampling time"):

@@ -3,6 +3,7 @@
 use ballbot::Ballbot;
 use ballbot_identification::ConfigError;
 use ballbot_scenario::{ScenarioError, words};
+use lpvmpc_certificate::DocumentError;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
@@ -40,6 +41,14 @@ pub enum InputError {
         path: PathBuf,
         /// Key, value and what would be right.
         source: ConfigError,
+    },
+    /// Not a certificate.
+    #[error("{}: {source}", path.display())]
+    Certificate {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: DocumentError,
     },
 }
 

@@ -6,10 +6,12 @@ mod error;
 pub use body::BodyTable;
 pub use error::ConfigError;
 
+use crate::coordinates;
 use crate::log::{Columns, WheelPlane};
 use crate::parameter::{Choice, Parameter, Values};
 use ballbot::Geometry;
 use serde::Deserialize;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// A configuration, as written in a TOML file. Every table may be left out.
@@ -191,6 +193,13 @@ impl Config {
                 within(key, time, 0.0, 1e9, "a time from 0 on")
             })?;
         }
+        if let (Some(from), Some(until)) = (self.log.from_s, self.log.until_s) {
+            within("log.until_s", until, from, 1e9, "a time after log.from_s")?;
+        }
+        let delimiter = self.log.delimiter;
+        if delimiter.is_alphanumeric() || "+-.\"'\r\n".contains(delimiter) {
+            return Err(ConfigError::Delimiter(delimiter));
+        }
         for [from, to] in &self.log.leave_out {
             within("log.leave_out", *from, 0.0, 1e9, "a time from 0 on")?;
             within(
@@ -302,16 +311,29 @@ impl Config {
         for (key, table) in &self.parameters {
             let parameter = Parameter::from_key(key)
                 .ok_or_else(|| ConfigError::UnknownParameter { key: key.clone() })?;
-            choices[parameter] = table.choice(&format!("parameters.{key}"))?;
-        }
-        if let Choice::Fixed(delay)
-        | Choice::Free { start: Some(delay) }
-        | Choice::Prior { mean: delay, .. } = choices[Parameter::Delay]
-        {
-            let longest = crate::coordinates::LONGEST_DELAY;
-            within("parameters.delay_s", delay, 0.0, longest, "from 0 to 0.1 s")?;
+            let key = format!("parameters.{key}");
+            choices[parameter] = table.choice(&key)?;
+            if let Choice::Fixed(value)
+            | Choice::Free { start: Some(value) }
+            | Choice::Prior { mean: value, .. } = choices[parameter]
+            {
+                self.check_size(parameter, &key, value)?;
+            }
         }
         Ok(choices)
+    }
+
+    /// That a robot of these lengths can have this `value`.
+    fn check_size(&self, parameter: Parameter, key: &str, value: f64) -> Result<(), ConfigError> {
+        let (least, most) = coordinates::range(parameter, self.geometry(), self.fit.physical);
+        let expected = match most.is_finite() {
+            true => {
+                let [least, most] = [least, most].map(lpvmpc_design::number_text);
+                format!("from {least} to {most} {}", parameter.unit())
+            }
+            false => "a positive number".to_owned(),
+        };
+        within(key, value, least, most, expected)
     }
 }
 
@@ -350,7 +372,7 @@ fn within(
     value: f64,
     least: f64,
     most: f64,
-    expected: &'static str,
+    expected: impl Into<Cow<'static, str>>,
 ) -> Result<(), ConfigError> {
     if (least..=most).contains(&value) {
         return Ok(());
@@ -358,13 +380,14 @@ fn within(
     Err(ConfigError::Value {
         key: key.to_owned(),
         value,
-        expected,
+        expected: expected.into(),
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::log::Unit;
 
     #[test]
     fn the_example_says_the_defaults() {
@@ -380,6 +403,26 @@ mod tests {
         let config = Config::parse(&text).unwrap();
         assert!(config.body.is_some() && !config.parameters.is_empty());
         assert!(config.noise.phi_rad.is_some());
+    }
+
+    #[test]
+    fn of_a_column_any_key_may_be_left_out() {
+        let log = |text: &str| Config::parse(text).unwrap().log;
+        let theta = log("[log.theta]\ncolumn = \"pitch\"").theta;
+        assert_eq!((theta.column.as_str(), theta.unit), ("pitch", Unit::Radian));
+        let theta = log("[log.theta]\nunit = \"deg\"").theta;
+        assert_eq!(
+            (theta.column.as_str(), theta.unit),
+            ("theta_rad", Unit::Degree)
+        );
+        let time = log("[log.time]\nfactor = 2.0").time;
+        assert_eq!((time.unit, time.factor), (Unit::Second, 2.0));
+    }
+
+    #[test]
+    fn what_no_ballbot_of_these_lengths_has_may_be_wanted_of_the_data_alone() {
+        let text = "[fit]\nphysical = false\n[parameters]\nb1_m2 = { start = 0.01 }";
+        assert!(Config::parse(text).is_ok());
     }
 
     #[test]
@@ -409,6 +452,30 @@ mod tests {
             ("[fit]\nheld_back = 1.0", "from 0 to 0.8"),
             ("[parameters]\nb7 = \"free\"", "there is no such parameter"),
             ("[parameters]\ndelay_s = { fixed = 3.0 }", "from 0 to 0.1 s"),
+            (
+                "[parameters]\nb1_m2 = { fixed = -1 }",
+                "parameters.b1_m2 = -1: it must be from 0.014402 to 1.5984 m^2",
+            ),
+            (
+                "[parameters]\nb4_m2_s = { start = -5 }",
+                "parameters.b4_m2_s = -5: it must be from 0 to 14.4 m^2/s",
+            ),
+            (
+                "[parameters]\ntorque_gain_1_kg = { prior = { mean = -0.1, standard_deviation = 1 } }",
+                "parameters.torque_gain_1_kg = -0.1: it must be a positive number",
+            ),
+            (
+                "[log]\nfrom_s = 5\nuntil_s = 2",
+                "log.until_s = 2: it must be a time after log.from_s",
+            ),
+            (
+                "[log]\ndelimiter = \"a\"",
+                "log.delimiter = 'a': it must be a character",
+            ),
+            (
+                "[log]\ndelimiter = \".\"",
+                "log.delimiter = '.': it must be a character",
+            ),
             (
                 "[parameters]\nb1_m2 = { prior = { mean = 1.0, standard_deviation = 0.0 } }",
                 "a positive number",

@@ -42,6 +42,20 @@ const LARGEST_CREEP: f64 = 0.2;
 /// No friction brings a ball to rest faster, 1/s.
 const FASTEST_FRICTION: f64 = 1000.0;
 
+/// What a robot of these lengths can have of a parameter, from the least to the most.
+pub fn range(parameter: Parameter, geometry: Geometry<f64>, physical: bool) -> (f64, f64) {
+    let free = Values([Choice::FREE; Parameter::ALL.len()]);
+    let coordinates = Coordinates::new(&free, geometry, false);
+    let bounds = coordinates.bounds(&Values([0.0; Parameter::ALL.len()]), physical);
+    // No parameter falls when a coordinate grows.
+    let [least, most] = [
+        bounds.0.map(|(least, _)| least),
+        bounds.0.map(|(_, most)| most),
+    ];
+    let value = |ends: &[f64]| coordinates.values(ends)[parameter];
+    (value(&least), value(&most))
+}
+
 impl Coordinates {
     /// The coordinates for a robot of which `choices` are made. `torque_known`: the torque is in N m.
     pub fn new(choices: &Values<Choice>, geometry: Geometry<f64>, torque_known: bool) -> Self {

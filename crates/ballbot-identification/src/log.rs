@@ -1,6 +1,7 @@
 //! A robot's log: read, converted to SI units, looked at. Nothing is repaired in silence: what is
 //! missing stays missing, and what is odd becomes a [`Finding`].
 
+mod channel;
 mod columns;
 mod diagnosis;
 mod error;
@@ -9,7 +10,8 @@ mod lines;
 mod run;
 mod table;
 
-pub use columns::{BallAngle, Channel, Columns, SecondPlane, Unit, WheelEncoders, WheelPlane};
+pub use channel::Channel;
+pub use columns::{BallAngle, Columns, SecondPlane, Unit, WheelEncoders, WheelPlane};
 pub use error::{LogError, Problem, Suspicion};
 pub use finding::Finding;
 pub use run::{Run, Torque};

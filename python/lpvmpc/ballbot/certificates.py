@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _lpvmpc
-from .._arrays import numbers
+from .._arrays import instance, number, numbers, whole
 from .._progress import reported
 from ..errors import SettingError
 from .._files import save
@@ -150,14 +150,16 @@ def certify(
         The scenario makes no sense.
     CertificateError
         What is asked makes none, or no set could be proved.
+    SettingError
+        Something that was asked is no number.
     """
-    asked = {
-        "size": size,
-        "level": level,
-        "contraction": contraction,
-        "boxes": boxes,
-        "trials": trials,
+    of_numbers = {"size": size, "level": level, "contraction": contraction}
+    asked: dict[str, Any] = {
+        name: None if one is None else number(name, one) for name, one in of_numbers.items()
     }
+    asked["boxes"] = None if boxes is None else whole("boxes", boxes, least=0)
+    asked["trials"] = None if trials is None else whole("trials", trials, least=0)
+    instance("scenario", scenario, Scenario, "lpvmpc.ballbot.Scenario")
     with reported(progress) as report:
         return ProvedSet(*_lpvmpc.certify_scenario(scenario._native, asked, report))
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _lpvmpc
+from .._arrays import column, listed, number, numbers, whole
 from .._progress import reported
 from ..errors import IdentificationError, SettingError
 from .._files import save
@@ -165,9 +166,11 @@ def identify(
     SettingError
         The configuration makes no sense.
     """
-    if not isinstance(recordings, (list, tuple)):
-        raise SettingError("recordings: it must be a list of recordings, of one too")
-    parts = [_part(i, part, len(recordings)) for i, part in enumerate(leave_out)]
+    recordings = listed("recordings", recordings, "a list of recordings, of one too")
+    if not recordings:
+        raise SettingError("recordings: it is empty; at least one is needed")
+    given = listed("leave_out", leave_out, "a list of (from, to) or (log, from, to)")
+    parts = [_part(i, part, len(recordings)) for i, part in enumerate(given)]
     with TemporaryDirectory(prefix="lpvmpc-") as folder, reported(progress) as report:
         paths = [_path(i, one, folder) for i, one in enumerate(recordings)]
         found = _lpvmpc.identify(paths, _content(config), parts, not physical, report)
@@ -278,19 +281,17 @@ def excite(
     IdentificationError
         There is no such excitation; the message says what is wrong with what was asked.
     SettingError
-        The configuration or the parameter file makes no sense.
+        The configuration or the parameter file makes no sense, or something that was asked is no number.
     """
-    if gain is not None and np.shape(gain) != (4,):
-        raise SettingError(f"gain: its shape is {np.shape(gain)}; it must be (4,)")
-    asked = {
-        "band": band,
-        "harmonics": harmonics,
-        "amplitude": amplitude,
-        "length": length,
-        "tilt_limit_deg": tilt_limit_deg,
-        "rate": rate,
-        "gain": None if gain is None else [float(one) for one in gain],
+    of_numbers = {
+        "amplitude": amplitude, "length": length, "tilt_limit_deg": tilt_limit_deg, "rate": rate,
+    }  # fmt: skip
+    asked: dict[str, Any] = {
+        name: None if one is None else number(name, one) for name, one in of_numbers.items()
     }
+    asked["harmonics"] = None if harmonics is None else whole("harmonics", harmonics, least=0)
+    asked["band"] = None if band is None else tuple(column("band", band, 2).tolist())
+    asked["gain"] = None if gain is None else column("gain", gain, 4).tolist()
     known = None if parameters is None else fspath(parameters)
     return Excitation(**_lpvmpc.excite(_content(config), known, asked))
 
@@ -340,10 +341,11 @@ def _csv(place: int, columns: Mapping[str, ArrayLike]) -> str:
     return "\n".join([",".join(arrays), *rows]) + "\n"
 
 
-def _part(
-    place: int, part: tuple[float, ...], logs: int
-) -> tuple[int | None, float, float]:
-    log, start, end = (None, *part) if len(part) == 2 else part
+def _part(place: int, part: Any, logs: int) -> tuple[int | None, float, float]:
+    found = numbers(f"leave_out[{place}]", part)
+    if found.shape not in ((2,), (3,)):
+        raise SettingError(f"leave_out[{place}]: {part!r} is neither (from, to) nor (log, from, to)")
+    log, start, end = (None, *found.tolist()) if len(found) == 2 else found.tolist()
     if log is not None and not (log == int(log) and 1 <= log <= logs):
         raise SettingError(f"leave_out[{place}]: the log is {log}; it must be from 1 to {logs}")
     if not (np.isfinite(start) and np.isfinite(end) and start < end):

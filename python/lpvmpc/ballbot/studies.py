@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from .. import _lpvmpc
+from .._arrays import instance, listed, whole
 from .._progress import reported
-from ..errors import SettingError
 from ._values import pandas
 from .scenario import Scenario
 
@@ -53,7 +53,12 @@ def bench(
         A scenario makes no sense, or cannot be timed.
     """
     chosen = _lpvmpc.timed_scenarios() if scenarios is None else scenarios
-    loaded = [one if isinstance(one, Scenario) else Scenario.builtin(one) for one in chosen]
+    loaded = [
+        Scenario.builtin(one)
+        if isinstance(one, str)
+        else instance("scenarios", one, Scenario, "lpvmpc.ballbot.Scenario")
+        for one in listed("scenarios", chosen, "a list of names or scenarios")
+    ]
     with reported(progress) as report:
         return Bench(*_lpvmpc.bench([one._native for one in loaded], scenarios is None, report))
 
@@ -115,9 +120,9 @@ def count_guarantee(
         "threads": (threads, 0, 1024),
     }
     for name, (value, least, most) in limits.items():
-        if not least <= value <= most:
-            raise SettingError(f"{name}: it is {value}; it must be from {least} to {most}")
-    native = (Scenario.builtin("far-setpoints") if scenario is None else scenario)._native
+        whole(name, value, least, most)
+    chosen = Scenario.builtin("far-setpoints") if scenario is None else scenario
+    native = instance("scenario", chosen, Scenario, "lpvmpc.ballbot.Scenario")._native
     with reported(progress) as report:
         found = _lpvmpc.count_guarantee(native, runs, samples, seed, threads, report)
     return [

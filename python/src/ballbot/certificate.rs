@@ -7,6 +7,7 @@ use crate::work::{Report, work};
 use ballbot_scenario::{TerminalCertificate, proofs};
 use ballbot_studies::{CertificateSearch, ProvedSet, Searching};
 use pyo3::prelude::*;
+use std::io;
 use std::path::PathBuf;
 
 /// What is asked of a set, as Python hands it over: all keys are there, `None` for what is usual.
@@ -58,7 +59,9 @@ pub fn certify_scenario<'py>(
 /// The text of a certificate's file.
 #[pyfunction]
 pub fn read_certificate(path: PathBuf) -> PyResult<String> {
-    Ok(ballbot_scenario::read_certificate(&path)?)
+    ballbot_scenario::read_certificate(&path).map_err(|error| {
+        io::Error::new(error.kind(), format!("{}: {error}", path.display())).into()
+    })
 }
 
 /// Proves the certificate in a text again: its numbers.

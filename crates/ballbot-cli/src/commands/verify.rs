@@ -37,7 +37,11 @@ pub fn run(arguments: &VerifyArguments) -> Result<String, CommandError> {
         path: path.clone(),
         source,
     })?;
-    let certificate = TerminalCertificate::from_json(&text)?;
+    let certificate =
+        TerminalCertificate::from_json(&text).map_err(|source| InputError::Certificate {
+            path: path.clone(),
+            source,
+        })?;
     let bar = Progress::of_parts("verifying");
     let proof = proofs::prove(&certificate, &|done| bar.set_part(done))?;
     drop(bar);

@@ -93,6 +93,15 @@ fn every_changed_number_is_refused() {
 }
 
 #[test]
+fn a_file_that_is_no_certificate_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("empty.json");
+    std::fs::write(&path, "").unwrap();
+    let message = failure(&["verify", path.to_str().unwrap()], 1);
+    assert_says(&message, &["empty.json: not a certificate"]);
+}
+
+#[test]
 fn a_false_claim_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let (document, _) = certified(folder.path());

@@ -2,6 +2,7 @@
 
 use crate::parameter::Parameter;
 use lpvmpc_design::number_text;
+use std::borrow::Cow;
 
 /// What makes no sense in a configuration.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -21,6 +22,12 @@ pub enum ConfigError {
          per unit: give that as factor, or leave [body] out"
     )]
     NoTorque,
+    /// A character that names and numbers have, too.
+    #[error(
+        "log.delimiter = {0:?}: it must be a character that no name and no number has, such as \",\", \";\", \
+         \"\\t\" or \" \""
+    )]
+    Delimiter(char),
     /// Tables about the planes of a log that contradict each other.
     #[error("{key}: {expected}")]
     Planes {
@@ -46,6 +53,6 @@ pub enum ConfigError {
         /// What was given.
         value: f64,
         /// What would be right.
-        expected: &'static str,
+        expected: Cow<'static, str>,
     },
 }

@@ -1,5 +1,6 @@
 //! Where a log's quantities stand, and in which units.
 
+use super::channel::{self, Channel};
 use super::error::Problem;
 use ballbot::{AZIMUTHS_OF_PAPER_DEG, BadWheels, Wheel, Wheels};
 use nalgebra::Vector3;
@@ -21,18 +22,23 @@ pub struct Columns {
     /// Rows between these times are left out, s since the first row.
     pub leave_out: Vec<[f64; 2]>,
     /// Time stamps.
+    #[serde(deserialize_with = "channel::time")]
     pub time: Channel,
     /// Ball angle.
+    #[serde(deserialize_with = "channel::phi")]
     pub phi: Channel,
     /// The encoders of the three wheels, whose angles are put together to the ball angle; `phi` is
     /// not read then.
     pub wheels: Option<WheelEncoders>,
     /// Tilt, as the inertial unit gives it.
+    #[serde(deserialize_with = "channel::theta")]
     pub theta: Channel,
     /// Tilt rate, as the gyroscope gives it. An empty column name says that there is none.
+    #[serde(deserialize_with = "channel::theta_dot")]
     pub theta_dot: Channel,
     /// Torque of the virtual wheel. Without a column name it is `torque_applied_nm` if the file has
     /// that, otherwise `torque_commanded_nm`.
+    #[serde(deserialize_with = "channel::torque")]
     pub torque: Channel,
     /// The second plane, where both are identified together: then all of the above is of the first, x.
     pub y: Option<SecondPlane>,
@@ -40,21 +46,6 @@ pub struct Columns {
     pub ball_angle: BallAngle,
     /// Go on although the units look wrong.
     pub accept_suspicious_units: bool,
-}
-
-/// One column.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Channel {
-    /// Name in the header.
-    #[serde(default)]
-    pub column: String,
-    /// Unit of the file.
-    pub unit: Unit,
-    /// Multiplies the value, for example r_w / r_b for a wheel's angle, a motor's torque per
-    /// ampere, or -1 for the other sign.
-    #[serde(default = "one")]
-    pub factor: f64,
 }
 
 /// The columns of the plane y in a file that holds both planes; time and wheels are those of the plane
@@ -77,10 +68,6 @@ pub struct SecondPlane {
 
 fn azimuths_of_paper() -> [f64; 3] {
     AZIMUTHS_OF_PAPER_DEG
-}
-
-fn one() -> f64 {
-    1.0
 }
 
 /// The encoders of three wheels. The angles m of the wheels against the body are those of the
@@ -422,28 +409,6 @@ impl Unit {
             Self::Turn | Self::TurnPerSecond => TAU,
             Self::TurnPerMinute => TAU / 60.0,
         }
-    }
-}
-
-impl Channel {
-    fn new(column: &str, unit: Unit) -> Self {
-        Self {
-            column: column.to_owned(),
-            unit,
-            factor: 1.0,
-        }
-    }
-
-    /// Whether a torque is in N m once the factor is applied: a current or a voltage is by a factor
-    /// that was measured.
-    fn is_torque(&self) -> bool {
-        let newton_metres = [Unit::NewtonMetre, Unit::MillinewtonMetre];
-        newton_metres.contains(&self.unit) || self.factor.abs() != 1.0
-    }
-
-    /// SI units for one of the file's.
-    pub(super) fn scale(&self) -> f64 {
-        self.unit.in_si() * self.factor
     }
 }
 

@@ -239,6 +239,19 @@ pub enum Problem {
         /// All rows.
         rows: usize,
     },
+    /// Most rows are earlier than the row before.
+    #[error(
+        "column `{column}` goes back at {count} of {rows} rows: the rows must be in the order of time, the \
+         earliest first"
+    )]
+    Backwards {
+        /// The column.
+        column: String,
+        /// Rows that are earlier than the row before.
+        count: usize,
+        /// All rows.
+        rows: usize,
+    },
     /// The time between rows is that of no control loop.
     #[error(
         "rows are {} s apart (median): {}",

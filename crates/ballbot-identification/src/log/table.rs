@@ -1,7 +1,8 @@
 //! From the text of a CSV file to columns of numbers.
 
 use super::Progress;
-use super::columns::{APPLIED, COMMANDED, Channel, Columns, Dimension};
+use super::channel::Channel;
+use super::columns::{APPLIED, COMMANDED, Columns, Dimension};
 use super::error::Problem;
 use super::finding::Finding;
 use super::lines::Lines;

@@ -35,6 +35,14 @@ pub(super) fn check(
             consequence: "the rows have no order in time",
         });
     }
+    let backward = intervals.iter().filter(|interval| **interval < 0.0).count();
+    if backward > forward.len() {
+        return Err(Problem::Backwards {
+            column: names.0[0].to_owned(),
+            count: backward,
+            rows: time.len(),
+        });
+    }
     let middle = median(&mut forward);
     if !INTERVALS.contains(&middle) {
         return Err(Problem::Rate { interval: middle });
