@@ -7,7 +7,6 @@ use crate::elsewhere::Watch;
 use crate::list::List;
 use crate::memory::ControllerMemory;
 use crate::model::{LpvModel, Scalar};
-use crate::ocp::{Ocp, Stage};
 use crate::outputs;
 use crate::plan::{Aim, Policy, at};
 #[cfg(feature = "alloc")]
@@ -16,16 +15,13 @@ use crate::settings::{
     ControllerError, ControllerSettings, InputReference, Iterations, TerminalIngredient, Weights,
     check, check_period,
 };
-use crate::small_matrix::product;
 use crate::soft_bounds::SoftPrices;
 use crate::solution::{Solution, Status};
 use crate::solver::{SolverSettings, WarmStart};
 use crate::steady_state::{SteadyState, SteadyStateProblem};
-
 use crate::two_parts::Answered;
 use crate::workspace::Workspace;
-use core::array::from_fn;
-use nalgebra::{SMatrix, SVector, convert};
+use nalgebra::SVector;
 
 /// The state reference along the horizon, in state units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,13 +47,6 @@ impl<T: Scalar, const NX: usize> Reference<'_, T, NX> {
         self.stages.get(i).unwrap_or(&self.terminal)
     }
 }
-
-/// So many stages are linearised together where that takes less time.
-const GROUP: usize = 4;
-
-/// States and inputs of such a group.
-type Group<'a, T, const NX: usize, const NU: usize> =
-    (&'a [SVector<T, NX>; GROUP], &'a [SVector<T, NU>; GROUP]);
 
 /// The LPVMPC controller of one plant.
 ///
@@ -225,23 +214,6 @@ where
         self.problems = 1;
     }
 
-    /// Weights, bounds and rows of the program, and the prices of soft bounds from `x` on.
-    #[inline(always)]
-    pub(crate) fn pose<D: CostByStage<T, NX, NU>>(
-        &mut self,
-        x: &SVector<T, NX>,
-        aim: &Aim<'_, T, NX, NU, D>,
-        workspace: &mut Workspace<T, NX, NU>,
-    ) {
-        let (settings, own) = (&self.settings, &aim.own);
-        let terminal = own.terminal().unwrap_or(&settings.terminal);
-        self.soft = SoftPrices::new(settings, terminal, &(x - aim.end()));
-        workspace.pose(settings, &self.soft);
-        if own.any() {
-            workspace.pose_own(settings, &self.soft, own);
-        }
-    }
-
     /// The steady state that the last step headed for: the end of its reference, or, where the plant
     /// cannot stand there, the nearest place where it can (`reached` tells which). `None` with a given
     /// input reference, and where no steady state was found; the reference is then taken as it is.
@@ -372,116 +344,6 @@ where
         }
     }
 
-    /// Algorithm 2, step 1: without a past, the plant is expected to stay at `x`.
-    fn initialise_scheduling(&mut self, x: &SVector<T, NX>) {
-        if !self.initialised {
-            self.rollout.fill(*x);
-            self.solution.u.fill(SVector::zeros());
-        }
-    }
-
-    /// Algorithm 1, lines 1 to 8: the predictor's matrices along the scheduling window, which
-    /// is that of the last rollout (Algorithm 2, steps 5 and 9).
-    pub(crate) fn predict<D: PlantByStage<P, T, NX, NU, NS>>(
-        &self,
-        x: &SVector<T, NX>,
-        own: D,
-        ocp: &mut Ocp<T, NX, NU>,
-    ) {
-        ocp.horizon = self.settings.horizon;
-        ocp.x0 = *x;
-        self.linearize(x, &self.solution.u, 1, own, ocp);
-    }
-
-    /// The predictor's matrices along the last rollout, which began at `x` and had these
-    /// `inputs`, from its sample `first` (0 or 1) on; the last input is repeated.
-    // Not inlined, so that each loop has the registers for itself: a tenth of the step's time.
-    #[inline(never)]
-    fn linearize<D: PlantByStage<P, T, NX, NU, NS>>(
-        &self,
-        x: &SVector<T, NX>,
-        inputs: &[SVector<T, NU>],
-        first: usize,
-        own: D,
-        ocp: &mut Ocp<T, NX, NU>,
-    ) {
-        let horizon = self.settings.horizon;
-        if P::TOGETHER {
-            let done = self.in_groups(x, inputs, first, &mut ocp.stages, |motion, stages| {
-                let Some(made) = own.predict_each(&self.model, &self.settings, motion) else {
-                    return false;
-                };
-                for ((c, a, b), stage) in made.iter().zip(stages) {
-                    (stage.a, stage.b, stage.c) = (*a, *b, *c);
-                }
-                true
-            });
-            let rest = ocp.stages.iter_mut().enumerate().take(horizon);
-            for (i, stage) in rest.skip(done) {
-                let (x, u) = self.expected(x, inputs, first + i);
-                (stage.a, stage.b, stage.c) = own.predict(i, &self.model, &self.settings, &x, &u);
-            }
-            return;
-        }
-        let states = core::iter::once(x).chain(self.rollout.iter()).skip(first);
-        let inputs = inputs.iter().take(horizon);
-        let window = states.zip(inputs.clone().skip(first).chain(inputs.last()));
-        let samples = ocp.stages.iter_mut().zip(window).take(horizon);
-        if D::SOME {
-            for (i, (stage, (x, u))) in samples.enumerate() {
-                (stage.a, stage.b, stage.c) = own.predict(i, &self.model, &self.settings, x, u);
-            }
-            return;
-        }
-        // The same again, for its registers: 2 % of the step's instructions.
-        let ControllerSettings { t_s, predictor, .. } = &self.settings;
-        let held = self.settings.scheduling.held();
-        for (stage, (x, u)) in samples {
-            let pair = predictor.linearize_along(&self.model, held, x, u, *t_s);
-            let c = predictor.offset_along(&self.model, held, (x, u), *t_s, &pair);
-            stage.c = c.unwrap_or_else(SVector::zeros);
-            (stage.a, stage.b) = pair;
-        }
-    }
-
-    /// State and input that are expected `i` samples from `x` on, along the last rollout and these `inputs`; beyond the
-    /// last, the last.
-    fn expected(
-        &self,
-        x: &SVector<T, NX>,
-        inputs: &[SVector<T, NU>],
-        i: usize,
-    ) -> (SVector<T, NX>, SVector<T, NU>) {
-        let state = i
-            .checked_sub(1)
-            .map_or(*x, |before| at(&self.rollout, before));
-        (state, at(inputs, i))
-    }
-
-    /// Has the `stages` written from states and inputs, in groups, until there is no whole group left or `write` makes
-    /// nothing of them. The states are those of the rollout from `x`, the `first` of them for the first stage.
-    /// Returns how many stages were written.
-    pub(crate) fn in_groups(
-        &self,
-        x: &SVector<T, NX>,
-        inputs: &[SVector<T, NU>],
-        first: usize,
-        stages: &mut [Stage<T, NX, NU>],
-        write: impl Fn(Group<'_, T, NX, NU>, &mut [Stage<T, NX, NU>; GROUP]) -> bool,
-    ) -> usize {
-        let mut done = 0;
-        let (groups, _) = stages.as_chunks_mut();
-        for stages in groups.iter_mut().take(self.settings.horizon / GROUP) {
-            let expected: [_; GROUP] = from_fn(|k| self.expected(x, inputs, first + done + k));
-            let (states, inputs) = (expected.map(|(x, _)| x), expected.map(|(_, u)| u));
-            if !write((&states, &inputs), stages) {
-                break;
-            }
-            done += GROUP;
-        }
-        done
-    }
-
     /// The further quadratic programs of the sample, each along the plan of the one before.
     #[inline(never)]
     fn iterate<D: PlantByStage<P, T, NX, NU, NS>>(
@@ -508,84 +370,6 @@ where
             self.roll_out(x, own);
             self.problems += 1;
         }
-    }
-
-    /// Algorithm 1, cost: the reference enters the linear terms.
-    #[inline(never)]
-    pub(crate) fn track<D: CostByStage<T, NX, NU>>(
-        &self,
-        aim: &Aim<'_, T, NX, NU, D>,
-        ocp: &mut Ocp<T, NX, NU>,
-    ) {
-        let q = -self.settings.weights.q;
-        let linear_u = -product(&self.settings.weights.r, &aim.u_ref);
-        let stages = ocp.stages.iter_mut().enumerate();
-        for (i, stage) in stages.take(self.settings.horizon) {
-            stage.linear_x = product(&q, aim.at(i));
-            stage.linear_u = linear_u;
-            if aim.own.any() {
-                (stage.linear_x, stage.linear_u) = aim.linear_terms(i, &self.settings.weights);
-            }
-        }
-        let x_ref = *aim.end();
-        let (p, equality) = match aim.own.terminal().unwrap_or(&self.settings.terminal) {
-            TerminalIngredient::Cost(p) => (*p, None),
-            TerminalIngredient::Equality => (SMatrix::zeros(), Some(x_ref)),
-        };
-        ocp.terminal.p = p;
-        ocp.terminal.linear_x = -product(&p, &x_ref);
-        if D::SOME
-            && let Some(price) = aim.own.linear_x(self.settings.horizon)
-        {
-            ocp.terminal.linear_x += price * convert::<f64, T>(0.5);
-        }
-        ocp.terminal.equality = equality;
-    }
-
-    /// The outputs of the program, where there are any, linear about the last rollout from its sample `first`
-    /// (0 or 1) on, which began at `x` and had these `inputs`. What changes of the inputs costs extra by the
-    /// `damping`.
-    #[inline(never)]
-    pub(crate) fn pose_outputs<D: CostByStage<T, NX, NU>>(
-        &self,
-        (x, inputs): (&SVector<T, NX>, &[SVector<T, NU>]),
-        first: usize,
-        (aim, damping): (&Aim<'_, T, NX, NU, D>, T),
-        ocp: &mut Ocp<T, NX, NU>,
-    ) {
-        let Some(outputs) = aim.own.outputs() else {
-            return;
-        };
-        let horizon = self.settings.horizon;
-        let bounded = outputs::rows(&aim.own);
-        let per_stage = ocp.rows_per_stage;
-        let states = core::iter::once(x).chain(self.rollout.iter()).skip(first);
-        let inputs = inputs.iter().take(horizon);
-        let window = states.zip(inputs.clone().skip(first).chain(inputs.last()));
-        let samples = ocp.stages.iter_mut().zip(ocp.own.iter_mut()).zip(window);
-        for (i, ((stage, common), (x, u))) in samples.enumerate().take(horizon) {
-            let Weights { q, r } = *aim.own.weights(i).unwrap_or(&self.settings.weights);
-            (common.q, common.r) = (q, r + SMatrix::identity() * damping);
-            common.s = aim.own.cross(i).copied().unwrap_or_else(SMatrix::zeros);
-            (stage.linear_x, stage.linear_u) = aim.linear_terms(i, &self.settings.weights);
-            stage.linear_u -= u * damping;
-            let linear = (&mut stage.linear_x, &mut stage.linear_u);
-            outputs::add_costs(outputs, i, (x, u), common, linear);
-            let rows = ocp.rows.get_mut(i * per_stage..i * per_stage + bounded);
-            outputs::write_rows(outputs, i, (x, u), false, rows.unwrap_or_default());
-        }
-        let end = at(&self.rollout, self.last_stage());
-        let rows = ocp
-            .rows
-            .get_mut(horizon * per_stage..horizon * per_stage + bounded);
-        let still = SVector::zeros();
-        outputs::write_rows(
-            outputs,
-            horizon,
-            (&end, &still),
-            true,
-            rows.unwrap_or_default(),
-        );
     }
 
     /// The last stage of the horizon.
