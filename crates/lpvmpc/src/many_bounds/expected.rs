@@ -13,6 +13,10 @@ const MANY: usize = 24;
 /// So many where some are soft, which takes more factorisations, or those of a single input are known, with which the
 /// dual method begins.
 const MORE: usize = 32;
+/// So many soft ones of a single input, where all that can hold are violated: the dual method adds and drops them again.
+const ALL_SOFT: usize = 20;
+/// And so many where some are known.
+const KNOWN_SOFT: usize = 16;
 /// So many of several inputs, and states, that were held by the last answer are worth a guess, which is right more often
 /// than not.
 const FAMILIAR: usize = 20;
@@ -48,13 +52,19 @@ impl Expected {
         solution: &Solution<T, NX, NU>,
         known: usize,
     ) -> Self {
-        let (mut violated, mut inputs) = (0, 0);
-        let mut takes_more = NU == 1 && known > 0;
+        let (mut violated, mut inputs, mut soft) = (0, 0, false);
         rows::violated_bounds(ocp, &trajectory(solution), &mut |candidate| {
             violated += 1;
             inputs += usize::from(matches!(candidate.bound.quantity, Quantity::Input(_)));
-            takes_more |= candidate.soft.is_some();
+            soft |= candidate.soft.is_some();
         });
+        let takes_more = soft || NU == 1 && known > 0;
+        let enough = match (NU == 1 && soft, known) {
+            (true, 0) => ocp.length().clamp(ALL_SOFT, MORE),
+            (true, _) => KNOWN_SOFT,
+            (false, _) if takes_more => MORE,
+            (false, _) => MANY,
+        };
         // Where several inputs act together, general rows that were active are taken over one by one in less time.
         let rows = NU > 1 && guess::mostly_rows(&solution.active);
         // As a rule most of those that are known hold again, and others are violated only as long as they do not.
@@ -64,7 +74,7 @@ impl Expected {
         let bounds = if tells { known } else { violated }.min(ocp.length() * NU);
         Self {
             bounds,
-            many: bounds >= if takes_more { MORE } else { MANY },
+            many: bounds >= enough,
             familiar: tells && !takes_more && known >= FAMILIAR,
             // Those are nearly right where a single input moves the states.
             saturated: NU == 1 && 2 * inputs > violated && inputs >= MANY_SATURATED,
