@@ -18,7 +18,7 @@ def to_native(plant: Plant, given: Mapping[str, Any]) -> dict[str, Any]:
     n, m = len(states), len(inputs)
     settings = dict(given)
     for name, most in (
-        ("horizon", 1000), ("nodes", 16), ("substeps", 10_000), ("max_programs", 1_000_000), ("first_programs", 1_000_000),
+        ("horizon", 1000), ("nodes", 16), ("substeps", 10_000), ("max_programs", 65_535), ("first_programs", 65_535),
     ):  # fmt: skip
         settings[name] = whole(name, given[name], most=most)
     for name, known in (

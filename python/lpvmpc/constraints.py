@@ -24,7 +24,7 @@ infinite number where there is no bound."""
 
 @dataclass(frozen=True)
 class Penalty:
-    """The price of exceeding a bound by e: ``linear * e + quadratic * e**2``, in units of the cost."""
+    """The price of exceeding a bound by e: ``linear * e + quadratic * e**2 / 2``, in units of the cost."""
 
     linear: float = 0.0
     quadratic: float = 0.0

@@ -62,6 +62,7 @@ def lqr(
     SettingError
         The weights make no sense, the plant does not stand there, or no regulator stabilises it.
     """
+    instance("plant", plant, Plant)
     n, m = len(plant.states), len(plant.inputs)
     t_s = number("t_s", t_s)
     at = plant.equilibrium or (np.zeros(n), np.zeros(m))
@@ -135,6 +136,7 @@ def certify(
     >>> certificate.contains([0.1, 0])
     True
     """
+    instance("plant", plant, Plant)
     n, m = len(plant.states), len(plant.inputs)
     at = plant.equilibrium or (np.zeros(n), np.zeros(m))
     x_eq = at[0] if x is None else column("x", x, n)

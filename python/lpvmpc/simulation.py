@@ -138,7 +138,7 @@ class Run:
 
     def cost(self, q: ArrayLike, r: ArrayLike, u_ref: ArrayLike | None = None) -> float:
         """The closed-loop cost: the sum over the samples of (x - x_ref)'Q (x - x_ref) +
-        (u - u_ref)'R (u - u_ref).
+        (u - u_ref)'R (u - u_ref). Of a run without a reference, x_ref is the plant's equilibrium, or zero without one.
 
         Parameters
         ----------
@@ -156,7 +156,8 @@ class Run:
 
         n, m = self.x.shape[1], self.u.shape[1]
         q_matrix, r_matrix = weight("q", q, n), weight("r", r, m)
-        e = self.x[:-1] - (0.0 if self.x_ref is None else self.x_ref)
+        rest = np.zeros(n) if self.plant.equilibrium is None else self.plant.equilibrium[0]
+        e = self.x[:-1] - (rest if self.x_ref is None else self.x_ref)
         known = np.zeros((1, m)) if u_ref is None else by_stage("u_ref", u_ref, m)
         if len(known) not in (1, len(self.u)):
             raise SettingError(f"u_ref: it has {len(known)} rows; the run has {len(self.u)} samples")

@@ -5,6 +5,7 @@ import os
 import signal
 import threading
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -198,10 +199,24 @@ def test_runs_and_plans_are_equal_to_themselves():
         run.plot([])
 
 
+def test_the_cost_of_a_run_without_reference_is_about_the_equilibrium():
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    tank = lpvmpc.Plant.from_casadi(
+        x, u, u - 0.5 * ca.sqrt(x), states=["level"], inputs=["inflow"], bounds={"inflow": (0, 2)},
+        equilibrium=([1.0], [0.5]),
+    )  # fmt: skip
+    run = lpvmpc.simulate(tank, lpvmpc.Mpc(tank, 0.5, 20, [1], [0.1]), [1.0], 5.0)
+    assert run.cost([1], [0.1], u_ref=[0.5]) < 1e-12
+    assert abs(run.cost([1], [0.1]) - 10 * 0.1 * 0.25) < 1e-12
+
+
 def test_controllers_that_make_no_sense():
     plant = double_integrator()
     with pytest.raises(lpvmpc.SettingError, match="plant: int is no lpvmpc.Plant"):
         lpvmpc.simulate(3, lambda t, x: [0.0], [0, 0], 1.0, t_s=0.1)
+    for design in (lpvmpc.lqr, lpvmpc.certify):
+        with pytest.raises(lpvmpc.SettingError, match="plant: int is no lpvmpc.Plant"):
+            design(1, 0.1, [1], [1])
     with pytest.raises(lpvmpc.SettingError, match="for 4 states"):
         lpvmpc.simulate(plant, controller(), [0, 0], 1)
     with pytest.raises(lpvmpc.SettingError, match="needs a sampling time"):

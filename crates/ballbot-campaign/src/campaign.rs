@@ -534,7 +534,9 @@ fn check_success(file: &CampaignFile, measures: &[Measure]) -> Result<(), Campai
             _ => true,
         };
         if !(finite && ordered) {
-            let value = format!("at_least {at_least:?}, at_most {at_most:?}");
+            let sides = [("at_least", at_least), ("at_most", at_most)].into_iter();
+            let given = sides.filter_map(|(name, limit)| Some(format!("{name} = {:?}", limit?)));
+            let value = given.collect::<Vec<_>>().join(", ");
             let expected = "it needs at_least or at_most or both, finite and in this order";
             return Err(CampaignError::value(key, value, expected));
         }

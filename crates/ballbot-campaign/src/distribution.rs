@@ -98,9 +98,23 @@ impl Distribution {
             }
         };
         Value::Float(match step {
-            Some(step) => tidy((number / step).round() * step),
+            Some(step) => {
+                let (from, to) = self.steps(step);
+                tidy((number / step).round().max(from).min(to) * step)
+            }
             None => number,
         })
+    }
+
+    /// The least and the largest number of steps that are in its range.
+    fn steps(&self, step: f64) -> (f64, f64) {
+        let (from, to) = match self {
+            Self::Uniform { from, to } | Self::LogUniform { from, to } => (*from, *to),
+            _ => (f64::NEG_INFINITY, f64::INFINITY),
+        };
+        // What is a multiple but for rounding is one.
+        let slack = 1e-9;
+        ((from / step - slack).ceil(), (to / step + slack).floor())
     }
 
     /// The number from 0 to 1 whose value this is, in the middle of those that give it; none where
@@ -305,7 +319,19 @@ pub(crate) fn rounding(
             format!("{step:?}"),
             "it must be positive, and goes with uniform, log_uniform and normal only",
         ),
-        step => Ok(step),
+        Some(step) => {
+            let (from, to) = distribution.steps(step);
+            match from <= to {
+                true => Ok(Some(step)),
+                false => refused(
+                    place,
+                    "round_to",
+                    format!("{step:?}"),
+                    "no multiple of it is in the range",
+                ),
+            }
+        }
+        None => Ok(None),
     }
 }
 
@@ -316,6 +342,28 @@ mod tests {
     fn of(text: &str) -> Result<Distribution, CampaignError> {
         let table: VaryTable = toml::from_str(&format!("key = \"a\"\n{text}")).unwrap();
         Distribution::new("vary[0]", &table)
+    }
+
+    #[test]
+    fn what_is_rounded_stays_in_its_range() {
+        for text in ["uniform = [0.003, 0.041]", "log_uniform = [0.003, 0.041]"] {
+            let distribution = of(text).unwrap();
+            for i in 0..1000 {
+                let value = distribution.value((f64::from(i) + 0.5) / 1000.0, Some(0.01));
+                let steps = value.as_float().unwrap() / 0.01;
+                assert!(
+                    (1.0 - 1e-9..=4.0 + 1e-9).contains(&steps),
+                    "{text}: {steps}"
+                );
+            }
+            let message = rounding("vary[0]", Some(0.1), &distribution)
+                .unwrap_err()
+                .to_string();
+            assert!(
+                message.contains("no multiple of it is in the range"),
+                "{message}"
+            );
+        }
     }
 
     fn numbers(text: &str) -> Vec<f64> {

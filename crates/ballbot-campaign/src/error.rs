@@ -40,8 +40,8 @@ pub enum CampaignError {
     /// A drawn scenario is none.
     #[error(
         "run {run} draws {drawn}, and that is no scenario: {source}\nnarrow the distribution (a \
-         normal one takes lower and upper), or set refused = \"count\" to have such runs counted \
-         apart"
+         normal one takes lower and upper), or have such runs counted apart (refused = \"count\"), if \
+         there are others"
     )]
     Refused {
         /// Number of the run.

@@ -485,6 +485,10 @@ mod tests {
                 "body.body_inertia_kg_m2 is missing",
             ),
             ("[body]\nbody_mass_kg = 0.0", "body.body_mass_kg = 0"),
+            (
+                "[body]\nbody_mass_kg = 11000",
+                "body.body_mass_kg = 11000: it must be from 0.26411 to 1320.5 kg, with its centre of mass at 0.2978 m",
+            ),
             ("[log.theta]\ncolumn = \"t\"\nunit = \"grad\"", "grad"),
             (
                 "[log]\nleave_out = [[3.0, 2.0]]",

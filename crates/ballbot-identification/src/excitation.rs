@@ -167,7 +167,7 @@ const FALLEN: f64 = 1.5;
 /// A loop with a pole right of this lets the robot drift or fall, 1/s.
 const SLOWEST: f64 = 1e-6;
 
-/// If less than this part of the torque is left, something is wrong.
+/// If less than this part of the torque is left, of a usual one if more was asked for, something is wrong.
 const LEAST_LEFT: f64 = 0.02;
 
 /// An expected standard deviation relative to the value from which on a log is not worth recording.
@@ -251,7 +251,7 @@ impl ExcitationTask {
         for _ in 0..30 {
             let torque: Vec<f64> = shape.iter().map(|value| amplitude * value).collect();
             let motion = self.simulate(&gain, &torque);
-            if amplitude < LEAST_LEFT * self.amplitude {
+            if amplitude < LEAST_LEFT * self.amplitude.min(Self::AMPLITUDE) {
                 return Err(ExcitationError::Useless {
                     left: amplitude,
                     wanted: self.amplitude,

@@ -123,12 +123,15 @@ pub(crate) fn controller_of_size<const NX: usize, const NU: usize, const NS: usi
 
 /// Memory for a step: every stage may have weights and bounds of its own and so many general rows, and there is room for a
 /// second plan.
-fn workspace<const NX: usize, const NU: usize, const NS: usize>(
-    settings: &lpvmpc::ControllerSettings<f64, NX, NU, NS>,
+fn make_room<const NX: usize, const NU: usize, const NS: usize>(
+    controller: &mut Planner<NX, NU, NS>,
     rows: usize,
 ) -> Workspace<f64, NX, NU> {
-    let capacity = settings.capacity().with_own_stages().with_second_plan();
-    Workspace::allocate(capacity.with_general_rows(rows))
+    let capacity = controller.settings().capacity();
+    let capacity = capacity.with_own_stages().with_second_plan();
+    let capacity = capacity.with_general_rows(rows);
+    controller.make_room(capacity);
+    Workspace::allocate(capacity)
 }
 
 impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
@@ -147,7 +150,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         let rows = List::Owned(made.rows.into_boxed_slice());
         controller.set_rows(rows).map_err(refused)?;
         let room = settings.rows.len();
-        let workspace = workspace(controller.settings(), room);
+        let workspace = make_room(&mut controller, room);
         Ok(Self {
             plant: plant.clone(),
             names,
@@ -203,7 +206,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         let most = of_stages.unwrap_or(self.settings.rows.len()) + of_tasks;
         if most > self.room {
             self.room = most;
-            self.workspace = workspace(self.controller.settings(), most);
+            self.workspace = make_room(&mut self.controller, most);
         }
         let terminal = lists.x_ref.last().copied().unwrap_or(self.rest.0);
         let prices = self.prices_of(&lists.x_bounds);
@@ -296,7 +299,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
             controller.reset();
         }
         self.room = settings.rows.len();
-        self.workspace = workspace(controller.settings(), self.room);
+        self.workspace = make_room(&mut controller, self.room);
         (self.controller, self.last_input) = (controller, last_input);
         (self.settings, self.bounds) = (settings.clone(), made.bounds);
         Ok(())

@@ -2,10 +2,14 @@
 
 use crate::controller::{Controller, Reference};
 use crate::list::List;
+#[cfg(feature = "alloc")]
+use crate::memory::Capacity;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Bounds, GeneralRow};
 use crate::preview::{Preview, check_rows};
 use crate::settings::{ControllerError, ControllerSettings, check, check_bounds};
+#[cfg(feature = "alloc")]
+use crate::solution::ActiveSet;
 use crate::workspace::Workspace;
 use nalgebra::SVector;
 
@@ -62,6 +66,15 @@ where
         self.fixed = (!rows.is_empty()).then_some(FixedRows { rows, run });
         self.prepared = None;
         Ok(())
+    }
+
+    /// Room for as many active bounds as `capacity` says, where there was less: for more general rows, say. On the
+    /// heap; the plan stays.
+    #[cfg(feature = "alloc")]
+    pub fn make_room(&mut self, capacity: Capacity) {
+        let mut active = ActiveSet::with_capacity(capacity.active);
+        active.copy_from(&self.solution.active);
+        self.solution.active = active;
     }
 
     /// Another model of the plant from the next step on; the last plan stays its start. It is one in the same kind of

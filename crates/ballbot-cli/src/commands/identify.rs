@@ -85,8 +85,14 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, CommandError> {
         let reasons = reasons.iter();
         let reasons = reasons.map(|reason| format!("\n- {}", robot.told(reason)));
         let mut old = PARAMETERS.into_iter().map(|name| arguments.out.join(name));
+        let findings = robot.findings().into_iter();
+        let seen = findings.flat_map(|(log, findings)| {
+            let lines = findings.into_iter();
+            lines.map(move |finding| format!("\n- {log}: {finding}"))
+        });
         return Err(CommandError::NoRobot {
             reasons: reasons.collect(),
+            seen: seen.collect(),
             report: arguments.out.join(REPORT),
             old: old.find(|path| path.exists()),
         });

@@ -98,7 +98,7 @@ pub enum CommandError {
     Estimate(#[from] EstimateError),
     /// What was identified is no robot.
     #[error(
-        "no parameters: what was found is no robot.{reasons}\nwhat was fitted is in {}{}",
+        "no parameters: what was found is no robot.{reasons}{seen}\nwhat was fitted is in {}{}",
         report.display(),
         old.as_ref().map_or(String::new(), |old| format!(
             "; {} is of an earlier identification", old.display()
@@ -107,6 +107,8 @@ pub enum CommandError {
     NoRobot {
         /// Why, a line each.
         reasons: String,
+        /// What the logs have shown, a line each.
+        seen: String,
         /// The report.
         report: PathBuf,
         /// Parameters of an earlier identification that still stand there.

@@ -215,6 +215,30 @@ fn scaled(column: usize, factor: f64) -> String {
     format!("{header}\n{}", rows.collect::<String>())
 }
 
+/// What is odd about a log may be why there is no robot in it.
+#[test]
+fn what_the_log_shows_is_said_with_the_reasons() {
+    let folder = tempfile::tempdir().unwrap();
+    let (log_file, out) = (folder.path().join("log.csv"), folder.path().join("out"));
+    let text = scaled(4, -1.0);
+    let lines: Vec<&str> = text.lines().collect();
+    std::fs::write(
+        &log_file,
+        [&lines[..1000], &lines[1100..]].concat().join("\n"),
+    )
+    .unwrap();
+    let arguments = ["identify", name(&log_file), "--out", name(&out)];
+    let message = failure(&[&arguments[..], &["--leave-out", "900,910"]].concat(), 1);
+    assert_says(
+        &message,
+        &[
+            "no parameters",
+            "log.csv: 1 gap",
+            "log.csv: nothing of the log is from 900 to 910 s",
+        ],
+    );
+}
+
 #[test]
 fn what_is_no_robot_has_a_report_and_no_parameters() {
     let folder = tempfile::tempdir().unwrap();
@@ -344,7 +368,7 @@ fn mistakes_in_a_configuration_are_told_without_the_words_of_a_programming_langu
             "[log.theta]\ncolumn = \"t\"\nunit = \"grad\"",
             &["line 3", "`rad`"],
         ),
-        ("[log.theta]\ncolumn = \"t\"", &["missing", "`unit`"]),
+        ("[log.y.theta]\ncolumn = \"t\"", &["missing", "`unit`"]),
         (
             "[parameters]\nb1_m2 = 0.3",
             &[
@@ -454,6 +478,7 @@ fn the_examples_of_excite_work_and_useless_torques_are_refused() {
     assert!(help.contains(gain), "{help}");
     run(&["--amplitude", "2", "--tilt-limit", "8", gain]);
     run(&["--gain", "-1.4,-48,-1.8,-11"]);
+    assert_says(&run(&["--amplitude", "1000"]), &["the tilt limits it"]);
     assert_says(&run(&["--band", "0.2,5"]), &["0.20 Hz to 5.00 Hz"]);
     assert!(torque.exists());
     std::fs::remove_file(&torque).unwrap();

@@ -1,8 +1,10 @@
 //! `[body]`: what scales and a drawing say of the parameters.
 
 use super::{ConfigError, positive, within};
+use crate::coordinates::Coordinates;
 use crate::parameter::{Choice, Parameter, Values};
 use ballbot::Geometry;
+use lpvmpc_design::number_text;
 use serde::Deserialize;
 
 /// The body: its mass, weighed; or, with all of the rest, masses and inertias from a drawing.
@@ -43,7 +45,21 @@ impl BodyTable {
         geometry: &Geometry<f64>,
         choices: &mut Values<Choice>,
     ) -> Result<(), ConfigError> {
-        positive("body.body_mass_kg", self.body_mass_kg)?;
+        let coordinates = Coordinates::new(choices, *geometry, true);
+        let (lightest, heaviest) = coordinates.masses();
+        let expected = format!(
+            "from {} to {} kg, with its centre of mass at {} m",
+            number_text(lightest),
+            number_text(heaviest),
+            number_text(geometry.centre_of_mass)
+        );
+        within(
+            "body.body_mass_kg",
+            self.body_mass_kg,
+            lightest,
+            heaviest,
+            expected,
+        )?;
         match self.drawing()? {
             Some(drawing) => drawing.priors(geometry, choices),
             None => choices[Parameter::TorqueGain] = Choice::Fixed(1.0 / self.body_mass_kg),

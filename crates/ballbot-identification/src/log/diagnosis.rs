@@ -56,6 +56,9 @@ pub(super) fn run(
     if !out.is_empty() {
         findings.push(Finding::LeftOut { count: out.len() });
     }
+    let length = time.last().copied().unwrap_or_default();
+    let beyond = columns.leave_out.iter().filter(|[from, _]| *from > length);
+    findings.extend(beyond.map(|&[from, to]| Finding::NothingLeftOut { from, to, length }));
     missing(
         table,
         &names,

@@ -1,5 +1,6 @@
 //! What is odd about a log and yet no reason to refuse it.
 
+use crate::words::number;
 use thiserror::Error;
 
 /// Something the builder should know; its sentence is its `Display`. Lines are counted from 1,
@@ -32,6 +33,20 @@ pub enum Finding {
     LeftOut {
         /// How many rows.
         count: usize,
+    },
+    /// A part that is to be left out, and is none of the log.
+    #[error(
+        "nothing of the log is from {} to {} s, which is to be left out: it lasts {} s, and times count from its \
+         first row",
+        number(*from), number(*to), number(*length)
+    )]
+    NothingLeftOut {
+        /// From when, s.
+        from: f64,
+        /// Until when, s.
+        to: f64,
+        /// The log's length, s.
+        length: f64,
     },
     /// A rate in place of an angle.
     #[error("`{column}` is a rate; it is integrated to the ball angle")]

@@ -43,7 +43,7 @@ pub struct PlaneWorld {
     pub settings: WorldSettings<4, 1, 4, 2>,
     /// What happens without a plan.
     pub without_plan: OnInfeasible,
-    /// Outside of it the robot has fallen.
+    /// Outside of it the robot has fallen: beyond a right angle it lies on the floor.
     pub range: Bounds<f64, 4>,
     /// What is added to the controller's torque.
     pub excitation: Option<Excitation>,
@@ -59,10 +59,17 @@ impl PlaneWorld {
             },
             settings: WorldSettings::ideal(t_s, tolerances),
             without_plan: OnInfeasible::End,
-            range: Bounds::none(),
+            range: upright(),
             excitation: None,
         }
     }
+}
+
+/// The states of a robot that has not fallen.
+fn upright() -> Bounds<f64, 4> {
+    let mut range = Bounds::none();
+    (range.lower[1], range.upper[1]) = (-FRAC_PI_2, FRAC_PI_2);
+    range
 }
 
 impl WorldTable {
@@ -115,9 +122,6 @@ impl WorldTable {
         };
         let mechanics = self.mechanics(plane, ballbot)?;
         finite("world.actuator.bias_nm", self.actuator.bias_nm)?;
-        let mut range = Bounds::none();
-        range.lower[1] = -FRAC_PI_2;
-        range.upper[1] = FRAC_PI_2;
         // Every plane and every run has noise of its own.
         let seed = self.seed.wrapping_mul(2).wrapping_add(plane as u64);
         Ok(PlaneWorld {
@@ -136,7 +140,7 @@ impl WorldTable {
                 tolerances,
             },
             without_plan: OnInfeasible::Apply,
-            range,
+            range: upright(),
             excitation: self.excitation(plane, files)?,
         })
     }

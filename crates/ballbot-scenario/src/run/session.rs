@@ -58,11 +58,8 @@ impl Session {
     /// # Errors
     /// [`ScenarioError::Controller`] or [`ScenarioError::World`] if either refuses its settings.
     pub fn new(prepared: Prepared) -> Result<Self, ScenarioError> {
-        let loops = prepared.planes.iter().map(|plane| {
-            let mut closed_loop = prepared.closed_loop(plane)?;
-            lie_down(&mut closed_loop);
-            Ok(closed_loop)
-        });
+        let planes = prepared.planes.iter();
+        let loops = planes.map(|plane| prepared.closed_loop(plane));
         Ok(Self {
             loops: loops.collect::<Result<_, ScenarioError>>()?,
             prepared,
@@ -89,16 +86,14 @@ impl Session {
         }
         let planes = prepared.planes.iter().enumerate();
         let loops = planes.map(|(index, plane)| {
-            let mut closed_loop = match self.loops.get(index) {
+            Ok(match self.loops.get(index) {
                 Some(before) => prepared.continued_loop(plane, before)?,
                 None => {
                     let mut begun = prepared.closed_loop(plane)?;
                     begun.world = begun.world.at_time(self.time());
                     begun
                 }
-            };
-            lie_down(&mut closed_loop);
-            Ok(closed_loop)
+            })
         });
         let loops: Vec<_> = loops.collect::<Result<_, ScenarioError>>()?;
         let mut samples = self.samples.clone();
@@ -394,10 +389,4 @@ impl Session {
     pub fn planes(&self) -> &[Plane] {
         &self.prepared.planes
     }
-}
-
-/// Beyond a right angle the robot lies on the floor.
-fn lie_down(closed_loop: &mut PlaneLoop) {
-    closed_loop.range.lower[1] = -FRAC_PI_2;
-    closed_loop.range.upper[1] = FRAC_PI_2;
 }

@@ -4,7 +4,7 @@ use crate::plants::limits;
 use crate::quadratic::{Affine, Quadratic};
 use lpvmpc::Rk4;
 use lpvmpc::{Dynamics, Number};
-use lpvmpc_any::{Mpc, MpcSettings, Preview, StateBounds, Terminal};
+use lpvmpc_any::{Mpc, MpcSettings, Penalty, Preview, Row, StateBounds, Terminal};
 use lpvmpc_plant::{Matrices, Plant, PlantData};
 use nalgebra::{DMatrix, DVector, Vector1, Vector2, dmatrix, dvector};
 
@@ -177,4 +177,75 @@ fn another_sampling_time_than_the_period_is_refused() {
         said,
         "t_s: it is 0.1 s; the plant is in discrete time with a period of 0.2 s"
     );
+}
+
+/// x+ = x + u.
+fn integrator() -> Plant {
+    let matrices = Matrices {
+        a: dmatrix![1.0],
+        b: dmatrix![1.0],
+        period: Some(0.1),
+        ..Matrices::default()
+    };
+    Plant::new(PlantData::of_matrices("integrator", &matrices).unwrap()).unwrap()
+}
+
+/// A step from 2 under 4 + u^2 + linear e + quadratic e^2 / 2, e = 2 + u - 0.5: the minimum by hand.
+#[test]
+fn a_price_counts_its_quadratic_part_by_half() {
+    for (linear, quadratic, expected) in
+        [(0.0, 10.0, -1.25), (1.0, 0.0, -0.5), (1.0, 4.0, -7.0 / 6.0)]
+    {
+        let settings = MpcSettings {
+            x_bounds: limits(&[0.5]),
+            u_ref: Some(dvector![0.0]),
+            state_bounds: StateBounds::Priced(vec![Some(Penalty { linear, quadratic })]),
+            terminal: Terminal::Cost(dmatrix![0.0]),
+            ..MpcSettings::new(0.1, 1, &[1.0], &[1.0])
+        };
+        let plan = Mpc::new(&integrator(), &settings).unwrap();
+        let plan = { plan }.step(&[2.0], &Preview::default()).unwrap();
+        assert!(plan.is_solved(), "{}", plan.status);
+        let u = plan.u[(0, 0)];
+        assert!((u - expected).abs() < 1e-9, "{linear} {quadratic}: {u}");
+    }
+}
+
+/// Soft rows of a stage, more of them active than there are states and inputs: all have room.
+#[test]
+fn soft_rows_have_room_whatever_the_horizon() {
+    for horizon in 1..30 {
+        for count in 1..5 {
+            let row = |i: usize| Row {
+                name: format!("row {i}"),
+                x: dvector![1.0 + 0.1 * i as f64],
+                u: dvector![0.0],
+                lower: f64::NEG_INFINITY,
+                upper: 0.1,
+                soft: Some(Penalty {
+                    linear: 1.0,
+                    quadratic: 5.0,
+                }),
+            };
+            let settings = MpcSettings {
+                u_bounds: limits(&[0.2]),
+                u_ref: Some(dvector![0.0]),
+                rows: (0..count).map(row).collect(),
+                terminal: Terminal::Cost(dmatrix![1.0]),
+                ..MpcSettings::new(0.1, horizon, &[1.0], &[1e-3])
+            };
+            let mut mpc = Mpc::new(&integrator(), &settings).unwrap();
+            let plan = mpc.step(&[2.0], &Preview::default()).unwrap();
+            assert!(plan.is_solved(), "{horizon} {count}: {}", plan.status);
+            // As many again with the settings of a controller that had none.
+            let none = MpcSettings {
+                rows: Vec::new(),
+                ..settings.clone()
+            };
+            let mut mpc = Mpc::new(&integrator(), &none).unwrap();
+            mpc.set_settings(&settings).unwrap();
+            let again = mpc.step(&[2.0], &Preview::default()).unwrap();
+            assert!(again.is_solved(), "{horizon} {count}: {}", again.status);
+        }
+    }
 }

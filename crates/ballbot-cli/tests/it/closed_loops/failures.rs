@@ -99,6 +99,23 @@ fn an_infeasible_start_is_said_so() {
     );
 }
 
+/// From too far over it turns over, of whatever the controller is satisfied with.
+#[test]
+fn a_robot_that_falls_ends_its_run_without_a_world_too() {
+    let folder = tempfile::tempdir().unwrap();
+    for world in [&[][..], &["--set", "world.seed=1"]] {
+        let start = [
+            "simulate",
+            "one-metre",
+            "--set",
+            "initial_state.theta_rad=0.6",
+        ];
+        let arguments = [&start[..], world, &["--out", "run"]].concat();
+        let message = fail(folder.path(), &arguments, 1);
+        assert_says(&message, &["the robot has fallen: theta left its range"]);
+    }
+}
+
 #[test]
 fn a_plane_that_ends_early_is_named_and_both_are_kept() {
     // The path on the floor once needed both planes to be of one length.
