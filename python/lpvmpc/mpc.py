@@ -63,7 +63,9 @@ class Mpc:
     state_bounds
         What becomes of a plan that cannot keep the bounds of the states: ``"soft"`` (exceeded as little as
         possible, at a price that grows with the distance of the goal), ``"hard"`` (infeasible), or prices by
-        name, ``{"position": Penalty(1e3)}``; states that are not named are hard then.
+        name, ``{"position": Penalty(1e3)}``; states that are not named are hard then. Where the goal outweighs the
+        price of ``"soft"``, a bound that could be kept is exceeded, too: `Plan.active_bounds` has "(exceeded)", and a
+        dearer price, or ``"hard"``, keeps it.
     u_ref
         The input that costs nothing, shape (m,). Without, the input that holds the plant at the end of
         the reference.
@@ -80,7 +82,8 @@ class Mpc:
         R_du of (u_i - u_{i-1})'R_du (u_i - u_{i-1}) on top: (m,) or (m, m).
     du_bounds
         Bounds of the change of the inputs from sample to sample, hard. The input before the first is the
-        last one that the controller gave, or what `set_last_input` says.
+        last one that the controller gave, or what `set_last_input` says. The inputs' own bounds come first: where
+        these are farther from the last input, the first change is as large as they ask for.
     linear_models
         Which linear models the programs have: ``"own"`` (the plant's own embedding where it has one,
         else as ``"ray"``), ``"motion"`` (derivatives along the expected motion), or ``"ray"`` (mean

@@ -487,7 +487,7 @@ mod tests {
             ("[body]\nbody_mass_kg = 0.0", "body.body_mass_kg = 0"),
             (
                 "[body]\nbody_mass_kg = 11000",
-                "body.body_mass_kg = 11000: it must be from 0.26411 to 1320.5 kg, with its centre of mass at 0.2978 m",
+                "body.body_mass_kg = 11000: it must be from 0.2641 to 1321 kg, with its centre of mass at 0.2978 m",
             ),
             ("[log.theta]\ncolumn = \"t\"\nunit = \"grad\"", "grad"),
             (

@@ -25,6 +25,9 @@ use block::Block;
 pub use fit::{ShootingFit, ShootingSettings, ShootingTermination};
 pub use unknown::{Prior, Unknown};
 
+/// What a simulation of some thousand steps is right to, relative.
+const EXACT: f64 = 1e-12;
+
 /// A model with its data: simulated outputs beside measured ones, segment by segment.
 pub trait ShootingModel<const NX: usize, const NY: usize>: Sync {
     /// The number of segments.
@@ -277,6 +280,20 @@ where
             gradient += &slope * prior.residual(parameters);
         }
         (information, gradient)
+    }
+
+    /// The chi^2 of residuals as large as rounding makes them: measured values right to [`EXACT`] of themselves.
+    fn rounding(&self) -> f64 {
+        let segments = (0..self.model.segments()).map(|segment| {
+            let noise = self.model.noise(segment);
+            let rows = self.model.measured(segment).iter();
+            let errors = rows.map(|row| row.component_div(&noise) * EXACT);
+            // Missing ones are NaN.
+            errors
+                .map(|row| row.iter().map(|e| e * e).filter(|e| *e > 0.0).sum::<f64>())
+                .sum::<f64>()
+        });
+        segments.sum()
     }
 
     /// Measured values that are not missing.

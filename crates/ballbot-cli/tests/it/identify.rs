@@ -215,6 +215,28 @@ fn scaled(column: usize, factor: f64) -> String {
     format!("{header}\n{}", rows.collect::<String>())
 }
 
+/// A simulated log without noise is that of its robot, to rounding.
+#[test]
+fn a_log_without_noise_is_fitted_to_rounding() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let (log_file, run) = (path("log.csv"), path("run"));
+    text(&[
+        "simulate",
+        "one-metre",
+        "--log",
+        name(&log_file),
+        "--out",
+        name(&run),
+    ]);
+    let out = path("out");
+    let told = json(&["identify", name(&log_file), "--json", "--out", name(&out)]);
+    for (key, truth) in [("b1_m2", 0.0294), ("b2_m2", 0.01), ("b3_m2", 0.1487)] {
+        let found = told["parameters"][key]["value"].as_f64().unwrap();
+        assert!((found - truth).abs() < 1e-6 * truth, "{key}: {found}");
+    }
+}
+
 /// What is odd about a log may be why there is no robot in it.
 #[test]
 fn what_the_log_shows_is_said_with_the_reasons() {

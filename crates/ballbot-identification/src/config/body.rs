@@ -3,6 +3,7 @@
 use super::{ConfigError, positive, within};
 use crate::coordinates::Coordinates;
 use crate::parameter::{Choice, Parameter, Values};
+use crate::words::number;
 use ballbot::Geometry;
 use lpvmpc_design::number_text;
 use serde::Deserialize;
@@ -49,8 +50,8 @@ impl BodyTable {
         let (lightest, heaviest) = coordinates.masses();
         let expected = format!(
             "from {} to {} kg, with its centre of mass at {} m",
-            number_text(lightest),
-            number_text(heaviest),
+            number(lightest),
+            number(heaviest),
             number_text(geometry.centre_of_mass)
         );
         within(

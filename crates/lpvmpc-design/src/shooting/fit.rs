@@ -13,7 +13,7 @@ pub struct ShootingSettings {
     /// Converged when a step can lower chi^2 by no more than this many times chi^2 per value. A
     /// parameter that is off by 1 % of its standard deviation costs 1e-4 of that. Default 1e-4. At a
     /// kink (see [`Unknown::kinked`]) a move of that 1 % to either side, or of ten times as much, with
-    /// all else fitted again, lowers chi^2 by no more, either.
+    /// all else fitted again, lowers chi^2 by no more, either. What rounding makes of chi^2 is not gone after.
     pub reduction_tolerance: f64,
     /// Steps at most. Default 60.
     pub max_iterations: usize,
@@ -124,6 +124,8 @@ where
         };
         let mut damping = FIRST_DAMPING;
         let mut history = vec![at.chi_square];
+        // Of values without noise nothing else is left.
+        let rounding = self.rounding();
         let mut equations = Equations::new(self, &at, &free);
         let termination = loop {
             if history.len() > settings.max_iterations {
@@ -132,6 +134,7 @@ where
                 };
             }
             let tolerance = settings.reduction_tolerance * at.chi_square / values as f64;
+            let tolerance = tolerance.max(rounding);
             match equations.step(self, &at, &mut damping, tolerance) {
                 Step::Better(next) => at = next,
                 Step::Converged => break ShootingTermination::Converged,

@@ -13,10 +13,10 @@ const MANY: usize = 24;
 /// So many where some are soft, which takes more factorisations, or those of a single input are known, with which the
 /// dual method begins.
 const MORE: usize = 32;
-/// And so many of a single input, unless they are soft or known, and where they are both.
-const MANY_OF_ONE: usize = 16;
-/// So many soft ones of a single input, where those are all stages: one after the other they come and go.
+/// So many soft ones of a single input, where all that can hold are violated: the dual method adds and drops them again.
 const ALL_SOFT: usize = 20;
+/// And so many where some are known.
+const KNOWN_SOFT: usize = 16;
 /// So many of several inputs, and states, that were held by the last answer are worth a guess, which is right more often
 /// than not.
 const FAMILIAR: usize = 20;
@@ -59,11 +59,11 @@ impl Expected {
             soft |= candidate.soft.is_some();
         });
         let takes_more = soft || NU == 1 && known > 0;
-        let enough = match (NU == 1, soft, known > 0) {
-            (true, true, false) => ocp.length().clamp(ALL_SOFT, MORE),
-            (false, true, _) | (true, false, true) => MORE,
-            (false, false, _) => MANY,
-            (true, ..) => MANY_OF_ONE,
+        let enough = match (NU == 1 && soft, known) {
+            (true, 0) => ocp.length().clamp(ALL_SOFT, MORE),
+            (true, _) => KNOWN_SOFT,
+            (false, _) if takes_more => MORE,
+            (false, _) => MANY,
         };
         // Where several inputs act together, general rows that were active are taken over one by one in less time.
         let rows = NU > 1 && guess::mostly_rows(&solution.active);
