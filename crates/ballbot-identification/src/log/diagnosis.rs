@@ -107,12 +107,18 @@ pub(super) fn run(
             Finding::Jumps { column, count, .. } => Some((column.clone(), *count)),
             _ => None,
         });
+        let jumps = jumps.max_by_key(|(_, count)| *count);
+        // These have sentences of their own.
+        let (_, seen): (Vec<_>, Vec<_>) = findings.drain(..).partition(|finding| {
+            matches!(finding, Finding::Jumps { .. } | Finding::LeftOut { .. })
+        });
         return Err(Problem::NoStretch {
             needed: SHORTEST_STRETCH,
             longest,
             rows,
             left_out: out.len(),
-            jumps: jumps.max_by_key(|(_, count)| *count),
+            jumps,
+            seen,
         });
     }
     Ok(run)

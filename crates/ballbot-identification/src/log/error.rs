@@ -1,5 +1,6 @@
 //! Why a log cannot be used, said to a person.
 
+use super::finding::Finding;
 use crate::words::number;
 use lpvmpc_design::number_text;
 use std::fmt;
@@ -276,7 +277,7 @@ pub enum Problem {
     /// Nothing is left between gaps and jumps.
     #[error(
         "there is no stretch of {needed} s without gap, jump or missing torque; the longest is \
-         {longest:.3} s{}{}",
+         {longest:.3} s{}{}{}",
         match left_out {
             0 => String::new(),
             count => format!(". {count} of the {rows} rows are left out because the configuration or \
@@ -285,7 +286,9 @@ pub enum Problem {
         jumps.as_ref().map_or(String::new(), |(column, count)| format!(
             ". `{column}` jumps {count} times: is its unit wrong (degrees taken for radians), or does \
              its sensor fail?"
-        )), needed = number_text(*needed))]
+        )),
+        seen.iter().map(|finding| format!(". {finding}")).collect::<String>(),
+        needed = number_text(*needed))]
     NoStretch {
         /// Needed, s.
         needed: f64,
@@ -297,6 +300,8 @@ pub enum Problem {
         left_out: usize,
         /// The column that jumps most, and how often.
         jumps: Option<(String, usize)>,
+        /// What else is odd.
+        seen: Vec<Finding>,
     },
 }
 

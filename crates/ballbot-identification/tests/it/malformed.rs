@@ -245,6 +245,15 @@ fn time_stamps() {
         recalculated(0, |_, time| -time),
         &["`t_s` goes back at", "the earliest first"],
     );
+    // To a thirtieth of a second.
+    refused(
+        recalculated(0, |_, time| (30.0 * time).floor() / 30.0),
+        &[
+            "no stretch of 1 s",
+            "row(s) repeat the time stamp",
+            "line 3",
+        ],
+    );
     refused(recalculated(0, |_, time| time * 1e3), &["10 s apart", "ms"]);
     refused(
         recalculated(0, |_, time| time * 1e-4),
