@@ -35,6 +35,11 @@ def number(place: str, given: Any, error: type[Exception] = SettingError) -> flo
         raise error(f"{place}: it is {given!r}; it must be a number") from None
 
 
+def numbers_or_none(given: Mapping[str, Any]) -> dict[str, float | None]:
+    """Numbers by name, each of which may be left out."""
+    return {name: None if one is None else number(name, one) for name, one in given.items()}
+
+
 def whole(name: str, given: Any, least: int = 1, most: int = 2**31) -> int:
     """A whole number."""
     if isinstance(given, (int, np.integer)) and not isinstance(given, bool) and least <= given <= most:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar, Union
+from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _lpvmpc
-from ._arrays import by_name, column, instance, listed, number, numbers
+from ._arrays import Kind, by_name, column, instance, listed, number, numbers
 from ._progress import samples_of
 from .errors import MissingPackageError, SettingError, SimulationError
 from .estimator import Estimator
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-Kind = TypeVar("Kind")
 
 MOST_SAMPLES = 10_000_000
 """The longest run; it has to fit into memory."""
@@ -457,7 +456,7 @@ def _reference(
     )
 
 
-def _by_name(
+def _of_signals(
     place: str, given: Mapping[str, Kind] | None, signals: list[Signal], kind: type[Kind]
 ) -> Mapping[str, Kind]:
     names = [signal.name for signal in signals]
@@ -480,7 +479,7 @@ def _sensors(
             if name not in known:
                 raise SettingError(f"plant: it has no {name!r}, which the controller measures")
         measured = [known[name] for name in estimator.measured]
-    sensors = _by_name("sensors", given, measured, Sensor)
+    sensors = _of_signals("sensors", given, measured, Sensor)
     if not sensors and estimator is None:
         return None
     found = []
@@ -499,7 +498,7 @@ def _sensors(
 def _actuators(
     given: Mapping[str, Actuator] | None, inputs: list[Signal]
 ) -> list[tuple[float, float, float]] | None:
-    actuators = _by_name("actuators", given, inputs, Actuator)
+    actuators = _of_signals("actuators", given, inputs, Actuator)
     if not actuators:
         return None
     each = [(signal.name, actuators.get(signal.name, Actuator())) for signal in inputs]

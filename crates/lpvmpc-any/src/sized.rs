@@ -127,8 +127,8 @@ fn make_room<const NX: usize, const NU: usize, const NS: usize>(
     controller: &mut Planner<NX, NU, NS>,
     rows: usize,
 ) -> Workspace<f64, NX, NU> {
-    let capacity = controller.settings().capacity();
-    let capacity = capacity.with_own_stages().with_second_plan();
+    let settings = controller.settings().capacity();
+    let capacity = settings.with_own_stages().with_second_plan();
     let capacity = capacity.with_general_rows(rows);
     controller.make_room(capacity);
     Workspace::allocate(capacity)

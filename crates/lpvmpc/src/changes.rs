@@ -68,8 +68,8 @@ where
         Ok(())
     }
 
-    /// Room for as many active bounds as `capacity` says, where there was less: for more general rows, say. On the
-    /// heap; the plan stays.
+    /// Room for as many active bounds as `capacity` says, on the heap, for more general rows than before, say. The plan
+    /// stays.
     #[cfg(feature = "alloc")]
     pub fn make_room(&mut self, capacity: Capacity) {
         let mut active = ActiveSet::with_capacity(capacity.active);

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _lpvmpc
-from .._arrays import instance, number, numbers, whole
+from .._arrays import instance, numbers, numbers_or_none, whole
 from .._progress import reported
 from ..errors import SettingError
 from .._files import save
@@ -154,9 +154,7 @@ def certify(
         Something that was asked is no number.
     """
     of_numbers = {"size": size, "level": level, "contraction": contraction}
-    asked: dict[str, Any] = {
-        name: None if one is None else number(name, one) for name, one in of_numbers.items()
-    }
+    asked: dict[str, Any] = {**numbers_or_none(of_numbers)}
     asked["boxes"] = None if boxes is None else whole("boxes", boxes, least=0)
     asked["trials"] = None if trials is None else whole("trials", trials, least=0)
     instance("scenario", scenario, Scenario, "lpvmpc.ballbot.Scenario")

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _lpvmpc
-from .._arrays import column, listed, number, numbers, whole
+from .._arrays import column, listed, numbers, numbers_or_none, whole
 from .._progress import reported
 from ..errors import IdentificationError, SettingError
 from .._files import save
@@ -286,9 +286,7 @@ def excite(
     of_numbers = {
         "amplitude": amplitude, "length": length, "tilt_limit_deg": tilt_limit_deg, "rate": rate,
     }  # fmt: skip
-    asked: dict[str, Any] = {
-        name: None if one is None else number(name, one) for name, one in of_numbers.items()
-    }
+    asked: dict[str, Any] = {**numbers_or_none(of_numbers)}
     asked["harmonics"] = None if harmonics is None else whole("harmonics", harmonics, least=0)
     asked["band"] = None if band is None else tuple(column("band", band, 2).tolist())
     asked["gain"] = None if gain is None else column("gain", gain, 4).tolist()

@@ -87,7 +87,7 @@ pub enum CommandError {
     /// A claim of a certificate is false, or could not be shown.
     #[error("the certificate {verdict}: {0}", verdict = .0.verdict())]
     Claim(#[from] ClaimError),
-    /// A certificate that cannot be read, or was changed.
+    /// A certificate that cannot be written down.
     #[error(transparent)]
     Certificate(#[from] DocumentError),
     /// A log that cannot be used.

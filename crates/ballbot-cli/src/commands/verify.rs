@@ -37,16 +37,16 @@ pub fn run(arguments: &VerifyArguments) -> Result<String, CommandError> {
         path: path.clone(),
         source,
     })?;
-    let certificate =
-        TerminalCertificate::from_json(&text).map_err(|source| InputError::Certificate {
-            path: path.clone(),
-            source,
-        })?;
+    let refused = |source| InputError::Certificate {
+        path: path.clone(),
+        source,
+    };
+    let certificate = TerminalCertificate::from_json(&text).map_err(refused)?;
     let bar = Progress::of_parts("verifying");
     let proof = proofs::prove(&certificate, &|done| bar.set_part(done))?;
     drop(bar);
     // After the proof, so that a false claim is told by what it claims.
-    TerminalCertificate::check_digest(&text)?;
+    TerminalCertificate::check_digest(&text).map_err(refused)?;
     if arguments.json {
         return Ok(json::text(&document(&certificate, &proof)));
     }

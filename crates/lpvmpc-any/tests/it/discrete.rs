@@ -203,8 +203,8 @@ fn a_price_counts_its_quadratic_part_by_half() {
             terminal: Terminal::Cost(dmatrix![0.0]),
             ..MpcSettings::new(0.1, 1, &[1.0], &[1.0])
         };
-        let plan = Mpc::new(&integrator(), &settings).unwrap();
-        let plan = { plan }.step(&[2.0], &Preview::default()).unwrap();
+        let mut mpc = Mpc::new(&integrator(), &settings).unwrap();
+        let plan = mpc.step(&[2.0], &Preview::default()).unwrap();
         assert!(plan.is_solved(), "{}", plan.status);
         let u = plan.u[(0, 0)];
         assert!((u - expected).abs() < 1e-9, "{linear} {quadratic}: {u}");
