@@ -22,9 +22,9 @@ RANGES = {
 """States are drawn within +- the first vector, set points within +- the second."""
 
 
-def plan_cost(problem: Problem, plan: lpvmpc.Plan, x_ref) -> float:
+def plan_cost(problem: Problem, plan: lpvmpc.Plan, x_ref, u_ref) -> float:
     """The cost of a plan, the prices of exceeded bounds included."""
-    prices = problem.prices_from(plan.x[0], np.asarray(x_ref, dtype=float))
+    prices = problem.prices_from(plan.x[0], np.asarray(x_ref, dtype=float), u_ref)
     prices = np.where(np.isfinite(prices), prices, 0.0)
     return float(plan.cost + (problem.excess(plan.x[1:]) @ prices).sum())
 
@@ -42,7 +42,7 @@ def ratios(example: Example, count: int, max_programs: int, seed: int = 0) -> li
         converged.plan = None
         rows = by_sample(target, 0, problem.horizon + 1, mpc.t_s)
         converged.solve(x0, rows, by_sample(u_ref, 0, problem.horizon, mpc.t_s))
-        ratio = plan_cost(problem, plan, target) / converged.cost if plan.is_solved else np.inf
+        ratio = plan_cost(problem, plan, target, u_ref) / converged.cost if plan.is_solved else np.inf
         found.append((ratio, x0, target, plan.status, plan.programs))
     return sorted(found, key=lambda one: -one[0])
 

@@ -71,6 +71,8 @@ class Problem:
     """Of each state's bounds, (n,): infinite where they are hard, NaN where there are none."""
     step: ca.Function
     """x_{i+1} of x_i and u_i: as many steps of the classical Runge-Kutta method as the controller's."""
+    jacobian: ca.Function
+    """Its derivatives with respect to x_i, of x_i and u_i."""
 
     @classmethod
     def of(cls, example: Example) -> Problem:
@@ -85,22 +87,27 @@ class Problem:
         bounds = list(mpc.bounds.values())
         lower = np.array([one[0] for one in bounds], dtype=float)
         upper = np.array([one[1] for one in bounds], dtype=float)
+        step = runge_kutta(example, mpc.t_s, settings["substeps"])
+        x, u = ca.SX.sym("x", n), ca.SX.sym("u", m)
+        jacobian = ca.Function("jacobian", [x, u], [ca.jacobian(step(x, u), x)])
         return cls(
             n=n, m=m, horizon=mpc.horizon, q=q, r=r, p=p,
             x_lower=lower[:n], x_upper=upper[:n], u_lower=lower[n:], u_upper=upper[n:],
             prices=_prices(settings["state_bounds"], p, lower[:n], upper[:n]),
-            step=runge_kutta(example, mpc.t_s, settings["substeps"]),
+            step=step, jacobian=jacobian,
         )  # fmt: skip
 
-    def prices_from(self, x: Array, x_ref: Array) -> Array:
-        """The prices of a sample at `x` whose references end at `x_ref`: far away they are higher. Written down once more from
-        the documentation of `lpvmpc::ControllerSettings::raise_prices`."""
+    def prices_from(self, x: Array, x_ref: Array, u_ref: Array) -> Array:
+        """The prices of a sample at `x` whose references end at `x_ref` and whose input reference begins with `u_ref`: far
+        away they are higher. Written down once more from the documentation of `lpvmpc::ControllerSettings::raise_prices`."""
         e = x - x_ref
-        still = e @ (self.p + self.horizon * self.q) @ e
+        slope = 2 * (self.p + self.horizon * self.q) @ e
         diagonal = np.diag(self.p)
-        slope = np.where(diagonal > 0, diagonal, abs(self.p).max())
+        own = np.where(diagonal > 0, diagonal, abs(self.p).max())
+        of_way = 4 * np.sqrt(own * (e @ slope) / 2)
+        of_excess = abs((self.jacobian(x, u_ref).full() - np.eye(self.n)).T @ slope)
         # NaN, where there is no price, stays.
-        return np.maximum(self.prices, 4 * np.sqrt(slope * still))
+        return np.maximum(self.prices, np.maximum(of_way, of_excess))
 
     def excess(self, x: Array, bounds: tuple[Array, Array] | None = None) -> Array:
         """By how much states exceed their bounds, in the states' units."""

@@ -54,7 +54,7 @@ class Converged:
         lower[:, soft], upper[:, soft] = -np.inf, np.inf
         lower[0] = upper[0] = x
         slacks = np.zeros(horizon * len(soft))
-        prices = problem.prices_from(x, x_ref[-1])[soft]
+        prices = problem.prices_from(x, x_ref[-1], u_ref[0])[soft]
         arguments = {
             "p": np.concatenate([x_ref.ravel(), u_ref.ravel(), prices]),
             "lbx": np.concatenate([lower.ravel(), np.tile(problem.u_lower, horizon), slacks]),

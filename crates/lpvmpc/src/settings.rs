@@ -142,8 +142,10 @@ pub struct ControllerSettings<T, const NX: usize, const NU: usize, const NS: usi
     pub soft_x: SoftBounds<T, NX>,
     /// Whether far from the end of the reference these prices, and those of a preview, are raised to what the way ahead may
     /// make of a bound's multiplier: in each sample the linear price of state j is at least 4 (P_jj V)^(1/2), where
-    /// V = w'(P + N Q)w is the cost of a plan that stands still, w before its goal. With a terminal equality, and
-    /// without a terminal cost, they stay as they are.
+    /// V = w'(P + N Q)w is the cost of a plan that stands still, w before its goal, and at least |(A - I)'p|_j, where
+    /// p = 2 (P + N Q)w is its slope and A the derivative of a sample's motion from the present state under the input
+    /// reference: what an excess of one sample brings by moving the other states. With a terminal equality, without a
+    /// terminal cost, and where V is too much for the number type, they stay as they are.
     pub raise_prices: bool,
     /// Input bounds, at the stages 0 to N - 1.
     pub u: Bounds<T, NU>,

@@ -2,12 +2,12 @@
 //!
 //! A price is exact where it is above the multiplier of the hard bound. Near the goal that is a matter of the bound's own
 //! width: how much of the cost lies beyond it. Far away it is a matter of the way ahead: how much sooner the plant is at
-//! its goal if it exceeds the bound.
+//! its goal if it exceeds the bound, and how far an excess of one sample takes the other states there.
 
 use crate::model::Scalar;
 use crate::ocp::{Bounds, Penalty, SoftBounds};
-use crate::plan::squared;
 use crate::settings::{ControllerSettings, TerminalIngredient, largest};
+use crate::small_matrix::product;
 use nalgebra::{SMatrix, SVector, convert};
 
 /// Price of a state bound exceeded by its width, in terminal costs of a state at that width: of a
@@ -18,6 +18,10 @@ const PRICE_OF_WIDTH: f64 = 20.0;
 /// Price of an excess far from the goal, in roots of P_jj times the cost of a plan that stands still: twice the slope that
 /// x'Px has anywhere at that cost. Of bounds of any width no multiplier was larger (`multipliers.py`: 3.2).
 const PRICE_OF_WAY: f64 = 4.0;
+
+/// The same in halves of the slope of the cost of a plan that stands still, along what one sample's excess moves the states by:
+/// that slope itself.
+const PRICE_OF_EXCESS: f64 = 2.0;
 
 /// Prices of soft state bounds, high enough to be exact as a rule, from the cost x'Px of a state
 /// from there on (`cost` is P): 20 P_jj times the width of the bound per unit of excess, in the unit
@@ -68,22 +72,26 @@ impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
     }
 
     /// Those of a sample whose goal is `way` from where the state is: those of the settings, raised where they are to be.
+    /// `a` is the plant's matrix where the sample begins.
     // Of its own, not within the step, whose registers it would take.
     #[inline(never)]
     pub fn new<const NU: usize, const NS: usize>(
         settings: &ControllerSettings<T, NX, NU, NS>,
         terminal: &TerminalIngredient<T, NX>,
         way: &SVector<T, NX>,
+        a: impl FnOnce() -> SMatrix<T, NX, NX>,
     ) -> Self {
         let mut prices = Self::given(&settings.soft_x);
         if settings.raise_prices
             && let TerminalIngredient::Cost(p) = terminal
         {
             let samples: T = convert(settings.horizon as f64);
-            // Of a plan that stands still, than which a good one costs no more.
-            let value = squared(p, way) + squared(&settings.weights.q, way) * samples;
-            for (j, least) in prices.least.iter_mut().enumerate() {
-                *least = price_of_way(p, j, value);
+            // Of a plan that stands still, than which a good one costs no more: half of its cost's slope.
+            let slope = product(p, way) + product(&settings.weights.q, way) * samples;
+            let value = way.dot(&slope);
+            let brought = product(&a().transpose(), &slope) - slope;
+            for (j, (least, brought)) in prices.least.iter_mut().zip(brought.iter()).enumerate() {
+                *least = price_of_way(own_cost(p, j), value, brought.abs());
             }
             prices.common = prices.at_least(&settings.soft_x);
         }
@@ -110,12 +118,20 @@ impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
     }
 }
 
-/// Of state `j`, where a plan that stands still costs `value`; nothing where that is too much for the number type.
+/// Of a state that costs P_jj (`own`), where a plan that stands still costs `value` and a unit of excess brings twice what
+/// is `brought`; nothing where that is too much for the number type.
 // Once in the machine code of a microcontroller, for its flash.
 #[cfg_attr(target_arch = "arm", inline(never))]
-fn price_of_way<T: Scalar, const NX: usize>(cost: &SMatrix<T, NX, NX>, j: usize, value: T) -> T {
-    let price = (own_cost(cost, j) * value).sqrt() * convert(PRICE_OF_WAY);
-    if price.is_finite() { price } else { T::zero() }
+fn price_of_way<T: Scalar>(own: T, value: T, brought: T) -> T {
+    let price = largest(
+        brought * convert(PRICE_OF_EXCESS),
+        (own * value).sqrt() * convert(PRICE_OF_WAY),
+    );
+    if value.is_finite() && price.is_finite() {
+        price
+    } else {
+        T::zero()
+    }
 }
 
 /// P_jj; of a state that costs nothing, the largest entry of P, which is one of its diagonal.

@@ -1,7 +1,8 @@
 //! What a program costs and keeps to (Algorithm 1, cost): weights, reference, bounds and outputs.
 
-use crate::by_stage::CostByStage;
+use crate::by_stage::{CostByStage, PlantByStage};
 use crate::controller::Controller;
+use crate::descent::Along;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Ocp;
 use crate::outputs;
@@ -19,7 +20,7 @@ where
 {
     /// Weights, bounds and rows of the program, and the prices of soft bounds from `x` on.
     #[inline(always)]
-    pub(crate) fn pose<D: CostByStage<T, NX, NU>>(
+    pub(crate) fn pose<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
         x: &SVector<T, NX>,
         aim: &Aim<'_, T, NX, NU, D>,
@@ -27,7 +28,11 @@ where
     ) {
         let (settings, own) = (&self.settings, &aim.own);
         let terminal = own.terminal().unwrap_or(&settings.terminal);
-        self.soft = SoftPrices::new(settings, terminal, &(x - aim.end()));
+        let begun = (x, aim.u_ref(0));
+        self.soft = SoftPrices::new(settings, terminal, &(x - aim.end()), || {
+            own.sample_matrices(0, &self.model, settings, begun, Along::Jacobian)
+                .0
+        });
         workspace.pose(settings, &self.soft);
         if own.any() {
             workspace.pose_own(settings, &self.soft, own);

@@ -2,9 +2,10 @@
 
 use super::{assert_safe, controller, settings};
 use lpvmpc::{
-    Bounds, ControllerSettings, Iterations, Ocp, Penalty, Preview, Reference, TerminalIngredient,
+    Bounds, Controller, ControllerSettings, Embedding, Iterations, Number, Ocp, Penalty, Preview,
+    Reference, Rk4, TerminalIngredient, Weights,
 };
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix1, Matrix2, Matrix4, SMatrix, SVector, Vector1, Vector2, Vector4};
 
 const N: usize = 20;
 type Settings = ControllerSettings<f64, 4, 1, 2>;
@@ -158,5 +159,73 @@ fn a_price_is_a_number() {
         let plan = tried.step(&Vector4::zeros(), &reference, &mut memory);
         assert_safe(plan, &settings.u);
         assert_posed(memory.ocp(), own);
+    }
+}
+
+/// A mass of 1 kg on a rail, pushed by a force: position and speed.
+#[derive(Debug)]
+struct Cart;
+
+impl Embedding<2, 1, 0> for Cart {
+    fn scheduling<N: Number>(&self, _: &SVector<N, 2>, _: &SVector<N, 1>) -> SVector<N, 0> {
+        SVector::repeat(N::constant(0.0))
+    }
+
+    fn matrices<N: Number>(&self, _: &SVector<N, 0>) -> (SMatrix<N, 2, 2>, SMatrix<N, 2, 1>) {
+        let [zero, one] = [0.0, 1.0].map(N::constant);
+        (
+            SMatrix::from([[zero, zero], [one, zero]]),
+            SMatrix::from([[zero, one]]),
+        )
+    }
+}
+
+/// The speed costs next to nothing itself, but it brings the cart to its goal. Hard bounds keep it, so soft ones have to,
+/// with the same motion.
+#[test]
+fn a_price_is_above_what_an_excess_brings() {
+    let (t_s, limit) = (0.1, 0.3);
+    for (r, horizon, goal, end) in [
+        (0.1, 30, 3.0, 1.0),
+        (1e-3, 20, 10.0, 1.0),
+        (1.0, 60, 3.0, 0.01),
+        (0.1, 10, 100.0, 100.0),
+    ] {
+        let weights = Weights {
+            q: Matrix2::from_diagonal(&Vector2::new(100.0, 0.0)),
+            r: Matrix1::new(r),
+        };
+        let terminal = TerminalIngredient::Cost(Matrix2::from_diagonal(&Vector2::new(100.0, end)));
+        let mut speed = Bounds::none();
+        (speed.lower[1], speed.upper[1]) = (-limit, limit);
+        let u = Bounds {
+            lower: Vector1::new(-1.0),
+            upper: Vector1::new(1.0),
+        };
+        let settings = ControllerSettings::new(t_s, horizon, weights, terminal, u);
+        let soft = settings.soft_bounds(speed);
+        let hard = ControllerSettings {
+            x: speed,
+            ..settings
+        };
+        let reference = Reference::constant(Vector2::new(goal, 0.0));
+        let [soft, hard] = [soft, hard].map(|settings| {
+            let mut controller = Controller::allocate(Cart, settings).unwrap();
+            let mut workspace = controller.workspace();
+            let mut x = Vector2::zeros();
+            (0..200)
+                .map(|_| {
+                    let plan = controller.step(&x, &reference, &mut workspace);
+                    assert!(plan.status.is_solved(), "{}", plan.status);
+                    x = Rk4 { substeps: 1 }.advance(&Cart, &x, &plan.u[0], t_s);
+                    x
+                })
+                .collect::<Vec<_>>()
+        });
+        for (soft, hard) in soft.iter().zip(&hard) {
+            assert!(soft[1] <= limit + 1e-9, "{} m/s within {limit}", soft[1]);
+            assert!((soft - hard).amax() < 1e-4, "{soft} {hard}");
+        }
+        assert!(hard.iter().any(|x| x[1] > limit - 1e-6));
     }
 }
