@@ -547,8 +547,8 @@ class Plant:
         Raises
         ------
         SettingError
-            None was found: there is none within the bounds, or Newton's method does not find it from the
-            reference.
+            None was found: there is none within the bounds, or none is near where the search from the
+            reference ended.
 
         Examples
         --------

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("casadi")
+ca = pytest.importorskip("casadi")
 sys.path.insert(0, str(Path(__file__).parent.parent / "examples"))
 
 import compare  # noqa: E402
@@ -33,6 +33,32 @@ def test_the_first_samples_cost_what_those_of_converged_nonlinear_mpc_cost(name)
     assert row.ratio < 1.01
     assert row.excess < row.excess_ipopt + 1e-4
     assert len(ours.u) == len(theirs.u) == SAMPLES
+
+
+@pytest.mark.parametrize("name", ["cart_pole", "cstr", "four_tanks", "quadrotor"])
+def test_steady_states_are_the_nearest_within_bounds(name):
+    """From references that no plant can stand at, a third beyond their bounds: as near as IPOPT finds one."""
+    example = importlib.import_module(name).example()
+    plant, random = example.mpc.plant, np.random.default_rng(0)
+    n = len(plant.states)
+    x, u, xdot = (ca.vertcat(*one) if isinstance(one, list) else one for one in (example.x, example.u, example.xdot))
+    x_ref = ca.SX.sym("x_ref", n)
+    e = x - x_ref
+    nlp = {"x": ca.vertcat(x, u), "p": x_ref, "f": ca.dot(e, e) + 1e-9 * ca.dot(u, u), "g": xdot}
+    ipopt = ca.nlpsol("ipopt", "ipopt", nlp, {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False})
+    signals = [*plant.states, *plant.inputs]
+    lower = np.array([-np.inf if one.lower is None else one.lower for one in signals])
+    upper = np.array([np.inf if one.upper is None else one.upper for one in signals])
+    box = [np.where(np.isfinite(one), one, size)[:n] for one, size in ((lower, -1.5), (upper, 1.5))]
+    for _ in range(20):
+        target = (box[0] + box[1]) / 2 + (box[1] - box[0]) / 2 * random.uniform(-1.3, 1.3, n)
+        ours = plant.steady_state(target)
+        inside = np.clip(np.concatenate([target, np.zeros(len(plant.inputs))]), lower, upper)
+        theirs = ipopt(x0=inside, p=target, lbx=lower, ubx=upper, lbg=0, ubg=0)
+        assert ipopt.stats()["success"]
+        found = theirs["x"].full().ravel()[:n]
+        assert np.sum((ours.x - target) ** 2) < 1.001 * np.sum((found - target) ** 2) + 1e-6
+        assert abs(plant.f(ours.x, ours.u)).max() < 1e-6 * (1 + abs(ours.x).max())
 
 
 @pytest.mark.parametrize("name", EXAMPLES)

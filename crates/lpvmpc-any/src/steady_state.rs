@@ -29,7 +29,7 @@ pub struct SteadyState {
 ///
 /// # Errors
 /// A list has not the plant's size or a number that makes no sense, or no steady state was found:
-/// there is none within the bounds, or Newton's method does not find it from the reference.
+/// there is none within the bounds, or none is near where the search from the reference ended.
 pub fn steady_state(
     plant: &Plant,
     x_ref: &[f64],

@@ -169,7 +169,7 @@ pub trait LpvModel<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
     /// The steady state, f(x, u) = 0 (F(x, u) = x of a model with a period) within bounds, that is nearest to a reference; `None` where
     /// none is found.
     ///
-    /// By Newton's method from the reference. A plant that knows its steady states in closed form
+    /// By Newton's method from the reference, or, where bounds are met or it bends away, by an interior-point method. A plant that knows its steady states in closed form
     /// may say so.
     fn steady_state(
         &self,

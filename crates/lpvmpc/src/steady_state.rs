@@ -3,9 +3,14 @@
 //! A pendulum away from upright, a robot on a slope, a tank that leaks: each needs an input to stay
 //! where it is. A cost that asks for no input would pull it off its set point.
 
+mod interior_point;
+mod newton;
+
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Bounds;
+use interior_point::InteriorPoint;
 use nalgebra::{SMatrix, SVector, convert};
+use newton::{Steps, newton};
 
 /// A steady state that is looked for: f(x, u) = 0 within the bounds, as near to the reference as
 /// can be.
@@ -36,10 +41,9 @@ pub struct SteadyState<T, const NX: usize, const NU: usize> {
     pub reached: bool,
 }
 
-/// Newton steps at most, for each set of components at their bounds.
-const MOST_STEPS: usize = 50;
-/// Steps after which they are halved, and halved again: f may be far from linear.
-const PATIENCE: usize = 15;
+/// How far inside the bounds the interior-point method begins, in parts of the room between them: near them, then, should that
+/// lead nowhere, in the middle.
+const INSIDE: [f64; 2] = [0.01, 0.5];
 
 /// What each component of state and input may do.
 struct Free<const NX: usize, const NU: usize> {
@@ -47,11 +51,14 @@ struct Free<const NX: usize, const NU: usize> {
     u: [bool; NU],
 }
 
-/// The steady state of `model` nearest to `problem.x_ref`. `None` where none was found: the plant
-/// has none within the bounds, or Newton's method does not find it from the reference.
+/// A state and an input.
+type Point<T, const NX: usize, const NU: usize> = (SVector<T, NX>, SVector<T, NU>);
+
+/// The steady state of `model` nearest to `problem.x_ref`, of the sum of `q` times squares and next to nothing of `r`.
+/// `None` where none was found: the plant has none within the bounds, or none is near where the search came to an end.
 ///
-/// Each step solves min |x - x_ref|_Q^2 + eps^(2/3) |u|_R^2 subject to the linearised f = 0. A
-/// component that ends beyond its bound is set to it, the farthest first.
+/// Where the plant can stand at the reference, or near it without a bound, Newton's method finds it in a few steps. Elsewhere
+/// an interior-point method goes there within the bounds, and tells which of them are met; Newton's method ends on them.
 pub(crate) fn nearest<P, T, const NX: usize, const NU: usize, const NS: usize>(
     model: &P,
     problem: &SteadyStateProblem<T, NX, NU>,
@@ -60,23 +67,74 @@ where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS> + ?Sized,
 {
-    let mut free = Free {
+    let all = Free {
         x: [true; NX],
         u: [true; NU],
     };
-    let mut x = problem.x.project(&problem.x_ref);
-    let mut u = problem.u.project(&SVector::zeros());
-    for _ in 0..=NX + NU {
-        newton(model, problem, &free, &mut x, &mut u)?;
-        if !bind_farthest(problem, &mut free, &mut x, &mut u) {
-            let near: T = T::default_epsilon().powf(convert(0.25));
-            let sizes = x.iter().zip(problem.x_ref.iter());
-            let reached =
-                { sizes }.all(|(x, x_ref)| (*x - *x_ref).abs() <= near * (T::one() + x_ref.abs()));
-            return Some(SteadyState { x, u, reached });
-        }
+    let begin = (
+        problem.x.project(&problem.x_ref),
+        problem.u.project(&SVector::zeros()),
+    );
+    let at_once = newton(model, problem, &all, begin, Steps::Straight);
+    let found = at_once.and_then(|point| problem.within(&point));
+    let (x, u) = match found {
+        Some(found) => found,
+        None => within_bounds(model, problem)?,
+    };
+    let near: T = T::default_epsilon().powf(convert(0.25));
+    let mut sizes = x.iter().zip(problem.x_ref.iter());
+    let reached = sizes.all(|(x, x_ref)| (*x - *x_ref).abs() <= near * (T::one() + x_ref.abs()));
+    Some(SteadyState { x, u, reached })
+}
+
+/// The one that is nearest within the bounds, some of which are met.
+#[cold]
+#[inline(never)]
+fn within_bounds<P, T, const NX: usize, const NU: usize, const NS: usize>(
+    model: &P,
+    problem: &SteadyStateProblem<T, NX, NU>,
+) -> Option<Point<T, NX, NU>>
+where
+    T: Scalar,
+    P: LpvModel<T, NX, NU, NS> + ?Sized,
+{
+    let mut starts = INSIDE.iter();
+    let found = starts.find_map(|inside| InteriorPoint::new(problem, *inside).minimise(model))?;
+    let (free, on_bounds) = found.active();
+    // Which bounds are met can be in doubt: then the point itself is the answer, which is inside.
+    let ended = newton(model, problem, &free, on_bounds, Steps::Halved);
+    let no_dearer = |point: &Point<T, NX, NU>| {
+        let most = problem.distance(&found.point());
+        problem.distance(point) <= most + T::default_epsilon().sqrt() * (T::one() + most)
+    };
+    let ended = { ended }.and_then(|point| problem.within(&point));
+    Some({ ended }.filter(no_dearer).unwrap_or(found.point()))
+}
+
+impl<T: Scalar, const NX: usize, const NU: usize> SteadyStateProblem<T, NX, NU> {
+    /// The point, if it is within the bounds up to rounding, which is taken off.
+    fn within(&self, (x, u): &Point<T, NX, NU>) -> Option<Point<T, NX, NU>> {
+        let inside = (self.x.project(x), self.u.project(u));
+        let rounding = T::default_epsilon().sqrt();
+        let same =
+            |value: &T, inside: &T| (*value - *inside).abs() <= rounding * (T::one() + value.abs());
+        let same_x = x.iter().zip(&inside.0).all(|(x, inside)| same(x, inside));
+        let same_u = u.iter().zip(&inside.1).all(|(u, inside)| same(u, inside));
+        (same_x && same_u).then_some(inside)
     }
-    None
+
+    /// What is to be least, of the state.
+    fn distance(&self, (x, _): &Point<T, NX, NU>) -> T {
+        (x - self.x_ref).map(|e| e * e).dot(&self.q)
+    }
+
+    /// What a unit of each component costs. A state without weight may move, but not for nothing; an input costs next to
+    /// nothing.
+    fn weights(&self) -> Point<T, NX, NU> {
+        let least = (self.q.amax() * convert(1e-6)).max(convert(1e-12));
+        let nearly_nothing = T::default_epsilon().powf(convert(2.0 / 3.0));
+        (self.q.map(|q| q.max(least)), self.r * nearly_nothing)
+    }
 }
 
 /// What is zero where the plant stands: f(x, u), or F(x, u) - x of a model with a period.
@@ -113,94 +171,53 @@ where
     }
 }
 
-/// Newton's method for the free components; `None` if it does not converge.
-fn newton<P, T, const NX: usize, const NU: usize, const NS: usize>(
-    model: &P,
-    problem: &SteadyStateProblem<T, NX, NU>,
-    free: &Free<NX, NU>,
-    x: &mut SVector<T, NX>,
-    u: &mut SVector<T, NU>,
-) -> Option<()>
-where
-    T: Scalar,
-    P: LpvModel<T, NX, NU, NS> + ?Sized,
-{
-    let eps = T::default_epsilon();
-    let small = eps.sqrt();
-    let nearly_nothing = eps.powf(convert(2.0 / 3.0));
-    let one_if = |free: bool| if free { T::one() } else { T::zero() };
-    // A state without weight may move, but not for nothing.
-    let least = (problem.q.amax() * convert(1e-6)).max(convert(1e-12));
-    // The units in which a unit of each component costs 1; a component that is not free has none.
-    let unit_x = SVector::from_fn(|i, _| one_if(free.x[i]) / problem.q[i].max(least).sqrt());
-    let unit_u =
-        SVector::from_fn(|i, _| one_if(free.u[i]) / (problem.r[i] * nearly_nothing).sqrt());
-    for step in 0..MOST_STEPS {
-        let (a, b) = rates_of(model, x, u);
-        let towards_x =
-            (problem.x_ref - *x).component_mul(&SVector::from_fn(|i, _| one_if(free.x[i])));
-        let towards_u = (-*u).component_mul(&SVector::from_fn(|i, _| one_if(free.u[i])));
-        let missing = rate(model, x, u) + a * towards_x + b * towards_u;
-        let columns = (scaled_columns(&a, &unit_x), scaled_columns(&b, &unit_u));
-        let (away_x, away_u) = least_norm(columns, missing)?;
-        let part = convert::<f64, T>(0.5).powi(i32::try_from(step / PATIENCE).unwrap_or(i32::MAX));
-        let dx = (towards_x - away_x.component_mul(&unit_x)) * part;
-        let du = (towards_u - away_u.component_mul(&unit_u)) * part;
-        *x += dx;
-        *u += du;
-        let settled = |change: &T, value: &T| change.abs() <= small * (T::one() + value.abs());
-        let f = rate(model, x, u);
-        let standing = f.iter().zip(a.row_iter()).all(|(f, row)| {
-            let size = row.iter().fold(T::one(), |sum, a| sum + a.abs());
-            f.abs() <= small * size
-        });
-        if standing
-            && dx.iter().zip(x.iter()).all(|(d, x)| settled(d, x))
-            && du.iter().zip(u.iter()).all(|(d, u)| settled(d, u))
-        {
-            return Some(());
-        }
-    }
-    None
+/// What each entry of f is measured by: the sum of its derivatives with respect to the state (`a`), and 1.
+fn sizes<T: Scalar, const NX: usize>(a: &SMatrix<T, NX, NX>) -> SVector<T, NX> {
+    SVector::from_fn(|i, _| a.row(i).iter().fold(T::one(), |sum, a| sum + a.abs()))
 }
 
-/// Sets the component that is farthest beyond its bound to it, for good. `false` if none is beyond.
-fn bind_farthest<T: Scalar, const NX: usize, const NU: usize>(
-    problem: &SteadyStateProblem<T, NX, NU>,
-    free: &mut Free<NX, NU>,
-    x: &mut SVector<T, NX>,
-    u: &mut SVector<T, NU>,
-) -> bool {
-    let (within_x, within_u) = (problem.x.project(x), problem.u.project(u));
-    let excess_x = (*x - within_x).abs();
-    let excess_u = (*u - within_u).abs();
-    let rounding = T::default_epsilon().sqrt();
-    // Inputs first: a state beyond its bound is often the consequence.
-    let (excess_u, j) = largest(&excess_u);
-    let (excess_x, i) = largest(&excess_x);
-    if excess_u > rounding * (T::one() + u[j].abs()) {
-        u[j] = within_u[j];
-        free.u[j] = false;
-        true
-    } else if excess_x > rounding * (T::one() + x[i].abs()) {
-        x[i] = within_x[i];
-        free.x[i] = false;
-        true
-    } else {
-        (*x, *u) = (within_x, within_u);
-        false
-    }
+/// How far f bends away over a step, in its `sizes`: the difference of its derivatives at the end and at the beginning, along
+/// it.
+fn bent<T: Scalar, const NX: usize, const NU: usize>(
+    begin: &(SMatrix<T, NX, NX>, SMatrix<T, NX, NU>),
+    end: &(SMatrix<T, NX, NX>, SMatrix<T, NX, NU>),
+    (dx, du): &Point<T, NX, NU>,
+    sizes: &SVector<T, NX>,
+) -> T {
+    let bent = (end.0 - begin.0) * dx + (end.1 - begin.1) * du;
+    bent.component_div(sizes).lp_norm(1)
 }
 
-/// The largest entry and its place.
-fn largest<T: Scalar, const K: usize>(v: &SVector<T, K>) -> (T, usize) {
-    let mut found = (-T::one(), 0);
-    for (i, entry) in v.iter().enumerate() {
-        if *entry > found.0 {
-            found = (*entry, i);
-        }
-    }
-    found
+/// Whether f is zero up to rounding, beside derivatives `a`.
+fn stands<T: Scalar, const NX: usize>(f: &SVector<T, NX>, a: &SMatrix<T, NX, NX>) -> bool {
+    let small = T::default_epsilon().sqrt();
+    let measured = f.component_div(&sizes(a));
+    measured.iter().all(|f| f.abs() <= small)
+}
+
+/// Whether a change of a component is next to nothing beside its `value`.
+fn is_settled<T: Scalar, const K: usize>(change: &SVector<T, K>, value: &SVector<T, K>) -> bool {
+    let small = T::default_epsilon().sqrt();
+    let mut pairs = change.iter().zip(value.iter());
+    pairs.all(|(change, value)| change.abs() <= small * (T::one() + value.abs()))
+}
+
+/// The change of x and u with f + A dx + B du = 0 that is nearest to where each component would go without that
+/// (`towards`), in the `units` in which a unit of each costs 1; a component of unit zero stays. `None` if a number is not
+/// finite.
+fn constrained_step<T: Scalar, const NX: usize, const NU: usize>(
+    f: SVector<T, NX>,
+    (a, b): &(SMatrix<T, NX, NX>, SMatrix<T, NX, NU>),
+    units: &Point<T, NX, NU>,
+    towards: &Point<T, NX, NU>,
+) -> Option<Point<T, NX, NU>> {
+    let missing = f + a * towards.0 + b * towards.1;
+    let columns = (scaled_columns(a, &units.0), scaled_columns(b, &units.1));
+    let (away_x, away_u) = least_norm(columns, missing)?;
+    Some((
+        towards.0 - away_x.component_mul(&units.0),
+        towards.1 - away_u.component_mul(&units.1),
+    ))
 }
 
 /// M diag(`factors`)
