@@ -67,6 +67,9 @@ where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS> + ?Sized,
 {
+    if !problem.x_ref.iter().all(|x_ref| x_ref.is_finite()) {
+        return None;
+    }
     let all = Free {
         x: [true; NX],
         u: [true; NU],

@@ -12,7 +12,7 @@ use crate::ocp::Bounds;
 use nalgebra::{SVector, convert};
 
 /// Steps at most.
-const MOST_STEPS: usize = 200;
+const MOST_STEPS: usize = 100;
 /// Halvings of a step at most.
 const MOST_HALVINGS: usize = 40;
 /// Part of the way to the nearest bound that a step goes at most.
@@ -66,7 +66,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> InteriorPoint<T, NX, NU> {
     where
         P: LpvModel<T, NX, NU, NS> + ?Sized,
     {
-        let last_barrier = self.barrier * T::default_epsilon();
+        let last_barrier = self.barrier.min(self.x.weights.amax()) * T::default_epsilon();
         let (x, u) = self.point();
         let sizes = sizes(&rates_of(model, &x, &u).0);
         let mut price = T::zero();
@@ -159,6 +159,12 @@ impl<T: Scalar, const K: usize> Part<T, K> {
     /// bound's size.
     fn new(goal: SVector<T, K>, weights: SVector<T, K>, bounds: Bounds<T, K>, inside: f64) -> Self {
         let inside: T = convert(inside);
+        // A goal far beyond a bound asks for the bound, however far; its cost could be too much for the number type.
+        let far: T = T::default_epsilon().powf(convert(-1.0 / 3.0));
+        let goal = goal.zip_zip_map(&bounds.lower, &bounds.upper, |goal, lower, upper| {
+            let beyond = |bound: T| (T::one() + bound.abs()) * far;
+            goal.max(lower - beyond(lower)).min(upper + beyond(upper))
+        });
         let value = goal.zip_zip_map(&bounds.lower, &bounds.upper, |goal, lower, upper| {
             let room = (upper - lower) * inside;
             let margin = |bound: T| room.min(T::one().max(bound.abs()) * inside);
