@@ -61,17 +61,20 @@ where
         }
         (x, u) = (x + dx, u + du);
         let there = rates_of(model, &x, &u);
-        let sizes = sizes(&derivatives.0);
-        let off = f.component_div(&sizes).lp_norm(1);
-        f = rate(model, &x, &u);
-        let stands = stands(&f, &there.0);
+        let (before, now) = (f, rate(model, &x, &u));
+        let stands = stands(&now, &there.0);
         if stands && is_settled(&dx, &x) && is_settled(&du, &u) {
             return Some((x, u));
         }
-        let straight = bent(&derivatives, &there, &(dx, du), &sizes) <= off * convert(0.5);
-        if steps == Steps::Straight && !(straight || stands) {
-            return None;
+        if steps == Steps::Straight && !stands {
+            let sizes = sizes(&derivatives.0);
+            let off = before.component_div(&sizes).lp_norm(1);
+            let straight = bent(&derivatives, &there, &(dx, du), &sizes) <= off * convert(0.5);
+            if !straight {
+                return None;
+            }
         }
+        f = now;
         derivatives = there;
     }
     None
