@@ -9,7 +9,7 @@ use super::{
 };
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Bounds;
-use nalgebra::{SVector, convert};
+use nalgebra::{SMatrix, SVector, convert};
 
 /// Steps at most.
 const MOST_STEPS: usize = 100;
@@ -68,12 +68,12 @@ impl<T: Scalar, const NX: usize, const NU: usize> InteriorPoint<T, NX, NU> {
     {
         let last_barrier = self.barrier.min(self.x.weights.amax()) * T::default_epsilon();
         let (x, u) = self.point();
-        let sizes = sizes(&rates_of(model, &x, &u).0);
+        let (mut f, mut derivatives) = (rate(model, &x, &u), rates_of(model, &x, &u));
+        let sizes = sizes(&derivatives.0);
+        let size_of = |f: &SVector<T, NX>| f.component_div(&sizes).lp_norm(1);
         let mut price = T::zero();
         for _ in 0..MOST_STEPS {
             let (x, u) = self.point();
-            let derivatives = rates_of(model, &x, &u);
-            let f = rate(model, &x, &u);
             let slopes = (self.x.slope(self.barrier), self.u.slope(self.barrier));
             let bends = (self.x.curvature(), self.u.curvature());
             let units = (self.x.units(&bends.0), self.u.units(&bends.1));
@@ -82,7 +82,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> InteriorPoint<T, NX, NU> {
                 -slopes.1.component_mul(&units.1).component_mul(&units.1),
             );
             let (dx, du) = constrained_step(f, &derivatives, &units, &towards)?;
-            let off = f.component_div(&sizes).lp_norm(1);
+            let off = size_of(&f);
             let along = slopes.0.dot(&dx) + slopes.1.dot(&du);
             let bend = bends.0.dot(&dx.component_mul(&dx)) + bends.1.dot(&du.component_mul(&du));
             let half: T = convert(0.5);
@@ -93,51 +93,55 @@ impl<T: Scalar, const NX: usize, const NU: usize> InteriorPoint<T, NX, NU> {
             }
             let fall = (along - price * off).min(T::zero());
             let to_bound = self.x.to_bound(&dx).min(self.u.to_bound(&du));
-            let merit = |x: &SVector<T, NX>, u: &SVector<T, NU>| {
+            let merit = |x: &SVector<T, NX>, u: &SVector<T, NU>, f: &SVector<T, NX>| {
                 let cost = self.x.cost(x, self.barrier) + self.u.cost(u, self.barrier);
-                cost + price * rate(model, x, u).component_div(&sizes).lp_norm(1)
+                cost + price * size_of(f)
             };
-            let before = merit(&x, &u);
+            let before = merit(&x, &u, &f);
             let rounding = before.abs() * T::default_epsilon() * convert(10.0);
-            let is_good = |step: T| {
+            // f and its derivatives at the end of a step that is good.
+            let end_of = |step: T| {
                 let (dx, du) = (dx * step, du * step);
-                let there = (x + dx, u + du);
-                merit(&there.0, &there.1)
-                    <= before + fall * step * convert(SUFFICIENT) + rounding
-                    // Beyond where f bends away, other steady states are nearer than the one that it leads to.
-                    && bent(&derivatives, &rates_of(model, &there.0, &there.1), &(dx, du), &sizes) * price
-                        <= (price * off + bend * step) * half
+                let (x, u) = (x + dx, u + du);
+                let f = rate(model, &x, &u);
+                let enough = before + fall * step * convert(SUFFICIENT) + rounding;
+                if !(merit(&x, &u, &f) <= enough) {
+                    return None;
+                }
+                let there = rates_of(model, &x, &u);
+                // Beyond where f bends away, other steady states are nearer than the one that it leads to.
+                let bent = bent(&derivatives, &there, &(dx, du), &sizes) * price;
+                (bent <= (price * off + bend * step) * half).then_some((f, there))
             };
             let mut step = to_bound;
             let mut halvings = 0;
-            while !is_good(step) {
+            let there = loop {
+                if let Some(there) = end_of(step) {
+                    break there;
+                }
                 halvings += 1;
                 if halvings > MOST_HALVINGS {
-                    return self.end(model);
+                    return self.end(&f, &derivatives.0);
                 }
                 step *= half;
-            }
+            };
             self.x.advance(&dx, step, self.barrier);
             self.u.advance(&du, step, self.barrier);
+            (f, derivatives) = there;
             let settled = is_settled(&dx, &self.x.value) && is_settled(&du, &self.u.value);
             if settled && self.barrier <= last_barrier {
-                return self.end(model);
+                return self.end(&f, &derivatives.0);
             }
             if settled || step >= half {
                 self.barrier = (self.barrier * convert(FALL)).max(last_barrier);
             }
         }
-        self.end(model)
+        self.end(&f, &derivatives.0)
     }
 
-    /// What it has come to, if the plant stands there.
-    fn end<P, const NS: usize>(self, model: &P) -> Option<Self>
-    where
-        P: LpvModel<T, NX, NU, NS> + ?Sized,
-    {
-        let (x, u) = self.point();
-        let standing = stands(&rate(model, &x, &u), &rates_of(model, &x, &u).0);
-        standing.then_some(self)
+    /// What it has come to, if the plant stands there, with this f and these derivatives of it.
+    fn end(self, f: &SVector<T, NX>, a: &SMatrix<T, NX, NX>) -> Option<Self> {
+        stands(f, a).then_some(self)
     }
 
     /// Which components are not at a bound, and the point with the others on theirs.
