@@ -39,8 +39,8 @@ class Plan:
     of the inputs."""
     status: str
     """``"converged"``, ``"improved"``, ``"no improvement"`` (a descent), ``"solved"`` (a fixed number of
-    programs), and of those that are no plan ``"infeasible"``, ``"inaccurate"``, ``"max changes"``,
-    ``"no memory"``, ``"numerical failure"``, ``"not finite"``, ``"refused"``."""
+    programs), and of those that are no plan ``"infeasible"``, ``"exceeded"`` (a hard bound, in a descent, and nothing
+    proves that it has to be), ``"inaccurate"``, ``"max changes"``, ``"no memory"``, ``"numerical failure"``, ``"not finite"``, ``"refused"``."""
     message: str
     """The status in words, with the plant's names: ``"infeasible: position <= 0.5 m at stage 7 against
     force >= -10 N at stages 0 to 6"``."""

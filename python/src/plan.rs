@@ -14,6 +14,7 @@ fn word(status: &Status<f64>) -> &'static str {
         Status::Improved => "improved",
         Status::NoImprovement => "no improvement",
         Status::Infeasible(_) => "infeasible",
+        Status::Exceeded(_) => "exceeded",
         Status::Inaccurate(_) => "inaccurate",
         Status::MaxChanges => "max changes",
         Status::WorkingSetFull | Status::HorizonTooLong => "no memory",

@@ -111,6 +111,32 @@ def test_hard_bounds_are_compared_as_hard_ones():
     assert row.failures == 0 and abs(row.ratio - 1) < 1e-3 and ours.is_solved
 
 
+def test_hard_bounds_are_kept_where_ipopt_keeps_them():
+    """From starts whose first programs are infeasible, and from random ones; and of one no plan is known."""
+    example = importlib.import_module("furuta").example()
+    mpc = lpvmpc.Mpc(example.mpc.plant, **{**example.mpc.settings, "state_bounds": "hard"})
+    hard = replace(example, mpc=mpc)
+    problem, ipopt, random = Problem.of(hard), Converged(hard), np.random.default_rng(4)
+    starts = [
+        ([-0.742, -0.09, -1.908, -3.626], -1.74), ([-1.547, -0.548, -2.545, 2.708], -0.921),
+        ([0.832, 0.389, 3.173, -0.247], -0.942), ([-1.351, -0.234, -1.395, -0.376], -1.182),
+        *((random.uniform(-1, 1, 4) * [1.8, 0.8, 4, 4], random.uniform(-1.8, 1.8)) for _ in range(10)),
+    ]  # fmt: skip
+    for x0, arm in starts:
+        target = np.array([arm, 0, 0, 0])
+        mpc.reset()
+        plan = mpc.step(x0, target, u_ref=[0])
+        ipopt.plan = None
+        ipopt.solve(np.asarray(x0), np.tile(target, (41, 1)), np.zeros((40, 1)))
+        assert ipopt.failures == 0 and plan.is_solved
+        assert problem.excess(plan.x[1:]).max() < 0.04 and plan.cost < 1.05 * ipopt.cost
+        assert mpc.step(x0, target, u_ref=[0]).is_solved
+    drone = importlib.import_module("quadrotor").example()
+    mpc = lpvmpc.Mpc(drone.mpc.plant, **{**drone.mpc.settings, "state_bounds": "hard"})
+    plan = mpc.step([-0.78, -0.119, 0.273, -1.45, 1.224, 5.671], [0.51, 0.096, 0, 0, 0, 0], u_ref=references(drone, drone.starts[0])[1])
+    assert plan.status in ("infeasible", "exceeded")
+
+
 def test_the_acados_model_is_swung_up():
     run = importlib.import_module("from_acados").main()
     assert run.is_solved and np.abs(run.x[-1]).max() < 1e-2

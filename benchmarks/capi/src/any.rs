@@ -139,7 +139,8 @@ pub fn status_number<T>(status: &Status<T>) -> i32 {
         Status::WorkingSetFull => 4,
         Status::HorizonTooLong => 5,
         Status::NumericalFailure { .. } => 6,
-        Status::NotFinite | Status::Refused(_) => 7,
+        // The last two are of controllers, not of problems.
+        Status::NotFinite | Status::Refused(_) | Status::Exceeded(_) => 7,
     }
 }
 

@@ -50,6 +50,11 @@ impl Bounded<'_> {
                     false => format!("infeasible: {first} against {}", against.join(", ")),
                 }
             }
+            Status::Exceeded(bound) => format!(
+                "exceeded: no plan was found that keeps {} at stage {}",
+                self.words(*bound),
+                bound.stage
+            ),
             Status::Inaccurate(bound) => format!(
                 "inaccurate: rounding keeps {} at stage {} from being met",
                 self.words(*bound),

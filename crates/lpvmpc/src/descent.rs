@@ -18,9 +18,9 @@ use crate::by_stage::{CostByStage, PlantByStage};
 use crate::controller::Controller;
 use crate::embedding::Tangent;
 use crate::first_plan::First;
+use crate::line_search::LONGEST_STEP;
 use crate::model::{LpvModel, Scalar};
-use crate::plan::{Aim, Merit, Prices, Trial, at};
-use crate::policy::input_at;
+use crate::plan::{Aim, Merit, Prices, at};
 use crate::settings::{ControllerSettings, TerminalIngredient};
 use crate::small_matrix::product;
 use crate::solution::Status;
@@ -70,12 +70,8 @@ pub(crate) enum Outcome<T> {
     },
 }
 
-/// Parts of the way to a program's answer that are tried; beyond it only where damping holds it back.
-const STEPS: [f64; 6] = [3.0, 1.0, 0.5, 0.25, 0.1, 0.03];
 /// From each of them to the next longer one, at least.
 const LONGER: f64 = 4.0;
-/// Part of the expected gain that a step has to bring (Armijo's condition).
-const SUFFICIENT: f64 = 1e-4;
 /// The search ends after so many programs in a row that bring nothing; each is damped more.
 const MOST_FAILURES: usize = 8;
 /// A difference of two merits is known to so many roundings of one of them, and of its states.
@@ -120,9 +116,9 @@ where
             && self.hold_matrices(x, aim, tolerance, &mut prices, workspace);
         let begun = first != First::Nothing;
         let found = begun.then(|| {
-            match self.search(x, aim, (along, most, tolerance), &mut prices, workspace) {
-                Status::Converged => Status::Converged,
-                _ if moved => Status::Improved,
+            let begin = (along, most, tolerance);
+            match self.search_within_bounds(x, aim, begin, &mut prices, workspace) {
+                Status::NoImprovement if moved => Status::Improved,
                 status => status,
             }
         });
@@ -158,7 +154,7 @@ where
             let damped = self.policy.damping > T::zero();
             let longest = match along {
                 Along::Scheduling => longest_step,
-                Along::Jacobian if damped => convert(STEPS[0]),
+                Along::Jacobian if damped => convert(LONGEST_STEP),
                 Along::Jacobian => T::one(),
             };
             let outcome = self.improve(x, aim, (tolerance, longest), prices, workspace);
@@ -214,7 +210,9 @@ where
                         status = reason;
                     }
                     failures += 1;
-                    if failures >= MOST_FAILURES {
+                    // Damping makes no program feasible.
+                    let infeasible = matches!(self.solution.status, Status::Infeasible(_));
+                    if failures >= MOST_FAILURES || infeasible && failures > 1 {
                         break;
                     }
                     self.policy.far &= along == Along::Jacobian;
@@ -390,47 +388,6 @@ where
         }
     }
 
-    /// The longest step from the plan towards `answer` (state and input of a stage) that lowers the
-    /// merit enough, of those up to the `longest`, and the merit of the rollout that it leaves in `trial`.
-    #[inline(never)]
-    pub(crate) fn search_line<D: PlantByStage<P, T, NX, NU, NS>>(
-        &self,
-        x: &SVector<T, NX>,
-        merit: &Merit<'_, T, NX, NU, D>,
-        (expected, longest): (T, T),
-        trial: &mut Trial<T, NX, NU>,
-        answer: &dyn Fn(usize) -> (SVector<T, NX>, SVector<T, NU>),
-    ) -> Option<(T, T)> {
-        let Self {
-            policy, rollout, ..
-        } = self;
-        let steps = STEPS.into_iter().map(convert::<f64, T>);
-        for step in steps.filter(|step| *step <= longest) {
-            // Beyond the answer, all that was expected of it.
-            let part = if step > T::one() {
-                T::one()
-            } else {
-                step * convert(SUFFICIENT)
-            };
-            let sufficient = policy.cost - expected * part;
-            let cost = self.roll_out_plan(x, merit, sufficient, trial, &|i, x_i| {
-                let x_plan = i.checked_sub(1).map_or(*x, |j| at(rollout, j));
-                let (x_answer, u_answer) = answer(i);
-                let planned = x_plan + (x_answer - x_plan) * step;
-                let u_plan = at(&policy.u, i);
-                let u = u_plan + (u_answer - u_plan) * step;
-                let bounds = merit.aim.own.u(i, &self.settings.u);
-                input_at(x_i, (&planned, &u), &at(&policy.feedback, i), &bounds)
-            });
-            if let Some(cost) = cost
-                && cost < policy.cost
-            {
-                return Some((step, cost));
-            }
-        }
-        None
-    }
-
     /// The curvature that the last step showed, for the next program of the Jacobian; more where there
     /// was no step.
     pub(crate) fn adapt_damping<D: PlantByStage<P, T, NX, NU, NS>>(
@@ -474,53 +431,6 @@ where
         prices: Prices<T, NX>,
     ) -> Merit<'a, T, NX, NU, D> {
         Merit::new(&self.settings, &self.soft, aim, prices)
-    }
-
-    /// Rolls the nonlinear model out from `x` into `trial`, with the inputs that `input` gives for a
-    /// stage and its state. Returns the merit; `None` if it is not finite or above `most`, where the
-    /// rollout ends.
-    // Once in the machine code: a call per stage is nothing beside a Runge-Kutta step.
-    #[inline(never)]
-    pub(crate) fn roll_out_plan<D: PlantByStage<P, T, NX, NU, NS>>(
-        &self,
-        x: &SVector<T, NX>,
-        merit: &Merit<'_, T, NX, NU, D>,
-        most: T,
-        trial: &mut Trial<T, NX, NU>,
-        input: &dyn Fn(usize, &SVector<T, NX>) -> SVector<T, NU>,
-    ) -> Option<T> {
-        let mut state = *x;
-        let mut total = T::zero();
-        // No stage costs less than nothing, but for linear costs.
-        let most_before_end = if merit.aim.own.has_linear_costs() {
-            convert(f64::INFINITY)
-        } else {
-            most
-        };
-        let places = trial.u.iter_mut().zip(&mut trial.x);
-        for (i, (u, next)) in places.enumerate().take(self.settings.horizon) {
-            *u = input(i, &state);
-            total += merit.stage(i, &state, u);
-            // Negated, so that a NaN ends it.
-            if !(total <= most_before_end) {
-                return None;
-            }
-            let own = &merit.aim.own;
-            state = own.next_state(i, &self.model, &self.settings, &state, u);
-            *next = state;
-        }
-        total += merit.end(&state);
-        (total <= most && total.is_finite()).then_some(total)
-    }
-
-    /// The trial becomes the plan, if it has a cost.
-    pub(crate) fn take_if_some(&mut self, cost: Option<T>, trial: &Trial<T, NX, NU>) {
-        if let Some(cost) = cost {
-            copy(&mut self.policy.u, &trial.u);
-            copy(&mut self.rollout, &trial.x);
-            self.policy.cost = cost;
-            self.initialised = true;
-        }
     }
 
     /// The plan becomes the answer.

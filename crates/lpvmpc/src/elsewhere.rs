@@ -11,6 +11,7 @@
 use crate::by_stage::PlantByStage;
 use crate::controller::Controller;
 use crate::descent::{Along, States};
+use crate::hard_bounds::DEAR;
 use crate::list::List;
 use crate::memory::Capacity;
 use crate::model::{LpvModel, Scalar};
@@ -121,7 +122,8 @@ where
             match last {
                 None => {
                     self.watch = Watch::new();
-                    if found.is_none() || programs > self.settings.iterations.most() {
+                    let is_plan = found.is_some_and(|status| status.is_solved());
+                    if !is_plan || programs > self.settings.iterations.most() {
                         for beginning in [Beginning::Line, Beginning::Still] {
                             let problem = (x, aim, tolerance);
                             self.try_another(problem, beginning, &mut best, &mut kept, workspace);
@@ -167,21 +169,26 @@ where
         };
         let most = (self.problems() + most).min(usize::from(u16::MAX));
         self.exchange(kept);
-        let dearest = status.map(|_| kept.policy.cost);
+        let known = status.filter(Status::is_solved);
+        let dearest = known.map(|_| kept.policy.cost);
         let begun = match beginning {
             Beginning::Regulator => self.regulate(x, aim, None, workspace).is_some(),
             _ => self.close_gaps((x, aim), beginning, (dearest, most), prices, workspace),
         };
-        let other = begun.then(|| self.search(x, aim, (along, most, tolerance), prices, workspace));
+        self.pose_hard(aim, workspace);
+        let begin = (along, most, tolerance);
+        let other = begun.then(|| self.search_within_bounds(x, aim, begin, prices, workspace));
         let merit = self.merit(aim, *prices);
         let cost = merit.of(x, &self.policy.u, &self.rollout);
         let before = merit.of(x, &kept.policy.u, &kept.rollout);
+        let is_plan = other.is_some_and(|other| other.is_solved());
         // A NaN is not cheaper.
-        let cheaper = match status {
-            Some(_) => before - cost > before.abs() * tolerance,
-            None => cost.is_finite(),
+        let better = match (*status, known) {
+            (_, Some(_)) => is_plan && before - cost > before.abs() * tolerance,
+            (Some(_), None) => is_plan && cost.is_finite(),
+            (None, None) => other.is_some() && cost.is_finite(),
         };
-        if other.is_some() && cheaper {
+        if better {
             *status = other;
             return true;
         }
@@ -219,7 +226,12 @@ where
             self.solve_program(workspace);
             let answer = &self.solution;
             if !answer.status.is_solved() {
-                break;
+                // Gaps are closed sooner than hard bounds are kept.
+                if dearest.is_some() || self.soft.is_elastic() {
+                    break;
+                }
+                self.pose_elastic(x, aim, convert(DEAR), workspace);
+                continue;
             }
             prices.raise(&answer.active);
             let merit = self.merit(aim, *prices);

@@ -5,6 +5,7 @@
 //! general rows. The merit of a descent has the outputs themselves.
 
 use crate::by_stage::CostByStage;
+use crate::cost::excess;
 use crate::model::Scalar;
 use crate::ocp::{Common, GeneralRow, Penalty};
 use crate::workspace::half;
@@ -165,14 +166,14 @@ fn weighted<T: Scalar>(goal: &OutputGoal<T>, y: T) -> T {
     }
 }
 
-/// What the outputs of stage `i` cost with the price of their bounds, `hard` of hard ones. There is no input
+/// What the outputs of stage `i` cost with the price of their bounds, `hard` that of hard ones. There is no input
 /// at the end.
 pub(crate) fn merit<T: Scalar, const NX: usize, const NU: usize>(
     outputs: &dyn Outputs<T, NX, NU>,
     i: usize,
     (x, u): (&SVector<T, NX>, Option<&SVector<T, NU>>),
     about: Option<(&SVector<T, NX>, &SVector<T, NU>)>,
-    (hard, excess): (T, fn(T, T, T) -> T),
+    hard: Penalty<T>,
 ) -> T {
     let mut total = T::zero();
     let still = SVector::zeros();
@@ -184,14 +185,30 @@ pub(crate) fn merit<T: Scalar, const NX: usize, const NU: usize>(
         }
         if counts(outputs, j, i == 0, u.is_none()) {
             let beyond = excess(y, goal.lower, goal.upper);
-            let price = goal.soft.map_or(hard * beyond, |price| price.of(beyond));
             // Negated, so that an output that is none has a price.
             if !(beyond == T::zero()) {
-                total += price;
+                total += goal.soft.unwrap_or(hard).of(beyond);
             }
         }
     });
     total
+}
+
+/// Calls `visit` with the value and the bounds of each output at stage `i` that has hard ones. There is no input at the end.
+pub(crate) fn hard_bounds<T: Scalar, const NX: usize, const NU: usize>(
+    outputs: &dyn Outputs<T, NX, NU>,
+    i: usize,
+    (x, u): (&SVector<T, NX>, Option<&SVector<T, NU>>),
+    visit: &mut dyn FnMut(usize, T, T, T),
+) {
+    let still = SVector::zeros();
+    let motion = (x, u.unwrap_or(&still));
+    each(outputs, i, motion, None, &mut |j, y| {
+        let goal = outputs.goal(i, j);
+        if goal.soft.is_none() && counts(outputs, j, i == 0, u.is_none()) {
+            visit(j, y, goal.lower, goal.upper);
+        }
+    });
 }
 
 /// Adds the outputs of stage `i`, linear about `motion`, to the quadratic and the linear cost of a program.
@@ -218,12 +235,14 @@ pub(crate) fn add_costs<T: Scalar, const NX: usize, const NU: usize>(
     });
 }
 
-/// Writes the bounds of the outputs of stage `i`, linear about `motion`, to the first of its general `rows`.
+/// Writes the bounds of the outputs of stage `i`, linear about `motion`, to the first of its general `rows`; those
+/// without a price have the `elastic` one, if there is one.
 pub(crate) fn write_rows<T: Scalar, const NX: usize, const NU: usize>(
     outputs: &dyn Outputs<T, NX, NU>,
     i: usize,
     motion: (&SVector<T, NX>, &SVector<T, NU>),
     end: bool,
+    elastic: Option<Penalty<T>>,
     rows: &mut [GeneralRow<T, NX, NU>],
 ) {
     outputs.tangents(i, motion.0, motion.1, &mut |j, y, by_x, by_u| {
@@ -243,7 +262,7 @@ pub(crate) fn write_rows<T: Scalar, const NX: usize, const NU: usize>(
             u: *by_u,
             lower: goal.lower - constant,
             upper: goal.upper - constant,
-            soft: goal.soft.map(half),
+            soft: goal.soft.or(elastic).map(half),
         };
     });
 }

@@ -5,7 +5,7 @@ use crate::controller::Reference;
 use crate::cost::{excess, price};
 use crate::list::List;
 use crate::model::Scalar;
-use crate::ocp::Bounds;
+use crate::ocp::{Bounds, Penalty};
 use crate::outputs;
 use crate::settings::{ControllerSettings, TerminalIngredient, Weights};
 use crate::small_matrix::product;
@@ -321,7 +321,7 @@ where
     ) -> T {
         let outputs = self.aim.own.outputs();
         outputs.map_or(T::zero(), |outputs| {
-            outputs::merit(outputs, i, motion, about, (self.prices.rows, excess))
+            outputs::merit(outputs, i, motion, about, self.price_of_row(None))
         })
     }
 
@@ -377,10 +377,15 @@ where
         let counting = rows.filter(|row| row.counts(i == 0, u.is_none()));
         counting.fold(T::zero(), |total, row| {
             let beyond = excess(row.value(x, u), row.lower, row.upper);
-            let price = row
-                .soft
-                .map_or(self.prices.rows * beyond, |price| price.of(beyond));
-            total + price
+            total + self.price_of_row(row.soft).of(beyond)
+        })
+    }
+
+    /// The price of a general row; of a hard one, that of hard ones.
+    fn price_of_row(&self, soft: Option<Penalty<T>>) -> Penalty<T> {
+        soft.or(self.soft.of_rows()).unwrap_or(Penalty {
+            linear: self.prices.rows,
+            quadratic: T::zero(),
         })
     }
 }

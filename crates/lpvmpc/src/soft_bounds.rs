@@ -37,20 +37,24 @@ pub fn exact_prices<T: Scalar, const NX: usize>(
     let sides = x.lower.iter().zip(x.upper.iter());
     let mut prices = [None; NX];
     for (j, (place, (lower, upper))) in prices.iter_mut().zip(sides).enumerate() {
-        let width = match (lower.is_finite(), upper.is_finite()) {
-            (true, true) => *upper - *lower,
-            (true, false) => lower.abs(),
-            (false, true) => upper.abs(),
-            (false, false) => continue,
-        };
-        // A bound of no width, or at zero, is as dear as one of a unit.
-        let width = if width > T::zero() { width } else { T::one() };
-        *place = Some(Penalty {
-            linear: convert::<f64, T>(PRICE_OF_WIDTH) * own_cost(cost, j) * width,
+        *place = width(*lower, *upper).map(|width| Penalty {
+            linear: price_of_width(own_cost(cost, j), width),
             quadratic: T::zero(),
         });
     }
     prices
+}
+
+/// How wide bounds are; one alone, as far as it is from zero. Bounds of no width, or one at zero, count as one unit.
+/// `None` without a bound.
+pub(crate) fn width<T: Scalar>(lower: T, upper: T) -> Option<T> {
+    let width = match (lower.is_finite(), upper.is_finite()) {
+        (true, true) => upper - lower,
+        (true, false) => lower.abs(),
+        (false, true) => upper.abs(),
+        (false, false) => return None,
+    };
+    Some(if width > T::zero() { width } else { T::one() })
 }
 
 /// The prices of a sample.
@@ -60,6 +64,8 @@ pub(crate) struct SoftPrices<T, const NX: usize> {
     common: SoftBounds<T, NX>,
     /// The least linear price of each state.
     least: SVector<T, NX>,
+    /// Of hard bounds, while a descent looks for a plan that keeps them: of each state, and of a general row.
+    elastic: Option<(SVector<T, NX>, T)>,
 }
 
 impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
@@ -68,6 +74,7 @@ impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
         Self {
             common: *soft_x,
             least: SVector::zeros(),
+            elastic: None,
         }
     }
 
@@ -85,23 +92,70 @@ impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
         if settings.raise_prices
             && let TerminalIngredient::Cost(p) = terminal
         {
-            let samples: T = convert(settings.horizon as f64);
-            // Of a plan that stands still, than which a good one costs no more: half of its cost's slope.
-            let slope = product(p, way) + product(&settings.weights.q, way) * samples;
-            let value = way.dot(&slope);
-            let brought = product(&a().transpose(), &slope) - slope;
-            for (j, (least, brought)) in prices.least.iter_mut().zip(brought.iter()).enumerate() {
-                *least = price_of_way(own_cost(p, j), value, brought.abs());
-            }
+            prices.least = of_way(settings, p, way, &a());
             prices.common = prices.at_least(&settings.soft_x);
         }
         prices
     }
 
+    /// The same, with hard bounds of states and general rows soft, too, at `factor` times a price that is meant to be
+    /// exact.
+    pub fn elastic<const NU: usize, const NS: usize>(
+        self,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+        terminal: &TerminalIngredient<T, NX>,
+        way: &SVector<T, NX>,
+        a: &SMatrix<T, NX, NX>,
+        factor: T,
+    ) -> Self {
+        let cost = settings.cost_to_go(terminal);
+        let mut prices = of_way(settings, &cost, way, a);
+        let sides = settings.x.lower.iter().zip(settings.x.upper.iter());
+        for (j, (price, (lower, upper))) in prices.iter_mut().zip(sides).enumerate() {
+            let width = width(*lower, *upper).unwrap_or(T::one());
+            *price = largest(*price, price_of_width(own_cost(&cost, j), width)) * factor;
+        }
+        let elastic = Some((prices, prices.amax()));
+        Self { elastic, ..self }
+    }
+
+    /// The same, with hard bounds hard.
+    pub fn hard(self) -> Self {
+        Self {
+            elastic: None,
+            ..self
+        }
+    }
+
+    /// Whether hard bounds are soft.
+    #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
+    pub fn is_elastic(&self) -> bool {
+        self.elastic.is_some()
+    }
+
+    /// Of hard general rows; `None` where they are hard.
+    pub fn of_rows(&self) -> Option<Penalty<T>> {
+        let price = self.elastic.map(|(_, price)| price);
+        price.map(|linear| Penalty {
+            linear,
+            quadratic: T::zero(),
+        })
+    }
+
     /// Those of a stage that may have `own` ones.
     #[inline(always)]
     pub fn of(&self, own: Option<&SoftBounds<T, NX>>) -> SoftBounds<T, NX> {
-        own.map_or(self.common, |own| self.at_least(own))
+        let mut prices = own.map_or(self.common, |own| self.at_least(own));
+        if let Some((elastic, _)) = &self.elastic {
+            for (price, elastic) in prices.iter_mut().zip(elastic.iter()) {
+                let elastic = Penalty {
+                    linear: *elastic,
+                    quadratic: T::zero(),
+                };
+                *price = price.or(Some(elastic));
+            }
+        }
+        prices
     }
 
     /// The prices, none below the least.
@@ -116,6 +170,30 @@ impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
         }
         raised
     }
+}
+
+/// The least price of each state, on this `way` to a goal where the cost x'Px (`p`) is left.
+fn of_way<T: Scalar, const NX: usize, const NU: usize, const NS: usize>(
+    settings: &ControllerSettings<T, NX, NU, NS>,
+    p: &SMatrix<T, NX, NX>,
+    way: &SVector<T, NX>,
+    a: &SMatrix<T, NX, NX>,
+) -> SVector<T, NX> {
+    let samples: T = convert(settings.horizon as f64);
+    // Of a plan that stands still, than which a good one costs no more: half of its cost's slope.
+    let slope = product(p, way) + product(&settings.weights.q, way) * samples;
+    let value = way.dot(&slope);
+    let brought = product(&a.transpose(), &slope) - slope;
+    let mut least = SVector::<T, NX>::zeros();
+    for (j, (least, brought)) in least.iter_mut().zip(brought.iter()).enumerate() {
+        *least = price_of_way(own_cost(p, j), value, brought.abs());
+    }
+    least
+}
+
+/// Of a state that costs P_jj (`own`) and has bounds of this `width`.
+fn price_of_width<T: Scalar>(own: T, width: T) -> T {
+    convert::<f64, T>(PRICE_OF_WIDTH) * own * width
 }
 
 /// Of a state that costs P_jj (`own`), where a plan that stands still costs `value` and a unit of excess brings twice what

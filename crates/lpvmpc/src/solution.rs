@@ -281,6 +281,9 @@ pub enum Status<T> {
     /// No input satisfies all hard bounds. The active rows of the solution are the proof
     /// ([`infeasibility_margin`](crate::infeasibility_margin)); this bound is the earliest of them.
     Infeasible(BoundId),
+    /// The plan of a descent is a rollout of the nonlinear model that exceeds this hard bound, the earliest of them, by more
+    /// than a hundredth of its width, and nothing proves that no input keeps it.
+    Exceeded(BoundId),
     /// Rounding keeps this bound from being met as closely as asked for, and nothing proves that it
     /// cannot be: the numbers of the problem are too far apart for the number type. The inputs are the
     /// best that were found.
@@ -323,6 +326,9 @@ impl<T: fmt::Display> fmt::Display for Status<T> {
             Self::Improved => write!(f, "improved"),
             Self::NoImprovement => write!(f, "no improvement found"),
             Self::Infeasible(bound) => write!(f, "infeasible: {bound} cannot be met"),
+            Self::Exceeded(bound) => {
+                write!(f, "exceeded: no plan was found that keeps the {bound}")
+            }
             Self::Inaccurate(bound) => {
                 write!(f, "inaccurate: rounding keeps the {bound} from being met")
             }

@@ -28,15 +28,65 @@ where
     ) {
         let (settings, own) = (&self.settings, &aim.own);
         let terminal = own.terminal().unwrap_or(&settings.terminal);
-        let begun = (x, aim.u_ref(0));
         self.soft = SoftPrices::new(settings, terminal, &(x - aim.end()), || {
-            own.sample_matrices(0, &self.model, settings, begun, Along::Jacobian)
-                .0
+            self.begins_along(x, aim)
         });
-        workspace.pose(settings, &self.soft);
-        if own.any() {
-            workspace.pose_own(settings, &self.soft, own);
+        self.pose_bounds(aim, workspace);
+    }
+
+    /// The plant's matrix A where the sample begins.
+    fn begins_along<D: PlantByStage<P, T, NX, NU, NS>>(
+        &self,
+        x: &SVector<T, NX>,
+        aim: &Aim<'_, T, NX, NU, D>,
+    ) -> SMatrix<T, NX, NX> {
+        let begun = (x, aim.u_ref(0));
+        let (model, settings) = (&self.model, &self.settings);
+        { &aim.own }
+            .sample_matrices(0, model, settings, begun, Along::Jacobian)
+            .0
+    }
+
+    /// Weights, bounds and rows of the program at the present prices.
+    #[inline(always)]
+    fn pose_bounds<D: PlantByStage<P, T, NX, NU, NS>>(
+        &self,
+        aim: &Aim<'_, T, NX, NU, D>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) {
+        workspace.pose(&self.settings, &self.soft);
+        if aim.own.any() {
+            workspace.pose_own(&self.settings, &self.soft, &aim.own);
         }
+    }
+
+    /// The same with hard bounds of states and rows soft, at `factor` times a price that is meant to be exact.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn pose_elastic<D: PlantByStage<P, T, NX, NU, NS>>(
+        &mut self,
+        x: &SVector<T, NX>,
+        aim: &Aim<'_, T, NX, NU, D>,
+        factor: T,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) {
+        let settings = &self.settings;
+        let terminal = aim.own.terminal().unwrap_or(&settings.terminal);
+        let (way, a) = (x - aim.end(), self.begins_along(x, aim));
+        self.soft = self.soft.elastic(settings, terminal, &way, &a, factor);
+        self.pose_bounds(aim, workspace);
+    }
+
+    /// The same with hard ones hard again.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn pose_hard<D: PlantByStage<P, T, NX, NU, NS>>(
+        &mut self,
+        aim: &Aim<'_, T, NX, NU, D>,
+        workspace: &mut Workspace<T, NX, NU>,
+    ) {
+        self.soft = self.soft.hard();
+        self.pose_bounds(aim, workspace);
     }
 
     /// Algorithm 1, cost: the reference enters the linear terms.
@@ -88,6 +138,7 @@ where
         let horizon = self.settings.horizon;
         let bounded = outputs::rows(&aim.own);
         let per_stage = ocp.rows_per_stage;
+        let elastic = self.soft.of_rows();
         let states = core::iter::once(x).chain(self.rollout.iter()).skip(first);
         let inputs = inputs.iter().take(horizon);
         let window = states.zip(inputs.clone().skip(first).chain(inputs.last()));
@@ -101,7 +152,8 @@ where
             let linear = (&mut stage.linear_x, &mut stage.linear_u);
             outputs::add_costs(outputs, i, (x, u), common, linear);
             let rows = ocp.rows.get_mut(i * per_stage..i * per_stage + bounded);
-            outputs::write_rows(outputs, i, (x, u), false, rows.unwrap_or_default());
+            let rows = rows.unwrap_or_default();
+            outputs::write_rows(outputs, i, (x, u), false, elastic, rows);
         }
         let end = at(&self.rollout, self.last_stage());
         let rows = ocp
@@ -113,6 +165,7 @@ where
             horizon,
             (&end, &still),
             true,
+            elastic,
             rows.unwrap_or_default(),
         );
     }

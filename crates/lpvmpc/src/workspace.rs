@@ -170,7 +170,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Workspace<T, NX, NU> {
             let given = j.checked_sub(of_outputs).and_then(|j| own.rows(i).get(j));
             let counting = given.filter(|row| row.counts(i == 0, i == end));
             *row = counting.copied().unwrap_or_default();
-            row.soft = row.soft.map(half);
+            // What bounds inputs alone can be kept by itself.
+            let elastic = soft.of_rows().filter(|_| row.x.amax() > T::zero());
+            row.soft = row.soft.or(elastic).map(half);
         }
     }
 }

@@ -4,8 +4,8 @@ use super::closed_loop::{self, Sample};
 use super::plant::CartPole;
 use super::regulator::{self, FORCE, Regulator};
 use lpvmpc::{
-    Controller, ControllerSettings, LpvModel, Quantity, Reference, Scheduling, Side, Status,
-    TerminalIngredient,
+    Controller, ControllerSettings, Iterations, LpvModel, Quantity, Reference, Scheduling, Side,
+    Status, TerminalIngredient,
 };
 use lpvmpc_testkit::rng::Rng;
 use nalgebra::{Vector1, Vector2, Vector4};
@@ -204,4 +204,57 @@ fn a_hard_bound_that_cannot_be_kept_is_named_with_its_first_stage() {
         // 15 N move a cart of 1 kg by 2 cm in a sample, and the pole with it.
         assert!(cause.stage <= 3, "{cause}");
     }
+}
+
+/// A plan of a descent that counts as one keeps its hard bounds. Where none was found that does, either the last program is
+/// proved to be infeasible, or the programs were too few.
+#[test]
+fn a_descent_says_when_its_plan_exceeds_a_hard_bound() {
+    let plant = CartPole::laboratory();
+    let soft = regulator::settings(&plant, 1.5, Scheduling::Predicted).unwrap();
+    let mut exceeded = Vec::new();
+    for most in [1, 2, 8, 30] {
+        let hard = ControllerSettings {
+            soft_x: [None; 4],
+            raise_prices: false,
+            iterations: Iterations::Descent {
+                tolerance: 1e-5,
+                most,
+                first: most,
+            },
+            ..soft
+        };
+        let mut rng = Rng::new(7);
+        let (mut few, mut solved) = (0, 0);
+        for _ in 0..100 {
+            let mut one = |size: f64| rng.uniform(-size, size);
+            let start = Vector4::new(one(1.4), one(0.7), one(2.0), one(3.0));
+            let goal = Reference::constant(Vector4::new(one(1.4), 0.0, 0.0, 0.0));
+            let mut controller: Regulator = Controller::allocate(plant, hard).unwrap();
+            let mut workspace = controller.workspace();
+            let plan = controller.step(&start, &goal, &mut workspace);
+            let beyond = plan.x.iter().map(|x| x[0].abs() - 1.5);
+            let beyond = beyond.fold(f64::NEG_INFINITY, f64::max);
+            match plan.status {
+                Status::Infeasible(_) => {
+                    assert!(lpvmpc::infeasibility_margin(workspace.ocp(), &plan.active) > 0.0);
+                    assert!(beyond > 1e-9);
+                }
+                Status::Exceeded(bound) => {
+                    assert_eq!(bound.quantity, Quantity::State(0));
+                    let at_it = plan.x[bound.stage - 1][0].abs();
+                    assert!(at_it > 1.5 + 0.029, "{start} {bound}: {at_it}");
+                    few += 1;
+                }
+                status => {
+                    assert!(status.is_solved(), "{status}");
+                    assert!(beyond < 0.031, "{start}: {beyond}");
+                    solved += 1;
+                }
+            }
+        }
+        exceeded.push(few);
+        assert!(solved > 40, "{most}: {solved}");
+    }
+    assert!(exceeded[0] > 10 && exceeded[3] == 0, "{exceeded:?}");
 }

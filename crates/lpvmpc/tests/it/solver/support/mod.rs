@@ -61,6 +61,7 @@ pub fn kind<T>(status: &Status<T>) -> &'static str {
     match status {
         Status::Solved | Status::Converged | Status::Improved | Status::NoImprovement => "solved",
         Status::Infeasible(_) => "infeasible",
+        Status::Exceeded(_) => "exceeded",
         Status::Inaccurate(_) => "inaccurate",
         Status::MaxChanges => "maximum of changes",
         Status::WorkingSetFull => "working set full",
