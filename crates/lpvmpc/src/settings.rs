@@ -213,19 +213,16 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NS: usize>
     /// (of the LQR), or of Q, sample by sample, with a terminal equality; far from the end of the reference they are
     /// [raised](Self::raise_prices).
     pub fn soft_bounds(self, x: Bounds<T, NX>) -> Self {
+        let samples: T = convert(self.horizon as f64);
+        let cost = match &self.terminal {
+            TerminalIngredient::Cost(p) if p.amax() > T::zero() => *p,
+            _ => self.weights.q * samples,
+        };
         Self {
             x,
-            soft_x: exact_prices(&self.cost_to_go(&self.terminal), &x),
+            soft_x: exact_prices(&cost, &x),
             raise_prices: true,
             ..self
-        }
-    }
-
-    /// P of the `terminal` cost; without one, what standing still at a state costs.
-    pub(crate) fn cost_to_go(&self, terminal: &TerminalIngredient<T, NX>) -> SMatrix<T, NX, NX> {
-        match terminal {
-            TerminalIngredient::Cost(p) if p.amax() > T::zero() => *p,
-            _ => self.weights.q * convert::<f64, T>(self.horizon as f64),
         }
     }
 }

@@ -108,12 +108,16 @@ impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
         a: &SMatrix<T, NX, NX>,
         factor: T,
     ) -> Self {
-        let cost = settings.cost_to_go(terminal);
-        let mut prices = of_way(settings, &cost, way, a);
+        // Without a terminal cost, that of a sample.
+        let cost = match terminal {
+            TerminalIngredient::Cost(p) if own_cost(p, 0) > T::zero() => p,
+            _ => &settings.weights.q,
+        };
+        let mut prices = of_way(settings, cost, way, a);
         let sides = settings.x.lower.iter().zip(settings.x.upper.iter());
         for (j, (price, (lower, upper))) in prices.iter_mut().zip(sides).enumerate() {
             let width = width(*lower, *upper).unwrap_or(T::one());
-            *price = largest(*price, price_of_width(own_cost(&cost, j), width)) * factor;
+            *price = largest(*price, price_of_width(own_cost(cost, j), width)) * factor;
         }
         let elastic = Some((prices, prices.amax()));
         Self { elastic, ..self }
