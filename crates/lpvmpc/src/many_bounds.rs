@@ -66,6 +66,8 @@ pub(crate) enum Turn {
 pub(crate) enum AtOnce<T> {
     /// It was not tried, and nothing has changed.
     Untried,
+    /// No bound is violated: the trajectory without bounds is the answer.
+    Kept,
     /// The solution, or the proof that there is none.
     Done(Result<(), Status<T>>),
     /// Neither: the trajectory without bounds is in the solution, and the active rows are those to begin with: of the last
@@ -183,6 +185,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         let mut expected = Expected::new(ocp, solution, known);
         if last_turn {
             (expected.many, expected.saturated) = (true, false);
+        } else if expected.violated == 0 {
+            return AtOnce::Kept;
         } else if !expected.is_due(&mut self.retries) {
             return AtOnce::Untried;
         }

@@ -30,6 +30,8 @@ const LITTLE_OF_ONE: usize = 4;
 
 /// What can be told from the trajectory without bounds, and from the last answer.
 pub(super) struct Expected {
+    /// How many are violated.
+    pub violated: usize,
     /// How many bounds.
     pub bounds: usize,
     /// Whether these are many enough for the interior-point method.
@@ -73,6 +75,7 @@ impl Expected {
         // No more can hold independently than there are inputs.
         let bounds = if tells { known } else { violated }.min(ocp.length() * NU);
         Self {
+            violated,
             bounds,
             many: bounds >= enough,
             familiar: tells && !takes_more && known >= FAMILIAR,
