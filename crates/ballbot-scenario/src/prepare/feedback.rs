@@ -4,7 +4,7 @@ use crate::error::ScenarioError;
 use crate::file::feedback_table::{
     DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,
 };
-use crate::file::schema::{ControllerTable, TerminalTable};
+use crate::file::schema::{BoundsTable, ControllerTable, TerminalTable};
 use crate::number::{not_negative, positive, text};
 use crate::prepare::heading::Turning;
 use crate::prepare::problem::{MOST_SUBSTEPS, dynamic};
@@ -247,9 +247,31 @@ impl TorqueRateTable {
 }
 
 impl ShapingTable {
-    /// What the ball may be asked for.
-    pub(crate) fn limits(&self, ballbot: &Ballbot<f64>) -> Result<MoveLimits<f64>, ScenarioError> {
+    /// What the ball may be asked for within the `bounds`.
+    pub(crate) fn limits(
+        &self,
+        ballbot: &Ballbot<f64>,
+        bounds: &BoundsTable,
+    ) -> Result<MoveLimits<f64>, ScenarioError> {
         let tilt = self.tilt_rad;
+        for (key, value, [lower, upper], bound) in [
+            ("tilt_rad", tilt, bounds.theta_rad, "bounds.theta_rad"),
+            (
+                "phi_dot_rad_s",
+                self.phi_dot_rad_s,
+                bounds.phi_dot_rad_s,
+                "bounds.phi_dot_rad_s",
+            ),
+        ] {
+            let most = upper.min(-lower);
+            if value > most {
+                return Err(ScenarioError::value(
+                    &format!("controller.shaping.{key}"),
+                    value,
+                    format!("a move must keep {bound}, so it is at most {most}"),
+                ));
+            }
+        }
         if !(tilt > 0.0 && tilt < FRAC_PI_2) {
             return Err(ScenarioError::value(
                 "controller.shaping.tilt_rad",

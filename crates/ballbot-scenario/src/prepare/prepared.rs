@@ -153,7 +153,9 @@ impl Scenario {
             ));
         }
         let shaping = self.controller.shaping.as_ref();
-        let moves = shaping.map(|table| table.limits(&ballbot)).transpose()?;
+        let moves = shaping
+            .map(|table| table.limits(&ballbot, &self.bounds))
+            .transpose()?;
         let references = match moves {
             Some(limits) => {
                 let planes = references.into_iter();

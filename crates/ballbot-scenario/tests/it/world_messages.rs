@@ -147,3 +147,26 @@ fn each_mistake_is_named_with_key_value_and_what_is_right() {
         }
     }
 }
+
+/// With a speed of 8 rad/s within 4 the robot swung about its set point for ever.
+#[test]
+fn a_move_beyond_the_bounds_of_the_states_is_refused() {
+    let text = builtin::find("one-metre").expect("built-in").text;
+    let refusal = |bounds: &str| {
+        let text = text.replace("theta_rad = [-0.7, 0.7]", bounds);
+        let prepared = Scenario::parse(&text, "my.toml").unwrap();
+        let prepared = prepared.prepare(Path::new("."));
+        prepared.err().map(|error| error.to_string())
+    };
+    let speed = refusal("phi_dot_rad_s = [-9.0, 4.0]").unwrap();
+    for words in [
+        "controller.shaping.phi_dot_rad_s = 8",
+        "bounds.phi_dot_rad_s",
+        "at most 4",
+    ] {
+        assert!(speed.contains(words), "{speed}");
+    }
+    assert_eq!(refusal("phi_dot_rad_s = [-8.0, 8.0]"), None);
+    let tilt = refusal("theta_rad = [-0.04, 0.7]").unwrap();
+    assert!(tilt.contains("controller.shaping.tilt_rad = 0.05") && tilt.contains("at most 0.04"));
+}
