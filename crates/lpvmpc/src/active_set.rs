@@ -43,6 +43,8 @@ pub(crate) struct DualActiveSet<T: 'static, const NU: usize> {
     pub(crate) refinements: usize,
     /// Sign of the candidate's multiplier where it contradicts the working set; zero before.
     contradicting: T,
+    /// Whether it is known of the minimiser without bounds that it keeps them all.
+    pub kept: bool,
 }
 
 /// Why a step along the direction ends.
@@ -76,6 +78,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
             max_changes: 0,
             refinements: 0,
             contradicting: T::zero(),
+            kept: false,
         }
     }
 
@@ -90,6 +93,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         self.max_changes = max_changes;
         self.refinements = 3;
         self.contradicting = T::zero();
+        self.kept = false;
     }
 
     /// Back to the minimiser without bounds, with the changes that are left.
@@ -104,6 +108,9 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         ocp: &Ocp<T, NX, NU>,
         trajectory: &Trajectory<'_, T, NX, NU>,
     ) -> Option<Candidate<T>> {
+        if self.kept {
+            return None;
+        }
         let mut worst: Option<Candidate<T>> = None;
         let mut least = -T::one();
         rows::violated_bounds(ocp, trajectory, &mut |candidate| {

@@ -23,10 +23,13 @@ const NEGLIGIBLE: f64 = 0.01;
 /// The same of a plan along which a program is proved to be infeasible, where the number type is fine enough.
 const ROUNDING: f64 = 1e-6;
 /// Of the price that is meant to be exact, one after the other.
+#[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
 const FACTORS: [f64; 2] = [1.0, DEAR];
 /// The larger one.
+#[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
 pub(crate) const DEAR: f64 = 100.0;
 /// Programs with hard bounds that are left for after the soft ones.
+#[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
 const HARD: usize = 2;
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize> Controller<P, T, NX, NU, NS>
@@ -45,41 +48,59 @@ where
     ) -> Status<T> {
         let status = self.search(x, aim, begin, prices, workspace);
         let infeasible = matches!(self.solution.status, Status::Infeasible(_));
-        if self.has_hard_bounds(aim) && (infeasible || self.exceeds(x, aim).is_some()) {
-            let (_, most, tolerance) = begin;
-            return self.restore(x, aim, (status, most, tolerance), prices, workspace);
+        if !(self.has_hard_bounds(aim) && (infeasible || self.exceeds(x, aim).is_some())) {
+            return status;
         }
-        status
+        let moved = status == Status::Improved;
+        // A microcontroller has neither flash nor time for it, and a module for a browser has to be small.
+        #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
+        let (status, moved) = self.restore(x, aim, ((status, moved), begin), prices, workspace);
+        self.judge(x, aim, (status, moved))
     }
 
-    /// The search goes on from a plan that exceeds hard bounds, or along which no program keeps them.
+    /// The search goes on from a plan that exceeds hard bounds, or along which no program keeps them; what is `known` is its
+    /// status, and whether it was moved.
+    #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
     #[cold]
     #[inline(never)]
     fn restore<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
         x: &SVector<T, NX>,
         aim: &Aim<'_, T, NX, NU, D>,
-        (mut status, most, tolerance): (Status<T>, usize, T),
+        (known, (_, most, tolerance)): ((Status<T>, bool), (Along, usize, T)),
         prices: &mut Prices<T, NX>,
         workspace: &mut Workspace<T, NX, NU>,
-    ) -> Status<T> {
-        let mut moved = status == Status::Improved;
-        if self.problems() + HARD < most {
-            let soft_most = most - HARD;
-            for factor in FACTORS {
-                self.pose_elastic(x, aim, convert(factor), workspace);
-                let begin = (Along::Jacobian, soft_most, tolerance);
-                let found = self.search(x, aim, begin, &mut prices.clone(), workspace);
-                moved |= matches!(found, Status::Improved | Status::Converged);
-                let done = self.problems() >= soft_most || self.exceeds(x, aim).is_none();
-                if done || !self.solution.status.is_solved() {
-                    break;
-                }
-            }
-            self.pose_hard(aim, workspace);
-            let begin = (Along::Jacobian, most, tolerance);
-            status = self.search(x, aim, begin, prices, workspace);
+    ) -> (Status<T>, bool) {
+        if self.problems() + HARD >= most {
+            return known;
         }
+        let (_, mut moved) = known;
+        let soft_most = most - HARD;
+        for factor in FACTORS {
+            self.pose_elastic(x, aim, convert(factor), workspace);
+            let begin = (Along::Jacobian, soft_most, tolerance);
+            let found = self.search(x, aim, begin, &mut prices.clone(), workspace);
+            moved |= matches!(found, Status::Improved | Status::Converged);
+            let done = self.problems() >= soft_most || self.exceeds(x, aim).is_none();
+            if done || !self.solution.status.is_solved() {
+                break;
+            }
+        }
+        self.pose_hard(aim, workspace);
+        let begin = (Along::Jacobian, most, tolerance);
+        let status = self.search(x, aim, begin, prices, workspace);
+        (status, moved)
+    }
+
+    /// What a plan is worth that exceeds hard bounds, or along which no program keeps them, after a search with this `status`.
+    #[cold]
+    #[inline(never)]
+    fn judge<D: PlantByStage<P, T, NX, NU, NS>>(
+        &self,
+        x: &SVector<T, NX>,
+        aim: &Aim<'_, T, NX, NU, D>,
+        (status, moved): (Status<T>, bool),
+    ) -> Status<T> {
         let terminal = aim.own.terminal().unwrap_or(&self.settings.terminal);
         let equality = matches!(terminal, TerminalIngredient::Equality);
         match (self.exceeds(x, aim), self.solution.status) {

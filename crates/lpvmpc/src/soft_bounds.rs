@@ -37,10 +37,8 @@ pub fn exact_prices<T: Scalar, const NX: usize>(
     let sides = x.lower.iter().zip(x.upper.iter());
     let mut prices = [None; NX];
     for (j, (place, (lower, upper))) in prices.iter_mut().zip(sides).enumerate() {
-        *place = width(*lower, *upper).map(|width| Penalty {
-            linear: price_of_width(own_cost(cost, j), width),
-            quadratic: T::zero(),
-        });
+        let width = width(*lower, *upper);
+        *place = width.map(|width| linear_price(price_of_width(own_cost(cost, j), width)));
     }
     prices
 }
@@ -64,8 +62,8 @@ pub(crate) struct SoftPrices<T, const NX: usize> {
     common: SoftBounds<T, NX>,
     /// The least linear price of each state.
     least: SVector<T, NX>,
-    /// Of hard bounds, while a descent looks for a plan that keeps them: of each state, and of a general row.
-    elastic: Option<(SVector<T, NX>, T)>,
+    /// Whether hard bounds are soft, too, while a descent looks for a plan that keeps them.
+    elastic: bool,
 }
 
 impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
@@ -74,7 +72,7 @@ impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
         Self {
             common: *soft_x,
             least: SVector::zeros(),
-            elastic: None,
+            elastic: false,
         }
     }
 
@@ -100,71 +98,69 @@ impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
 
     /// The same, with hard bounds of states and general rows soft, too, at `factor` times a price that is meant to be
     /// exact.
-    pub fn elastic<const NU: usize, const NS: usize>(
-        self,
+    #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
+    pub fn soften<const NU: usize, const NS: usize>(
+        &mut self,
         settings: &ControllerSettings<T, NX, NU, NS>,
         terminal: &TerminalIngredient<T, NX>,
         way: &SVector<T, NX>,
         a: &SMatrix<T, NX, NX>,
         factor: T,
-    ) -> Self {
+    ) {
         // Without a terminal cost, that of a sample.
         let cost = match terminal {
             TerminalIngredient::Cost(p) if own_cost(p, 0) > T::zero() => p,
             _ => &settings.weights.q,
         };
-        let mut prices = of_way(settings, cost, way, a);
+        let least = of_way(settings, cost, way, a);
+        self.harden(settings);
+        self.elastic = true;
         let sides = settings.x.lower.iter().zip(settings.x.upper.iter());
-        for (j, (price, (lower, upper))) in prices.iter_mut().zip(sides).enumerate() {
+        let states = self.common.iter_mut().zip(least.iter()).zip(sides);
+        for (j, ((price, least), (lower, upper))) in states.enumerate() {
             let width = width(*lower, *upper).unwrap_or(T::one());
-            *price = largest(*price, price_of_width(own_cost(cost, j), width)) * factor;
+            let linear = largest(*least, price_of_width(own_cost(cost, j), width)) * factor;
+            *price = price.or(Some(linear_price(linear)));
         }
-        let elastic = Some((prices, prices.amax()));
-        Self { elastic, ..self }
     }
 
-    /// The same, with hard bounds hard.
-    pub fn hard(self) -> Self {
-        Self {
-            elastic: None,
-            ..self
-        }
+    /// The same, with hard bounds hard again.
+    #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
+    pub fn harden<const NU: usize, const NS: usize>(
+        &mut self,
+        settings: &ControllerSettings<T, NX, NU, NS>,
+    ) {
+        self.elastic = false;
+        self.common = self.at_least(&settings.soft_x);
     }
 
     /// Whether hard bounds are soft.
     #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
     pub fn is_elastic(&self) -> bool {
-        self.elastic.is_some()
+        self.elastic
     }
 
-    /// Of hard general rows; `None` where they are hard.
+    /// Of hard general rows, the largest of a state; `None` where they are hard.
     pub fn of_rows(&self) -> Option<Penalty<T>> {
-        let price = self.elastic.map(|(_, price)| price);
-        price.map(|linear| Penalty {
-            linear,
-            quadratic: T::zero(),
-        })
+        let prices = || self.common.iter().flatten().map(|price| price.linear);
+        self.elastic
+            .then(|| linear_price(prices().fold(T::zero(), largest)))
     }
 
     /// Those of a stage that may have `own` ones.
     #[inline(always)]
     pub fn of(&self, own: Option<&SoftBounds<T, NX>>) -> SoftBounds<T, NX> {
-        let mut prices = own.map_or(self.common, |own| self.at_least(own));
-        if let Some((elastic, _)) = &self.elastic {
-            for (price, elastic) in prices.iter_mut().zip(elastic.iter()) {
-                let elastic = Penalty {
-                    linear: *elastic,
-                    quadratic: T::zero(),
-                };
-                *price = price.or(Some(elastic));
-            }
-        }
-        prices
+        own.map_or(self.common, |own| self.at_least(own))
     }
 
-    /// The prices, none below the least.
+    /// The prices, none below the least, and in place of hard bounds the common ones while these are soft.
     fn at_least(&self, soft: &SoftBounds<T, NX>) -> SoftBounds<T, NX> {
         let mut raised = *soft;
+        if self.elastic {
+            for (price, common) in raised.iter_mut().zip(self.common) {
+                *price = price.or(common);
+            }
+        }
         for (price, least) in raised.iter_mut().zip(self.least.iter()) {
             if let Some(price) = price
                 && *least > price.linear
@@ -193,6 +189,11 @@ fn of_way<T: Scalar, const NX: usize, const NU: usize, const NS: usize>(
         *least = price_of_way(own_cost(p, j), value, brought.abs());
     }
     least
+}
+
+fn linear_price<T: Scalar>(linear: T) -> Penalty<T> {
+    let quadratic = T::zero();
+    Penalty { linear, quadratic }
 }
 
 /// Of a state that costs P_jj (`own`) and has bounds of this `width`.

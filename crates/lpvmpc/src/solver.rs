@@ -163,7 +163,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         let outcome = begun.and_then(|()| {
             match self.solve_at_once(ocp, shift, solution, (Turn::First, &mut spent)) {
                 AtOnce::Done(outcome) => return outcome,
-                AtOnce::Kept => return self.finish(ocp, shift, solution),
+                AtOnce::Kept => self.dual.kept = true,
                 AtOnce::InVain => shift = Some(0),
                 AtOnce::Untried => {}
             }
@@ -293,16 +293,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             }
             self.roll_out(ocp, solution)?;
         }
-        self.finish(ocp, shift, solution)
-    }
-
-    /// Inputs, cost and active bounds of the solution, whose states are those of the search's end.
-    fn finish(
-        &mut self,
-        ocp: &Ocp<T, NX, NU>,
-        shift: Option<usize>,
-        solution: &mut Solution<T, NX, NU>,
-    ) -> Result<(), Status<T>> {
         // What the tolerance or rounding lets through is no input for an actuator.
         clip_inputs(ocp, solution);
         solution.cost = cost(ocp, solution);

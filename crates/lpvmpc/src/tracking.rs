@@ -47,7 +47,7 @@ where
             .0
     }
 
-    /// Weights, bounds and rows of the program at the present prices.
+    /// The same at the present prices.
     #[inline(always)]
     fn pose_bounds<D: PlantByStage<P, T, NX, NU, NS>>(
         &self,
@@ -60,7 +60,8 @@ where
         }
     }
 
-    /// The same with hard bounds of states and rows soft, at `factor` times a price that is meant to be exact.
+    /// Hard bounds of states and rows soft, at `factor` times a price that is meant to be exact.
+    #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
     #[cold]
     #[inline(never)]
     pub(crate) fn pose_elastic<D: PlantByStage<P, T, NX, NU, NS>>(
@@ -73,11 +74,12 @@ where
         let settings = &self.settings;
         let terminal = aim.own.terminal().unwrap_or(&settings.terminal);
         let (way, a) = (x - aim.end(), self.begins_along(x, aim));
-        self.soft = self.soft.elastic(settings, terminal, &way, &a, factor);
+        self.soft.soften(settings, terminal, &way, &a, factor);
         self.pose_bounds(aim, workspace);
     }
 
-    /// The same with hard ones hard again.
+    /// Hard bounds hard again.
+    #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
     #[cold]
     #[inline(never)]
     pub(crate) fn pose_hard<D: PlantByStage<P, T, NX, NU, NS>>(
@@ -85,7 +87,7 @@ where
         aim: &Aim<'_, T, NX, NU, D>,
         workspace: &mut Workspace<T, NX, NU>,
     ) {
-        self.soft = self.soft.hard();
+        self.soft.harden(&self.settings);
         self.pose_bounds(aim, workspace);
     }
 
