@@ -118,7 +118,10 @@ where
         let found = begun.then(|| {
             let begin = (along, most, tolerance);
             match self.search_within_bounds(x, aim, begin, &mut prices, workspace) {
+                Status::Converged => Status::Converged,
+                // The program along the present state has improved the plan; whether it keeps hard bounds is judged.
                 Status::NoImprovement if moved => Status::Improved,
+                _ if moved && !self.has_hard_bounds(aim) => Status::Improved,
                 status => status,
             }
         });

@@ -118,7 +118,7 @@ where
 
     /// Whether there may be a hard bound of states or a hard general row.
     #[inline(always)]
-    fn has_hard_bounds<D: PlantByStage<P, T, NX, NU, NS>>(
+    pub(crate) fn has_hard_bounds<D: PlantByStage<P, T, NX, NU, NS>>(
         &self,
         aim: &Aim<'_, T, NX, NU, D>,
     ) -> bool {
