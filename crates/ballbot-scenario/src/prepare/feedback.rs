@@ -266,7 +266,7 @@ impl ShapingTable {
             let most = upper.min(-lower);
             if value > most {
                 return Err(ScenarioError::value(
-                    &format!("controller.shaping.{key}"),
+                    format!("controller.shaping.{key}"),
                     value,
                     format!("a move must keep {bound}, so it is at most {most}"),
                 ));
