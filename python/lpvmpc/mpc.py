@@ -62,7 +62,7 @@ class Mpc:
         ``{"position": (-1, 1)}``; a state or input that is not named has those of the plant.
     state_bounds
         What becomes of a plan that cannot keep the bounds of the states: ``"soft"`` (exceeded as little as
-        possible, at a price that grows with the distance of the goal), ``"hard"`` (infeasible), or prices by
+        possible, at a price that grows with the distance of the goal), ``"hard"`` (it is none), or prices by
         name, ``{"position": Penalty(1e3)}``; states that are not named are hard then. Where the goal outweighs the
         price of ``"soft"``, a bound that could be kept is exceeded, too: `Plan.active_bounds` has "(exceeded)", and a
         dearer price, or ``"hard"``, keeps it.

@@ -96,8 +96,7 @@ impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
         prices
     }
 
-    /// The same, with hard bounds of states and general rows soft, too, at `factor` times a price that is meant to be
-    /// exact.
+    /// Makes hard bounds of states and general rows soft, too, at `factor` times a price that is meant to be exact.
     #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
     pub fn soften<const NU: usize, const NS: usize>(
         &mut self,
@@ -124,7 +123,7 @@ impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
         }
     }
 
-    /// The same, with hard bounds hard again.
+    /// Makes them hard again.
     #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
     pub fn harden<const NU: usize, const NS: usize>(
         &mut self,
