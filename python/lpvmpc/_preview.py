@@ -22,8 +22,10 @@ AHEAD = (
 """What a step may be told besides the reference."""
 
 
-def to_native(plant: Plant, x_ref: ArrayLike | None, ahead: Mapping[str, Any]) -> dict[str, Any]:
-    """What a step is told, of which what is None is left out."""
+def to_native(
+    plant: Plant, settings: Mapping[str, Any], x_ref: ArrayLike | None, ahead: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What a step of a controller with these settings is told, of which what is None is left out."""
     n, m, k = len(plant.states), len(plant.inputs), len(plant.outputs)
     told = {"x_ref": x_ref, **ahead}
     given = {name: one for name, one in told.items() if one is not None}
@@ -48,7 +50,7 @@ def to_native(plant: Plant, x_ref: ArrayLike | None, ahead: Mapping[str, Any]) -
         known["q"], known["r"] = equally_long(known["q"], known["r"])
     for name in ("x", "u", "y", "du"):
         if f"{name}_bounds" in given:
-            known |= bounds(plant, name, given[f"{name}_bounds"])
+            known |= bounds(plant, settings, name, given[f"{name}_bounds"])
     if "rows" in given:
         stages = listed("rows", given["rows"], "a list of lists of lpvmpc.Row, one for each stage")
         known["rows"] = [

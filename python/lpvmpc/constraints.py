@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Union
 
 import numpy as np
@@ -59,6 +59,20 @@ def changes(plant: Plant) -> list[Signal]:
     return [Signal(one.name) for one in plant.inputs]
 
 
+def _signals(plant: Plant, name: str) -> list[Signal]:
+    """The states (x), inputs (u), outputs (y) or changes of inputs (du)."""
+    return {"x": plant.states, "u": plant.inputs, "y": plant.outputs, "du": changes(plant)}[name]
+
+
+def kept(
+    plant: Plant, settings: Mapping[str, Any], name: str
+) -> tuple[list[Signal], list[float], list[float]]:
+    """The signals of this name with the bounds that a controller with these settings keeps to, lower and upper."""
+    signals, place = _signals(plant, name), f"{name}_bounds"
+    given = settings[place]
+    return signals, *_sides(place, {} if given is None else given, signals)
+
+
 def _names(place: str, given: Mapping[str, Any], signals: list[Signal]) -> list[str]:
     """The names of the signals, of which those that are given must be some."""
     names = [signal.name for signal in signals]
@@ -87,8 +101,11 @@ def limits(
     place: str, given: Limits | None, signals: list[Signal]
 ) -> tuple[list[float], list[float]] | None:
     """Bounds, one for each signal, as the native half takes them."""
-    if given is None:
-        return None
+    return None if given is None else _sides(place, given, signals)
+
+
+def _sides(place: str, given: Limits, signals: list[Signal]) -> tuple[list[float], list[float]]:
+    """The lower and the upper bounds; a signal that is not named has its own."""
     if isinstance(given, Mapping):
         _names(place, given, signals)
         pairs = [
@@ -107,14 +124,16 @@ def limits(
     )
 
 
-def bounds(plant: Plant, name: str, given: Limits) -> dict[str, Array]:
-    """Bounds by stage, or by name for all stages, as the native half takes them."""
-    signals = {
-        "x": plant.states, "u": plant.inputs, "y": plant.outputs, "du": changes(plant),
-    }[name]  # fmt: skip
-    place, size = f"{name}_bounds", len(signals)
+def bounds(
+    plant: Plant, settings: Mapping[str, Any], name: str, given: Limits
+) -> dict[str, Array]:
+    """Bounds by stage, or by name for all stages, as the native half takes them; what is not named has those of the
+    settings."""
+    place, size = f"{name}_bounds", len(_signals(plant, name))
     if isinstance(given, Mapping):
-        given = limits(place, given, signals) or ([], [])
+        usual = zip(*kept(plant, settings, name), strict=True)
+        signals = [replace(one, lower=lower, upper=upper) for one, lower, upper in usual]
+        given = _sides(place, given, signals)
     lower, upper = _pair(place, given)
     lower, upper = equally_long(
         by_stage(f"{place}, lower", _open(lower, -np.inf), size),

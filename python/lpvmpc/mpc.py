@@ -15,7 +15,7 @@ from ._arrays import column, copied, instance, listed, number, whole
 from ._preview import AHEAD
 from ._preview import to_native as preview_to_native
 from ._settings import to_native as settings_to_native
-from .constraints import Limits, Penalty, Row, limits
+from .constraints import Limits, Penalty, Row, kept
 from .errors import SettingError
 from .estimator import Estimate, Estimator
 from .estimator import to_native as estimator_to_native
@@ -191,11 +191,8 @@ class Mpc:
     def bounds(self) -> dict[str, tuple[float, float]]:
         """The bounds of states, inputs and outputs that it keeps to, by name; infinite where there are none."""
         found: dict[str, tuple[float, float]] = {}
-        plant = self._plant
-        for name, signals in (
-            ("x_bounds", plant.states), ("u_bounds", plant.inputs), ("y_bounds", plant.outputs),
-        ):  # fmt: skip
-            lower, upper = limits(name, self._settings[name] or {}, signals) or ([], [])
+        for name in ("x", "u", "y"):
+            signals, lower, upper = kept(self._plant, self._settings, name)
             found |= {one.name: (a, b) for one, a, b in zip(signals, lower, upper, strict=True)}
         return found
 
@@ -245,8 +242,9 @@ class Mpc:
         linear_x, linear_u
             Linear costs, (n,) or (stages, n), and (m,) or (stages, m).
         x_bounds, u_bounds
-            (lower, upper), each (n,) or (stages, n), and (m,) or (stages, m); or by name for the whole horizon, as of
-            `Mpc`. Those of states are as soft or hard as its `state_bounds` say.
+            (lower, upper), each (n,) or (stages, n), and (m,) or (stages, m); or by name for the whole horizon,
+            ``{"position": (-1, 1)}``: what is not named then has the bounds of the settings. Those of states are as soft
+            or hard as `state_bounds` of `Mpc` says.
         rows
             For each stage its linear constraints, in place of those of the settings; from where the list ends its
             last entry holds.
@@ -260,7 +258,8 @@ class Mpc:
         q_y, r_du
             Other weights, where the settings have any: (k,), (k, k) or (stages, k, k), and so on.
         y_bounds, du_bounds
-            (lower, upper) of outputs and of changes, each (k,) or (stages, k), and (m,) or (stages, m); or by name.
+            (lower, upper) of outputs and of changes, each (k,) or (stages, k), and (m,) or (stages, m); or by name, as
+            `x_bounds`.
         matrices
             (A, B) or (A, B, c) of x+ = A x + B u + c over the samples, in place of the plant: (n, n) or
             (stages, n, n), and so on.
@@ -283,7 +282,7 @@ class Mpc:
             "parameters": parameters, "y_ref": y_ref, "q_y": q_y, "y_bounds": y_bounds, "r_du": r_du,
             "du_bounds": du_bounds, "matrices": matrices, "scheduling": scheduling,
         }  # fmt: skip
-        known = preview_to_native(self._plant, x_ref, ahead)
+        known = preview_to_native(self._plant, self._settings, x_ref, ahead)
         return Plan(*self._native.step(column("x", x, self._n), known))
 
     def observe(self, t: float, readings: Mapping[str, float | None] | ArrayLike) -> dict[str, str]:
@@ -348,7 +347,8 @@ class Mpc:
             if name not in AHEAD:
                 raise SettingError(f"{name}: a step takes no such thing; there are {', '.join(AHEAD)}")
         self._measured()
-        return Plan(*self._native.decide(preview_to_native(self._plant, x_ref, ahead)))
+        known = preview_to_native(self._plant, self._settings, x_ref, ahead)
+        return Plan(*self._native.decide(known))
 
     @property
     def estimator(self) -> Estimator | None:

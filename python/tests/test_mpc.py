@@ -145,6 +145,34 @@ def test_bounds_of_a_step_may_be_given_by_name():
     assert plan(None, None).x[:, 0].max() > 0.11
 
 
+def test_a_step_s_bounds_by_name_leave_the_others_as_they_are():
+    """They gave those of the plant, or none, to whatever was not named."""
+    plant = lpvmpc.Plant.from_matrices(
+        [[-1, 0], [0, -1]], np.eye(2), np.eye(2), states=["v", "w"], inputs=["a", "b"], outputs=["y", "z"],
+        bounds={name: (-9, 9) for name in "abvwyz"},
+    )  # fmt: skip
+    kept = {
+        "x_bounds": {"v": (-0.5, 0.5), "w": (-0.5, 0.5)}, "u_bounds": ([-1, -1], [1, 1]),
+        "y_bounds": {"y": (-0.4, 0.4), "z": (-0.4, 0.4)}, "du_bounds": np.array([[-0.2, -0.2], [0.2, 0.2]]),
+    }  # fmt: skip
+    mpc = lpvmpc.Mpc(plant, 0.1, 30, [1, 1], [0.01, 0.01], state_bounds="hard", **kept)
+
+    def plan(**told):
+        mpc.reset()
+        return mpc.step([0, 0], [5, 5], u_ref=[0, 0], **told)
+
+    assert mpc.bounds["a"] == (-1, 1) and mpc.bounds["z"] == (-0.4, 0.4)
+    for name, by_name, by_place in (
+        ("x_bounds", {"v": (-0.3, 0.3)}, ([-0.3, -0.5], [0.3, 0.5])),
+        ("u_bounds", {"a": (None, 0.35)}, ([-np.inf, -1], [0.35, 1])),
+        ("y_bounds", {"y": (-0.2, 0.2)}, ([-0.2, -0.4], [0.2, 0.4])),
+        ("du_bounds", {"a": (-0.05, 0.05)}, ([-0.05, -0.2], [0.05, 0.2])),
+    ):
+        told = plan(**{name: by_name})
+        assert (told.u == plan(**{name: by_place}).u).all() and (told.u != plan().u).any()
+        assert (plan(**{name: {}}).u == plan().u).all()
+
+
 def test_a_row_holds():
     plant = double_integrator()
     row = lpvmpc.Row("braking", x={"position": 1, "speed": 1}, upper=0.7)
