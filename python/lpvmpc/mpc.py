@@ -154,6 +154,7 @@ class Mpc:
     ) -> None:
         instance("plant", plant, Plant)
         self._plant = plant
+        self._designed_for = plant  # the terminal cost stays that of these parameters
         self._settings: dict[str, Any] = copied({
             "t_s": t_s, "horizon": horizon, "q": q, "r": r, "terminal": terminal,
             "x_bounds": x_bounds, "u_bounds": u_bounds, "state_bounds": state_bounds,
@@ -397,11 +398,11 @@ class Mpc:
                 raise SettingError(f"{name}: it stays; make another controller")
         native = settings_to_native(self._plant, new)
         self._native.set(native, self._filter(new["estimator"]))
-        self._settings = new
+        self._settings, self._designed_for = new, self._plant
 
     def set_parameters(self, **values: float) -> None:
         """Other values of the plant's parameters from the next step on, all or none. The terminal cost stays what it
-        was.
+        was, also in copies of the controller, until `set`.
 
         Raises
         ------
@@ -479,13 +480,15 @@ class Mpc:
             whole("samples", samples),
         )
 
-    def __getstate__(self) -> tuple[Plant, dict[str, Any]]:
-        return self._plant, self._settings
+    def __getstate__(self) -> tuple[Plant, dict[str, Any], Plant]:
+        return self._designed_for, self._settings, self._plant
 
-    def __setstate__(self, state: tuple[Plant, dict[str, Any]]) -> None:
-        """The controller with the same settings, without the last plan."""
-        plant, settings = state
-        self.__init__(plant, **settings)  # type: ignore[misc]
+    def __setstate__(self, state: tuple[Plant, dict[str, Any], Plant]) -> None:
+        """The controller with the same settings, parameters and terminal cost, without the last plan."""
+        designed_for, settings, plant = state
+        self.__init__(designed_for, **settings)  # type: ignore[misc]
+        if plant != designed_for:
+            self.set_parameters(**plant.parameters)
 
     def __repr__(self) -> str:
         return f"<Mpc of {self._plant.name!r}: {self.horizon} samples of {self.t_s} s>"

@@ -1,5 +1,6 @@
 """Controllers, against programs that share no code with them."""
 
+import copy
 import pickle
 from collections import namedtuple
 from concurrent.futures import ThreadPoolExecutor
@@ -275,6 +276,21 @@ def test_a_controller_can_be_pickled():
     assert (again.step([0, 0.3, 0, 0]).u == mpc.step([0, 0.3, 0, 0]).u).all()
     plan = pickle.loads(pickle.dumps(mpc.step([0, 0.3, 0, 0])))
     assert plan.is_solved and plan.x.shape == (N + 1, 4)
+
+
+def test_copies_keep_the_terminal_cost_when_parameters_have_changed():
+    """They designed it again, for the new parameters."""
+    mpc = lpvmpc.Mpc(cart_pole(), T_S, 5, Q, R)
+    mpc.set_parameters(pole_mass=0.9)
+    x = [0, 0.3, 0, 0]
+    for again in (pickle.loads(pickle.dumps(mpc)), copy.copy(mpc), copy.deepcopy(pickle.loads(pickle.dumps(mpc)))):
+        mpc.reset()
+        assert (again.step(x).u == mpc.step(x).u).all()
+        assert again.plant == mpc.plant
+    mpc.set(q=Q)  # which designs it for them
+    designed = lpvmpc.Mpc(mpc.plant, T_S, 5, Q, R)
+    assert (pickle.loads(pickle.dumps(mpc)).step(x).u == designed.step(x).u).all()
+    assert (designed.step(x).u != again.step(x).u).any()
 
 
 def test_controllers_work_side_by_side():
