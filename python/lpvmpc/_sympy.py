@@ -30,11 +30,24 @@ def take(tape: Tape, leaves: dict[Any, tuple[str, int]], outputs: list[Any]) -> 
     """The places on the tape of expressions `outputs` of the symbols `leaves`, each with the name that it has on
     the tape and its place there."""
     sp = sympy()
-    replacements, reduced = sp.cse([sp.sympify(output) for output in outputs])
+    formulas = [sp.sympify(output) for output in outputs]
+    for formula in formulas:
+        for pieces in formula.atoms(sp.Piecewise):
+            _check_otherwise(pieces)
+    replacements, reduced = sp.cse(formulas)
     known = {symbol: tape.add(name, index) for symbol, (name, index) in leaves.items()}
     for symbol, expression in replacements:
         known[symbol] = _place(sp, tape, known, expression)
     return [_place(sp, tape, known, expression) for expression in reduced]
+
+
+def _check_otherwise(pieces: Any) -> None:
+    """Refuses a formula that has no value where none of its conditions holds."""
+    if pieces.args[-1].cond != True:  # noqa: E712  (SymPy's own truth)
+        raise PlantError(
+            f"formulas: {pieces} has no value where none of its conditions holds; add an otherwise branch, "
+            "(value, True), as its last piece"
+        )
 
 
 def _place(sp: Any, tape: Tape, known: dict[Any, int], expression: Any) -> int:
@@ -108,7 +121,7 @@ def _power(sp: Any, tape: Tape, of: Any, base: Any, exponent: Any) -> int:
 def _piecewise(sp: Any, tape: Tape, of: Any, pieces: Any) -> int:
     """The sum of the pieces, each where its condition is the first that holds."""
     terms, none_before = [], None
-    for value, condition in pieces:
+    for value, condition in pieces:  # of which the last is `True`
         if condition == True:  # noqa: E712  (SymPy's own truth)
             here = none_before
         else:

@@ -335,7 +335,8 @@ class Plant:
         x, u
             The symbols (or functions of time) that are states and inputs.
         xdot
-            f(x, u, p): a list or a column ``Matrix``.
+            f(x, u, p): a list or a column ``Matrix``. The last condition of a ``Piecewise`` must be True, the otherwise
+            branch.
         y
             g(x, u, p), the outputs: a list or a column ``Matrix``.
         parameters

@@ -152,6 +152,7 @@ def test_of_sympy():
         np.testing.assert_allclose(plant.f(at, under), expected, rtol=1e-13, atol=1e-13)
         np.testing.assert_allclose(plant.g(at, under), [at[0] * at[1]])
     assert plant.parameters == {"m": 2.0, "g": 9.81}
+    assert pieces((A_X, A_X > 0), (-A_X, A_X <= 0)).f([-4.0], [0.0]) == [1 + np.sin(4.0)]
     with pytest.raises(lpvmpc.PlantError, match="m is neither a state"):
         lpvmpc.Plant.from_sympy([a, b], [v], f, parameters={g: 9.81})
 
@@ -217,6 +218,12 @@ def test_what_a_plant_says_of_itself():
 
 X, U = ca.SX.sym("x", 2), ca.SX.sym("u")
 F = ca.vertcat(X[1], U)
+A_X, A_U = sp.symbols("a_x a_u")
+
+
+def pieces(*given):
+    """Where none of the conditions held, it was 0."""
+    return lpvmpc.Plant.from_sympy([A_X], [A_U], [1 + sp.sin(sp.Piecewise(*given)) + A_U])
 
 
 @pytest.mark.parametrize(
@@ -254,6 +261,8 @@ F = ca.vertcat(X[1], U)
         (lambda: cart_pole().with_parameters(cart_mass=float("inf")), "finite"),
         (lambda: cart_pole().f([0, 0, 0], [0]), r"x: its shape is \(3,\); it must be \(4,\)"),
         (lambda: lpvmpc.Plant.from_sympy([sp.Symbol("a")], [sp.Symbol("a")], [1]), "twice"),
+        (lambda: pieces((A_X, A_X > 0)), "Piecewise.* add an otherwise branch"),
+        (lambda: pieces((A_X, A_X > 0), (-A_X, A_X < 0)), "Piecewise.* add an otherwise branch"),
     ],
 )
 def test_what_makes_no_plant_is_refused(make, message):
