@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import is_dataclass
 from typing import Any, TypeVar
@@ -25,6 +25,39 @@ def numbers(place: str, given: ArrayLike, error: type[Exception] = SettingError)
         return np.ascontiguousarray(array, dtype=np.float64)
     except (TypeError, ValueError):
         raise error(f"{place}: {_short(given)} is no array of real numbers") from None
+
+
+def _labels(given: Any) -> list[Any] | None:
+    """What the entries of a Series, or the columns of a DataFrame, of pandas are called; None of anything else."""
+    if not hasattr(given, "iloc"):
+        return None
+    labels = list(given.columns if hasattr(given, "columns") else given.index)
+    return None if labels == list(range(len(labels))) else labels
+
+
+def named(given: Any) -> Any:
+    """A Series whose index has names as a dictionary; anything else as it is."""
+    labels = _labels(given)
+    if labels is None or hasattr(given, "columns") or not all(isinstance(one, str) for one in labels):
+        return given
+    found = dict(zip(labels, given.tolist(), strict=True))
+    return found if len(found) == len(labels) else given
+
+
+def ordered(
+    place: str, given: Any, of: Sequence[str] | int, error: type[Exception] = SettingError
+) -> Any:
+    """A Series, or a DataFrame, whose entries, or columns, have names in the order of the names `of`; anything else as
+    it is."""
+    labels = _labels(given)
+    if labels is None:
+        return given
+    called = ", ".join(map(str, labels[:20]))
+    if isinstance(of, int):
+        raise error(f"{place}: its names are {called}; it is taken by its order, so it must have none: to_numpy()")
+    if len(labels) != len(of) or set(labels) != set(of):
+        raise error(f"{place}: its names are {called}; they must be {', '.join(of)}")
+    return given[list(of)]
 
 
 def number(place: str, given: Any, error: type[Exception] = SettingError) -> float:
@@ -68,11 +101,15 @@ def instance(place: str, given: Any, kind: type[Kind], name: str | None = None) 
     raise SettingError(f"{place}: {type(given).__name__} is no {name or f'lpvmpc.{kind.__name__}'}")
 
 
+def _size(of: Sequence[str] | int) -> int:
+    return of if isinstance(of, int) else len(of)
+
+
 def column(
-    place: str, given: ArrayLike, size: int, error: type[Exception] = SettingError
+    place: str, given: ArrayLike, of: Sequence[str] | int, error: type[Exception] = SettingError
 ) -> Array:
-    """A vector of `size` numbers; a column or a row of a matrix is one, too."""
-    array = numbers(place, given, error)
+    """A vector with a number for each name, or of so many; a column or a row of a matrix is one, too."""
+    array, size = numbers(place, ordered(place, given, of, error), error), _size(of)
     if array.ndim == 2 and 1 in array.shape:
         array = array.ravel()
     if array.shape != (size,) and not (array.ndim == 0 and size == 1):
@@ -90,9 +127,15 @@ def table(place: str, given: ArrayLike, error: type[Exception] = SettingError) -
     return array
 
 
-def weight(place: str, given: ArrayLike, size: int) -> Array:
+def _both_ordered(place: str, given: Any, names: Sequence[str]) -> Any:
+    """A matrix, rows and columns in the order of the names, or its diagonal."""
+    found = ordered(place, given, names)
+    return ordered(place, found.T, names).T if hasattr(found, "columns") else found
+
+
+def weight(place: str, given: ArrayLike, names: Sequence[str]) -> Array:
     """A weight matrix: given whole, or by its diagonal."""
-    array = numbers(place, given)
+    array, size = numbers(place, _both_ordered(place, given, names)), len(names)
     if array.ndim == 0 and size == 1:
         array = array.reshape(1)
     if array.shape == (size,):
@@ -104,9 +147,9 @@ def weight(place: str, given: ArrayLike, size: int) -> Array:
     )
 
 
-def by_stage(place: str, given: ArrayLike, size: int) -> Array:
+def by_stage(place: str, given: ArrayLike, of: Sequence[str] | int) -> Array:
     """A vector for each stage as rows; one vector is a single row."""
-    array = numbers(place, given)
+    array, size = numbers(place, ordered(place, given, of)), _size(of)
     if array.ndim == 0 and size == 1:
         array = array.reshape(1)
     if array.shape == (size,):
@@ -116,6 +159,12 @@ def by_stage(place: str, given: ArrayLike, size: int) -> Array:
     raise SettingError(
         f"{place}: its shape is {array.shape}; it must be ({size},), or (stages, {size})"
     )
+
+
+def weights_by_stage(place: str, given: ArrayLike, names: Sequence[str]) -> Array:
+    """A weight matrix for each stage; one, or the diagonal of one, is a single stage."""
+    shape = (len(names), len(names))
+    return matrices_by_stage(place, _both_ordered(place, given, names), shape)
 
 
 def matrices_by_stage(place: str, given: ArrayLike, shape: tuple[int, int]) -> Array:
@@ -140,7 +189,7 @@ def copied(given: Any) -> Any:
         return [copied(value) for value in given]
     if isinstance(given, tuple):  # of named ones, too, the values
         return tuple(copied(value) for value in given)
-    if isinstance(given, np.ndarray) or is_dataclass(given):
+    if isinstance(given, np.ndarray) or is_dataclass(given) or hasattr(given, "iloc"):
         return deepcopy(given)
     return given
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import column, number
+from ._arrays import column, named, number, ordered
 from ._tape import Tape
 from .errors import PlantError
 
@@ -84,8 +84,8 @@ def text(
         except (TypeError, ValueError):
             raise PlantError(f"equilibrium: it is {equilibrium!r}; it must be (x, u)") from None
         data["equilibrium"] = {
-            "x": column("equilibrium, x", x, len(states), PlantError).tolist(),
-            "u": column("equilibrium, u", u, len(inputs), PlantError).tolist(),
+            "x": column("equilibrium, x", x, states, PlantError).tolist(),
+            "u": column("equilibrium, u", u, inputs, PlantError).tolist(),
         }
     if embedding is not None:
         data["embedding"] = embedding
@@ -110,7 +110,9 @@ def values(
     given: Mapping[str, float] | Sequence[float] | None, names: list[str]
 ) -> dict[str, float]:
     """The values of the parameters by name. The keys of a mapping are the `names`, or other ones in their order."""
-    called, values = list(names), list(() if given is None else given)
+    given = named(given)
+    called = list(names)
+    values = list(() if given is None else ordered("parameters", given, names, PlantError))
     if isinstance(given, Mapping):
         called, values = [str(one) for one in given], list(given.values())
     if len(values) != len(names):
@@ -141,6 +143,7 @@ def by_label(
     given: Mapping[str, float] | Sequence[float] | None, labels: list[str]
 ) -> Mapping[str, float]:
     """The values of the parameters that are called `labels`, in that order."""
+    given = named(given)
     if not isinstance(given, Mapping):
         return values(given, labels)
     if set(given) != set(labels):

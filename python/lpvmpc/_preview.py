@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import by_stage, equally_long, listed, matrices_by_stage
+from ._arrays import by_stage, equally_long, listed, matrices_by_stage, weights_by_stage
 from .constraints import bounds, row
 from .errors import SettingError
-from .plant import Plant
+from .plant import Plant, names_of
 
 Array = NDArray[np.float64]
 
@@ -26,24 +26,25 @@ def to_native(
     plant: Plant, settings: Mapping[str, Any], x_ref: ArrayLike | None, ahead: Mapping[str, Any]
 ) -> dict[str, Any]:
     """What a step of a controller with these settings is told, of which what is None is left out."""
-    n, m, k = len(plant.states), len(plant.inputs), len(plant.outputs)
+    of_x, of_u, of_y = names_of(plant.states), names_of(plant.inputs), names_of(plant.outputs)
+    n, m = len(of_x), len(of_u)
     told = {"x_ref": x_ref, **ahead}
     given = {name: one for name, one in told.items() if one is not None}
     known: dict[str, Any] = {"x_ref": None}
-    for name, size in (
-        ("x_ref", n), ("u_ref", m), ("linear_x", n), ("linear_u", m), ("disturbance", n),
-        ("parameters", len(plant.parameters)), ("y_ref", k),
+    for name, of in (
+        ("x_ref", of_x), ("u_ref", of_u), ("linear_x", of_x), ("linear_u", of_u), ("disturbance", of_x),
+        ("parameters", list(plant.parameters)), ("y_ref", of_y),
     ):  # fmt: skip
         if name in given:
-            known[name] = by_stage(name, given[name], size)
+            known[name] = by_stage(name, given[name], of)
     if "scheduling" in given:
         size = (np.shape(given["scheduling"]) or (1,))[-1]
         known["scheduling"] = by_stage("scheduling", given["scheduling"], size)
-    for name, shape in (
-        ("q", (n, n)), ("r", (m, m)), ("cross", (m, n)), ("q_y", (k, k)), ("r_du", (m, m)),
-    ):  # fmt: skip
+    for name, of in (("q", of_x), ("r", of_u), ("q_y", of_y), ("r_du", of_u)):
         if name in given:
-            known[name] = matrices_by_stage(name, given[name], shape)
+            known[name] = weights_by_stage(name, given[name], of)
+    if "cross" in given:
+        known["cross"] = matrices_by_stage("cross", given["cross"], (m, n))
     if ("q" in given) != ("r" in given):
         raise SettingError("q, r: give both or neither")
     if "q" in given:

@@ -9,13 +9,13 @@ from ._arrays import column, number, weight, whole
 from .certificate import Certificate
 from .constraints import changes, limits, prices, row
 from .errors import SettingError
-from .plant import Plant
+from .plant import Plant, names_of
 
 
 def to_native(plant: Plant, given: Mapping[str, Any]) -> dict[str, Any]:
     """Settings as the native half takes them."""
     states, inputs = plant.states, plant.inputs
-    n, m = len(states), len(inputs)
+    of_x, of_u = names_of(states), names_of(inputs)
     settings = dict(given)
     for name, most in (
         ("horizon", 1000), ("nodes", 16), ("substeps", 10_000), ("max_programs", 65_535), ("first_programs", 65_535),
@@ -33,21 +33,21 @@ def to_native(plant: Plant, given: Mapping[str, Any]) -> dict[str, Any]:
             )
     for name in ("t_s", "tolerance"):
         settings[name] = number(name, given[name])
-    settings["q"], settings["r"] = weight("q", given["q"], n), weight("r", given["r"], m)
+    settings["q"], settings["r"] = weight("q", given["q"], of_x), weight("r", given["r"], of_u)
     if isinstance(given["terminal"], Certificate):
         settings["terminal"] = (given["terminal"].to_json(),)
     elif not isinstance(given["terminal"], str):
-        settings["terminal"] = weight("terminal", given["terminal"], n)
+        settings["terminal"] = weight("terminal", given["terminal"], of_x)
     settings["x_bounds"] = limits("x_bounds", given["x_bounds"], states)
     settings["u_bounds"] = limits("u_bounds", given["u_bounds"], inputs)
     if isinstance(given["state_bounds"], Mapping):
         settings["state_bounds"] = prices("state_bounds", given["state_bounds"], states)
     if given["u_ref"] is not None:
-        settings["u_ref"] = column("u_ref", given["u_ref"], m)
+        settings["u_ref"] = column("u_ref", given["u_ref"], of_u)
     outputs = plant.outputs
-    for name, size in (("q_y", len(outputs)), ("r_du", m)):
+    for name, of in (("q_y", names_of(outputs)), ("r_du", of_u)):
         if given[name] is not None:
-            settings[name] = weight(name, given[name], size)
+            settings[name] = weight(name, given[name], of)
     settings["y_bounds"] = limits("y_bounds", given["y_bounds"], outputs)
     settings["du_bounds"] = limits("du_bounds", given["du_bounds"], changes(plant))
     if isinstance(given["output_bounds"], Mapping):

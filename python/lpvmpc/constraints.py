@@ -9,9 +9,9 @@ from typing import Any, Union
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import by_stage, column, equally_long, instance, number
+from ._arrays import by_stage, column, equally_long, instance, named, number
 from .errors import SettingError
-from .plant import Plant, Signal
+from .plant import Plant, Signal, names_of
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def kept(
 
 def _names(place: str, given: Mapping[str, Any], signals: list[Signal]) -> list[str]:
     """The names of the signals, of which those that are given must be some."""
-    names = [signal.name for signal in signals]
+    names = names_of(signals)
     for name in given:
         if name not in names:
             raise SettingError(f"{place}: there is no {name!r}; there are {', '.join(names)}")
@@ -106,6 +106,7 @@ def limits(
 
 def _sides(place: str, given: Limits, signals: list[Signal]) -> tuple[list[float], list[float]]:
     """The lower and the upper bounds; a signal that is not named has its own."""
+    given = named(given)
     if isinstance(given, Mapping):
         _names(place, given, signals)
         pairs = [
@@ -117,10 +118,10 @@ def _sides(place: str, given: Limits, signals: list[Signal]) -> tuple[list[float
         lower, upper = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
     else:
         lower, upper = _pair(place, given)
-    size = len(signals)
+    names = names_of(signals)
     return (
-        column(f"{place}, lower", _open(lower, -np.inf), size).tolist(),
-        column(f"{place}, upper", _open(upper, np.inf), size).tolist(),
+        column(f"{place}, lower", _open(lower, -np.inf), names).tolist(),
+        column(f"{place}, upper", _open(upper, np.inf), names).tolist(),
     )
 
 
@@ -129,15 +130,16 @@ def bounds(
 ) -> dict[str, Array]:
     """Bounds by stage, or by name for all stages, as the native half takes them; what is not named has those of the
     settings."""
-    place, size = f"{name}_bounds", len(_signals(plant, name))
+    place, names = f"{name}_bounds", names_of(_signals(plant, name))
+    given = named(given)
     if isinstance(given, Mapping):
         usual = zip(*kept(plant, settings, name), strict=True)
         signals = [replace(one, lower=lower, upper=upper) for one, lower, upper in usual]
         given = _sides(place, given, signals)
     lower, upper = _pair(place, given)
     lower, upper = equally_long(
-        by_stage(f"{place}, lower", _open(lower, -np.inf), size),
-        by_stage(f"{place}, upper", _open(upper, np.inf), size),
+        by_stage(f"{place}, lower", _open(lower, -np.inf), names),
+        by_stage(f"{place}, upper", _open(upper, np.inf), names),
     )
     return {f"{name}_lower": lower, f"{name}_upper": upper}
 
@@ -178,8 +180,9 @@ def row(plant: Plant, given: Row) -> tuple[Any, ...]:
 def _coefficients(place: str, given: Any, signals: list[Signal]) -> list[float]:
     if given is None:
         return [0.0] * len(signals)
+    given = named(given)
     if isinstance(given, Mapping):
         names = _names(place, given, signals)
         return [number(place, given.get(name, 0.0)) for name in names]
-    found: list[float] = column(place, given, len(signals)).tolist()
+    found: list[float] = column(place, given, names_of(signals)).tolist()
     return found

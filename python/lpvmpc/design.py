@@ -13,7 +13,7 @@ from ._progress import reported
 from .certificate import Certificate
 from .constraints import Limits, limits
 from .errors import SettingError
-from .plant import Plant
+from .plant import Plant, names_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +63,15 @@ def lqr(
         The weights make no sense, the plant does not stand there, or no regulator stabilises it.
     """
     instance("plant", plant, Plant)
-    n, m = len(plant.states), len(plant.inputs)
+    of_x, of_u = names_of(plant.states), names_of(plant.inputs)
     t_s = number("t_s", t_s)
-    at = plant.equilibrium or (np.zeros(n), np.zeros(m))
-    x_eq = at[0] if x is None else column("x", x, n)
-    u_eq = at[1] if u is None else column("u", u, m)
+    at = plant.equilibrium or (np.zeros(len(of_x)), np.zeros(len(of_u)))
+    x_eq = at[0] if x is None else column("x", x, of_x)
+    u_eq = at[1] if u is None else column("u", u, of_u)
     for place, given in (("x", x_eq), ("u", u_eq)):
         if not np.isfinite(given).all():
             raise SettingError(f"{place}: it has an entry that is not finite")
-    k, p = _lpvmpc.lqr(plant._native, t_s, weight("q", q, n), weight("r", r, m), x_eq, u_eq)
+    k, p = _lpvmpc.lqr(plant._native, t_s, weight("q", q, of_x), weight("r", r, of_u), x_eq, u_eq)
     return Lqr(k=k, p=p, x=x_eq, u=u_eq)
 
 
@@ -137,14 +137,14 @@ def certify(
     True
     """
     instance("plant", plant, Plant)
-    n, m = len(plant.states), len(plant.inputs)
-    at = plant.equilibrium or (np.zeros(n), np.zeros(m))
-    x_eq = at[0] if x is None else column("x", x, n)
-    u_eq = at[1] if u is None else column("u", u, m)
+    of_x, of_u = names_of(plant.states), names_of(plant.inputs)
+    at = plant.equilibrium or (np.zeros(len(of_x)), np.zeros(len(of_u)))
+    x_eq = at[0] if x is None else column("x", x, of_x)
+    u_eq = at[1] if u is None else column("u", u, of_u)
     asked = {
         "t_s": number("t_s", t_s),
-        "q": weight("q", q, n),
-        "r": weight("r", r, m),
+        "q": weight("q", q, of_x),
+        "r": weight("r", r, of_u),
         "equilibrium": (x_eq.tolist(), u_eq.tolist()),
         "x_bounds": limits("x_bounds", x_bounds, plant.states),
         "u_bounds": limits("u_bounds", u_bounds, plant.inputs),

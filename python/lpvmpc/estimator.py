@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import by_name, column, instance, number
+from ._arrays import by_name, column, instance, named, number
 from .errors import SettingError
-from .plant import Plant, Signal
+from .plant import Plant, Signal, names_of
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def to_native(plant: Plant, given: Estimator) -> dict[str, Any]:
         "state_noise": _by_state(f"{place}, state_noise", given.state_noise, states, 0.0),
         "start": None
         if given.start is None
-        else column(f"{place}, start", given.start, len(states)).tolist(),
+        else column(f"{place}, start", given.start, names_of(states)).tolist(),
         "initial_state": _by_state(f"{place}, initial_state", given.initial_state, states, 1.0),
         "disturbances": [
             (
@@ -120,7 +120,7 @@ def to_native(plant: Plant, given: Estimator) -> dict[str, Any]:
 def _by_state(
     place: str, given: ArrayLike | Mapping[str, float], states: list[Signal], usual: float
 ) -> list[float]:
-    names = [state.name for state in states]
+    names, given = names_of(states), named(given)
     if isinstance(given, Mapping):
         for name in given:
             if name not in names:
@@ -128,5 +128,5 @@ def _by_state(
         return [number(f"{place}, {name}", given.get(name, usual)) for name in names]
     if np.ndim(given) == 0:
         return [number(place, given)] * len(names)
-    found: list[float] = column(place, given, len(names)).tolist()
+    found: list[float] = column(place, given, names).tolist()
     return found

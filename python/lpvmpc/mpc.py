@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _lpvmpc
-from ._arrays import column, copied, instance, listed, number, whole
+from ._arrays import column, copied, instance, listed, named, number, ordered, whole
 from ._preview import AHEAD
 from ._preview import to_native as preview_to_native
 from ._settings import to_native as settings_to_native
@@ -20,7 +20,7 @@ from .errors import SettingError
 from .estimator import Estimate, Estimator
 from .estimator import to_native as estimator_to_native
 from .plan import Plan
-from .plant import Plant
+from .plant import Plant, names_of
 
 
 class Mpc:
@@ -163,7 +163,7 @@ class Mpc:
             "substeps": substeps, "method": method, "max_programs": max_programs, "first_programs": first_programs,
             "tolerance": tolerance, "estimator": estimator,
         })  # fmt: skip
-        self._n, self._m = len(plant.states), len(plant.inputs)
+        self._states, self._inputs = names_of(plant.states), names_of(plant.inputs)
         self._native = _lpvmpc.Mpc(plant._native, settings_to_native(plant, self._settings))
         self._native.set_estimator(self._filter(estimator))
 
@@ -224,7 +224,8 @@ class Mpc:
         """One sample: from the measured state and what is known ahead to the plan.
 
         Everything but `x` may be given by stage, an array with one more dimension in front, from the present
-        stage on; from where it ends its last entry holds. So one vector is a value for the whole horizon.
+        stage on; from where it ends its last entry holds. So one vector is a value for the whole horizon. Of a Series of
+        pandas the index, of a DataFrame the columns may be the names of what the numbers are of, in any order.
 
         Parameters
         ----------
@@ -284,7 +285,7 @@ class Mpc:
             "du_bounds": du_bounds, "matrices": matrices, "scheduling": scheduling,
         }  # fmt: skip
         known = preview_to_native(self._plant, self._settings, x_ref, ahead)
-        return Plan(*self._native.step(column("x", x, self._n), known))
+        return Plan(*self._native.step(column("x", x, self._states), known))
 
     def observe(self, t: float, readings: Mapping[str, float | None] | ArrayLike) -> dict[str, str]:
         """Takes in readings of the time `t`; may be called more often than once a sample.
@@ -294,7 +295,8 @@ class Mpc:
         t
             When they were taken, s, on any clock.
         readings
-            By name, or in the order of ``estimator.measured``; one that is missing is left out, None or NaN.
+            By name, also as a Series of pandas, or in the order of ``estimator.measured``; one that is missing is left out,
+            None or NaN.
 
         Returns
         -------
@@ -308,7 +310,7 @@ class Mpc:
         SettingError
             The controller has no estimator, or there are not as many readings.
         """
-        names = self._measured()
+        names, readings = self._measured(), named(readings)
         if isinstance(readings, Mapping):
             for name in readings:
                 if name not in names:
@@ -317,7 +319,8 @@ class Mpc:
                     )
             given = [readings.get(name) for name in names]
         else:
-            given = list(np.atleast_1d(np.asarray(readings, dtype=object)))
+            known = ordered("readings", readings, names)
+            given = list(np.atleast_1d(np.asarray(known, dtype=object)))
         values = [None if one is None else number("readings", one) for one in given]
         missing = [None if one is None or np.isnan(one) else one for one in values]
         verdicts = self._native.observe(number("t", t), missing)
@@ -427,7 +430,7 @@ class Mpc:
         SettingError
             It is not of shape (m,), or not finite.
         """
-        self._native.set_last_input(column("u", u, self._m))
+        self._native.set_last_input(column("u", u, self._inputs))
 
     def reset(self) -> None:
         """Forgets the last plan, the last input and what was estimated: the next step is as the first."""
@@ -475,8 +478,8 @@ class Mpc:
             Path(folder),
             settings_to_native(self._plant, self._settings),
             str(lpvmpc),
-            column("x0", x0, self._n),
-            None if x_ref is None else column("x_ref", x_ref, self._n),
+            column("x0", x0, self._states),
+            None if x_ref is None else column("x_ref", x_ref, self._states),
             whole("samples", samples),
         )
 

@@ -32,6 +32,11 @@ class Signal:
     """The largest value that it may have; none without."""
 
 
+def names_of(signals: Sequence[Signal]) -> list[str]:
+    """What they are called."""
+    return [one.name for one in signals]
+
+
 @dataclass(frozen=True)
 class Embedding:
     """A plant's own linear parameter-varying form, f = A(s) x + B(s) u + c(s) with s = sigma(x, u), in
@@ -142,7 +147,7 @@ class Plant:
             Their names. Without: what the symbols are called, and ``y_0``, ``y_1``, ...
         parameters
             The values of `p`: by the names of its symbols, in any order; by other names, which they are to have, in
-            the order of `p`; or as a list.
+            the order of `p`; or as a list. A Series of pandas with names is taken by these.
         units
             Units by name, for messages and figures.
         bounds
@@ -349,7 +354,7 @@ class Plant:
         PlantError
             The expressions make no plant; the message names the place.
         """
-        values = dict(parameters or {})
+        values = {} if parameters is None else dict(parameters)
         leaves = {
             symbol: (leaf, i)
             for leaf, symbols in (("state", x), ("input", u), ("parameter", values))
@@ -557,14 +562,14 @@ class Plant:
         >>> tank.steady_state([2.0]).u.round(6).tolist()
         [0.2]
         """
-        n = len(self._native.states)
-        weight = np.ones(n) if weights is None else column("weights", weights, n)
-        return SteadyState(*self._native.steady_state(column("x_ref", x_ref, n), weight))
+        states = names_of(self.states)
+        weight = np.ones(len(states)) if weights is None else column("weights", weights, states)
+        return SteadyState(*self._native.steady_state(column("x_ref", x_ref, states), weight))
 
     def _point(self, x: ArrayLike, u: ArrayLike) -> tuple[Array, Array]:
         return (
-            column("x", x, len(self._native.states), PlantError),
-            column("u", u, len(self._native.inputs), PlantError),
+            column("x", x, names_of(self.states), PlantError),
+            column("u", u, names_of(self.inputs), PlantError),
         )
 
     # Where it goes.

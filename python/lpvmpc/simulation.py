@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _lpvmpc
-from ._arrays import Kind, by_name, column, instance, listed, number, numbers
+from ._arrays import Kind, by_name, column, instance, listed, number, numbers, ordered
 from ._progress import samples_of
 from .errors import MissingPackageError, SettingError, SimulationError
 from .estimator import Estimator
 from .mpc import Mpc
 from .plan import Plan
-from .plant import Plant, Signal
+from .plant import Plant, Signal, names_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -154,10 +154,11 @@ class Run:
         from ._arrays import by_stage, weight
 
         n, m = self.x.shape[1], self.u.shape[1]
-        q_matrix, r_matrix = weight("q", q, n), weight("r", r, m)
+        of_x, of_u = names_of(self.plant.states), names_of(self.plant.inputs)
+        q_matrix, r_matrix = weight("q", q, of_x), weight("r", r, of_u)
         rest = np.zeros(n) if self.plant.equilibrium is None else self.plant.equilibrium[0]
         e = self.x[:-1] - (rest if self.x_ref is None else self.x_ref)
-        known = np.zeros((1, m)) if u_ref is None else by_stage("u_ref", u_ref, m)
+        known = np.zeros((1, m)) if u_ref is None else by_stage("u_ref", u_ref, of_u)
         if len(known) not in (1, len(self.u)):
             raise SettingError(f"u_ref: it has {len(known)} rows; the run has {len(self.u)} samples")
         v = self.u - known
@@ -302,9 +303,10 @@ def simulate(
     n, m = len(states), len(inputs)
     mpc = controller if isinstance(controller, Mpc) else None
     if mpc is not None:
-        if (mpc._n, mpc._m) != (n, m):
+        known_to_it = (len(mpc._states), len(mpc._inputs))
+        if known_to_it != (n, m):
             raise SettingError(
-                f"controller: it is for {mpc._n} states and {mpc._m} inputs; the plant has {n} and {m}"
+                f"controller: it is for {known_to_it[0]} states and {known_to_it[1]} inputs; the plant has {n} and {m}"
             )
         if t_s is not None and t_s != mpc.t_s:
             raise SettingError(f"t_s: it is {t_s} s, and that of the controller {mpc.t_s} s")
@@ -326,20 +328,20 @@ def simulate(
             f"duration: {duration} s are {count:.4g} samples of {period} s; there is room for {MOST_SAMPLES}"
         )
     horizon = mpc.horizon if mpc is not None else 0
-    reference = _reference(x_ref, n, count, period)
+    reference = _reference(x_ref, names_of(states), count, period)
     estimator = None if mpc is None else mpc.estimator
     acts = 0.0 if estimator is None else float(estimator.delay)
-    ahead = None if mpc is None else _reference(x_ref, n, count + horizon + 1, period, acts)
+    ahead = None if mpc is None else _reference(x_ref, names_of(states), count + horizon + 1, period, acts)
     pushes = listed("disturbances", disturbances, "a list of lpvmpc.Load and lpvmpc.Jump")
     world = _lpvmpc.World(
         plant._native,
-        column("x0", x0, n),
+        column("x0", x0, names_of(states)),
         {
             "period": period,
             "sensors": _sensors(sensors, plant, estimator),
             "actuators": _actuators(actuators, inputs),
             "delay": number("delay", delay),
-            "pushes": [_push(i, push, n) for i, push in enumerate(pushes)],
+            "pushes": [_push(i, push, names_of(states)) for i, push in enumerate(pushes)],
             "seed": _seed(seed),
             "relative_tolerance": number("relative_tolerance", relative_tolerance),
             "absolute_tolerance": number("absolute_tolerance", absolute_tolerance),
@@ -374,7 +376,8 @@ def _run(
 ) -> Run:
     from time import perf_counter
 
-    n, m, k = len(plant.states), len(plant.inputs), len(plant.outputs)
+    inputs = names_of(plant.inputs)
+    n, m, k = len(plant.states), len(inputs), len(plant.outputs)
     x, u, y = np.empty((count + 1, n)), np.empty((count, m)), np.empty((count, k))
     readings = np.empty((count, len(world.readings)))
     measured, step_times = np.empty((count, n)), np.empty(count)
@@ -405,7 +408,7 @@ def _run(
             plans.append(plan)
             u[i] = plan.u0
         else:
-            u[i] = column("controller", controller(i * period, seen.copy()), m)  # type: ignore[operator]
+            u[i] = column("controller", controller(i * period, seen.copy()), inputs)  # type: ignore[operator]
         step_times[i] = perf_counter() - start
         if not np.isfinite(u[i]).all():
             raise SimulationError(
@@ -436,16 +439,16 @@ def _run(
 
 
 def _reference(
-    given: Reference, n: int, stages: int, period: float, start: float = 0.0
+    given: Reference, of: list[str], stages: int, period: float, start: float = 0.0
 ) -> Array | None:
     """The reference at so many samples from the time `start` on."""
     if given is None:
         return None
     if callable(given):
         times = start + np.arange(stages) * period
-        return np.array([column(f"x_ref at {t:g} s", given(float(t)), n) for t in times])
+        return np.array([column(f"x_ref at {t:g} s", given(float(t)), of) for t in times])
     first = int(np.floor(start / period + 1e-9))
-    array = numbers("x_ref", given)
+    array, n = numbers("x_ref", ordered("x_ref", given, of)), len(of)
     if array.shape == (n,) or (array.ndim == 0 and n == 1):
         return np.tile(array.reshape(1, n), (stages, 1))
     if array.ndim == 2 and array.shape[1] == n and len(array):
@@ -512,16 +515,16 @@ def _actuators(
     ]
 
 
-def _push(i: int, push: Load | Jump, n: int) -> tuple[Any, ...]:
+def _push(i: int, push: Load | Jump, of: list[str]) -> tuple[Any, ...]:
     place = f"disturbances[{i}]"
     if isinstance(push, Load):
         begin, end = number(f"{place}, start", push.start), number(f"{place}, end", push.end)
-        return begin, end, column(place, push.load, n).tolist()
+        return begin, end, column(place, push.load, of).tolist()
     if isinstance(push, Jump):
         time = number(f"{place}, time", push.time)
         if not time >= 0:
             raise SettingError(f"{place}, time: it is {time} s; the run begins at 0 s")
-        return time, column(place, push.change, n).tolist()
+        return time, column(place, push.change, of).tolist()
     raise SettingError(f"{place}: {push!r} is neither an lpvmpc.Load nor an lpvmpc.Jump")
 
 

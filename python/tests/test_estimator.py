@@ -3,6 +3,7 @@
 import pickle
 
 import numpy as np
+import pandas as pd
 import pytest
 from plants import cart_pole, cart_pole_formulas, double_integrator
 from scipy.linalg import expm, solve_discrete_are
@@ -87,6 +88,21 @@ def test_readings_by_name_and_what_became_of_them():
     assert mpc.estimate.disturbances == {}
     mpc.reset()
     np.testing.assert_array_equal(mpc.estimate.x, 0)
+
+
+def test_readings_and_variances_of_pandas_are_taken_by_their_names():
+    """They were taken by their order."""
+    noise = {"rate": 1e-2, "speed": 1e-3, "tilt": 1e-6, "position": 1e-5}
+    one, other = (
+        controller(estimator=lpvmpc.Estimator(measured=MEASURED, state_noise=given)) for given in (noise, pd.Series(noise))
+    )
+    for k, readings in enumerate(({"tilt": 0.1, "tip_position": 0.3}, {"tilt": 0.2})):
+        assert one.observe(0.1 * k, readings) == other.observe(0.1 * k, pd.Series(readings))
+        assert (one.estimate.x == other.estimate.x).all()
+    with pytest.raises(lpvmpc.SettingError, match="readings: 'speed' is not measured"):
+        other.observe(1.0, pd.Series({"speed": 0.1}))
+    with pytest.raises(lpvmpc.SettingError, match="readings: its names are tilt, tilt; they must be tip_position, tilt"):
+        other.observe(1.0, pd.Series([0.1, 0.2], ["tilt", "tilt"]))
 
 
 def test_an_estimator_comes_and_goes_and_is_pickled():

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import casadi as ca
 import numpy as np
+import pandas as pd
 import pytest
 
 import lpvmpc
@@ -474,6 +475,50 @@ def test_what_was_given_may_change():
     mpc.set(u_bounds=([-1], [1]))
     assert mpc.bounds == untouched.bounds
     assert mpc.step([0.1, 0.0]).u0 == untouched.step([0.1, 0.0]).u0
+
+
+def test_what_has_names_is_taken_by_them():
+    """Series and DataFrames of pandas were taken by their order, whatever their names said."""
+    plant = cart_pole()
+    by_name = pd.Series({"rate": 0.1, "speed": -0.2, "tilt": 0.3, "position": 0.4})
+    x = by_name[["position", "tilt", "speed", "rate"]].to_numpy()
+    mpc = lpvmpc.Mpc(plant, T_S, N, Q, R, q_y=[0.1, 0.2], r_du=[0.1])
+
+    def plan(x=x, *arguments, **told):
+        mpc.reset()
+        return mpc.step(x, *arguments, **told)
+
+    moving = np.linspace(0, 1, N + 1)[:, None] * x
+    table = pd.DataFrame(moving, columns=["position", "tilt", "speed", "rate"])
+    turned = table[["tilt", "rate", "position", "speed"]].set_index(pd.Index(T_S * np.arange(N + 1), name="t"))
+    assert (plan(by_name, turned).u == plan(x, moving).u).all()
+    assert (plan(pd.Series(x), pd.DataFrame(moving)).u == plan(x, moving).u).all()
+    parameters = pd.Series({"half_length": 0.6, "cart_mass": 1.1, "pole_mass": 0.2})
+    of_y = ["tip_height", "tip_position"]
+    weights = pd.DataFrame(Q, index=by_name.index[::-1], columns=by_name.index[::-1])
+    for named, numbers in (
+        ({"parameters": parameters}, {"parameters": [1.1, 0.2, 0.6]}),
+        ({"y_ref": pd.Series([0.9, 0.1], of_y)}, {"y_ref": [0.1, 0.9]}),
+        ({"q_y": pd.Series([3.0, 0.2], of_y)}, {"q_y": [0.2, 3.0]}),
+        ({"disturbance": by_name}, {"disturbance": x}),
+        ({"q": by_name.abs(), "r": [0.1]}, {"q": abs(x), "r": [0.1]}),
+        ({"q": weights.loc[by_name.index], "r": [0.1]}, {"q": Q, "r": [0.1]}),
+        ({"x_bounds": (by_name - 9, pd.Series(x + 9))}, {"x_bounds": (x - 9, x + 9)}),
+        ({"u_bounds": pd.Series({"force": (-3, 3)})}, {"u_bounds": {"force": (-3, 3)}}),
+    ):
+        assert (plan(**named).u == plan(**numbers).u).all()
+    assert (plant.f(by_name, pd.Series({"force": 1.0})) == plant.f(x, [1.0])).all()
+    for row in (pd.Series({"speed": 1.0}), pd.Series([0.0, 0, 1, 0])):
+        told = plan(rows=[[lpvmpc.Row("slow", x=row, upper=0.1)]])
+        assert (told.u == plan(rows=[[lpvmpc.Row("slow", x={"speed": 1}, upper=0.1)]]).u).all()
+    for wrong, message in (
+        (by_name.rename({"tilt": "angle"}), "x: its names are rate, speed, angle, position; they must be position, tilt"),
+        (by_name[:3], "its names are rate, speed, tilt; they must be"),
+        (pd.concat([by_name, by_name]), "its names are rate, speed"),
+        (pd.Series(x, [1, 2, 3, 4]), "its names are 1, 2, 3, 4; they must be"),
+    ):
+        with pytest.raises(lpvmpc.SettingError, match=message):
+            plan(wrong)
 
 
 def test_laws_and_costs_take_vectors_of_their_size():

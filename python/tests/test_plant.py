@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
+import pandas as pd
 import pytest
 import sympy as sp
 
@@ -182,6 +183,14 @@ def test_parameters_are_found_by_their_names():
     renamed = rod({"m": 2.0, "l": 0.5})
     assert renamed.parameters == {"m": 2.0, "l": 0.5}
     assert renamed.f([0, 0], [1.0]).tolist() == [0.0, 2.0]
+
+
+def test_parameters_of_pandas_are_found_by_their_names():
+    """They were taken by their order."""
+    assert rod(pd.Series({"length": 0.5, "mass": 2.0})).parameters == {"mass": 2.0, "length": 0.5}
+    assert rod(pd.Series([2.0, 0.5])).parameters == {"mass": 2.0, "length": 0.5}
+    with pytest.raises(lpvmpc.PlantError, match="p has mass, length, and no long"):
+        rod(pd.Series({"mass": 2, "long": 0.5}))
 
 
 def test_files_and_pickles_hold_the_same_plant(tmp_path):

@@ -7,6 +7,7 @@ import threading
 
 import casadi as ca
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
@@ -59,6 +60,9 @@ def test_a_controller_sees_its_reference_ahead():
     by_sample = np.array([reference(i * 0.05) for i in range(200)])
     again = lpvmpc.simulate(cart_pole(), controller(), [0] * 4, 3.0, x_ref=by_sample)
     assert (again.x == run.x).all()
+    turned = pd.DataFrame(by_sample[:, ::-1], columns=["rate", "speed", "tilt", "position"])
+    named = lpvmpc.simulate(cart_pole(), controller(), [0] * 4, 3.0, x_ref=turned)
+    assert (named.x == run.x).all()
 
 
 def test_noise_comes_from_its_seed():
