@@ -75,7 +75,10 @@ def text(
     if period is None:
         data["derivative"] = derivative
     else:
-        data |= {"period": number("period", period, PlantError), "next": derivative}
+        seconds = number("period", period, PlantError)
+        if not (np.isfinite(seconds) and seconds > 0):
+            raise PlantError(f"period: it is {seconds} s; it must be a positive number of seconds")
+        data |= {"period": seconds, "next": derivative}
     if output:
         data["output"] = output
     if equilibrium is not None:
@@ -84,9 +87,8 @@ def text(
         except (TypeError, ValueError):
             raise PlantError(f"equilibrium: it is {equilibrium!r}; it must be (x, u)") from None
         data["equilibrium"] = {
-            "x": column("equilibrium, x", x, states, PlantError).tolist(),
-            "u": column("equilibrium, u", u, inputs, PlantError).tolist(),
-        }
+            "x": _finite("equilibrium, x", x, states), "u": _finite("equilibrium, u", u, inputs)
+        }  # fmt: skip
     if embedding is not None:
         data["embedding"] = embedding
     try:
@@ -95,6 +97,14 @@ def text(
         raise PlantError(
             "formulas: they contain a number that is not finite (a division by zero, an overflow)"
         ) from None
+
+
+def _finite(place: str, given: ArrayLike, of: Sequence[str]) -> list[float]:
+    found: list[float] = column(place, given, of, PlantError).tolist()
+    for name, value in zip(of, found, strict=True):
+        if not np.isfinite(value):
+            raise PlantError(f"{place}: {name} is {value}; it must be finite")
+    return found
 
 
 def names(place: str, given: Sequence[str] | None, usual: list[str]) -> list[str]:

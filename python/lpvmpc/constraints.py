@@ -16,10 +16,10 @@ from .plant import Plant, Signal, names_of
 Array = NDArray[np.float64]
 
 Limits = Union[
-    "tuple[ArrayLike, ArrayLike]", Mapping[str, "tuple[float | None, float | None]"]
+    "tuple[ArrayLike | None, ArrayLike | None]", Mapping[str, "tuple[float | None, float | None]"]
 ]
 """Bounds: (lower, upper), each with a number for every state or input, or by name; None or an
-infinite number where there is no bound."""
+infinite number where there is no bound, also for a whole side."""
 
 
 @dataclass(frozen=True)
@@ -92,9 +92,17 @@ def _pair(place: str, given: Any) -> tuple[Any, Any]:
 
 def _open(given: Any, infinite: float) -> Any:
     """Bounds with an infinite one for None."""
+    if isinstance(given, np.ndarray) and given.dtype == object:
+        given = given.tolist()
     if isinstance(given, (list, tuple)):
-        return [infinite if one is None else _open(one, infinite) for one in given]
-    return given
+        return [_open(one, infinite) for one in given]
+    return infinite if given is None else given
+
+
+def _both_open(pair: tuple[Any, Any], size: int) -> tuple[Any, Any]:
+    """Lower and upper bounds of `size` signals, infinite ones for None, also for that of all."""
+    lower, upper = ([None] * size if side is None else side for side in pair)
+    return _open(lower, -np.inf), _open(upper, np.inf)
 
 
 def limits(
@@ -115,13 +123,14 @@ def _sides(place: str, given: Limits, signals: list[Signal]) -> tuple[list[float
             else (signal.lower, signal.upper)
             for signal in signals
         ]
-        lower, upper = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+        sides: tuple[Any, Any] = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
     else:
-        lower, upper = _pair(place, given)
+        sides = _pair(place, given)
     names = names_of(signals)
+    lower, upper = _both_open(sides, len(names))
     return (
-        column(f"{place}, lower", _open(lower, -np.inf), names).tolist(),
-        column(f"{place}, upper", _open(upper, np.inf), names).tolist(),
+        column(f"{place}, lower", lower, names).tolist(),
+        column(f"{place}, upper", upper, names).tolist(),
     )
 
 
@@ -136,10 +145,9 @@ def bounds(
         usual = zip(*kept(plant, settings, name), strict=True)
         signals = [replace(one, lower=lower, upper=upper) for one, lower, upper in usual]
         given = _sides(place, given, signals)
-    lower, upper = _pair(place, given)
+    lower, upper = _both_open(_pair(place, given), len(names))
     lower, upper = equally_long(
-        by_stage(f"{place}, lower", _open(lower, -np.inf), names),
-        by_stage(f"{place}, upper", _open(upper, np.inf), names),
+        by_stage(f"{place}, lower", lower, names), by_stage(f"{place}, upper", upper, names)
     )
     return {f"{name}_lower": lower, f"{name}_upper": upper}
 

@@ -396,10 +396,10 @@ class Mpc:
                     f"{name}: there is no such setting; there are {', '.join(self._settings)}"
                 )
         new = {**self._settings, **copied(changes)}
-        for name in ("t_s", "horizon"):
-            if new[name] != self._settings[name]:
-                raise SettingError(f"{name}: it stays; make another controller")
         native = settings_to_native(self._plant, new)
+        for name, kept_at in (("t_s", self.t_s), ("horizon", self.horizon)):
+            if native[name] != kept_at:
+                raise SettingError(f"{name}: it stays at {kept_at}; make another controller")
         self._native.set(native, self._filter(new["estimator"]))
         self._settings, self._designed_for = new, self._plant
 

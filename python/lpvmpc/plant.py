@@ -373,7 +373,10 @@ class Plant:
             states=_plant_file.names("states", states, [_sympy.name(symbol) for symbol in x]),
             inputs=_plant_file.names("inputs", inputs, [_sympy.name(symbol) for symbol in u]),
             outputs=outputs,
-            parameters={_sympy.name(symbol): value for symbol, value in values.items()},
+            parameters=_plant_file.values(
+                {_sympy.name(symbol): value for symbol, value in values.items()},
+                [_sympy.name(symbol) for symbol in values],
+            ),
             units=units,
             bounds=bounds,
             equilibrium=equilibrium,

@@ -27,8 +27,8 @@ MOST_SAMPLES = 10_000_000
 """The longest run; it has to fit into memory."""
 
 Reference = Union[ArrayLike, Callable[[float], ArrayLike], None]
-"""A constant reference (n,), one by sample (samples, n) whose last row holds from its end, or a
-function of time."""
+"""A constant reference, (n,) of states or (m,) of inputs, one by sample, (samples, n) or (samples, m), whose last row holds
+from its end, or a function of time."""
 
 
 @dataclass(frozen=True)
@@ -228,7 +228,7 @@ def simulate(
     duration: float,
     x_ref: Reference = None,
     *,
-    u_ref: ArrayLike | None = None,
+    u_ref: Reference = None,
     t_s: float | None = None,
     sensors: Mapping[str, Sensor] | None = None,
     actuators: Mapping[str, Actuator] | None = None,
@@ -257,7 +257,8 @@ def simulate(
         The reference: constant, by sample, or a function of time. An `Mpc` sees it ahead over its horizon, from when
         its input acts.
     u_ref
-        The input that costs nothing, for an `Mpc`, shape (m,).
+        The input that costs nothing, for an `Mpc`, which sees it ahead as `x_ref`: constant, by sample, or a function of
+        time.
     t_s
         The sampling time, s, of a controller that is a function.
     sensors
@@ -328,10 +329,14 @@ def simulate(
             f"duration: {duration} s are {count:.4g} samples of {period} s; there is room for {MOST_SAMPLES}"
         )
     horizon = mpc.horizon if mpc is not None else 0
-    reference = _reference(x_ref, names_of(states), count, period)
+    reference = None if x_ref is None else _reference("x_ref", x_ref, names_of(states), count, period)
     estimator = None if mpc is None else mpc.estimator
     acts = 0.0 if estimator is None else float(estimator.delay)
-    ahead = None if mpc is None else _reference(x_ref, names_of(states), count + horizon + 1, period, acts)
+    ahead = {
+        place: _reference(place, given, names_of(signals), count + horizon + 1, period, acts)
+        for place, given, signals in (("x_ref", x_ref, states), ("u_ref", u_ref, inputs))
+        if mpc is not None and given is not None
+    }
     pushes = listed("disturbances", disturbances, "a list of lpvmpc.Load and lpvmpc.Jump")
     world = _lpvmpc.World(
         plant._native,
@@ -349,8 +354,7 @@ def simulate(
     )
     if mpc is not None:
         mpc.reset()
-    known = _Known(reference, ahead, u_ref)
-    return _run(plant, controller, mpc, world, count, period, known, progress)
+    return _run(plant, controller, mpc, world, count, period, _Known(reference, ahead), progress)
 
 
 @dataclass(frozen=True)
@@ -359,9 +363,9 @@ class _Known:
 
     reference: Array | None
     """The reference at the samples, for the result."""
-    ahead: Array | None
-    """The reference from when the input of the first sample acts, beyond the last sample by a horizon."""
-    u_ref: ArrayLike | None
+    ahead: dict[str, Array]
+    """The references, `x_ref` and `u_ref`, from when the input of the first sample acts, beyond the last sample by a
+    horizon."""
 
 
 def _run(
@@ -400,11 +404,8 @@ def _run(
             seen = np.where(np.isnan(readings[i]), seen, readings[i])
         measured[i] = seen
         if mpc is not None:
-            ahead = None if known.ahead is None else known.ahead[i : i + mpc.horizon + 1]
-            if estimator is None:
-                plan = mpc.step(seen, ahead, u_ref=known.u_ref)
-            else:
-                plan = mpc.decide(ahead, u_ref=known.u_ref)
+            ahead: dict[str, Any] = {place: one[i : i + mpc.horizon + 1] for place, one in known.ahead.items()}
+            plan = mpc.step(seen, **ahead) if estimator is None else mpc.decide(**ahead)
             plans.append(plan)
             u[i] = plan.u0
         else:
@@ -439,30 +440,33 @@ def _run(
 
 
 def _reference(
-    given: Reference, of: list[str], stages: int, period: float, start: float = 0.0
-) -> Array | None:
+    place: str,
+    given: ArrayLike | Callable[[float], ArrayLike],
+    of: list[str],
+    stages: int,
+    period: float,
+    start: float = 0.0,
+) -> Array:
     """The reference at so many samples from the time `start` on."""
-    if given is None:
-        return None
     if callable(given):
         times = start + np.arange(stages) * period
-        return np.array([column(f"x_ref at {t:g} s", given(float(t)), of) for t in times])
+        return np.array([column(f"{place} at {t:g} s", given(float(t)), of) for t in times])
     first = int(np.floor(start / period + 1e-9))
-    array, n = numbers("x_ref", ordered("x_ref", given, of)), len(of)
+    array, n = numbers(place, ordered(place, given, of)), len(of)
     if array.shape == (n,) or (array.ndim == 0 and n == 1):
         return np.tile(array.reshape(1, n), (stages, 1))
     if array.ndim == 2 and array.shape[1] == n and len(array):
         held = np.repeat(array[-1:], max(0, first + stages - len(array)), axis=0)
         return np.concatenate([array, held])[first : first + stages]
     raise SettingError(
-        f"x_ref: its shape is {array.shape}; it must be ({n},), (samples, {n}) or a function of time"
+        f"{place}: its shape is {array.shape}; it must be ({n},), (samples, {n}) or a function of time"
     )
 
 
 def _of_signals(
     place: str, given: Mapping[str, Kind] | None, signals: list[Signal], kind: type[Kind]
 ) -> Mapping[str, Kind]:
-    names = [signal.name for signal in signals]
+    names = names_of(signals)
     one_each = by_name(place, {} if given is None else given, f"lpvmpc.{kind.__name__} by name")
     for name, one in one_each.items():
         if name not in names:

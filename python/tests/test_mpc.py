@@ -147,6 +147,22 @@ def test_bounds_of_a_step_may_be_given_by_name():
     assert plan(None, None).x[:, 0].max() > 0.11
 
 
+@pytest.mark.parametrize("absent", [None, [None], np.array([None]), [-np.inf], {"force": (None, 0.5)}])
+def test_none_is_no_bound(absent):
+    """A whole side of None, or of objects, was NaN."""
+    bounds = absent if isinstance(absent, dict) else (absent, [0.5])
+    mpc = lpvmpc.Mpc(double_integrator(), 0.1, 20, [1, 0.1], [0.01], u_bounds=bounds)
+    told = lpvmpc.Mpc(double_integrator(), 0.1, 20, [1, 0.1], [0.01])
+    plan = mpc.step([0, 0], [1, 0])
+    assert mpc.bounds["force"] == (-np.inf, 0.5)
+    assert (told.step([0, 0], [1, 0], u_bounds=bounds).u == plan.u).all()
+    assert plan.u.max() == pytest.approx(0.5) and plan.u.min() < -0.6
+    told.reset()
+    free = told.step([0, 0], [1, 0], u_bounds=([[None]] * 4, None))
+    told.reset()
+    assert (told.step([0, 0], [1, 0]).u == free.u).all() and free.u.max() > 0.6
+
+
 def test_a_step_s_bounds_by_name_leave_the_others_as_they_are():
     """They gave those of the plant, or none, to whatever was not named."""
     plant = lpvmpc.Plant.from_matrices(
@@ -330,6 +346,9 @@ def make(**changes):
         (lambda: make(terminal="lqg"), "terminal: it is \"lqg\""),
         (lambda: make(terminal=[1, 1]), "terminal"),
         (lambda: make(u_bounds=([1], [-1])), "force"),
+        (lambda: make(u_bounds=(np.nan, [1])), "u_bounds: force must lie from NaN to 1"),
+        (lambda: make().set(t_s=np.array([0.1, 0.1])), r"t_s: it is array\(\[0.1, 0.1\]\); it must be a number"),
+        (lambda: make().set(t_s=0.1), "t_s: it stays at 0.05; make another controller"),
         (lambda: make(u_bounds=3), r"u_bounds: it must be \(lower, upper\)"),
         (lambda: make(u_bounds={"torque": (0, 1)}), "there is no 'torque'; there are force"),
         (lambda: make(x_bounds=([0], [1])), r"x_bounds, lower: its shape is \(1,\)"),

@@ -227,7 +227,7 @@ def test_what_a_plant_says_of_itself():
 
 X, U = ca.SX.sym("x", 2), ca.SX.sym("u")
 F = ca.vertcat(X[1], U)
-A_X, A_U = sp.symbols("a_x a_u")
+A_X, A_U, M = sp.symbols("a_x a_u m")
 
 
 def pieces(*given):
@@ -256,6 +256,9 @@ def pieces(*given):
         (lambda: rod([np.nan, 1]), "parameters, mass: it is nan; it must be finite"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, bounds={"u": ("a", 1)}), "bounds, u, lower: it is 'a'"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, equilibrium=[0, 0, 0]), r"it must be \(x, u\)"),
+        (lambda: lpvmpc.Plant.from_matrices([[0]], [[1]], period=np.nan), "period: it is nan s; it must be a positive"),
+        (lambda: lpvmpc.Plant.from_matrices([[0]], [[1]], equilibrium=([np.nan], [0])), "equilibrium, x: x_0 is nan; it must"),
+        (lambda: lpvmpc.Plant.from_sympy([A_X], [A_U], [M * A_U], parameters={M: np.inf}), "parameters, m: it is inf"),
         (lambda: lpvmpc.Plant.from_matrices([[0]], [[1]], c=1), "c: it has . dimensions"),
         (lambda: cart_pole().with_parameters(cart_mass="a"), "parameters, cart_mass: it is 'a'"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, ca.vertcat(X[1], ca.fmod(U, 2))), "operation fmod"),

@@ -65,6 +65,20 @@ def test_a_controller_sees_its_reference_ahead():
     assert (named.x == run.x).all()
 
 
+def test_an_input_reference_is_followed_by_time():
+    """Every sample was told that of the first ones."""
+    rows = np.repeat([0.0, 0.2, -0.1], 12)[:, None]
+    mpc = lpvmpc.Mpc(double_integrator(), 0.1, 5, [1, 1], [1])
+    run, of_time, constant, single = (
+        lpvmpc.simulate(double_integrator(), mpc, [1, 0], 4.0, u_ref=given)
+        for given in (rows, lambda t: rows[min(round(t / 0.1), 35)], np.full((1, 1), 0.2), [0.2])
+    )
+    mpc.reset()
+    for i, x in enumerate(run.x[:-1]):
+        assert (mpc.step(x, u_ref=rows[min(i, 35):]).u0 == run.u[i]).all()
+    assert (of_time.x == run.x).all() and (constant.x == single.x).all()
+
+
 def test_noise_comes_from_its_seed():
     sensors = {"tilt": lpvmpc.Sensor(noise=0.02), "rate": lpvmpc.Sensor(bias=0.1)}
     runs = [
@@ -168,6 +182,7 @@ def diverging(t, x):
         (lambda s: s([0] * 4, np.inf), lpvmpc.SettingError, "duration"),
         (lambda s: s([0] * 4, 1.0, [0, 1]), lpvmpc.SettingError, "x_ref"),
         (lambda s: s([0] * 4, 1.0, lambda t: [t]), lpvmpc.SettingError, "x_ref at 0 s"),
+        (lambda s: s([0] * 4, 1.0, u_ref=np.zeros((9, 2))), lpvmpc.SettingError, r"u_ref: .* \(1,\), \(samples, 1\) or"),
         (lambda s: s([0] * 4, 1.0, t_s=0.1), lpvmpc.SettingError, "t_s"),
         (lambda s: s([0] * 4, 1.0, delay=-1.0), lpvmpc.SettingError, "delay"),
         (lambda s: s([0] * 4, 1.0, seed=-1), lpvmpc.SettingError, "seed"),
