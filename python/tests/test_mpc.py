@@ -219,6 +219,38 @@ def test_bounds_weights_and_disturbances_by_stage():
     assert np.abs(dear.u0) < np.abs(mpc.step([0, 0], [3, 0]).u0)
 
 
+@pytest.mark.parametrize("settings", [{}, {"terminal": "equality"}, {"r_du": [0.1]}])
+@pytest.mark.parametrize("u_ref", [{}, {"u_ref": [0.0]}])
+def test_what_is_beyond_the_horizon_is_not_read(settings, u_ref):
+    """The last row of a reference counted at the end of the horizon, however late it was."""
+    horizon = 20
+    x_ref = np.zeros((61, 2))
+    x_ref[horizon - 1 :, 0] = [0.1, 0.2] + [0.3] * 40
+
+    def plan(x_ref, **told):
+        mpc = lpvmpc.Mpc(double_integrator(), 0.1, horizon, [1, 0.1], [0.01], **settings)
+        return mpc.step([0, 0], x_ref, **told)
+
+    seen = plan(x_ref[: horizon + 1], **u_ref)
+    assert (plan(x_ref, **u_ref).u == seen.u).all()
+    if settings:
+        return
+    # One row less: its last one is the end's, too.
+    short = plan(x_ref[:horizon], **u_ref)
+    assert (plan(np.vstack([x_ref[:horizon], x_ref[horizon - 1]]), **u_ref).u == short.u).all()
+    assert abs(short.x[-1, 0] - seen.x[-1, 0]) > 0.01
+
+
+def test_bounds_and_inputs_beyond_the_horizon_are_not_read():
+    mpc = lpvmpc.Mpc(double_integrator(), 0.1, 20, [1, 0.1], [0.01], r_du=[0.1])
+    beyond = np.array([[0.0]] * 20 + [[5.0]] * 20)
+    narrow = np.array([[9.0, 9.0]] * 21 + [[1e-3, 1e-3]] * 20)
+    free = mpc.step([0, 0], [1, 0], u_ref=[0.0], x_bounds=(-narrow[:21], narrow[:21]))
+    mpc.reset()
+    told = mpc.step([0, 0], [1, 0], u_ref=beyond, x_bounds=(-narrow, narrow))
+    assert (told.u == free.u).all()
+
+
 def test_linear_costs_against_the_normal_equations():
     """The condensed problem of a linear plant without bounds, solved densely."""
     q, r, t_s, horizon = np.diag([1.0, 0.1]), 0.1, 0.1, 12

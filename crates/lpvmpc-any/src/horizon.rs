@@ -355,8 +355,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             (None, false) => given,
         };
         let first = lists.x_ref.first().copied();
-        let mut seen = lists.x_ref.iter().take(self.settings.horizon + 1);
-        let rests = seen.all(|x_ref| Some(*x_ref) == first);
+        let rests = lists.x_ref.iter().all(|x_ref| Some(*x_ref) == first);
         if let (Some((x, _)), true) = (&found, rests) {
             lists.x_ref = vec![*x];
         } else if lists.x_ref.is_empty() {

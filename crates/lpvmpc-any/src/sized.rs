@@ -194,7 +194,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             last.write(&mut x, &self.applied);
         }
         let models = self.models(preview, acting)?;
-        let mut lists = StageLists::new(&self.names, preview, models)?;
+        let mut lists = StageLists::new(&self.names, preview, models, self.settings.horizon)?;
         let mut tasks = self.tasks(preview)?;
         let target = self.aim(preview, &mut lists, tasks.as_mut());
         let u_first = tasks

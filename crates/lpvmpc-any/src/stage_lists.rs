@@ -23,14 +23,16 @@ pub(crate) struct StageLists<const NX: usize, const NU: usize, const NS: usize> 
 }
 
 impl<const NX: usize, const NU: usize, const NS: usize> StageLists<NX, NU, NS> {
-    /// The lists of `preview`, whose shapes are checked, with the `models` of its samples.
+    /// The lists of `preview`, whose shapes are checked, with the `models` of its samples. Of those that are looked at
+    /// as a whole, what is beyond the horizon is left out.
     pub fn new(
         names: &Names,
         preview: &Preview,
         models: Vec<Sampled<NX, NU, NS>>,
+        horizon: usize,
     ) -> Result<Self, MpcError> {
         let axes = (Axis::Inputs, Axis::States);
-        Ok(Self {
+        let mut lists = Self {
             x_ref: names.vectors(Axis::States, "x_ref", &preview.x_ref)?,
             u_ref: names.vectors(Axis::Inputs, "u_ref", &preview.u_ref)?,
             weights: by_stage("weights", &preview.weights, |place, (q, r)| {
@@ -50,7 +52,11 @@ impl<const NX: usize, const NU: usize, const NS: usize> StageLists<NX, NU, NS> {
             rows: by_stage("rows", &preview.rows, |place, rows| names.rows(place, rows))?,
             disturbance: names.vectors(Axis::States, "disturbance", &preview.disturbance)?,
             models,
-        })
+        };
+        lists.x_ref.truncate(horizon + 1);
+        lists.u_ref.truncate(horizon);
+        lists.x_bounds.truncate(horizon + 1);
+        Ok(lists)
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a step is told stage by stage.
 
 use crate::plants::{cart_pole, chain};
-use lpvmpc_any::{Limits, LinearModels, Mpc, MpcSettings, Preview, StateBounds, lqr};
+use lpvmpc_any::{Limits, LinearModels, Mpc, MpcSettings, Preview, StateBounds, Terminal, lqr};
 use nalgebra::{DMatrix, DVector};
 
 fn settings() -> MpcSettings {
@@ -167,4 +167,55 @@ fn the_largest_plant_is_held() {
     }
     let largest = x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     assert!(largest < 1e-2, "{largest}");
+}
+
+/// A set point, an input and a bound beyond the horizon were read as if they held at its end.
+#[test]
+fn what_is_beyond_the_horizon_is_not_read() {
+    let here = DVector::zeros(4);
+    let there = DVector::from_row_slice(&[1.0, 0.0, 0.0, 0.0]);
+    let (inside, outside) = (
+        DVector::from_row_slice(&[0.0]),
+        DVector::from_row_slice(&[3.0]),
+    );
+    let wide = Limits {
+        lower: vec![-1.0, -1.0, -5.0, -5.0],
+        upper: vec![1.0, 1.0, 5.0, 5.0],
+    };
+    let narrow = Limits {
+        lower: vec![-1e-3; 4],
+        upper: vec![1e-3; 4],
+    };
+    let lengthened = |entries: usize, rest: usize| Preview {
+        x_ref: [vec![here.clone(); entries], vec![there.clone(); rest]].concat(),
+        u_ref: [vec![inside.clone(); entries], vec![outside.clone(); rest]].concat(),
+        x_bounds: [vec![wide.clone(); entries], vec![narrow.clone(); rest]].concat(),
+        ..Preview::default()
+    };
+    let without_u_ref = |preview: Preview| Preview {
+        u_ref: Vec::new(),
+        ..preview
+    };
+    let changes = DMatrix::from_element(1, 1, 0.1);
+    for (terminal, r_du) in [
+        (Terminal::Lqr, None),
+        (Terminal::Equality, None),
+        (Terminal::Lqr, Some(changes)),
+    ] {
+        let settings = MpcSettings {
+            terminal,
+            r_du,
+            ..settings()
+        };
+        let plan = |told: &Preview| {
+            let mut mpc = Mpc::new(&cart_pole(), &settings).unwrap();
+            mpc.step(&[0.1, 0.05, 0.0, 0.0], told).unwrap()
+        };
+        let (cut, long) = (lengthened(31, 0), lengthened(31, 20));
+        assert_eq!(plan(&cut), plan(&long));
+        assert_eq!(plan(&without_u_ref(cut)), plan(&without_u_ref(long)));
+        // One entry less: the last of the states is then at the end, too.
+        let moves = plan(&lengthened(30, 1));
+        assert!((moves.x - plan(&lengthened(31, 0)).x).amax() > 1e-3);
+    }
 }
