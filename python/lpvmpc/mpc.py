@@ -253,7 +253,7 @@ class Mpc:
         disturbance
             What is added to f, in state units per second: (n,) or (stages, n).
         parameters
-            The plant's parameters in their order, (k,) or (stages, k).
+            The plant's parameters in their order, (k,) or (stages, k), checked as by `set_parameters`.
         y_ref
             The reference of the outputs, (k,) or (stages, k). Without `x_ref`, that is where the plant stands
             nearest to it.
@@ -276,7 +276,8 @@ class Mpc:
         Raises
         ------
         SettingError
-            An array has not the shape that it must have, or an entry that makes no sense.
+            An array has not the shape that it must have, or an entry that makes no sense; or with the `parameters` the
+            steps of the prediction are too long.
         """
         ahead = {
             "u_ref": u_ref, "q": q, "r": r, "cross": cross, "linear_x": linear_x, "linear_u": linear_u,

@@ -310,6 +310,24 @@ def test_parameters_change_while_it_runs():
         mpc.set_parameters(mass=1)
 
 
+def test_parameters_of_a_step_are_checked_as_others_are():
+    """A pole too fast for the steps of the prediction made a plan that was nonsense."""
+    x, u, rate = ca.SX.sym("x"), ca.SX.sym("u"), ca.SX.sym("rate")
+    plant = lpvmpc.Plant.from_casadi(x, u, u - rate * x, p=rate, parameters=[1.0])
+    mpc = lpvmpc.Mpc(plant, 0.1, 10, [1], [1])
+    coarse = "substeps: with 1 in 0.1 s .* at least 4 substeps are needed"
+    with pytest.raises(lpvmpc.SettingError, match=coarse):
+        mpc.set_parameters(rate=100.0)
+    for parameters in ([100.0], [[1.0]] * 9 + [[100.0]]):
+        for _ in range(2):
+            with pytest.raises(lpvmpc.SettingError, match=coarse):
+                mpc.step([1.0], parameters=parameters)
+        assert mpc.step([1.0], parameters=[[1.0]] * 10 + [[100.0]]).is_solved
+    assert mpc.step([1.0], parameters=[100.0], matrices=([[0.5]], [[0.1]])).is_solved
+    mpc.set(substeps=4)
+    assert mpc.step([1.0], parameters=[100.0]).is_solved
+
+
 def test_a_state_that_is_not_finite_gets_an_input_that_is():
     mpc = lpvmpc.Mpc(cart_pole(), T_S, N, Q, R)
     for bad in (np.nan, np.inf):

@@ -67,7 +67,7 @@ fn needs(given: bool, place: &str, setting: bool) -> Result<(), MpcError> {
 
 impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
     /// The plant with other parameters.
-    fn plant_with(&self, place: &str, values: &[f64]) -> Result<Plant, MpcError> {
+    pub fn plant_with(&self, place: &str, values: &[f64]) -> Result<Plant, MpcError> {
         let mut plant = self.plant.clone();
         let known: Vec<String> = plant
             .data()

@@ -63,7 +63,8 @@ impl Mpc {
     /// A state that is not finite is answered by a plan whose status says so.
     ///
     /// # Errors
-    /// A list of the preview that has not the plant's sizes, or has a number that makes no sense.
+    /// A list of the preview that has not the plant's sizes, or has a number that makes no sense; with its parameters the
+    /// prediction's steps are too long.
     pub fn step(&mut self, x: &[f64], preview: &Preview) -> Result<Plan, MpcError> {
         match &mut self.guarantee {
             Some(guarantee) => {

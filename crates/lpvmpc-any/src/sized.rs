@@ -9,7 +9,7 @@ use crate::model::Model;
 use crate::plan::{Plan, Target};
 use crate::preview::Preview;
 use crate::settings::{MpcSettings, StateBounds};
-use crate::stage_lists::StageLists;
+use crate::stage_lists::{StageLists, held};
 use lpvmpc::{
     Bounds, Controller, GeneralRow, List, Penalty, Reference, Rk4, SoftBounds, Workspace,
 };
@@ -75,6 +75,8 @@ pub(crate) struct Sized<const NX: usize, const NU: usize, const NS: usize> {
     pub last_input: Option<LastInput>,
     /// The input that was applied last.
     pub applied: SVector<f64, NU>,
+    /// The parameters by stage of which the last step was told, for which the prediction's steps are short enough.
+    sound: Vec<Vec<f64>>,
 }
 
 /// What is made of settings.
@@ -162,6 +164,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             room,
             last_input,
             applied: rest.1,
+            sound: Vec::new(),
         })
     }
 
@@ -183,6 +186,34 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         (prices != settings.soft_x).then_some(prices)
     }
 
+    /// Refuses parameters under which the prediction's steps are too long, as [`AnySize::set_plant`] does. Those that the
+    /// last step was told, at the same stage or one later, are known.
+    fn check_parameters(&mut self, preview: &Preview) -> Result<(), MpcError> {
+        if !(preview.matrices.is_empty() && preview.scheduling.is_empty()) {
+            // The prediction is not of the plant's formulas.
+            return Ok(());
+        }
+        let told = preview.parameters.iter().take(self.settings.horizon);
+        let mut before = None;
+        for (stage, values) in told.clone().enumerate() {
+            let known = [
+                held(&self.sound, stage),
+                held(&self.sound, stage + 1),
+                before,
+            ];
+            if !known.contains(&Some(values)) {
+                let plant = self.plant_with("parameters", values)?;
+                let model =
+                    Model::<NX, NU, NS>::new(&plant, self.settings.linear_models, self.rest)?;
+                check_prediction(&plant, &self.settings, &model, &self.rest)?;
+            }
+            before = Some(values);
+        }
+        self.sound.clear();
+        self.sound.extend(told.cloned());
+        Ok(())
+    }
+
     /// The plan from `x`, where more acts on the plant than its input.
     fn plan_from(
         &mut self,
@@ -194,6 +225,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             last.write(&mut x, &self.applied);
         }
         let models = self.models(preview, acting)?;
+        self.check_parameters(preview)?;
         let mut lists = StageLists::new(&self.names, preview, models, self.settings.horizon)?;
         let mut tasks = self.tasks(preview)?;
         let target = self.aim(preview, &mut lists, tasks.as_mut());
@@ -302,6 +334,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
         self.workspace = make_room(&mut controller, self.room);
         (self.controller, self.last_input) = (controller, last_input);
         (self.settings, self.bounds) = (settings.clone(), made.bounds);
+        self.sound.clear();
         Ok(())
     }
 

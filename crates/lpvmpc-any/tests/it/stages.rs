@@ -2,6 +2,7 @@
 
 use crate::plants::{cart_pole, chain};
 use lpvmpc_any::{Limits, LinearModels, Mpc, MpcSettings, Preview, StateBounds, Terminal, lqr};
+use lpvmpc_plant::Plant;
 use nalgebra::{DMatrix, DVector};
 
 fn settings() -> MpcSettings {
@@ -218,4 +219,58 @@ fn what_is_beyond_the_horizon_is_not_read() {
         let moves = plan(&lengthened(30, 1));
         assert!((moves.x - plan(&lengthened(31, 0)).x).amax() > 1e-3);
     }
+}
+
+/// x_dot = u - rate x.
+fn decay() -> Plant {
+    Plant::from_json(
+        r#"{
+        "schema": 1,
+        "name": "decay",
+        "states": [{"name": "x", "unit": ""}],
+        "inputs": [{"name": "u", "unit": ""}],
+        "parameters": [{"name": "rate", "unit": "1/s", "value": 1.0}],
+        "operations": [["state", 0], ["input", 0], ["parameter", 0], ["mul", 2, 0], ["sub", 1, 3]],
+        "derivative": [4]
+    }"#,
+    )
+    .unwrap()
+}
+
+/// They were taken as they came: a pole too fast for the steps of the prediction made a plan that is nonsense.
+#[test]
+fn parameters_that_are_told_are_checked_as_others_are() {
+    let fast = decay();
+    let settings = MpcSettings::new(0.1, 10, &[1.0], &[1.0]);
+    let mut mpc = Mpc::new(&fast, &settings).unwrap();
+    let expected = mpc.set_parameter("rate", 100.0).unwrap_err().to_string();
+    let told = |rates: &[f64]| Preview {
+        parameters: rates.iter().map(|rate| vec![*rate]).collect(),
+        ..Preview::default()
+    };
+    let mut message = |rates: &[f64]| {
+        let plan = mpc.step(&[1.0], &told(rates));
+        plan.map_or_else(|error| error.to_string(), |plan| plan.status)
+    };
+    assert_eq!(message(&[100.0]), expected);
+    assert_eq!(message(&[2.0]), "converged");
+    assert_eq!(message(&[100.0]), expected);
+    let mut by_stage = vec![1.0; 10];
+    by_stage[9] = 100.0;
+    assert_eq!(message(&by_stage), expected);
+    by_stage[9] = 2.0;
+    assert_eq!(message(&by_stage), "converged");
+    // Beyond the horizon.
+    by_stage.push(100.0);
+    assert_eq!(message(&by_stage), "converged");
+    assert_eq!(message(&by_stage[1..]), expected);
+    // With more steps it is right, and with fewer again wrong.
+    let finer = MpcSettings {
+        substeps: 8,
+        ..settings.clone()
+    };
+    mpc.set_settings(&finer).unwrap();
+    assert!(mpc.step(&[1.0], &told(&[100.0])).is_ok());
+    mpc.set_settings(&settings).unwrap();
+    assert!(mpc.step(&[1.0], &told(&[100.0])).is_err());
 }
