@@ -56,8 +56,9 @@ class Plant:
     def operations(self) -> int: ...
 
 _Plan = tuple[
-    _Array, _Array, str, str, bool, float, int, list[tuple[int, str, float, bool]], str, str | None
-]
+    _Array, _Array, str, str, bool, float, int, list[tuple[int, str, float, bool]], str, str | None,
+    _Array | None, _Array | None,
+]  # fmt: skip
 
 @final
 class Mpc:

@@ -67,8 +67,9 @@ class Mpc:
         price of ``"soft"``, a bound that could be kept is exceeded, too: `Plan.active_bounds` has "(exceeded)", and a
         dearer price, or ``"hard"``, keeps it.
     u_ref
-        The input that costs nothing, shape (m,). Without, the input that holds the plant at the end of
-        the reference.
+        The input that costs nothing, shape (m,). With one, references are tracked as they are. Without, it is the input
+        that holds the plant at the end of the reference, or where it can stand nearest to it; and there a constant
+        reference is, too: see `step`.
     rows
         Linear constraints that hold at every stage.
     q_y
@@ -233,10 +234,16 @@ class Mpc:
             The measured state, shape (n,). One that is not finite is answered by a plan whose
             status says so.
         x_ref
-            The reference, (n,) or (stages, n). Without: the plant's equilibrium, or zero. With a certificate it is all
-            that a step may be told.
+            The reference, (n,) or (stages, n). Without: the plant's equilibrium, or zero. One that is constant over the
+            horizon is a set point, unless there is a `u_ref`, here or in the settings: what is tracked is then the steady
+            state nearest to it (`Plan.x_target`), by the diagonal of Q and within the bounds. That is the reference itself
+            where the plant can stand there. One that changes over the horizon is tracked as it is. With a certificate
+            `x_ref` is all that a step may be told.
         u_ref
-            The input that costs nothing, (m,) or (stages, m). With one, `x_ref` is taken as it is.
+            The input that costs nothing, (m,) or (stages, m). With one, `x_ref` is tracked as it is, also where the plant
+            cannot stand: a cart with Q = diag(0, 1) for position and speed stands still at ``x_ref=[0, 1]``, since with
+            another speed it does not stand, and drives at 1 at ``x_ref=[0, 1], u_ref=[0]``. Without, here and in the
+            settings, the input that holds the steady state nearest to the end of `x_ref` costs nothing (`Plan.u_target`).
         q, r
             Other weights, both or neither: (n,), (n, n) or (stages, n, n), and so on.
         cross

@@ -59,6 +59,12 @@ class Plan:
     """With a certificate, what the first input is backed by: ``"new plan"``, ``"candidate"`` (the rest of the last
     plan), ``"terminal law"``; and where no plan is known that keeps the bounds and ends in the certified set,
     ``"soft bounds"`` or ``"saturated LQR"``."""
+    x_target: Array | None = None
+    """The steady state nearest to the end of the reference, shape (n,), which is tracked in place of a constant reference.
+    None where there is a `u_ref`, and where none was found: the reference is then tracked as it is. With a certificate it is
+    the one about which the plan ends in the set; None where nothing is guaranteed."""
+    u_target: Array | None = None
+    """The input that holds it, shape (m,), which costs nothing."""
 
     @property
     def is_guaranteed(self) -> bool:

@@ -255,7 +255,7 @@ def simulate(
         How long, s; a whole number of samples, rounded up.
     x_ref
         The reference: constant, by sample, or a function of time. An `Mpc` sees it ahead over its horizon, from when
-        its input acts.
+        its input acts; where it is constant, and there is no `u_ref`, it goes to the nearest steady state (`Mpc.step`).
     u_ref
         The input that costs nothing, for an `Mpc`, which sees it ahead as `x_ref`: constant, by sample, or a function of
         time.

@@ -3,7 +3,7 @@
 use crate::arrays::to_numpy;
 use lpvmpc::Status;
 use lpvmpc_any::Plan;
-use numpy::PyArray2;
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
 /// The word for a status in programs.
@@ -27,8 +27,8 @@ fn word(status: &Status<f64>) -> &'static str {
 /// Stage, bound in words, multiplier, whether it is exceeded.
 type Active = (usize, String, f64, bool);
 
-/// u, x, status, message, whether it is solved, cost, programs, active bounds and they in words, and what it is backed
-/// by.
+/// u, x, status, message, whether it is solved, cost, programs, active bounds and they in words, what it is backed by, and
+/// state and input of the steady state that it heads for.
 pub type PlanTuple<'py> = (
     Bound<'py, PyArray2<f64>>,
     Bound<'py, PyArray2<f64>>,
@@ -40,6 +40,8 @@ pub type PlanTuple<'py> = (
     Vec<Active>,
     String,
     Option<String>,
+    Option<Bound<'py, PyArray1<f64>>>,
+    Option<Bound<'py, PyArray1<f64>>>,
 );
 
 /// The fields of a plan.
@@ -47,6 +49,7 @@ pub fn fields<'py>(py: Python<'py>, plan: Plan) -> PlanTuple<'py> {
     let in_words = plan.active_bounds();
     let is_solved = plan.is_solved();
     let active = plan.active.into_iter();
+    let (x_target, u_target) = plan.target.map(|target| (target.x, target.u)).unzip();
     (
         to_numpy(py, &plan.u),
         to_numpy(py, &plan.x),
@@ -60,5 +63,7 @@ pub fn fields<'py>(py: Python<'py>, plan: Plan) -> PlanTuple<'py> {
             .collect(),
         in_words,
         plan.decision.map(|decision| decision.to_string()),
+        x_target.map(|x| PyArray1::from_vec(py, x)),
+        u_target.map(|u| PyArray1::from_vec(py, u)),
     )
 }

@@ -484,6 +484,26 @@ def test_a_plan_is_found_where_the_regulator_leads_to_nothing_finite():
     assert np.abs(plan.x[-1]).max() < 0.1
 
 
+def test_a_constant_reference_is_replaced_by_the_nearest_steady_state():
+    """A cruise control: told nothing of the input, it stands, since no plant stands at a speed."""
+    plant = lpvmpc.Plant.from_matrices(
+        [[0, 1], [0, 0]], [[0], [1]], states=["position", "speed"], inputs=["force"], bounds={"force": (-1, 1)}
+    )
+    mpc = lpvmpc.Mpc(plant, 0.1, 20, [0, 1], [0.01], terminal=[0, 1])
+    stands = mpc.step([0, 0], [0, 1])
+    assert abs(stands.u).max() < 1e-9
+    np.testing.assert_allclose(stands.x_target[1], 0, atol=1e-9)
+    np.testing.assert_allclose(stands.u_target, [0], atol=1e-9)
+    mpc.reset()
+    drives = mpc.step([0, 0], [0, 1], u_ref=[0])
+    assert drives.u0[0] == pytest.approx(1) and drives.x[-1, 1] == pytest.approx(1, abs=1e-3)
+    assert drives.x_target is None and drives.u_target is None
+    mpc = lpvmpc.Mpc(lpvmpc.Plant.from_matrices([[-0.5]], [[1]]), 0.1, 10, [1], [1])
+    np.testing.assert_allclose(mpc.step([0], [2]).u_target, [1])
+    np.testing.assert_allclose(mpc.step([0], [2]).x_target, [2])
+    assert pickle.loads(pickle.dumps(mpc.step([0], [2]))).x_target == pytest.approx([2])
+
+
 def test_changes_of_the_input_are_bounded_and_cost():
     mpc = lpvmpc.Mpc(double_integrator(), 0.1, 20, [1, 0.1], [0.01], du_bounds=([-0.3], [0.2]))
     mpc.set_last_input([0.5])
