@@ -56,6 +56,8 @@ impl Plant {
         ] {
             fits(name, list, count)?;
         }
+        does_not_vanish("q", &settings.q)?;
+        does_not_vanish("r", &settings.r)?;
         if settings.p.len() != states {
             let fault = format!("{} rows for {states} states", settings.p.len());
             return Err(PlantError::new("p", fault));
@@ -72,8 +74,8 @@ impl Plant {
             }
         }
         fits("t_s", &[settings.t_s], 1)?;
-        if settings.t_s <= 0.0 {
-            let fault = format!("{} s is no time between samples", settings.t_s);
+        if settings.t_s as f32 <= 0.0 {
+            let fault = format!("{:?} s is no time between samples", settings.t_s);
             return Err(PlantError::new("t_s", fault));
         }
         if let Some(period) = data.period
@@ -229,6 +231,22 @@ fn fits(place: &str, list: &[f64], count: usize) -> Result<(), PlantError> {
         Some(value) => Err(PlantError::new(
             place,
             format!("{value:?} is no finite number in f32"),
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Weights that are not zero in `f32` either, to all its digits.
+fn does_not_vanish(place: &str, weights: &[f64]) -> Result<(), PlantError> {
+    let vanishes = |weight: &&f64| **weight != 0.0 && weight.abs() < f64::from(f32::MIN_POSITIVE);
+    match weights.iter().find(vanishes) {
+        Some(weight) => Err(PlantError::new(
+            place,
+            format!(
+                "{weight:?} vanishes in f32, whose smallest number is {:e}; multiply all weights by a common factor, \
+                 which changes nothing",
+                f32::MIN_POSITIVE
+            ),
         )),
         None => Ok(()),
     }

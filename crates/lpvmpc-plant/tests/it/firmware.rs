@@ -132,8 +132,22 @@ fn settings_that_do_not_fit_are_refused() {
             "t_s: NaN is no finite number in f32",
         ),
         (
+            refused(|s| s.q[2] = 1e-48),
+            "q: 1e-48 vanishes in f32, whose smallest number is 1.1754944e-38; multiply all weights by a common factor, \
+             which changes nothing",
+        ),
+        (
+            refused(|s| s.r[0] = 1e-40),
+            "r: 1e-40 vanishes in f32, whose smallest number is 1.1754944e-38; multiply all weights by a common factor, \
+             which changes nothing",
+        ),
+        (
+            refused(|s| s.t_s = 1e-50),
+            "t_s: 1e-50 s is no time between samples",
+        ),
+        (
             refused(|s| s.t_s = 0.0),
-            "t_s: 0 s is no time between samples",
+            "t_s: 0.0 s is no time between samples",
         ),
         (
             refused(|s| s.horizon = 0),
