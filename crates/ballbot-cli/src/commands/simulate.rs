@@ -183,7 +183,7 @@ fn readings(logs: &[Vec<LogRow<4, 1>>]) -> String {
     });
     lines
         .filter(|(_, told)| !told.is_empty())
-        .map(|(plane, told)| format!("\nreadings{plane}: {told}"))
+        .map(|(plane, told)| format!("readings{plane}: {told}\n"))
         .collect()
 }
 

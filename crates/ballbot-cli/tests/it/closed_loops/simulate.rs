@@ -234,7 +234,7 @@ fn the_log_has_what_the_sensors_delivered_one_file_per_plane() {
         let duration = text.lines().find(|line| line.starts_with("duration_s"));
         text.replace(duration.unwrap(), "duration_s = 1.0") + world
     };
-    std::fs::write(folder.path().join("one.toml"), short("two-setpoints")).unwrap();
+    std::fs::write(folder.path().join("one.toml"), short("single-setpoint")).unwrap();
     std::fs::write(folder.path().join("two.toml"), short("lissajous")).unwrap();
     succeed(folder.path(), &["simulate", "one.toml", "--log", "one.csv"]);
     succeed(
@@ -294,9 +294,14 @@ fn nothing_of_an_earlier_run_stays_in_the_folder() {
 fn keys_are_set_on_the_command_line() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    let short = ["simulate", "two-setpoints", "--set", "duration_s=1.0"];
-    let more = ["--set", "controller.horizon = 10", "--set", "title=Mine"];
-    let said = succeed(here, &[&short[..], &more].concat());
+    let set = ["duration_s=1.0", "controller.horizon = 10", "title=Mine"];
+    let points = "reference.set_points.points=[{time_s=0.0,phi_rad=1.0}]";
+    let set = set
+        .into_iter()
+        .chain([points])
+        .flat_map(|set| ["--set", set]);
+    let command = ["simulate", "two-setpoints"].into_iter().chain(set);
+    let said = succeed(here, &command.collect::<Vec<_>>());
     assert_says(
         &said,
         &["Mine: 20 samples", "from 0 s to 1 s", "closed-loop cost"],
@@ -335,6 +340,21 @@ fn other_programs_get_json_and_scripts_silence() {
     assert_eq!(succeed(here, &[&["-q"], &short[..]].concat()), "");
     // What it prints is the result, and not a report of it.
     assert!(!succeed(here, &["--quiet", "scenario", "show", "lissajous"]).is_empty());
+}
+
+#[test]
+fn a_line_about_readings_ends_as_every_line_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples");
+    let file = examples.join("push-and-move.toml");
+    let short = ["--set", "duration_s=2.5"];
+    let said = succeed(
+        folder.path(),
+        &[&["simulate", file.to_str().unwrap()], &short[..]].concat(),
+    );
+    let last = said.lines().last().unwrap();
+    assert!(last.starts_with("readings: "), "{said}");
+    assert!(said.ends_with(&format!("{last}\n")), "{said}");
 }
 
 #[test]
