@@ -47,6 +47,10 @@ const KEPT: f64 = 1e-9;
 /// Runs an experiment and writes what happened.
 pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
     let experiment = Experiment::load(&arguments.experiment)?;
+    experiment
+        .too_late()
+        .iter()
+        .for_each(|told| output::warn(told));
     let usual = || PathBuf::from("out").join(&experiment.name);
     let out = arguments.out.clone().unwrap_or_else(usual);
     let folder = ResultFolder::open(PROGRAM, &out, &FILES)?;

@@ -58,6 +58,11 @@ pub enum Problem {
 }
 
 impl Prepared {
+    /// When the run ends, s.
+    pub fn end(&self) -> f64 {
+        self.samples as f64 * self.settings.t_s
+    }
+
     /// The settings of the guaranteed controller, where that runs.
     pub fn guaranteed(&self) -> Option<&GuaranteedSettings<f64>> {
         match &self.problem {
@@ -239,15 +244,15 @@ impl Scenario {
         (t_s, tolerances): (f64, Tolerances),
         files: &dyn Files,
     ) -> Result<Vec<Plane>, ScenarioError> {
+        let one_plane = references.len() == 1;
+        if let (true, Some(world)) = (one_plane, &self.world) {
+            world.check_one_plane()?;
+        }
         let first = self.initial_state.check("initial_state")?;
         let second = match self.initial_state_y {
             Some(_) if one_plane => {
                 return Err(ScenarioError::value(
                     "initial_state_y",
-        let one_plane = references.len() == 1;
-        if let (true, Some(world)) = (one_plane, &self.world) {
-            world.check_one_plane()?;
-        }
                     "(given)",
                     ONE_PLANE,
                 ));

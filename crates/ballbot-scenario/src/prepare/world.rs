@@ -283,6 +283,15 @@ impl PushTable {
         }
     }
 
+    /// When it begins: its key, and the time in s.
+    pub(crate) fn beginning(&self) -> (String, f64) {
+        let (name, time) = match *self {
+            Self::Rates { time_s, .. } | Self::Impulse { time_s, .. } => ("time_s", time_s),
+            Self::Force { from_s, .. } => ("from_s", from_s),
+        };
+        (format!("{}.{name}", self.kind()), time)
+    }
+
     fn check(&self, key: &dyn Fn(&str) -> String) -> Result<(), ScenarioError> {
         match *self {
             Self::Rates {

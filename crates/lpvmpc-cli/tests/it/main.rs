@@ -37,13 +37,14 @@ fn fail(folder: &Path, arguments: &[&str]) -> String {
     message
 }
 
-/// A folder with the example, shortened to 1 s.
+/// A folder with the example, shortened to 1 s and pushed within it.
 fn example() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let plant = succeed(folder.path(), &["example", "plant"]);
     fs::write(folder.path().join("cart-pole.json"), plant).unwrap();
     let text = succeed(folder.path(), &["example"]);
     let text = changed(&text, "duration = 6.0", "duration = 1.0");
+    let text = changed(&text, "time = 3.0", "time = 0.8");
     fs::write(folder.path().join("cart-pole.toml"), text).unwrap();
     folder
 }
@@ -266,6 +267,23 @@ fn a_plant_in_discrete_time_is_certified_and_proved_again() {
     .unwrap();
     let message = fail(folder.path(), &["certify", "map.toml"]);
     assert!(message.contains("period of 0.1 s"), "{message}");
+}
+
+/// They were dropped in silence.
+#[test]
+fn jumps_and_loads_after_the_end_are_told() {
+    let folder = example();
+    let text = fs::read_to_string(folder.path().join("cart-pole.toml")).unwrap();
+    let late = "[[world.jump]]\ntime = 3.0\nchange = [0, 0, 0, 0.1]\n[[world.load]]\nstart = 100.0\nend = 101.0\n\
+                load = [0, 0, 0.1, 0]\n";
+    fs::write(folder.path().join("late.toml"), text + late).unwrap();
+    let output = lpvmpc(folder.path(), &["simulate", "late.toml"]);
+    assert!(output.status.success());
+    assert_eq!(
+        String::from_utf8(output.stderr).unwrap(),
+        "note: world.jump 2.time = 3: the run ends at 1 s and does not come to it\n\
+         note: world.load 1.start = 100: the run ends at 1 s and does not come to it\n"
+    );
 }
 
 /// An input that is switched off has one bound on both sides, which once could not be drawn.

@@ -357,6 +357,37 @@ fn a_line_about_readings_ends_as_every_line_does() {
     assert!(said.ends_with(&format!("{last}\n")), "{said}");
 }
 
+/// They were dropped in silence.
+#[test]
+fn what_comes_after_the_end_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = |sets: &[&str]| {
+        let sets = sets.iter().flat_map(|set| ["--set", set]);
+        let arguments: Vec<&str> = ["simulate", "one-metre"].into_iter().chain(sets).collect();
+        let output = crate::ballbot_in(folder.path(), &arguments);
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let points = |time: &str| {
+        format!(
+            "reference.set_points.points=[{{time_s=0.0,phi_rad=0.0}},{{time_s={time},phi_rad=1.0}}]"
+        )
+    };
+    let push = "world.pushes=[{rates={time_s=0.5}}, {impulse={time_s=1.5,momentum_m_s=0.1,height_m=0.3}}, \
+                {force={from_s=9.0,until_s=inf,force_m_s2=0.1,height_m=0.3}}]";
+    assert_eq!(
+        told(&["duration_s=1.5", &points("1.6"), push]),
+        "note: world.pushes[1].impulse.time_s = 1.5: the run ends at 1.5 s and does not come to it\n\
+         note: world.pushes[2].force.from_s = 9: the run ends at 1.5 s and does not come to it\n"
+    );
+    // A set point that a plan looks at is not in vain.
+    assert_eq!(told(&["duration_s=1.5", &points("1.6")]), "");
+    assert_eq!(
+        told(&["duration_s=1.5", &points("30.0")]),
+        "note: reference.set_points.points[1].time_s = 30: the run ends at 1.5 s and does not come to it\n"
+    );
+}
+
 #[test]
 fn a_log_goes_to_standard_output_alone() {
     let folder = tempfile::tempdir().unwrap();
