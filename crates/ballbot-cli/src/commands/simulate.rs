@@ -374,6 +374,24 @@ fn figures(
     }
 }
 
+/// Where a plane's shaped reference was still on its way, a line each: the robot follows it, and is not there.
+fn unreached(prepared: &Prepared, metrics: &[Metrics]) -> String {
+    let planes = match metrics.len() {
+        1 => ["", ""],
+        _ => [" of the x plane", " of the y plane"],
+    };
+    let lines = planes.iter().zip(metrics).filter_map(|(plane, metrics)| {
+        let set_point = metrics.unreached_set_point_rad?;
+        Some(format!(
+            "the set point{plane} of {set_point:.4} rad is not reached by the end of the run: the shaped reference ends at \
+             {:.4} rad; lengthen duration_s ({} s), or allow more in [controller.shaping]\n",
+            metrics.final_reference_rad,
+            recorded::time(prepared.end())
+        ))
+    });
+    lines.collect()
+}
+
 fn summary(prepared: &Prepared, metrics: &[Metrics], folder: &Path) -> String {
     let planes: &[&str] = if metrics.len() == 1 {
         &["value"]
@@ -391,11 +409,12 @@ fn summary(prepared: &Prepared, metrics: &[Metrics], folder: &Path) -> String {
     });
     format!(
         "{}: {} samples of {} s; costs, rms and largest values from 0 s to {} s\n\
-         {table}{certificate}written to {}\n",
+         {table}{}{certificate}written to {}\n",
         prepared.title,
         prepared.samples,
         prepared.settings.t_s,
         recorded::time(prepared.end()),
+        unreached(prepared, metrics),
         folder.display()
     )
 }

@@ -388,6 +388,43 @@ fn what_comes_after_the_end_is_told() {
     );
 }
 
+/// It looked like a set point that was followed well.
+#[test]
+fn a_shaped_move_that_does_not_arrive_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let slow = [
+        "simulate",
+        "one-metre",
+        "--set",
+        "controller.shaping.tilt_rad=0.001",
+    ];
+    let said = succeed(folder.path(), &slow);
+    assert_says(
+        &said,
+        &[
+            "the set point of 8.3333 rad is not reached by the end of the run",
+            "[controller.shaping]",
+        ],
+    );
+    let document: Value =
+        serde_json::from_str(&succeed(folder.path(), &[&slow[..], &["--json"]].concat())).unwrap();
+    let plane = &document["planes"][0];
+    let (goal, end) = (
+        &plane["unreached_set_point_rad"],
+        &plane["final_reference_rad"],
+    );
+    assert!((goal.as_f64().unwrap() - 25.0 / 3.0).abs() < 1e-9, "{goal}");
+    let file = folder.path().join("out/one-metre/trajectory.csv");
+    let (_, last) = recorded::trajectory(&file);
+    assert!((end.as_f64().unwrap() - last.reference).abs() < 1e-9 && last.reference < 8.0);
+    assert!(
+        said.contains(&format!("ends at {:.4} rad", end.as_f64().unwrap())),
+        "{said}"
+    );
+    let said = succeed(folder.path(), &["simulate", "one-metre"]);
+    assert!(!said.contains("not reached"), "{said}");
+}
+
 #[test]
 fn a_log_goes_to_standard_output_alone() {
     let folder = tempfile::tempdir().unwrap();
