@@ -286,6 +286,41 @@ fn jumps_and_loads_after_the_end_are_told() {
     );
 }
 
+/// What is called a cost is that of states alone, as its name says; the reference's weights are in the file.
+#[test]
+fn the_cost_of_states_is_without_the_inputs() {
+    let folder = example();
+    let said = succeed(folder.path(), &["simulate", "cart-pole.toml"]);
+    let out = folder.path().join("out/cart-pole");
+    let summary = fs::read_to_string(out.join("summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    assert!(
+        said.contains("cost of states") && said.contains("without the inputs"),
+        "{said}"
+    );
+    let table = fs::read_to_string(out.join("trajectory.csv")).unwrap();
+    let rows = table.lines().skip(1).take(25).map(|line| {
+        let cells = line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN));
+        cells.collect::<Vec<f64>>()
+    });
+    let header: Vec<&str> = table.lines().next().unwrap().split(',').collect();
+    let reference = header
+        .iter()
+        .position(|name| name.contains(" reference"))
+        .unwrap();
+    let cost: f64 = rows
+        .map(|row| {
+            let errors = (0..4).map(|i| row[1 + i] - row[reference + i]);
+            errors
+                .zip([10.0, 10.0, 0.1, 0.1])
+                .map(|(e, q)| q * e * e)
+                .sum::<f64>()
+        })
+        .sum();
+    let found = summary["state_cost"].as_f64().unwrap();
+    assert!((found - cost).abs() < 1e-9 * cost, "{found} for {cost}");
+}
+
 /// An input that is switched off has one bound on both sides, which once could not be drawn.
 #[test]
 fn an_input_that_is_switched_off_is_drawn() {
