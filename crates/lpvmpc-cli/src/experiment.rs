@@ -504,6 +504,11 @@ pub fn names(signals: &[Signal]) -> Vec<&str> {
 
 /// One finite number for each signal.
 pub fn components(place: &str, list: &[f64], signals: &[Signal]) -> Result<(), String> {
+    if signals.is_empty() && !list.is_empty() {
+        return Err(format!(
+            "{place}: the plant has nothing that it could be for; it must be []"
+        ));
+    }
     if list.len() != signals.len() {
         return Err(format!(
             "{place}: {} numbers; it needs {}, for {}",

@@ -100,6 +100,17 @@ impl Plausible {
             true => (self.most, "more"),
             false => (self.least, "less"),
         };
+    /// The same of what is never negative: a value below zero is for other checks, as a NaN is.
+    ///
+    /// # Errors
+    /// As [`check`](Self::check).
+    pub fn check_size(&self, key: &str, value: f64) -> Result<(), ScenarioError> {
+        match value < 0.0 {
+            true => Ok(()),
+            false => self.check(key, value),
+        }
+    }
+
         let meant = self.mistaken.map(|(name, factor)| (name, value * factor));
         let question = match meant {
             Some((name, right)) if self.holds(right) => format!(
@@ -220,8 +231,8 @@ impl ReferenceTable {
 
 impl ControllerTable {
     fn check_plausible(&self) -> Result<(), ScenarioError> {
-        SAMPLING.check("controller.t_s", self.t_s)?;
-        DELAY.check("controller.delay_s", self.delay_s)?;
+        SAMPLING.check_size("controller.t_s", self.t_s)?;
+        DELAY.check_size("controller.delay_s", self.delay_s)?;
         if let Some(EstimatorTable {
             phi_noise_rad,
             theta_noise_rad,
@@ -229,21 +240,21 @@ impl ControllerTable {
             ..
         }) = self.estimator
         {
-            ANGLE_ERROR.check("controller.estimator.phi_noise_rad", phi_noise_rad)?;
-            ANGLE_ERROR.check("controller.estimator.theta_noise_rad", theta_noise_rad)?;
+            ANGLE_ERROR.check_size("controller.estimator.phi_noise_rad", phi_noise_rad)?;
+            ANGLE_ERROR.check_size("controller.estimator.theta_noise_rad", theta_noise_rad)?;
             let key = "controller.estimator.theta_dot_noise_rad_s";
-            TILT_RATE.check(key, theta_dot_noise_rad_s)?;
+            TILT_RATE.check_size(key, theta_dot_noise_rad_s)?;
         }
         if let Some(ShapingTable { phi_dot_rad_s, .. }) = self.shaping {
-            BALL_RATE.check("controller.shaping.phi_dot_rad_s", phi_dot_rad_s)?;
+            BALL_RATE.check_size("controller.shaping.phi_dot_rad_s", phi_dot_rad_s)?;
         }
         if let Some(MotorsTable {
             limit_nm,
             yaw_reserve_nm,
         }) = self.motors
         {
-            TORQUE.check("controller.motors.limit_nm", limit_nm)?;
-            TORQUE.check("controller.motors.yaw_reserve_nm", yaw_reserve_nm)?;
+            TORQUE.check_size("controller.motors.limit_nm", limit_nm)?;
+            TORQUE.check_size("controller.motors.yaw_reserve_nm", yaw_reserve_nm)?;
         }
         Ok(())
     }
@@ -283,36 +294,36 @@ impl WorldTable {
             ..
         } = self;
         if let Some(period) = self.sensor_period_s {
-            SAMPLING.check("world.sensor_period_s", period)?;
+            SAMPLING.check_size("world.sensor_period_s", period)?;
         }
         for (name, angle) in [("phi", &sensors.phi), ("theta", &sensors.theta)] {
             let key = |quantity: &str| format!("world.sensors.{name}.{quantity}");
-            ANGLE_ERROR.check(&key("noise_rad"), angle.noise_rad)?;
+            ANGLE_ERROR.check_size(&key("noise_rad"), angle.noise_rad)?;
             ANGLE_ERROR.check(&key("bias_rad"), angle.bias_rad)?;
-            ANGLE_ERROR.check(&key("resolution_rad"), angle.resolution_rad)?;
-            DELAY.check(&key("delay_s"), angle.delay_s)?;
+            ANGLE_ERROR.check_size(&key("resolution_rad"), angle.resolution_rad)?;
+            DELAY.check_size(&key("delay_s"), angle.delay_s)?;
         }
         for (name, rate) in [
             ("phi_dot", &sensors.phi_dot),
             ("theta_dot", &sensors.theta_dot),
         ] {
             let key = |quantity: &str| format!("world.sensors.{name}.{quantity}");
-            TILT_RATE.check(&key("noise_rad_s"), rate.noise_rad_s)?;
+            TILT_RATE.check_size(&key("noise_rad_s"), rate.noise_rad_s)?;
             TILT_RATE.check(&key("bias_rad_s"), rate.bias_rad_s)?;
-            TILT_RATE.check(&key("resolution_rad_s"), rate.resolution_rad_s)?;
-            DELAY.check(&key("delay_s"), rate.delay_s)?;
+            TILT_RATE.check_size(&key("resolution_rad_s"), rate.resolution_rad_s)?;
+            DELAY.check_size(&key("delay_s"), rate.delay_s)?;
         }
         for (name, torque) in [
             ("limit_nm", actuator.limit_nm),
             ("dead_zone_nm", actuator.dead_zone_nm),
             ("coulomb_friction_nm", actuator.coulomb_friction_nm),
-            ("bias_nm", actuator.bias_nm),
         ] {
-            TORQUE.check(&format!("world.actuator.{name}"), torque)?;
+            TORQUE.check_size(&format!("world.actuator.{name}"), torque)?;
         }
-        DELAY.check("world.actuator.lag_s", actuator.lag_s)?;
-        DELAY.check("world.delay.computation_s", delay.computation_s)?;
-        DELAY.check("world.delay.transport_s", delay.transport_s)?;
+        TORQUE.check("world.actuator.bias_nm", actuator.bias_nm)?;
+        DELAY.check_size("world.actuator.lag_s", actuator.lag_s)?;
+        DELAY.check_size("world.delay.computation_s", delay.computation_s)?;
+        DELAY.check_size("world.delay.transport_s", delay.transport_s)?;
         for (i, push) in self.pushes.iter().enumerate() {
             push.check_plausible(&|name| format!("world.pushes[{i}].{name}"))?;
         }

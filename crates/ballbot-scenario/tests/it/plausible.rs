@@ -89,6 +89,75 @@ fn other_units_are_asked_about() {
     }
 }
 
+/// No setting makes a negative deviation or time right, however large it is.
+#[test]
+fn a_size_below_zero_is_not_called_unusual() {
+    for (lines, key) in [
+        (
+            "[world.sensors.phi]\nnoise_rad = -1.0",
+            "world.sensors.phi.noise_rad = -1",
+        ),
+        (
+            "[world.sensors.theta_dot]\nresolution_rad_s = -1e3",
+            "world.sensors.theta_dot.resolution_rad_s = -1000",
+        ),
+        (
+            "[world.sensors.phi]\ndelay_s = -10.0",
+            "world.sensors.phi.delay_s = -10",
+        ),
+        (
+            "[world]\nsensor_period_s = -10.0",
+            "world.sensor_period_s = -10",
+        ),
+        (
+            "[world.actuator]\nlimit_nm = -1e3",
+            "world.actuator.limit_nm = -1000",
+        ),
+        (
+            "[world.actuator]\ndead_zone_nm = -1e3",
+            "world.actuator.dead_zone_nm = -1000",
+        ),
+        (
+            "[world.actuator]\ncoulomb_friction_nm = -1e3",
+            "world.actuator.coulomb_friction_nm = -1000",
+        ),
+        (
+            "[world.actuator]\nlag_s = -10.0",
+            "world.actuator.lag_s = -10",
+        ),
+        (
+            "[world.delay]\ntransport_s = -10.0",
+            "world.delay.transport_s = -10",
+        ),
+        (
+            "[world.delay]\ncomputation_s = -10.0",
+            "world.delay.computation_s = -10",
+        ),
+        (
+            "[controller.estimator]\nphi_noise_rad = -1.0",
+            "controller.estimator.phi_noise_rad = -1",
+        ),
+        (
+            "[controller.estimator]\ntheta_dot_noise_rad_s = -1e3",
+            "controller.estimator.theta_dot_noise_rad_s = -1000",
+        ),
+        (
+            "[controller.shaping]\ntilt_rad = 0.1\nphi_dot_rad_s = -1e3",
+            "controller.shaping.phi_dot_rad_s = -1000",
+        ),
+    ] {
+        let said = refused(&scenario(&[], lines));
+        assert!(said.contains(key) && !said.contains("unusual"), "{said}");
+    }
+    for (from, to) in [
+        ("t_s = 0.05", "t_s = -50.0"),
+        ("r = 1000.0", "r = 1000.0\ndelay_s = -10.0"),
+    ] {
+        let said = refused(&scenario(&[(from, to)], ""));
+        assert!(!said.contains("unusual"), "{said}");
+    }
+}
+
 #[test]
 fn places_in_other_units_are_asked_about() {
     let jump = "{ time_s = 1.0, phi_rad = 6.283185307179586 }";

@@ -125,6 +125,11 @@ fn mistakes_are_named() {
             ["held_out.confidence = 95.0", "0.95"],
         ),
         (
+            "runs = 6",
+            "runs = 0",
+            ["held_out.runs = 0", "it must be from 1"],
+        ),
+        (
             "evaluations = 60",
             "evaluations = 35",
             ["search.evaluations = 35", "from 36, for the start"],

@@ -321,6 +321,20 @@ fn the_cost_of_states_is_without_the_inputs() {
     assert!((found - cost).abs() < 1e-9 * cost, "{found} for {cost}");
 }
 
+#[test]
+fn weights_of_inputs_that_a_plant_has_none_of_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let plant = r#"{"schema": 1, "name": "drift", "states": [{"name": "place", "unit": "m"}],
+        "operations": [["state", 0], ["neg", 0]], "derivative": [1]}"#;
+    fs::write(folder.path().join("drift.json"), plant).unwrap();
+    let experiment = "name = \"drift\"\nplant = \"drift.json\"\nx0 = [1.0]\nduration = 1.0\n[controller]\n\
+                      t_s = 0.1\nhorizon = 5\nq = [1.0]\nr = [0.01]\n";
+    fs::write(folder.path().join("drift.toml"), experiment).unwrap();
+    let message = fail(folder.path(), &["simulate", "drift.toml"]);
+    let expected = "controller.r: the plant has nothing that it could be for; it must be []";
+    assert!(message.contains(expected), "{message}");
+}
+
 /// An input that is switched off has one bound on both sides, which once could not be drawn.
 #[test]
 fn an_input_that_is_switched_off_is_drawn() {
