@@ -105,6 +105,11 @@ fn mistakes_are_named() {
             ["closed_loop_cost", "own weights"],
         ),
         (
+            "measure = \"rms_torque_nm\"\nstatistic = \"worst\"",
+            "measure = \"rms_error_rad\"\nstatistic = \"mean\"\nat_most = 0.1",
+            ["goal[1] = ", "goal[0] is the same; leave one of them out"],
+        ),
+        (
             "statistic = \"worst\"",
             "statistic = { quantile = 1.5 }",
             ["goal[1].statistic.quantile = 1.5", "below 1"],
@@ -120,14 +125,14 @@ fn mistakes_are_named() {
             ["held_out.seed = 1", "differ"],
         ),
         (
-            "[held_out]",
-            "[held_out]\nconfidence = 95",
-            ["held_out.confidence = 95.0", "0.95"],
-        ),
-        (
             "runs = 6",
             "runs = 0",
             ["held_out.runs = 0", "it must be from 1"],
+        ),
+        (
+            "[held_out]",
+            "[held_out]\nconfidence = 95",
+            ["held_out.confidence = 95.0", "0.95"],
         ),
         (
             "evaluations = 60",

@@ -83,6 +83,7 @@ fn a_bound_beyond_the_numbers_of_f32_is_none() {
         error.to_string()
     };
     (data.inputs[0].lower, data.inputs[0].upper) = (Some(1e39), None);
+    data.equilibrium = None;
     assert_eq!(
         refused(data.clone()),
         "inputs[0] (force): no number of f32 is from 1e39 to inf, its bounds"
