@@ -89,6 +89,39 @@ fn other_units_are_asked_about() {
     }
 }
 
+/// The limits of b1, b2 and b4 grow with the robot: b1 of a thousand times an ordinary one was taken.
+#[test]
+fn inertias_and_frictions_that_no_ball_of_this_size_has_are_asked_about() {
+    for (from, to, words) in [
+        (
+            "b1_m2 = 0.002483",
+            "b1_m2 = 29.4",
+            ["parameters.b1_m2 = 29.4", "more than 1.44 m^2"],
+        ),
+        (
+            "b2_m2 = 0.059325",
+            "b2_m2 = 59325.0",
+            ["parameters.b2_m2 = 59325", "59325 mm^2 are 0.05932 m^2"],
+        ),
+        (
+            "b4_m2_s = -0.07436",
+            "b4_m2_s = -10.0",
+            ["parameters.b4_m2_s = -10", "more than 1.177 m^2/s"],
+        ),
+    ] {
+        let mut changed = scenario(&[(from, to)], "");
+        let said = refused(&changed);
+        for word in words {
+            assert!(said.contains(word), "no `{word}` in: {said}");
+        }
+        assert!(said.contains("accept_unusual_values = true"), "{said}");
+        changed.accept_unusual_values = true;
+        if let Err(error) = changed.prepare(Path::new(".")) {
+            assert!(!error.to_string().contains("unusual"), "{error}");
+        }
+    }
+}
+
 /// No setting makes a negative deviation or time right, however large it is.
 #[test]
 fn a_size_below_zero_is_not_called_unusual() {
