@@ -321,14 +321,13 @@ pub(crate) fn rounding(
         ),
         Some(step) => {
             let (from, to) = distribution.steps(step);
-            match from <= to {
-                true => Ok(Some(step)),
-                false => refused(
-                    place,
-                    "round_to",
-                    format!("{step:?}"),
-                    "no multiple of it is in the range",
+            let refused = |why| refused(place, "round_to", format!("{step:?}"), why);
+            match to - from {
+                1.0.. => Ok(Some(step)),
+                0.0 => refused(
+                    "a single multiple of it is in the range, so nothing varies; it must be smaller",
                 ),
+                _ => refused("no multiple of it is in the range"),
             }
         }
         None => Ok(None),
@@ -364,6 +363,24 @@ mod tests {
                 "{message}"
             );
         }
+    }
+
+    /// A campaign drew zero a thousand times, and nothing was said.
+    #[test]
+    fn a_rounding_that_leaves_one_value_is_refused() {
+        let distribution = of("uniform = [0.0, 0.05]").unwrap();
+        let error = rounding("vary[0]", Some(5.0), &distribution).unwrap_err();
+        let message = error.to_string();
+        assert!(
+            message.starts_with("vary[0].round_to = 5.0: a single multiple of it is in the range"),
+            "{message}"
+        );
+        assert_eq!(
+            rounding("vary[0]", Some(0.05), &distribution).unwrap(),
+            Some(0.05)
+        );
+        let normal = of("normal = { mean = 2.0, deviation = 3.0 }").unwrap();
+        assert_eq!(rounding("vary[0]", Some(5.0), &normal).unwrap(), Some(5.0));
     }
 
     fn numbers(text: &str) -> Vec<f64> {

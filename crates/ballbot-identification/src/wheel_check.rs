@@ -139,12 +139,24 @@ pub struct WheelCheck {
     pub off_deg: f64,
     /// What the encoders should show in each push, of a ball that turns by one rad.
     pub expected: Vec<[f64; 3]>,
+    /// Encoders, of the configuration's, that hardly move in any push, though one is to move them.
+    pub still: Vec<usize>,
     /// What would agree, with the least changes; empty if the configuration does, or nothing would.
     pub instead: Vec<Arrangement>,
 }
 
 /// A push by hand goes astray by so much at most, degrees.
 const ASTRAY_DEG: f64 = 15.0;
+
+/// An encoder that turns by less than this share of the one that turns most shows noise. A wheel on whose axle the ball
+/// rolls turns by more: no hand pushes to half a degree.
+const STILL: f64 = 0.01;
+
+/// Whether the encoder of a wheel hardly moves where the largest of the three angles is much larger.
+fn is_still(angles: &[f64; 3], wheel: usize) -> bool {
+    let largest = angles.iter().fold(0.0_f64, |most, a| most.max(a.abs()));
+    angles[wheel].abs() < STILL * largest
+}
 
 impl WheelCheck {
     /// Compares what a configuration says with what its encoders show: pushes, and how far the
@@ -166,12 +178,18 @@ impl WheelCheck {
         let fewest = instead.iter().map(Arrangement::changes).min();
         instead.retain(|arrangement| Some(arrangement.changes()) == fewest);
         let angles = said.wheels()?.motor_angles(1.0);
-        let expected = seen.iter().map(|(push, _)| angles.column(*push as usize));
+        let columns = seen.iter().map(|(push, _)| angles.column(*push as usize));
+        let expected: Vec<[f64; 3]> = columns
+            .map(|column| [column[0], column[1], column[2]])
+            .collect();
+        let is_dead = |wheel: &usize| {
+            seen.iter().all(|(_, angles)| is_still(angles, *wheel))
+                && expected.iter().any(|angles| !is_still(angles, *wheel))
+        };
         Ok(Self {
             off_deg: fit.clamp(-1.0, 1.0).acos().to_degrees(),
-            expected: expected
-                .map(|column| [column[0], column[1], column[2]])
-                .collect(),
+            still: (0..3).filter(is_dead).collect(),
+            expected,
             instead,
         })
     }

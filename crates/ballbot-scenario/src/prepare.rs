@@ -7,6 +7,7 @@ pub(crate) mod files;
 pub(crate) mod guarantee;
 pub(crate) mod heading;
 pub(crate) mod known_robot;
+mod late;
 pub(crate) mod parameters;
 pub mod plausible;
 pub(crate) mod prepared;

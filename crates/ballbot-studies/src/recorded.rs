@@ -65,6 +65,10 @@ pub struct Metrics {
     pub rms_error_rad: f64,
     /// Largest |phi - phi_ref|, rad.
     pub largest_error_rad: f64,
+    /// phi_ref at the end of the run, rad.
+    pub final_reference_rad: f64,
+    /// The set point that a shaped reference was on its way to at the end of the run, rad; none where it had arrived.
+    pub unreached_set_point_rad: Option<f64>,
     /// Samples at which the plant's state was outside its bounds.
     pub violations: usize,
     /// Samples whose torque was not backed by a guarantee, where the loop has one.
@@ -122,6 +126,8 @@ impl Metrics {
             largest_torque_nm: torques.fold(0.0, f64::max),
             rms_error_rad: (squares / errors.len() as f64).sqrt(),
             largest_error_rad: errors.iter().fold(0.0, |most, error| most.max(error.abs())),
+            final_reference_rad: plane.reference.at(prepared.end()),
+            unreached_set_point_rad: plane.reference.on_its_way_to(prepared.end()),
             violations: outside.count(),
             not_guaranteed: prepared.guaranteed().map(|_| {
                 let guarantees = samples.iter().filter_map(|sample| sample.guarantee);

@@ -91,4 +91,16 @@ impl TuningError {
             expected: expected.into(),
         }
     }
+
+    /// What a campaign says of its keys, which stand in a table of the tuning.
+    pub(crate) fn within(table: &str, error: CampaignError) -> Self {
+        match error {
+            CampaignError::Value {
+                key,
+                value,
+                expected,
+            } => Self::value(format!("{table}.{key}"), value, expected),
+            other => other.into(),
+        }
+    }
 }

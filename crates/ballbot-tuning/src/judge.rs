@@ -1,7 +1,7 @@
 //! What a candidate is worth: its goals and limits over the worlds, and one number for the search.
 
 use crate::error::TuningError;
-use crate::file::{Statistic, TuningFile};
+use crate::file::{GoalTable, Statistic, TuningFile};
 use ballbot_campaign::{Cell, Column, Ending, Measure, Row};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -145,6 +145,17 @@ impl Judge {
                 goal.at_most,
             )?;
             check_measure(&format!("goal[{i}]"), &quantity, file)?;
+            let is_same = |other: &GoalTable| {
+                (other.measure, other.statistic) == (goal.measure, goal.statistic)
+            };
+            if let Some(first) = file.goal[..i].iter().position(is_same) {
+                let expected = format!("goal[{first}] is the same; leave one of them out");
+                return Err(TuningError::value(
+                    format!("goal[{i}]"),
+                    quantity.to_string(),
+                    expected,
+                ));
+            }
             judge.goals.push(quantity);
         }
         for (i, limit) in file.limit.iter().enumerate() {

@@ -101,16 +101,18 @@ impl<'a, F: Files + Copy + Sync> Tuning<'a, F> {
             ));
         }
         let changed = changes(&axes, &start);
-        let worlds = Campaign::new(&source.worlds, files, program)?.with(changed.clone());
-        let held_out = Campaign::new(&source.held_out, files, program)?.with(changed);
-        if worlds.runs() > MOST_RUNS || held_out.runs() > MOST_RUNS {
-            let expected = format!("at most {MOST_RUNS} are possible for a candidate");
-            return Err(TuningError::value(
-                "worlds.runs",
-                worlds.runs().to_string(),
-                expected,
-            ));
-        }
+        let campaign = |source, table: &str| {
+            let campaign = Campaign::new(source, files, program);
+            let campaign = campaign.map_err(|error| TuningError::within(table, error))?;
+            if campaign.runs() > MOST_RUNS {
+                let expected = format!("at most {MOST_RUNS} are possible for a candidate");
+                let (key, runs) = (format!("{table}.runs"), campaign.runs().to_string());
+                return Err(TuningError::value(key, runs, expected));
+            }
+            Ok(campaign.with(changed.clone()))
+        };
+        let worlds = campaign(&source.worlds, "worlds")?;
+        let held_out = campaign(&source.held_out, "held_out")?;
         let duration = worlds.scenario(&worlds.draw(0))?;
         let duration = duration.samples as f64 * duration.settings.t_s;
         let judge = Judge::new(file, duration)?;

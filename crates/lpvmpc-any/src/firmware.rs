@@ -138,6 +138,8 @@ fn bounded(plant: &Plant, settings: &MpcSettings) -> Result<Plant, PlantError> {
     );
     set(&mut data.states, &x);
     set(&mut data.inputs, &u);
+    // A program has no use for it, and these bounds need not contain it.
+    data.equilibrium = None;
     let mut plant_with = Plant::new(data)?;
     plant_with.set_parameters(plant.parameters())?;
     Ok(plant_with)

@@ -90,7 +90,10 @@ pub struct ExperimentArguments {
 /// An experiment, and where its results go.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Writes trajectory.csv, summary.json, figure.svg and figure.png.\n\nExample:\n  lpvmpc simulate cart-pole.toml --out results"
+    after_help = "Writes trajectory.csv, summary.json, figure.svg and figure.png. The cost of states (state_cost in summary.json) is the\n\
+sum over the samples of (x - x_ref)'Q (x - x_ref), without the inputs; without a reference x_ref is the plant's equilibrium.\n\
+Jumps and loads that the run ends before are told on standard error.\n\n\
+Example:\n  lpvmpc simulate cart-pole.toml --out results"
 )]
 pub struct SimulateArguments {
     /// The experiment, TOML

@@ -217,6 +217,28 @@ impl Experiment {
         read.into_iter().chain(self.certificate.clone()).collect()
     }
 
+    /// Jumps and loads that the run ends before, a sentence each.
+    pub fn too_late(&self) -> Vec<String> {
+        let end = self.samples as f64 * self.settings.t_s;
+        let (mut jumps, mut loads) = (0, 0);
+        let begin = self.world.pushes.iter().map(|push| match push {
+            Push::Jump { time, .. } => {
+                jumps += 1;
+                (format!("world.jump {jumps}.time"), *time)
+            }
+            Push::Load { from, .. } => {
+                loads += 1;
+                (format!("world.load {loads}.start"), *from)
+            }
+        });
+        let late = begin.filter(|(_, time)| *time >= end);
+        let told = late.map(|(key, time)| {
+            let (time, end) = (short(time), short(end));
+            format!("{key} = {time}: the run ends at {end} s and does not come to it")
+        });
+        told.collect()
+    }
+
     /// What its controller or its world refuses, in words that name its file.
     pub fn refused(&self, part: &str, error: &MpcError) -> CommandError {
         let MpcError { place, fault } = error;
@@ -482,6 +504,11 @@ pub fn names(signals: &[Signal]) -> Vec<&str> {
 
 /// One finite number for each signal.
 pub fn components(place: &str, list: &[f64], signals: &[Signal]) -> Result<(), String> {
+    if signals.is_empty() && !list.is_empty() {
+        return Err(format!(
+            "{place}: the plant has nothing that it could be for; it must be []"
+        ));
+    }
     if list.len() != signals.len() {
         return Err(format!(
             "{place}: {} numbers; it needs {}, for {}",

@@ -47,6 +47,10 @@ const KEPT: f64 = 1e-9;
 /// Runs an experiment and writes what happened.
 pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
     let experiment = Experiment::load(&arguments.experiment)?;
+    experiment
+        .too_late()
+        .iter()
+        .for_each(|told| output::warn(told));
     let usual = || PathBuf::from("out").join(&experiment.name);
     let out = arguments.out.clone().unwrap_or_else(usual);
     let folder = ResultFolder::open(PROGRAM, &out, &FILES)?;
@@ -136,7 +140,7 @@ fn time_table(run: &Run) -> Table {
 
 /// Sum over the samples of (x - x_ref)'Q (x - x_ref), without the inputs; where no reference is given, it is the plant's
 /// equilibrium, or zero.
-fn tracking_cost(experiment: &Experiment, run: &Run) -> f64 {
+fn state_cost(experiment: &Experiment, run: &Run) -> f64 {
     let (rest, _) = experiment.plant.data().operating_point();
     let q = experiment.settings.q.diagonal();
     let samples = run.x.iter().take(run.u.len()).enumerate();
@@ -162,7 +166,7 @@ fn summary(experiment: &Experiment, run: &Run) -> Value {
         "plant": experiment.plant.data().name,
         "samples": run.u.len(),
         "t_s": experiment.settings.t_s,
-        "tracking_cost": tracking_cost(experiment, run),
+        "state_cost": state_cost(experiment, run),
         "final_state": run.x.last(),
         "bounds_exceeded": exceeded,
         "statuses": run.statuses,
@@ -202,12 +206,12 @@ fn report(experiment: &Experiment, run: &Run, out: &std::path::Path) -> String {
     };
     format!(
         "{}: {} samples of {} s\n  plans            {}\n  bounds exceeded  {broken}\n  \
-         tracking cost    {}\n{found}\n{}\nWritten: {} with {}\n",
+         cost of states   {}, without the inputs\n{found}\n{}\nWritten: {} with {}\n",
         experiment.name,
         run.u.len(),
         short(experiment.settings.t_s),
         statuses.join(", "),
-        short(tracking_cost(experiment, run)),
+        short(state_cost(experiment, run)),
         time_table(run),
         out.display(),
         FILES.join(", ")

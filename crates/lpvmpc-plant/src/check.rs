@@ -307,17 +307,30 @@ fn check_equilibrium(plant: &PlantData) -> Result<(), PlantError> {
     let Some(equilibrium) = &plant.equilibrium else {
         return Ok(());
     };
-    for (name, values, count) in [
-        ("x", &equilibrium.x, plant.states.len()),
-        ("u", &equilibrium.u, plant.inputs.len()),
+    for (name, values, signals) in [
+        ("x", &equilibrium.x, &plant.states),
+        ("u", &equilibrium.u, &plant.inputs),
     ] {
         let place = format!("equilibrium.{name}");
-        if values.len() != count {
-            let fault = format!("{} numbers where {count} are needed", values.len());
+        if values.len() != signals.len() {
+            let (found, count) = (values.len(), signals.len());
+            let fault = format!("{found} numbers where {count} are needed");
             return Err(PlantError::new(place, fault));
         }
-        if let Some(i) = values.iter().position(|value| !value.is_finite()) {
-            return Err(PlantError::new(format!("{place}[{i}]"), "it is not finite"));
+        for (i, (value, signal)) in values.iter().zip(signals).enumerate() {
+            let place = || format!("{place}[{i}]");
+            if !value.is_finite() {
+                return Err(PlantError::new(place(), "it is not finite"));
+            }
+            let lower = signal.lower.unwrap_or(f64::NEG_INFINITY);
+            let upper = signal.upper.unwrap_or(f64::INFINITY);
+            if !(lower..=upper).contains(value) {
+                let fault = format!(
+                    "{} is {value:?}; it must be from {lower:?} to {upper:?}, its bounds",
+                    signal.name
+                );
+                return Err(PlantError::new(place(), fault));
+            }
         }
     }
     Ok(())

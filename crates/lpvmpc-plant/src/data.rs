@@ -43,7 +43,7 @@ pub struct PlantData {
     /// The plant's own x_dot = A(s, p) x + B(s, p) u + c(s, p), or x+ of a plant in discrete time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub embedding: Option<EmbeddingData>,
-    /// A steady state, f(x, u) = 0, or F(x, u) = x.
+    /// A steady state within the bounds, f(x, u) = 0, or F(x, u) = x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub equilibrium: Option<Equilibrium>,
 }

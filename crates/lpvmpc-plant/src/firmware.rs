@@ -1,6 +1,8 @@
 //! A program for a microcontroller around a plant.
 
+use crate::data::Signal;
 use crate::error::PlantError;
+use crate::operation::Operation;
 use crate::plant::Plant;
 use crate::source::{text, type_name};
 use std::path::Path;
@@ -54,6 +56,8 @@ impl Plant {
         ] {
             fits(name, list, count)?;
         }
+        does_not_vanish("q", &settings.q)?;
+        does_not_vanish("r", &settings.r)?;
         if settings.p.len() != states {
             let fault = format!("{} rows for {states} states", settings.p.len());
             return Err(PlantError::new("p", fault));
@@ -61,9 +65,17 @@ impl Plant {
         for (i, row) in settings.p.iter().enumerate() {
             fits(&format!("p[{i}]"), row, states)?;
         }
+        for (parameter, value) in data.parameters.iter().zip(self.parameters()) {
+            fits(&format!("parameter {}", parameter.name), &[*value], 1)?;
+        }
+        for (i, operation) in data.operations.iter().enumerate() {
+            if let Operation::Constant(value) = operation {
+                fits(&format!("operations[{i}]"), &[*value], 1)?;
+            }
+        }
         fits("t_s", &[settings.t_s], 1)?;
-        if settings.t_s <= 0.0 {
-            let fault = format!("{} s is no time between samples", settings.t_s);
+        if settings.t_s as f32 <= 0.0 {
+            let fault = format!("{:?} s is no time between samples", settings.t_s);
             return Err(PlantError::new("t_s", fault));
         }
         if let Some(period) = data.period
@@ -88,23 +100,16 @@ impl Plant {
                 format!("lpvmpc::AlongMotion({name}::default())"),
             ),
         };
-        let bound = |signals: &[crate::Signal], lower: bool| {
-            let bounds = signals.iter().map(|signal| {
-                let (value, none) = match lower {
-                    true => (signal.lower, f64::NEG_INFINITY),
-                    false => (signal.upper, f64::INFINITY),
-                };
-                value.unwrap_or(none)
-            });
-            bounds.collect::<Vec<f64>>()
-        };
-        let bounded = { data.states.iter() }
-            .filter(|signal| signal.lower.is_some() || signal.upper.is_some())
+        let [x_lower, x_upper] = bounds("states", &data.states)?;
+        let [u_lower, u_upper] = bounds("inputs", &data.inputs)?;
+        let bounded = { x_lower.iter() }
+            .zip(&x_upper)
+            .filter(|(lower, upper)| lower.is_finite() || upper.is_finite())
             .count();
         let soft = format!(
             ".soft_bounds(Bounds {{\n        lower: SVector::from([{}]),\n        upper: SVector::from([{}]),\n    }})",
-            list(&bound(&data.states, true)),
-            list(&bound(&data.states, false)),
+            list(&x_lower),
+            list(&x_upper),
         );
         let rows: Vec<String> = settings
             .p
@@ -131,8 +136,8 @@ impl Plant {
             ("Q", list(&settings.q)),
             ("R", list(&settings.r)),
             ("P", rows.join("\n")),
-            ("U_LOWER", list(&bound(&data.inputs, true))),
-            ("U_UPPER", list(&bound(&data.inputs, false))),
+            ("U_LOWER", list(&u_lower)),
+            ("U_UPPER", list(&u_upper)),
             ("X", if bounded > 0 { soft } else { String::new() }),
             ("CRATE", "plant-controller".to_owned()),
             ("LPVMPC", format!("{:?}", settings.lpvmpc)),
@@ -231,6 +236,40 @@ fn fits(place: &str, list: &[f64], count: usize) -> Result<(), PlantError> {
     }
 }
 
+/// Weights that are not zero in `f32` either, to all its digits.
+fn does_not_vanish(place: &str, weights: &[f64]) -> Result<(), PlantError> {
+    let vanishes = |weight: &&f64| **weight != 0.0 && weight.abs() < f64::from(f32::MIN_POSITIVE);
+    match weights.iter().find(vanishes) {
+        Some(weight) => Err(PlantError::new(
+            place,
+            format!(
+                "{weight:?} vanishes in f32, whose smallest number is {:e}; multiply all weights by a common factor, \
+                 which changes nothing",
+                f32::MIN_POSITIVE
+            ),
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Lower and upper bounds, as `f32` has them: one that is beyond all its numbers is none, unless it
+/// leaves nothing.
+fn bounds(place: &str, signals: &[Signal]) -> Result<[Vec<f64>; 2], PlantError> {
+    let (mut lower, mut upper) = (Vec::new(), Vec::new());
+    for (i, signal) in signals.iter().enumerate() {
+        let least = signal.lower.unwrap_or(f64::NEG_INFINITY);
+        let most = signal.upper.unwrap_or(f64::INFINITY);
+        if least as f32 == f32::INFINITY || most as f32 == f32::NEG_INFINITY {
+            let place = format!("{place}[{i}] ({})", signal.name);
+            let fault = format!("no number of f32 is from {least:?} to {most:?}, its bounds");
+            return Err(PlantError::new(place, fault));
+        }
+        lower.push(f64::from(least as f32));
+        upper.push(f64::from(most as f32));
+    }
+    Ok([lower, upper])
+}
+
 fn list(values: &[f64]) -> String {
     let values: Vec<String> = values.iter().map(|value| number(*value)).collect();
     values.join(", ")
@@ -238,11 +277,9 @@ fn list(values: &[f64]) -> String {
 
 /// As a literal of Rust.
 fn number(value: f64) -> String {
-    if value == f64::INFINITY {
-        "f32::INFINITY".to_owned()
-    } else if value == f64::NEG_INFINITY {
-        "f32::NEG_INFINITY".to_owned()
-    } else {
-        format!("{:?}", value as f32)
+    match value as f32 {
+        f32::INFINITY => "f32::INFINITY".to_owned(),
+        f32::NEG_INFINITY => "f32::NEG_INFINITY".to_owned(),
+        value => format!("{value:?}"),
     }
 }

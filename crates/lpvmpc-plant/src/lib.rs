@@ -73,7 +73,7 @@
 //! | `period`, `next` | in place of `derivative`, of a plant in discrete time: its period in s, and the results that are x+, the state one period later |
 //! | `output` | the results that are y, one for each output |
 //! | `embedding` | `scheduling`: the results that are s; `a`, `b`: the rows of A(s), B(s); `c`: c(s), where it is not zero |
-//! | `equilibrium` | `x` and `u` of a steady state, f(x, u) = 0 or F(x, u) = x |
+//! | `equilibrium` | `x` and `u` of a steady state within the bounds, f(x, u) = 0 or F(x, u) = x |
 //!
 //! `states`, `operations`, `derivative` (or `period` and `next`) and the first two must be there. Names and units are free text.
 //!

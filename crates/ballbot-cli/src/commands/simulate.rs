@@ -29,7 +29,8 @@ Examples:
 Writes trajectory.csv (for two planes trajectory_x.csv, trajectory_y.csv and motors.csv) and a
 figure as SVG and PNG, in place of those of an earlier run in the same folder; other files are not
 touched, .ballbot-files says which are the program's. --log adds what the
-sensors of `[world]` delivered. A run that ends early keeps what it recorded, and exits with 1.")]
+sensors of `[world]` delivered. A run that ends early keeps what it recorded, and exits with 1. Pushes
+and set points that it ends before are told on standard error.")]
 pub struct SimulateArguments {
     /// A built-in scenario or a TOML file
     pub scenario: String,
@@ -84,6 +85,7 @@ pub struct Simulated {
 /// As [`run`].
 pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError> {
     let prepared = arguments.options.prepare(&arguments.scenario)?;
+    tell_too_late(arguments, &prepared)?;
     let file = Path::new(&arguments.scenario);
     let name = file.file_stem().unwrap_or(file.as_os_str());
     let folder = match &arguments.out {
@@ -125,7 +127,7 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
         "samples": prepared.samples,
         "t_s": prepared.settings.t_s,
         // All sums, means and largest values are over this time, from 0 s on.
-        "window_s": prepared.samples as f64 * prepared.settings.t_s,
+        "window_s": prepared.end(),
         "planes": metrics,
         "folder": folder.path(),
     });
@@ -157,6 +159,19 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
     }
 }
 
+/// Tells of pushes and set points that the run ends before.
+fn tell_too_late(arguments: &SimulateArguments, prepared: &Prepared) -> Result<(), CommandError> {
+    let (scenario, _) = arguments.options.load(&arguments.scenario)?;
+    let end = recorded::time(prepared.end());
+    for (key, time) in scenario.too_late(prepared) {
+        let time = recorded::time(time);
+        output::warn(&format!(
+            "{key} = {time}: the run ends at {end} s and does not come to it"
+        ));
+    }
+    Ok(())
+}
+
 /// Runs a scenario with a progress bar.
 ///
 /// # Errors
@@ -183,7 +198,7 @@ fn readings(logs: &[Vec<LogRow<4, 1>>]) -> String {
     });
     lines
         .filter(|(_, told)| !told.is_empty())
-        .map(|(plane, told)| format!("\nreadings{plane}: {told}"))
+        .map(|(plane, told)| format!("readings{plane}: {told}\n"))
         .collect()
 }
 
@@ -359,6 +374,24 @@ fn figures(
     }
 }
 
+/// Where a plane's shaped reference was still on its way, a line each: the robot follows it, and is not there.
+fn unreached(prepared: &Prepared, metrics: &[Metrics]) -> String {
+    let planes = match metrics.len() {
+        1 => ["", ""],
+        _ => [" of the x plane", " of the y plane"],
+    };
+    let lines = planes.iter().zip(metrics).filter_map(|(plane, metrics)| {
+        let set_point = metrics.unreached_set_point_rad?;
+        Some(format!(
+            "the set point{plane} of {set_point:.4} rad is not reached by the end of the run: the shaped reference ends at \
+             {:.4} rad; lengthen duration_s ({} s), or allow more in [controller.shaping]\n",
+            metrics.final_reference_rad,
+            recorded::time(prepared.end())
+        ))
+    });
+    lines.collect()
+}
+
 fn summary(prepared: &Prepared, metrics: &[Metrics], folder: &Path) -> String {
     let planes: &[&str] = if metrics.len() == 1 {
         &["value"]
@@ -376,11 +409,12 @@ fn summary(prepared: &Prepared, metrics: &[Metrics], folder: &Path) -> String {
     });
     format!(
         "{}: {} samples of {} s; costs, rms and largest values from 0 s to {} s\n\
-         {table}{certificate}written to {}\n",
+         {table}{}{certificate}written to {}\n",
         prepared.title,
         prepared.samples,
         prepared.settings.t_s,
-        recorded::time(prepared.samples as f64 * prepared.settings.t_s),
+        recorded::time(prepared.end()),
+        unreached(prepared, metrics),
         folder.display()
     )
 }

@@ -81,7 +81,7 @@ pub fn run(arguments: &WheelsArguments) -> Result<String, CommandError> {
     }
     Err(CommandError::Wheels(format!(
         "{table}\n{}",
-        mistake(&seen, &check)
+        mistake(said, &seen, &check)
     )))
 }
 
@@ -107,11 +107,21 @@ fn table(said: &WheelEncoders, seen: &[(Push, [f64; 3])], check: &WheelCheck) ->
 }
 
 /// What does not agree, and what would.
-fn mistake(seen: &[(Push, [f64; 3])], check: &WheelCheck) -> String {
+fn mistake(said: &WheelEncoders, seen: &[(Push, [f64; 3])], check: &WheelCheck) -> String {
     let off = check.off_deg;
     let mut text = format!("the wheels are not as [log.wheels] says: {off:.0} degrees off");
+    for wheel in &check.still {
+        let column = &said.encoders[*wheel].column;
+        write!(
+            text,
+            "\nthe angle of wheel {} (`{column}`) hardly moves while others turn: is the encoder connected? What follows \
+             holds only if it is",
+            wheel + 1
+        )
+        .ok();
+    }
     if check.instead.is_empty() {
-        text += "; no order, sense or quarter turn of these azimuths agrees";
+        text += "\nno order, sense or quarter turn of these azimuths agrees";
     } else {
         text += "\nit would agree if";
         for (i, arrangement) in check.instead.iter().enumerate() {

@@ -66,6 +66,24 @@ fn name(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
+/// Its standard deviations were smaller by 1 / sqrt(2).
+#[test]
+fn a_log_that_is_named_twice_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let [first, second] = ["a.csv", "b.csv"].map(|file| folder.path().join(file));
+    std::fs::write(&first, log()).unwrap();
+    std::fs::copy(&first, &second).unwrap();
+    for again in [&first, &second] {
+        let message = failure(&["identify", name(&first), name(again)], 1);
+        let expected = format!(
+            "{}: it has the same content as {}",
+            name(again),
+            name(&first)
+        );
+        assert_says(&message, &[&expected, "name it once"]);
+    }
+}
+
 #[test]
 fn a_log_becomes_parameters_a_report_and_words() {
     let folder = tempfile::tempdir().unwrap();

@@ -125,6 +125,43 @@ fn mixed_up_encoders_and_senses_are_told() {
     assert!(!said.contains(" or "), "{said}");
 }
 
+/// It was taken for a wheel that stands elsewhere.
+#[test]
+fn an_encoder_that_hardly_moves_is_told_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let [x, y, turn] = logs(folder.path(), STANDING, [0, 1, 2]);
+    for path in [&x, &y, &turn] {
+        let text = std::fs::read_to_string(path).unwrap();
+        let rows = text.lines().enumerate().map(|(row, line)| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            if row > 0 {
+                cells[2] = (17.0 + 0.05 * (row as f64).sin()).to_string();
+            }
+            cells.join(",") + "\n"
+        });
+        std::fs::write(path, rows.collect::<String>()).unwrap();
+    }
+    let config = config(folder.path(), [0.0, 120.0, -120.0], [false, true, false]);
+    for all in [false, true] {
+        let said = fails(&command(
+            &config,
+            &[x.clone(), y.clone(), turn.clone()],
+            all,
+        ));
+        let told = said
+            .find("the angle of wheel 2 (`m2`) hardly moves")
+            .unwrap();
+        assert_says(&said[told..], &["is the encoder connected?", "agree"]);
+        assert!(
+            !said[..told].contains("azimuths agrees") && !said[..told].contains("it would agree")
+        );
+        assert!(
+            !said.contains("wheel 1 (`m1`)") && !said.contains("wheel 3 (`m3`)"),
+            "{said}"
+        );
+    }
+}
+
 #[test]
 fn a_log_without_a_push_is_refused() {
     let folder = tempfile::tempdir().unwrap();

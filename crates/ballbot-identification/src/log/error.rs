@@ -70,6 +70,16 @@ pub enum Problem {
         /// The limit, bytes.
         limit: usize,
     },
+    /// A log that is there already.
+    #[error(
+        "it has the same content as {}: a log that counts twice makes the results look surer than they are; name it \
+         once",
+        first.display()
+    )]
+    SameLog {
+        /// The file that was named before.
+        first: PathBuf,
+    },
     /// A zenith angle of the wheels at which they do not turn the ball.
     #[error(
         "[log.wheels] zenith_angle_deg = {degrees}: it must be strictly between 0 and 90 degrees \

@@ -56,7 +56,8 @@ pub enum Finding {
     },
     /// Rows are missing.
     #[error(
-        "{count} gap(s) in the time stamps, the longest of {longest:.3} s after {time:.3} s; the fit does not reach across"
+        "{count} gap(s) in the time stamps, the longest of {} s after {} s; the fit does not reach across",
+        number(*longest), number(*time)
     )]
     Gaps {
         /// How many gaps.
@@ -78,7 +79,8 @@ pub enum Finding {
     },
     /// A time stamp before the one before.
     #[error(
-        "the time goes back {count} time(s), first in line {line} by {by:.4} s (rows out of order, or a restart of the clock); the run is cut there"
+        "the time goes back {count} time(s), first in line {line} by {} s (rows out of order, or a restart of the clock); the run is cut there",
+        number(*by)
     )]
     BackwardStamps {
         /// How many rows.
@@ -99,7 +101,7 @@ pub enum Finding {
         longest: f64,
     },
     /// A value that jumps: a reset, a wrap or a spike.
-    #[error("`{column}` jumps {count} time(s), first by {size:.3} in line {line} ({}); the run is cut there", kind_of_jump(*size))]
+    #[error("`{column}` jumps {count} time(s), first by {} in line {line} ({}); the run is cut there", number(*size), kind_of_jump(*size))]
     Jumps {
         /// The column.
         column: String,
@@ -131,7 +133,7 @@ pub enum Finding {
         step: f64,
     },
     /// The torque is at its limit.
-    #[error("the torque is at its limit of {limit:.3} N m in {:.1} % of the rows{}", 100.0 * part, if *commanded { COMMANDED_ONLY } else { "" })]
+    #[error("the torque is at its limit of {} N m in {:.1} % of the rows{}", number(*limit), 100.0 * part, if *commanded { COMMANDED_ONLY } else { "" })]
     Saturated {
         /// The limit, N m.
         limit: f64,
@@ -142,7 +144,8 @@ pub enum Finding {
     },
     /// What acted is not what was asked for.
     #[error(
-        "the applied torque differs from the commanded one by {difference:.3} N m (rms); the applied one is used"
+        "the applied torque differs from the commanded one by {} N m (rms); the applied one is used",
+        number(*difference)
     )]
     CommandNotApplied {
         /// Root of the mean square difference, N m.

@@ -226,7 +226,7 @@ fn time_stamps() {
                 fields.clear()
             }
         }),
-        &["1 gap", "0.210 s"],
+        &["1 gap", "0.21 s"],
     );
     found(
         recalculated(0, |row, time| if row == 100 { time - 0.01 } else { time }),
@@ -318,6 +318,11 @@ fn sensors() {
         recalculated(1, |row, phi| if row >= 120 { phi + 2.0 } else { phi }),
         &["`phi_rad` jumps 1 time", "a reset or a spike"],
     );
+    // It was written with its three hundred digits.
+    found(
+        recalculated(1, |row, phi| if row == 120 { 1e300 } else { phi }),
+        &["`phi_rad` jumps", "first by 1.0e300 in line 122"],
+    );
     found(
         recalculated(2, |row, theta| if row == 50 { theta + 0.5 } else { theta }),
         &["`theta_rad` jumps"],
@@ -346,7 +351,7 @@ fn sensors() {
 #[test]
 fn torques() {
     let limit = |_: usize, torque: f64| torque.clamp(-0.5, 0.5);
-    found(recalculated(5, limit), &["at its limit of 0.500 N m"]);
+    found(recalculated(5, limit), &["at its limit of 0.5 N m"]);
     found(recalculated(5, limit), &["differs from the commanded one"]);
     let commanded = recalculated(4, limit).replace("torque_applied_nm", "spare");
     found(

@@ -73,6 +73,14 @@ pub const RADIUS: Plausible = range(0.002, 1.0, "m", MILLIMETRES);
 pub const HEIGHT: Plausible = range(0.002, 5.0, "m", MILLIMETRES);
 /// An inertia per body mass.
 pub const INERTIA: Plausible = range(0.0, 100.0, "m^2", Some(("mm^2", 1e-6)));
+/// Inertias of the rolling are at most so many times the ball's radius squared: a solid ball of ten times the body's mass
+/// has 15, and wheels and motors, as the ball sees them, the rest; the paper's b2 is 4.
+const MOST_ROLLING: f64 = 100.0;
+/// At a ball's rate of 1 rad/s friction brakes at most as much as the floor could hold the whole body, with a
+/// coefficient of friction of 1: |b4| <= g r_b.
+const BRAKING_RATE: f64 = 1.0;
+/// A viscous friction per body mass, as far as no robot is known.
+const FRICTION: Plausible = range(0.0, f64::INFINITY, "m^2/s", Some(("mm^2/s", 1e-6)));
 /// The acceleration of gravity, on the moon as well.
 pub const GRAVITY: Plausible = range(1.0, 30.0, "m/s^2", Some(("mm/s^2", 1e-3)));
 /// The zenith angle of the wheels.
@@ -81,10 +89,26 @@ pub const ZENITH: Plausible = range(5.0, 90.0, "degrees", Some(("rad", 180.0 / P
 pub const ANGLE_ERROR: Plausible = range(0.0, 0.5, "rad", DEGREES);
 
 impl Plausible {
+    /// The same with another largest value.
+    fn up_to(self, most: f64) -> Self {
+        Self { most, ..self }
+    }
+
     /// Whether the value can be meant.
     pub fn holds(&self, value: f64) -> bool {
         let size = value.abs();
         size == 0.0 || !size.is_finite() || (self.least..=self.most).contains(&size)
+    }
+
+    /// The same of what is never negative: a value below zero is for other checks, as a NaN is.
+    ///
+    /// # Errors
+    /// As [`check`](Self::check).
+    pub fn check_size(&self, key: &str, value: f64) -> Result<(), ScenarioError> {
+        match value < 0.0 {
+            true => Ok(()),
+            false => self.check(key, value),
+        }
     }
 
     /// Asks about a value that cannot be meant; a NaN is for other checks.
@@ -171,14 +195,19 @@ impl Scenario {
 pub fn check_robot(key: &str, robot: &KnownRobot) -> Result<(), ScenarioError> {
     let geometry = &robot.ballbot.geometry;
     let zenith = robot.wheels.zenith_angle().to_degrees();
+    let (radius, gravity) = (geometry.ball_radius, geometry.gravity);
+    let rolling = INERTIA.up_to(MOST_ROLLING * radius * radius);
+    let braking = FRICTION.up_to(gravity * radius / BRAKING_RATE);
     for (name, value, plausible) in [
-        ("b1_m2", robot.ballbot.b1, INERTIA),
-        ("b2_m2", robot.ballbot.b2, INERTIA),
-        ("b3_m2", robot.ballbot.b3, INERTIA),
         ("centre_of_mass_m", geometry.centre_of_mass, HEIGHT),
-        ("ball_radius_m", geometry.ball_radius, RADIUS),
+        ("ball_radius_m", radius, RADIUS),
         ("wheel_radius_m", geometry.wheel_radius, RADIUS),
-        ("gravity_m_s2", geometry.gravity, GRAVITY),
+        ("gravity_m_s2", gravity, GRAVITY),
+        // These by the lengths of this robot, which are plausible by now.
+        ("b1_m2", robot.ballbot.b1, rolling),
+        ("b2_m2", robot.ballbot.b2, rolling),
+        ("b3_m2", robot.ballbot.b3, INERTIA),
+        ("b4_m2_s", robot.ballbot.b4, braking),
         ("zenith_angle_deg", zenith, ZENITH),
     ] {
         plausible.check(&format!("{key}.{name}"), value)?;
@@ -220,8 +249,8 @@ impl ReferenceTable {
 
 impl ControllerTable {
     fn check_plausible(&self) -> Result<(), ScenarioError> {
-        SAMPLING.check("controller.t_s", self.t_s)?;
-        DELAY.check("controller.delay_s", self.delay_s)?;
+        SAMPLING.check_size("controller.t_s", self.t_s)?;
+        DELAY.check_size("controller.delay_s", self.delay_s)?;
         if let Some(EstimatorTable {
             phi_noise_rad,
             theta_noise_rad,
@@ -229,21 +258,21 @@ impl ControllerTable {
             ..
         }) = self.estimator
         {
-            ANGLE_ERROR.check("controller.estimator.phi_noise_rad", phi_noise_rad)?;
-            ANGLE_ERROR.check("controller.estimator.theta_noise_rad", theta_noise_rad)?;
+            ANGLE_ERROR.check_size("controller.estimator.phi_noise_rad", phi_noise_rad)?;
+            ANGLE_ERROR.check_size("controller.estimator.theta_noise_rad", theta_noise_rad)?;
             let key = "controller.estimator.theta_dot_noise_rad_s";
-            TILT_RATE.check(key, theta_dot_noise_rad_s)?;
+            TILT_RATE.check_size(key, theta_dot_noise_rad_s)?;
         }
         if let Some(ShapingTable { phi_dot_rad_s, .. }) = self.shaping {
-            BALL_RATE.check("controller.shaping.phi_dot_rad_s", phi_dot_rad_s)?;
+            BALL_RATE.check_size("controller.shaping.phi_dot_rad_s", phi_dot_rad_s)?;
         }
         if let Some(MotorsTable {
             limit_nm,
             yaw_reserve_nm,
         }) = self.motors
         {
-            TORQUE.check("controller.motors.limit_nm", limit_nm)?;
-            TORQUE.check("controller.motors.yaw_reserve_nm", yaw_reserve_nm)?;
+            TORQUE.check_size("controller.motors.limit_nm", limit_nm)?;
+            TORQUE.check_size("controller.motors.yaw_reserve_nm", yaw_reserve_nm)?;
         }
         Ok(())
     }
@@ -283,36 +312,36 @@ impl WorldTable {
             ..
         } = self;
         if let Some(period) = self.sensor_period_s {
-            SAMPLING.check("world.sensor_period_s", period)?;
+            SAMPLING.check_size("world.sensor_period_s", period)?;
         }
         for (name, angle) in [("phi", &sensors.phi), ("theta", &sensors.theta)] {
             let key = |quantity: &str| format!("world.sensors.{name}.{quantity}");
-            ANGLE_ERROR.check(&key("noise_rad"), angle.noise_rad)?;
+            ANGLE_ERROR.check_size(&key("noise_rad"), angle.noise_rad)?;
             ANGLE_ERROR.check(&key("bias_rad"), angle.bias_rad)?;
-            ANGLE_ERROR.check(&key("resolution_rad"), angle.resolution_rad)?;
-            DELAY.check(&key("delay_s"), angle.delay_s)?;
+            ANGLE_ERROR.check_size(&key("resolution_rad"), angle.resolution_rad)?;
+            DELAY.check_size(&key("delay_s"), angle.delay_s)?;
         }
         for (name, rate) in [
             ("phi_dot", &sensors.phi_dot),
             ("theta_dot", &sensors.theta_dot),
         ] {
             let key = |quantity: &str| format!("world.sensors.{name}.{quantity}");
-            TILT_RATE.check(&key("noise_rad_s"), rate.noise_rad_s)?;
+            TILT_RATE.check_size(&key("noise_rad_s"), rate.noise_rad_s)?;
             TILT_RATE.check(&key("bias_rad_s"), rate.bias_rad_s)?;
-            TILT_RATE.check(&key("resolution_rad_s"), rate.resolution_rad_s)?;
-            DELAY.check(&key("delay_s"), rate.delay_s)?;
+            TILT_RATE.check_size(&key("resolution_rad_s"), rate.resolution_rad_s)?;
+            DELAY.check_size(&key("delay_s"), rate.delay_s)?;
         }
         for (name, torque) in [
             ("limit_nm", actuator.limit_nm),
             ("dead_zone_nm", actuator.dead_zone_nm),
             ("coulomb_friction_nm", actuator.coulomb_friction_nm),
-            ("bias_nm", actuator.bias_nm),
         ] {
-            TORQUE.check(&format!("world.actuator.{name}"), torque)?;
+            TORQUE.check_size(&format!("world.actuator.{name}"), torque)?;
         }
-        DELAY.check("world.actuator.lag_s", actuator.lag_s)?;
-        DELAY.check("world.delay.computation_s", delay.computation_s)?;
-        DELAY.check("world.delay.transport_s", delay.transport_s)?;
+        TORQUE.check("world.actuator.bias_nm", actuator.bias_nm)?;
+        DELAY.check_size("world.actuator.lag_s", actuator.lag_s)?;
+        DELAY.check_size("world.delay.computation_s", delay.computation_s)?;
+        DELAY.check_size("world.delay.transport_s", delay.transport_s)?;
         for (i, push) in self.pushes.iter().enumerate() {
             push.check_plausible(&|name| format!("world.pushes[{i}].{name}"))?;
         }

@@ -11,7 +11,7 @@ use crate::prepare::parameters::check_motion;
 use crate::prepare::reference::{self, PhiReference};
 use crate::prepare::standing::Standing;
 use crate::prepare::three_motors::ThreeMotors;
-use crate::prepare::world::PlaneWorld;
+use crate::prepare::world::{ONE_PLANE, PlaneWorld};
 use ballbot::{Ballbot, GuaranteedSettings, PlaneFeedback, PlanePlanner, RampedSettings, Wheels};
 use lpvmpc::MoveLimits;
 use lpvmpc_sim::Tolerances;
@@ -58,6 +58,11 @@ pub enum Problem {
 }
 
 impl Prepared {
+    /// When the run ends, s.
+    pub fn end(&self) -> f64 {
+        self.samples as f64 * self.settings.t_s
+    }
+
     /// The settings of the guaranteed controller, where that runs.
     pub fn guaranteed(&self) -> Option<&GuaranteedSettings<f64>> {
         match &self.problem {
@@ -239,13 +244,17 @@ impl Scenario {
         (t_s, tolerances): (f64, Tolerances),
         files: &dyn Files,
     ) -> Result<Vec<Plane>, ScenarioError> {
+        let one_plane = references.len() == 1;
+        if let (true, Some(world)) = (one_plane, &self.world) {
+            world.check_one_plane()?;
+        }
         let first = self.initial_state.check("initial_state")?;
         let second = match self.initial_state_y {
-            Some(_) if references.len() == 1 => {
+            Some(_) if one_plane => {
                 return Err(ScenarioError::value(
                     "initial_state_y",
                     "(given)",
-                    "the reference has one plane only; leave it out",
+                    ONE_PLANE,
                 ));
             }
             Some(state) => state.check("initial_state_y")?,

@@ -51,6 +51,18 @@ impl PhiReference {
         }
     }
 
+    /// The goal in rad of the shaped move that is under way at the time `t` (s), if one is.
+    pub fn on_its_way_to(&self, t: f64) -> Option<f64> {
+        let Self::Moves(moves) = self else {
+            return None;
+        };
+        let is_under_way = |(begin, planned): &&(f64, SmoothMove<f64>)| {
+            *begin < t - SAME_TIME && t < begin + planned.duration - SAME_TIME
+        };
+        let under_way = moves.iter().find(is_under_way);
+        under_way.map(|(_, planned)| planned.to)
+    }
+
     /// Steps become smooth moves within `limits`; other references stay what they are. A set
     /// point that comes while a move is under way waits for its end.
     pub(crate) fn shaped(self, limits: MoveLimits<f64>) -> Self {

@@ -67,7 +67,16 @@ impl TimeSeries {
         let headers = reader.headers();
         let headers = headers.map_err(|error| self.problem(Some(1), error.to_string()))?;
         let column = |name: &str| {
-            let place = headers.iter().position(|header| header == name);
+            let mut places = (0..headers.len()).filter(|i| &headers[*i] == name);
+            let place = places.next();
+            if let (Some(first), Some(second)) = (place, places.next()) {
+                let problem = format!(
+                    "the header names `{name}` twice, as fields {} and {}: rename one",
+                    first + 1,
+                    second + 1
+                );
+                return Err(self.problem(Some(1), problem));
+            }
             place.ok_or_else(|| {
                 let present = headers.iter().collect::<Vec<_>>().join(", ");
                 let problem = format!("there is no column `{name}`; the columns are: {present}");

@@ -5,7 +5,7 @@ use crate::file::world_table::{
     ActuatorTable, AngleSensorTable, PlaneName, PushTable, RateSensorTable, SensorsTable,
     WorldTable,
 };
-use crate::number::{finite, not_negative, positive};
+use crate::number::{check, finite, not_negative, positive};
 use crate::prepare::excitation::Excitation;
 use crate::prepare::files::Files;
 use crate::prepare::known_robot::KnownRobot;
@@ -17,6 +17,9 @@ use std::f64::consts::FRAC_PI_2;
 
 /// More samples of the sensors per sample of the control than this would be a slip of the pen.
 const MOST_SENSOR_SAMPLES: f64 = 1e4;
+
+/// What is right in place of something that is said of the y plane.
+pub(crate) const ONE_PLANE: &str = "the reference has one plane only; leave it out";
 
 /// The robot as the simulated world sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -145,6 +148,30 @@ impl WorldTable {
         })
     }
 
+    /// Nothing is said of a plane that the reference has not.
+    ///
+    /// # Errors
+    /// The first key of the y plane that is not zero, or the first push in it.
+    pub(crate) fn check_one_plane(&self) -> Result<(), ScenarioError> {
+        for (key, value) in [
+            ("world.floor.slope_y_deg", self.floor.slope_y_deg),
+            (
+                "world.robot.tilt_offset_y_rad",
+                self.robot.tilt_offset_y_rad,
+            ),
+        ] {
+            check(key, value, value == 0.0, ONE_PLANE)?;
+        }
+        let in_y = |push: &PushTable| push.plane() == PlaneName::Y;
+        match self.pushes.iter().position(in_y) {
+            Some(i) => {
+                let key = format!("world.pushes[{i}].{}.plane", self.pushes[i].kind());
+                Err(ScenarioError::value(key, "y", ONE_PLANE))
+            }
+            None => Ok(()),
+        }
+    }
+
     fn sensor_period(&self, period: f64, t_s: f64) -> Result<f64, ScenarioError> {
         let key = "world.sensor_period_s";
         let ratio = (t_s / positive(key, period)?).round();
@@ -245,6 +272,24 @@ impl PushTable {
                 plane
             }
         }
+    }
+
+    /// What it is called in a file.
+    fn kind(&self) -> &'static str {
+        match self {
+            Self::Rates { .. } => "rates",
+            Self::Impulse { .. } => "impulse",
+            Self::Force { .. } => "force",
+        }
+    }
+
+    /// When it begins: its key, and the time in s.
+    pub(crate) fn beginning(&self) -> (String, f64) {
+        let (name, time) = match *self {
+            Self::Rates { time_s, .. } | Self::Impulse { time_s, .. } => ("time_s", time_s),
+            Self::Force { from_s, .. } => ("from_s", from_s),
+        };
+        (format!("{}.{name}", self.kind()), time)
     }
 
     fn check(&self, key: &dyn Fn(&str) -> String) -> Result<(), ScenarioError> {

@@ -386,6 +386,14 @@ fn reference_files() {
         &["line 4"],
     );
     refused(
+        "twice",
+        "t_s,phi_ref_rad,phi_ref_rad\n0,0,1\n4,1,1\n",
+        &[
+            "line 1",
+            "names `phi_ref_rad` twice, as fields 2 and 3: rename one",
+        ],
+    );
+    refused(
         "column",
         &rows(grid(40)).replace("phi_ref_rad", "phi"),
         &["phi_ref_rad", "t_s, phi"],

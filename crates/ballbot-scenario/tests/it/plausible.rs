@@ -89,6 +89,108 @@ fn other_units_are_asked_about() {
     }
 }
 
+/// The limits of b1, b2 and b4 grow with the robot: b1 of a thousand times an ordinary one was taken.
+#[test]
+fn inertias_and_frictions_that_no_ball_of_this_size_has_are_asked_about() {
+    for (from, to, words) in [
+        (
+            "b1_m2 = 0.002483",
+            "b1_m2 = 29.4",
+            ["parameters.b1_m2 = 29.4", "more than 1.44 m^2"],
+        ),
+        (
+            "b2_m2 = 0.059325",
+            "b2_m2 = 59325.0",
+            ["parameters.b2_m2 = 59325", "59325 mm^2 are 0.05932 m^2"],
+        ),
+        (
+            "b4_m2_s = -0.07436",
+            "b4_m2_s = -10.0",
+            ["parameters.b4_m2_s = -10", "more than 1.177 m^2/s"],
+        ),
+    ] {
+        let mut changed = scenario(&[(from, to)], "");
+        let said = refused(&changed);
+        for word in words {
+            assert!(said.contains(word), "no `{word}` in: {said}");
+        }
+        assert!(said.contains("accept_unusual_values = true"), "{said}");
+        changed.accept_unusual_values = true;
+        if let Err(error) = changed.prepare(Path::new(".")) {
+            assert!(!error.to_string().contains("unusual"), "{error}");
+        }
+    }
+}
+
+/// No setting makes a negative deviation or time right, however large it is.
+#[test]
+fn a_size_below_zero_is_not_called_unusual() {
+    for (lines, key) in [
+        (
+            "[world.sensors.phi]\nnoise_rad = -1.0",
+            "world.sensors.phi.noise_rad = -1",
+        ),
+        (
+            "[world.sensors.theta_dot]\nresolution_rad_s = -1e3",
+            "world.sensors.theta_dot.resolution_rad_s = -1000",
+        ),
+        (
+            "[world.sensors.phi]\ndelay_s = -10.0",
+            "world.sensors.phi.delay_s = -10",
+        ),
+        (
+            "[world]\nsensor_period_s = -10.0",
+            "world.sensor_period_s = -10",
+        ),
+        (
+            "[world.actuator]\nlimit_nm = -1e3",
+            "world.actuator.limit_nm = -1000",
+        ),
+        (
+            "[world.actuator]\ndead_zone_nm = -1e3",
+            "world.actuator.dead_zone_nm = -1000",
+        ),
+        (
+            "[world.actuator]\ncoulomb_friction_nm = -1e3",
+            "world.actuator.coulomb_friction_nm = -1000",
+        ),
+        (
+            "[world.actuator]\nlag_s = -10.0",
+            "world.actuator.lag_s = -10",
+        ),
+        (
+            "[world.delay]\ntransport_s = -10.0",
+            "world.delay.transport_s = -10",
+        ),
+        (
+            "[world.delay]\ncomputation_s = -10.0",
+            "world.delay.computation_s = -10",
+        ),
+        (
+            "[controller.estimator]\nphi_noise_rad = -1.0",
+            "controller.estimator.phi_noise_rad = -1",
+        ),
+        (
+            "[controller.estimator]\ntheta_dot_noise_rad_s = -1e3",
+            "controller.estimator.theta_dot_noise_rad_s = -1000",
+        ),
+        (
+            "[controller.shaping]\ntilt_rad = 0.1\nphi_dot_rad_s = -1e3",
+            "controller.shaping.phi_dot_rad_s = -1000",
+        ),
+    ] {
+        let said = refused(&scenario(&[], lines));
+        assert!(said.contains(key) && !said.contains("unusual"), "{said}");
+    }
+    for (from, to) in [
+        ("t_s = 0.05", "t_s = -50.0"),
+        ("r = 1000.0", "r = 1000.0\ndelay_s = -10.0"),
+    ] {
+        let said = refused(&scenario(&[(from, to)], ""));
+        assert!(!said.contains("unusual"), "{said}");
+    }
+}
+
 #[test]
 fn places_in_other_units_are_asked_about() {
     let jump = "{ time_s = 1.0, phi_rad = 6.283185307179586 }";

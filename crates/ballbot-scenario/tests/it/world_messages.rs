@@ -137,6 +137,19 @@ fn each_mistake_is_named_with_key_value_and_what_is_right() {
             ["controller.motors", "no torque for the planes"],
         ),
         (
+            "[world.floor]\nslope_y_deg = 40.0",
+            ["world.floor.slope_y_deg = 40", "has one plane only"],
+        ),
+        (
+            "[world.robot]\ntilt_offset_y_rad = nan",
+            ["world.robot.tilt_offset_y_rad = NaN", "leave it out"],
+        ),
+        (
+            "[[world.pushes]]\nrates = { time_s = 4.0, theta_dot_rad_s = 1.0 }\n[[world.pushes]]\n\
+             impulse = { time_s = 4.0, momentum_m_s = 0.1, height_m = 0.2, plane = \"y\" }",
+            ["world.pushes[1].impulse.plane = y", "has one plane only"],
+        ),
+        (
             "[heading]\ninertia_m2 = 0.02\nstiffness_nm_rad = 0.1\ndamping_nm_s_rad = 0.03",
             ["heading", "two planes and [controller.motors]"],
         ),

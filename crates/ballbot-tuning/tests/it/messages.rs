@@ -105,6 +105,11 @@ fn mistakes_are_named() {
             ["closed_loop_cost", "own weights"],
         ),
         (
+            "measure = \"rms_torque_nm\"\nstatistic = \"worst\"",
+            "measure = \"rms_error_rad\"\nstatistic = \"mean\"\nat_most = 0.1",
+            ["goal[1] = ", "goal[0] is the same; leave one of them out"],
+        ),
+        (
             "statistic = \"worst\"",
             "statistic = { quantile = 1.5 }",
             ["goal[1].statistic.quantile = 1.5", "below 1"],
@@ -118,6 +123,11 @@ fn mistakes_are_named() {
             "[held_out]",
             "[held_out]\nseed = 1",
             ["held_out.seed = 1", "differ"],
+        ),
+        (
+            "runs = 6",
+            "runs = 0",
+            ["held_out.runs = 0", "it must be from 1"],
         ),
         (
             "[held_out]",

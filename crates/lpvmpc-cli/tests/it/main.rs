@@ -37,13 +37,14 @@ fn fail(folder: &Path, arguments: &[&str]) -> String {
     message
 }
 
-/// A folder with the example, shortened to 1 s.
+/// A folder with the example, shortened to 1 s and pushed within it.
 fn example() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let plant = succeed(folder.path(), &["example", "plant"]);
     fs::write(folder.path().join("cart-pole.json"), plant).unwrap();
     let text = succeed(folder.path(), &["example"]);
     let text = changed(&text, "duration = 6.0", "duration = 1.0");
+    let text = changed(&text, "time = 3.0", "time = 0.8");
     fs::write(folder.path().join("cart-pole.toml"), text).unwrap();
     folder
 }
@@ -266,6 +267,72 @@ fn a_plant_in_discrete_time_is_certified_and_proved_again() {
     .unwrap();
     let message = fail(folder.path(), &["certify", "map.toml"]);
     assert!(message.contains("period of 0.1 s"), "{message}");
+}
+
+/// They were dropped in silence.
+#[test]
+fn jumps_and_loads_after_the_end_are_told() {
+    let folder = example();
+    let text = fs::read_to_string(folder.path().join("cart-pole.toml")).unwrap();
+    let late = "[[world.jump]]\ntime = 3.0\nchange = [0, 0, 0, 0.1]\n[[world.load]]\nstart = 100.0\nend = 101.0\n\
+                load = [0, 0, 0.1, 0]\n";
+    fs::write(folder.path().join("late.toml"), text + late).unwrap();
+    let output = lpvmpc(folder.path(), &["simulate", "late.toml"]);
+    assert!(output.status.success());
+    assert_eq!(
+        String::from_utf8(output.stderr).unwrap(),
+        "note: world.jump 2.time = 3: the run ends at 1 s and does not come to it\n\
+         note: world.load 1.start = 100: the run ends at 1 s and does not come to it\n"
+    );
+}
+
+/// What is called a cost is that of states alone, as its name says; the reference's weights are in the file.
+#[test]
+fn the_cost_of_states_is_without_the_inputs() {
+    let folder = example();
+    let said = succeed(folder.path(), &["simulate", "cart-pole.toml"]);
+    let out = folder.path().join("out/cart-pole");
+    let summary = fs::read_to_string(out.join("summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    assert!(
+        said.contains("cost of states") && said.contains("without the inputs"),
+        "{said}"
+    );
+    let table = fs::read_to_string(out.join("trajectory.csv")).unwrap();
+    let rows = table.lines().skip(1).take(25).map(|line| {
+        let cells = line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN));
+        cells.collect::<Vec<f64>>()
+    });
+    let header: Vec<&str> = table.lines().next().unwrap().split(',').collect();
+    let reference = header
+        .iter()
+        .position(|name| name.contains(" reference"))
+        .unwrap();
+    let cost: f64 = rows
+        .map(|row| {
+            let errors = (0..4).map(|i| row[1 + i] - row[reference + i]);
+            errors
+                .zip([10.0, 10.0, 0.1, 0.1])
+                .map(|(e, q)| q * e * e)
+                .sum::<f64>()
+        })
+        .sum();
+    let found = summary["state_cost"].as_f64().unwrap();
+    assert!((found - cost).abs() < 1e-9 * cost, "{found} for {cost}");
+}
+
+#[test]
+fn weights_of_inputs_that_a_plant_has_none_of_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let plant = r#"{"schema": 1, "name": "drift", "states": [{"name": "place", "unit": "m"}],
+        "operations": [["state", 0], ["neg", 0]], "derivative": [1]}"#;
+    fs::write(folder.path().join("drift.json"), plant).unwrap();
+    let experiment = "name = \"drift\"\nplant = \"drift.json\"\nx0 = [1.0]\nduration = 1.0\n[controller]\n\
+                      t_s = 0.1\nhorizon = 5\nq = [1.0]\nr = [0.01]\n";
+    fs::write(folder.path().join("drift.toml"), experiment).unwrap();
+    let message = fail(folder.path(), &["simulate", "drift.toml"]);
+    let expected = "controller.r: the plant has nothing that it could be for; it must be []";
+    assert!(message.contains(expected), "{message}");
 }
 
 /// An input that is switched off has one bound on both sides, which once could not be drawn.

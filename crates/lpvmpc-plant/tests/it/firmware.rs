@@ -2,7 +2,7 @@
 
 use crate::reference::plant;
 use crate::round_trip::drift;
-use lpvmpc_plant::{FirmwareSettings, Plant, PlantError};
+use lpvmpc_plant::{FirmwareSettings, Operation, Plant, PlantData, PlantError};
 
 fn settings(states: usize, inputs: usize) -> FirmwareSettings {
     FirmwareSettings {
@@ -62,6 +62,50 @@ fn the_program_is_that_of_the_plant() {
     }
 }
 
+/// The program said `-inf`, which is no Rust.
+#[test]
+fn a_bound_beyond_the_numbers_of_f32_is_none() {
+    let mut data = plant("cart-pole").data().clone();
+    (data.inputs[0].lower, data.inputs[0].upper) = (Some(-1e39), Some(1e39));
+    (data.states[0].lower, data.states[0].upper) = (Some(-1e39), Some(1e39));
+    let main = file(&Plant::new(data.clone()).unwrap(), "src/main.rs");
+    for expected in [
+        "lower: SVector::from([f32::NEG_INFINITY]),",
+        "upper: SVector::from([f32::INFINITY]),",
+    ] {
+        assert!(main.contains(expected), "{expected}: {main}");
+    }
+    assert!(!main.contains("soft_bounds"), "{main}");
+    let refused = |data: PlantData| {
+        let plant = Plant::new(data).unwrap();
+        let sizes = (plant.data().states.len(), plant.data().inputs.len());
+        let error = plant.to_firmware(&settings(sizes.0, sizes.1)).unwrap_err();
+        error.to_string()
+    };
+    (data.inputs[0].lower, data.inputs[0].upper) = (Some(1e39), None);
+    data.equilibrium = None;
+    assert_eq!(
+        refused(data.clone()),
+        "inputs[0] (force): no number of f32 is from 1e39 to inf, its bounds"
+    );
+    // What is no bound must be a number.
+    data.inputs[0].lower = None;
+    data.parameters[0].value = 1e39;
+    let message = refused(data);
+    assert!(
+        message.ends_with(": 1e39 is no finite number in f32"),
+        "{message}"
+    );
+    let mut data = plant("functions").data().clone();
+    let is_constant = |one: &&mut Operation| matches!(one, Operation::Constant(_));
+    *data.operations.iter_mut().find(is_constant).unwrap() = Operation::Constant(1e39);
+    let message = refused(data);
+    assert!(
+        message.starts_with("operations[") && message.ends_with("1e39 is no finite number in f32"),
+        "{message}"
+    );
+}
+
 #[test]
 fn settings_that_do_not_fit_are_refused() {
     let plant = plant("cart-pole");
@@ -89,8 +133,22 @@ fn settings_that_do_not_fit_are_refused() {
             "t_s: NaN is no finite number in f32",
         ),
         (
+            refused(|s| s.q[2] = 1e-48),
+            "q: 1e-48 vanishes in f32, whose smallest number is 1.1754944e-38; multiply all weights by a common factor, \
+             which changes nothing",
+        ),
+        (
+            refused(|s| s.r[0] = 1e-40),
+            "r: 1e-40 vanishes in f32, whose smallest number is 1.1754944e-38; multiply all weights by a common factor, \
+             which changes nothing",
+        ),
+        (
+            refused(|s| s.t_s = 1e-50),
+            "t_s: 1e-50 s is no time between samples",
+        ),
+        (
             refused(|s| s.t_s = 0.0),
-            "t_s: 0 s is no time between samples",
+            "t_s: 0.0 s is no time between samples",
         ),
         (
             refused(|s| s.horizon = 0),

@@ -248,6 +248,11 @@ fn a_wrong_list_is_named() {
             "equilibrium.x: 1 numbers where 2 are needed",
         ),
         (
+            "/equilibrium",
+            json!({"x": [std::f64::consts::FRAC_PI_2, 0], "u": [-9.81]}),
+            "equilibrium.u[0]: torque is -9.81; it must be from -8.0 to 8.0, its bounds",
+        ),
+        (
             "/equilibrium/x/0",
             json!(1),
             "equilibrium: it is none: the derivative of rate is 8.25",

@@ -226,7 +226,7 @@ impl Report<'_> {
 
     fn text(&self) -> String {
         let mut said = format!(
-            "{}: {}\ncandidate {} of {} in front: {}\n",
+            "{}: {}\ncandidate {}; {} are in front: {}\n",
             self.tuning.source().file().title,
             self.summed_up(),
             self.found.chosen,

@@ -234,7 +234,7 @@ fn the_log_has_what_the_sensors_delivered_one_file_per_plane() {
         let duration = text.lines().find(|line| line.starts_with("duration_s"));
         text.replace(duration.unwrap(), "duration_s = 1.0") + world
     };
-    std::fs::write(folder.path().join("one.toml"), short("two-setpoints")).unwrap();
+    std::fs::write(folder.path().join("one.toml"), short("single-setpoint")).unwrap();
     std::fs::write(folder.path().join("two.toml"), short("lissajous")).unwrap();
     succeed(folder.path(), &["simulate", "one.toml", "--log", "one.csv"]);
     succeed(
@@ -294,9 +294,14 @@ fn nothing_of_an_earlier_run_stays_in_the_folder() {
 fn keys_are_set_on_the_command_line() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    let short = ["simulate", "two-setpoints", "--set", "duration_s=1.0"];
-    let more = ["--set", "controller.horizon = 10", "--set", "title=Mine"];
-    let said = succeed(here, &[&short[..], &more].concat());
+    let set = ["duration_s=1.0", "controller.horizon = 10", "title=Mine"];
+    let points = "reference.set_points.points=[{time_s=0.0,phi_rad=1.0}]";
+    let set = set
+        .into_iter()
+        .chain([points])
+        .flat_map(|set| ["--set", set]);
+    let command = ["simulate", "two-setpoints"].into_iter().chain(set);
+    let said = succeed(here, &command.collect::<Vec<_>>());
     assert_says(
         &said,
         &["Mine: 20 samples", "from 0 s to 1 s", "closed-loop cost"],
@@ -335,6 +340,89 @@ fn other_programs_get_json_and_scripts_silence() {
     assert_eq!(succeed(here, &[&["-q"], &short[..]].concat()), "");
     // What it prints is the result, and not a report of it.
     assert!(!succeed(here, &["--quiet", "scenario", "show", "lissajous"]).is_empty());
+}
+
+#[test]
+fn a_line_about_readings_ends_as_every_line_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples");
+    let file = examples.join("push-and-move.toml");
+    let short = ["--set", "duration_s=2.5"];
+    let said = succeed(
+        folder.path(),
+        &[&["simulate", file.to_str().unwrap()], &short[..]].concat(),
+    );
+    let last = said.lines().last().unwrap();
+    assert!(last.starts_with("readings: "), "{said}");
+    assert!(said.ends_with(&format!("{last}\n")), "{said}");
+}
+
+/// They were dropped in silence.
+#[test]
+fn what_comes_after_the_end_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = |sets: &[&str]| {
+        let sets = sets.iter().flat_map(|set| ["--set", set]);
+        let arguments: Vec<&str> = ["simulate", "one-metre"].into_iter().chain(sets).collect();
+        let output = crate::ballbot_in(folder.path(), &arguments);
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let points = |time: &str| {
+        format!(
+            "reference.set_points.points=[{{time_s=0.0,phi_rad=0.0}},{{time_s={time},phi_rad=1.0}}]"
+        )
+    };
+    let push = "world.pushes=[{rates={time_s=0.5}}, {impulse={time_s=1.5,momentum_m_s=0.1,height_m=0.3}}, \
+                {force={from_s=9.0,until_s=inf,force_m_s2=0.1,height_m=0.3}}]";
+    assert_eq!(
+        told(&["duration_s=1.5", &points("1.6"), push]),
+        "note: world.pushes[1].impulse.time_s = 1.5: the run ends at 1.5 s and does not come to it\n\
+         note: world.pushes[2].force.from_s = 9: the run ends at 1.5 s and does not come to it\n"
+    );
+    // A set point that a plan looks at is not in vain.
+    assert_eq!(told(&["duration_s=1.5", &points("1.6")]), "");
+    assert_eq!(
+        told(&["duration_s=1.5", &points("30.0")]),
+        "note: reference.set_points.points[1].time_s = 30: the run ends at 1.5 s and does not come to it\n"
+    );
+}
+
+/// It looked like a set point that was followed well.
+#[test]
+fn a_shaped_move_that_does_not_arrive_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let slow = [
+        "simulate",
+        "one-metre",
+        "--set",
+        "controller.shaping.tilt_rad=0.001",
+    ];
+    let said = succeed(folder.path(), &slow);
+    assert_says(
+        &said,
+        &[
+            "the set point of 8.3333 rad is not reached by the end of the run",
+            "[controller.shaping]",
+        ],
+    );
+    let document: Value =
+        serde_json::from_str(&succeed(folder.path(), &[&slow[..], &["--json"]].concat())).unwrap();
+    let plane = &document["planes"][0];
+    let (goal, end) = (
+        &plane["unreached_set_point_rad"],
+        &plane["final_reference_rad"],
+    );
+    assert!((goal.as_f64().unwrap() - 25.0 / 3.0).abs() < 1e-9, "{goal}");
+    let file = folder.path().join("out/one-metre/trajectory.csv");
+    let (_, last) = recorded::trajectory(&file);
+    assert!((end.as_f64().unwrap() - last.reference).abs() < 1e-9 && last.reference < 8.0);
+    assert!(
+        said.contains(&format!("ends at {:.4} rad", end.as_f64().unwrap())),
+        "{said}"
+    );
+    let said = succeed(folder.path(), &["simulate", "one-metre"]);
+    assert!(!said.contains("not reached"), "{said}");
 }
 
 #[test]

@@ -90,6 +90,11 @@ fn a_tuning_writes_a_scenario_that_runs() {
     let summary: Value =
         serde_json::from_slice(&fs::read(out.join("summary.json")).unwrap()).unwrap();
     let front = summary["front"].as_array().unwrap();
+    let (chosen, count) = (&summary["chosen"], front.len());
+    assert_says(
+        &text,
+        &[&format!("\ncandidate {chosen}; {count} are in front: ")],
+    );
     let rows = fs::read_to_string(out.join("candidates.csv")).unwrap();
     assert_eq!(
         rows.lines().count() as u64,
