@@ -623,3 +623,19 @@ def test_laws_and_costs_take_vectors_of_their_size():
     for wrong in ([1, 1, 1], np.ones((3, 1))):
         with pytest.raises(lpvmpc.SettingError, match="u_ref"):
             run.cost([1, 1], [1], u_ref=wrong)
+
+
+def test_a_plan_of_an_unstable_plant_does_not_depend_on_a_long_horizon() -> None:
+    """The regulator within the input bounds runs away from here, to where nothing can be linearised; over 700 samples a step
+    came to no end. The plan comes to rest within 200: its cost is the same, and IPOPT's (2198.1738)."""
+    rng = np.random.default_rng(0)
+    a = rng.normal(size=(16, 16)) * 0.3 - np.eye(16) * 0.2
+    plant = lpvmpc.Plant.from_matrices(a, rng.normal(size=(16, 6)))
+    x0 = rng.normal(size=16)
+    for horizon in (200, 700):
+        limits = ([-0.3] * 6, [0.3] * 6)
+        mpc = lpvmpc.Mpc(plant, 0.05, horizon, np.ones(16), np.ones(6) * 0.1, u_bounds=limits)
+        plan = mpc.step(x0)
+        assert plan.status == "converged"
+        assert plan.cost == pytest.approx(2198.1738, rel=1e-6)
+        assert plan.programs <= 6

@@ -115,7 +115,14 @@ where
             && !self.keeps_bounds(aim)
             && self.hold_matrices(x, aim, tolerance, &mut prices, workspace);
         let begun = first != First::Nothing;
+        // Where another beginning can be looked for.
+        let elsewhere = cfg!(all(feature = "alloc", not(target_arch = "wasm32")));
+        let runs_away = elsewhere && begun && self.runs_away(x, aim);
         let found = begun.then(|| {
+            if runs_away {
+                // As good as none.
+                return Status::NotFinite;
+            }
             let begin = (along, most, tolerance);
             match self.search_within_bounds(x, aim, begin, &mut prices, workspace) {
                 Status::Converged => Status::Converged,
@@ -126,8 +133,12 @@ where
             }
         });
         #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
-        let found = self.look_elsewhere(x, aim, (last, tolerance), (found, prices), workspace);
+        let found = {
+            let last = last.filter(|_| !runs_away);
+            self.look_elsewhere(x, aim, (last, tolerance), (found, prices), workspace)
+        };
         match found {
+            Some(Status::NotFinite) if runs_away => self.publish(Status::NoImprovement),
             Some(status) => self.publish(status),
             None => self.give_up(Status::NotFinite),
         }

@@ -9,12 +9,19 @@ use crate::list::List;
 use crate::model::Scalar;
 use crate::ocp::{Common, Ocp, Stage};
 use crate::riccati::{Adjustment, BadPivot, CostToGo, StageFactor, StageMinimum};
+#[cfg(feature = "alloc")]
+use crate::rows;
 use crate::rows::Trajectory;
+#[cfg(feature = "alloc")]
+use crate::small_matrix::transposed_product;
 use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
 use crate::solver::Solver;
 
 /// Searches with held inputs; two are enough in `f64`, more than ten are rare in `f32`.
 const MOST_SEARCHES: usize = 20;
+/// Changes of the active set between two looks whether bounds drown.
+#[cfg(feature = "alloc")]
+const CHANGES_PER_LOOK: usize = 64;
 
 /// For every input of every stage: the bound that it is held at, if any.
 #[derive(Debug)]
@@ -167,6 +174,54 @@ impl<T: Scalar, const NX: usize, const NU: usize> Adjustment<T, NX, NU>
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
+    /// Fails where the dual method, looked at now and then, has pushed an input so far from what the regulator asks for that
+    /// its bound drowns in the rounding of the difference. The dual cost only grows: without held inputs the search
+    /// would take thousands of changes more and end in the same place. Beside hard bounds of states and rows it goes on,
+    /// for it may be on its way to a proof that they cannot be kept.
+    #[cfg(feature = "alloc")]
+    #[inline(always)]
+    pub(crate) fn check_rounding(&self, ocp: &Ocp<T, NX, NU>) -> Result<(), Status<T>> {
+        if self.dual.changes.is_multiple_of(CHANGES_PER_LOOK) && self.dual.changes > 0 {
+            self.drowned_input(ocp)
+                .map_or(Ok(()), |bound| Err(Status::Inaccurate(bound)))
+        } else {
+            Ok(())
+        }
+    }
+
+    #[cfg(feature = "alloc")]
+    #[cold]
+    #[inline(never)]
+    fn drowned_input(&self, ocp: &Ocp<T, NX, NU>) -> Option<BoundId> {
+        let can_be_kept = |row: ActiveRow<T>| {
+            matches!(row.bound.quantity, Quantity::Input(_)) || row.part != Part::Hard
+        };
+        if !self.dual.active().all(can_be_kept) {
+            return None;
+        }
+        let policies = self.factors.iter().zip(self.dual.v.iter());
+        let mut stages = policies.take(ocp.length()).enumerate();
+        stages.find_map(|(stage, (factor, v))| {
+            let pushed = transposed_product(&factor.inverse_factor, v);
+            let bounds = &ocp.common_at(stage).u;
+            (0..NU).find_map(|j| {
+                let side = if pushed[j] > T::zero() {
+                    Side::Lower
+                } else {
+                    Side::Upper
+                };
+                let bound = BoundId {
+                    stage,
+                    quantity: Quantity::Input(j),
+                    side,
+                };
+                let bounded = bounds.lower[j].is_finite() || bounds.upper[j].is_finite();
+                let rounding = pushed[j].abs() * T::default_epsilon();
+                (bounded && rounding > rows::size(ocp, &bound)).then_some(bound)
+            })
+        })
+    }
+
     /// Tries to answer what the dual method could not, for the rounding at `bound`: with the inputs that
     /// it has found at their bounds held there. `spent` counts the changes of the active set.
     #[cold]

@@ -48,6 +48,9 @@ const MOST_FACTORISATIONS: usize = 24;
 const BOUNDS: usize = 2;
 /// up to so many.
 const MOST_FOR_MANY: usize = 60;
+/// So many stages for each of them that there may be at least: over a long horizon more bounds are active than the trajectory
+/// without bounds violates, and a change takes longer beside so many rows.
+const STAGES: usize = 16;
 /// Part of the changes that there may be, for the dual method has to have enough where this phase has
 /// no answer: one in so many.
 const SHARE: usize = 4;
@@ -198,7 +201,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         newton::measure(&whole, sides, &trajectory(solution));
         let tolerances = Tolerances::new(ocp, &trajectory(solution), solver.dual.tolerance);
         let factorisations = match turn {
-            Turn::First => (expected.bounds / BOUNDS).clamp(MOST_FACTORISATIONS, MOST_FOR_MANY),
+            Turn::First => (expected.bounds / BOUNDS)
+                .max(n / STAGES)
+                .clamp(MOST_FACTORISATIONS, MOST_FOR_MANY),
             Turn::Last => MOST_FACTORISATIONS,
         };
         let trials = factorisations.div_ceil(TRIAL);

@@ -292,6 +292,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 None => break,
             }
             self.roll_out(ocp, solution)?;
+            #[cfg(feature = "alloc")]
+            self.check_rounding(ocp)?;
         }
         // What the tolerance or rounding lets through is no input for an actuator.
         clip_inputs(ocp, solution);

@@ -319,7 +319,13 @@ fn explain<T: Scalar, const NX: usize, const NU: usize>(
         x: program.x,
         u: program.u,
     };
-    newton::explain(&program.span, sides, &trajectory, program.v)
+    newton::explain(
+        &program.span,
+        program.factors,
+        sides,
+        &trajectory,
+        program.v,
+    )
 }
 
 /// Moves to the minimum with the sides as they are, until what is left is `enough` or does not shrink, from a point
@@ -367,7 +373,7 @@ fn refine<T: Scalar, const NX: usize, const NU: usize>(
         (least, last_missed) = (least.min(worst), missed);
         left -= 1;
         let trajectory = (&mut *program.u, &mut *program.x);
-        newton::descend(&program.span, program.factors, program.v);
+        newton::descend(&program.span, program.factors, residual.followed, program.v);
         newton::deviate(&program.span, program.factors, program.v, trajectory, sides);
         measure(program, sides, rounding);
         *residual = explain(program, sides);

@@ -339,13 +339,19 @@ pub(super) struct Residual<T> {
     pub rest: T,
     /// Largest term of a gradient.
     pub largest: T,
+    /// Whether later inputs follow the policies.
+    pub followed: bool,
 }
 
-/// The problem's own adjoint recursion on the trajectory, with the multipliers of the sides at their
+/// The problem's adjoint recursion on the trajectory, with the multipliers of the sides at their
 /// distances: gives every held input its multiplier, and leaves in `slopes` what is left of the gradient in
 /// the inputs.
+///
+/// Where inputs alone are bounded, later ones follow the policies: at a minimum that makes no difference, and
+/// otherwise rounding would grow along the horizon as an unstable plant does.
 pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
     span: &Span<'_, T, NX, NU>,
+    factors: &[StageFactor<T, NX, NU>],
     sides: &mut [BoundSide<T>],
     trajectory: &Trajectory<'_, T, NX, NU>,
     slopes: &mut [SVector<T, NU>],
@@ -355,6 +361,7 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
     let mut residual = Residual {
         rest: T::zero(),
         largest: T::zero(),
+        followed: sides.iter().all(|side| side.input().is_some()),
     };
     let of_rows = |side: &mut BoundSide<T>| match side.input() {
         None if side.role != Role::Free => side.multiplier_at(side.distance),
@@ -368,7 +375,8 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
     // The sizes of what adds up to the costate, and cancels where the sides decide.
     let mut sizes = costate.abs() + of_cost.abs();
     costate += of_cost;
-    for ((i, stage), left) in span.stages().zip(span.of_mut(slopes)).rev() {
+    let stages = span.stages().zip(span.of(factors));
+    for (((i, stage), factor), left) in stages.zip(span.of_mut(slopes)).rev() {
         let here = split_off_mut(&mut before, i);
         let (slope_x, slope_u) = gradient(ocp, here, of_rows);
         let (x, u) = (span.state(trajectory, i), trajectory.u.get(i));
@@ -389,6 +397,9 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
             + product(q, x)
             + transposed_times(s, &u)
             + stage.linear_x;
+        if residual.followed {
+            costate += transposed_product(&factor.feedback, &slope);
+        }
         sizes = costate.abs() + slope_x.abs();
         costate += slope_x;
         *left = slope;
@@ -396,15 +407,20 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
     residual
 }
 
-/// Makes of a gradient in the inputs, in `v`, the deviations that take it away.
+/// Makes of a gradient in the inputs, in `v`, the deviations that take it away. Where later inputs are `followed`, it has
+/// what they do already.
 pub(super) fn descend<T: Scalar, const NX: usize, const NU: usize>(
     span: &Span<'_, T, NX, NU>,
     factors: &[StageFactor<T, NX, NU>],
+    followed: bool,
     v: &mut [SVector<T, NU>],
 ) {
     let mut costate = SVector::zeros();
     let stages = span.stages().zip(span.of(factors)).zip(span.of_mut(v));
     for (((_, stage), factor), v) in stages.rev() {
+        if followed {
+            costate = SVector::zeros();
+        }
         *v = step_back(stage, factor, v, &mut costate);
     }
 }
