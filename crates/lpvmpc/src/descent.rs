@@ -115,9 +115,11 @@ where
             && !self.keeps_bounds(aim)
             && self.hold_matrices(x, aim, tolerance, &mut prices, workspace);
         let begun = first != First::Nothing;
-        // Where another beginning can be looked for.
-        let elsewhere = cfg!(all(feature = "alloc", not(target_arch = "wasm32")));
-        let runs_away = elsewhere && begun && self.runs_away(x, aim);
+        // Where there is another beginning to be looked for.
+        #[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
+        let runs_away = begun && workspace.kept.is_some() && self.runs_away(x, aim);
+        #[cfg(not(all(feature = "alloc", not(target_arch = "wasm32"))))]
+        let runs_away = false;
         let found = begun.then(|| {
             if runs_away {
                 // As good as none.

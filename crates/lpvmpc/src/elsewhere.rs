@@ -102,6 +102,28 @@ where
     T: Scalar,
     P: LpvModel<T, NX, NU, NS>,
 {
+    /// Whether the plan runs away, so far that what rounds off its states is no longer small beside what matters: the
+    /// present state, the reference, and where one sample of anything that acts leads to. A program along it would be one of
+    /// another plant.
+    pub(crate) fn runs_away<D: PlantByStage<P, T, NX, NU, NS>>(
+        &self,
+        x: &SVector<T, NX>,
+        aim: &Aim<'_, T, NX, NU, D>,
+    ) -> bool {
+        let plan = self.rollout.iter().take(self.settings.horizon);
+        let far = plan.fold(T::zero(), |most, x| most.max(x.amax()));
+        let is_small = |size: T| size < far * T::default_epsilon().sqrt();
+        let one_sample = |(i, u): (usize, &SVector<T, NU>)| {
+            let (model, settings) = (&self.model, &self.settings);
+            aim.own.next_state(i, model, settings, x, u).amax()
+        };
+        is_small(x.amax())
+            && (0..=self.settings.horizon).all(|i| is_small(aim.at(i).amax()))
+            && (self.policy.u.iter().enumerate())
+                .take(self.settings.horizon)
+                .all(|acting| is_small(one_sample(acting)))
+    }
+
     /// What was `found` (a status, if there is a plan), or something cheaper; `last` is what the plan of the sample before
     /// cost. Without room for a second plan nothing is looked for.
     #[inline(never)]

@@ -75,20 +75,6 @@ where
         states.all(|(i, x)| aim.own.x(i + 1).unwrap_or(&self.settings.x).hold_at(x))
     }
 
-    /// Whether the plan goes so far away that what rounds off its states is no longer small beside those that matter: a
-    /// program along it would be one of another plant.
-    pub(crate) fn runs_away<D: PlantByStage<P, T, NX, NU, NS>>(
-        &self,
-        x: &SVector<T, NX>,
-        aim: &Aim<'_, T, NX, NU, D>,
-    ) -> bool {
-        let near = x.amax().max(aim.end().amax());
-        let near = near.max(at(&self.rollout, 0).amax());
-        let plan = self.rollout.iter().take(self.settings.horizon);
-        let far = plan.fold(T::zero(), |most, x| most.max(x.amax()));
-        far * T::default_epsilon().sqrt() > near
-    }
-
     /// One program with the matrices of `x` at all stages, as one program per sample begins, too. The plan moves towards its
     /// answer as far as that is better; whether it does is the answer.
     ///

@@ -274,3 +274,45 @@ fn parameters_that_are_told_are_checked_as_others_are() {
     mpc.set_settings(&settings).unwrap();
     assert!(mpc.step(&[1.0], &told(&[100.0])).is_err());
 }
+
+/// A plan that rests at first, goes somewhere and comes back does not run away, however small the state is that it begins
+/// with: the last sample's plan is gone on from.
+#[test]
+fn a_plan_that_leaves_and_comes_back_is_gone_on_from() {
+    let told = |sample: usize| {
+        let stages = sample..sample + 31;
+        let x_ref = stages.clone().map(|k| {
+            let away = if (14..24).contains(&k) { 0.2 } else { 0.0 };
+            DVector::from_row_slice(&[away, 0.0, 0.0, 0.0])
+        });
+        let u_bounds = stages.map(|k| {
+            let most = if k < 8 { 0.0 } else { 5.0 };
+            Limits {
+                lower: vec![-most],
+                upper: vec![most],
+            }
+        });
+        Preview {
+            x_ref: x_ref.collect(),
+            u_ref: vec![DVector::zeros(1)],
+            u_bounds: u_bounds.collect(),
+            ..Preview::default()
+        }
+    };
+    for size in [0.0, 1e-300, 1e-12] {
+        let mut mpc = Mpc::new(&cart_pole(), &settings()).unwrap();
+        let x = [size, 0.0, 0.0, 0.0];
+        let first = mpc.step(&x, &told(0)).unwrap();
+        assert!(first.x.amax() > 0.01, "{}", first.x.amax());
+        let next = mpc.step(&x, &told(1)).unwrap();
+        println!(
+            "{size} {} {} {} {}",
+            first.problems, next.problems, first.cost, next.cost
+        );
+        assert!(
+            next.is_solved() && next.problems <= 2,
+            "{size}: {}",
+            next.problems
+        );
+    }
+}
