@@ -305,10 +305,6 @@ fn a_plan_that_leaves_and_comes_back_is_gone_on_from() {
         let first = mpc.step(&x, &told(0)).unwrap();
         assert!(first.x.amax() > 0.01, "{}", first.x.amax());
         let next = mpc.step(&x, &told(1)).unwrap();
-        println!(
-            "{size} {} {} {} {}",
-            first.problems, next.problems, first.cost, next.cost
-        );
         assert!(
             next.is_solved() && next.problems <= 2,
             "{size}: {}",
