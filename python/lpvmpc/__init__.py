@@ -29,7 +29,8 @@ from .estimator import Disturbance, Estimate, Estimator, Gate
 from .mpc import Mpc
 from .plan import ActiveBound, Plan
 from .plant import Embedding, Plant, Signal, SteadyState
-from .simulation import Actuator, Jump, Load, Run, Sensor, simulate
+from .simulation import Run, simulate
+from .world import Actuator, Jump, Load, Sensor
 
 __all__ = [
     "ActiveBound",

@@ -113,8 +113,7 @@ impl<'a, F: Files + Copy + Sync> Tuning<'a, F> {
         };
         let worlds = campaign(&source.worlds, "worlds")?;
         let held_out = campaign(&source.held_out, "held_out")?;
-        let duration = worlds.scenario(&worlds.draw(0))?;
-        let duration = duration.samples as f64 * duration.settings.t_s;
+        let duration = worlds.scenario(&worlds.draw(0))?.end();
         let judge = Judge::new(file, duration)?;
         check_search(&file.search, judge.goals.len(), axes.len())?;
         Ok(Self {

@@ -1,21 +1,27 @@
 //! An experiment: a plant from a file, its controller, and what happens to it.
 
+mod signals;
+mod world;
+
 use crate::arguments::{Example, ExampleArguments};
 use crate::describe::load;
 use crate::error::CommandError;
 use crate::estimator::EstimatorTable;
 use lpvmpc_any::{
-    EstimatorSettings, Iterations, Limits, LinearModels, MpcError, MpcSettings, Push, Quantity,
-    Sensor, StateBounds, Terminal, USUAL_NODES, WorldSettings,
+    EstimatorSettings, Iterations, LinearModels, MpcError, MpcSettings, StateBounds, Terminal,
+    USUAL_NODES, WorldSettings,
 };
 use lpvmpc_plant::{Plant, Signal};
 use lpvmpc_terminal::table::short;
-use lpvmpc_words::{nearest, toml_message};
+use lpvmpc_words::toml_message;
 use nalgebra::{DMatrix, DVector};
 use serde::Deserialize;
+pub use signals::{check_name, components, names};
+use signals::{limits, weights};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use world::World;
 
 /// The files of the example.
 pub fn example(arguments: &ExampleArguments) -> &'static str {
@@ -155,32 +161,6 @@ enum Method {
     Fixed,
 }
 
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields, default)]
-struct World {
-    parameters: BTreeMap<String, f64>,
-    delay: f64,
-    noise: BTreeMap<String, f64>,
-    seed: u64,
-    jump: Vec<Jump>,
-    load: Vec<Load>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Jump {
-    time: f64,
-    change: Vec<f64>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Load {
-    start: f64,
-    end: f64,
-    load: Vec<f64>,
-}
-
 /// The most samples of a run.
 const MOST_SAMPLES: f64 = 1e6;
 
@@ -215,28 +195,6 @@ impl Experiment {
     pub fn files(&self) -> Vec<PathBuf> {
         let read = [self.path.clone(), self.plant_file.clone()];
         read.into_iter().chain(self.certificate.clone()).collect()
-    }
-
-    /// Jumps and loads that the run ends before, a sentence each.
-    pub fn too_late(&self) -> Vec<String> {
-        let end = self.samples as f64 * self.settings.t_s;
-        let (mut jumps, mut loads) = (0, 0);
-        let begin = self.world.pushes.iter().map(|push| match push {
-            Push::Jump { time, .. } => {
-                jumps += 1;
-                (format!("world.jump {jumps}.time"), *time)
-            }
-            Push::Load { from, .. } => {
-                loads += 1;
-                (format!("world.load {loads}.start"), *from)
-            }
-        });
-        let late = begin.filter(|(_, time)| *time >= end);
-        let told = late.map(|(key, time)| {
-            let (time, end) = (short(time), short(end));
-            format!("{key} = {time}: the run ends at {end} s and does not come to it")
-        });
-        told.collect()
     }
 
     /// What its controller or its world refuses, in words that name its file.
@@ -434,149 +392,4 @@ impl Controller {
             other => other,
         })
     }
-}
-
-impl World {
-    /// `measured` are the states and outputs that an estimator reads; without one, it is the states.
-    fn settings(
-        self,
-        period: f64,
-        states: &[Signal],
-        measured: Option<&[String]>,
-    ) -> Result<WorldSettings, String> {
-        let begins = |place: &str, key: &str, time: f64| match time < 0.0 {
-            true => Err(format!("{place}.{key} = {time}: the run begins at 0 s")),
-            false => Ok(()),
-        };
-        for (i, jump) in self.jump.iter().enumerate() {
-            let place = format!("world.jump {}", i + 1);
-            components(&place, &jump.change, states)?;
-            begins(&place, "time", jump.time)?;
-        }
-        for (i, load) in self.load.iter().enumerate() {
-            let place = format!("world.load {}", i + 1);
-            components(&place, &load.load, states)?;
-            begins(&place, "end", load.end)?;
-        }
-        let states = names(states);
-        let sensed: Vec<&str> = match measured {
-            Some(measured) => measured.iter().map(String::as_str).collect(),
-            None => states.clone(),
-        };
-        for name in self.noise.keys() {
-            check_name("world.noise", name, sensed.iter().copied())?;
-        }
-        let sensor = |name: &&str| {
-            let row = states.iter().map(|one| if one == name { 1.0 } else { 0.0 });
-            let of = match states.contains(name) {
-                true => Quantity::Row(row.collect()),
-                false => Quantity::Output((*name).to_owned()),
-            };
-            Sensor {
-                noise: self.noise.get(*name).copied().unwrap_or(0.0),
-                ..Sensor::ideal(of)
-            }
-        };
-        let is_ideal = measured.is_none() && self.noise.is_empty();
-        let jumps = self.jump.into_iter().map(|jump| Push::Jump {
-            time: jump.time,
-            change: jump.change,
-        });
-        let loads = self.load.into_iter().map(|load| Push::Load {
-            from: load.start,
-            until: load.end,
-            load: load.load,
-        });
-        Ok(WorldSettings {
-            sensors: (!is_ideal).then(|| sensed.iter().map(sensor).collect()),
-            delay: self.delay,
-            pushes: jumps.chain(loads).collect(),
-            seed: self.seed,
-            ..WorldSettings::ideal(period)
-        })
-    }
-}
-
-/// Their names.
-pub fn names(signals: &[Signal]) -> Vec<&str> {
-    signals.iter().map(|one| one.name.as_str()).collect()
-}
-
-/// One finite number for each signal.
-pub fn components(place: &str, list: &[f64], signals: &[Signal]) -> Result<(), String> {
-    if signals.is_empty() && !list.is_empty() {
-        return Err(format!(
-            "{place}: the plant has nothing that it could be for; it must be []"
-        ));
-    }
-    if list.len() != signals.len() {
-        return Err(format!(
-            "{place}: {} numbers; it needs {}, for {}",
-            list.len(),
-            signals.len(),
-            names(signals).join(", ")
-        ));
-    }
-    let mut pairs = signals.iter().zip(list);
-    match pairs.find(|(_, value)| !value.is_finite()) {
-        Some((signal, value)) => Err(format!("{place}: {} = {value} is not finite", signal.name)),
-        None => Ok(()),
-    }
-}
-
-/// The same of weights.
-fn weights(place: &str, list: &[f64], signals: &[Signal]) -> Result<(), String> {
-    components(place, list, signals)?;
-    let mut pairs = signals.iter().zip(list);
-    match pairs.find(|(_, weight)| **weight < 0.0) {
-        Some((signal, weight)) => Err(format!(
-            "{place}: the weight of {} is {}; it must not be negative",
-            signal.name,
-            short(*weight)
-        )),
-        None => Ok(()),
-    }
-}
-
-/// Bounds of each signal: those given by name, else its own.
-fn limits(place: &str, given: &Option<Pairs>, signals: &[Signal]) -> Result<Limits, String> {
-    for (name, Pair([lower, upper])) in given.iter().flatten() {
-        check_name(place, name, names(signals).into_iter())?;
-        if !(lower <= upper) {
-            let (lower, upper) = (short(*lower), short(*upper));
-            return Err(format!(
-                "{place}: {name} = [{lower}, {upper}] has no value between"
-            ));
-        }
-    }
-    let pair = |signal: &Signal| match given.as_ref().and_then(|given| given.get(&signal.name)) {
-        Some(Pair(pair)) => *pair,
-        None => [
-            signal.lower.unwrap_or(f64::NEG_INFINITY),
-            signal.upper.unwrap_or(f64::INFINITY),
-        ],
-    };
-    let pairs: Vec<[f64; 2]> = signals.iter().map(pair).collect();
-    Ok(Limits {
-        lower: pairs.iter().map(|pair| pair[0]).collect(),
-        upper: pairs.iter().map(|pair| pair[1]).collect(),
-    })
-}
-
-/// Whether it is one of these names.
-pub fn check_name<'a>(
-    place: &str,
-    name: &str,
-    known: impl Iterator<Item = &'a str>,
-) -> Result<(), String> {
-    let known: Vec<&str> = known.collect();
-    if known.contains(&name) {
-        return Ok(());
-    }
-    let meant = nearest(name, known.iter().copied());
-    Err(format!(
-        "{place}: there is no {name:?}; there are {}{}",
-        known.join(", "),
-        meant.map_or(String::new(), |meant| format!("; did you mean {meant:?}?"))
-    ))
 }

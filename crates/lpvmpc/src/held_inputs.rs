@@ -7,11 +7,13 @@
 use crate::adjoint::Adjoint;
 use crate::list::List;
 use crate::model::Scalar;
+#[cfg(feature = "alloc")]
+use crate::ocp::Bounds;
 use crate::ocp::{Common, Ocp, Stage};
 use crate::riccati::{Adjustment, BadPivot, CostToGo, StageFactor, StageMinimum};
-#[cfg(feature = "alloc")]
-use crate::rows;
 use crate::rows::Trajectory;
+#[cfg(feature = "alloc")]
+use crate::rows::size_of_bound;
 #[cfg(feature = "alloc")]
 use crate::small_matrix::transposed_product;
 use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
@@ -19,7 +21,7 @@ use crate::solver::Solver;
 
 /// Searches with held inputs; two are enough in `f64`, more than ten are rare in `f32`.
 const MOST_SEARCHES: usize = 20;
-/// Changes of the active set between two looks whether bounds drown.
+/// Whether bounds drown is looked at where the number of changes is a multiple of this.
 #[cfg(feature = "alloc")]
 const CHANGES_PER_LOOK: usize = 64;
 
@@ -203,21 +205,19 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         let mut stages = policies.take(ocp.length()).enumerate();
         stages.find_map(|(stage, (factor, v))| {
             let pushed = transposed_product(&factor.inverse_factor, v);
-            let bounds = &ocp.common_at(stage).u;
-            (0..NU).find_map(|j| {
-                let side = if pushed[j] > T::zero() {
-                    Side::Lower
-                } else {
-                    Side::Upper
-                };
-                let bound = BoundId {
-                    stage,
-                    quantity: Quantity::Input(j),
-                    side,
-                };
-                let bounded = bounds.lower[j].is_finite() || bounds.upper[j].is_finite();
-                let rounding = pushed[j].abs() * T::default_epsilon();
-                (bounded && rounding > rows::size(ocp, &bound)).then_some(bound)
+            let Bounds { lower, upper } = &ocp.common_at(stage).u;
+            let drowns = |j: &usize| {
+                let bounded = lower[*j].is_finite() || upper[*j].is_finite();
+                let rounding = pushed[*j].abs() * T::default_epsilon();
+                bounded && rounding > size_of_bound(lower[*j], upper[*j])
+            };
+            (0..NU).find(drowns).map(|j| BoundId {
+                stage,
+                quantity: Quantity::Input(j),
+                side: match pushed[j] > T::zero() {
+                    true => Side::Lower,
+                    false => Side::Upper,
+                },
             })
         })
     }

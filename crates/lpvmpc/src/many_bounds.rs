@@ -15,6 +15,7 @@ mod guess;
 mod interior_point;
 mod last_answer;
 mod newton;
+mod residual;
 mod retries;
 mod search;
 mod side;

@@ -205,7 +205,7 @@ struct Error {
 impl Error {
     fn of(run: &Simulated) -> Self {
         let planes = || run.prepared.planes.iter().zip(&run.trajectories);
-        let end = run.prepared.samples as f64 * run.prepared.settings.t_s;
+        let end = run.prepared.end();
         // The planes of a run have references of one kind.
         let [from_s, until_s] = window(run.prepared.planes.first(), end);
         let squares = planes().map(|(_, trajectory)| mean_square(trajectory, [from_s, until_s]));

@@ -24,6 +24,21 @@ fn refused(scenario: &Scenario) -> String {
     }
 }
 
+/// The scenario with the change is refused, in these words, unless it says that it means it.
+fn asked_about(change: (&str, &str), words: [&str; 2]) {
+    let mut changed = scenario(&[change], "");
+    let said = refused(&changed);
+    for word in words {
+        assert!(said.contains(word), "no `{word}` in: {said}");
+    }
+    assert!(said.contains("accept_unusual_values = true"), "{said}");
+    // Said to be meant, they are not asked about again; work without end stays refused.
+    changed.accept_unusual_values = true;
+    if let Err(error) = changed.prepare(Path::new(".")) {
+        assert!(!error.to_string().contains("unusual"), "{error}");
+    }
+}
+
 #[test]
 fn other_units_are_asked_about() {
     let theta = "theta_rad = [-1.0471975511965976, 1.0471975511965976]";
@@ -75,17 +90,7 @@ fn other_units_are_asked_about() {
             ["controller.delay_s = 1000000", "more than 1 s"],
         ),
     ] {
-        let mut changed = scenario(&[(from, to)], "");
-        let said = refused(&changed);
-        for word in words {
-            assert!(said.contains(word), "no `{word}` in: {said}");
-        }
-        assert!(said.contains("accept_unusual_values = true"), "{said}");
-        // Said to be meant, they are not asked about again; work without end stays refused.
-        changed.accept_unusual_values = true;
-        if let Err(error) = changed.prepare(Path::new(".")) {
-            assert!(!error.to_string().contains("unusual"), "{error}");
-        }
+        asked_about((from, to), words);
     }
 }
 
@@ -109,16 +114,7 @@ fn inertias_and_frictions_that_no_ball_of_this_size_has_are_asked_about() {
             ["parameters.b4_m2_s = -10", "more than 1.177 m^2/s"],
         ),
     ] {
-        let mut changed = scenario(&[(from, to)], "");
-        let said = refused(&changed);
-        for word in words {
-            assert!(said.contains(word), "no `{word}` in: {said}");
-        }
-        assert!(said.contains("accept_unusual_values = true"), "{said}");
-        changed.accept_unusual_values = true;
-        if let Err(error) = changed.prepare(Path::new(".")) {
-            assert!(!error.to_string().contains("unusual"), "{error}");
-        }
+        asked_about((from, to), words);
     }
 }
 

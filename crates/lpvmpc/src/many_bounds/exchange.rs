@@ -7,6 +7,7 @@
 
 use super::guess;
 use super::newton;
+use super::residual::{self, Residual};
 use super::side::{self, BoundSide, Role};
 use super::span::Span;
 use crate::model::Scalar;
@@ -314,12 +315,12 @@ fn drop_rounding<T: Scalar>(sides: &mut [BoundSide<T>], rounding: T) {
 fn explain<T: Scalar, const NX: usize, const NU: usize>(
     program: &mut Program<'_, T, NX, NU>,
     sides: &mut [BoundSide<T>],
-) -> newton::Residual<T> {
+) -> Residual<T> {
     let trajectory = Trajectory {
         x: program.x,
         u: program.u,
     };
-    newton::explain(
+    residual::explain(
         &program.span,
         program.factors,
         sides,
@@ -336,7 +337,7 @@ fn explain<T: Scalar, const NX: usize, const NU: usize>(
 fn refine<T: Scalar, const NX: usize, const NU: usize>(
     program: &mut Program<'_, T, NX, NU>,
     sides: &mut [BoundSide<T>],
-    residual: &mut newton::Residual<T>,
+    residual: &mut Residual<T>,
     tolerances: &Tolerances<T>,
     (enough, tolerance): (T, T),
 ) -> bool {
@@ -373,7 +374,7 @@ fn refine<T: Scalar, const NX: usize, const NU: usize>(
         (least, last_missed) = (least.min(worst), missed);
         left -= 1;
         let trajectory = (&mut *program.u, &mut *program.x);
-        newton::descend(&program.span, program.factors, residual.followed, program.v);
+        residual::descend(&program.span, program.factors, residual.followed, program.v);
         newton::deviate(&program.span, program.factors, program.v, trajectory, sides);
         measure(program, sides, rounding);
         *residual = explain(program, sides);

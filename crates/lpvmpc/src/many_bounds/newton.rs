@@ -1,17 +1,16 @@
-//! The linear-quadratic program that the sides of the bounds make of the problem: its factors, its
-//! trajectory, and what is missing for a minimum.
+//! The linear-quadratic program that the sides of the bounds make of the problem: its factors and its
+//! trajectory.
 
 use super::side::{
     BoundSide, Role, by_bound, split_first_mut, split_off, split_off_mut, split_states,
 };
 use super::span::Span;
 use crate::model::Scalar;
-use crate::ocp::{Common, Ocp, Stage};
+use crate::ocp::{Ocp, Stage};
 use crate::riccati::{Adjustment, BadPivot, CostToGo, StageFactor, StageMinimum};
 use crate::rows::Trajectory;
 use crate::small_matrix::{
-    add_outer_product, add_scaled, largest, product, transposed_product, transposed_sizes,
-    transposed_times,
+    add_outer_product, add_scaled, product, transposed_product, transposed_times,
 };
 use crate::solution::Quantity;
 use nalgebra::SVector;
@@ -233,7 +232,7 @@ pub(super) fn measure_each<T: Scalar, const NX: usize, const NU: usize>(
 
 /// The derivative of the sides' part of the Lagrangian at a stage, in state and input, with these
 /// multipliers.
-fn gradient<T: Scalar, const NX: usize, const NU: usize>(
+pub(super) fn gradient<T: Scalar, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
     sides: &mut [BoundSide<T>],
     mut multiplier: impl FnMut(&mut BoundSide<T>) -> T,
@@ -285,7 +284,7 @@ pub(super) fn shift<T: Scalar, const NX: usize, const NU: usize>(
 /// The deviation that takes the gradient `slope` in the input, and what the costate means for it, away; the
 /// costate becomes that in front of the stage.
 #[inline(always)]
-fn step_back<T: Scalar, const NX: usize, const NU: usize>(
+pub(super) fn step_back<T: Scalar, const NX: usize, const NU: usize>(
     stage: &Stage<T, NX, NU>,
     factor: &StageFactor<T, NX, NU>,
     slope: &SVector<T, NU>,
@@ -330,98 +329,6 @@ fn take_up<T: Scalar, const NX: usize, const NU: usize>(
     for side in sides.iter_mut().filter(|side| side.is_weighted()) {
         let change = side.value(ocp, change_x, change_u) * side.sign;
         side.base -= side.weight * (side.distance + change);
-    }
-}
-
-/// What is missing for a minimum.
-pub(super) struct Residual<T> {
-    /// Largest entry of the Lagrangian's gradient in inputs that are not held.
-    pub rest: T,
-    /// Largest term of a gradient.
-    pub largest: T,
-    /// Whether later inputs follow the policies.
-    pub followed: bool,
-}
-
-/// The problem's adjoint recursion on the trajectory, with the multipliers of the sides at their
-/// distances: gives every held input its multiplier, and leaves in `slopes` what is left of the gradient in
-/// the inputs.
-///
-/// Where inputs alone are bounded, later ones follow the policies: at a minimum that makes no difference, and
-/// otherwise rounding would grow along the horizon as an unstable plant does.
-pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
-    span: &Span<'_, T, NX, NU>,
-    factors: &[StageFactor<T, NX, NU>],
-    sides: &mut [BoundSide<T>],
-    trajectory: &Trajectory<'_, T, NX, NU>,
-    slopes: &mut [SVector<T, NU>],
-) -> Residual<T> {
-    let ocp = span.ocp;
-    let n = ocp.length();
-    let mut residual = Residual {
-        rest: T::zero(),
-        largest: T::zero(),
-        followed: sides.iter().all(|side| side.input().is_some()),
-    };
-    let of_rows = |side: &mut BoundSide<T>| match side.input() {
-        None if side.role != Role::Free => side.multiplier_at(side.distance),
-        _ => T::zero(),
-    };
-    let mut before = sides;
-    let end = split_off_mut(&mut before, n);
-    let (mut costate, _) = gradient(ocp, end, of_rows);
-    end.iter_mut().for_each(|side| side.estimate = side.base);
-    let of_cost = ocp.terminal.p * span.state(trajectory, n) + ocp.terminal.linear_x;
-    // The sizes of what adds up to the costate, and cancels where the sides decide.
-    let mut sizes = costate.abs() + of_cost.abs();
-    costate += of_cost;
-    let stages = span.stages().zip(span.of(factors));
-    for (((i, stage), factor), left) in stages.zip(span.of_mut(slopes)).rev() {
-        let here = split_off_mut(&mut before, i);
-        let (slope_x, slope_u) = gradient(ocp, here, of_rows);
-        let (x, u) = (span.state(trajectory, i), trajectory.u.get(i));
-        let u = u.copied().unwrap_or_else(SVector::zeros);
-        let Common { q, r, s, .. } = ocp.common_at(i);
-        let through = transposed_times(&stage.b, &costate);
-        let mut slope = product(r, &u) + product(s, x) + stage.linear_u + through + slope_u;
-        let terms = largest(&transposed_sizes(&stage.b, &sizes));
-        residual.largest = residual.largest.max(terms).max(largest(&slope_u));
-        for side in here.iter_mut().filter(|side| side.role == Role::Held) {
-            side.estimate = match side.input() {
-                None => side.base,
-                Some(j) => side.sign * core::mem::replace(&mut slope[j], T::zero()),
-            };
-        }
-        residual.rest = residual.rest.max(largest(&slope));
-        costate = transposed_times(&stage.a, &costate)
-            + product(q, x)
-            + transposed_times(s, &u)
-            + stage.linear_x;
-        if residual.followed {
-            costate += transposed_product(&factor.feedback, &slope);
-        }
-        sizes = costate.abs() + slope_x.abs();
-        costate += slope_x;
-        *left = slope;
-    }
-    residual
-}
-
-/// Makes of a gradient in the inputs, in `v`, the deviations that take it away. Where later inputs are `followed`, it has
-/// what they do already.
-pub(super) fn descend<T: Scalar, const NX: usize, const NU: usize>(
-    span: &Span<'_, T, NX, NU>,
-    factors: &[StageFactor<T, NX, NU>],
-    followed: bool,
-    v: &mut [SVector<T, NU>],
-) {
-    let mut costate = SVector::zeros();
-    let stages = span.stages().zip(span.of(factors)).zip(span.of_mut(v));
-    for (((_, stage), factor), v) in stages.rev() {
-        if followed {
-            costate = SVector::zeros();
-        }
-        *v = step_back(stage, factor, v, &mut costate);
     }
 }
 
