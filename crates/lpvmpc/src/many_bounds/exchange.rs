@@ -223,6 +223,11 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
                 wrong = release_unmet(sides, tolerances.violation);
             }
             if wrong == 0 {
+                // Those that the residual is judged with: a weight makes much of a distance that is hardly more than
+                // rounding.
+                for side in sides.iter_mut().filter(|side| side.is_weighted()) {
+                    side.estimate = side.multiplier_at(side.distance);
+                }
                 return near && is_of_the_plant(program, tolerances.violation);
             }
         }

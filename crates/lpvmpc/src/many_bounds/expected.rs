@@ -72,8 +72,9 @@ impl Expected {
         // As a rule most of those that are known hold again, and others are violated only as long as they do not.
         let little = if NU == 1 { LITTLE_OF_ONE } else { LITTLE };
         let tells = !rows && little * known >= violated;
-        // No more can hold independently than there are inputs.
-        let bounds = if tells { known } else { violated }.min(ocp.length() * NU);
+        // No more can hold independently than there are inputs, but any number can be exceeded.
+        let most = if soft { usize::MAX } else { ocp.length() * NU };
+        let bounds = if tells { known } else { violated }.min(most);
         Self {
             violated,
             bounds,

@@ -16,11 +16,13 @@ use nalgebra::{SVector, convert};
 
 /// Part of the way to the nearest zero that a step may take.
 const NEARLY: f64 = 0.995;
+/// A step that goes a smaller part of its way is short.
+const SHORT: f64 = 0.3;
+/// Still smaller parts mean that bounds may contradict each other.
+pub(super) const STUCK: f64 = 0.1;
 
-/// Least slack to begin with, as a part of the bound's size; of a soft one, which need not be kept, its slack and its
-/// excess.
+/// Least slack to begin with, as a part of the bound's size.
 const LEAST: f64 = 1.0;
-const LEAST_SOFT: f64 = 0.2;
 /// And as a part of the largest violation, each in its bound's size: from far beyond their bounds steps that begin with
 /// little slack are short.
 const LEAST_OF_WORST: f64 = 0.1;
@@ -28,6 +30,11 @@ const LEAST_OF_WORST: f64 = 0.1;
 const PER_VIOLATION: f64 = 0.3;
 /// so many times.
 const LARGEST: f64 = 100.0;
+/// Those of a soft side begin with this part of what it costs to exceed its bound by as much as the worst is violated: with
+/// less the role that it begins with, which may be wrong, is hard to leave.
+const UNDECIDED_SOFT: f64 = 0.5;
+/// Part of its bound's size at which its price counts.
+const EXCESS: f64 = 0.1;
 
 /// Between the parts of its slack and of its multiplier that a step leaves there is less than this where it does not say
 /// clearly which of them goes to zero.
@@ -149,31 +156,26 @@ impl<T: Scalar> InteriorPoint<T> {
             worst.max(-side.distance / side.size)
         });
         let times = worst * convert(PER_VIOLATION);
-        let cost = cost * times.max(T::one()).min(convert(LARGEST));
+        let times = times.max(T::one()).min(convert(LARGEST));
+        let cost = cost * times;
         let least_of_hard = convert::<f64, T>(LEAST).max(worst * convert(LEAST_OF_WORST));
         for side in sides.iter_mut() {
-            let least = side.soft.map_or(least_of_hard, |_| convert(LEAST_SOFT));
-            let least = side.size * least;
-            let slack = side.distance.max(least);
-            let excess = (slack - side.distance).max(least);
-            let multiplier = cost / slack;
             side.interior = match side.soft {
-                None => Interior {
-                    slack,
-                    multiplier,
-                    excess: T::zero(),
-                    rest: T::zero(),
-                },
-                // Both multipliers add up to the price.
-                Some(price) => {
-                    let whole = price.linear + price.quadratic * excess;
-                    let multiplier = multiplier.min(whole * convert(0.5));
+                None => {
+                    let slack = side.distance.max(side.size * least_of_hard);
                     Interior {
                         slack,
-                        multiplier,
-                        excess,
-                        rest: whole - multiplier,
+                        multiplier: cost / slack,
+                        excess: T::zero(),
+                        rest: T::zero(),
                     }
+                }
+                Some(price) => {
+                    let excess = (-side.distance).max(side.size * convert(EXCESS));
+                    let price = price.linear + price.quadratic * excess;
+                    let far = side.distance.max(side.size * worst.max(T::one()));
+                    let product = price * far * times * convert(UNDECIDED_SOFT);
+                    centred(side.distance, price, product.max(cost))
                 }
             };
             side.role = Role::Free;
@@ -281,37 +283,33 @@ impl<T: Scalar> InteriorPoint<T> {
 
     /// The corrector: the trajectory of the prediction moves on, and the sides' unknowns go towards it as far
     /// as they stay above zero. Returns that part of the way.
+    ///
+    /// Where that is short, what the prediction's products add to second order is of a way that is not gone: then the step
+    /// is one towards equal products alone, from which the next one gets farther. Of bounds that contradict each other
+    /// the multipliers are to grow.
     pub fn correct<const NX: usize, const NU: usize>(
         &mut self,
         span: &Span<'_, T, NX, NU>,
         sides: &mut [BoundSide<T>],
         factors: &[StageFactor<T, NX, NU>],
         v: &mut [SVector<T, NU>],
-        (u, x): (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
+        mut trajectory: (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
     ) -> T {
         let sum = self.complementarity * self.count;
         let ratio = ((sum + self.prediction.change()) / sum).max(T::zero());
         let center = ratio * ratio * ratio * self.complementarity;
-        let change = |side: &mut BoundSide<T>| {
-            // The center, less what the prediction's own products add.
-            side.target = Target {
-                slack: center - side.target.slack,
-                excess: center - side.target.excess,
-            };
-            let change = match side.soft {
-                None => side.target.slack / side.interior.slack,
-                Some(_) => multiplier(side, side.target).0 - side.base,
-            };
-            side.base += change;
-            change
+        let with_products = |predicted: Target<T>| Target {
+            slack: center - predicted.slack,
+            excess: center - predicted.excess,
         };
-        newton::shift(span, factors, sides, change, v, (u, x));
-        let mut part = Part::far();
-        newton::measure_each(span, sides, &Trajectory { x, u }, |side| {
-            let corrected = step_to(side, side.target);
-            part.keep_above_zero(&side.interior, &corrected, side.soft.is_some());
-        });
-        let part = part.shortened(convert(NEARLY));
+        let mut part = aim(span, sides, factors, v, &mut trajectory, with_products);
+        if (convert(STUCK)..convert(SHORT)).contains(&part.shortest()) {
+            let equal = Target {
+                slack: self.complementarity,
+                excess: self.complementarity,
+            };
+            part = aim(span, sides, factors, v, &mut trajectory, |_| equal);
+        }
         let mut sum = T::zero();
         for side in sides.iter_mut() {
             side.interior = along(&side.interior, &step_to(side, side.target), part);
@@ -320,6 +318,48 @@ impl<T: Scalar> InteriorPoint<T> {
         }
         self.complementarity = sum / self.count;
         part.shortest()
+    }
+}
+
+/// Moves the trajectory to where the sides' products come to the `target` of each, which follows from the one that it has;
+/// returns how far their unknowns may go there.
+fn aim<T: Scalar, const NX: usize, const NU: usize>(
+    span: &Span<'_, T, NX, NU>,
+    sides: &mut [BoundSide<T>],
+    factors: &[StageFactor<T, NX, NU>],
+    v: &mut [SVector<T, NU>],
+    (u, x): &mut (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
+    target: impl Fn(Target<T>) -> Target<T>,
+) -> Part<T> {
+    let change = |side: &mut BoundSide<T>| {
+        side.target = target(side.target);
+        let base = multiplier(side, side.target).0;
+        base - core::mem::replace(&mut side.base, base)
+    };
+    newton::shift(span, factors, sides, change, v, (u, x));
+    let mut part = Part::far();
+    newton::measure_each(span, sides, &Trajectory { x, u }, |side| {
+        let corrected = step_to(side, side.target);
+        part.keep_above_zero(&side.interior, &corrected, side.soft.is_some());
+    });
+    part.shortened(convert(NEARLY))
+}
+
+/// The unknowns of a soft side whose multipliers add up to `price`, with both its products equal.
+fn centred<T: Scalar>(distance: T, price: T, product: T) -> Interior<T> {
+    let half_value = price * distance.abs() * convert(0.5);
+    let value = half_value + (half_value * half_value + product * product).sqrt();
+    let larger = (value + product) / price;
+    let smaller = larger * product / value;
+    let (slack, excess) = match distance > T::zero() {
+        true => (larger, smaller),
+        false => (smaller, larger),
+    };
+    Interior {
+        slack,
+        multiplier: product / slack,
+        excess,
+        rest: product / excess,
     }
 }
 

@@ -92,6 +92,12 @@ impl<T: Scalar, const NX: usize, const NU: usize> Adjustment<T, NX, NU> for Cost
         for bound in by_bound(self.sides) {
             add_to_minimum(self.ocp, bound, minimum);
         }
+        // At last, for rows may have a part in the inputs that are held.
+        for side in self.sides.iter().filter(|side| side.role == Role::Held) {
+            if let Some(j) = side.input() {
+                minimum.hold(j, side.limit);
+            }
+        }
     }
 }
 
@@ -106,14 +112,11 @@ fn add_to_minimum<T: Scalar, const NX: usize, const NU: usize>(
         return;
     };
     match side.bound.quantity {
-        Quantity::Input(j) => match sides.iter().find(|side| side.role == Role::Held) {
-            Some(held) => minimum.hold(j, held.limit),
-            None => {
-                let (weight, pull) = sum_of_weights_and_pulls(sides);
-                minimum.hessian[(j, j)] += weight;
-                minimum.g[j] -= pull;
-            }
-        },
+        Quantity::Input(j) => {
+            let (weight, pull) = sum_of_weights_and_pulls(sides);
+            minimum.hessian[(j, j)] += weight;
+            minimum.g[j] -= pull;
+        }
         Quantity::Row(j) => {
             let (weight, pull) = sum_of_weights_and_pulls(sides);
             if let Some(row) = ocp.row(side.bound.stage, j) {
@@ -335,7 +338,10 @@ fn take_up<T: Scalar, const NX: usize, const NU: usize>(
 #[cfg(all(test, feature = "alloc"))]
 mod tests {
     use super::*;
-    use crate::many_bounds::side;
+    use crate::list::List;
+    use crate::many_bounds::{residual, side};
+    use crate::ocp::{GeneralRow, Penalty};
+    use crate::solution::Side;
     use alloc::vec;
     use lpvmpc_testkit::rng::Rng;
     use nalgebra::SMatrix;
@@ -404,5 +410,64 @@ mod tests {
         compare::<5, 3>();
         compare::<8, 2>();
         compare::<16, 6>();
+    }
+
+    /// A row in which a held input has a part, exceeded or held by a weight, does not move it, and the other inputs are
+    /// at their minimum.
+    #[test]
+    fn held_inputs_stay_beside_rows_of_them() {
+        const N: usize = 5;
+        let mut random = Rng::new(11);
+        let mut ocp = Ocp::<f64, 3, 2>::allocate(N);
+        ocp.x0 = SVector::from_fn(|_, _| random.uniform(-1.0, 1.0));
+        ocp.rows_per_stage = 1;
+        let row = GeneralRow {
+            x: SVector::from_fn(|_, _| random.uniform(-1.0, 1.0)),
+            u: SVector::from([1.0, 0.7]),
+            lower: -0.1,
+            upper: 0.1,
+            soft: Some(Penalty {
+                linear: 3.0,
+                quadratic: 5.0,
+            }),
+        };
+        ocp.rows = List::repeat(row, N + 1);
+        for stage in ocp.stages.iter_mut() {
+            stage.a = SMatrix::from_fn(|_, _| random.uniform(-1.0, 1.0));
+            stage.b = SMatrix::from_fn(|_, _| random.uniform(-1.0, 1.0));
+        }
+        (ocp.common.q, ocp.common.r) = (SMatrix::identity(), SMatrix::identity());
+        ocp.common.u.lower.fill(-1.0);
+        ocp.common.u.upper.fill(2.0);
+        let mut sides = vec![BoundSide::empty(); 20 * N];
+        let count = side::collect(&ocp, &mut sides).unwrap_or_default();
+        sides.truncate(count);
+        for side in &mut sides {
+            let stage = side.bound.stage;
+            let second = side.bound.side == Side::Upper;
+            side.role = match side.bound.quantity {
+                Quantity::Input(0) if second && stage != 1 => Role::Held,
+                Quantity::Input(1) if !second && stage == 3 => Role::Held,
+                Quantity::Row(_) if second == (stage == 2) => Role::Exceeded,
+                _ => Role::Free,
+            };
+            if side.role == Role::Exceeded {
+                (side.base, side.weight) = (side.price(), side.curvature());
+            }
+        }
+        let span = Span::whole(&ocp);
+        let mut factors = vec![StageFactor::zeros(); N];
+        let (mut u, mut x) = (vec![SVector::zeros(); N], vec![SVector::zeros(); N]);
+        factorize(&span, &sides, &mut factors).unwrap();
+        roll_out(&span, &factors, (&mut u, &mut x));
+        let trajectory = Trajectory { x: &x, u: &u };
+        measure(&span, &mut sides, &trajectory);
+        for (i, u) in u.iter().enumerate() {
+            assert!(i == 1 || u[0] == 2.0, "{i}: {u}");
+            assert!(i != 3 || u[1] == -1.0, "{i}: {u}");
+        }
+        let mut slopes = vec![SVector::zeros(); N];
+        let residual = residual::explain(&span, &factors, &mut sides, &trajectory, &mut slopes);
+        assert!(residual.rest < 1e-13 * residual.largest);
     }
 }

@@ -1,15 +1,13 @@
 //! The way of the interior-point method to a guess that is right, or to a proof that there is no point within all bounds.
 
 use super::exchange::{Program, Tolerances};
-use super::interior_point::{Foretold, InteriorPoint};
+use super::interior_point::{Foretold, InteriorPoint, STUCK};
 use super::side::{self, BoundSide};
 use crate::model::Scalar;
 use crate::solution::{ActiveRow, ActiveSet, Part, Status};
 use crate::solver::infeasible;
 use nalgebra::convert;
 
-/// Shorter parts of the way mean that bounds may contradict each other.
-const STUCK: f64 = 0.1;
 /// The roles that a step foretells are tried when one in so many of the active sides, or fewer, has changed
 /// its since the step before; of three roles, where bounds are soft, it is harder to foretell the right one.
 const CERTAIN: usize = 8;

@@ -3,9 +3,10 @@
 //! violated without the limits is many times what they allow.
 
 use super::many_bounds::Both;
-use lpvmpc::{Ocp, SolverSettings, kkt_residual};
+use super::support::solve_with;
+use lpvmpc::{Bounds, GeneralRow, List, Ocp, Penalty, SolverSettings, kkt_residual};
 use lpvmpc_testkit::rng::Rng;
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 
 const SAMPLES: usize = 6;
 
@@ -102,4 +103,55 @@ fn points_with_limits_take_few_factorisations() {
     let [at_once, one_by_one, most] = sums;
     assert!(13 * at_once < 5 * one_by_one, "{at_once} for {one_by_one}");
     assert!(most <= 40, "{most}");
+}
+
+/// Points that begin far beyond soft limits of all states and of a row in which the inputs have a part, too: most inputs
+/// are at their bounds beside rows that are exceeded. Such an input was not held by the factorisation, no guess was right,
+/// and the dual method took up to 1448 changes.
+#[test]
+fn inputs_at_their_bounds_beside_exceeded_rows_are_found_at_once() {
+    const N: usize = 100;
+    let mut most = 0;
+    for seed in 0..12 {
+        let random = &mut Rng::new(seed);
+        let mut ocp = problem::<4, 2>(random, N);
+        let soft = |linear| {
+            Some(Penalty {
+                linear,
+                quadratic: 1.0,
+            })
+        };
+        ocp.x0 = SVector::from_fn(|_, _| random.uniform(-4.0, 4.0));
+        ocp.common.u = within(1.0);
+        (ocp.common.x, ocp.common.soft_x) = (within(0.4), [soft(10.0); 4]);
+        (ocp.terminal.x, ocp.terminal.soft_x) = (ocp.common.x, ocp.common.soft_x);
+        ocp.rows_per_stage = 1;
+        let row = GeneralRow {
+            x: SVector::repeat(1.0),
+            u: SVector::from([1.0, random.uniform(-1.0, 1.0)]),
+            lower: -1.0,
+            upper: 0.8,
+            soft: soft(20.0),
+        };
+        ocp.rows = List::repeat(row, N + 1);
+        let answer = solve_with(&ocp, &SolverSettings::default());
+        assert!(answer.status.is_solved(), "{seed}: {}", answer.status);
+        let residual = kkt_residual(&ocp, &answer).largest();
+        assert!(residual < 1e-8, "{seed}: {residual:e}");
+        println!(
+            "{seed}: {} changes, {} active",
+            answer.changes,
+            answer.active.len()
+        );
+        most = most.max(answer.changes / (4 + 2));
+    }
+    println!("{most} factorisations");
+    assert!(most <= 30, "{most}");
+}
+
+fn within<const N: usize>(limit: f64) -> Bounds<f64, N> {
+    Bounds {
+        lower: SVector::repeat(-limit),
+        upper: SVector::repeat(limit),
+    }
 }

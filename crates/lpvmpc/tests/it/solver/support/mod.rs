@@ -23,6 +23,7 @@ pub fn capacity<T: Scalar, const NX: usize, const NU: usize>(ocp: &Ocp<T, NX, NU
         stages,
         rows,
         active: rows,
+        general_rows: ocp.rows_per_stage,
         ..Capacity::default()
     }
 }
