@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _lpvmpc
-from ._arrays import column, numbers
+from ._arrays import column, numbers, ordered
 from ._files import save
 from .errors import SettingError
 
@@ -141,9 +141,12 @@ class Certificate:
         return int(self._content["record"]["boxes"])
 
     def value(self, x: ArrayLike) -> Array:
-        """(x - x_eq)'P (x - x_eq) of a state, shape (n,), or of each row of states, (count, n)."""
-        states = numbers("x", x)
+        """(x - x_eq)'P (x - x_eq) of a state, shape (n,), or of each row of states, (count, n).
+
+        A certificate knows no names: Series and DataFrames with names are refused.
+        """
         n = len(self.x)
+        states = numbers("x", ordered("x", x, n))
         if states.ndim not in (1, 2) or states.shape[-1] != n:
             raise SettingError(f"x: its shape is {states.shape}; it must be ({n},) or (count, {n})")
         e = states - self.x
@@ -151,7 +154,7 @@ class Certificate:
         return found
 
     def contains(self, x: ArrayLike) -> Any:
-        """Whether a state, shape (n,), is in the set, or each row of states, (count, n)."""
+        """Whether a state, shape (n,), is in the set, or each row of states, (count, n); without names, as in `value`."""
         inside = self.value(x) <= self.level
         return bool(inside) if inside.ndim == 0 else inside
 

@@ -16,6 +16,7 @@ from ._preview import AHEAD
 from ._preview import to_native as preview_to_native
 from ._settings import to_native as settings_to_native
 from .constraints import Limits, Penalty, Row, kept
+from .design import lqr
 from .errors import SettingError
 from .estimator import Estimate, Estimator
 from .estimator import to_native as estimator_to_native
@@ -457,7 +458,8 @@ class Mpc:
         Rust for ``cargo build`` and, on an emulated board, ``cargo run``.
 
         It runs a descent of at most eight programs per sample with one Runge-Kutta step, keeps the bounds of inputs and,
-        softly, of states, and has the plant itself as a stand-in for a robot.
+        softly, of states, and has the plant itself as a stand-in for a robot. Its terminal cost is this controller's, which
+        `set_parameters` leaves as it was.
 
         Parameters
         ----------
@@ -482,9 +484,14 @@ class Mpc:
         """
         if self._settings["estimator"] is not None:
             raise SettingError("estimator: on a microcontroller it must be left out")
+        settings = dict(self._settings)
+        if isinstance(settings["terminal"], str) and settings["terminal"] == "lqr":
+            settings["terminal"] = lqr(
+                self._designed_for, *(settings[name] for name in ("t_s", "q", "r"))
+            ).p
         self._plant._native.save_firmware(
             Path(folder),
-            settings_to_native(self._plant, self._settings),
+            settings_to_native(self._plant, settings),
             str(lpvmpc),
             column("x0", x0, self._states),
             None if x_ref is None else column("x_ref", x_ref, self._states),

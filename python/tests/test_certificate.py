@@ -6,6 +6,7 @@ import re
 
 import casadi as ca
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
@@ -92,6 +93,9 @@ def test_a_file_is_the_certificate(certified, tmp_path):
     assert loaded.k.shape == (1, 4) and loaded.u.shape == (1,) and not loaded.contains([0, 2, 0, 0])
     with pytest.raises(lpvmpc.SettingError, match="x: its shape"):
         loaded.contains([0, 0])
+    in_another_order = pd.Series([0.0, 2.0, 0.0, 0.0], plant.states[::-1])
+    with pytest.raises(lpvmpc.SettingError, match="x: its names are"):  # they were taken by their order
+        loaded.contains(in_another_order)
     with pytest.raises(lpvmpc.CertificateError, match="another plant"):
         lpvmpc.verify(loaded, plant.with_parameters(pole_mass=0.31))
 

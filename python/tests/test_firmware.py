@@ -1,5 +1,6 @@
 """Controllers as programs for a microcontroller."""
 
+import pickle
 import re
 
 import numpy as np
@@ -19,14 +20,35 @@ def saved(mpc, folder, **others):
     return (folder / "src" / "main.rs").read_text()
 
 
+def terminal_cost(text):
+    rows = re.search(r"Cost\(SMatrix::from\(\[(.*?)\]\)\)", text, re.S).group(1)
+    return np.array(re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", rows), dtype=float).reshape(4, 4)
+
+
+def test_the_terminal_cost_of_a_program_is_that_of_the_controller(tmp_path):
+    """After other parameters it was another one, designed for them."""
+    mpc = controller()
+    before = terminal_cost(saved(mpc, tmp_path / "before"))
+    mpc.set_parameters(pole_mass=0.375)
+    kept = terminal_cost(saved(mpc, tmp_path / "kept"))
+    copied = terminal_cost(saved(pickle.loads(pickle.dumps(mpc)), tmp_path / "copied"))
+    np.testing.assert_array_equal(kept, before)
+    np.testing.assert_array_equal(copied, before)
+    mpc.set(q=[10, 10, 0.1, 0.1])  # designs anew
+    anew = terminal_cost(saved(mpc, tmp_path / "anew"))
+    p = lpvmpc.lqr(mpc.plant, 0.05, [10, 10, 0.1, 0.1], [0.01]).p
+    np.testing.assert_allclose(anew, p, rtol=1e-6)
+    assert abs(anew - before).max() > 1e-3
+    mpc.set(terminal=2 * p)
+    np.testing.assert_allclose(terminal_cost(saved(mpc, tmp_path / "given")), 2 * p, rtol=1e-6)
+
+
 def test_a_program_has_the_controllers_numbers(tmp_path):
     mpc = controller()
     mpc.set_parameters(pole_mass=0.375)
     text = saved(mpc, tmp_path / "robot", x_ref=[0.5, 0, 0, 0], samples=40)
-    p = lpvmpc.lqr(mpc.plant, 0.05, [10, 10, 0.1, 0.1], [0.01]).p
-    rows = re.search(r"Cost\(SMatrix::from\(\[(.*?)\]\)\)", text, re.S).group(1)
-    found = np.array(re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", rows), dtype=float)
-    np.testing.assert_allclose(found.reshape(4, 4), p, rtol=1e-6)
+    p = lpvmpc.lqr(cart_pole(), 0.05, [10, 10, 0.1, 0.1], [0.01]).p  # as before the parameters changed
+    np.testing.assert_allclose(terminal_cost(text), p, rtol=1e-6)
     for part in ("[12.0]", "[-12.0]", "-0.75", "usize = 25", "usize = 40", "[0.5, 0.0, 0.0, 0.0]"):
         assert part in text, part
     assert "/where/lpvmpc/is" in (tmp_path / "robot" / "Cargo.toml").read_text()
