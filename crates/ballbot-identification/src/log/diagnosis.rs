@@ -96,6 +96,7 @@ pub(super) fn run(
         findings.push(Finding::AcceptedUnits(suspicion));
     }
     sensors::jumps(table, &run, &names, &mut breaks, findings);
+    sensors::standing_out(table, &names, &mut breaks, findings);
     sensors::fallen(table, &run.time, &mut breaks, findings);
     sensors::torque(table, findings);
     sensors::stuck_or_stepped(table, &names, &run.time, findings);

@@ -112,6 +112,23 @@ pub enum Finding {
         /// Its size, SI.
         size: f64,
     },
+    /// Values for a moment that are many times all others.
+    #[error(
+        "`{column}` has {count} value(s) that stand out, first {} in line {line}, where 99 % are within {} of their middle; these rows are left out",
+        number(*value), number(*usual)
+    )]
+    StandOut {
+        /// The column.
+        column: String,
+        /// How many rows.
+        count: usize,
+        /// Line of the first.
+        line: usize,
+        /// The first, SI.
+        value: f64,
+        /// The distance from the middle that 99 % are within, SI.
+        usual: f64,
+    },
     /// The sensor stands still for longer than a robot does.
     #[error(
         "`{column}` does not change for {duration:.2} s from line {line} on: a sensor that hangs?"

@@ -110,6 +110,21 @@ fn the_log_as_it_is_has_parameters() {
     }
 }
 
+/// Beside one wrong value of a torque among 800 there were no parameters.
+#[test]
+fn a_value_that_stands_out_changes_no_parameter_by_much() {
+    let b1 = |found: IdentifiedRobot| {
+        found.parameter_files().unwrap();
+        found.estimate().values[Parameter::B1] / laboratory().plant.b1
+    };
+    let clean = b1(outcome("", |_| ()).unwrap());
+    let torque = b1(outcome("", |record| record.run.torque[333] = 20.0).unwrap());
+    let rate = b1(outcome("", |record| record.run.outputs[444][2] = -60.0).unwrap());
+    for found in [torque, rate] {
+        assert!((found - clean).abs() < 0.01, "{found} for {clean}");
+    }
+}
+
 #[test]
 fn a_torque_with_the_other_sign() {
     refused("", "the torque has the other sign", torque_scaled(-1.0));

@@ -331,6 +331,16 @@ fn sensors() {
         recalculated(1, |_, phi| (phi / 0.05).round() * 0.05),
         &["`phi_rad` has steps of 5.00e-2"],
     );
+    for (column, name) in [(3, "theta_dot_rad_s"), (5, "torque")] {
+        let stands_out = format!("`{name}` has 1 value(s) that stand out, first 20 in line 52");
+        found(
+            recalculated(column, |row, value| if row == 50 { 20.0 } else { value }),
+            &[&stands_out],
+        );
+        let log = recalculated(column, |row, value| if row == 50 { 20.0 } else { value });
+        let log = read_with(log.as_bytes(), "").unwrap();
+        assert_eq!(log.run.stretches, [0..50, 51..300]);
+    }
     let frozen = |row: usize, theta: f64| {
         if (100..160).contains(&row) {
             0.01

@@ -3,7 +3,7 @@
 use super::{Names, isolate};
 use crate::log::error::{Problem, Suspicion};
 use crate::log::finding::Finding;
-use crate::log::run::{Run, Torque, median};
+use crate::log::run::{Run, Torque, median, quantile};
 use crate::log::table::Table;
 
 /// A column that never changes.
@@ -77,6 +77,50 @@ pub(super) fn jumps(
         }
         for jump in jumps {
             breaks[jump + 1] = true;
+        }
+    }
+}
+
+/// A rate or a torque so many times as far from its middle as 99 % of all are is none of a robot, unless it lasts.
+const STANDS_OUT: f64 = 5.0;
+
+/// Rows whose tilt rate or torque is many times what all others are; they are cut out one by one. Neither changes
+/// smoothly, so that a jump says nothing.
+pub(super) fn standing_out(
+    table: &Table,
+    names: &Names<'_>,
+    breaks: &mut [bool],
+    findings: &mut Vec<Finding>,
+) {
+    for place in [3, 4] {
+        let values = &table.columns[place];
+        let middle = middle_of(values);
+        let distances = values.iter().map(|value| (value - middle).abs());
+        let mut present: Vec<f64> = distances.clone().filter(|d| !d.is_nan()).collect();
+        // Where most values are the same, such as a torque that is zero between pulses, any other stands out.
+        let usual = match median(&mut present) > 0.0 {
+            true => quantile(&mut present, 0.99),
+            false => continue,
+        };
+        let beyond: Vec<bool> = distances.map(|d| d > STANDS_OUT * usual).collect();
+        let excursions = beyond.chunk_by(|a, b| a == b).scan(0, |begin, rows| {
+            let range = *begin..*begin + rows.len();
+            *begin = range.end;
+            Some((rows[0], range))
+        });
+        let spikes = excursions.filter(|(beyond, range)| *beyond && range.len() < SPIKE);
+        let rows: Vec<usize> = spikes.flat_map(|(_, range)| range).collect();
+        for &row in &rows {
+            isolate(row, breaks);
+        }
+        if let Some(&first) = rows.first() {
+            findings.push(Finding::StandOut {
+                column: names.0[place].to_owned(),
+                count: rows.len(),
+                line: table.lines[first],
+                value: values[first],
+                usual,
+            });
         }
     }
 }
