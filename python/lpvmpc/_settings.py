@@ -8,8 +8,16 @@ from typing import Any
 from ._arrays import column, number, weight, whole
 from .certificate import Certificate
 from .constraints import changes, limits, prices, row
+from .design import lqr
 from .errors import SettingError
 from .plant import Plant, names_of
+
+
+def designed(plant: Plant, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings whose terminal cost, where it is to be designed, is that for these parameters of the plant."""
+    if isinstance(given["terminal"], str) and given["terminal"] == "lqr":
+        return {**given, "terminal": lqr(plant, given["t_s"], given["q"], given["r"]).p}
+    return dict(given)
 
 
 def to_native(plant: Plant, given: Mapping[str, Any]) -> dict[str, Any]:

@@ -14,9 +14,9 @@ from . import _lpvmpc
 from ._arrays import column, copied, instance, listed, named, number, ordered, whole
 from ._preview import AHEAD
 from ._preview import to_native as preview_to_native
+from ._settings import designed
 from ._settings import to_native as settings_to_native
 from .constraints import Limits, Penalty, Row, kept
-from .design import lqr
 from .errors import SettingError
 from .estimator import Estimate, Estimator
 from .estimator import to_native as estimator_to_native
@@ -484,11 +484,7 @@ class Mpc:
         """
         if self._settings["estimator"] is not None:
             raise SettingError("estimator: on a microcontroller it must be left out")
-        settings = dict(self._settings)
-        if isinstance(settings["terminal"], str) and settings["terminal"] == "lqr":
-            settings["terminal"] = lqr(
-                self._designed_for, *(settings[name] for name in ("t_s", "q", "r"))
-            ).p
+        settings = designed(self._designed_for, self._settings)
         self._plant._native.save_firmware(
             Path(folder),
             settings_to_native(self._plant, settings),

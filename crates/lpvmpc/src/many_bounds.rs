@@ -20,6 +20,7 @@ mod retries;
 mod search;
 mod side;
 mod span;
+mod start;
 
 pub(crate) use side::BoundSide;
 

@@ -23,8 +23,7 @@ pub struct Capacity {
     /// Stages with weights and bounds of their own ([`Preview`](crate::Preview)): none, as a rule, or
     /// all of the horizon. Of a controller's workspace only.
     pub own_stages: usize,
-    /// General rows of a stage; none, as a rule. A controller's workspace has room for so many; a solver on the heap
-    /// finds many active bounds at once where a problem has no more.
+    /// General rows of a stage; none, as a rule. Beyond so many a solver takes active bounds one by one.
     pub general_rows: usize,
     /// A second plan: where a descent's plan is likely to be a dear local minimum, another one is looked for
     /// (`docs/descent.md`). Of a controller's workspace on the heap only (not among the bytes), which then

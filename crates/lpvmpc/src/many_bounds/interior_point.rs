@@ -9,6 +9,7 @@ use super::exchange::{Patience, Program, Tolerances, exchange};
 use super::newton;
 use super::side::{BoundSide, Interior, Role, Target};
 use super::span::Span;
+use super::start;
 use crate::model::Scalar;
 use crate::riccati::{BadPivot, StageFactor};
 use crate::rows::Trajectory;
@@ -20,21 +21,6 @@ const NEARLY: f64 = 0.995;
 const SHORT: f64 = 0.3;
 /// Still smaller parts mean that bounds may contradict each other.
 pub(super) const STUCK: f64 = 0.1;
-
-/// Least slack to begin with, as a part of the bound's size.
-const LEAST: f64 = 1.0;
-/// And as a part of the largest violation, each in its bound's size: from far beyond their bounds steps that begin with
-/// little slack are short.
-const LEAST_OF_WORST: f64 = 0.1;
-/// The products begin so many times the largest violation larger, between once and
-const PER_VIOLATION: f64 = 0.3;
-/// so many times.
-const LARGEST: f64 = 100.0;
-/// Those of a soft side begin with this part of what it costs to exceed its bound by as much as the worst is violated: with
-/// less the role that it begins with, which may be wrong, is hard to leave.
-const UNDECIDED_SOFT: f64 = 0.5;
-/// Part of its bound's size at which its price counts.
-const EXCESS: f64 = 0.1;
 
 /// Between the parts of its slack and of its multiplier that a step leaves there is less than this where it does not say
 /// clearly which of them goes to zero.
@@ -152,35 +138,8 @@ impl<T: Scalar> InteriorPoint<T> {
     /// Begins at a trajectory whose distances are known, with products of slack and multiplier of the size
     /// of `cost`, larger where bounds are violated by several times their size.
     pub fn new(sides: &mut [BoundSide<T>], cost: T) -> Self {
-        let worst = sides.iter().fold(T::zero(), |worst, side| {
-            worst.max(-side.distance / side.size)
-        });
-        let times = worst * convert(PER_VIOLATION);
-        let times = times.max(T::one()).min(convert(LARGEST));
-        let cost = cost * times;
-        let least_of_hard = convert::<f64, T>(LEAST).max(worst * convert(LEAST_OF_WORST));
-        for side in sides.iter_mut() {
-            side.interior = match side.soft {
-                None => {
-                    let slack = side.distance.max(side.size * least_of_hard);
-                    Interior {
-                        slack,
-                        multiplier: cost / slack,
-                        excess: T::zero(),
-                        rest: T::zero(),
-                    }
-                }
-                Some(price) => {
-                    let excess = (-side.distance).max(side.size * convert(EXCESS));
-                    let price = price.linear + price.quadratic * excess;
-                    let far = side.distance.max(side.size * worst.max(T::one()));
-                    let product = price * far * times * convert(UNDECIDED_SOFT);
-                    centred(side.distance, price, product.max(cost))
-                }
-            };
-            side.role = Role::Free;
-            weigh(side);
-        }
+        start::place(sides, cost);
+        sides.iter_mut().for_each(free);
         Self::at(sides)
     }
 
@@ -235,10 +194,7 @@ impl<T: Scalar> InteriorPoint<T> {
             return true;
         }
         program.change_places();
-        for side in sides.iter_mut() {
-            side.role = Role::Free;
-            weigh(side);
-        }
+        sides.iter_mut().for_each(free);
         let (x, u) = (&*program.x, &*program.u);
         self.foretell(&program.span, sides, &Trajectory { x, u });
         false
@@ -345,22 +301,10 @@ fn aim<T: Scalar, const NX: usize, const NU: usize>(
     part.shortened(convert(NEARLY))
 }
 
-/// The unknowns of a soft side whose multipliers add up to `price`, with both its products equal.
-fn centred<T: Scalar>(distance: T, price: T, product: T) -> Interior<T> {
-    let half_value = price * distance.abs() * convert(0.5);
-    let value = half_value + (half_value * half_value + product * product).sqrt();
-    let larger = (value + product) / price;
-    let smaller = larger * product / value;
-    let (slack, excess) = match distance > T::zero() {
-        true => (larger, smaller),
-        false => (smaller, larger),
-    };
-    Interior {
-        slack,
-        multiplier: product / slack,
-        excess,
-        rest: product / excess,
-    }
+/// No guess says what becomes of the side.
+fn free<T: Scalar>(side: &mut BoundSide<T>) {
+    side.role = Role::Free;
+    weigh(side);
 }
 
 /// Gives the side the cost that it has in a Newton step towards complementarity zero.

@@ -98,10 +98,10 @@ pub(super) fn standing_out(
         let distances = values.iter().map(|value| (value - middle).abs());
         let mut present: Vec<f64> = distances.clone().filter(|d| !d.is_nan()).collect();
         // Where most values are the same, such as a torque that is zero between pulses, any other stands out.
-        let usual = match median(&mut present) > 0.0 {
-            true => quantile(&mut present, 0.99),
-            false => continue,
-        };
+        if median(&mut present) == 0.0 {
+            continue;
+        }
+        let usual = quantile(&mut present, 0.99);
         let beyond: Vec<bool> = distances.map(|d| d > STANDS_OUT * usual).collect();
         let excursions = beyond.chunk_by(|a, b| a == b).scan(0, |begin, rows| {
             let range = *begin..*begin + rows.len();

@@ -107,7 +107,7 @@ fn points_with_limits_take_few_factorisations() {
 
 /// Points that begin far beyond soft limits of all states and of a row in which the inputs have a part, too: most inputs
 /// are at their bounds beside rows that are exceeded. Such an input was not held by the factorisation, no guess was right,
-/// and the dual method took up to 1448 changes.
+/// and the dual method took up to 2698 changes.
 #[test]
 fn inputs_at_their_bounds_beside_exceeded_rows_are_found_at_once() {
     const N: usize = 100;
