@@ -32,7 +32,8 @@ class Penalty:
 
 @dataclass(frozen=True)
 class Row:
-    """A linear constraint lower <= x'x_i + u'u_i <= upper at every stage.
+    """A linear constraint lower <= x'x_i + u'u_i <= upper at every stage: of states alone at stages 1 to N, with inputs
+    at 0 to N - 1, since there is no input at the end.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ pub struct MpcSettings {
     /// u_ref, the input that costs nothing; `None` means the input that holds the end of the reference,
     /// from the nonlinear model.
     pub u_ref: Option<DVector<f64>>,
-    /// Linear rows that hold at every stage.
+    /// Linear rows that hold at every stage: those of states alone at 1 to N, those with inputs at 0 to N - 1.
     pub rows: Vec<Row>,
     /// Q_y, for p outputs p x p, symmetric positive semidefinite: (y - y_ref)'Q_y (y - y_ref) per sample on top.
     pub q_y: Option<DMatrix<f64>>,
