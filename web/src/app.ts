@@ -1,6 +1,6 @@
 // The page's state: one set-up, the robots derived from it, and what they did.
 
-import { Engine, LONGEST_SILENCE, NoAnswer, type Source } from "./engine";
+import { Engine, NoAnswer, type Source } from "./engine";
 import { readRecording, trajectoryCsv } from "./files";
 import { History } from "./history";
 import type { Offer } from "./message";
@@ -77,7 +77,7 @@ export class App {
       if (this.takesOrders()) this.receive(batch);
     };
     this.engine.onFailure = (reason) => this.failed(reason);
-    this.engine.onSilence = () => this.stalled();
+    this.engine.onSilence = (seconds) => this.stalled(seconds);
   }
 
   /** There is no robot any more that would take orders. */
@@ -93,9 +93,9 @@ export class App {
   }
 
   /** The worker was ended since it did not answer; the one in its place waits for a set-up. */
-  private stalled(): void {
+  private stalled(seconds: number): void {
     const { working } = this;
-    const text = `The controller did not answer for ${LONGEST_SILENCE} s and was ended: with these settings one sample takes too long. ` +
+    const text = `The controller did not answer for ${seconds} s and was ended: with these settings one sample takes too long. ` +
       "A shorter horizon, fewer sub-steps or fewer QPs make it faster.";
     this.forgetWorker();
     this.events.message(text, "error", working && {

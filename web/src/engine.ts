@@ -15,8 +15,9 @@ const LOOK = 500;
 /** After so many looks without a word from it the worker is ended. Looks are counted, not time: a page
  *  that was held up itself has heard nothing either. */
 const PATIENCE = 4;
-/** The same as a time, s. */
-export const LONGEST_SILENCE = (LOOK * PATIENCE) / 1000;
+/** The same while it owes an answer: how exact a guaranteed loop's plans have to be is searched for when
+ *  a set-up is taken in, which takes seconds on a slow machine. */
+const PATIENCE_WITH_CALLS = 20;
 
 /** There will be no answer: the worker was ended, which `onSilence` says. */
 export class NoAnswer extends Error {}
@@ -24,8 +25,9 @@ export class NoAnswer extends Error {}
 export class Engine implements Source {
   onBatch: (batch: Batch) => void = () => {};
   onFailure: (text: string) => void = () => {};
-  /** The worker did not answer any more; another one, which knows of nothing, has taken its place. */
-  onSilence: () => void = () => {};
+  /** The worker did not answer for so many seconds; another one, which knows of nothing, has taken its
+   *  place. */
+  onSilence: (seconds: number) => void = () => {};
   private worker = this.start();
   private readonly waiting = new Map<number, Waiting>();
   private nextId = 0;
@@ -48,12 +50,13 @@ export class Engine implements Source {
   private look(): void {
     if (this.silentFor === undefined) return;
     if (this.silentFor === 0) this.worker.postMessage({ ping: true });
-    if (this.silentFor++ < PATIENCE) return;
+    const patience = this.waiting.size > 0 ? PATIENCE_WITH_CALLS : PATIENCE;
+    if (this.silentFor++ < patience) return;
     this.worker.terminate();
     this.silentFor = undefined;
     this.worker = this.start();
     this.rejectAll(new NoAnswer());
-    this.onSilence();
+    this.onSilence((patience * LOOK) / 1000);
   }
 
   /** Asks the worker; rejects with its message. */

@@ -119,6 +119,28 @@ test("a controller that does not answer is ended, and the last settings that wor
   await expect(page.locator("#message")).toBeHidden();
 });
 
+/** In front of the worker's program: every set-up takes four seconds to be taken in. */
+const SLOW_MACHINE = `Object.defineProperty(self, "onmessage", {
+  set: (take) => self.addEventListener("message", (event) => {
+    const end = performance.now() + (event.data.call?.kind === "configure" ? 4000 : 0);
+    while (performance.now() < end);
+    take(event);
+  }),
+});`;
+
+test("a set-up that a slow machine takes long to take in is waited for", async ({ page }) => {
+  await page.route("**/worker*.js", async (route) => {
+    const response = await route.fetch();
+    await route.fulfill({ response, body: `${SLOW_MACHINE}\n${await response.text()}` });
+  });
+  await openFlat(page);
+  await page.locator("#play").click();
+  await until(page, 0.5);
+  await fill(page, "Horizon N", "25");
+  await pass(page, 0.5);
+  await expect(page.locator("#message")).toBeHidden();
+});
+
 test("a link whose controller does not answer leaves the page at work", async ({ page }) => {
   await openFlat(page);
   const toml = await saved(page, "Save TOML");
