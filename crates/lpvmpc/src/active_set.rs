@@ -272,9 +272,14 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         self.max_changes - self.changes
     }
 
-    /// So many of them are for another method.
+    /// So many of them are for later, or another method.
     pub fn keep_back(&mut self, changes: usize) {
         self.max_changes = self.max_changes.saturating_sub(changes);
+    }
+
+    /// So many that were kept back are allowed now.
+    pub fn give_back(&mut self, changes: usize) {
+        self.max_changes += changes;
     }
 
     /// Counts one more change of the active set.

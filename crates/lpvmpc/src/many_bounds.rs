@@ -5,8 +5,8 @@
 //! interior-point method that goes on until it can be told which bounds will be active. The program in
 //! which these hold says which of them should not, and which are missing; that takes a few factorisations,
 //! however many bounds there are. Where it finds nothing the dual method begins as it would have without it.
-//! Where the dual method comes to no end, most of all with few bounds that contradict each other, the
-//! interior-point method has a turn after it.
+//! Where few bounds are expected the dual method begins; the interior-point method has a later turn when as many
+//! changes as it would be worth have not led to the end: many bounds are active after all, or few contradict each other.
 
 mod answer;
 mod exchange;
@@ -48,7 +48,7 @@ const MOST_FACTORISATIONS: usize = 24;
 /// Where many more bounds are expected than these are for, one for so many, since the dual method would need longer
 /// than in proportion,
 const BOUNDS: usize = 2;
-/// up to so many.
+/// up to so many; and so many where bounds are soft, of which any number can be active, whatever is expected.
 const MOST_FOR_MANY: usize = 60;
 /// So many stages for each of them that there may be at least: over a long horizon more bounds are active than the trajectory
 /// without bounds violates, and a change takes longer beside so many rows.
@@ -62,8 +62,8 @@ const SHARE: usize = 4;
 pub(crate) enum Turn {
     /// Before the dual method, if there are many bounds.
     First,
-    /// After it has come to no end.
-    Last,
+    /// After it has come to no end in as many changes as the phase may take, or at all.
+    Later,
 }
 
 /// What comes of it.
@@ -80,16 +80,19 @@ pub(crate) enum AtOnce<T> {
     InVain,
 }
 
-/// The least cap with which a problem with so many `entries` of state and input has a last turn.
-pub(crate) fn cap_with_last_turn(entries: usize) -> usize {
+/// The least cap with which a problem with so many `entries` of state and input has a later turn.
+pub(crate) fn cap_with_later_turn(entries: usize) -> usize {
     SHARE * MOST_FACTORISATIONS * entries
 }
 
-/// Changes of the active set that are kept back for the last turn of a problem with so many `entries` of state and
-/// input, out of a `cap` for all: none where the dual method would lack them.
-pub(crate) fn work_of_last_turn(cap: usize, entries: usize) -> usize {
-    let work = MOST_FACTORISATIONS * entries;
-    if work <= cap / SHARE { work } else { 0 }
+/// Changes of the active set, out of a `cap` for all, that are kept back until a problem with so many `entries` of state
+/// and input has had its later turn: all but those of the phase; none where it has no such turn, since the dual method
+/// would lack them.
+pub(crate) fn kept_for_later_turn(cap: usize, entries: usize) -> usize {
+    if cap < cap_with_later_turn(entries) {
+        return 0;
+    }
+    cap - MOST_FACTORISATIONS * entries
 }
 
 /// Memory of the phase, beside the step that knows it: a solver without it has no machine code for it.
@@ -129,9 +132,9 @@ impl<T, const NX: usize, const NU: usize> ManyBoundsPlace<T, NX, NU> {
     }
 }
 
-/// Solves the problem, or proves that it is infeasible; counts changes of the active set. The first turn begins with
-/// the trajectory without bounds in the solution, and where the active rows of the last one are to be begun with,
-/// they are so many stages later.
+/// Solves the problem, or proves that it is infeasible; counts changes of the active set. A turn begins with the
+/// trajectory without bounds in the solution; where the active rows of the last one are to be begun with, they are so many
+/// stages later.
 type Run<T, const NX: usize, const NU: usize> = fn(
     &mut ManyBounds<T, NX, NU>,
     &mut Solver<T, NX, NU>,
@@ -152,6 +155,12 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         }
     }
 
+    /// Whether it can have a turn: there is no terminal equality, and there are places for all stages.
+    pub fn has_room(&self, ocp: &Ocp<T, NX, NU>) -> bool {
+        let fits = |place: &ManyBoundsPlace<T, NX, NU>| ocp.length() <= place.stages();
+        ocp.terminal.equality.is_none() && self.places.iter().all(fits)
+    }
+
     /// The states of the last answer, if bounds are active in it, as long as nothing else needs the place.
     fn keep_states(&mut self, last: &Solution<T, NX, NU>) {
         if !last.active.is_empty() {
@@ -169,26 +178,17 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         (turn, spent): (Turn, &mut usize),
     ) -> AtOnce<T> {
         let n = ocp.length();
-        let fits = self.places.iter().all(|place| n <= place.stages());
-        if !fits || ocp.terminal.equality.is_some() {
+        if !self.has_room(ocp) {
             return AtOnce::Untried;
         }
-        let last_turn = turn == Turn::Last;
-        if !last_turn && shift.is_none() {
+        let later = turn == Turn::Later;
+        if !later && shift.is_none() {
             // Without an answer to go on from, nothing is known of the solves before.
             self.retries = AllRetries::default();
         }
-        if last_turn {
-            // Held inputs may have left factors of their own.
-            solver.dual.begin_again();
-            let begun = solver.factorize(ocp);
-            if begun.and_then(|()| solver.roll_out(ocp, solution)).is_err() {
-                return AtOnce::Untried;
-            }
-        }
         let known = shift.map_or(0, |_| solution.active.len());
         let mut expected = Expected::new(ocp, solution, known);
-        if last_turn {
+        if later {
             (expected.many, expected.saturated) = (true, false);
         } else if expected.violated == 0 {
             return AtOnce::Kept;
@@ -202,19 +202,21 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         let whole = Span::whole(ocp);
         newton::measure(&whole, sides, &trajectory(solution));
         let tolerances = Tolerances::new(ocp, &trajectory(solution), solver.dual.tolerance);
-        let factorisations = match turn {
-            Turn::First => (expected.bounds / BOUNDS)
-                .max(n / STAGES)
-                .clamp(MOST_FACTORISATIONS, MOST_FOR_MANY),
-            Turn::Last => MOST_FACTORISATIONS,
+        let least = match side::any_soft(sides) {
+            true => MOST_FOR_MANY,
+            false => MOST_FACTORISATIONS,
+        };
+        let (left, before) = (solver.dual.changes_left(), *spent);
+        let (factorisations, most) = match turn {
+            Turn::First => {
+                let many = (expected.bounds / BOUNDS).max(n / STAGES);
+                (many.clamp(least, MOST_FOR_MANY), left / SHARE)
+            }
+            Turn::Later => (least, left - left / SHARE),
         };
         let trials = factorisations.div_ceil(TRIAL);
-        let work = factorisations * (NX + NU);
-        let cap = match turn {
-            Turn::First => work.min(solver.dual.changes_left() / SHARE),
-            Turn::Last => *spent + work,
-        };
-        let (before, mut factorised) = (*spent, 0);
+        let cap = before + (factorisations * (NX + NU)).min(most);
+        let mut factorised = 0;
         let mut count = |stages: usize| {
             let with_these = before + ((NX + NU) * (factorised + stages)).div_ceil(n);
             let allowed = with_these <= cap;
@@ -276,7 +278,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             }
             other => other,
         };
-        if !last_turn && !expected.saturated {
+        if !later && !expected.saturated {
             let most = expected.worth::<NU>(side::any_soft(sides));
             self.retries
                 .turns
@@ -286,7 +288,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         if let Some(outcome) = outcome {
             return AtOnce::Done(outcome);
         }
-        let left = solver.dual.changes_left().saturating_sub(*spent);
+        let left = left.saturating_sub(*spent - before);
         solver.dual.reset(solver.dual.tolerance, left);
         // What it was made from was finite.
         solver.roll_out(ocp, solution).ok();

@@ -6,7 +6,7 @@ use crate::cost::cost;
 use crate::farkas::infeasibility_margin;
 use crate::held_inputs::{HeldInputs, eliminate_held};
 use crate::list::List;
-use crate::many_bounds::{AtOnce, ManyBounds, Turn, cap_with_last_turn, work_of_last_turn};
+use crate::many_bounds::{AtOnce, ManyBounds, Turn, cap_with_later_turn, kept_for_later_turn};
 #[cfg(feature = "alloc")]
 use crate::memory::Capacity;
 use crate::memory::SolverMemory;
@@ -40,7 +40,7 @@ pub struct SolverSettings<T> {
 fn default_cap<T: Scalar, const NX: usize, const NU: usize>(ocp: &Ocp<T, NX, NU>) -> usize {
     let rows = (NX + NU).saturating_add(ocp.rows_per_stage);
     let by_rows = rows.saturating_mul(CHANGES_PER_ROW * ocp.length());
-    by_rows.max(cap_with_last_turn(NX + NU))
+    by_rows.max(cap_with_later_turn(NX + NU))
 }
 
 /// Where the search for the active set begins. It changes the time, never the answer. Where the previous active set has
@@ -167,25 +167,34 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 AtOnce::InVain => shift = Some(0),
                 AtOnce::Untried => {}
             }
-            // Where all bounds at once were not tried, they are before the changes run out, or when rounding has ended
-            // the search.
-            let untried = spent == 0 && !self.many_bounds.is_empty();
-            let kept_back = if untried {
-                work_of_last_turn(cap, NX + NU)
-            } else {
-                0
+            // Where all bounds at once were not tried, they are when the search gets long, or rounding has ended it.
+            let phase = self.many_bounds.first().filter(|_| spent == 0);
+            let mut kept_back = match phase.is_some_and(|phase| phase.has_room(ocp)) {
+                true => kept_for_later_turn(cap, NX + NU),
+                false => 0,
             };
-            self.dual.keep_back(kept_back);
-            let one_by_one = self.solve_one_by_one(ocp, shift, solution, &mut spent);
-            if kept_back > 0
-                && matches!(one_by_one, Err(Status::MaxChanges | Status::Inaccurate(_)))
-            {
-                let last = (Turn::Last, &mut spent);
-                if let AtOnce::Done(outcome) = self.solve_at_once(ocp, None, solution, last) {
+            loop {
+                self.dual.keep_back(kept_back);
+                let one_by_one = self.solve_one_by_one(ocp, shift, solution, &mut spent);
+                let long = matches!(one_by_one, Err(Status::MaxChanges));
+                let ended = !(long || matches!(one_by_one, Err(Status::Inaccurate(_))));
+                if kept_back == 0 || ended {
+                    return one_by_one;
+                }
+                self.dual.give_back(core::mem::take(&mut kept_back));
+                self.dual.begin_again();
+                shift = None;
+                // Held inputs may have left factors of their own.
+                self.factorize(ocp)?;
+                self.roll_out(ocp, solution)?;
+                let later = (Turn::Later, &mut spent);
+                if let AtOnce::Done(outcome) = self.solve_at_once(ocp, shift, solution, later) {
                     return outcome;
                 }
+                if !long {
+                    return one_by_one;
+                }
             }
-            one_by_one
         });
         solution.changes = spent;
         solution.status = match outcome {

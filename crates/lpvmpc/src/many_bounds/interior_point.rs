@@ -19,8 +19,10 @@ use nalgebra::{SVector, convert};
 const NEARLY: f64 = 0.995;
 /// A step that goes a smaller part of its way is short.
 const SHORT: f64 = 0.3;
-/// Still smaller parts mean that bounds may contradict each other.
+/// Still smaller parts mean that hard bounds may contradict each other.
 pub(super) const STUCK: f64 = 0.1;
+/// Where none can, the next step goes farther from products so many times larger.
+const LARGER: f64 = 10.0;
 
 /// Between the parts of its slack and of its multiplier that a step leaves there is less than this where it does not say
 /// clearly which of them goes to zero.
@@ -87,6 +89,8 @@ pub(super) struct InteriorPoint<T> {
     /// Mean of slack * multiplier.
     complementarity: T,
     count: T,
+    /// Whether hard bounds may contradict each other: those of inputs alone cannot.
+    may_contradict: bool,
     prediction: Prediction<T>,
 }
 
@@ -161,6 +165,7 @@ impl<T: Scalar> InteriorPoint<T> {
         Self {
             complementarity: sum / count,
             count,
+            may_contradict: sides.iter().any(BoundSide::may_contradict),
             prediction: Prediction::begin(),
         }
     }
@@ -241,8 +246,8 @@ impl<T: Scalar> InteriorPoint<T> {
     /// as they stay above zero. Returns that part of the way.
     ///
     /// Where that is short, what the prediction's products add to second order is of a way that is not gone: then the step
-    /// is one towards equal products alone, from which the next one gets farther. Of bounds that contradict each other
-    /// the multipliers are to grow.
+    /// is one towards equal products alone, from which the next one gets farther; larger ones where it is very short. Of hard
+    /// bounds that contradict each other the multipliers are to grow instead.
     pub fn correct<const NX: usize, const NU: usize>(
         &mut self,
         span: &Span<'_, T, NX, NU>,
@@ -259,10 +264,14 @@ impl<T: Scalar> InteriorPoint<T> {
             excess: center - predicted.excess,
         };
         let mut part = aim(span, sides, factors, v, &mut trajectory, with_products);
-        if (convert(STUCK)..convert(SHORT)).contains(&part.shortest()) {
+        let shortest = part.shortest();
+        let stuck = shortest < convert(STUCK);
+        if shortest < convert(SHORT) && !(stuck && self.may_contradict) {
+            let times = if stuck { LARGER } else { 1.0 };
+            let product = self.complementarity * convert(times);
             let equal = Target {
-                slack: self.complementarity,
-                excess: self.complementarity,
+                slack: product,
+                excess: product,
             };
             part = aim(span, sides, factors, v, &mut trajectory, |_| equal);
         }

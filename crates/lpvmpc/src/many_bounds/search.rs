@@ -98,8 +98,7 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
 /// there are places and they count.
 fn list_multipliers<T: Scalar>(sides: &[BoundSide<T>], list: &mut ActiveSet<T>) {
     list.clear();
-    let decide = |side: &&BoundSide<T>| side.input().is_none() && side.soft.is_none();
-    let multipliers = sides.iter().filter(decide);
+    let multipliers = sides.iter().filter(|side| side.may_contradict());
     let multipliers = multipliers.map(|side| (side.bound, side.interior.multiplier));
     let largest = multipliers
         .clone()

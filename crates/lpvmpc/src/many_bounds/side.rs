@@ -145,6 +145,11 @@ impl<T: Scalar> BoundSide<T> {
         }
     }
 
+    /// Whether it can have a part in bounds that contradict each other: a hard one that is not of an input.
+    pub fn may_contradict(&self) -> bool {
+        self.input().is_none() && self.soft.is_none()
+    }
+
     /// Whether it is held by a weight on its distance.
     pub fn is_weighted(&self) -> bool {
         self.role == Role::Held && self.input().is_none()

@@ -2,9 +2,12 @@
 //!
 //! Run with `--nocapture` for the figures.
 
+use super::many_bounds::Both;
 use super::support::census::{Counts, Distribution};
 use super::support::{capacity, kind, solve_with};
-use lpvmpc::{Bounds, List, Ocp, Solution, Solver, SolverSettings, Status, kkt_residual};
+use lpvmpc::{
+    Bounds, List, Ocp, Solution, Solver, SolverSettings, Status, WarmStart, kkt_residual,
+};
 use lpvmpc_testkit::problems::{Family, problem};
 use lpvmpc_testkit::rng::Rng;
 use nalgebra::{DMatrix, SVector};
@@ -104,25 +107,38 @@ fn the_default_cap_grows_with_the_problem() {
     sweep::<4, 1>(200, 1, 4);
 }
 
-/// A search on 200 stages that a constant for short horizons has cut off.
+/// A search on 200 stages that a constant for short horizons has cut off, where bounds are taken one by one.
 #[test]
 fn a_long_horizon_gets_the_changes_that_it_needs() {
     let mut ocp = saturated::<4, 1>(&mut Rng::new(2), 200, 0);
     ocp.horizon = 200;
-    let solution = solve_with(&ocp, &SolverSettings::default());
+    let Both {
+        at_once: (mut at_once, mut answer),
+        one_by_one: (mut one_by_one, mut solution),
+    } = Both::<4, 1>::new::<200, 300>();
+    one_by_one.solve(&ocp, &SolverSettings::default(), &mut solution);
     assert_eq!(solution.status, Status::Solved);
     assert!(solution.changes > CONSTANT, "{}", solution.changes);
     let residual = kkt_residual(&ocp, &solution).largest();
     assert!(residual < 1e-8, "{residual:.1e}");
 
+    at_once.solve(&ocp, &SolverSettings::default(), &mut answer);
+    assert_eq!(answer.status, Status::Solved);
+    assert!(answer.changes <= CONSTANT, "{}", answer.changes);
+    let difference = (answer.u[0] - solution.u[0]).amax();
+    assert!(difference < 1e-8, "{difference:.1e}");
+
     // A number that is set still holds.
     let set = SolverSettings {
         max_changes: Some(CONSTANT),
+        warm_start: WarmStart::Cold,
         ..SolverSettings::default()
     };
-    let solution = solve_with(&ocp, &set);
-    assert_eq!(solution.status, Status::MaxChanges);
-    assert_eq!(solution.changes, CONSTANT);
+    for (mut solver, mut solution) in [(one_by_one, solution), (at_once, answer)] {
+        solver.solve(&ocp, &set, &mut solution);
+        assert_eq!(solution.status, Status::MaxChanges);
+        assert_eq!(solution.changes, CONSTANT);
+    }
 }
 
 /// Inputs that cannot hold the plant over the horizon: their bounds drowned in rounding, which the search noticed only at its
