@@ -53,7 +53,8 @@ class Mpc:
         R, positive definite: the diagonal, shape (m,), or whole, (m, m).
     terminal
         P: ``"lqr"``, the cost of the linear-quadratic regulator about the plant's equilibrium (about zero
-        without one) from there on; a matrix (n, n) or its diagonal; ``"equality"``, x_N = x_ref; or a
+        without one) from there on; a matrix (n, n) or its diagonal; ``"equality"``, x_N = x_ref, and with `r_du` or
+        `du_bounds`, where the last input counts as a state, u_{N-1} = u_ref, too; or a
         `Certificate` of this plant, with its cost and its set: the loop is then guaranteed as `Plan.decision` says. Its
         reference is the certificate's equilibrium, but for states that no formula of the plant reads (a cart's
         position): these may be sent anywhere, at every sample, and by stage where it is known ahead. With an

@@ -97,7 +97,8 @@ pub enum Terminal {
     Lqr,
     /// (x_N - x_ref)'P (x_N - x_ref) with this P, n x n, symmetric positive semidefinite.
     Cost(DMatrix<f64>),
-    /// x_N = x_ref.
+    /// x_N = x_ref. With [`MpcSettings::r_du`] or [`MpcSettings::du_bounds`], where the last input counts as a state,
+    /// u_{N-1} = u_ref, too, so that the plant can stay there without a change of the input.
     Equality,
     /// Cost and set of a certificate, with which the loop is guaranteed: see [`TerminalSet`].
     Certified(Box<TerminalSet>),

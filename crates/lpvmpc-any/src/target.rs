@@ -27,8 +27,15 @@ const PATIENCE: usize = 15;
 const NEARLY_NOTHING: f64 = 1e-9;
 /// A step this small is the end.
 const SETTLED: f64 = 1e-8;
+/// Where nothing moves faster than this part of its size, beside how state and input enter it, the plant stands.
+const STANDS: f64 = 1e-6;
+/// A component at its bound is released where its slope is more than this part of the steepest.
+const DOWNHILL: f64 = 1e-6;
 
 /// The state and the input; `None` where none was found.
+///
+/// Components that are to leave their bounds are held there, the farthest first, as long as the plant can stand with them,
+/// and released, each of them once, where the cost falls towards the inside.
 pub(crate) fn nearest<const NX: usize, const NU: usize, const NS: usize>(
     model: &Disturbed<NX, NU, NS>,
     wanted: &Wanted<'_, NX, NU>,
@@ -38,57 +45,88 @@ pub(crate) fn nearest<const NX: usize, const NU: usize, const NS: usize>(
         None => (wanted.x.lower[k], wanted.x.upper[k]),
         Some(j) => (wanted.u.lower[j], wanted.u.upper[j]),
     };
-    let mut at = DVector::from_fn(n + m, |k, _| {
+    let within = |k: usize, value: f64| {
         let (lower, upper) = bounds(k);
-        let start = if k < n { wanted.x_ref[k] } else { 0.0 };
-        start.max(lower).min(upper)
+        value.max(lower).min(upper)
+    };
+    let mut at = DVector::from_fn(n + m, |k, _| {
+        within(k, if k < n { wanted.x_ref[k] } else { 0.0 })
     });
-    let mut free = vec![true; n + m];
-    for _ in 0..=n + m {
-        let mut settled = false;
-        for step in 0..MOST_STEPS {
-            let moved = newton_step(model, wanted, &at, &free)?;
-            let part = 0.5_f64.powi(i32::try_from(step / PATIENCE).unwrap_or(i32::MAX));
-            at += &moved * part;
-            let small = moved
-                .iter()
-                .zip(&at)
-                .all(|(d, at)| d.abs() <= SETTLED * (1.0 + at.abs()));
-            if small {
-                settled = true;
-                break;
-            }
-        }
-        if !settled {
-            return None;
-        }
-        // The farthest beyond its bound stays there; inputs first, since a state is often the consequence.
-        let excess = |k: usize| {
-            let (lower, upper) = bounds(k);
-            (at[k] - at[k].max(lower).min(upper)).abs() / (1.0 + at[k].abs())
-        };
+    let mut held: Vec<usize> = Vec::new();
+    let mut releasable = vec![true; n + m];
+    // Each is held and released once, and held again.
+    for _ in 0..=3 * (n + m) {
+        let end = settle(model, wanted, &mut at, &held)?;
+        // Inputs first, since a state is often the consequence.
+        let excess = |k: usize| (at[k] - within(k, at[k])).abs() / (1.0 + at[k].abs());
         let farthest = |places: std::ops::Range<usize>| {
             let beyond = places.filter(|k| excess(*k) > SETTLED);
             beyond.max_by(|a, b| excess(*a).total_cmp(&excess(*b)))
         };
-        let Some(k) = farthest(n..n + m).or_else(|| farthest(0..n)) else {
-            let (x, u) = at.as_slice().split_at(n);
-            return Some((filled(x), filled(u)));
+        if let Some(k) = farthest(n..n + m).or_else(|| farthest(0..n)) {
+            at[k] = within(k, at[k]);
+            held.push(k);
+            continue;
+        }
+        let released = if end.stands {
+            let inside = |k: usize| match at[k] <= bounds(k).0 {
+                true => -end.slope[k],
+                false => end.slope[k],
+            };
+            let steepest = end.slope.amax().max(f64::MIN_POSITIVE);
+            let downhill = (0..held.len())
+                .filter(|i| releasable[held[*i]] && inside(held[*i]) > DOWNHILL * steepest);
+            let next = downhill.max_by(|a, b| inside(held[*a]).total_cmp(&inside(held[*b])));
+            if next.is_none() {
+                let (x, u) = at.as_slice().split_at(n);
+                return Some((filled(x), filled(u)));
+            }
+            next
+        } else {
+            held.iter().position(|k| releasable[*k])
         };
-        let (lower, upper) = bounds(k);
-        at[k] = at[k].max(lower).min(upper);
-        free[k] = false;
+        let k = held.remove(released?);
+        releasable[k] = false;
     }
     None
 }
 
-/// A step of Newton's method, with the Gauss-Newton matrix of the outputs.
+/// Where the steps end, with some components held.
+struct End {
+    /// How fast the cost grows with each component while the others keep the plant at rest.
+    slope: DVector<f64>,
+    /// The plant stands there.
+    stands: bool,
+}
+
+/// Newton's method, with the components of `held` where they are.
+fn settle<const NX: usize, const NU: usize, const NS: usize>(
+    model: &Disturbed<NX, NU, NS>,
+    wanted: &Wanted<'_, NX, NU>,
+    at: &mut DVector<f64>,
+    held: &[usize],
+) -> Option<End> {
+    let mut free = vec![true; at.len()];
+    held.iter().for_each(|k| free[*k] = false);
+    for step in 0..MOST_STEPS {
+        let (moved, end) = newton_step(model, wanted, at, &free)?;
+        let part = 0.5_f64.powi(i32::try_from(step / PATIENCE).unwrap_or(i32::MAX));
+        *at += &moved * part;
+        let settled = |(d, at): (&f64, &f64)| d.abs() <= SETTLED * (1.0 + at.abs());
+        if moved.iter().zip(at.iter()).all(settled) {
+            return Some(end);
+        }
+    }
+    None
+}
+
+/// A step of Newton's method, with the Gauss-Newton matrix of the outputs, and what it tells of where it begins.
 fn newton_step<const NX: usize, const NU: usize, const NS: usize>(
     model: &Disturbed<NX, NU, NS>,
     wanted: &Wanted<'_, NX, NU>,
     at: &DVector<f64>,
     free: &[bool],
-) -> Option<DVector<f64>> {
+) -> Option<(DVector<f64>, End)> {
     let (n, m) = (wanted.q.nrows(), wanted.r.nrows());
     let (x_at, u_at) = at.as_slice().split_at(n);
     let (x, u): (SVector<f64, NX>, SVector<f64, NU>) = (filled(x_at), filled(u_at));
@@ -141,13 +179,19 @@ fn newton_step<const NX: usize, const NU: usize, const NS: usize>(
             matrix[(n + m + k, i)] = jacobian[(k, i)];
         }
     }
-    right.rows_mut(n + m, n).copy_from(&-rest);
+    right.rows_mut(n + m, n).copy_from(&-&rest);
     // By singular values: a row of f that nothing moves has no multiplier.
     let svd = matrix.svd(true, true);
     let least = svd.singular_values.amax() * 1e-15;
     let solved = svd.solve(&right, least).ok()?;
-    let moved = solved.rows(0, n + m).into_owned();
-    moved.iter().all(|d| d.is_finite()).then_some(moved)
+    // What is held stays where it is to the last bit.
+    let moved = DVector::from_fn(n + m, |k, _| if free[k] { solved[k] } else { 0.0 });
+    let multipliers = solved.rows(n + m, n);
+    let slope = gradient + &hessian * &moved + jacobian.tr_mul(&multipliers);
+    let size = jacobian.abs() * at.map(|value| 1.0 + value.abs());
+    let stands = (0..n).all(|i| rest[i].abs() <= STANDS * size[i]);
+    let finite = moved.iter().all(|d| d.is_finite());
+    finite.then_some((moved, End { slope, stands }))
 }
 
 /// y and its derivatives with respect to state and input, n_y x (n + m).

@@ -278,8 +278,10 @@ pub enum Status<T> {
     /// The plan is a rollout of the nonlinear model, the rest of the last one as a rule: no program
     /// of this sample has an answer with a lower cost.
     NoImprovement,
-    /// No input satisfies all hard bounds. The active rows of the solution are the proof
-    /// ([`infeasibility_margin`](crate::infeasibility_margin)); this bound is the earliest of them.
+    /// No input satisfies all hard bounds of the quadratic program. The active rows of the solution are the proof
+    /// ([`infeasibility_margin`](crate::infeasibility_margin)); this bound is the earliest of them. Of a linear plant that
+    /// is a proof, too; of another one it says that its model along the last trajectory that was tried has no plan: there
+    /// may be one elsewhere.
     Infeasible(BoundId),
     /// The plan of a descent is a rollout of the nonlinear model that exceeds this hard bound, the earliest of them, by more
     /// than a hundredth of its width, and nothing proves that no input keeps it.
@@ -349,8 +351,8 @@ impl<T: fmt::Display> fmt::Display for Status<T> {
 
 /// Inputs, predicted states and status of one solve.
 ///
-/// Whatever the status, the inputs are finite and within the input bounds; unless it is
-/// [`Status::Solved`] they are a fallback, not an optimum.
+/// Whatever the status, the inputs are finite and within the input bounds; unless
+/// [`Status::is_solved`] they are a fallback, not an optimum.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
 pub struct Solution<T: 'static, const NX: usize, const NU: usize> {

@@ -6,6 +6,7 @@ use lpvmpc_any::{
     Iterations, Limits, LinearModels, Mpc, MpcSettings, Penalty, Preview, StateBounds, Terminal,
 };
 use lpvmpc_plant::{Matrices, Plant, PlantData};
+use lpvmpc_testkit::rng::Rng;
 use nalgebra::{DMatrix, DVector, dmatrix, dvector};
 
 const HORIZON: usize = 18;
@@ -253,6 +254,118 @@ fn a_reference_of_an_output_has_a_target() {
         plan = mpc.step(&x, &Preview::to(&[0.2, 0.0])).unwrap();
         assert!((plan.target.unwrap().x[0] - 0.2).abs() < 1e-6);
     }
+}
+
+/// Linear plants whose inputs are bounded: y = G u at rest, and the best u within the bounds is that of the best of its nine
+/// sets of bounds. An input that was held once stayed held, and some targets were not the nearest.
+#[test]
+fn the_target_of_outputs_is_the_nearest() {
+    let mut random = Rng::new(5);
+    let mut corners = 0;
+    for _ in 0..60 {
+        let a = dmatrix![-random.uniform(0.5, 2.0), random.uniform(-1.0, 1.0); 0.0, -random.uniform(0.5, 2.0)];
+        let b = DMatrix::from_fn(2, 2, |_, _| random.uniform(-2.0, 2.0));
+        let c = DMatrix::from_fn(2, 2, |_, _| random.uniform(-1.0, 1.0));
+        let gain = -&c * a.clone().try_inverse().unwrap() * &b;
+        let matrices = Matrices {
+            a,
+            b,
+            c: Some(c),
+            ..Matrices::default()
+        };
+        let mut data = PlantData::of_matrices("tanks", &matrices).unwrap();
+        for input in &mut data.inputs {
+            (input.lower, input.upper) = (Some(-0.5), Some(1.0));
+        }
+        let plant = Plant::new(data).unwrap();
+        let settings = MpcSettings {
+            q_y: Some(DMatrix::identity(2, 2)),
+            ..MpcSettings::new(0.1, 10, &[0.0, 0.0], &[1.0, 1.0])
+        };
+        let y_ref = DVector::from_fn(2, |_, _| random.uniform(-3.0, 3.0));
+        let distance = |u: &DVector<f64>| (&gain * u - &y_ref).norm();
+        let sides = [None, Some(-0.5), Some(1.0)];
+        let mut best = f64::INFINITY;
+        for (first, second) in sides
+            .iter()
+            .flat_map(|one| sides.map(|other| (*one, other)))
+        {
+            // The others follow from least squares.
+            let held = [first, second];
+            let mut u = DVector::from_iterator(2, held.map(|side| side.unwrap_or(0.0)));
+            let free: Vec<_> = (0..2).filter(|k| held[*k].is_none()).collect();
+            if !free.is_empty() {
+                let part = gain.select_columns(&free);
+                let rest = &y_ref - &gain * &u;
+                let solved = part.svd(true, true).solve(&rest, 1e-12).unwrap();
+                free.iter()
+                    .zip(&solved)
+                    .for_each(|(k, value)| u[*k] = *value);
+            }
+            if u.iter().all(|u| (-0.5..=1.0).contains(u)) {
+                best = best.min(distance(&u));
+            }
+        }
+        let mut mpc = Mpc::new(&plant, &settings).unwrap();
+        let preview = Preview::to_outputs(y_ref.as_slice());
+        let target = mpc.step(&[0.0; 2], &preview).unwrap().target.unwrap();
+        let u = DVector::from_vec(target.u);
+        corners += usize::from(u.iter().all(|u| *u == -0.5 || *u == 1.0));
+        assert!(
+            distance(&u) < best + 1e-6 * (1.0 + best),
+            "{u}: {} for {best}",
+            distance(&u)
+        );
+        let at_rest = plant.derivative(&target.x, u.as_slice()).unwrap();
+        assert!(at_rest.iter().all(|rate| rate.abs() < 1e-6), "{at_rest:?}");
+    }
+    println!("{corners} with both inputs at their bounds");
+    assert!(corners > 10, "{corners}");
+}
+
+/// A target is a place where the plant stands; there is none where it cannot.
+#[test]
+fn a_target_is_at_rest() {
+    // An input that is to follow an output, and cannot be where the state's bound keeps the plant from standing.
+    let lag = Matrices {
+        a: dmatrix![-1.0],
+        b: dmatrix![1.0],
+        c: Some(dmatrix![1.0; 0.5]),
+        d: Some(dmatrix![0.0; 1.0]),
+        ..Matrices::default()
+    };
+    let mut data = PlantData::of_matrices("lag", &lag).unwrap();
+    (data.inputs[0].lower, data.inputs[0].upper) = (Some(0.0), Some(1.0));
+    data.states[0].upper = Some(0.5);
+    let settings = MpcSettings {
+        q_y: Some(DMatrix::identity(2, 2)),
+        ..MpcSettings::new(0.1, 20, &[0.0], &[1.0])
+    };
+    let mut mpc = Mpc::new(&Plant::new(data).unwrap(), &settings).unwrap();
+    let plan = mpc.step(&[0.0], &Preview::to_outputs(&[5.0, 5.0])).unwrap();
+    let target = plan.target.unwrap();
+    assert!(
+        (target.x[0] - 0.5).abs() < 1e-6 && (target.u[0] - 0.5).abs() < 1e-6,
+        "{target:?}"
+    );
+
+    // x+ = x + u with u > 0 never stands.
+    let integrator = Matrices {
+        a: dmatrix![1.0],
+        b: dmatrix![1.0],
+        period: Some(1.0),
+        ..Matrices::default()
+    };
+    let mut data = PlantData::of_matrices("integrator", &integrator).unwrap();
+    (data.inputs[0].lower, data.inputs[0].upper) = (Some(0.2), Some(0.6));
+    let settings = MpcSettings {
+        r_du: Some(dmatrix![0.1]),
+        terminal: Terminal::Cost(dmatrix![1.0]),
+        ..MpcSettings::new(1.0, 5, &[1.0], &[1.0])
+    };
+    let mut mpc = Mpc::new(&Plant::new(data).unwrap(), &settings).unwrap();
+    let plan = mpc.step(&[0.0], &Preview::to(&[3.0])).unwrap();
+    assert!(plan.target.is_none(), "{:?}", plan.target);
 }
 
 #[test]
