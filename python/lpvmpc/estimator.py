@@ -29,7 +29,9 @@ class Gate:
     """Which readings are not believed."""
 
     deviations: float = np.inf
-    """A reading farther from the prediction than so many standard deviations is an outlier, and not used."""
+    """A reading farther from the prediction than so many standard deviations is an outlier, and not used. Without a
+    number those are that are farther than 4.5e15 of them, three in a row at most: they would leave nothing of the
+    estimate but rounding."""
     patience: int = 0
     """So many outliers in a row are not used; the next one is believed."""
     oldest: float = np.inf

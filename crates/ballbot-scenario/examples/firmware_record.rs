@@ -11,11 +11,12 @@
 //! ```
 //!
 //! Of a robot whose planes share their motors it writes what the sensors deliver, and what stands
-//! around the controllers.
+//! around the controllers, which plan by descent. Without shared motors it is a controller alone, with the paper's program:
+//! one for each sample, hard bounds, the scheduling held within a sample. What else a scenario asks for is refused.
 
 use ballbot::{Ballbot, Geometry};
-use ballbot_scenario::{Parameters, Plane, Prepared, RunHooks, Scenario, ThreeMotors};
-use lpvmpc::{Iterations, Reading, TerminalIngredient};
+use ballbot_scenario::{Parameters, Plane, Prepared, Problem, RunHooks, Scenario, ThreeMotors};
+use lpvmpc::{Iterations, Predictor, Reading, Scheduling, TerminalIngredient};
 use lpvmpc_sim::Trajectory;
 use std::error::Error;
 use std::fmt::Write;
@@ -33,10 +34,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("the firmware takes a scenario with its own table of parameters".into());
     };
     let zenith_angle = robot.zenith_angle_deg.to_radians();
+    check_plan(&prepared)?;
     if let Some(motors) = prepared.motors {
+        check_descent(&prepared)?;
         print!("{}", whole_robot(name, &prepared, zenith_angle, &motors)?);
         return Ok(());
     }
+    check_alone(&prepared)?;
     let trajectories = prepared.run(&RunHooks::NONE)?;
     let mut text = format!(
         "//! The scenario `{name}` and its first {samples} samples in closed loop.\n\
@@ -56,6 +60,69 @@ fn main() -> Result<(), Box<dyn Error>> {
     writeln!(text, "    ],\n}};")?;
     print!("{text}");
     Ok(())
+}
+
+/// What none of the firmware's controllers has.
+fn check_plan(prepared: &Prepared) -> Result<(), Box<dyn Error>> {
+    let settings = &prepared.settings;
+    refuse(&[
+        (
+            !matches!(prepared.problem, Problem::Plain),
+            "controller.torque_rate and a certified terminal set: leave them out",
+        ),
+        (
+            !matches!(settings.scheduling, Scheduling::Predicted),
+            "controller.model = \"linear\": take \"lpv\"",
+        ),
+    ])
+}
+
+/// What a robot whose planes share their motors does not have.
+fn check_descent(prepared: &Prepared) -> Result<(), Box<dyn Error>> {
+    let settings = &prepared.settings;
+    let quadratic = |price: &lpvmpc::Penalty<f64>| price.quadratic != 0.0;
+    refuse(&[
+        (
+            !matches!(settings.predictor, Predictor::StageConsistent(_)),
+            "controller.predictor but stage_consistent",
+        ),
+        (
+            settings.soft_x.iter().flatten().any(quadratic),
+            "quadratic prices of state bounds: leave them at 0",
+        ),
+    ])
+}
+
+/// What a controller alone does not have.
+fn check_alone(prepared: &Prepared) -> Result<(), Box<dyn Error>> {
+    let settings = &prepared.settings;
+    let one = matches!(settings.iterations, Iterations::Fixed(1));
+    refuse(&[
+        (
+            !one,
+            "controller.iterations: a descent needs [controller.motors]; take { fixed = 1 }",
+        ),
+        (
+            !matches!(settings.predictor, Predictor::FrozenRk4(_)),
+            "controller.predictor: take { rk4 = { substeps = 1 } }",
+        ),
+        (
+            settings.soft_x.iter().any(Option::is_some),
+            "soft state bounds: take controller.state_bounds = \"hard\"",
+        ),
+        (
+            prepared.feedback.estimator.is_some() || prepared.feedback.delay > 0.0,
+            "controller.estimator and controller.delay_s: they need [controller.motors]",
+        ),
+    ])
+}
+
+/// The first of these that is so.
+fn refuse(faults: &[(bool, &str)]) -> Result<(), Box<dyn Error>> {
+    match faults.iter().find(|(is_so, _)| *is_so) {
+        Some((_, fault)) => Err(format!("the firmware does not have {fault}").into()),
+        None => Ok(()),
+    }
 }
 
 fn write_robot(text: &mut String, robot: &Ballbot<f64>) -> std::fmt::Result {

@@ -55,7 +55,8 @@ pub struct EstimatorSettings<T, const NX: usize, const NU: usize, const NY: usiz
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gate<T> {
     /// A reading further from its prediction than this many standard deviations is an outlier;
-    /// infinite for none.
+    /// infinite for none but those further than 1/eps of them (4.5e15 for `f64`, 8.4e6 for `f32`), which leave nothing of
+    /// an estimate but rounding: three of these in a row are outliers whatever the gate.
     pub deviations: T,
     /// After this many outliers of one sensor in a row it is the state that must be wrong, as
     /// after a blow: the reading is believed, and the state's variance grows to fit it.

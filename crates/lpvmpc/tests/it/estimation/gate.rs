@@ -2,15 +2,19 @@
 
 use super::pendulum::{INSTANTS, Observer, PENDULUM, settings};
 use crate::pendulum::Pendulum;
-use lpvmpc::{Reading, Rk4, Verdict};
+use lpvmpc::{EstimatorSettings, Gate, Reading, Rk4, Verdict};
 use nalgebra::{Vector1, Vector2};
 
 const T_S: f64 = 0.01;
 
 /// An estimator that has settled at the upright pendulum, and the held-up pendulum itself.
 fn settled() -> Observer<Pendulum<f64>> {
-    let mut estimator =
-        Observer::allocate(PENDULUM, settings(), Vector2::zeros(), INSTANTS).unwrap();
+    settled_with(settings().gate)
+}
+
+fn settled_with(gate: Gate<f64>) -> Observer<Pendulum<f64>> {
+    let settings = EstimatorSettings { gate, ..settings() };
+    let mut estimator = Observer::allocate(PENDULUM, settings, Vector2::zeros(), INSTANTS).unwrap();
     for _ in 0..500 {
         estimator.advance(&Vector1::zeros(), T_S);
         estimator.update(&[Some(Reading::fresh(0.0))]);
@@ -38,6 +42,39 @@ fn an_outlier_is_seen_and_changes_nothing() {
         *estimator.covariance(),
     );
     assert_eq!(before, after);
+}
+
+/// What leaves nothing of an estimate but rounding is not believed where there is no gate, either: after one reading of 1e200 no
+/// plan was finite for seconds. Four in a row are.
+#[test]
+fn an_absurd_reading_is_an_outlier_without_a_gate() {
+    let gate = Gate {
+        deviations: f64::INFINITY,
+        patience: 0,
+        ..settings().gate
+    };
+    for absurd in [1e20, -1e100, 1e150, 1e300] {
+        let mut estimator = settled_with(gate);
+        let before = (estimator.state(), *estimator.covariance());
+        let verdict = estimator.update(&[Some(Reading::fresh(absurd))]);
+        assert_eq!(verdict, [Verdict::Outlier], "{absurd:e}");
+        assert_eq!((estimator.state(), *estimator.covariance()), before);
+        estimator.advance(&Vector1::zeros(), T_S);
+        let verdict = estimator.update(&[Some(Reading::fresh(0.0))]);
+        assert_eq!(verdict, [Verdict::Used]);
+        assert!(estimator.state().norm() < 1e-3, "{}", estimator.state());
+    }
+    let mut estimator = settled_with(gate);
+    let verdicts = [(); 4].map(|()| {
+        estimator.advance(&Vector1::zeros(), T_S);
+        estimator.update(&[Some(Reading::fresh(1e20))])[0]
+    });
+    assert_eq!(verdicts[..3], [Verdict::Outlier; 3]);
+    assert_eq!(verdicts[3], Verdict::UsedAfterBlow);
+    // Far away is not absurd.
+    let mut estimator = settled_with(gate);
+    let verdict = estimator.update(&[Some(Reading::fresh(1e6))]);
+    assert_eq!(verdict, [Verdict::Used]);
 }
 
 #[test]
