@@ -17,10 +17,6 @@ use nalgebra::{SMatrix, SVector};
 pub use observation::{Observation, Restart, Verdict};
 pub use settings::{EstimatorError, EstimatorSettings, Gate, Reading};
 
-/// Of readings so far off that what they leave of the estimate is rounding, so many in a row are not believed, whatever the
-/// gate says.
-const UNBELIEVABLE: usize = 3;
-
 /// An extended Kalman filter whose covariance follows the LPV model at the estimated scheduling,
 /// updated one sensor at a time in Joseph's form (Bucy and Joseph 1968; Simon, Optimal State
 /// Estimation, 2006, ch. 6.1 and 5).
@@ -419,15 +415,8 @@ where
         let (error, c_z, c_d) = self.error(i, value, estimate);
         let variance = estimate.covariance.of(&c_z, &c_d) + self.settings.measurement_noise[i];
         let excess = error * error / variance;
-        let gate = &self.settings.gate;
-        let rounding = T::default_epsilon().recip();
-        let believable = rounding * rounding;
         let mut judgement = (Verdict::Used, Trust::Plain);
-        if !(excess <= believable.min(gate.deviations * gate.deviations)) {
-            let patience = match excess <= believable {
-                true => gate.patience,
-                false => gate.patience.max(UNBELIEVABLE),
-            };
+        if let Some(patience) = self.settings.gate.patience_with(excess) {
             let patient = self.heard[i] && self.rejected[i] < patience;
             if patient || !excess.is_finite() {
                 self.rejected[i] += 1;

@@ -69,7 +69,25 @@ pub struct Gate<T> {
     pub longest_gap: T,
 }
 
+/// Of readings so far off that what they leave of the estimate is rounding, so many in a row are not believed, whatever the
+/// gate says.
+const UNBELIEVABLE: usize = 3;
+
 impl<T: Scalar> Gate<T> {
+    /// So many outliers in a row are not believed that are as far off as a reading whose squared distance from its prediction
+    /// is `excess` variances; `None` where it is no outlier.
+    pub(super) fn patience_with(&self, excess: T) -> Option<usize> {
+        let rounding = T::default_epsilon().recip();
+        let believable = rounding * rounding;
+        if excess <= believable.min(self.deviations * self.deviations) {
+            None
+        } else if excess <= believable {
+            Some(self.patience)
+        } else {
+            Some(self.patience.max(UNBELIEVABLE))
+        }
+    }
+
     /// What is wrong with a reading whatever the estimate, if anything.
     pub(super) fn refuses(&self, reading: &Reading<T>) -> Option<Verdict> {
         if !reading.value.is_finite() {
