@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# The program with the page inside (page.sh makes it), and the page's tests in Chromium (install-browser.sh).
+# The program with the page inside (page.sh makes it), the time of the module's steps beside the program's, and the
+# page's tests in Chromium (install-browser.sh).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}
@@ -10,4 +11,6 @@ export CHROMIUM
 
 cargo build --locked --release --features page -p ballbot-cli
 cd web
-BALLBOT=$CARGO_TARGET_DIR/release/ballbot npm test
+export BALLBOT=$CARGO_TARGET_DIR/release/ballbot
+node scripts/times.mjs --fail
+npm test

@@ -1,7 +1,8 @@
 // What depends on the clock of the machine: these run alone, after the others.
 
 import { availableParallelism, loadavg } from "node:os";
-import { expect } from "@playwright/test";
+import { expect, type Page } from "@playwright/test";
+import { median } from "../src/steptime";
 import { fill, open, pause, saved, scenario, settled, table, test, until } from "./page";
 
 /** Said of a measurement that is not as expected: a machine with more to do than it has cores cannot tell. */
@@ -32,30 +33,31 @@ test("the loop runs at one kilohertz", async ({ page }) => {
   expect(problems).toEqual([]);
 });
 
-test("the time per step that is shown is the measured one, and below 100 us for N = 20", async ({ page }) => {
-  await open(page);
-  await scenario(page, "two-setpoints");
-  await page.locator("#play").click();
-  await expect(page.locator("#message")).toContainText("End of the scenario", { timeout: 60_000 });
-  const steps = (table(await saved(page, "Save CSV"))["step_us"] ?? []).filter(Number.isFinite).sort((a, b) => a - b);
-  const middle = ((steps[39] ?? NaN) + (steps[40] ?? NaN)) / 2;
+/** That the time per step that is shown is the median of the saved ones. How long a step may take is judged beside
+ *  the program's, in one run (scripts/times.mjs): the time alone depends on what else the machine does. */
+async function expectMeasured(page: Page): Promise<void> {
+  const steps = (table(await saved(page, "Save CSV"))["step_us"] ?? []).filter(Number.isFinite);
+  expect(steps.length).toBeGreaterThan(70);
+  const middle = median(steps);
   await settled(page);
   const shown = parseFloat((await page.locator("#status .time").textContent()) ?? "");
   expect(shown).toBeCloseTo(middle, 1);
   expect(middle).toBeGreaterThan(0);
-  expect(middle, busyness()).toBeLessThan(100);
   test.info().annotations.push({ type: "median time per step", description: `${middle} us` });
+}
+
+test("the time per step that is shown is the measured one", async ({ page }) => {
+  await open(page);
+  await scenario(page, "two-setpoints");
+  await page.locator("#play").click();
+  await expect(page.locator("#message")).toContainText("End of the scenario", { timeout: 60_000 });
+  await expectMeasured(page);
 });
 
-test("a step of the default predictor takes less than 100 us", async ({ page }) => {
+test("and that of two planes with the default predictor", async ({ page }) => {
   await open(page);
   await fill(page, "Target X", "0.5");
   await until(page, 4);
   await pause(page);
-  const steps = (table(await saved(page, "Save CSV"))["step_us"] ?? []).filter(Number.isFinite).sort((a, b) => a - b);
-  expect(steps.length).toBeGreaterThan(70);
-  const middle = steps[Math.floor(steps.length / 2)] ?? NaN;
-  expect(middle).toBeGreaterThan(0);
-  expect(middle, busyness()).toBeLessThan(100);
-  test.info().annotations.push({ type: "median time per step", description: `${middle} us` });
+  await expectMeasured(page);
 });

@@ -5,8 +5,9 @@
 //! interior-point method that goes on until it can be told which bounds will be active. The program in
 //! which these hold says which of them should not, and which are missing; that takes a few factorisations,
 //! however many bounds there are. Where it finds nothing the dual method begins as it would have without it.
-//! Where few bounds are expected the dual method begins; the interior-point method has a later turn when as many
-//! changes as it would be worth have not led to the end: many bounds are active after all, or few contradict each other.
+//! Where few bounds are expected, or it cannot be told, the dual method begins; the interior-point method has a later turn
+//! when as many changes as it would be worth have not led to the end: many bounds are active after all, or few contradict
+//! each other.
 
 mod answer;
 mod exchange;
@@ -62,7 +63,7 @@ const SHARE: usize = 4;
 pub(crate) enum Turn {
     /// Before the dual method, if there are many bounds.
     First,
-    /// After it has come to no end in as many changes as the phase may take, or at all.
+    /// After it has come to no end in as many changes as it was given, or at all.
     Later,
 }
 
@@ -76,8 +77,8 @@ pub(crate) enum AtOnce<T> {
     /// The solution, or the proof that there is none.
     Done(Result<(), Status<T>>),
     /// Neither: the trajectory without bounds is in the solution, and the active rows are those to begin with: of the last
-    /// solution at their new stages, if they are to be begun with.
-    InVain,
+    /// solution at their new stages, if they are to be begun with. It has a later turn after so many changes, if any.
+    InVain(Option<usize>),
 }
 
 /// The least cap with which a problem with so many `entries` of state and input has a later turn.
@@ -190,6 +191,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         let mut expected = Expected::new(ocp, solution, known);
         if later {
             (expected.many, expected.saturated) = (true, false);
+            expected.changes_first = None;
         } else if expected.violated == 0 {
             return AtOnce::Kept;
         } else if !expected.is_due(&mut self.retries) {
@@ -264,7 +266,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         }
         let outcome = if found {
             Some(Ok(()))
-        } else if !expected.many {
+        } else if !expected.search_is_due() {
             None
         } else {
             newton::measure(&whole, sides, &trajectory(solution));
@@ -278,7 +280,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             }
             other => other,
         };
-        if !later && !expected.saturated {
+        let put_off = outcome.is_none() && expected.many && expected.changes_first.is_some();
+        if !(later || expected.saturated || put_off) {
             let most = expected.worth::<NU>(side::any_soft(sides));
             self.retries
                 .turns
@@ -294,6 +297,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         solver.roll_out(ocp, solution).ok();
         guess::known(sides);
         list(sides, &mut solution.active);
-        AtOnce::InVain
+        AtOnce::InVain(expected.changes_first.filter(|_| put_off))
     }
 }

@@ -161,18 +161,22 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         }
         let begun = factorized.and_then(|()| self.roll_out(ocp, solution));
         let outcome = begun.and_then(|()| {
-            match self.solve_at_once(ocp, shift, solution, (Turn::First, &mut spent)) {
-                AtOnce::Done(outcome) => return outcome,
-                AtOnce::Kept => self.dual.kept = true,
-                AtOnce::InVain => shift = Some(0),
-                AtOnce::Untried => {}
-            }
             // Where all bounds at once were not tried, they are when the search gets long, or rounding has ended it.
-            let phase = self.many_bounds.first().filter(|_| spent == 0);
+            let phase = self.many_bounds.first();
             let mut kept_back = match phase.is_some_and(|phase| phase.has_room(ocp)) {
                 true => kept_for_later_turn(cap, NX + NU),
                 false => 0,
             };
+            match self.solve_at_once(ocp, shift, solution, (Turn::First, &mut spent)) {
+                AtOnce::Done(outcome) => return outcome,
+                AtOnce::Kept => self.dual.kept = true,
+                AtOnce::InVain(changes) => {
+                    shift = Some(0);
+                    let left = self.dual.changes_left();
+                    kept_back = changes.map_or(0, |changes| left.saturating_sub(changes));
+                }
+                AtOnce::Untried => {}
+            }
             loop {
                 self.dual.keep_back(kept_back);
                 let one_by_one = self.solve_one_by_one(ocp, shift, solution, &mut spent);

@@ -18,6 +18,7 @@ use std::path::{Path, PathBuf};
 const SAMPLES: usize = 12;
 const SEED: u64 = 1;
 
+const KEYS: [&str; 4] = ["size", "horizon", "kind", "share"];
 const SIZES: [&str; 4] = ["4x1", "8x2", "12x4", "16x6"];
 const HORIZONS: [&str; 4] = ["20", "50", "100", "200"];
 const SHARES: [&str; 6] = ["0", "0.1", "0.2", "0.4", "0.6", "0.8"];
@@ -29,6 +30,26 @@ struct Selection {
 }
 
 impl Selection {
+    fn from_arguments(mut arguments: impl Iterator<Item = String>) -> Result<Self, String> {
+        let folder = arguments.next().filter(|word| !word.starts_with('-')).ok_or(
+            "usage: write-problems FOLDER [size=4x1,...] [horizon=20,...] [kind=inputs,...] [share=0,...]",
+        )?;
+        let chosen: Vec<String> = arguments.collect();
+        let known = |word: &String| {
+            word.split_once('=')
+                .is_some_and(|(key, _)| KEYS.contains(&key))
+        };
+        match chosen.iter().find(|word| !known(word)) {
+            Some(word) => Err(format!(
+                "{word}: it must be KEY=VALUE,... with a key of {KEYS:?}"
+            )),
+            None => Ok(Self {
+                folder: PathBuf::from(folder),
+                chosen,
+            }),
+        }
+    }
+
     /// The chosen values of a key, or all there are.
     fn of<'a>(&'a self, key: &str, all: &[&'a str]) -> Vec<&'a str> {
         let of_key = |word: &'a String| word.strip_prefix(key)?.strip_prefix('=');
@@ -40,14 +61,7 @@ impl Selection {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
-    let folder = arguments.next().ok_or(
-        "usage: write-problems FOLDER [size=4x1,...] [horizon=20,...] [kind=inputs,...] [share=0,...]",
-    )?;
-    let selection = Selection {
-        folder: PathBuf::from(folder),
-        chosen: arguments.collect(),
-    };
+    let selection = Selection::from_arguments(std::env::args().skip(1))?;
     std::fs::create_dir_all(&selection.folder)?;
     let kinds = Kind::ALL.map(Kind::name);
     for size in selection.of("size", &SIZES) {

@@ -13,6 +13,13 @@ const MANY: usize = 24;
 /// So many where some are soft, which takes more factorisations, or those of a single input are known, with which the
 /// dual method begins.
 const MORE: usize = 32;
+/// Where more states are bounded than there are inputs, as speeds and accelerations are beside a position, most of what is
+/// violated is not active in the answer: below so many, or as many of a single input as above, the dual method has
+const MANY_LIMITS: usize = 56;
+/// so many changes first, in which it comes to an end as a rule,
+const CHANGES_FIRST: usize = 64;
+/// and so many of a single input.
+const CHANGES_OF_ONE: usize = 32;
 /// So many soft ones of a single input, where all that can hold are violated: the dual method adds and drops them again.
 const ALL_SOFT: usize = 20;
 /// And so many where some are known.
@@ -36,6 +43,8 @@ pub(super) struct Expected {
     pub bounds: usize,
     /// Whether these are many enough for the interior-point method.
     pub many: bool,
+    /// After how many changes of the dual method, if that should come first.
+    pub changes_first: Option<usize>,
     /// Whether the last answer is worth a guess, although they are fewer.
     pub familiar: bool,
     /// Whether the inputs that the regulator saturates are worth a guess.
@@ -75,9 +84,17 @@ impl Expected {
         // No more can hold independently than there are inputs, but any number can be exceeded.
         let most = if soft { usize::MAX } else { ocp.length() * NU };
         let bounds = if tells { known } else { violated }.min(most);
+        // Those that are known were few of the violated ones, too.
+        let limits = if tells { 2 * known } else { violated };
+        let (many_limits, changes) = match NU {
+            1 => (MORE, CHANGES_OF_ONE),
+            _ => (MANY_LIMITS, CHANGES_FIRST),
+        };
         Self {
             violated,
             bounds,
+            changes_first: (limits < many_limits && !soft && hard_states(ocp) > NU)
+                .then_some(changes),
             many: bounds >= enough,
             familiar: tells && !takes_more && known >= FAMILIAR,
             // Those are nearly right where a single input moves the states.
@@ -85,6 +102,11 @@ impl Expected {
             rows,
             takes_more,
         }
+    }
+
+    /// Whether the interior-point method is worth a try before the dual one.
+    pub fn search_is_due(&self) -> bool {
+        self.many && self.changes_first.is_none()
     }
 
     /// Whether it is worth a try now.
@@ -102,4 +124,15 @@ impl Expected {
             (false, false) => self.bounds,
         }
     }
+}
+
+/// How many states have hard bounds; as a rule they are the same at all stages.
+fn hard_states<T: Scalar, const NX: usize, const NU: usize>(ocp: &Ocp<T, NX, NU>) -> usize {
+    let common = ocp.common_at(0);
+    let sides = common.x.lower.iter().zip(common.x.upper.iter());
+    let bounds = sides.zip(&common.soft_x);
+    let hard = bounds.filter(|((lower, upper), soft)| {
+        soft.is_none() && (lower.is_finite() || upper.is_finite())
+    });
+    hard.count()
 }
