@@ -16,7 +16,24 @@ cross=$PWD/.ci/cross-cargo.sh
         -p firmware --bins --examples
 )
 # With the program named, its dependencies are those that are built already.
-cargo build --locked --release -p ballbot-cli -p ballbot-scenario --example firmware_check
+cargo build --locked --release -p ballbot-cli -p ballbot-scenario \
+    --example firmware_check --example firmware_record
+
+# The recordings have the form that is written today; their numbers are those of the day that they were written on.
+record() { "$CARGO_TARGET_DIR/release/examples/firmware_record" "$@"; }
+form() { sed -E 's/-?[0-9][0-9.]*(e-?[0-9]+)?/N/g'; }
+while read -r scenario samples recorded; do
+    diff <(record "$scenario" "$samples" | form) <(form <"firmware/src/recorded/$recorded.rs")
+done <<'END'
+lissajous 40 lissajous
+tight-bounds 80 tight_bounds
+docs/examples/whole-robot.toml 40 whole_robot
+END
+# What the firmware's controllers do not have is refused.
+if refused=$(record one-metre 5 2>&1) || [[ $refused != *"the firmware does not have"* ]]; then
+    echo "firmware_record one-metre: $refused" >&2
+    exit 1
+fi
 
 # Flash: code, constants and initial data. The host's `size` counts sections by their flags,
 # whatever the processor.

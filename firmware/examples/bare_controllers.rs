@@ -85,11 +85,7 @@ fn main() -> ! {
     ) else {
         board.stop()
     };
-    let (Some(x), Some(y), Ok(wheels)) = (
-        controller(x),
-        controller(y),
-        Wheels::of_paper(ROBOT.zenith_angle),
-    ) else {
+    let (Some(x), Some(y), Ok(wheels)) = (controller(x), controller(y), ROBOT.wheels()) else {
         board.stop() // the settings make no sense
     };
     let workspace = &mut Workspace::new(memory.lend());

@@ -5,7 +5,7 @@
 #![no_std]
 #![no_main]
 
-use ballbot::{RobotState, Wheels};
+use ballbot::RobotState;
 use core::hint::black_box;
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -84,7 +84,7 @@ fn main() -> ! {
     ) else {
         board.stop()
     };
-    let Ok(wheels) = Wheels::of_paper(ROBOT.plane.zenith_angle) else {
+    let Ok(wheels) = ROBOT.plane.wheels() else {
         board.stop() // the wheels make no sense
     };
     let Ok(mut regulator) = ROBOT.regulator(wheels, memory) else {

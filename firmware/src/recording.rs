@@ -1,7 +1,7 @@
 //! A scenario's settings, states and references, as they stand in the flash.
 
 use crate::{N, Window};
-use ballbot::Ballbot;
+use ballbot::{BadWheels, Ballbot, Wheel, Wheels};
 use lpvmpc::{
     Bounds, ControllerSettings, InputReference, Iterations, Penalty, Predictor, Rk4, Scheduling,
     SolverSettings, TerminalIngredient, Weights,
@@ -17,6 +17,8 @@ pub struct Recording {
     pub ballbot: Ballbot<f32>,
     /// Angle of the wheels' contact points from the top of the ball, rad.
     pub zenith_angle: f32,
+    /// Where the wheels stand, and which way they turn.
+    pub wheels: [Wheel<f32>; 3],
     /// Sampling time, s.
     pub t_s: f32,
     /// Prediction horizon, samples.
@@ -112,6 +114,14 @@ impl Recording {
             iterations: Iterations::descent(tolerance, most),
             ..self.settings()
         }
+    }
+
+    /// The wheels, with their torque map.
+    ///
+    /// # Errors
+    /// The torque map has no inverse.
+    pub fn wheels(&self) -> Result<Wheels<f32>, BadWheels<f32>> {
+        Wheels::new(self.zenith_angle, self.wheels)
     }
 
     /// Samples that were recorded.

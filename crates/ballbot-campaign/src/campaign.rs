@@ -9,7 +9,6 @@ use crate::inputs::{Input, Inputs, child, named_seed};
 use crate::measure::{Ending, Measure, Measured};
 use ballbot_scenario::{Document, Files, Prepared, Record, RunHooks, ScenarioError, words};
 use rayon::prelude::*;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use toml::Value;
@@ -37,7 +36,7 @@ impl Source {
     /// A file cannot be read, or is no campaign or no scenario.
     pub fn load(path: &Path) -> Result<Self, CampaignError> {
         Self::parse(
-            fs::read_to_string(path).map_err(CampaignError::at(path))?,
+            words::read_text(path).map_err(CampaignError::at(path))?,
             path,
         )
     }

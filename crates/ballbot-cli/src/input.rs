@@ -57,7 +57,7 @@ pub enum InputError {
 /// # Errors
 /// [`InputError::Read`].
 pub fn read_text(path: &Path) -> Result<String, InputError> {
-    std::fs::read_to_string(path).map_err(|source| InputError::Read {
+    words::read_text(path).map_err(|source| InputError::Read {
         path: path.to_owned(),
         source,
     })

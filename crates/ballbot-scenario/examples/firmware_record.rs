@@ -14,8 +14,8 @@
 //! around the controllers, which plan by descent. Without shared motors it is a controller alone, with the paper's program:
 //! one for each sample, hard bounds, the scheduling held within a sample. What else a scenario asks for is refused.
 
-use ballbot::{Ballbot, Geometry};
-use ballbot_scenario::{Parameters, Plane, Prepared, Problem, RunHooks, Scenario, ThreeMotors};
+use ballbot::{Ballbot, Geometry, Wheel, Wheels};
+use ballbot_scenario::{Plane, Prepared, Problem, RunHooks, Scenario, ThreeMotors};
 use lpvmpc::{Iterations, Predictor, Reading, Scheduling, TerminalIngredient};
 use lpvmpc_sim::Trajectory;
 use std::error::Error;
@@ -28,16 +28,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("usage: firmware_record SCENARIO SAMPLES".into());
     };
     let scenario = Scenario::load(name)?;
-    let mut prepared = scenario.prepare(Path::new("."))?;
+    let folder = Path::new(name).parent().unwrap_or(Path::new("."));
+    let mut prepared = scenario.prepare(folder)?;
     prepared.samples = samples.parse()?;
-    let Parameters::Table(robot) = &scenario.parameters else {
-        return Err("the firmware takes a scenario with its own table of parameters".into());
-    };
-    let zenith_angle = robot.zenith_angle_deg.to_radians();
     check_plan(&prepared)?;
     if let Some(motors) = prepared.motors {
         check_descent(&prepared)?;
-        print!("{}", whole_robot(name, &prepared, zenith_angle, &motors)?);
+        print!("{}", whole_robot(name, &prepared, &motors)?);
         return Ok(());
     }
     check_alone(&prepared)?;
@@ -46,12 +43,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         "//! The scenario `{name}` and its first {samples} samples in closed loop.\n\
          //! Written by `firmware_record {name} {samples}`, an example of `ballbot-scenario`.\n\n\
          use crate::recording::{{Plane, Recording}};\n\
-         use ballbot::{{Ballbot, DriveFriction, Geometry}};\n\n\
+         use ballbot::{{Ballbot, DriveFriction, Geometry, Wheel}};\n\n\
          /// The recording.\n\
          pub const RECORDING: Recording = Recording {{\n    name: {name:?},\n"
     );
     write_robot(&mut text, &prepared.ballbot)?;
-    writeln!(text, "    zenith_angle: {},", literal(zenith_angle))?;
+    write_wheels(&mut text, &prepared.wheels)?;
     write_settings(&mut text, &prepared)?;
     writeln!(text, "    planes: &[")?;
     for (plane, trajectory) in prepared.planes.iter().zip(&trajectories) {
@@ -123,6 +120,23 @@ fn refuse(faults: &[(bool, &str)]) -> Result<(), Box<dyn Error>> {
         Some((_, fault)) => Err(format!("the firmware does not have {fault}").into()),
         None => Ok(()),
     }
+}
+
+fn write_wheels(text: &mut String, wheels: &Wheels<f64>) -> std::fmt::Result {
+    writeln!(
+        text,
+        "    zenith_angle: {},",
+        literal(wheels.zenith_angle())
+    )?;
+    writeln!(text, "    wheels: [")?;
+    for Wheel { azimuth, reversed } in wheels.arrangement() {
+        let azimuth = literal(azimuth);
+        writeln!(
+            text,
+            "        Wheel {{ azimuth: {azimuth}, reversed: {reversed} }},"
+        )?;
+    }
+    writeln!(text, "    ],")
 }
 
 fn write_robot(text: &mut String, robot: &Ballbot<f64>) -> std::fmt::Result {
@@ -215,7 +229,6 @@ fn write_plane(
 fn whole_robot(
     name: &str,
     prepared: &Prepared,
-    zenith_angle: f64,
     ThreeMotors { limits, turning }: &ThreeMotors,
 ) -> Result<String, Box<dyn Error>> {
     let record = prepared.record(&RunHooks::NONE)?;
@@ -231,7 +244,7 @@ fn whole_robot(
          //! Written by `firmware_record {name} {samples}`, an example of `ballbot-scenario`.\n\n\
          use crate::recording::{{Descent, Recording}};\n\
          use crate::robot_recording::{{RobotRecording, RobotSettings}};\n\
-         use ballbot::{{Ballbot, DriveFriction, Geometry, MotorLimits, YawLaw}};\n\
+         use ballbot::{{Ballbot, DriveFriction, Geometry, MotorLimits, Wheel, YawLaw}};\n\
          use lpvmpc::Gate;\n\n\
          /// The recording.\n\
          pub const RECORDING: RobotRecording = RobotRecording {{\n\
@@ -239,7 +252,7 @@ fn whole_robot(
          plane: Recording {{\n    name: \"whole-robot\",\n"
     );
     write_robot(&mut text, &prepared.ballbot)?;
-    writeln!(text, "    zenith_angle: {},", literal(zenith_angle))?;
+    write_wheels(&mut text, &prepared.wheels)?;
     write_settings(&mut text, prepared)?;
     writeln!(text, "    planes: &[],\n}},")?;
     let Iterations::Descent {

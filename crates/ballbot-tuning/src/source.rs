@@ -4,7 +4,6 @@ use crate::error::TuningError;
 use crate::file::TuningFile;
 use ballbot_campaign::{CampaignFile, OnRefused, Source, named_seed};
 use ballbot_scenario::words;
-use std::fs;
 use std::path::{Path, PathBuf};
 use toml::Value;
 
@@ -25,7 +24,7 @@ impl TuningSource {
     /// # Errors
     /// A file cannot be read, or is no tuning or no scenario.
     pub fn load(path: &Path) -> Result<Self, TuningError> {
-        let text = fs::read_to_string(path).map_err(|source| TuningError::File {
+        let text = words::read_text(path).map_err(|source| TuningError::File {
             path: path.to_owned(),
             source,
         })?;

@@ -178,7 +178,8 @@ impl Simulation {
     /// Azimuths of the wheels' contact points from the robot's x axis, counter-clockwise seen from
     /// above, rad.
     pub fn azimuths(&self) -> Vec<f64> {
-        self.session.prepared().wheels.azimuths().to_vec()
+        let wheels = self.session.prepared().wheels.arrangement();
+        wheels.map(|wheel| wheel.azimuth).to_vec()
     }
 
     /// Why the robot does not stand any more; absent while it stands.

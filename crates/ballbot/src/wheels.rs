@@ -141,11 +141,14 @@ impl<T: Scalar + Number> Wheels<T> {
         RealField::atan2(sin, cos)
     }
 
-    /// Azimuths of the wheels' contact points from the robot's x axis, rad, from -pi to pi.
-    pub fn azimuths(&self) -> [T; 3] {
+    /// Where each wheel stands, with azimuths from -pi to pi rad, and which way it turns.
+    pub fn arrangement(&self) -> [Wheel<T>; 3] {
         self.directions.map(|direction| {
             let sense = direction.z;
-            RealField::atan2(direction.y * sense, direction.x * sense)
+            Wheel {
+                azimuth: RealField::atan2(direction.y * sense, direction.x * sense),
+                reversed: sense < T::zero(),
+            }
         })
     }
 

@@ -10,8 +10,8 @@ use lpvmpc_plant::Plant;
 use lpvmpc_terminal::output;
 use lpvmpc_terminal::progress::ProofProgress;
 use lpvmpc_terminal::table::short;
+use lpvmpc_words::read_text;
 use serde_json::json;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Finds and proves a certificate for the controller of an experiment; its text, or where it was written.
@@ -67,7 +67,7 @@ impl Experiment {
 
 /// Reads a certificate and proves what it claims.
 fn prove(path: &Path, plant: &Plant) -> Result<(Certificate, Verified), CommandError> {
-    let text = fs::read_to_string(path).map_err(|source| CommandError::Read {
+    let text = read_text(path).map_err(|source| CommandError::Read {
         path: path.to_owned(),
         source,
     })?;

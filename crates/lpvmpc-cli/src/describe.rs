@@ -6,13 +6,14 @@ use lpvmpc_any::AT_REST;
 use lpvmpc_design::controllability_rank;
 use lpvmpc_plant::{Plant, Signal};
 use lpvmpc_terminal::table::{self, Table, short};
+use lpvmpc_words::read_text;
 use nalgebra::{Complex, DMatrix};
 use serde_json::{Value, json};
 use std::path::Path;
 
 /// The plant in the file at `path`.
 pub fn load(path: &Path) -> Result<Plant, CommandError> {
-    let text = std::fs::read_to_string(path).map_err(|source| CommandError::Read {
+    let text = read_text(path).map_err(|source| CommandError::Read {
         path: path.to_owned(),
         source,
     })?;

@@ -13,13 +13,12 @@ use lpvmpc_any::{
 };
 use lpvmpc_plant::{Plant, Signal};
 use lpvmpc_terminal::table::short;
-use lpvmpc_words::toml_message;
+use lpvmpc_words::{read_text, toml_message};
 use nalgebra::{DMatrix, DVector};
 use serde::Deserialize;
 pub use signals::{check_name, components, names};
 use signals::{limits, weights};
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 use world::World;
 
@@ -170,7 +169,7 @@ impl Experiment {
     /// # Errors
     /// The file cannot be read, is no TOML, has a key that is none, or a value that makes no sense.
     pub fn load(path: &Path) -> Result<Self, CommandError> {
-        let text = fs::read_to_string(path).map_err(|source| CommandError::Read {
+        let text = read_text(path).map_err(|source| CommandError::Read {
             path: path.to_owned(),
             source,
         })?;

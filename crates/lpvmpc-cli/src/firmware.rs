@@ -4,6 +4,7 @@ use crate::arguments::FirmwareArguments;
 use crate::error::CommandError;
 use crate::experiment::Experiment;
 use lpvmpc_any::{Demonstration, MpcError};
+use lpvmpc_words::read_text;
 use std::path::Path;
 
 /// Prints the controller of an experiment; where it was written.
@@ -39,7 +40,7 @@ pub fn run(arguments: &FirmwareArguments) -> Result<String, CommandError> {
 /// The absolute path of the crate lpvmpc, as a Cargo.toml elsewhere must have it.
 fn crate_folder(given: &Path) -> Result<String, CommandError> {
     let manifest = given.join("Cargo.toml");
-    let text = std::fs::read_to_string(&manifest).map_err(|source| CommandError::Read {
+    let text = read_text(&manifest).map_err(|source| CommandError::Read {
         path: manifest.clone(),
         source,
     })?;

@@ -28,7 +28,12 @@ use std::process::ExitCode;
 const PROGRAM: &str = "lpvmpc";
 
 fn main() -> ExitCode {
-    let matches = Arguments::command().get_matches();
+    let matches = match Arguments::command().try_get_matches() {
+        Ok(matches) => matches,
+        // Help and version are results, too.
+        Err(asked) if !asked.use_stderr() => return output::printed(asked.print()),
+        Err(error) => error.exit(),
+    };
     let arguments = match Arguments::from_arg_matches(&matches) {
         Ok(arguments) => arguments,
         Err(error) => error.exit(),

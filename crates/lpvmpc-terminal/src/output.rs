@@ -333,7 +333,12 @@ fn temporary(path: &Path) -> PathBuf {
 pub fn print(text: &str) -> ExitCode {
     let mut output = io::stdout().lock();
     let written = output.write_all(text.as_bytes());
-    match written.and_then(|()| output.flush()) {
+    printed(written.and_then(|()| output.flush()))
+}
+
+/// The end of a program whose result is on standard output, as far as it could be written.
+pub fn printed(written: io::Result<()>) -> ExitCode {
+    match written {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
         Err(error) => complain(&format!("cannot write to standard output: {error}")),

@@ -1,6 +1,37 @@
-//! Messages for people about files that were written by people.
+//! Files that were written by people: their text, and messages about it.
 
 use serde::de::DeserializeOwned;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Most bytes of a file that is read as a whole, 64 MiB: more than any set-up, plant or table of references has.
+pub const MOST_BYTES: u64 = 64 << 20;
+
+/// The content of a file.
+///
+/// # Errors
+/// It cannot be read, or has more than [`MOST_BYTES`], as a device that never ends has.
+pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let mut content = Vec::new();
+    File::open(path)?
+        .take(MOST_BYTES + 1)
+        .read_to_end(&mut content)?;
+    if content.len() as u64 > MOST_BYTES {
+        let problem = "it has more than 64 MiB, which no file of this kind needs";
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, problem));
+    }
+    Ok(content)
+}
+
+/// The text of a file.
+///
+/// # Errors
+/// As of [`read`], or it is no UTF-8.
+pub fn read_text(path: &Path) -> io::Result<String> {
+    let no_text = |_| io::Error::new(io::ErrorKind::InvalidData, "it is not text in UTF-8");
+    String::from_utf8(read(path)?).map_err(no_text)
+}
 
 /// What a TOML text says, whose lists are as long as they must be: the reader by itself leaves out what is behind.
 ///

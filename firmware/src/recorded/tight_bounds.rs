@@ -2,7 +2,7 @@
 //! Written by `firmware_record tight-bounds 80`, an example of `ballbot-scenario`.
 
 use crate::recording::{Plane, Recording};
-use ballbot::{Ballbot, DriveFriction, Geometry};
+use ballbot::{Ballbot, DriveFriction, Geometry, Wheel};
 
 /// The recording.
 pub const RECORDING: Recording = Recording {
@@ -24,6 +24,11 @@ pub const RECORDING: Recording = Recording {
         },
     },
     zenith_angle: 0.7853982,
+    wheels: [
+        Wheel { azimuth: -1.5707964, reversed: false },
+        Wheel { azimuth: 0.5235988, reversed: false },
+        Wheel { azimuth: 2.6179938, reversed: false },
+    ],
     t_s: 0.05,
     horizon: 20,
     substeps: 1,

@@ -3,7 +3,7 @@
 
 use crate::recording::{Descent, Recording};
 use crate::robot_recording::{RobotRecording, RobotSettings};
-use ballbot::{Ballbot, DriveFriction, Geometry, MotorLimits, YawLaw};
+use ballbot::{Ballbot, DriveFriction, Geometry, MotorLimits, Wheel, YawLaw};
 use lpvmpc::Gate;
 
 /// The recording.
@@ -28,6 +28,11 @@ plane: Recording {
         },
     },
     zenith_angle: 0.7853982,
+    wheels: [
+        Wheel { azimuth: -1.5707964, reversed: false },
+        Wheel { azimuth: 0.5235988, reversed: false },
+        Wheel { azimuth: 2.6179938, reversed: false },
+    ],
     t_s: 0.05,
     horizon: 20,
     substeps: 1,

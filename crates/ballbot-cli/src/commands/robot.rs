@@ -81,8 +81,16 @@ impl ScenarioOptions {
     /// A scenario with these options, and the folder for files that it names; not checked yet.
     ///
     /// # Errors
-    /// The scenario cannot be read, or a key of it cannot be set.
+    /// The scenario cannot be read, or a key of it cannot be set, or is to be set twice.
     pub fn load(&self, scenario: &str) -> Result<(Scenario, PathBuf), CommandError> {
+        for (place, (key, value)) in self.set.iter().enumerate() {
+            let before = self.set.iter().take(place);
+            if let Some((_, other)) = before.into_iter().find(|(earlier, _)| earlier == key) {
+                return Err(CommandError::Usage(format!(
+                    "--set {key} is there twice, with {other} and with {value}: leave one"
+                )));
+            }
+        }
         let mut loaded = Scenario::load_with(scenario, &self.set)?;
         if let Some(path) = &self.robot.parameters {
             // Relative to where the command was given, not to the scenario.

@@ -99,19 +99,35 @@ fn a_reader_that_has_seen_enough_is_no_failure() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_a_failure() {
-    let full = std::fs::OpenOptions::new()
-        .write(true)
-        .open("/dev/full")
-        .unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_ballbot"))
-        .arg("lqr")
-        .stdout(full)
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .unwrap()
-        .wait_with_output()
-        .unwrap();
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{message}");
-    assert_says(&message, &["error: cannot write to standard output"]);
+    for argument in ["lqr", "--help", "--version"] {
+        let full = std::fs::OpenOptions::new()
+            .write(true)
+            .open("/dev/full")
+            .unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_ballbot"))
+            .arg(argument)
+            .stdout(full)
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap()
+            .wait_with_output()
+            .unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{argument}: {message}");
+        assert_says(&message, &["error: cannot write to standard output"]);
+    }
+}
+
+/// A device that never ends filled the memory.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_without_end_is_refused() {
+    for command in [
+        vec!["simulate", "/dev/zero"],
+        vec!["lqr", "--parameters", "/dev/zero"],
+        vec!["campaign", "/dev/zero"],
+        vec!["tune", "/dev/zero"],
+    ] {
+        assert_says(&failure(&command, 1), &["/dev/zero", "64 MiB"]);
+    }
 }

@@ -187,7 +187,7 @@ fn text(name_or_path: &str) -> Result<String, ScenarioError> {
     if !path.exists() && !looks_like_a_path {
         return Err(ScenarioError::unknown(name_or_path));
     }
-    std::fs::read_to_string(path).map_err(|source| ScenarioError::Read {
+    words::read_text(path).map_err(|source| ScenarioError::Read {
         path: path.to_owned(),
         source,
     })

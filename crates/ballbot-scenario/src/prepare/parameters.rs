@@ -63,7 +63,7 @@ fn in_file(
     path: &Path,
     robot: impl Fn(&str) -> Result<KnownRobot, ScenarioError>,
 ) -> Result<KnownRobot, ScenarioError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Read {
+    let text = words::read_text(path).map_err(|source| ScenarioError::Read {
         path: path.to_owned(),
         source,
     })?;

@@ -1,6 +1,7 @@
 //! Numbers over time, from a CSV file.
 
 use crate::error::ScenarioError;
+use crate::words;
 use std::path::PathBuf;
 
 /// One quantity over time, in order, without gaps.
@@ -26,7 +27,7 @@ impl TimeSeries {
     /// # Errors
     /// The file cannot be read, has no such columns or no rows, or a number makes no sense.
     pub(crate) fn read(path: PathBuf, names: [&str; 2]) -> Result<Self, ScenarioError> {
-        let text = std::fs::read(&path).map_err(|source| ScenarioError::Read {
+        let text = words::read(&path).map_err(|source| ScenarioError::Read {
             path: path.clone(),
             source,
         })?;

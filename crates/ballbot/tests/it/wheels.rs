@@ -140,8 +140,9 @@ fn any_wheels_do_what_contact_in_three_dimensions_says() {
         assert!((wheels.motor_angles(gear) * turned - m).norm() < 1e-11);
         let psi = wheels.matrix().transpose() * m;
         assert!((psi / gear - turned).norm() < 1e-11, "{psi}");
-        for (found, wheel) in wheels.azimuths().iter().zip(&arranged) {
-            assert!(((found - wheel.azimuth) / 2.0).sin().abs() < 1e-12);
+        for (found, wheel) in wheels.arrangement().iter().zip(&arranged) {
+            assert!(((found.azimuth - wheel.azimuth) / 2.0).sin().abs() < 1e-12);
+            assert_eq!(found.reversed, wheel.reversed);
         }
     }
 }
@@ -166,9 +167,8 @@ fn the_papers_first_wheel_stands_at_minus_90_degrees() {
     assert!((psi(of_paper) - Vector2::new(1.0, 0.0)).norm() < 1e-14);
     let any = Wheels::new(PI / 4.0, at(of_paper)).expect("apart");
     assert!((any.matrix() - Wheels::paper().matrix()).amax() < 1e-15);
-    let degrees = Wheels::<f64>::paper().azimuths().map(f64::to_degrees);
-    for (found, expected) in degrees.iter().zip(of_paper) {
-        assert!((found - expected).abs() < 1e-12);
+    for (found, expected) in Wheels::<f64>::paper().arrangement().iter().zip(of_paper) {
+        assert!((found.azimuth.to_degrees() - expected).abs() < 1e-12);
     }
 }
 

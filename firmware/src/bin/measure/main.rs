@@ -7,7 +7,6 @@ mod failure;
 mod instructions;
 mod stack;
 
-use ballbot::Wheels;
 use cortex_m::singleton;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::{debug, hprintln};
@@ -104,7 +103,7 @@ fn regulate(
     memory: &'static mut RobotMemory,
     counter: &mut InstructionCounter,
 ) -> u32 {
-    let Ok(wheels) = Wheels::of_paper(recording.robot.plane.zenith_angle) else {
+    let Ok(wheels) = recording.robot.plane.wheels() else {
         failure::stop()
     };
     let mut regulator = match recording.robot.regulator(wheels, memory) {
@@ -170,7 +169,7 @@ fn replay(
     workspace: &mut Workspace,
     counter: &mut InstructionCounter,
 ) -> u32 {
-    let Ok(wheels) = Wheels::of_paper(recording.zenith_angle) else {
+    let Ok(wheels) = recording.wheels() else {
         failure::stop()
     };
     let mut deepest = 0;

@@ -10,6 +10,7 @@ use crate::progress::{Progress, ProofProgress};
 use crate::results::ResultFolder;
 use ballbot_campaign::{Campaign, CampaignError, Shard, Source};
 use ballbot_scenario::proofs::ProvedFiles;
+use ballbot_scenario::words;
 use clap::Args;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -66,7 +67,7 @@ impl Plan {
         if !path.exists() {
             return Ok(None);
         }
-        let text = fs::read_to_string(&path).map_err(FileError::at(&path))?;
+        let text = words::read_text(&path).map_err(FileError::at(&path))?;
         let plan = serde_json::from_str(&text);
         plan.map(Some).map_err(|error| {
             CommandError::Usage(format!("{} is no plan of shards: {error}", path.display()))

@@ -319,6 +319,17 @@ fn keys_are_set_on_the_command_line() {
         let message = fail(here, &["simulate", "two-setpoints", "--set", set], code);
         assert_says(&message, &parts);
     }
+    let twice = [
+        "--set",
+        "controller.horizon=5",
+        "--set",
+        "controller.horizon=6",
+    ];
+    let command = [&["simulate", "two-setpoints"], &twice[..]].concat();
+    assert_says(
+        &fail(here, &command, 2),
+        &["controller.horizon", "twice", "5", "6"],
+    );
 }
 
 #[test]
