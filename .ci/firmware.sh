@@ -29,6 +29,17 @@ lissajous 40 lissajous
 tight-bounds 80 tight_bounds
 docs/examples/whole-robot.toml 40 whole_robot
 END
+# The wheels are the robot's own, and its parameters may be in a file of their own, beside the scenario.
+robot=$(mktemp -d)
+trap 'rm -rf "$robot"' EXIT
+own='/^\[/ { own = ($0 == "[parameters]") } own == wanted'
+awk -v wanted=1 "$own" docs/examples/whole-robot.toml >"$robot/robot.toml"
+printf 'wheel_azimuths_deg = [0.0, 120.0, 240.0]\nwheels_reversed = [false, true, false]\n' >>"$robot/robot.toml"
+{ echo 'parameters = "robot.toml"' && awk -v wanted=0 "$own" docs/examples/whole-robot.toml; } >"$robot/own-wheels.toml"
+record "$robot/own-wheels.toml" 2 >"$robot/recorded.rs"
+for wheel in "0.0, reversed: false" "2.0943952, reversed: true" "-2.0943952, reversed: false"; do
+    grep -qF "azimuth: $wheel" "$robot/recorded.rs"
+done
 # What the firmware's controllers do not have is refused.
 if refused=$(record one-metre 5 2>&1) || [[ $refused != *"the firmware does not have"* ]]; then
     echo "firmware_record one-metre: $refused" >&2
@@ -40,7 +51,7 @@ fi
 flash() { size --format=berkeley "$images/examples/$1" | awk 'NR == 2 { print $1 + $2 }'; }
 compiler=$("$cross" "$target" --version)
 output=$(mktemp)
-trap 'rm -f "$output"' EXIT
+trap 'rm -rf "$output" "$robot"' EXIT
 for board in mps2-an386 mps2-an500; do
     printf '\n%s\n' "$board"
     if ! BOARD=$board firmware/run-qemu.sh "$images/measure" >"$output"; then
@@ -55,7 +66,7 @@ done
 # The program around a plant from a file, printed and built as it is, brings the plant to rest.
 printf '\na printed plant\n'
 folder=$(mktemp -d)
-trap 'rm -rf "$output" "$folder"' EXIT
+trap 'rm -rf "$output" "$robot" "$folder"' EXIT
 cargo run --locked -p lpvmpc-plant --example firmware "$folder/plant"
 # The same versions of the same dependencies.
 cp firmware/Cargo.lock "$folder/plant"

@@ -23,14 +23,20 @@ const { initSync, Simulation } = await import(pathToFileURL(join(web, "src", "ge
 initSync({ module: readFileSync(join(web, "src", "generated", "ballbot_web_bg.wasm")) });
 const { certificate } = JSON.parse(read(builtin, "terminal-certificate.json"));
 
+/** The text with another in place of all that match. */
+function changed(text, pattern, other) {
+  if (!pattern.test(text)) throw new Error(`no ${pattern} in the set-up`);
+  return text.replaceAll(new RegExp(pattern, "gm"), other);
+}
+
 /** The page's first set-up, sent back and forth. */
-const drive = read(web, "presets", "drive.toml")
-  .replace(/^duration_s = .*$/m, "duration_s = 10.0")
-  .replaceAll(/^points = .*$/gm, `points = [${[0, 5, 0, 5, 0].map((phi, i) => `{ time_s = ${2 * i}.0, phi_rad = ${phi}.0 }`)}]`);
+const points = [0, 5, 0, 5, 0].map((phi, i) => `{ time_s = ${2 * i}.0, phi_rad = ${phi}.0 }`);
+const short = changed(read(web, "presets", "drive.toml"), /^duration_s = .*$/m, "duration_s = 10.0");
+const drive = changed(short, /^points = .*$/m, `points = [${points}]`);
 const setups = {
   "paper's predictor": read(builtin, "two-setpoints.toml"),
   "default predictor": drive,
-  "guaranteed loop": drive.replace('"discrete_riccati"', "{ certified = {} }"),
+  "guaranteed loop": changed(drive, /"discrete_riccati"/, "{ certified = {} }"),
 };
 
 function median(times) {
@@ -50,7 +56,7 @@ function ofModule(toml) {
 }
 
 function ofProgram(folder) {
-  execFileSync(program, ["simulate", join(folder, "scenario.toml"), "--out", folder], { stdio: "ignore" });
+  execFileSync(program, ["simulate", join(folder, "scenario.toml"), "--out", folder], { stdio: ["ignore", "ignore", "inherit"] });
   const first = readdirSync(folder).find((name) => /^trajectory(_x)?\.csv$/.test(name));
   const [header, ...rows] = read(folder, first).trim().split("\n").map((line) => line.split(","));
   return median(rows.map((row) => parseFloat(row[header.indexOf("step_us")])));

@@ -4,10 +4,9 @@ use crate::campaign::Source;
 use crate::distribution::Distribution;
 use crate::inputs::Inputs;
 use crate::results::hexadecimal;
-use ballbot_scenario::Document;
+use ballbot_scenario::{Document, words};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::Path;
 use toml::Value;
 
@@ -45,7 +44,7 @@ pub(crate) fn of(
     }
     for name in names {
         // A text that is no file's name is in the campaign or the scenario already.
-        if let Ok(content) = fs::read(Path::new(source.folder()).join(name)) {
+        if let Ok(content) = words::read(&Path::new(source.folder()).join(name)) {
             add(name.as_bytes());
             add(&content);
         }

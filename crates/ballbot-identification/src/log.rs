@@ -146,7 +146,10 @@ fn check_different(paths: &[impl AsRef<Path>]) -> Result<(), LogError> {
 
 /// What is wrong with a file that cannot be read is said when it is read as a log.
 fn have_one_content(one: &Path, other: &Path) -> bool {
-    let size = |path: &Path| Some(std::fs::metadata(path).ok()?.len());
+    let size = |path: &Path| {
+        let known = std::fs::metadata(path).ok()?;
+        known.is_file().then(|| known.len())
+    };
     let content = |path: &Path| std::fs::read(path).ok();
     size(one).is_some() && size(one) == size(other) && content(one) == content(other)
 }

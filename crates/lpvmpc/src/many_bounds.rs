@@ -6,8 +6,8 @@
 //! which these hold says which of them should not, and which are missing; that takes a few factorisations,
 //! however many bounds there are. Where it finds nothing the dual method begins as it would have without it.
 //! Where few bounds are expected, or it cannot be told, the dual method begins; the interior-point method has a later turn
-//! when as many changes as it would be worth have not led to the end: many bounds are active after all, or few contradict
-//! each other.
+//! when the changes that the dual method is given for it have not led to the end: many bounds are active after all, or few
+//! contradict each other.
 
 mod answer;
 mod exchange;
@@ -104,6 +104,8 @@ pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
     places: [ManyBoundsPlace<T, NX, NU>; 2],
     sides: List<BoundSide<T>>,
     retries: AllRetries,
+    /// Whether its turn in this solve was put off.
+    put_off: bool,
     pub run: Run<T, NX, NU>,
     /// Takes down the last answer, before it is overwritten.
     pub keep: fn(&mut Self, &Solution<T, NX, NU>),
@@ -151,6 +153,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             places,
             sides,
             retries: AllRetries::default(),
+            put_off: false,
             run: Self::solve,
             keep: Self::keep_states,
         }
@@ -183,15 +186,18 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             return AtOnce::Untried;
         }
         let later = turn == Turn::Later;
+        let was_put_off = core::mem::take(&mut self.put_off);
         if !later && shift.is_none() {
             // Without an answer to go on from, nothing is known of the solves before.
             self.retries = AllRetries::default();
         }
         let known = shift.map_or(0, |_| solution.active.len());
         let mut expected = Expected::new(ocp, solution, known);
+        if later || solver.dual.changes_left() < cap_with_later_turn(NX + NU) {
+            expected.changes_first = None;
+        }
         if later {
             (expected.many, expected.saturated) = (true, false);
-            expected.changes_first = None;
         } else if expected.violated == 0 {
             return AtOnce::Kept;
         } else if !expected.is_due(&mut self.retries) {
@@ -280,8 +286,12 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             }
             other => other,
         };
-        let put_off = outcome.is_none() && expected.many && expected.changes_first.is_some();
-        if !(later || expected.saturated || put_off) {
+        self.put_off = outcome.is_none() && expected.many && expected.changes_first.is_some();
+        let learns = match turn {
+            Turn::First => !(expected.saturated || self.put_off),
+            Turn::Later => was_put_off,
+        };
+        if learns {
             let most = expected.worth::<NU>(side::any_soft(sides));
             self.retries
                 .turns
@@ -297,6 +307,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         solver.roll_out(ocp, solution).ok();
         guess::known(sides);
         list(sides, &mut solution.active);
-        AtOnce::InVain(expected.changes_first.filter(|_| put_off))
+        AtOnce::InVain(expected.changes_first.filter(|_| self.put_off))
     }
 }

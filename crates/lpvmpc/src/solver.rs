@@ -161,7 +161,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         }
         let begun = factorized.and_then(|()| self.roll_out(ocp, solution));
         let outcome = begun.and_then(|()| {
-            // Where all bounds at once were not tried, they are when the search gets long, or rounding has ended it.
+            // Where all bounds at once were not tried, or not yet, they are when the search gets long, or rounding has ended it.
             let phase = self.many_bounds.first();
             let mut kept_back = match phase.is_some_and(|phase| phase.has_room(ocp)) {
                 true => kept_for_later_turn(cap, NX + NU),
@@ -172,8 +172,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 AtOnce::Kept => self.dual.kept = true,
                 AtOnce::InVain(changes) => {
                     shift = Some(0);
-                    let left = self.dual.changes_left();
-                    kept_back = changes.map_or(0, |changes| left.saturating_sub(changes));
+                    if let Some(changes) = changes {
+                        kept_back = self.dual.changes_left().saturating_sub(changes);
+                    } else if spent > 0 {
+                        kept_back = 0;
+                    }
                 }
                 AtOnce::Untried => {}
             }

@@ -9,12 +9,11 @@ use ballbot_identification::{
     Config, ConfigError, ExcitationTask, Identification, IdentifiedRobot, USUAL_STEPS,
     identified_parameters, identify as identify_robot,
 };
-use ballbot_scenario::words::toml_message;
+use ballbot_scenario::words::{read_text, toml_message};
 use nalgebra::Vector4;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A commented configuration.
@@ -192,8 +191,7 @@ fn configuration(given: Option<(Bound<'_, PyAny>, String)>) -> PyResult<(Config,
 }
 
 fn text(path: &Path) -> PyResult<String> {
-    fs::read_to_string(path)
-        .map_err(|error| setting(&path.display().to_string(), &error.to_string()))
+    read_text(path).map_err(|error| setting(&path.display().to_string(), &error.to_string()))
 }
 
 fn in_file(place: &str, error: &ConfigError) -> PyErr {

@@ -39,6 +39,12 @@ impl Selection {
             word.split_once('=')
                 .is_some_and(|(key, _)| KEYS.contains(&key))
         };
+        let key = |word: &str| word.split_once('=').map(|(key, _)| key.to_owned());
+        let twice =
+            |(i, word): (usize, &String)| chosen[..i].iter().any(|other| key(other) == key(word));
+        if chosen.iter().enumerate().any(twice) {
+            return Err("a key is there twice: separate its values by commas".to_owned());
+        }
         match chosen.iter().find(|word| !known(word)) {
             Some(word) => Err(format!(
                 "{word}: it must be KEY=VALUE,... with a key of {KEYS:?}"

@@ -87,7 +87,7 @@ impl ScenarioOptions {
             let before = self.set.iter().take(place);
             if let Some((_, other)) = before.into_iter().find(|(earlier, _)| earlier == key) {
                 return Err(CommandError::Usage(format!(
-                    "--set {key} is there twice, with {other} and with {value}: leave one"
+                    "--set {key} is there twice, with {other} and with {value}: keep one"
                 )));
             }
         }

@@ -14,7 +14,7 @@ const MANY: usize = 24;
 /// dual method begins.
 const MORE: usize = 32;
 /// Where more states are bounded than there are inputs, as speeds and accelerations are beside a position, most of what is
-/// violated is not active in the answer: below so many, or as many of a single input as above, the dual method has
+/// violated is not active in the answer: below so many, or as many of a single input as above, the dual method is given
 const MANY_LIMITS: usize = 56;
 /// so many changes first, in which it comes to an end as a rule,
 const CHANGES_FIRST: usize = 64;
@@ -43,7 +43,7 @@ pub(super) struct Expected {
     pub bounds: usize,
     /// Whether these are many enough for the interior-point method.
     pub many: bool,
-    /// After how many changes of the dual method, if that should come first.
+    /// How many changes the dual method has before the interior-point method, if it should come first.
     pub changes_first: Option<usize>,
     /// Whether the last answer is worth a guess, although they are fewer.
     pub familiar: bool,
@@ -84,17 +84,17 @@ impl Expected {
         // No more can hold independently than there are inputs, but any number can be exceeded.
         let most = if soft { usize::MAX } else { ocp.length() * NU };
         let bounds = if tells { known } else { violated }.min(most);
-        // Those that are known were few of the violated ones, too.
+        // About twice as many were violated as are known.
         let limits = if tells { 2 * known } else { violated };
         let (many_limits, changes) = match NU {
             1 => (MORE, CHANGES_OF_ONE),
             _ => (MANY_LIMITS, CHANGES_FIRST),
         };
+        let few_hold = !soft && 2 * inputs < violated && hard_states(ocp) > NU;
         Self {
             violated,
             bounds,
-            changes_first: (limits < many_limits && !soft && hard_states(ocp) > NU)
-                .then_some(changes),
+            changes_first: (few_hold && limits < many_limits).then_some(changes),
             many: bounds >= enough,
             familiar: tells && !takes_more && known >= FAMILIAR,
             // Those are nearly right where a single input moves the states.
@@ -126,9 +126,9 @@ impl Expected {
     }
 }
 
-/// How many states have hard bounds; as a rule they are the same at all stages.
+/// How many states have hard bounds in the middle of the horizon; as a rule they are the same at all stages.
 fn hard_states<T: Scalar, const NX: usize, const NU: usize>(ocp: &Ocp<T, NX, NU>) -> usize {
-    let common = ocp.common_at(0);
+    let common = ocp.common_at(ocp.length() / 2);
     let sides = common.x.lower.iter().zip(common.x.upper.iter());
     let bounds = sides.zip(&common.soft_x);
     let hard = bounds.filter(|((lower, upper), soft)| {

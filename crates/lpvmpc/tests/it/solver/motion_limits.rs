@@ -133,6 +133,43 @@ fn few_limits_that_hold_are_found_one_by_one() {
     }
 }
 
+/// Where more changes are needed than come before the phase, it has its turn after them; and where the cap leaves no
+/// changes for that, but the dual method as many as it needs beside the quarter of the phase, it has them.
+#[test]
+fn limits_that_hold_in_numbers_are_found_later_or_one_by_one() {
+    // Optimised, the arrays take more stack on their way than a test has.
+    let large = std::thread::Builder::new().stack_size(1 << 26);
+    large.spawn(in_numbers).unwrap().join().unwrap();
+}
+
+fn in_numbers() {
+    let recipe = Recipe {
+        kind: Kind::Motion,
+        horizon: 50,
+        samples: 12,
+        share: 0.2,
+        seed: 1,
+    };
+    let (mut solver, mut answer) = Both::<12, 4>::new::<50, 300>().one_by_one;
+    let mut long = 0;
+    for ocp in &recipe.make::<12, 4>().unwrap().problems {
+        solver.solve(ocp, &cold(), &mut answer);
+        assert!(answer.status.is_solved(), "{}", answer.status);
+        let capped = SolverSettings {
+            max_changes: Some(answer.changes + answer.changes.div_ceil(3) + 1),
+            ..cold()
+        };
+        for settings in [cold(), capped] {
+            let solution = solve_with(ocp, &settings);
+            assert!(solution.status.is_solved(), "{}", solution.status);
+            assert!(kkt_residual(ocp, &solution).largest() < 1e-8);
+            assert!(solution.changes <= 64 + 16 * 16, "{}", solution.changes);
+        }
+        long += usize::from(answer.changes > 64);
+    }
+    assert!(long > 0);
+}
+
 /// Points that begin far beyond soft limits of all states and of a row in which the inputs have a part, too: most inputs
 /// are at their bounds beside rows that are exceeded. Such an input was not held by the factorisation, no guess was right,
 /// and the dual method took up to 2698 changes.
