@@ -148,7 +148,7 @@ fn check_different(paths: &[impl AsRef<Path>]) -> Result<(), LogError> {
 fn have_one_content(one: &Path, other: &Path) -> bool {
     let size = |path: &Path| {
         let known = std::fs::metadata(path).ok()?;
-        known.is_file().then(|| known.len())
+        known.is_file().then_some(known.len())
     };
     let content = |path: &Path| std::fs::read(path).ok();
     size(one).is_some() && size(one) == size(other) && content(one) == content(other)
