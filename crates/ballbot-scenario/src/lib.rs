@@ -31,7 +31,7 @@ mod run;
 pub mod words;
 
 pub use error::ScenarioError;
-pub use file::certificate::{RobotTable, TerminalCertificate, ViscousBallbot, read_certificate};
+pub use file::certificate::{RobotTable, TerminalCertificate, ViscousBallbot};
 pub use file::document::Document;
 pub use file::feedback_table::{
     DisturbancesTable, EstimatorTable, MotorsTable, ShapingTable, TorqueRateTable,

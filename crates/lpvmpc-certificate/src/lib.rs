@@ -39,6 +39,6 @@ pub use terminal::{
     Certificate, CertificateProblem, CertifyError, ClaimError, DocumentError, Effort, MOST_BOXES,
     MOST_BYTES, PROOF_REVISION, Proof, QuadraticClaim, Record, SampledClaim, SynthesisError,
     TerminalClaim, TerminalIngredients, TerminalProblem, certify_terminal, check_document_digest,
-    document_content, document_text, is_at_most, raise_level, synthesize_terminal,
-    synthesize_terminal_at,
+    document_content, document_text, is_at_most, raise_level, read_certificate,
+    synthesize_terminal, synthesize_terminal_at,
 };

@@ -17,7 +17,7 @@ mod synthesis;
 
 pub use certificate::{
     Certificate, DocumentError, MOST_BYTES, QuadraticClaim, Record, TerminalClaim,
-    check_document_digest, document_content, document_text,
+    check_document_digest, document_content, document_text, read_certificate,
 };
 pub use claim::ClaimError;
 pub use design::{CertificateProblem, CertifyError, Effort, certify_terminal, raise_level};

@@ -2,13 +2,13 @@
 
 use crate::error::CertifyError;
 use lpvmpc_any::TerminalSet;
-use lpvmpc_certificate::{MOST_BYTES, check_document_digest, document_content, document_text};
+use lpvmpc_certificate::{
+    check_document_digest, document_content, document_text, read_certificate,
+};
 use lpvmpc_plant::Plant;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 /// What is claimed of a plant about an equilibrium under the law u = u_eq - K (x - x_eq), held over each
@@ -108,12 +108,8 @@ impl Certificate {
     /// The file cannot be read, is no certificate, or was changed after it was written.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, CertifyError> {
         let path = path.as_ref();
-        let unreadable = |error| CertifyError::setting(path.display(), error);
-        let mut text = String::new();
-        // More than a certificate may have makes it none.
-        let file = File::open(path).map_err(unreadable)?;
-        let mut start = file.take(MOST_BYTES as u64 + 1);
-        start.read_to_string(&mut text).map_err(unreadable)?;
+        let text =
+            read_certificate(path).map_err(|error| CertifyError::setting(path.display(), error))?;
         Self::from_json(&text)
     }
 

@@ -17,7 +17,7 @@ use crate::settings::{
 };
 use crate::soft_bounds::SoftPrices;
 use crate::solution::{Solution, Status};
-use crate::solver::{SolverSettings, WarmStart};
+use crate::solver_settings::{SolverSettings, WarmStart};
 use crate::steady_state::{SteadyState, SteadyStateProblem};
 use crate::two_parts::Answered;
 use crate::workspace::Workspace;

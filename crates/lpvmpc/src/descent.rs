@@ -24,7 +24,7 @@ use crate::plan::{Aim, Merit, Prices, at};
 use crate::settings::{ControllerSettings, TerminalIngredient};
 use crate::small_matrix::product;
 use crate::solution::Status;
-use crate::solver::{SolverSettings, WarmStart};
+use crate::solver_settings::{SolverSettings, WarmStart};
 use crate::working_set::copy;
 use crate::workspace::Workspace;
 use nalgebra::{SMatrix, SVector, convert};

@@ -6,7 +6,7 @@ use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::rows;
 use crate::solution::{ActiveSet, Part, Side};
-use crate::solver::default_tolerance;
+use crate::solver_settings::default_tolerance;
 use nalgebra::{SVector, convert};
 
 /// The sum is known to so many roundings of its terms.

@@ -34,7 +34,7 @@ use crate::model::{LpvModel, Scalar};
 #[cfg(feature = "alloc")]
 use crate::settings::LONGEST_HORIZON;
 use crate::solution::{BoundId, Quantity, Side, Status};
-use crate::solver::WarmStart;
+use crate::solver_settings::WarmStart;
 use aim::Aims;
 pub use aim::SetPoints;
 use core::fmt;

@@ -105,6 +105,7 @@ mod soft_bounds;
 mod solution;
 mod solve_working_set;
 mod solver;
+mod solver_settings;
 mod steady_state;
 mod step_with;
 mod tracking;
@@ -158,7 +159,8 @@ pub use soft_bounds::exact_prices;
 pub use solution::{
     ActiveRow, ActiveSet, BoundId, PackedRow, Part, Quantity, Side, Solution, Status,
 };
-pub use solver::{Solver, SolverSettings, WarmStart};
+pub use solver::Solver;
+pub use solver_settings::{SolverSettings, WarmStart};
 pub use steady_state::{SteadyState, SteadyStateProblem};
 pub use workspace::Workspace;
 

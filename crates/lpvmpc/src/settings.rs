@@ -6,7 +6,7 @@ use crate::ocp::{Bounds, SoftBounds};
 use crate::predictor::{Predictor, Rk4, periods};
 use crate::preview::PreviewMistake;
 use crate::soft_bounds::exact_prices;
-use crate::solver::SolverSettings;
+use crate::solver_settings::SolverSettings;
 use core::fmt;
 use nalgebra::{Cholesky, Const, SMatrix, SVector, convert};
 

@@ -59,7 +59,7 @@ pub fn certify_scenario<'py>(
 /// The text of a certificate's file.
 #[pyfunction]
 pub fn read_certificate(path: PathBuf) -> PyResult<String> {
-    ballbot_scenario::read_certificate(&path).map_err(|error| {
+    lpvmpc_certificate::read_certificate(&path).map_err(|error| {
         io::Error::new(error.kind(), format!("{}: {error}", path.display())).into()
     })
 }

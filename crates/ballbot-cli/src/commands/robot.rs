@@ -84,8 +84,8 @@ impl ScenarioOptions {
     /// The scenario cannot be read, or a key of it cannot be set, or is to be set twice.
     pub fn load(&self, scenario: &str) -> Result<(Scenario, PathBuf), CommandError> {
         for (place, (key, value)) in self.set.iter().enumerate() {
-            let before = self.set.iter().take(place);
-            if let Some((_, other)) = before.into_iter().find(|(earlier, _)| earlier == key) {
+            let mut before = self.set.iter().take(place);
+            if let Some((_, other)) = before.find(|(earlier, _)| earlier == key) {
                 return Err(CommandError::Usage(format!(
                     "--set {key} is there twice, with {other} and with {value}: keep one"
                 )));

@@ -5,8 +5,9 @@ use super::certify::{document, summary};
 use crate::input::InputError;
 use crate::json;
 use crate::progress::Progress;
-use ballbot_scenario::{TerminalCertificate, proofs, read_certificate};
+use ballbot_scenario::{TerminalCertificate, proofs};
 use clap::Args;
+use lpvmpc_certificate::read_certificate;
 use std::path::PathBuf;
 
 /// Arguments of `ballbot verify`.

@@ -1,7 +1,7 @@
 //! Help, completions, streams.
 
 use crate::{assert_says, ballbot, failure, text};
-use std::process::Command;
+use std::process::{Command, ExitStatus, Stdio};
 
 const COMMANDS: [&str; 4] = ["refine", "linearize", "lqr", "completions"];
 
@@ -73,6 +73,20 @@ fn a_command_that_does_not_exist_is_refused_with_the_nearest_one() {
     assert_eq!(ballbot(&[]).status.code(), Some(2));
 }
 
+/// How the program ends that prints its result there, and what it says beside it.
+fn printing_to(output: impl Into<Stdio>, arguments: &[&str]) -> (ExitStatus, String) {
+    let ended = Command::new(env!("CARGO_BIN_EXE_ballbot"))
+        .args(arguments)
+        .stdout(output)
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+        .wait_with_output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&ended.stderr);
+    (ended.status, said.into_owned())
+}
+
 #[test]
 fn a_reader_that_has_seen_enough_is_no_failure() {
     for arguments in [
@@ -82,16 +96,8 @@ fn a_reader_that_has_seen_enough_is_no_failure() {
     ] {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
-        let output = Command::new(env!("CARGO_BIN_EXE_ballbot"))
-            .args(arguments)
-            .stdout(writer)
-            .stderr(std::process::Stdio::piped())
-            .spawn()
-            .unwrap()
-            .wait_with_output()
-            .unwrap();
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{arguments:?}: {message}");
+        let (status, message) = printing_to(writer, arguments);
+        assert!(status.success(), "{arguments:?}: {message}");
         assert!(message.is_empty(), "{arguments:?}: {message}");
     }
 }
@@ -104,16 +110,8 @@ fn a_full_disk_is_a_failure() {
             .write(true)
             .open("/dev/full")
             .unwrap();
-        let output = Command::new(env!("CARGO_BIN_EXE_ballbot"))
-            .arg(argument)
-            .stdout(full)
-            .stderr(std::process::Stdio::piped())
-            .spawn()
-            .unwrap()
-            .wait_with_output()
-            .unwrap();
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{argument}: {message}");
+        let (status, message) = printing_to(full, &[argument]);
+        assert_eq!(status.code(), Some(1), "{argument}: {message}");
         assert_says(&message, &["error: cannot write to standard output"]);
     }
 }

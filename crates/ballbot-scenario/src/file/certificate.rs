@@ -4,28 +4,13 @@ use crate::error::ScenarioError;
 use crate::file::parameters::is_zero;
 use ballbot::{Ballbot, DriveFriction, Geometry};
 use lpvmpc::{Embedding, Number};
-use lpvmpc_certificate::{Certificate, MOST_BYTES};
+use lpvmpc_certificate::Certificate;
 use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
 use serde::{Deserialize, Serialize};
-use std::fs::File;
-use std::io::{self, Read};
-use std::path::Path;
 
 /// The certificate of a ballbot's terminal set: states (phi, theta, phi_dot, theta_dot), torque,
 /// scheduling (theta, theta_dot).
 pub type TerminalCertificate = Certificate<RobotTable, 4, 1, 2>;
-
-/// The text of a certificate's file, of which not more is read than a certificate can have: what
-/// follows makes it none ([`TerminalCertificate::from_json`]).
-///
-/// # Errors
-/// The file cannot be read, or is not text.
-pub fn read_certificate(path: &Path) -> io::Result<String> {
-    let mut text = String::new();
-    let most = MOST_BYTES as u64 + 1;
-    File::open(path)?.take(most).read_to_string(&mut text)?;
-    Ok(text)
-}
 
 /// The parameters that the motion of one plane depends on; see [`ballbot::Ballbot`]. Robots with
 /// Coulomb friction have no such table: without them the scheduling is (theta, theta_dot).

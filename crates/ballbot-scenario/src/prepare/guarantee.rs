@@ -4,7 +4,7 @@
 use crate::builtin;
 use crate::error::ScenarioError;
 use crate::file::certificate::RobotTable;
-use crate::file::certificate::{TerminalCertificate, read_certificate};
+use crate::file::certificate::TerminalCertificate;
 use crate::file::schema::{CertifiedTable, ControllerTable, ModelKind, TerminalTable};
 use crate::prepare::files::Files;
 use crate::prepare::problem::dynamic;
@@ -13,6 +13,7 @@ use crate::prepare::standing::Standing;
 use ballbot::{Ballbot, ControllerSettings, GuaranteedSettings};
 use lpvmpc::{GuaranteedIterations, Predictor, TerminalSet, Weights};
 use lpvmpc_certificate::is_at_most;
+use lpvmpc_certificate::read_certificate;
 use nalgebra::{SMatrix, Vector4};
 use std::fmt;
 use std::path::Path;

@@ -5,6 +5,9 @@ use super::document::{limits, rows};
 use nalgebra::{SMatrix, SVector};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
 use thiserror::Error;
 
 /// What is claimed of a plant under the terminal law u = **-K** x, held over each sample, and the
@@ -103,6 +106,18 @@ pub struct Record {
 
 /// A longer file is no certificate: that of a plant with 20 states has some 50 kB.
 pub const MOST_BYTES: usize = 256 * 1024;
+
+/// The text of a certificate's file, of which not more is read than a certificate can have: what
+/// follows makes it none.
+///
+/// # Errors
+/// The file cannot be read, or is not text.
+pub fn read_certificate(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    let most = MOST_BYTES as u64 + 1;
+    File::open(path)?.take(most).read_to_string(&mut text)?;
+    Ok(text)
+}
 
 /// A certificate file that cannot be read.
 #[derive(Debug, Clone, PartialEq, Error)]

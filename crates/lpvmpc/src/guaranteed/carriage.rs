@@ -7,7 +7,7 @@ use crate::model::LpvModel;
 use crate::ocp::Bounds;
 use crate::predictor::Rk4;
 use crate::settings::Weights;
-use crate::solver::SolverSettings;
+use crate::solver_settings::SolverSettings;
 use lpvmpc_testkit::rng::Rng;
 use nalgebra::{Matrix1, Matrix1x3, Matrix3, SVector, Vector1, Vector3};
 

@@ -5,7 +5,7 @@ use super::plan::Plan;
 use super::program::{self, Slope};
 use super::{Decision, GuaranteedController, GuaranteedWorkspace, Planner};
 use crate::model::{LpvModel, Scalar};
-use crate::solver::{SolverSettings, WarmStart};
+use crate::solver_settings::{SolverSettings, WarmStart};
 use core::mem::swap;
 use nalgebra::{SVector, convert};
 

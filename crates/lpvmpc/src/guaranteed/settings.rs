@@ -6,7 +6,7 @@ use crate::ocp::Bounds;
 use crate::predictor::Rk4;
 use crate::settings::ControllerError;
 use crate::settings::{Weights, check_bounds, check_horizon, check_weight};
-use crate::solver::SolverSettings;
+use crate::solver_settings::SolverSettings;
 use core::fmt;
 use nalgebra::{SMatrix, SVector, convert};
 

@@ -166,7 +166,8 @@ mod tests {
     use crate::memory::Capacity;
     use crate::ocp::{Bounds, GeneralRow};
     use crate::solution::{BoundId, Solution};
-    use crate::solver::{Solver, SolverSettings};
+    use crate::solver::Solver;
+    use crate::solver_settings::SolverSettings;
     use alloc::vec;
     use lpvmpc_testkit::rng::Rng;
     use nalgebra::{Matrix2, Vector1, Vector2};
