@@ -24,6 +24,8 @@ const REFINEMENTS: usize = 40;
 const COMES_NEARER: f64 = 0.8;
 /// With so many wrong sides a guess is nearly right, and worth a closer look.
 const NEARLY_RIGHT: usize = 8;
+/// A guess with more wrong sides than so many times the fewest before has gone astray.
+const WORSE: usize = 3;
 /// Distances of held sides that are rounding, in units of the smallest number beside one.
 const ROUNDING: f64 = 8.0;
 
@@ -124,7 +126,7 @@ pub(super) type Places<'a, T, const NX: usize, const NU: usize> = (
 pub(super) struct Patience {
     /// One active side in so many may be wrong at first.
     pub few: usize,
-    /// So many guesses may be hardly better than the one before,
+    /// So many guesses may be hardly better than the one before, or worse,
     pub guesses: usize,
     /// as long as no more sides than these are wrong.
     pub wrong: usize,
@@ -152,9 +154,14 @@ impl Patience {
     /// interior-point method is lost for them.
     pub const KNOWN: Self = Self {
         few: 2,
-        guesses: 2,
+        guesses: 7,
         wrong: usize::MAX,
         steps: 0,
+    };
+    /// The same of soft bounds, of whose three roles more are wrong.
+    pub const SOFT: Self = Self {
+        guesses: 4,
+        ..Self::KNOWN
     };
     /// Saturated inputs may all be wrong.
     pub const FAR: Self = Self {
@@ -174,7 +181,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
 ) -> bool {
     let active = sides.iter().filter(|side| side.role != Role::Free).count();
     let mut most = (active / patience.few).max(2);
-    let mut last = usize::MAX;
+    let (mut last, mut fewest) = (usize::MAX, usize::MAX);
     let closely = side::are_mixed(sides);
     let (mut nearly, mut one_by_one) = (false, false);
     // Of soft bounds the multipliers decide whether they hold or are exceeded. And rounding may have grown along the
@@ -207,7 +214,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
         let unexplained = residual.rest > loose * residual.largest;
         if closely && !careful && unexplained && (1..=NEARLY_RIGHT).contains(&wrong) {
             // What is as near may be right, and its multipliers not yet.
-            keep_last_changes(sides, 0);
+            take_back_changes(sides);
             refine(program, sides, &mut residual, tolerances, (loose, loose));
             wrong = reassign(sides, loose, loose * residual.largest);
         }
@@ -236,10 +243,16 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
             keep_first_changes(sides);
             continue;
         }
+        let much_worse = wrong / WORSE > fewest;
+        fewest = fewest.min(wrong);
         // A guess from near by is right after a few exchanges, each of which leaves fewer sides wrong.
         if wrong <= most && !one_by_one {
             most = wrong - wrong / 4;
-        } else if last < usize::MAX && patience.guesses > 0 && wrong <= patience.wrong {
+        } else if last < usize::MAX
+            && patience.guesses > 0
+            && wrong <= patience.wrong
+            && !much_worse
+        {
             patience.guesses -= 1;
         } else if nearly && patience.steps > 0 && !one_by_one {
             one_by_one = true;
@@ -249,7 +262,13 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
             break;
         }
         if wrong >= last {
-            keep_last_changes(sides, wrong.div_ceil(2));
+            // Exchanged at once sides may go in circles, and those towards the end of the horizon do not wait for what
+            // comes of the others.
+            if careful {
+                keep_worst_change(sides);
+            } else {
+                keep_last_changes(sides, wrong.div_ceil(2));
+            }
         }
         careful |= wrong >= last;
         last = wrong;
@@ -463,11 +482,41 @@ fn keep_first_changes<T: Scalar>(sides: &mut [BoundSide<T>]) {
     }
 }
 
-/// Takes back all changes of roles but the last `count`: exchanged at once sides may go in circles, and those
-/// towards the end of the horizon do not wait for what comes of the others.
+/// Takes back all changes of roles but the last `count`.
 fn keep_last_changes<T: Scalar>(sides: &mut [BoundSide<T>], count: usize) {
     let changed = sides.iter_mut().filter(|side| side.role != side.last_role);
     for side in changed.rev().skip(count) {
+        side.role = side.last_role;
+    }
+}
+
+/// Takes back all changes of roles but that of the side which was most wrong: by its distance beside its size, or by its
+/// multiplier beside the largest one.
+fn keep_worst_change<T: Scalar>(sides: &mut [BoundSide<T>]) {
+    let held = sides.iter().filter(|side| side.last_role == Role::Held);
+    let largest = held.fold(T::default_epsilon(), |most, side| {
+        most.max(side.estimate.abs() * side.size)
+    });
+    let (mut most, mut worst) = (-T::one(), None);
+    for (place, side) in sides.iter().enumerate() {
+        let wrong = match side.last_role {
+            Role::Held => (-side.estimate).max(side.estimate - side.price()) * side.size / largest,
+            Role::Free | Role::Exceeded => side.distance.abs() / side.size,
+        };
+        if side.role != side.last_role && wrong > most {
+            (most, worst) = (wrong, Some(place));
+        }
+    }
+    for (place, side) in sides.iter_mut().enumerate() {
+        if Some(place) != worst {
+            side.role = side.last_role;
+        }
+    }
+}
+
+/// Takes back all changes of roles.
+fn take_back_changes<T: Scalar>(sides: &mut [BoundSide<T>]) {
+    for side in sides {
         side.role = side.last_role;
     }
 }

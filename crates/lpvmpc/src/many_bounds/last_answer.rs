@@ -82,7 +82,8 @@ impl LastAnswer {
         }
         let patience = match self.kind {
             Kind::Simple if NU > 1 => Patience::KNOWN,
-            Kind::Rows | Kind::Soft if NU > 1 && end.is_some() => Patience::KNOWN,
+            Kind::Rows if NU > 1 && end.is_some() => Patience::KNOWN,
+            Kind::Soft if NU > 1 && end.is_some() => Patience::SOFT,
             Kind::Mixed => Patience::BINDING,
             _ => Patience::NEAR,
         };

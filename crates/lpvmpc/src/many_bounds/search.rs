@@ -12,6 +12,8 @@ use nalgebra::convert;
 /// its since the step before; of three roles, where bounds are soft, it is harder to foretell the right one.
 const CERTAIN: usize = 8;
 const CERTAIN_SOFT: usize = 10;
+/// and no more than these in all.
+const CHANGED_SOFT: usize = 12;
 /// And when that step went so far.
 const FREE: f64 = 0.5;
 /// Where states and inputs are bounded, and none softly, only when it also leaves no more than one side undecided for so many
@@ -33,9 +35,9 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
     mut count: impl FnMut() -> bool,
 ) -> Option<Result<(), Status<T>>> {
     let span = program.span;
-    let certain = match side::any_soft(sides) {
-        true => CERTAIN_SOFT,
-        false => CERTAIN,
+    let (certain, most_changed) = match side::any_soft(sides) {
+        true => (CERTAIN_SOFT, CHANGED_SOFT),
+        false => (CERTAIN, usize::MAX),
     };
     // Where inputs and states bind each other, one wrong side makes many others seem so.
     let clear = if side::are_mixed(sides) { CLEAR } else { 0 };
@@ -55,7 +57,8 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
         let near = method.complementarity() <= near_enough;
         // The same roles, wrong, are as a rule wrong again.
         untried |= changed > 0;
-        let likely = certain * changed <= active && clear * undecided <= active.max(clear);
+        let settled = certain * changed <= active && changed <= most_changed;
+        let likely = settled && clear * undecided <= active.max(clear);
         if untried && near && likely && part > convert(FREE) {
             untried = false;
             near_enough = method.complementarity() * convert(NEARER);
