@@ -166,6 +166,7 @@ impl Patience {
     /// Saturated inputs may all be wrong.
     pub const FAR: Self = Self {
         few: 1,
+        guesses: 4,
         ..Self::KNOWN
     };
 }
