@@ -18,6 +18,7 @@ mod last_answer;
 mod newton;
 mod residual;
 mod retries;
+mod roles;
 mod search;
 mod side;
 mod span;
