@@ -152,6 +152,9 @@ struct Planner<P, T: 'static, const NX: usize, const NU: usize, const NS: usize>
     damping: T,
     /// What the next program is linear by: what served last.
     slope: Slope,
+    /// Whether programs keep no more room from the bounds than the known plan has: since one that did had no answer,
+    /// until that plan has it.
+    without_room: bool,
     /// How far the plant may be from the plans of the last program, at x_1 to x_N.
     drift: List<SVector<T, NX>>,
     /// The same at the end, in the norm of P.
@@ -201,6 +204,7 @@ where
             wanted: None,
             damping: T::zero(),
             slope: Slope::Jacobian,
+            without_room: false,
             drift: drift.shortened(horizon),
             end_drift: T::zero(),
             pressure: T::zero(),
@@ -450,6 +454,7 @@ where
         self.wanted = None;
         self.damping = T::zero();
         self.slope = Slope::Jacobian;
+        self.without_room = false;
         self.drift.fill(SVector::zeros());
         self.end_drift = T::zero();
         self.pressure = T::zero();

@@ -157,6 +157,35 @@ fn errors_as_large_as_assumed_break_nothing() {
     }
 }
 
+/// The set point jumps by hundreds of radians while the robot cruises: the known plan is at the bound of the speed and has
+/// less room there than programs ask for. Then these had no answer, up to 42 of them in a row and 107 of 400, and the
+/// robot followed the rests of its plans meanwhile. After one without an answer they ask for no more room than the plan
+/// has, and it is one of their points.
+#[test]
+fn programs_along_a_plan_with_little_room_have_an_answer() {
+    let mut scenario = Scenario::load("far-setpoints").unwrap();
+    scenario.duration_s = 20.0;
+    scenario.controller.horizon = 30;
+    scenario.controller.iterations = Some(IterationsTable::Fixed(1));
+    let jumps = [200.0, -100.0, 400.0, -400.0, 0.0];
+    let points = jumps.iter().enumerate().map(|(i, phi_rad)| PointTable {
+        time_s: 4.0 * i as f64,
+        phi_rad: *phi_rad,
+    });
+    scenario.reference = ReferenceTable::SetPoints {
+        points: points.collect(),
+    };
+    let trajectory = run(&scenario);
+    let unanswered: Vec<usize> = (0..trajectory.samples.len())
+        .filter(|k| !trajectory.samples[*k].status.is_solved())
+        .collect();
+    assert!(unanswered.len() <= 10, "{unanswered:?}");
+    let in_a_row = unanswered.windows(2).any(|pair| pair[1] == pair[0] + 1);
+    assert!(!in_a_row, "{unanswered:?}");
+    let decisions = trajectory.samples.iter().filter_map(|s| s.guarantee);
+    assert!({ decisions }.all(|guarantee| guarantee.decision.is_guaranteed()));
+}
+
 /// Short and long horizons, in memories of either size: every input is backed and the set point is
 /// reached.
 #[test]

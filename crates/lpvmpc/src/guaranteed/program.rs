@@ -33,6 +33,25 @@ where
             }
         }
         self.pose_with_slopes(along, ocp);
+        if self.without_room {
+            self.without_room = self.admit(along, ocp);
+        }
+    }
+
+    /// Widens the bounds of the program's states so far that they hold for the plan `along` itself, which then is one
+    /// of the program's points; whether they did not.
+    fn admit<const NA: usize>(&self, along: &Plan<T, NX, NU>, ocp: &mut Ocp<T, NA, NU>) -> bool {
+        let origin = self.settings.direction * along.set_point;
+        let mut widened = false;
+        // The plan's stage i is the program's i + 1, and x_0 is as it is.
+        for (x, common) in along.states().zip(ocp.own.iter_mut().skip(1)).skip(1) {
+            let planned = augmented(&(x - origin), T::zero());
+            let bounds = &mut common.x;
+            widened |= !bounds.hold_at(&planned);
+            bounds.lower = bounds.lower.inf(&planned);
+            bounds.upper = bounds.upper.sup(&planned);
+        }
+        widened
     }
 
     /// The same where the derivatives along the plan, if they are asked for, are known.

@@ -58,6 +58,7 @@ where
         let mut served = planner.damping;
         // What is aimed at, while a first plan is looked for without it.
         let mut wanted = None;
+        planner.without_room &= known.is_some();
         for _ in 0..most {
             planner.pose(along, &mut workspace.ocp);
             let hopeless = least.is_none() && unanswered == HOPELESS;
@@ -70,7 +71,12 @@ where
                 planner.soften(&mut workspace.ocp);
                 planner.solve(workspace, WarmStart::Cold);
             }
-            let outcome = if workspace.solution.status.is_solved() {
+            let answered = workspace.solution.status.is_solved();
+            if !answered && known.is_some() && !planner.without_room {
+                planner.without_room = true;
+                continue;
+            }
+            let outcome = if answered {
                 planner.learn(workspace, along);
                 let outcome = planner.search(along, least, effort, workspace, [trial, nearer]);
                 match &outcome {

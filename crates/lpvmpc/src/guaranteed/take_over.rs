@@ -46,6 +46,7 @@ where
             wanted,
             damping,
             slope,
+            without_room,
             drift,
             end_drift,
             pressure,
@@ -57,6 +58,7 @@ where
         copy(drift, &previous.drift);
         copy(slopes, &previous.slopes);
         (*wanted, *damping, *slope) = (previous.wanted, previous.damping, previous.slope);
+        *without_room = previous.without_room;
         (*end_drift, *pressure) = (previous.end_drift, previous.pressure);
         *touch = previous.touch;
     }

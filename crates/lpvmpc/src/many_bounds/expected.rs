@@ -18,8 +18,10 @@ const MORE: usize = 32;
 const MANY_LIMITS: usize = 56;
 /// so many changes first, in which it comes to an end as a rule,
 const CHANGES_FIRST: usize = 64;
-/// and so many of a single input.
+/// and so many of a single input, beside one for each bound that is known,
 const CHANGES_OF_ONE: usize = 32;
+/// which it begins with in less time than the interior-point method finds them while they are fewer than these.
+const MANY_KNOWN: usize = 64;
 /// So many soft ones of a single input, where all that can hold are violated: the dual method adds and drops them again.
 const ALL_SOFT: usize = 20;
 /// And so many where some are known.
@@ -86,15 +88,16 @@ impl Expected {
         let bounds = if tells { known } else { violated }.min(most);
         // About twice as many were violated as are known.
         let limits = if tells { 2 * known } else { violated };
-        let (many_limits, changes) = match NU {
-            1 => (MORE, CHANGES_OF_ONE),
-            _ => (MANY_LIMITS, CHANGES_FIRST),
-        };
         let few_hold = !soft && 2 * inputs < violated && hard_states(ocp) > NU;
+        let (one_by_one, changes) = match NU {
+            1 if tells => (known < MANY_KNOWN, known + CHANGES_OF_ONE),
+            1 => (limits < MORE, known + CHANGES_OF_ONE),
+            _ => (limits < MANY_LIMITS, CHANGES_FIRST),
+        };
         Self {
             violated,
             bounds,
-            changes_first: (few_hold && limits < many_limits).then_some(changes),
+            changes_first: (few_hold && one_by_one).then_some(changes),
             many: bounds >= enough,
             familiar: tells && !takes_more && known >= FAMILIAR,
             // Those are nearly right where a single input moves the states.

@@ -3,8 +3,11 @@
 //! violated without the limits is many times what they allow.
 
 use super::many_bounds::Both;
-use super::support::{cold, solve_with};
-use lpvmpc::{Bounds, GeneralRow, List, Ocp, Penalty, SolverSettings, kkt_residual};
+use super::support::{capacity, cold, solve_with};
+use lpvmpc::{
+    Bounds, GeneralRow, List, Ocp, Penalty, Solution, Solver, SolverSettings, WarmStart,
+    kkt_residual,
+};
 use lpvmpc_sequences::{Kind, Recipe};
 use lpvmpc_testkit::rng::Rng;
 use nalgebra::{SMatrix, SVector};
@@ -168,6 +171,38 @@ fn in_numbers() {
         long += usize::from(answer.changes > 64);
     }
     assert!(long > 0);
+}
+
+/// One input, most of its stages at a limit of speed: where the last answer's limits are not quite those of the next one,
+/// the dual method is through with little more than a change for each of them. The interior-point method was tried first,
+/// in vain, and a sample took up to 172 changes.
+#[test]
+fn known_limits_that_hardly_change_are_begun_with_one_by_one() {
+    let mut most = 0;
+    for seed in 1..=6 {
+        let recipe = Recipe {
+            kind: Kind::Motion,
+            horizon: 60,
+            samples: 12,
+            share: 0.8,
+            seed,
+        };
+        let problems = recipe.make::<4, 1>().unwrap().problems;
+        let room = capacity(&problems[0]);
+        let (mut solver, mut answer) = (Solver::allocate(room), Solution::allocate(room));
+        for ocp in &problems {
+            let settings = SolverSettings {
+                warm_start: WarmStart::Shifted,
+                ..cold()
+            };
+            solver.solve(ocp, &settings, &mut answer);
+            assert!(answer.status.is_solved(), "{}", answer.status);
+            assert!(kkt_residual(ocp, &answer).largest() < 1e-9);
+            most = most.max(answer.changes);
+        }
+    }
+    println!("{most}");
+    assert!(most <= 100, "{most}");
 }
 
 /// Points that begin far beyond soft limits of all states and of a row in which the inputs have a part, too: most inputs
