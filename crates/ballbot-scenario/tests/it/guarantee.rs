@@ -158,7 +158,7 @@ fn errors_as_large_as_assumed_break_nothing() {
 }
 
 /// The set point jumps by hundreds of radians while the robot cruises: the known plan is at the bound of the speed and has
-/// less room there than programs ask for. Then these had no answer, up to 42 of them in a row and 107 of 400, and the
+/// less room there than programs ask for. Then these had no answer, up to 23 of them in a row and 71 of 400, and the
 /// robot followed the rests of its plans meanwhile. After one without an answer they ask for no more room than the plan
 /// has, and it is one of their points.
 #[test]
