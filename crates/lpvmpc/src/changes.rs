@@ -7,11 +7,12 @@ use crate::memory::Capacity;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Bounds, GeneralRow};
 use crate::preview::{Preview, check_rows};
-use crate::settings::{ControllerError, ControllerSettings, check, check_bounds};
+use crate::settings::{ControllerError, ControllerSettings, Iterations, check, check_bounds};
 #[cfg(feature = "alloc")]
 use crate::solution::ActiveSet;
+use crate::working_set::copy;
 use crate::workspace::Workspace;
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 /// General rows of every sample, beside the step that knows them: without any, a program has no machine
 /// code for rows.
@@ -50,7 +51,8 @@ where
         check_bounds(&x, "state")?;
         check_bounds(&u, "input")?;
         (self.settings.x, self.settings.u) = (x, u);
-        (self.prepared, self.aimed_at) = (None, None);
+        self.put_back();
+        self.aimed_at = None;
         Ok(())
     }
 
@@ -64,7 +66,7 @@ where
         check_rows(&rows).map_err(ControllerError::Rows)?;
         let run: Run<P, T, NX, NU, NS> = Self::run_with_rows;
         self.fixed = (!rows.is_empty()).then_some(FixedRows { rows, run });
-        self.prepared = None;
+        self.put_back();
         Ok(())
     }
 
@@ -81,7 +83,8 @@ where
     /// time: with the same period, or with none.
     pub fn set_model(&mut self, model: P) {
         self.model = model;
-        (self.prepared, self.aimed_at) = (None, None);
+        self.put_back();
+        self.aimed_at = None;
     }
 
     /// Other settings from the next step on: weights, bounds, prices, terminal ingredient, input
@@ -99,9 +102,25 @@ where
             return Err(ControllerError::Another);
         }
         check(&settings, horizon)?;
+        self.put_back();
+        if let (Iterations::Fixed(_), Iterations::Descent { .. }) =
+            (self.settings.iterations, settings.iterations)
+        {
+            self.begin_descent();
+        }
         self.settings = settings;
-        (self.prepared, self.aimed_at, self.target) = (None, None, None);
+        (self.aimed_at, self.target) = (None, None);
         Ok(())
+    }
+
+    /// The plan of the paper's loop becomes one of a descent: without feedback, and so dear that others are looked for
+    /// beside it.
+    #[cold]
+    fn begin_descent(&mut self) {
+        self.make_up(());
+        copy(&mut self.policy.u, &self.solution.u);
+        self.policy.feedback.fill(SMatrix::zeros());
+        (self.policy.cost, self.policy.damping) = (T::zero(), T::zero());
     }
 
     /// A sample with the controller's own rows.

@@ -19,7 +19,7 @@ use crate::soft_bounds::SoftPrices;
 use crate::solution::{Solution, Status};
 use crate::solver_settings::{SolverSettings, WarmStart};
 use crate::steady_state::{SteadyState, SteadyStateProblem};
-use crate::two_parts::Answered;
+use crate::two_parts::{Answered, Prepared};
 use crate::workspace::Workspace;
 use nalgebra::SVector;
 
@@ -75,8 +75,8 @@ pub struct Controller<P, T: 'static, const NX: usize, const NU: usize, const NS:
     /// The end of the reference for which `target` was worked out.
     pub(crate) aimed_at: Option<SVector<T, NX>>,
     pub(crate) target: Option<SteadyState<T, NX, NU>>,
-    /// What came of factorising the program that is ready for [`Controller::feedback`].
-    pub(crate) prepared: Option<Result<(), Status<T>>>,
+    /// The program that is ready for [`Controller::feedback`].
+    pub(crate) prepared: Option<Prepared<T, NX>>,
     /// What the last feedback began with, while the rest of its step is to be made up for.
     pub(crate) answered: Option<Answered<T, NX>>,
     /// General rows of every sample.

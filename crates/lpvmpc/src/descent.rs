@@ -461,6 +461,7 @@ where
     /// The state is not finite, or nothing that follows from it is.
     pub(crate) fn give_up(&mut self, status: Status<T>) {
         self.reset();
+        (self.problems, self.gap) = (0, SVector::zeros());
         self.solution
             .u
             .fill(self.settings.u.project(&SVector::zeros()));

@@ -191,13 +191,14 @@ where
         };
         let most = (self.problems() + most).min(usize::from(u16::MAX));
         self.exchange(kept);
+        // Without what the last program had of its own.
+        self.pose_hard(aim, workspace);
         let known = status.filter(Status::is_solved);
         let dearest = known.map(|_| kept.policy.cost);
         let begun = match beginning {
             Beginning::Regulator => self.regulate(x, aim, None, workspace).is_some(),
             _ => self.close_gaps((x, aim), beginning, (dearest, most), prices, workspace),
         };
-        self.pose_hard(aim, workspace);
         let begin = (along, most, tolerance);
         let other = begun.then(|| self.search_within_bounds(x, aim, begin, prices, workspace));
         let merit = self.merit(aim, *prices);

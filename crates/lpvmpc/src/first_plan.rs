@@ -209,6 +209,19 @@ where
         move_on(&mut self.policy.u, last, u);
         move_on(&mut self.policy.feedback, last, feedback);
     }
+
+    /// The plan one sample back, where the state `x` is expected next. The input and the feedback before that are lost;
+    /// nothing depends on them.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn shift_back(&mut self, x: SVector<T, NX>) {
+        move_back(&mut self.policy.u);
+        move_back(&mut self.policy.feedback);
+        move_back(&mut self.rollout);
+        if let Some(first) = self.rollout.first_mut() {
+            *first = x;
+        }
+    }
 }
 
 /// The entries one stage earlier, with `end` as that of stage `last`.
@@ -220,6 +233,15 @@ fn move_on<V: Copy>(entries: &mut [V], last: usize, end: V) {
     }
     if let Some(place) = entries.get_mut(last) {
         *place = end;
+    }
+}
+
+/// The entries one stage later, without the last one.
+fn move_back<V: Copy>(entries: &mut [V]) {
+    for i in (1..entries.len()).rev() {
+        if let Some([before, place]) = entries.get_mut(i - 1..=i) {
+            *place = *before;
+        }
     }
 }
 

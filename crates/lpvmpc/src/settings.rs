@@ -34,7 +34,8 @@ pub enum TerminalIngredient<T, const NX: usize> {
 pub enum Scheduling<T, const NS: usize> {
     /// From the nonlinear rollout of the previous plan (Algorithm 2): LPV MPC.
     Predicted,
-    /// Constant: linear MPC, the paper's comparison, with the scheduling of the equilibrium.
+    /// Constant: linear MPC, the paper's comparison, with the scheduling of the equilibrium. Not with
+    /// [`Iterations::Descent`], which follows the nonlinear model.
     Held(SVector<T, NS>),
 }
 
@@ -130,7 +131,8 @@ pub struct ControllerSettings<T, const NX: usize, const NU: usize, const NS: usi
     pub t_s: T,
     /// Prediction horizon in samples, at least 1.
     pub horizon: usize,
-    /// The discrete-time predictor.
+    /// The discrete-time predictor. A descent takes its Runge-Kutta steps alone: its matrices follow the scheduling
+    /// within a sample in any case.
     pub predictor: Predictor,
     /// Stage weights.
     pub weights: Weights<T, NX, NU>,
@@ -258,6 +260,8 @@ pub enum ControllerError {
     Price(usize),
     /// The constant scheduling contains a number that is not finite.
     HeldScheduling,
+    /// The scheduling is held, and each sample's plan a descent, which works out its own.
+    HeldDescent,
     /// The given input reference contains a number that is not finite.
     InputReference,
     /// No quadratic program per sample, or more than 65 535, or a tolerance of the iteration that is not
@@ -308,6 +312,11 @@ impl fmt::Display for ControllerError {
                 "the price of exceeding the bounds of state {component} must be finite and not negative"
             ),
             Self::HeldScheduling => write!(f, "the held scheduling must be finite"),
+            Self::HeldDescent => write!(
+                f,
+                "a descent plans with the nonlinear model: linear MPC, whose scheduling is held, takes \
+                 Iterations::Fixed"
+            ),
             Self::InputReference => write!(f, "the input reference must be finite"),
             Self::Iterations => write!(
                 f,
@@ -367,6 +376,9 @@ pub(crate) fn check<T: Scalar, const NX: usize, const NU: usize, const NS: usize
     match settings.scheduling {
         Scheduling::Held(held) if !held.iter().all(|entry| entry.is_finite()) => {
             Err(ControllerError::HeldScheduling)
+        }
+        Scheduling::Held(_) if matches!(settings.iterations, Iterations::Descent { .. }) => {
+            Err(ControllerError::HeldDescent)
         }
         _ => Ok(()),
     }

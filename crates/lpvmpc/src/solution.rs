@@ -351,8 +351,8 @@ impl<T: fmt::Display> fmt::Display for Status<T> {
 
 /// Inputs, predicted states and status of one solve.
 ///
-/// Whatever the status, the inputs are finite and within the input bounds; unless
-/// [`Status::is_solved`] they are a fallback, not an optimum.
+/// Whatever the status of a solve, the inputs are finite and within the input bounds; unless
+/// [`Status::is_solved`] they are a fallback, not an optimum. Before the first one they are zero.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
 pub struct Solution<T: 'static, const NX: usize, const NU: usize> {

@@ -23,6 +23,17 @@ pub(crate) enum Answered<T, const NX: usize> {
     Before(SVector<T, NX>),
 }
 
+/// A program that waits for the measured state.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Prepared<T, const NX: usize> {
+    /// The state that is expected.
+    x: SVector<T, NX>,
+    /// What came of factorising it.
+    factorized: Result<(), Status<T>>,
+    /// Whether the plan has moved on to the coming sample, as that of a descent does.
+    pub moved_on: bool,
+}
+
 impl<P, T, const NX: usize, const NU: usize, const NS: usize> Controller<P, T, NX, NU, NS>
 where
     T: Scalar,
@@ -51,24 +62,31 @@ where
         own: D,
         workspace: &mut Workspace<T, NX, NU>,
     ) {
-        self.prepared = None;
+        self.put_back();
         if !workspace.holds(self.settings.horizon) {
             return;
         }
         let aim = &self.aim(reference, own);
-        self.pose(&at(&self.rollout, 0), aim, workspace);
-        if let Iterations::Descent { .. } = self.settings.iterations {
+        let moved_on = matches!(self.settings.iterations, Iterations::Descent { .. });
+        let x;
+        if moved_on {
+            self.pose(&at(&self.rollout, 0), aim, workspace);
             let answered = self.answered.take();
-            if !self.initialised || !self.prepare_descent(answered, aim, workspace) {
+            let expected = { self.initialised }
+                .then(|| self.prepare_descent(answered, aim, workspace))
+                .flatten();
+            let Some(expected) = expected else {
                 self.initialised = false;
                 return;
-            }
+            };
+            x = expected;
         } else {
             self.make_up(own);
             if !self.initialised {
                 return;
             }
-            let x = at(&self.rollout, 0);
+            x = at(&self.rollout, 0);
+            self.pose(&x, aim, workspace);
             self.predict(&x, own, &mut workspace.ocp);
             self.track(aim, &mut workspace.ocp);
             if D::SOME {
@@ -76,7 +94,11 @@ where
                 self.pose_outputs(plan, 1, (aim, T::zero()), &mut workspace.ocp);
             }
         }
-        self.prepared = Some(workspace.solver.factorize(&workspace.ocp));
+        self.prepared = Some(Prepared {
+            x,
+            factorized: workspace.solver.factorize(&workspace.ocp),
+            moved_on,
+        });
     }
 
     /// The answer to the measured state `x` by the program that [`prepare`](Self::prepare) made
@@ -91,7 +113,7 @@ where
         reference: &Reference<'_, T, NX>,
         workspace: &mut Workspace<T, NX, NU>,
     ) -> &Solution<T, NX, NU> {
-        let Some(factorized) = self.prepared.take() else {
+        let Some(Prepared { factorized, .. }) = self.prepared.take() else {
             return self.step(x, reference, workspace);
         };
         self.answer(x, factorized, workspace);
@@ -117,7 +139,7 @@ where
     /// The rollout that a feedback has left for later.
     #[inline(always)]
     pub(crate) fn make_up<D: PlantByStage<P, T, NX, NU, NS>>(&mut self, own: D) {
-        self.prepared = None;
+        self.put_back();
         match self.answered.take() {
             None => return,
             Some(Answered::At(x)) => self.roll_out(&x, ()),
@@ -129,13 +151,13 @@ where
 
     /// Makes up for what [`Controller::feedback`] left: the plan, one sample after `x` was measured,
     /// is the best of what was planned before and of what the program answered. Then the program
-    /// along it is made ready. `false` if nothing is finite.
+    /// along it is made ready. The state that is expected; `None` if nothing is finite.
     fn prepare_descent<D: PlantByStage<P, T, NX, NU, NS>>(
         &mut self,
         answered: Option<Answered<T, NX>>,
         aim: &Aim<'_, T, NX, NU, D>,
         workspace: &mut Workspace<T, NX, NU>,
-    ) -> bool {
+    ) -> Option<SVector<T, NX>> {
         self.track(aim, &mut workspace.ocp);
         let last = self.last_stage();
         // Where the plant will be, as far as the model knows.
@@ -148,7 +170,7 @@ where
             None => at(&self.rollout, 0),
         };
         if self.first_plan(&x, aim, workspace) == First::Nothing {
-            return false;
+            return None;
         }
         if answered.is_some() && self.solution.status.is_solved() {
             let mut prices = Prices::none();
@@ -168,7 +190,18 @@ where
             self.adapt_damping(aim, &Outcome::NothingToGain { hidden: false });
         }
         self.linearize_plan(&x, aim, (Along::Jacobian, States::Follow), workspace);
-        true
+        Some(x)
+    }
+
+    /// What was prepared is not used: a plan that has moved on to the coming sample becomes that of the sample before
+    /// again, whose own input nothing depends on.
+    #[inline(always)]
+    pub(crate) fn put_back(&mut self) {
+        if let Some(prepared) = self.prepared.take()
+            && prepared.moved_on
+        {
+            self.shift_back(prepared.x);
+        }
     }
 
     /// [`prepare`](Self::prepare) with all that may be known ahead of the coming sample.
@@ -190,7 +223,7 @@ where
         preview: &Preview<'_, P, T, NX, NU, NS>,
         workspace: &mut Workspace<T, NX, NU>,
     ) -> &Solution<T, NX, NU> {
-        let Some(factorized) = self.prepared.take() else {
+        let Some(Prepared { factorized, .. }) = self.prepared.take() else {
             return self.step_with(x, preview, workspace);
         };
         self.with_rows(preview, workspace, |controller, given, workspace| {

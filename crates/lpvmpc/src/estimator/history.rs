@@ -176,6 +176,11 @@ where
         if self.length == self.ring.len() {
             // Without the instant before it, the new one could not be reached.
             place = place.checked_sub(1)?;
+            // Nor without a prior to begin with; and news must not be forgotten before they were taken in.
+            self.get(1)?.prior.as_ref()?;
+            if self.get(0)?.has_news() {
+                return None;
+            }
             self.forget_oldest();
         }
         let before = self.get_mut(place)?;

@@ -119,6 +119,10 @@ where
         of_any!(self, planner => planner.forget_plan())
     }
 
+    fn rest_at(&mut self, commanded: &SVector<T, NU>) {
+        of_any!(self, planner => planner.rest_at(commanded));
+    }
+
     /// One of another kind leaves nothing but the input.
     fn take_over(&mut self, previous: &Self, commanded: &SVector<T, NU>) {
         match (self, previous) {
@@ -131,7 +135,7 @@ where
             (Self::Guaranteed(planner, _), Self::Guaranteed(before, _)) => {
                 planner.take_over(before, commanded);
             }
-            (Self::Ramped(planner, _), _) => planner.begin_at(commanded),
+            (Self::Ramped(planner, _), _) => planner.rest_at(commanded),
             (Self::Held(..) | Self::Guaranteed(..), _) => {}
         }
     }

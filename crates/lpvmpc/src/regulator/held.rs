@@ -143,7 +143,7 @@ where
     }
 
     fn take_over(&mut self, previous: &Self, commanded: &SVector<T, NU>) {
-        self.input = *commanded;
+        (self.input, self.beside) = (*commanded, previous.beside);
         self.controller.take_over(&previous.controller);
     }
 

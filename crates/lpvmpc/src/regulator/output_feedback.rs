@@ -101,7 +101,7 @@ pub struct OutputFeedback<
     /// The input that was commanded last.
     commanded: SVector<T, NU>,
     window: Window<T, NX>,
-    /// The state that the last plan begins with, in the model's coordinates.
+    /// The state that the last plan begins with, in the model's coordinates; NaN before the first.
     pub(super) start: SVector<T, NX>,
 }
 
@@ -119,15 +119,17 @@ where
         settings: FeedbackSettings<T, NU>,
         memory: FeedbackMemory<T, NX, NU>,
     ) -> Self {
+        let delays = settings.delay > T::zero();
+        let delay = if delays { settings.delay } else { T::zero() };
         Self {
             belief,
             planner,
-            settings,
+            settings: FeedbackSettings { delay, ..settings },
             share: SVector::repeat(convert(f64::INFINITY)),
             commands: DelayLine::new(memory.commands),
             commanded: SVector::zeros(),
             window: Window::new(memory.window),
-            start: SVector::zeros(),
+            start: SVector::repeat(convert(f64::NAN)),
         }
     }
 
@@ -206,7 +208,8 @@ where
         self.belief.take_over(&previous.belief);
         self.commands.copy_from(&previous.commands);
         self.commanded = previous.commanded;
-        self.share = previous.share;
+        (self.share, self.start) = (previous.share, previous.start);
+        self.window.copy_from(&previous.window);
         let ramped = previous.planner.next_input();
         let next = ramped.unwrap_or(previous.commanded);
         self.planner.take_over(&previous.planner, &next);
@@ -265,7 +268,9 @@ where
             gap: SVector::zeros(),
             guarantee: None,
         };
-        self.command(SVector::zeros(), x_ref, nothing)
+        let command = self.command(SVector::zeros(), x_ref, nothing);
+        self.planner.rest_at(&command.u);
+        command
     }
 
     pub(super) fn command(

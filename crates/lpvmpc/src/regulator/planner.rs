@@ -71,6 +71,9 @@ pub trait Planner<T: Scalar, const NX: usize, const NU: usize> {
     /// Forgets the last plan: the next one is made without it.
     fn forget_plan(&mut self);
 
+    /// There is no state to plan for: the input that was `commanded` stays. A held one does so anyway.
+    fn rest_at(&mut self, _commanded: &SVector<T, NU>) {}
+
     /// Goes on from the plan of another planner, whose input is `commanded` at the next sample.
     fn take_over(&mut self, previous: &Self, commanded: &SVector<T, NU>);
 

@@ -26,7 +26,7 @@ pub struct Ramped<
     controller: Controller<RampedInput<P, NX>, T, NXU, NU, NS>,
     /// The reference over the horizon; the inputs have none but the controller's own.
     window: Window<T, NXU>,
-    /// State and inputs that the last plan begins with.
+    /// State and inputs that the last plan begins with; NaN before the first.
     start: SVector<T, NXU>,
     /// The commanded input.
     input: SVector<T, NU>,
@@ -48,7 +48,7 @@ where
         Self {
             controller,
             window: Window::new(window),
-            start: SVector::zeros(),
+            start: SVector::repeat(convert(f64::NAN)),
             input: SVector::zeros(),
             rate: SVector::zeros(),
         }
@@ -173,19 +173,14 @@ where
         self.controller.reset();
     }
 
-    fn take_over(&mut self, previous: &Self, commanded: &SVector<T, NU>) {
-        self.begin_at(commanded);
-        self.controller.take_over(&previous.controller);
+    fn rest_at(&mut self, commanded: &SVector<T, NU>) {
+        (self.input, self.rate) = (*commanded, SVector::zeros());
     }
-}
 
-impl<P, T, const NX: usize, const NU: usize, const NS: usize, const NXU: usize>
-    Ramped<P, T, NX, NU, NS, NXU>
-where
-    T: Scalar,
-{
-    /// The ramp goes on from this input.
-    pub(super) fn begin_at(&mut self, commanded: &SVector<T, NU>) {
-        self.input = *commanded;
+    fn take_over(&mut self, previous: &Self, commanded: &SVector<T, NU>) {
+        (self.input, self.rate) = (*commanded, previous.rate);
+        self.start = previous.start;
+        self.window.copy_from(&previous.window);
+        self.controller.take_over(&previous.controller);
     }
 }

@@ -3,6 +3,7 @@
 use crate::controller::Reference;
 use crate::list::List;
 use crate::model::Scalar;
+use crate::working_set::copy;
 use nalgebra::SVector;
 
 /// A reference that was looked up for one sample.
@@ -37,6 +38,13 @@ impl<T: Scalar, const NX: usize> Window<T, NX> {
     /// The same reference at all times.
     pub(super) fn hold(&mut self, x_ref: SVector<T, NX>) {
         (self.seen, self.terminal) = (0, x_ref);
+    }
+
+    /// What another window has seen, as far as there is memory for.
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        copy(&mut self.stages, &other.stages);
+        self.seen = other.seen.min(self.stages.len());
+        self.terminal = other.terminal;
     }
 
     pub(super) fn reference(&self) -> Reference<'_, T, NX> {

@@ -233,3 +233,51 @@ fn what_is_older_than_the_memory_is_stale_and_what_comes_twice_is_said() {
     assert_eq!(estimator.update(&aged(2.5))[0], Verdict::Stale);
     assert_eq!(estimator.update(&aged(1.5))[0], Verdict::Used);
 }
+
+/// With memory for few instants the estimate is that of much memory and the readings that were not called stale: what
+/// was used has been used. Readings from many instants were called so and forgotten.
+#[test]
+fn what_little_memory_uses_is_used() {
+    let mut rng = Rng::new(5);
+    let new = |memory| {
+        Estimator::<_, f64, 2, 1, 1, 2, 1>::allocate(
+            Linear,
+            two_sensors(),
+            Vector2::zeros(),
+            memory,
+        )
+        .unwrap()
+    };
+    for memory in 3..7 {
+        let (mut little, mut much) = (new(memory), new(64));
+        let [mut used, mut stale] = [0; 2];
+        for k in 0..300 {
+            let readings = [(); 2].map(|()| {
+                Some(Reading {
+                    value: 0.01 * (0.1 * f64::from(k)).sin() + 0.001 * rng.normal(),
+                    age: rng.uniform(0.0, 0.03),
+                })
+            });
+            let verdicts = little.update(&readings);
+            let fits = |i: usize| readings[i].filter(|_| verdicts[i] != Verdict::Stale);
+            much.update(&[fits(0), fits(1)]);
+            used += verdicts.iter().filter(|verdict| verdict.is_used()).count();
+            stale += verdicts
+                .iter()
+                .filter(|verdict| **verdict == Verdict::Stale)
+                .count();
+            let error = (little.state() - much.state()).norm();
+            assert!(
+                error < 1e-9,
+                "{memory} instants, update {k}: {error}, {verdicts:?}"
+            );
+            let u = Vector1::new((0.2 * f64::from(k)).cos());
+            little.advance(&u, 0.01);
+            much.advance(&u, 0.01);
+        }
+        assert!(
+            used > 50 && stale > 50,
+            "{memory}: {used} used, {stale} stale"
+        );
+    }
+}

@@ -370,3 +370,70 @@ fn an_unknown_state_commands_nothing() {
     let command = regulator.decide(&target);
     assert!(command.status.is_solved() && command.u[0] != 0.0);
 }
+
+/// Without a state a ramp does not go on between two decisions, and with one again it begins where the input was.
+#[test]
+fn a_ramp_rests_while_the_state_is_lost() {
+    let mut regulator = ramped(N);
+    let mut world = World::new(0.0, 0.0);
+    let moving = run(&mut regulator, &mut world, 3);
+    assert!((moving[2].0 - moving[1].0).abs() > 1e-3, "{moving:?}");
+    let start = 1e9 + 3.0 * T_S + 1.0;
+    for k in 0..100 {
+        let (t, readings) = (start + f64::from(k) * T_S, [None]);
+        regulator.observe(&Measurement { t, readings });
+        let u = match k % 4 {
+            0 => regulator.decide(&target).u,
+            _ => regulator.between().unwrap(),
+        };
+        assert_eq!(u[0], 0.0, "{k}");
+    }
+    let (t, readings) = (start + 100.0 * T_S, [Some(Reading::fresh(0.1))]);
+    regulator.observe(&Measurement { t, readings });
+    let command = regulator.decide(&target);
+    assert!(command.status.is_solved(), "{}", command.status);
+    // The middle of a ramp of at most 60 N m/s.
+    assert!(command.u[0].abs() <= 60.0 * T_S / 2.0, "{}", command.u);
+}
+
+/// What is said of the last plan, and what goes on between two decisions, is as it was.
+#[test]
+fn what_is_told_of_a_plan_is_taken_over() {
+    fn check<K: Planner<f64, 2, 1>>(mut first: Regulated<K>, mut second: Regulated<K>)
+    where
+        Regulated<K>: Regulator<f64, 2, 1, 1>,
+    {
+        assert!(first.cost().is_nan());
+        run(&mut first, &mut World::new(0.3, 0.0), 30);
+        second.take_over(&first);
+        assert_eq!(second.cost(), first.cost());
+        assert!(first.cost() > 0.0);
+        let largest = |of: &Regulated<K>| of.feedback.largest_inputs();
+        assert_eq!(largest(&second), largest(&first));
+        for _ in 0..3 {
+            assert_eq!(second.between(), first.between());
+        }
+    }
+    check(held(N), held(N));
+    check(ramped(N), ramped(N));
+}
+
+#[test]
+fn a_delay_that_is_none_counts_as_zero() {
+    let with = |delay: f64| {
+        let controller = Controller::allocate(PENDULUM, controller_settings(N)).unwrap();
+        let settings = FeedbackSettings {
+            delay,
+            ..feedback_settings()
+        };
+        let memory = FeedbackMemory::allocate(COMMANDS, N);
+        let mut regulator = Standalone {
+            workspace: controller.workspace(),
+            feedback: OutputFeedback::new(belief(), Held::new(controller), settings, memory),
+        };
+        run(&mut regulator, &mut World::new(0.3, 0.0), 60)
+    };
+    let without = with(0.0);
+    assert_eq!(with(f64::NAN), without);
+    assert_eq!(with(-0.01), without);
+}

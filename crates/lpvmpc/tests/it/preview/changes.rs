@@ -226,3 +226,80 @@ fn after_samples_without_a_plan_a_converged_one_is_the_optimum() {
         assert!(without > 0 && converged > 20, "{without} {converged}");
     }
 }
+
+/// What was prepared and is not used leaves no trace: the plan does not move on twice.
+#[test]
+fn what_is_prepared_in_vain_changes_nothing() {
+    let elsewhere = Reference::constant(Vector2::new(0.5, 0.0));
+    let settings = super::short_case::Settings {
+        iterations: Iterations::descent(1e-5, 1),
+        ..settings()
+    };
+    let mut controller = Controller::allocate(PENDULUM, settings).unwrap();
+    let mut workspace = controller.workspace();
+    let mut x = Vector2::new(0.8, -0.4);
+    for k in 0..15 {
+        let u = controller.step(&x, &upright(), &mut workspace).u[0];
+        x = Rk4 { substeps: 2 }.advance(&PENDULUM, &x, &u, 0.05);
+        x[1] += if k % 3 == 0 { 0.3 } else { 0.0 };
+        let [mut stepped, mut changed, mut twice, mut once, mut taken] =
+            [(); 5].map(|()| controller.clone());
+        let expected = controller
+            .clone()
+            .step(&x, &upright(), &mut workspace)
+            .u
+            .clone();
+        let check = |what: &str, found: &[Vector1<f64>]| {
+            let apart = found.iter().zip(expected.iter());
+            let error = apart.map(|(a, b)| (a - b).amax()).fold(0.0, f64::max);
+            assert!(error < 1e-9, "{k}, {what}: {error}");
+        };
+        stepped.prepare(&upright(), &mut workspace);
+        taken.take_over(&stepped);
+        check("step", &stepped.step(&x, &upright(), &mut workspace).u);
+        check("take over", &taken.step(&x, &upright(), &mut workspace).u);
+        changed.prepare(&upright(), &mut workspace);
+        changed.set_bounds(settings.x, settings.u).unwrap();
+        check(
+            "bounds",
+            &changed.feedback(&x, &upright(), &mut workspace).u,
+        );
+        once.prepare(&upright(), &mut workspace);
+        let answer = once.feedback(&x, &upright(), &mut workspace).u[0];
+        twice.prepare(&elsewhere, &mut workspace);
+        twice.prepare(&upright(), &mut workspace);
+        let again = twice.feedback(&x, &upright(), &mut workspace).u[0];
+        assert!(
+            (again - answer).amax() < 1e-9,
+            "{k}, twice: {again} {answer}"
+        );
+    }
+}
+
+/// From the paper's loop to a descent: it begins with the loop's last plan, not with that of an earlier descent.
+#[test]
+fn a_descent_goes_on_from_the_plan_of_the_papers_loop() {
+    let with = |iterations| super::short_case::Settings {
+        iterations,
+        ..settings()
+    };
+    let descent = with(Iterations::descent(1e-5, 1));
+    let mut controller = Controller::allocate(PENDULUM, descent).unwrap();
+    let mut workspace = controller.workspace();
+    controller.step(&Vector2::new(-1.0, -1.0), &upright(), &mut workspace);
+    controller.set_settings(with(Iterations::Fixed(1))).unwrap();
+    let mut x = Vector2::new(1.0, 1.0);
+    for k in 0..10 {
+        let u = controller.step(&x, &upright(), &mut workspace).u[0];
+        x = Rk4 { substeps: 2 }.advance(&PENDULUM, &x, &u, 0.05);
+        // Without gains and a known cost, as one that knows nothing but this plan.
+        let mut other = Controller::allocate(PENDULUM, descent).unwrap();
+        other.take_over(&controller);
+        let expected = other.step(&x, &upright(), &mut workspace).clone();
+        let mut changed = controller.clone();
+        changed.set_settings(descent).unwrap();
+        let found = changed.step(&x, &upright(), &mut workspace);
+        assert_eq!(found.u, expected.u, "{k}");
+        assert_eq!(found.x, expected.x, "{k}");
+    }
+}

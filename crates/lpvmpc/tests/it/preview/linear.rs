@@ -6,7 +6,7 @@ use super::dense::{self, Answer, sampled};
 use super::plants::{NU, NX, Scheduled};
 use lpvmpc::{
     Bounds, Controller, ControllerMemory, ControllerSettings, InputReference, Iterations, Penalty,
-    Predictor, Preview, Reference, Rk4, Scalar, Solution, SolverSettings, Status,
+    Predictor, Preview, Reference, Rk4, Scalar, Scheduling, Solution, SolverSettings, Status,
     TerminalIngredient, Weights, Workspace,
 };
 use lpvmpc_testkit::rng::Rng;
@@ -22,6 +22,14 @@ fn ways() -> [(Iterations<f64>, Predictor); 4] {
         (descent, Predictor::StageConsistent(rk4)),
         (descent, Predictor::FrozenRk4(rk4)),
     ]
+}
+
+/// Held by the paper's loop with the frozen predictor: the plant's own; what is told from outside takes its place.
+fn scheduling(iterations: Iterations<f64>, predictor: Predictor) -> Scheduling<f64, 1> {
+    match (iterations, predictor) {
+        (Iterations::Fixed(_), Predictor::FrozenRk4(_)) => Scheduling::Held(SVector::zeros()),
+        _ => Scheduling::Predicted,
+    }
 }
 
 fn plan(case: &Case, settings: Settings) -> (Solution<f64, NX, NU>, f64) {
@@ -125,11 +133,7 @@ fn the_plan_is_the_optimum_of_the_problem_written_out() {
         for (iterations, predictor) in ways() {
             let settings = Settings {
                 predictor,
-                scheduling: match predictor {
-                    // The plant's own; what is told from outside takes its place.
-                    Predictor::FrozenRk4(_) => lpvmpc::Scheduling::Held(SVector::zeros()),
-                    _ => lpvmpc::Scheduling::Predicted,
-                },
+                scheduling: scheduling(iterations, predictor),
                 ..case.settings(iterations)
             };
             let Answer::Solved { u, cost } = dense::solve(&case, &settings) else {
@@ -170,11 +174,7 @@ fn hard_rows_hold_or_are_called_infeasible() {
         for (iterations, predictor) in ways() {
             let settings = Settings {
                 predictor,
-                scheduling: match predictor {
-                    // The plant's own; what is told from outside takes its place.
-                    Predictor::FrozenRk4(_) => lpvmpc::Scheduling::Held(SVector::zeros()),
-                    _ => lpvmpc::Scheduling::Predicted,
-                },
+                scheduling: scheduling(iterations, predictor),
                 ..case.settings(iterations)
             };
             let (plan, _) = plan(&case, settings);
@@ -283,7 +283,7 @@ fn single_precision_is_close_to_the_optimum() {
                 soft_x: of_double.soft_x.each_ref().map(price),
                 raise_prices: false,
                 u: bounds(&of_double.u),
-                scheduling: lpvmpc::Scheduling::Predicted,
+                scheduling: Scheduling::Predicted,
                 iterations,
                 input_reference: InputReference::Given(SVector::repeat(0.1)),
                 solver: SolverSettings::default(),

@@ -3,8 +3,8 @@
 use super::{settings, tilted};
 use crate::method::plant::CartPole;
 use lpvmpc::{
-    Bounds, Controller, ControllerArrays, ControllerError, ControllerSettings, Penalty, Predictor,
-    Reference, Rk4, Scheduling, Status, TerminalIngredient,
+    Bounds, Controller, ControllerArrays, ControllerError, ControllerSettings, Iterations, Penalty,
+    Predictor, Reference, Rk4, Scheduling, Status, TerminalIngredient,
 };
 use nalgebra::{Matrix1, Matrix4, SVector, Vector1, Vector2, Vector4};
 
@@ -157,6 +157,12 @@ fn held_scheduling() {
         let words = ["held scheduling", "finite"];
         assert_refused(change, ControllerError::HeldScheduling, &words);
     }
+    let change = |s: &mut Settings| {
+        s.scheduling = Scheduling::Held(Vector2::zeros());
+        s.iterations = Iterations::default();
+    };
+    let words = ["linear MPC", "Iterations::Fixed"];
+    assert_refused(change, ControllerError::HeldDescent, &words);
 }
 
 /// One step under settings that must be accepted.

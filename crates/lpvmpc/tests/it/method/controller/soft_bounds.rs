@@ -101,6 +101,16 @@ fn so_do_those_of_a_step_in_two_parts() {
     let next = tried.rollout()[0];
     tried.prepare(&reference, &mut memory);
     assert_posed(memory.ocp(), expected(&settings, next - end));
+    // After a feedback of the paper's loop it is where that leads to.
+    let settings = soft(Iterations::Fixed(1));
+    let mut tried = controller(settings);
+    tried.step(&Vector4::zeros(), &reference, &mut memory);
+    tried.prepare(&reference, &mut memory);
+    tried.feedback(&Vector4::new(2.0, 0.05, 0.0, 0.0), &reference, &mut memory);
+    tried.prepare(&reference, &mut memory);
+    let next = tried.rollout()[0];
+    assert!((next[0] - 2.0).abs() < 0.1, "{next}");
+    assert_posed(memory.ocp(), expected(&settings, next - end));
 }
 
 /// Prices of a preview are raised, too.
