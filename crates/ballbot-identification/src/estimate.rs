@@ -32,7 +32,7 @@ pub struct Task<'a> {
     pub segment: f64,
     /// Whether the torque is in N m.
     pub torque_known: bool,
-    /// Known noise of ball angle, tilt and tilt rate; what is `None` is found.
+    /// Known noise of ball angle, tilt and tilt rate, for the weights; what is `None` is found.
     pub noise: [Option<f64>; 3],
     /// Where the columns are configured, for messages.
     pub tables: Tables,
@@ -53,8 +53,8 @@ pub struct Estimate {
     pub status: Values<Status>,
     /// Standard deviation of the residuals of ball angle, tilt and tilt rate.
     pub spread: Vector3<f64>,
-    /// What the outputs are weighted by: the spread, that of the ball angle times the root of how many
-    /// rows of coloured residuals count as one.
+    /// What the outputs are weighted by: what was known of their noise, otherwise the spread, that of
+    /// the ball angle times the root of how many rows of coloured residuals count as one.
     pub noise: Vector3<f64>,
     /// Where the fit ended, in its coordinates.
     pub coordinates: Vec<f64>,

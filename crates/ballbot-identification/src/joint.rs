@@ -178,7 +178,7 @@ impl<'a> Joint<'a> {
                 let next = task.known(Vector3::new(coloured[0], spread[1], spread[2]));
                 let changes = next.component_div(&noise).map(|ratio| (ratio - 1.0).abs());
                 change = change.max(changes.max());
-                spreads.push((task.known(spread), task.known(coloured)));
+                spreads.push((spread, task.known(coloured)));
                 noises.push(next);
             }
             rounds += 1;

@@ -127,6 +127,34 @@ fn an_ignored_tilt_offset_is_found_out() {
     );
 }
 
+/// What was said of the noise used to stand in place of the residuals, so that every fit was good.
+#[test]
+fn noise_that_is_known_does_not_hide_what_the_robot_does_not_explain() {
+    let laboratory = real();
+    let noise = laboratory.noise;
+    let known = format!(
+        "[noise]\nphi_rad = {:?}\ntheta_rad = {:?}\ntheta_dot_rad_s = {:?}\n",
+        noise[0], noise[1], noise[2]
+    );
+    let config = format!("{known}[parameters]\ntilt_offset_rad = {{ fixed = 0.0 }}");
+    let found = identified(&laboratory, 3, &config);
+    let verdicts = found.verdicts();
+    let too_large = verdicts
+        .iter()
+        .any(|verdict| matches!(verdict, Verdict::ResidualTooLarge { .. }));
+    assert!(too_large, "{verdicts:?}");
+    // Of the right robot the residuals are the noise that is there, not a larger one that was claimed.
+    let claimed = "[noise]\nphi_rad = 0.003\ntheta_rad = 0.003\ntheta_dot_rad_s = 0.015";
+    for config in [&known, claimed] {
+        let found = identified(&laboratory, 3, config);
+        for (residual, noise) in found.residuals.iter().zip(noise.iter()) {
+            let spread = residual.spread;
+            // A thousand rows tell a standard deviation to two or three per cent.
+            assert!(percent(spread, *noise) < 10.0, "{spread} for {noise}");
+        }
+    }
+}
+
 #[test]
 fn an_ignored_gyro_bias_hardly_matters() {
     let laboratory = at_length();
