@@ -241,8 +241,7 @@ impl SegmentedRuns<'_> {
     /// The torque that acts from the first row of a segment on, after a delay in s.
     fn torque(&self, segment: usize, delay: f64) -> TorqueReader<'_> {
         let Segment { run, first, .. } = self.segments[segment];
-        let run = &self.runs[run];
-        run.torque_from(run.time[first] - delay)
+        self.runs[run].torque_before(first, delay)
     }
 
     /// The outputs of a segment with their derivatives by the initial state and by the coordinates

@@ -109,7 +109,7 @@ struct Window {
 fn window(run: &Run, rows: Range<usize>, ball_angle: BallAngle, delay: f64) -> Option<Window> {
     let start = run.time[rows.start];
     let length = run.time[rows.end - 1] - start;
-    let mut torque = run.torque_from(start - delay);
+    let mut torque = run.torque_before(rows.start, delay);
     let mut sums = Window {
         regressors: [0.0; 5],
         ball: 0.0,

@@ -25,7 +25,7 @@ pub struct Run {
     pub outputs: Vec<Vector3<f64>>,
     /// Torque of the virtual wheel from each row to the next, N m.
     pub torque: Vec<f64>,
-    /// Rows between which nothing is missing: no gap, no jump, every torque known.
+    /// Rows between which nothing is missing, in their order: no gap, no jump, every torque known.
     pub stretches: Vec<Range<usize>>,
     /// Which torque it is.
     pub torque_kind: Torque,
@@ -54,31 +54,41 @@ impl Run {
         self.time[rows.end - 1] - self.time[rows.start]
     }
 
-    /// The torque as a function of time, to be read forward from `time`.
-    pub(crate) fn torque_from(&self, time: f64) -> TorqueReader<'_> {
-        let row = self.time.partition_point(|stamp| *stamp <= time);
+    /// The torque as a function of time in the stretch of a row, to be read forward from `delay`
+    /// seconds before that row.
+    pub(crate) fn torque_before(&self, row: usize, delay: f64) -> TorqueReader<'_> {
+        // The rows of another stretch are at other times, or of a clock that was set anew, or have no
+        // torque. What a delay brings in from before the stretch is the first torque that is known.
+        let place = self.stretches.partition_point(|rows| rows.end <= row);
+        let stretch = self.stretches.get(place).filter(|rows| rows.contains(&row));
+        let rows = stretch.map_or(0..self.time.len(), Clone::clone);
+        let start = self.time[row] - delay;
+        let time = &self.time[rows.clone()];
+        let after = time.partition_point(|stamp| *stamp <= start);
         TorqueReader {
-            run: self,
-            row: row.saturating_sub(1),
             time,
+            torque: &self.torque[rows],
+            row: after.saturating_sub(1),
+            start,
         }
     }
 }
 
 /// Reads a held torque forward in time.
 pub(crate) struct TorqueReader<'a> {
-    run: &'a Run,
+    time: &'a [f64],
+    torque: &'a [f64],
     row: usize,
-    time: f64,
+    start: f64,
 }
 
 impl TorqueReader<'_> {
     /// The mean torque over the next `duration` seconds.
     pub(crate) fn mean_over(&mut self, duration: f64) -> f64 {
-        let Run { time, torque, .. } = self.run;
-        let end = self.time + duration;
+        let Self { time, torque, .. } = *self;
+        let end = self.start + duration;
         let mut impulse = 0.0;
-        let mut from = self.time;
+        let mut from = self.start;
         while self.row + 1 < time.len() && time[self.row + 1] < end {
             let until = time[self.row + 1];
             impulse += torque[self.row] * (until - from).max(0.0);
@@ -86,7 +96,7 @@ impl TorqueReader<'_> {
             self.row += 1;
         }
         impulse += torque[self.row] * (end - from);
-        self.time = end;
+        self.start = end;
         impulse / duration
     }
 }

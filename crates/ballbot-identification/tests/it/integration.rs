@@ -27,6 +27,7 @@ fn divided(run: &Run) -> Run {
         torque: rows
             .flat_map(|row| each(row).map(|row| run.torque[row]))
             .collect(),
+        stretches: std::iter::once(0..PARTS * (run.time.len() - 1)).collect(),
         ..run.clone()
     }
 }

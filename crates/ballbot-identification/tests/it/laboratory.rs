@@ -41,6 +41,7 @@ pub struct Laboratory {
 }
 
 /// What the robot did.
+#[derive(Clone)]
 pub struct Record {
     pub run: Run,
     /// What was asked for, N m; `run.torque` is what acted.

@@ -14,3 +14,4 @@ mod laboratory;
 mod long;
 mod malformed;
 mod planes;
+mod stretches;
