@@ -58,6 +58,18 @@ impl Default for GeometryTable {
     }
 }
 
+impl GeometryTable {
+    /// The values with their keys.
+    pub(crate) fn entries(&self) -> [(&'static str, f64); 4] {
+        [
+            ("centre_of_mass_m", self.centre_of_mass_m),
+            ("ball_radius_m", self.ball_radius_m),
+            ("wheel_radius_m", self.wheel_radius_m),
+            ("gravity_m_s2", self.gravity_m_s2),
+        ]
+    }
+}
+
 /// What is done with a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]

@@ -6,6 +6,7 @@ use crate::estimate::{Task, problem};
 use crate::log::{BallAngle, Run, Torque};
 use crate::model::{Robot, steps};
 use crate::parameter::{Choice, Parameter, Values};
+use crate::parameter_file::Identified;
 use crate::poles::linear_model;
 use crate::segments::segments;
 use crate::suspects::Tables;
@@ -199,16 +200,20 @@ impl ExcitationTask {
     /// A usual rate of loop and log, Hz.
     pub const RATE: f64 = 200.0;
 
-    /// A usual task for the robot that a configuration expects, but for the parameters that were
-    /// `identified` before, and for a log with the configuration's sensors.
+    /// A usual task for the robot that a configuration expects, or that was `identified` before, and for
+    /// a log with the configuration's sensors.
     ///
     /// # Errors
-    /// As [`Config::choices`].
-    pub fn of(config: &Config, identified: &[(Parameter, f64)]) -> Result<Self, ConfigError> {
+    /// As [`Config::choices`]; or the configuration gives other lengths than the robot was identified with.
+    pub fn of(config: &Config, identified: Option<&Identified>) -> Result<Self, ConfigError> {
+        let config = match identified {
+            Some(identified) => &identified.configured(config)?,
+            None => config,
+        };
         let choices = config.choices()?;
         let geometry = config.geometry();
         let mut robot = Values::expected(&choices, &geometry);
-        for (parameter, value) in identified {
+        for (parameter, value) in identified.iter().flat_map(|robot| &robot.parameters) {
             robot[*parameter] = *value;
         }
         let noise = config.noise();

@@ -72,7 +72,7 @@ mod wheel_check;
 mod words;
 
 pub use ball_angle::OtherReading;
-pub use config::{Config, ConfigError};
+pub use config::{Config, ConfigError, GeometryTable};
 pub use coordinates::{Coordinates, LONGEST_DELAY};
 pub use estimate::{Coarse, Effort, Estimate, EstimateError, Progress, Status, Task};
 pub use excitation::{Excitation, ExcitationError, ExcitationTask};
@@ -81,7 +81,7 @@ pub use joint::{Joint, JointEstimate, PLANES};
 pub use miswiring::{Miswiring, WheelColumns};
 pub use model::{LONGEST_STEP, Robot, Segment, SegmentedRuns};
 pub use parameter::{Choice, Parameter, Values};
-pub use parameter_file::identified_parameters;
+pub use parameter_file::{Identified, identified_parameters};
 pub use poles::{Pole, linear_model, uncertain_poles};
 pub use published::{LinearRegression, regression};
 pub use residuals::{

@@ -1,35 +1,122 @@
 //! The result as a TOML file: written, and read again.
 
+use crate::config::{Config, ConfigError, GeometryTable};
 use crate::joint::PLANES;
 use crate::parameter::Parameter;
 use crate::robot::{IdentifiedRobot, OfPlane};
+use crate::words::number;
+use lpvmpc_design::number_text;
 use nalgebra::DMatrix;
 use serde::Deserialize;
+use serde::de::Error as _;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 /// What stands in a file of parameters: a table's key, the plane it is read from, the parameter.
 type Entry = (String, usize, Parameter);
 
-/// The parameters in the text of a file of parameters.
+/// A robot as a file of parameters has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Identified {
+    /// Lengths and gravity that the parameters were identified with.
+    pub lengths: GeometryTable,
+    /// What was found or held.
+    pub parameters: Vec<(Parameter, f64)>,
+}
+
+/// The robot in the text of a file of parameters.
 ///
 /// # Errors
-/// It is not TOML, or has no table `[identification]`.
-pub fn identified_parameters(text: &str) -> Result<Vec<(Parameter, f64)>, toml::de::Error> {
+/// It is not TOML, has no tables `[parameters]` and `[identification]`, or a number in them that no robot
+/// has.
+pub fn identified_parameters(text: &str) -> Result<Identified, toml::de::Error> {
     let file: IdentifiedFile = toml::from_str(text)?;
     let entries = file.identification.parameters.into_iter();
     let known = entries.filter_map(|(key, entry)| Parameter::from_key(&key).zip(entry.value));
-    Ok(known.collect())
+    let parameters: Vec<(Parameter, f64)> = known.collect();
+    let gain = parameters
+        .iter()
+        .find(|(parameter, _)| *parameter == Parameter::TorqueGain);
+    let (_, gain) = gain.ok_or_else(|| {
+        let key = Parameter::TorqueGain.key();
+        toml::de::Error::custom(format!("identification.{key} is missing"))
+    })?;
+    let Lengths {
+        centre_of_mass_m,
+        ball_radius_m,
+        wheel_radius_m,
+        gravity_m_s2,
+    } = file.parameters;
+    let lengths = GeometryTable {
+        centre_of_mass_m,
+        ball_radius_m,
+        // The file's own has the gain in it.
+        wheel_radius_m: wheel_radius_m * gain,
+        gravity_m_s2,
+    };
+    for (key, value) in lengths.entries() {
+        if !(value.is_finite() && value > 0.0) {
+            let value = number_text(value);
+            let problem = format!("{key} = {value}: it must be a positive number");
+            return Err(toml::de::Error::custom(problem));
+        }
+    }
+    Ok(Identified {
+        lengths,
+        parameters,
+    })
+}
+
+impl Identified {
+    /// The configuration with the lengths that the parameters were identified with: they mean nothing
+    /// with others.
+    ///
+    /// # Errors
+    /// The configuration gives others.
+    pub(crate) fn configured(&self, config: &Config) -> Result<Config, ConfigError> {
+        let usual = GeometryTable::default();
+        let given = config.geometry.entries().into_iter();
+        let known = self.lengths.entries().into_iter().zip(usual.entries());
+        for ((key, given), ((_, known), (_, usual))) in given.zip(known) {
+            // The gain was divided by and is multiplied with.
+            let agrees = (given - known).abs() <= 1e-9 * known;
+            if given != usual && !agrees {
+                return Err(ConfigError::Value {
+                    key: format!("geometry.{key}"),
+                    value: given,
+                    expected: format!(
+                        "{}, with which the parameters were identified, or be left out",
+                        number(known)
+                    )
+                    .into(),
+                });
+            }
+        }
+        Ok(Config {
+            geometry: self.lengths,
+            ..config.clone()
+        })
+    }
+}
+
+/// Lengths and gravity among the parameters of a scenario.
+#[derive(Deserialize)]
+struct Lengths {
+    centre_of_mass_m: f64,
+    ball_radius_m: f64,
+    wheel_radius_m: f64,
+    gravity_m_s2: f64,
 }
 
 /// What of the file is needed.
 #[derive(Deserialize)]
 struct IdentifiedFile {
-    identification: Identified,
+    parameters: Lengths,
+    identification: IdentifiedEntries,
 }
 
 #[derive(Deserialize)]
-struct Identified {
+struct IdentifiedEntries {
     #[serde(flatten)]
     parameters: BTreeMap<String, IdentifiedEntry>,
 }

@@ -130,16 +130,15 @@ pub fn excite<'py>(
     asked: Asked,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (config, place) = configuration(config)?;
-    let identified = match &parameters {
-        Some(path) => identified_parameters(&text(path)?).map_err(|error| {
+    let identified = parameters.as_ref().map(|path| {
+        identified_parameters(&text(path)?).map_err(|error| {
             in_file(
                 &path.display().to_string(),
                 &ConfigError::Syntax(toml_message(&error.to_string())),
             )
-        })?,
-        None => Vec::new(),
-    };
-    let usual = ExcitationTask::of(&config, &identified);
+        })
+    });
+    let usual = ExcitationTask::of(&config, identified.transpose()?.as_ref());
     let usual = usual.map_err(|error| in_file(&place, &error))?;
     let limit = asked.tilt_limit_deg.map(f64::to_radians);
     let task = ExcitationTask {

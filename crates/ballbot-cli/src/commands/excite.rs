@@ -28,7 +28,7 @@ pub struct ExciteArguments {
     /// The expected robot, lengths, noise [default: the paper's lengths]
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
-    /// Parameters from `ballbot identify`, in place of what the configuration expects
+    /// A robot from `ballbot identify`, with its lengths, in place of what the configuration expects
     #[arg(long, value_name = "parameters.toml")]
     pub parameters: Option<PathBuf>,
     /// Lowest and highest frequency, Hz [default: 0.2,6]
@@ -88,11 +88,9 @@ pub fn run(arguments: &ExciteArguments) -> Result<String, CommandError> {
 }
 
 fn task(arguments: &ExciteArguments, config: &Config) -> Result<ExcitationTask, CommandError> {
-    let identified = match &arguments.parameters {
-        Some(path) => input::parse(path, identified_parameters)?,
-        None => Vec::new(),
-    };
-    let usual = ExcitationTask::of(config, &identified);
+    let identified = arguments.parameters.as_ref();
+    let identified = identified.map(|path| input::parse(path, identified_parameters));
+    let usual = ExcitationTask::of(config, identified.transpose()?.as_ref());
     let usual = usual.map_err(|source| InputError::Identification {
         path: arguments.config.clone().unwrap_or_default(),
         source,

@@ -1,9 +1,11 @@
 //! Designed excitation: limits are kept, and the expected precision is the precision.
 
-use crate::laboratory::healthy;
+use crate::laboratory::{Laboratory, csv, healthy};
+use ballbot::Geometry;
 use ballbot_identification::log::BallAngle;
 use ballbot_identification::{
-    ExcitationError, ExcitationTask, Parameter, Split, Tables, Task, Values, noise,
+    Config, ExcitationError, ExcitationTask, Parameter, Split, Tables, Task, Values,
+    identified_parameters, identify, log, noise,
 };
 use fastrand::Rng;
 use nalgebra::Vector4;
@@ -61,7 +63,7 @@ fn the_expected_precision_is_that_of_the_fit() {
     let task = task();
     let excitation = task.design().unwrap();
     // The laboratory plays the designed torque, with the gains that the design counted on.
-    let laboratory = crate::laboratory::Laboratory {
+    let laboratory = Laboratory {
         delay: 0.01,
         ..healthy()
     };
@@ -143,4 +145,57 @@ fn what_cannot_be_done_is_said() {
     assert!(message.contains("it has a pole at +"), "{message}");
     let message = refused(|task| task.amplitude = 1e-4).to_string();
     assert!(message.contains("--amplitude"), "{message}");
+}
+
+/// The identified inertias used to be combined with the paper's lengths.
+#[test]
+fn the_lengths_of_an_identified_robot_are_those_of_its_file() {
+    let geometry = Geometry {
+        centre_of_mass: 0.25,
+        ball_radius: 0.1,
+        wheel_radius: 0.03,
+        gravity: 9.81,
+    };
+    let mut laboratory = healthy();
+    laboratory.plant.geometry = geometry;
+    let lengths = "[geometry]\ncentre_of_mass_m = 0.25\nball_radius_m = 0.1\nwheel_radius_m = 0.03";
+    let config = Config::parse(lengths).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    std::fs::write(&path, csv(&laboratory.record(1))).unwrap();
+    let recording = log::recording(&path, &config.log, &|_| ()).unwrap();
+    let choices = config.choices().unwrap();
+    let robot = identify(vec![recording], &config, choices, &|_| {}).unwrap();
+    let text = robot.parameter_files().unwrap()[0].1.clone();
+    let identified = identified_parameters(&text).unwrap();
+    // With a configuration of the same lengths, and without one.
+    for config in [&config, &Config::default()] {
+        let task = ExcitationTask::of(config, Some(&identified)).unwrap();
+        for (found, given) in [
+            (task.geometry.centre_of_mass, geometry.centre_of_mass),
+            (task.geometry.ball_radius, geometry.ball_radius),
+            (task.geometry.wheel_radius, geometry.wheel_radius),
+            (task.geometry.gravity, geometry.gravity),
+        ] {
+            assert!((found - given).abs() <= 1e-15, "{found} for {given}");
+        }
+        let b1 = robot.first().estimate.values[Parameter::B1];
+        assert_eq!(task.robot[Parameter::B1], b1);
+    }
+    let other = Config::parse(&lengths.replace("0.1\n", "0.11\n")).unwrap();
+    let refused = ExcitationTask::of(&other, Some(&identified)).unwrap_err();
+    let message = refused.to_string();
+    assert!(
+        message.contains("geometry.ball_radius_m = 0.11: it must be 0.1, with which"),
+        "{message}"
+    );
+    for (key, value) in [("ball_radius_m", "-0.1"), ("gravity_m_s2", "nan")] {
+        let line = text.lines().find(|line| line.starts_with(key)).unwrap();
+        let damaged = text.replace(line, &format!("{key} = {value}"));
+        let message = identified_parameters(&damaged).unwrap_err().to_string();
+        assert!(
+            message.contains("it must be a positive number"),
+            "{message}"
+        );
+    }
 }
