@@ -512,6 +512,11 @@ fn check_goal(file: &CampaignFile, inputs: &Inputs) -> Result<(), CampaignError>
         let expected = "a rare failure has its own numbers; leave runs, [success] and [stop] out";
         return refused("(given)", expected);
     }
+    if file.refused == OnRefused::Count {
+        let expected = "of a rare failure no draw is left out; give the inputs bounds within which each \
+                        draw makes a scenario";
+        return Err(CampaignError::value("refused", "\"count\"", expected));
+    }
     if inputs.grid_points > 1 || inputs.all.is_empty() {
         let expected = "its inputs need distributions, and a grid is none";
         return refused("(given)", expected);

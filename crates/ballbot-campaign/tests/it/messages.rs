@@ -89,6 +89,13 @@ fn mistakes_are_named() {
             ),
             ["rare", "leave runs"],
         ),
+        (
+            // Refused draws used to count as safe ones, with which nothing fails.
+            edited("runs = 24", "refused = \"count\"")
+                .replace("[success]\nlargest_tilt_rad.at_most = 0.5\n", "")
+                + "[rare]\nmeasure = \"largest_tilt_rad\"\nabove = 1.0\n",
+            ["refused = \"count\"", "no draw is left out"],
+        ),
         (String::from("title ="), ["not a valid campaign", "line 1"]),
     ] {
         let message = message(&text);
