@@ -72,13 +72,15 @@ impl Source {
             false => file.scenario.clone(),
         };
         let scenario = Document::load(&named)?;
-        let folder = Path::new(&named).parent().unwrap_or(folder).to_owned();
+        // A built-in scenario is nowhere: what it is given stands beside the campaign.
+        let file_of_scenario = Some(Path::new(&named)).filter(|path| path.is_file());
+        let folder = file_of_scenario.and_then(Path::parent).unwrap_or(folder);
         Ok(Self {
             path: path.to_owned(),
             text,
             file,
             scenario,
-            folder,
+            folder: folder.to_owned(),
             also,
         })
     }

@@ -1,7 +1,7 @@
 //! A run is a function of the campaign and its number.
 
-use crate::{NO_CLOCK, NOISY, column, numbers, read, rows, with, write_whole};
-use ballbot_campaign::{Cell, Summary};
+use crate::{NO_CLOCK, NOISY, PROGRAM, column, numbers, read, rows, with, write_whole, written};
+use ballbot_campaign::{Campaign, Cell, Source, Summary};
 use ballbot_scenario::{RunHooks, Scenario};
 use std::path::Path;
 
@@ -49,6 +49,25 @@ fn what_is_added_changes_no_draws() {
         + "[[vary]]\nkey = \"world.floor.slope_x_deg\"\nuniform = [0.0, 1.0]\n";
     let [few, many] = [NOISY, more.as_str()].map(|text| with(text, |campaign| campaign.draw(5)));
     assert_eq!((few.seed, &few.values[..]), (many.seed, &many.values[..4]));
+}
+
+/// They were looked for in the current folder.
+#[test]
+fn files_for_a_built_in_scenario_are_beside_the_campaign() {
+    let text = NOISY.replacen(
+        "[[vary]]",
+        "\"world.excitation\" = \"torque.csv\"\n[[vary]]",
+        1,
+    );
+    let (folder, path) = written(&text);
+    let torque = "t_s,torque_excitation_nm\n0,0.25\n1,0.25\n";
+    std::fs::write(folder.path().join("torque.csv"), torque).unwrap();
+    let source = Source::load(&path).unwrap();
+    assert_eq!(source.folder(), folder.path());
+    let campaign = Campaign::new(&source, source.folder(), PROGRAM).unwrap();
+    let prepared = campaign.scenario(&campaign.draw(0)).unwrap();
+    let excitation = prepared.planes[0].world.excitation.as_ref().unwrap();
+    assert_eq!(excitation.at(0.5), 0.25);
 }
 
 /// Beside a scenario that was written and run by hand.
