@@ -389,11 +389,12 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         };
         let rates = self.direction.dual.iter();
         let mut rows = self.working.rows().iter().zip(rates);
+        let rounding = self.direction.size * T::default_epsilon();
         proof.push(candidate)
             && rows.all(|(row, rate)| {
                 let multiplier = -*rate * sign;
                 // What is smaller is rounding.
-                let counts = row.equality || multiplier > T::default_epsilon();
+                let counts = row.equality || multiplier * row.size > rounding;
                 !counts
                     || proof.push(ActiveRow {
                         multiplier,

@@ -101,7 +101,7 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> Linear<'a, T, NX, NU> {
         by_u: &'a SVector<T, NU>,
     ) -> Self {
         Self {
-            constant: value - by_x.dot(x) - by_u.dot(u),
+            constant: without_rounding([value, -by_x.dot(x), -by_u.dot(u)]),
             x: by_x,
             u: by_u,
         }
@@ -109,6 +109,19 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> Linear<'a, T, NX, NU> {
 
     fn at(&self, x: &SVector<T, NX>, u: &SVector<T, NU>) -> T {
         self.constant + self.x.dot(x) + self.u.dot(u)
+    }
+}
+
+/// Their sum, which is zero where they cancel but for rounding: a limit of that size could not be met to a part of it.
+fn without_rounding<T: Scalar, const K: usize>(terms: [T; K]) -> T {
+    let zero = T::zero();
+    let (sum, size) = { terms.iter() }.fold((zero, zero), |(sum, size), term| {
+        (sum + *term, size + term.abs())
+    });
+    let rounding = size * T::default_epsilon() * convert(8.0);
+    match sum.abs() <= rounding && size.is_finite() {
+        true => zero,
+        false => sum,
     }
 }
 
@@ -260,8 +273,8 @@ pub(crate) fn write_rows<T: Scalar, const NX: usize, const NU: usize>(
         *row = GeneralRow {
             x: *by_x,
             u: *by_u,
-            lower: goal.lower - constant,
-            upper: goal.upper - constant,
+            lower: without_rounding([goal.lower, -constant]),
+            upper: without_rounding([goal.upper, -constant]),
             soft: goal.soft.or(elastic).map(half),
         };
     });

@@ -48,17 +48,20 @@ fn room_of_bound<T: Scalar>(lower: T, upper: T) -> T {
     }
 }
 
-/// The size against which a violation is measured: the larger finite limit, or 1.
+/// Limits of this magnitude, and of so many times the other one, stand for none.
+const FAR: f64 = 1e10;
+
+/// The size against which a violation is measured: the larger limit, or 1, but for one that is so far away that it
+/// stands for none.
 pub(crate) fn size_of_bound<T: Scalar>(lower: T, upper: T) -> T {
-    let magnitude = |limit: T| {
-        if limit.is_finite() {
-            limit.abs()
-        } else {
-            T::zero()
-        }
-    };
-    let size = magnitude(lower).max(magnitude(upper));
-    if size > T::zero() { size } else { T::one() }
+    let (lower, upper) = (lower.abs(), upper.abs());
+    let (near, far) = (lower.min(upper), lower.max(upper));
+    let counts = far < near.max(T::one()) * convert(FAR) && far.is_finite();
+    let size = if counts { far } else { near };
+    match size > T::zero() && size.is_finite() {
+        true => size,
+        false => T::one(),
+    }
 }
 
 /// Offers every violated side of `bounds` at `value` to `visit`. NaN counts as violated.

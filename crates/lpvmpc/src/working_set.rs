@@ -108,7 +108,7 @@ pub(crate) struct Direction<T: 'static, const NU: usize> {
     /// working set depends on it, up to a small relative change of the rows.
     pub noise: T,
     /// Length of alpha, with the elastic part.
-    size: T,
+    pub size: T,
     /// Stages that `primal` depends on.
     support: usize,
 }

@@ -25,6 +25,8 @@ use nalgebra::{SVector, convert};
 const REFINEMENTS: usize = 40;
 /// Held sides come nearer when what is left of their distances is at most this part.
 const COMES_NEARER: f64 = 0.8;
+/// Held sides come nearer in one mode where this part of their ratio from pass to pass is all that it changes by.
+const SAME_RATIO: f64 = 0.02;
 /// With so many wrong sides a guess is nearly right, and worth a closer look.
 const NEARLY_RIGHT: usize = 8;
 /// A guess with more wrong sides than so many times the fewest before has gone astray.
@@ -239,7 +241,9 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
                 for side in sides.iter_mut().filter(|side| side.is_weighted()) {
                     side.estimate = side.multiplier_at(side.distance);
                 }
-                return near && is_of_the_plant(program, tolerances.violation);
+                return near
+                    && !residual.contradicted
+                    && is_of_the_plant(program, tolerances.violation);
             }
         }
         if one_by_one && wrong <= NEARLY_RIGHT && patience.steps > 0 {
@@ -362,6 +366,8 @@ fn explain<T: Scalar, const NX: usize, const NU: usize>(
 ///
 /// Held sides come nearer from pass to pass, and until they have come to rest the gradient is not zero. A side that no
 /// input moves stays where it is: of so small a distance the weight makes more and more, until it counts as rounding.
+/// After a pass or two the slowest mode is left, in which all distances shrink by the same ratio: what the multipliers would
+/// take up in all further passes is added at once (Aitken's extrapolation).
 fn refine<T: Scalar, const NX: usize, const NU: usize>(
     program: &mut Program<'_, T, NX, NU>,
     sides: &mut [BoundSide<T>],
@@ -370,16 +376,13 @@ fn refine<T: Scalar, const NX: usize, const NU: usize>(
     (enough, tolerance): (T, T),
 ) -> bool {
     let infinity: T = convert(f64::INFINITY);
-    let (mut least, mut last_missed) = (infinity, infinity);
+    let (mut least, mut last_missed, mut last_ratio) = (infinity, infinity, T::zero());
     let mut stalled = false;
     let mut rounding = rounding::<T>();
     let mut waits = true;
     let mut left = REFINEMENTS;
+    let mut missed = farthest(sides);
     loop {
-        let held = sides.iter().filter(|side| side.role == Role::Held);
-        let missed = held.fold(T::zero(), |most, side| {
-            most.max(side.distance.abs() / side.size)
-        });
         let unexplained = residual.rest / residual.largest.max(T::default_epsilon());
         let worst = missed.max(unexplained);
         if worst <= enough || left == 0 {
@@ -405,6 +408,30 @@ fn refine<T: Scalar, const NX: usize, const NU: usize>(
         residual::descend(&program.span, program.factors, residual.followed, program.v);
         newton::deviate(&program.span, program.factors, program.v, trajectory, sides);
         measure(program, sides, rounding);
+        missed = farthest(sides);
+        let ratio = missed / last_missed;
+        let same = (ratio - last_ratio).abs() <= ratio * convert(SAME_RATIO);
+        last_ratio = ratio;
+        if same && ratio <= convert(COMES_NEARER) {
+            take_up_rest(sides, ratio);
+            last_ratio = T::zero();
+        }
         *residual = explain(program, sides);
+    }
+}
+
+/// The largest relative distance of a side that is held.
+fn farthest<T: Scalar>(sides: &[BoundSide<T>]) -> T {
+    let held = sides.iter().filter(|side| side.role == Role::Held);
+    held.fold(T::zero(), |most, side| {
+        most.max(side.distance.abs() / side.size)
+    })
+}
+
+/// What the multipliers of held sides will take up while their distances shrink by this ratio from pass to pass.
+fn take_up_rest<T: Scalar>(sides: &mut [BoundSide<T>], ratio: T) {
+    let rest = ratio / (T::one() - ratio);
+    for side in sides.iter_mut().filter(|side| side.is_weighted()) {
+        side.base -= side.weight * side.distance * rest;
     }
 }

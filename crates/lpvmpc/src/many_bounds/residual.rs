@@ -6,11 +6,14 @@ use super::span::Span;
 use crate::model::Scalar;
 use crate::ocp::Common;
 use crate::riccati::StageFactor;
-use crate::rows::Trajectory;
+use crate::rows::{self, Trajectory};
 use crate::small_matrix::{
     largest, product, transposed_product, transposed_sizes, transposed_times,
 };
-use nalgebra::SVector;
+use nalgebra::{SVector, convert};
+
+/// What of the terms beside a multiplier is rounding, as a power of the smallest number beside one.
+const ROUNDING: f64 = 0.4;
 
 /// What is missing for a minimum.
 pub(super) struct Residual<T> {
@@ -20,6 +23,9 @@ pub(super) struct Residual<T> {
     pub largest: T,
     /// Whether later inputs follow the policies.
     pub followed: bool,
+    /// Whether a held side has a multiplier of the wrong sign, or above its price, by more than rounding of the costs
+    /// that it stands beside, which may be of other units than the largest term.
+    pub contradicted: bool,
 }
 
 /// The problem's adjoint recursion on the trajectory, with the multipliers of the sides at their
@@ -41,7 +47,9 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
         rest: T::zero(),
         largest: T::zero(),
         followed: sides.iter().all(|side| side.input().is_some()),
+        contradicted: false,
     };
+    let rounding = T::default_epsilon().powf(convert(ROUNDING));
     let of_rows = |side: &mut BoundSide<T>| match side.input() {
         None if side.role != Role::Free => side.multiplier_at(side.distance),
         _ => T::zero(),
@@ -54,6 +62,18 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
     // The sizes of what adds up to the costate, and cancels where the sides decide.
     let mut sizes = costate.abs() + of_cost.abs();
     costate += of_cost;
+    let contradicts = |side: &BoundSide<T>, sizes: &SVector<T, NX>, terms: &SVector<T, NU>| {
+        let excess = side.excess();
+        if !(excess > T::zero()) {
+            return false;
+        }
+        let (x, u) = rows::normal(ocp, &side.bound);
+        let of_x = x.iter().zip(sizes.iter());
+        let mut beside = of_x.chain(u.iter().zip(terms.iter()));
+        beside.any(|(of, size)| (*of * excess).abs() > rounding * *size)
+    };
+    let none = SVector::zeros();
+    residual.contradicted |= end.iter().any(|side| contradicts(side, &sizes, &none));
     let stages = span.stages().zip(span.of(factors));
     for (((i, stage), factor), left) in stages.zip(span.of_mut(slopes)).rev() {
         let here = split_off_mut(&mut before, i);
@@ -63,8 +83,9 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
         let Common { q, r, s, .. } = ocp.common_at(i);
         let through = transposed_times(&stage.b, &costate);
         let mut slope = product(r, &u) + product(s, x) + stage.linear_u + through + slope_u;
-        let terms = largest(&transposed_sizes(&stage.b, &sizes));
-        residual.largest = residual.largest.max(terms).max(largest(&slope_u));
+        let terms = transposed_sizes(&stage.b, &sizes);
+        residual.largest = residual.largest.max(largest(&terms)).max(largest(&slope_u));
+        let terms = terms + slope_u.abs();
         for side in here.iter_mut().filter(|side| side.role == Role::Held) {
             side.estimate = match side.input() {
                 None => side.base,
@@ -80,6 +101,7 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
             costate += transposed_product(&factor.feedback, &slope);
         }
         sizes = costate.abs() + slope_x.abs();
+        residual.contradicted |= here.iter().any(|side| contradicts(side, &sizes, &terms));
         costate += slope_x;
         *left = slope;
     }

@@ -102,12 +102,15 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
 fn list_multipliers<T: Scalar>(sides: &[BoundSide<T>], list: &mut ActiveSet<T>) {
     list.clear();
     let multipliers = sides.iter().filter(|side| side.may_contradict());
-    let multipliers = multipliers.map(|side| (side.bound, side.interior.multiplier));
+    let multipliers = multipliers.map(|side| (side.bound, side.interior.multiplier, side.size));
+    // In units of the cost, since multipliers are of as many units as what is bounded.
     let largest = multipliers
         .clone()
-        .fold(T::zero(), |most, (_, multiplier)| most.max(multiplier));
-    for (bound, multiplier) in multipliers {
-        if multiplier > largest * T::default_epsilon().sqrt() {
+        .fold(T::zero(), |most, (_, multiplier, size)| {
+            most.max(multiplier * size)
+        });
+    for (bound, multiplier, size) in multipliers {
+        if multiplier * size > largest * T::default_epsilon().sqrt() {
             list.push(ActiveRow {
                 bound,
                 part: Part::Hard,

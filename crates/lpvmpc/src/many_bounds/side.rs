@@ -184,6 +184,14 @@ impl<T: Scalar> BoundSide<T> {
         self.base - self.weight * distance
     }
 
+    /// By how much the multiplier of a held side is below zero, or above its price.
+    pub fn excess(&self) -> T {
+        match self.role {
+            Role::Held => (-self.estimate).max(self.estimate - self.price()),
+            _ => T::zero(),
+        }
+    }
+
     /// The linear price, infinite for a hard side: the largest multiplier at which the side holds.
     pub fn price(&self) -> T {
         let infinite = convert(f64::INFINITY);
@@ -202,15 +210,18 @@ pub(super) fn collect<T: Scalar, const NX: usize, const NU: usize>(
     sides: &mut [BoundSide<T>],
 ) -> Option<usize> {
     let mut count = 0;
+    let infinite: T = convert(f64::INFINITY);
     let mut add = |stage, quantity, (lower, upper): (T, T), soft: Option<Penalty<T>>| {
         let free = |price: Penalty<T>| price.linear <= T::zero() && price.quadratic <= T::zero();
         if soft.is_some_and(free) {
             return Some(());
         }
+        // Whether a bound is met that is NaN, or that no number meets, the dual method is to say.
+        if !(lower < infinite && upper > -infinite) {
+            return None;
+        }
         let size = rows::size_of_bound(lower, upper);
         for (side, limit) in [(Side::Lower, lower), (Side::Upper, upper)] {
-            // Whether a bound that is NaN is met, the dual method is to say.
-            limit.partial_cmp(&limit)?;
             if limit.is_finite() {
                 let bound = BoundId {
                     stage,

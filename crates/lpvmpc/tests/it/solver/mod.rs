@@ -11,6 +11,7 @@ mod motion_limits;
 mod optimality;
 mod regressions;
 mod relations;
+mod scales;
 mod single_precision;
 mod verdicts;
 mod warm_starts;
