@@ -5,6 +5,7 @@ use crate::distribution::Distribution;
 use crate::error::CampaignError;
 use crate::file::{CampaignFile, LimitsTable, OnRefused};
 use crate::fingerprint;
+use crate::fixed::fixed;
 use crate::inputs::{Input, Inputs, child, named_seed};
 use crate::measure::{Ending, Measure, Measured};
 use ballbot_scenario::{Document, Files, Prepared, Record, RunHooks, ScenarioError, words};
@@ -100,6 +101,12 @@ impl Source {
         &self.scenario
     }
 
+    /// The keys of the scenario that are the same in all runs: those of `[set]`, tables in it as keys with
+    /// dots.
+    pub fn fixed(&self) -> Vec<(String, Value)> {
+        fixed(&self.scenario, &self.file.set)
+    }
+
     /// Values from elsewhere that may name files.
     pub(crate) fn also(&self) -> &[Value] {
         &self.also
@@ -170,7 +177,7 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
     pub fn new(source: &'a Source, files: F, program: &str) -> Result<Self, CampaignError> {
         let file = &source.file;
         let (inputs, runs) = Inputs::new(&file.vary, file.design, file.seed, runs_of(file))?;
-        let fixed: Vec<(String, Value)> = file.set.clone().into_iter().collect();
+        let fixed = source.fixed();
         let varied = |key: &str| {
             inputs
                 .all
@@ -186,12 +193,12 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
             ));
         }
         let has_world = source.scenario.root().get("world").is_some()
-            || fixed.iter().any(|(key, _)| key.starts_with("world."))
+            || fixed.iter().any(|(key, _)| is_of_world(key))
             || inputs
                 .all
                 .iter()
                 .flat_map(|input| &input.keys)
-                .any(|key| key.starts_with("world."));
+                .any(|key| is_of_world(key));
         let given = file.same_noise || varied(NOISE) || fixed.iter().any(|(key, _)| key == NOISE);
         let campaign = Self {
             noise: (has_world && !given).then(|| named_seed(file.seed, NOISE)),
@@ -474,6 +481,11 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
 fn runs_of(file: &CampaignFile) -> Option<u64> {
     file.runs
         .or(file.rare.map(|rare| u64::from(rare.level_runs)))
+}
+
+/// Whether a scenario with this key has a world, and so noise.
+fn is_of_world(key: &str) -> bool {
+    key == "world" || key.starts_with("world.")
 }
 
 /// One of so many runs must be a scenario.

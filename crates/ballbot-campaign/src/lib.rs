@@ -38,6 +38,7 @@ mod distribution;
 mod error;
 mod file;
 mod fingerprint;
+mod fixed;
 mod inputs;
 mod intervals;
 mod measure;

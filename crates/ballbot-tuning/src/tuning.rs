@@ -361,13 +361,9 @@ fn check_keys(source: &TuningSource) -> Result<(), TuningError> {
         ballbot_campaign::Keys::Several(keys) => keys.as_slice(),
     });
     let varied = varied.map(|key| (key, "worlds.vary"));
-    let others: Vec<(&String, &str)> = file
-        .worlds
-        .set
-        .keys()
-        .map(|key| (key, "worlds.set"))
-        .chain(varied)
-        .collect();
+    let set = source.worlds.fixed();
+    let set = set.iter().map(|(key, _)| (key, "worlds.set"));
+    let others: Vec<(&String, &str)> = set.chain(varied).collect();
     for (i, key) in searched.iter().enumerate() {
         let meets = |other: &str| is_within(key, other) || is_within(other, key);
         let before = searched[..i].iter().map(|other| (*other, "parameters"));

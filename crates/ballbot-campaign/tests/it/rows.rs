@@ -51,6 +51,54 @@ fn what_is_added_changes_no_draws() {
     assert_eq!((few.seed, &few.values[..]), (many.seed, &many.values[..4]));
 }
 
+/// A nested table used to take the place of all that the scenario has there, and where it was the only
+/// mention of a world, all runs had the same noise.
+#[test]
+fn tables_in_set_are_keys_with_dots() {
+    let rows_of = |set: &str| {
+        let text = format!(
+            "title = \"Tables\"\nscenario = \"single-setpoint\"\nruns = 6\nseed = 3\n\
+             [set]\nduration_s = 1.0\n{set}\n\
+             [[vary]]\nkey = \"initial_state.theta_rad\"\nuniform = [-0.1, 0.1]\n"
+        );
+        with(&text, rows)
+    };
+    let dotted = "\"world.sensors.theta.noise_rad\" = 0.001\n\"world.delay.computation_s\" = 0.02";
+    let wanted = rows_of(dotted);
+    for nested in [
+        "world.sensors.theta.noise_rad = 0.001\nworld.delay.computation_s = 0.02",
+        "world = { sensors.theta.noise_rad = 0.001, delay = { computation_s = 0.02 } }",
+        "[set.world.delay]\ncomputation_s = 0.02\n[set.world.sensors.theta]\nnoise_rad = 0.001",
+    ] {
+        assert_eq!(rows_of(nested), wanted, "{nested}");
+    }
+    // What the scenario has beside them stays.
+    let (folder, path) = written(
+        "title = \"Beside\"\nscenario = \"loop.toml\"\nruns = 1\n\
+         [set]\nworld.delay.computation_s = 0.02\n\
+         [[vary]]\nkey = \"initial_state.theta_rad\"\nuniform = [-0.1, 0.1]\n",
+    );
+    let scenario = ballbot_scenario::builtin::find("single-setpoint").unwrap();
+    let noisy = format!(
+        "{}\n[world.sensors.theta]\nnoise_rad = 0.003\n",
+        scenario.text
+    );
+    std::fs::write(folder.path().join("loop.toml"), noisy).unwrap();
+    let source = Source::load(&path).unwrap();
+    let campaign = Campaign::new(&source, source.folder(), PROGRAM).unwrap();
+    let prepared = campaign.scenario(&campaign.draw(0)).unwrap();
+    let settings = &prepared.planes[0].world.settings;
+    assert_eq!((settings.sensors[1].noise, settings.delay), (0.003, 0.02));
+    // Another kind of reference takes the place of the scenario's.
+    let lines = "[set.reference.lines]\npoints = [{ time_s = 0.0, phi_rad = 0.5 }]\n[[vary]]";
+    let text = NOISY.replacen("[[vary]]", lines, 1);
+    let phi = with(&text, |campaign| {
+        let prepared = campaign.scenario(&campaign.draw(0)).unwrap();
+        prepared.planes[0].state_reference(0.0)[0]
+    });
+    assert_eq!(phi, 0.5);
+}
+
 /// They were looked for in the current folder.
 #[test]
 fn files_for_a_built_in_scenario_are_beside_the_campaign() {

@@ -169,3 +169,20 @@ fn mistakes_are_named() {
         message(&goals)
     );
 }
+
+/// A table in `[worlds.set]` used to stand for all keys below it.
+#[test]
+fn beside_a_key_of_the_worlds_another_one_of_the_same_table_is_searched_over() {
+    let text = TWO_GOALS.replace(
+        "[worlds.set]\nduration_s = 1.0",
+        "[worlds.set]\nduration_s = 1.0\ncontroller.model = \"linear\"",
+    );
+    assert_ne!(text, TWO_GOALS);
+    let (_folder, source) = crate::written(&text);
+    Tuning::new(&source, source.folder(), PROGRAM).unwrap();
+    let twice = text.replace("controller.model = \"linear\"", "controller.r = 900.0");
+    let message = message(&twice);
+    for part in ["controller.r", "worlds.set has a value"] {
+        assert!(message.contains(part), "`{part}` is not in: {message}");
+    }
+}
