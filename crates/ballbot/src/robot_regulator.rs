@@ -119,6 +119,11 @@ impl<T: Scalar + Number, K: Planner<T, 4, 1>> RobotRegulator<T, K> {
         &self.wheels
     }
 
+    /// The measured heading, rad.
+    pub fn heading(&self) -> T {
+        self.heading[0]
+    }
+
     fn motor_torques(&self) -> Vector3<T> {
         let planes = Heading::new(self.heading[0]).to_robot(&self.torques.xy());
         self.wheels.motors(&planes.push(self.torques[2]))

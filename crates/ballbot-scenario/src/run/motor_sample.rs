@@ -1,5 +1,6 @@
 //! What a whole robot's samples are to its planes and motors.
 
+use crate::run::excited_robot::ExcitedRobot;
 use ballbot::{AnyPlanner, Heading, RobotRegulator, plane_of};
 use lpvmpc::Observation;
 use lpvmpc_sim::{LogRow, Sample};
@@ -23,16 +24,17 @@ pub struct MotorSample {
 
 /// One plane's sample of the whole robot's; half of the time of the decision counts for each.
 pub(crate) fn sample_of_plane(
-    regulator: &WholeRegulator,
+    excited: &ExcitedRobot,
     index: usize,
     sample: &Sample<10, 3>,
 ) -> Option<Sample<4, 1>> {
+    let regulator = excited.regulator();
     let command = regulator.command_of(index)?;
     Some(Sample {
         t: sample.t,
         x: plane_of(&sample.x, index),
         estimate: command.estimate,
-        u: command.u,
+        u: command.u.add_scalar(excited.on_top()[index]),
         x_ref: plane_of(&sample.x_ref, index),
         cost: regulator.cost_of(index)?,
         status: command.status,

@@ -3,13 +3,14 @@
 use crate::error::ScenarioError;
 use crate::prepare::prepared::{Plane, Prepared};
 use crate::prepare::three_motors::ThreeMotors;
-use crate::run::motor_sample::{MotorSample, WholeRegulator, log_of_plane, sample_of_plane};
+use crate::run::excited_robot::ExcitedRobot;
+use crate::run::motor_sample::{MotorSample, log_of_plane, sample_of_plane};
 use crate::run::record::{Record, RunHooks};
 use crate::run::whole_robot::{State, WholeRobot, whole_world};
 use ballbot::{HEADING, RobotRegulator, plane_feedback, plane_of};
 use lpvmpc_sim::{ClosedLoop, Recording, Termination, Trajectory, World};
 
-type WholeLoop = ClosedLoop<WholeRegulator, WholeRobot, 10, 3, 10, 4>;
+type WholeLoop = ClosedLoop<ExcitedRobot, WholeRobot, 10, 3, 10, 4>;
 
 impl Prepared {
     /// Runs both planes together.
@@ -43,7 +44,7 @@ impl Prepared {
                 samples.extend(sample_of_plane(regulator, index, &sample));
                 log.extend(rows.iter().map(|row| {
                     let heading = sample.x[HEADING] + sample.x[HEADING + 1] * (row.t - sample.t);
-                    log_of_plane(regulator, index, row, heading)
+                    log_of_plane(regulator.regulator(), index, row, heading)
                 }));
             }
             robot_log.extend(rows);
@@ -121,6 +122,7 @@ impl Prepared {
             turning.law,
             turning.initial,
         );
+        let regulator = ExcitedRobot::new(regulator, x.world.excitation.clone());
         let mut closed_loop = ClosedLoop::new(regulator, world)?;
         closed_loop.without_plan = x.world.without_plan;
         for (index, plane) in [x, y].into_iter().enumerate() {

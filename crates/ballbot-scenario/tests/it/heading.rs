@@ -127,6 +127,71 @@ fn with_a_wrong_heading_it_falls() {
     );
 }
 
+/// Where planes share their motors it used to be left out without a word.
+#[test]
+fn an_excitation_is_added_to_the_torque_of_the_x_plane_however_the_robot_stands() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("excited-whole-robot");
+    std::fs::create_dir_all(&folder).expect("writable");
+    let rows = (0..40).map(|i| format!("{},{}\n", 0.05 * f64::from(i), 0.3 * f64::from(i).sin()));
+    let text = format!("t_s,torque_excitation_nm\n{}", rows.collect::<String>());
+    std::fs::write(folder.join("torque.csv"), text).expect("writable");
+    let mut scenario = example();
+    scenario.duration_s = 3.0;
+    scenario.initial_state = StateTable::default();
+    scenario.initial_state_y = Some(StateTable::default());
+    // Enough for both planes, so that each moves as if it were alone.
+    motors(&mut scenario).limit_nm = 10.0;
+    let heading = scenario.heading.as_mut().expect("given");
+    (heading.initial_deg, heading.target_deg) = (40.0, 40.0);
+    heading.target_rate_deg_s = 0.0;
+    let run = |scenario: &Scenario| {
+        let prepared = scenario.prepare(folder.as_path()).expect("valid");
+        prepared.record(&RunHooks::NONE).expect("runs").planes
+    };
+    let mut with = |excitation: Option<&str>| {
+        scenario.world = Some(WorldTable {
+            excitation: excitation.map(Into::into),
+            ..WorldTable::default()
+        });
+        let mut alone = scenario.clone();
+        (alone.controller.motors, alone.heading) = (None, None);
+        [run(&scenario), run(&alone)]
+    };
+    let [still, _] = with(None);
+    let [together, alone] = with(Some("torque.csv"));
+    let torque = |run: &lpvmpc_sim::Recording<4, 1, 4>, k: usize| run.trajectory.samples[k].u[0];
+    assert!((torque(&together[0], 2) - torque(&still[0], 2)).abs() > 0.05);
+    for (together, alone) in together.iter().zip(&alone) {
+        assert_eq!(together.trajectory.samples.len(), 120);
+        for (a, b) in together
+            .trajectory
+            .samples
+            .iter()
+            .zip(&alone.trajectory.samples)
+        {
+            // Both are integrated within tolerances.
+            assert!(
+                (a.x - b.x).amax() < 1e-6,
+                "{} and {} at {} s",
+                a.x,
+                b.x,
+                a.t
+            );
+            assert!(
+                (a.u - b.u).amax() < 1e-4,
+                "{} and {} at {} s",
+                a.u,
+                b.u,
+                a.t
+            );
+        }
+        for (a, b) in together.log.iter().zip(&alone.log) {
+            let off = (a.commanded - b.commanded).amax();
+            assert!(off < 1e-4, "{off} at {} s", a.t);
+        }
+    }
+}
+
 /// The bound of a plane alone, in both planes at once.
 #[test]
 fn without_sharing_a_motor_is_asked_for_more_than_it_has() {
