@@ -57,16 +57,20 @@ impl TimeSeries {
 
     fn take_rows(&mut self, text: &[u8], names: [&str; 2]) -> Result<(), ScenarioError> {
         // Spreadsheets of countries with decimal commas write semicolons.
-        let header = text.split(|byte| *byte == b'\n');
-        let mut header = header.filter(|line| !line.starts_with(b"#"));
-        let semicolons = header.next().is_some_and(|line| line.contains(&b';'));
+        let names_of_columns = text.split(|byte| *byte == b'\n');
+        let mut names_of_columns = names_of_columns.filter(|line| !line.starts_with(b"#"));
+        let semicolons = names_of_columns
+            .next()
+            .is_some_and(|line| line.contains(&b';'));
         let mut reader = csv::ReaderBuilder::new()
             .delimiter(if semicolons { b';' } else { b',' })
             .trim(csv::Trim::All)
             .comment(Some(b'#'))
             .from_reader(text);
+        let mut lines = Lines::of(text);
+        let header = Some(lines.of_record(None));
         let headers = reader.headers();
-        let headers = headers.map_err(|error| self.problem(Some(1), error.to_string()))?;
+        let headers = headers.map_err(|error| self.problem(header, error.to_string()))?;
         let column = |name: &str| {
             let mut places = (0..headers.len()).filter(|i| &headers[*i] == name);
             let place = places.next();
@@ -76,21 +80,21 @@ impl TimeSeries {
                     first + 1,
                     second + 1
                 );
-                return Err(self.problem(Some(1), problem));
+                return Err(self.problem(header, problem));
             }
             place.ok_or_else(|| {
                 let present = headers.iter().collect::<Vec<_>>().join(", ");
                 let problem = format!("there is no column `{name}`; the columns are: {present}");
-                self.problem(Some(1), problem)
+                self.problem(header, problem)
             })
         };
         let places = [column(names[0])?, column(names[1])?];
         for record in reader.records() {
             let record = record.map_err(|error| {
-                let line = error.position().map(csv::Position::line);
-                self.problem(line, error.to_string())
+                let line = lines.of_record(error.position());
+                self.problem(Some(line), error.to_string())
             })?;
-            let line = record.position().map(csv::Position::line);
+            let line = Some(lines.of_record(record.position()));
             let number = |i: usize| {
                 let (name, text) = (names[i], record.get(places[i]).unwrap_or(""));
                 match text.parse::<f64>() {
@@ -166,5 +170,40 @@ impl TimeSeries {
             return Err(self.problem(self.lines.last().copied().flatten(), problem));
         }
         Ok(())
+    }
+}
+
+/// The lines of a file. Those that the reader counts are behind by the ends of CRLF lines, and by
+/// comments.
+struct Lines<'a> {
+    rest: &'a [u8],
+    /// Bytes before the rest, and the number of its first line.
+    bytes: usize,
+    line: u64,
+}
+
+impl<'a> Lines<'a> {
+    fn of(text: &'a [u8]) -> Self {
+        Self {
+            rest: text,
+            bytes: 0,
+            line: 1,
+        }
+    }
+
+    /// The line of the first record from a position on, the begin of the file without one. To be asked
+    /// in order.
+    fn of_record(&mut self, from: Option<&csv::Position>) -> u64 {
+        let from = from.map_or(0, |position| position.byte() as usize);
+        while let Some(end) = self.rest.iter().position(|byte| *byte == b'\n') {
+            let (line, rest) = self.rest.split_at(end + 1);
+            let is_record = !line.starts_with(b"#") && !line.trim_ascii_end().is_empty();
+            if is_record && from <= self.bytes {
+                break;
+            }
+            (self.rest, self.bytes) = (rest, self.bytes + line.len());
+            self.line += 1;
+        }
+        self.line
     }
 }

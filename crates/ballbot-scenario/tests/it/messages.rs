@@ -403,6 +403,23 @@ fn reference_files() {
         "t_s,phi_ref_rad\n0,0\n1,2\n0.5,1\n4,8\n",
         &["line 4", "increase"],
     );
+    // Lines are counted as an editor counts them, whatever ends them and whatever is between them.
+    let bad = rows(grid(40)).replace(",0.4\n", ",up\n");
+    refused("text crlf", &bad.replace('\n', "\r\n"), &["line 4", "`up`"]);
+    let remarks = format!("# one\n# two\n{}", bad.replace("0.1,", "# three\n\n0.1,"));
+    refused("remarks", &remarks, &["line 8", "`up`"]);
+    refused(
+        "remarks crlf",
+        &remarks.replace('\n', "\r\n"),
+        &["line 8", "`up`"],
+    );
+    let column = format!(
+        "# one\n# two\n{}",
+        rows(grid(40)).replace("phi_ref_rad", "phi")
+    );
+    refused("column below", &column, &["line 3", "no column"]);
+    let ragged = rows(grid(40)).replace(",0.4\n", "\n").replace('\n', "\r\n");
+    refused("ragged crlf", &ragged, &["line 4"]);
     with_reference("semicolons", &rows(grid(40)).replace(',', ";")).expect("accepted");
     refused(
         "decimal commas",
