@@ -39,6 +39,9 @@ pub enum CommandError {
     /// Options that do not go together.
     #[error("{0}")]
     Usage(String),
+    /// What stands in a folder, or the room on the disk, does not allow it.
+    #[error("{0}")]
+    Impossible(String),
     /// A file that was handed in.
     #[error(transparent)]
     Input(#[from] InputError),

@@ -46,7 +46,7 @@ pub(super) fn all(
     let file = RowFile::open(rows.parquet.temporary())?;
     let summary = Summary::of(campaign, &file)?;
     if summary.refused == summary.runs {
-        return Err(CommandError::Usage(
+        return Err(CommandError::Impossible(
             "all runs were refused by the scenario: `refused = \"stop\"` says why".to_owned(),
         ));
     }

@@ -53,7 +53,7 @@ pub(super) fn check(
         gigabytes(free)
     );
     if needed > free / 10 * 9 {
-        return Err(CommandError::Usage(format!(
+        return Err(CommandError::Impossible(format!(
             "{said}; fewer runs, fewer measures (`measure`), or another folder (--out)"
         )));
     }

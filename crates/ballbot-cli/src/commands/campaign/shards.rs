@@ -70,7 +70,7 @@ impl Plan {
         let text = words::read_text(&path).map_err(FileError::at(&path))?;
         let plan = serde_json::from_str(&text);
         plan.map(Some).map_err(|error| {
-            CommandError::Usage(format!("{} is no plan of shards: {error}", path.display()))
+            CommandError::Impossible(format!("{} is no plan of shards: {error}", path.display()))
         })
     }
 
@@ -108,7 +108,7 @@ impl Plan {
         } else {
             return Ok(());
         };
-        Err(CommandError::Usage(format!(
+        Err(CommandError::Impossible(format!(
             "the shards in {} {differs}; remove that folder or choose another one with --out",
             folder(out).display()
         )))

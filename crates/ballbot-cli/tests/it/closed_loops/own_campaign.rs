@@ -129,7 +129,7 @@ fn shards_are_merged_and_resumed() {
         &["0 to 9, 20 to 29"],
     );
     assert_says(
-        &fail(here, &with(&["--shard", "1/4"]), 2),
+        &fail(here, &with(&["--shard", "1/4"]), 1),
         &["3 in number, not 4", "--out"],
     );
     assert_eq!(
@@ -177,8 +177,13 @@ fn shards_are_merged_and_resumed() {
     )
     .unwrap();
     assert_says(
-        &fail(here, &["campaign", "merge", "parts"], 2),
+        &fail(here, &["campaign", "merge", "parts"], 1),
         &["changed since"],
+    );
+    fs::write(here.join("parts/shards/plan.json"), "{").unwrap();
+    assert_says(
+        &fail(here, &["campaign", "merge", "parts"], 1),
+        &["plan.json is no plan of shards"],
     );
 }
 
@@ -346,7 +351,7 @@ fn what_does_not_go_is_refused() {
     )
     .unwrap();
     assert_says(
-        &fail(here, &["campaign", "mine.toml", "--yes"], 2),
+        &fail(here, &["campaign", "mine.toml", "--yes"], 1),
         &["1000000000000 rows need", "GB"],
     );
     fs::write(
