@@ -99,6 +99,11 @@ impl Measure {
         matches!(self, Self::MeanStepUs | Self::LongestStepUs)
     }
 
+    /// Whether an empty cell of a run that came to its end says that the time never comes.
+    pub(crate) fn may_never_come(self) -> bool {
+        matches!(self, Self::SettlingS)
+    }
+
     /// What its column holds.
     pub fn kind(self) -> Kind {
         match self {

@@ -40,7 +40,7 @@ pub struct Summary {
     pub sensitivities: Vec<Sensitivity>,
 }
 
-/// A measure over many runs.
+/// A measure over many runs; what never comes in a run is infinite, `null` in JSON.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MeasureSummary {
     /// Its name.
@@ -86,13 +86,20 @@ impl Summary {
         let runs = results.rows();
         let mut measures = Vec::new();
         for measure in campaign.measures() {
-            let mut values = Vec::new();
+            let (mut values, mut empty) = (Vec::new(), 0);
             let mut complete = complete.iter();
             results.for_each_cell(measure.name(), |cell| {
                 if complete.next() == Some(&true) {
-                    values.extend(cell.number());
+                    let number = cell.number();
+                    empty += usize::from(number.is_none());
+                    values.extend(number);
                 }
             })?;
+            // Where none has a value, it has no meaning for the scenario. Otherwise a run that is left out
+            // for its bad end would make the others' numbers better than those of all.
+            if measure.may_never_come() && !values.is_empty() {
+                values.extend(std::iter::repeat_n(f64::INFINITY, empty));
+            }
             values.sort_unstable_by(f64::total_cmp);
             measures.extend(MeasureSummary::new(measure.name(), &values, confidence));
         }

@@ -182,6 +182,33 @@ fn a_run_is_settled_when_it_stays_within_2_percent() {
     });
 }
 
+/// They used to be left out, so that the worst runs made the quantiles better.
+#[test]
+fn a_run_that_never_settles_takes_longer_than_all_others() {
+    // Of three runs two end before they have settled.
+    let text = "title = \"x\"\nscenario = \"single-setpoint\"\n\
+        [[vary]]\nkey = \"duration_s\"\ngrid = [4.0, 0.2, 0.1]\n";
+    with(text, |campaign| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("runs.parquet");
+        write_whole(campaign, &path);
+        let cells = column(campaign, &rows(campaign), "settling_s");
+        assert_eq!(&cells[1..], [Cell::Missing, Cell::Missing]);
+        let file = ballbot_campaign::RowFile::open(&path).unwrap();
+        let summary = Summary::of(campaign, &file).unwrap();
+        assert_eq!(summary.complete, 3);
+        let mut measures = summary.measures.iter();
+        let settling = measures.find(|one| one.measure == "settling_s").unwrap();
+        assert_eq!(Some(settling.quantile_5), cells[0].number());
+        let never = [
+            settling.median.value,
+            settling.quantile_95,
+            settling.largest,
+        ];
+        assert_eq!(never, [f64::INFINITY; 3]);
+    });
+}
+
 /// What cannot be is counted apart, where that is asked for.
 #[test]
 fn draws_that_make_no_scenario_are_counted_apart() {

@@ -70,6 +70,9 @@ fn written(results: &ResultFolder) -> String {
     format!("written to {}\n", results.path().display())
 }
 
+/// A time that does not come.
+const NEVER: &str = "never";
+
 /// A number with its interval.
 fn with_interval(interval: &Interval, decimals: usize) -> String {
     let Interval {
@@ -77,7 +80,11 @@ fn with_interval(interval: &Interval, decimals: usize) -> String {
         lower,
         upper,
     } = interval;
-    format!("{value:.decimals$} [{lower:.decimals$}, {upper:.decimals$}]")
+    let [value, lower, upper] = [value, lower, upper].map(|number| match number.is_finite() {
+        true => format!("{number:.decimals$}"),
+        false => NEVER.to_owned(),
+    });
+    format!("{value} [{lower}, {upper}]")
 }
 
 fn text(campaign: &Own<'_>, summary: &Summary, known: bool) -> String {
@@ -117,8 +124,11 @@ fn text(campaign: &Own<'_>, summary: &Summary, known: bool) -> String {
         let interval = format!("median [bootstrap, {} %]", 100.0 * summary.confidence);
         let mut table = Table::new(["complete runs", &interval, "5 %", "95 %", "largest"]);
         for row in &summary.measures {
-            let [low, high, most] =
-                [row.quantile_5, row.quantile_95, row.largest].map(number::text);
+            let numbers = [row.quantile_5, row.quantile_95, row.largest];
+            let [low, high, most] = numbers.map(|number| match number.is_finite() {
+                true => number::text(number),
+                false => NEVER.to_owned(),
+            });
             table.row([
                 row.measure.to_owned(),
                 with_interval(&row.median, 4),
