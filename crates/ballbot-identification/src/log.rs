@@ -14,6 +14,7 @@ pub use channel::Channel;
 pub use columns::{BallAngle, Columns, SecondPlane, Unit, WheelEncoders, WheelPlane};
 pub use error::{LogError, Problem, Suspicion};
 pub use finding::Finding;
+use run::median;
 pub use run::{Run, Torque};
 pub(crate) use run::{TorqueReader, quantile};
 
@@ -39,29 +40,36 @@ pub struct Recording {
 }
 
 /// How far the three encoders of `[log.wheels]` have turned from the beginning of a log to its end,
-/// rad after their factors: medians of the first and the last tenth of the rows.
+/// rad after their factors: medians of the first and the last tenth of the values.
 ///
 /// # Errors
-/// [`LogError`]: the file cannot be read or understood, or nothing was turned.
+/// [`LogError`]: the file cannot be read or understood, most of a column is missing, or
+/// nothing was turned.
 pub fn turned(path: &Path, columns: &Columns) -> Result<[f64; 3], LogError> {
     let located = |problem| LogError::at(path, problem);
     let rows = table::encoders(path, columns).map_err(located)?;
-    let end = (rows.len() / 10).max(1).min(rows.len());
-    let median = |rows: &[[f64; 3]], wheel: usize| {
+    let mut turned = [0.0; 3];
+    let wheels = columns.wheels.iter().flat_map(|wheels| &wheels.encoders);
+    for (wheel, (turned, source)) in turned.iter_mut().zip(wheels).enumerate() {
         let angles = rows.iter().map(|row| row[wheel]);
         let mut angles: Vec<f64> = angles.filter(|angle| angle.is_finite()).collect();
-        match angles.is_empty() {
-            true => f64::NAN,
-            false => quantile(&mut angles, 0.5),
+        let missing = rows.len() - angles.len();
+        if missing >= angles.len() {
+            return Err(located(Problem::MostlyMissing {
+                column: source.column.clone(),
+                missing,
+                rows: rows.len(),
+            }));
         }
-    };
-    let (first, last) = (&rows[..end], &rows[rows.len() - end..]);
-    let turned = [0, 1, 2].map(|wheel| median(last, wheel) - median(first, wheel));
+        let end = (angles.len() / 10).max(1);
+        let last = angles.len() - end;
+        *turned = median(&mut angles[last..]) - median(&mut angles[..end]);
+    }
     let ball_deg = turned
         .iter()
         .fold(0.0_f64, |most, angle| most.max(angle.abs()))
         .to_degrees();
-    if ball_deg > LEAST_PUSH_DEG && turned.iter().all(|angle| angle.is_finite()) {
+    if ball_deg > LEAST_PUSH_DEG {
         Ok(turned)
     } else {
         Err(located(Problem::NoPush { ball_deg }))

@@ -125,6 +125,28 @@ fn mixed_up_encoders_and_senses_are_told() {
     assert!(!said.contains(" or "), "{said}");
 }
 
+/// The others were said not to have turned.
+#[test]
+fn a_column_without_values_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let [x, y, turn] = logs(folder.path(), STANDING, [0, 1, 2]);
+    let text = std::fs::read_to_string(&x).unwrap();
+    let rows = text.lines().enumerate().map(|(row, line)| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if row > 0 {
+            cells[2] = "";
+        }
+        cells.join(",") + "\n"
+    });
+    std::fs::write(&x, rows.collect::<String>()).unwrap();
+    let config = config(folder.path(), [0.0, 120.0, -120.0], [false, true, false]);
+    let said = fails(&command(&config, &[x, y, turn], false));
+    assert_says(
+        &said,
+        &["along-x.csv", "`m2` has no value in 200 of 200 rows"],
+    );
+}
+
 /// It was taken for a wheel that stands elsewhere.
 #[test]
 fn an_encoder_that_hardly_moves_is_told_first() {
