@@ -260,7 +260,8 @@ def excite(
     config
         A configuration of `identify`: lengths, noise, priors.
     parameters
-        The path of a parameter file of `IdentifiedRobot.save`: what is known of the robot.
+        The path of a parameter file of `IdentifiedRobot.save`: what is known of the robot, its lengths too.
+        A configuration of other lengths is refused.
     band
         Lowest and highest frequency, Hz.
     harmonics
