@@ -54,8 +54,9 @@ fn run(
     let mut sample = BEGUN.load(Ordering::Acquire);
     let mut without_plan = 0;
     loop {
+        // Not `wfi`: a period that begins between the two would be slept through, `wfe` wakes up from the past, too.
         while BEGUN.load(Ordering::Acquire) == sample {
-            cortex_m::asm::wfi();
+            cortex_m::asm::wfe();
         }
         sample = sample.wrapping_add(1);
         let mut torques = Vector3::zeros();

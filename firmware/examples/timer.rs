@@ -48,8 +48,9 @@ fn run(board: &mut impl Board, regulator: &mut RobotRegulator, per_decision: u32
     let mut period = BEGUN.load(Ordering::Acquire);
     let (mut to_decision, mut without_plan) = (0, 0);
     loop {
+        // Not `wfi`: a period that begins between the two would be slept through, `wfe` wakes up from the past, too.
         while BEGUN.load(Ordering::Acquire) == period {
-            cortex_m::asm::wfi();
+            cortex_m::asm::wfe();
         }
         period = period.wrapping_add(1);
         regulator.observe(&board.measurement());

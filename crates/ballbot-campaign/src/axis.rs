@@ -49,6 +49,11 @@ impl Axis {
         self.input.distribution.unit(value)
     }
 
+    /// Whether its values are multiples of a step.
+    pub fn has_step(&self) -> bool {
+        self.input.round_to.is_some()
+    }
+
     /// Whether equal steps are equal ratios.
     pub fn is_logarithmic(&self) -> bool {
         matches!(self.input.distribution, Distribution::LogUniform { .. })

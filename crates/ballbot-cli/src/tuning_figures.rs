@@ -26,6 +26,8 @@ const LINES: usize = 40;
 const FRONT_LINES: usize = 12;
 /// Least distance of markers on the front, as a share of the view: closer ones hide each other.
 const APART: f64 = 0.02;
+/// Goals below this are zero in a figure.
+const SMALLEST: f64 = 1e-200;
 const START: Role = Role::Linear;
 const CHOSEN: Role = Role::RungeKutta;
 const FRONT: Role = Role::Lpv;
@@ -103,7 +105,10 @@ impl Drawn<'_> {
                 .filter(|value| value.is_finite());
             let ends = |(low, high): (f64, f64), value: f64| (low.min(value), high.max(value));
             let (low, high) = shown.fold((f64::INFINITY, 0.0_f64), ends);
-            let margin = (0.1 * (high - low)).max(0.05 * high).max(f64::MIN_POSITIVE);
+            if high < SMALLEST {
+                return (0.0, 1.0);
+            }
+            let margin = (0.1 * (high - low)).max(0.05 * high);
             ((low - margin).max(0.0), high + margin)
         };
         let (x_range, y_range) = (range(x), range(y));

@@ -200,11 +200,14 @@ fn name(values: &[serde_json::Value]) -> String {
     values.iter().map(|value| format!("{value}\n")).collect()
 }
 
-/// A number as a person would write it: four digits, if these are allowed, too.
+/// A number as a person would write it: a multiple of its step, or four digits, if these are allowed, too.
 fn readable(axis: &Axis, value: Value) -> Value {
     let Value::Float(number) = value else {
         return value;
     };
+    if axis.has_step() {
+        return value;
+    }
     let short = format!("{number:.3e}").parse().unwrap_or(number);
     match axis.unit(&Value::Float(short)) {
         Some(_) => Value::Float(short),

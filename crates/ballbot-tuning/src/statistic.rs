@@ -20,7 +20,10 @@ impl Statistic {
             }
             Self::Median => at(of / 2),
             Self::Worst => at(of.saturating_sub(1)),
-            Self::Quantile(share) => at(((share * of as f64).ceil() as usize).saturating_sub(1)),
+            // Of 100 values 0.55 is the 55th, though 0.55 * 100 is above 55 in floating point.
+            Self::Quantile(share) => {
+                at(((share * of as f64 - 1e-9).ceil() as usize).saturating_sub(1))
+            }
         }
     }
 }
@@ -39,6 +42,10 @@ mod tests {
         assert_eq!(of(Statistic::Worst), 10.0);
         // 0.9 * 10 is above 9 in floating point on no machine.
         assert_eq!(of(Statistic::Quantile(0.9)), 9.0);
+        // 0.55 * 100 and 0.28 * 25 are above whole numbers.
+        let ranks: Vec<f64> = (1..=100).map(f64::from).collect();
+        assert_eq!(Statistic::Quantile(0.55).at_least(&ranks, 100), 55.0);
+        assert_eq!(Statistic::Quantile(0.28).at_least(&ranks[..25], 25), 7.0);
         assert_eq!(Statistic::Median.at_least(&values[..9], 9), 5.0);
         let failed = [1.0, 0.0, 0.0, 1.0];
         assert_eq!(Statistic::FailureShare.at_least(&failed, 4), 0.5);

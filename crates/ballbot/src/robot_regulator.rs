@@ -192,7 +192,12 @@ impl<T: Scalar + Number, K: Planner<T, 4, 1>> Regulator<T, 10, 3, 10> for RobotR
         let MotorLimits { motor, yaw } = self.limits;
         let target = x_ref.fixed_rows::<2>(HEADING).into_owned();
         let wanted = self.yaw.torque(&self.heading, &target);
-        self.torques[2] = wanted.max(-yaw).min(yaw);
+        let turns = wanted.is_finite();
+        self.torques[2] = if turns {
+            wanted.max(-yaw).min(yaw)
+        } else {
+            T::zero()
+        };
         let left = self.wheels.plane_torques(motor, self.torques[2]);
         let [x, y] = self.largest_torques();
         let [x_share, y_share] = self.shares;
@@ -216,13 +221,16 @@ impl<T: Scalar + Number, K: Planner<T, 4, 1>> Regulator<T, 10, 3, 10> for RobotR
         }
         (estimate[HEADING], estimate[HEADING + 1]) = (self.heading[0], self.heading[1]);
         let worse = |a: Status<T>, b: Status<T>| if a.is_solved() { b } else { a };
+        let of_yaw = if turns {
+            Status::Solved
+        } else {
+            Status::NotFinite
+        };
         Command {
             u: self.motor_torques(),
             estimate,
             x_ref,
-            status: commands()
-                .map(|command| command.status)
-                .fold(Status::Solved, worse),
+            status: commands().map(|command| command.status).fold(of_yaw, worse),
             active_bounds: commands().map(|command| command.active_bounds).sum(),
             gap,
             guarantee: commands().find_map(|command| command.guarantee),

@@ -2,7 +2,7 @@
 
 use ballbot::{AnyPlanner, HEADING, PlanePlanner, RobotRegulator, RobotState, plane_feedback};
 use ballbot_scenario::{MotorsTable, Prepared, Record, RunHooks, Scenario, StateTable, WorldTable};
-use lpvmpc::{Measurement, Reading, Regulator};
+use lpvmpc::{Measurement, Reading, Regulator, Status};
 use lpvmpc_sim::Termination;
 use std::path::Path;
 
@@ -36,22 +36,43 @@ fn largest_motor(record: &Record) -> f64 {
     torques.fold(0.0, f64::max)
 }
 
-/// A robot's regulator says what it decided for, and one that takes its place in mid-run goes on to
-/// the last bit.
-#[test]
-fn a_robot_s_regulator_tells_its_state_and_takes_over() {
-    let prepared = example().prepare(Path::new(".")).expect("valid");
+fn regulator(prepared: &Prepared) -> RobotRegulator<f64, AnyPlanner<f64>> {
     let motors = prepared.motors.expect("given");
     let plane = || {
         let planner = PlanePlanner::Held(prepared.settings);
         let (u, t_s) = (prepared.settings.u, prepared.settings.t_s);
         plane_feedback(&prepared.ballbot, &planner, &prepared.feedback, &u, t_s).expect("valid")
     };
-    let new = || {
-        let (law, heading) = (motors.turning.law, motors.turning.initial);
-        let planes = [plane(), plane()];
-        RobotRegulator::new(planes, (), prepared.wheels, motors.limits, law, heading)
-    };
+    let (law, heading) = (motors.turning.law, motors.turning.initial);
+    let planes = [plane(), plane()];
+    RobotRegulator::new(planes, (), prepared.wheels, motors.limits, law, heading)
+}
+
+/// Without a heading to turn to there is no yaw torque, and the status says so; it was all that is kept for yaw.
+#[test]
+fn a_wanted_heading_that_is_no_number_turns_nothing() {
+    let prepared = example().prepare(Path::new(".")).expect("valid");
+    let mut regulator = regulator(&prepared);
+    let readings = [Some(Reading::fresh(0.0)); 10];
+    regulator.observe(&Measurement { t: 0.0, readings });
+    let upright = regulator.decide(&|_| RobotState::zeros());
+    assert!(upright.status.is_solved() && upright.u.amax() < 1e-9);
+    let command = regulator.decide(&|_| {
+        let mut state = RobotState::zeros();
+        state[HEADING] = f64::NAN;
+        state
+    });
+    assert_eq!(command.status, Status::NotFinite);
+    assert!(command.u.amax() < 1e-9, "{}", command.u);
+}
+
+/// A robot's regulator says what it decided for, and one that takes its place in mid-run goes on to
+/// the last bit.
+#[test]
+fn a_robot_s_regulator_tells_its_state_and_takes_over() {
+    let prepared = example().prepare(Path::new(".")).expect("valid");
+    let motors = prepared.motors.expect("given");
+    let new = || regulator(&prepared);
     let state =
         |k: usize| RobotState::from_fn(|i, _| 0.02 * ((1 + i) as f64 * 0.3 * k as f64).sin());
     let reference = |t: f64| {

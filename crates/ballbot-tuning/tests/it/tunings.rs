@@ -251,3 +251,34 @@ fn without_anything_random_there_is_nothing_to_hold_out() {
         assert_eq!(tuning.start()[0], Value::Integer(20));
     });
 }
+
+/// Four digits of a multiple of a step are none as a rule: 32.375 became 32.38.
+#[test]
+fn values_with_a_step_are_multiples_of_it() {
+    let (free, step) = (
+        "log_uniform = [20.0, 2000.0]",
+        "uniform = [20.0, 60.0], round_to = 0.125",
+    );
+    assert!(TWO_GOALS.contains(free));
+    let text = TWO_GOALS.replace(free, step);
+    with(
+        &text.replace("evaluations = 60", "evaluations = 16"),
+        |tuning| {
+            let (found, _) = search(tuning, "").unwrap();
+            let values = found.candidates.iter().skip(1);
+            let values: Vec<f64> = values
+                .map(|candidate| tuning.values(candidate)[1].as_float().unwrap())
+                .collect();
+            assert!(
+                values.iter().all(|value| (value / 0.125).fract() == 0.0),
+                "{values:?}"
+            );
+            assert!(
+                values
+                    .iter()
+                    .any(|value| (value / 0.125) % 8.0 % 2.0 == 1.0),
+                "{values:?}"
+            );
+        },
+    );
+}

@@ -168,3 +168,19 @@ fn the_example_is_a_tuning() {
         &["no candidate keeps all limits", "largest_tilt_rad"],
     );
 }
+
+/// A goal that is zero for all candidates leaves the figure's axis no extent; then there was no result at all.
+#[test]
+fn a_goal_that_is_zero_everywhere_has_a_result() {
+    let folder = folder();
+    let here = folder.path();
+    let tuning = edited(
+        TUNING,
+        "measure = \"largest_tilt_rad\"\nstatistic = \"worst\"",
+        "statistic = \"failure_share\"",
+    );
+    let tuning = edited(&tuning, "evaluations = 40", "evaluations = 12");
+    fs::write(here.join("tuning.toml"), tuning).unwrap();
+    succeed(here, &["tune", "tuning.toml", "--out", "out"]);
+    assert_eq!(files(&here.join("out")), ALL);
+}
