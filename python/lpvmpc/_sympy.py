@@ -69,9 +69,11 @@ def _place(sp: Any, tape: Tape, known: dict[Any, int], expression: Any) -> int:
     if expression.is_Add:
         return tape.sum([of(part) for part in arguments])
     if expression.is_Mul:
-        return _product(sp, tape, of, expression)
+        return _product(sp, tape, of, arguments)
     if expression.is_Pow:
         return _power(sp, tape, of, *arguments)
+    if isinstance(expression, sp.logic.boolalg.Boolean):
+        return _condition(tape, of, expression)
     name = type(expression).__name__
     if name in _ALIKE:
         return tape.add(name, of(arguments[0]))
@@ -85,25 +87,26 @@ def _place(sp: Any, tape: Tape, known: dict[Any, int], expression: Any) -> int:
             place = tape.add(name.lower(), place, of(part))
         return place
     if name == "Piecewise":
-        return _piecewise(sp, tape, of, arguments)
+        return _piecewise(tape, of, arguments)
     raise PlantError(
         f"formulas: {name} in {expression} has no counterpart here; there are sums, products, "
         f"powers, {', '.join(_ALIKE)}, abs, atan2, Min, Max and Piecewise"
     )
 
 
-def _product(sp: Any, tape: Tape, of: Any, expression: Any) -> int:
-    numerator, denominator = expression.as_numer_denom()
-    if denominator != 1 and not denominator.is_number:
-        return tape.add("div", of(numerator), of(denominator))
-    coefficient, rest = expression.as_coeff_Mul()
-    if coefficient == -1:
-        return tape.add("neg", of(rest))
-    factors: list[int] = [of(part) for part in expression.args]
-    place = factors[0]
-    for factor in factors[1:]:
-        place = tape.add("mul", place, factor)
-    return place
+def _product(sp: Any, tape: Tape, of: Any, factors: Any) -> int:
+    """Divides by what is a power with a negative exponent, and by nothing else: in SymPy's own fraction v exp(-v**2) is
+    v / exp(v**2), and a sum has a common denominator, which overflow where the formula does not."""
+    above, below = [], []
+    for factor in factors:
+        if factor.is_Pow and factor.exp.is_number and factor.exp.is_negative:
+            below.append(of(sp.Pow(factor.base, -factor.exp)))
+        elif factor != -1:
+            above.append(of(factor))
+    place = tape.product(above)
+    if -1 in factors:
+        place = tape.add("neg", place)
+    return tape.add("div", place, tape.product(below)) if below else place
 
 
 def _power(sp: Any, tape: Tape, of: Any, base: Any, exponent: Any) -> int:
@@ -118,14 +121,14 @@ def _power(sp: Any, tape: Tape, of: Any, base: Any, exponent: Any) -> int:
     return tape.add("pow", of(base), of(exponent))
 
 
-def _piecewise(sp: Any, tape: Tape, of: Any, pieces: Any) -> int:
+def _piecewise(tape: Tape, of: Any, pieces: Any) -> int:
     """The sum of the pieces, each where its condition is the first that holds."""
     terms, none_before = [], None
     for value, condition in pieces:  # of which the last is `True`
         if condition == True:  # noqa: E712  (SymPy's own truth)
             here = none_before
         else:
-            holds = _condition(sp, tape, of, condition)
+            holds = of(condition)
             here = holds if none_before is None else tape.add("mul", none_before, holds)
             fails = tape.add("eq", holds, tape.constant(0.0))
             none_before = fails if none_before is None else tape.add("mul", none_before, fails)
@@ -134,24 +137,23 @@ def _piecewise(sp: Any, tape: Tape, of: Any, pieces: Any) -> int:
     return tape.sum(terms)
 
 
-def _condition(sp: Any, tape: Tape, of: Any, condition: Any) -> int:
+def _condition(tape: Tape, of: Any, condition: Any) -> int:
     name = type(condition).__name__
     comparisons = {
         "StrictLessThan": ("lt", False), "LessThan": ("le", False),
         "StrictGreaterThan": ("lt", True), "GreaterThan": ("le", True), "Equality": ("eq", False),
     }  # fmt: skip
+    parts: list[int] = [of(part) for part in condition.args]
     if name in comparisons:
         operation, turned = comparisons[name]
-        left, right = (of(part) for part in condition.args)
-        return tape.add(operation, right, left) if turned else tape.add(operation, left, right)
+        return tape.add(operation, *(reversed(parts) if turned else parts))
     if name in ("And", "Or"):
-        parts = [_condition(sp, tape, of, part) for part in condition.args]
         place = parts[0]
         for part in parts[1:]:
             place = tape.add("mul" if name == "And" else "max", place, part)
         return place
     if name == "Not":
-        return tape.add("eq", _condition(sp, tape, of, condition.args[0]), tape.constant(0.0))
+        return tape.add("eq", parts[0], tape.constant(0.0))
     raise PlantError(f"formulas: the condition {condition} has no counterpart here")
 
 

@@ -44,6 +44,15 @@ class Tape:
             total = self.add("add", total, term)
         return total
 
+    def product(self, factors: list[int]) -> int:
+        """The place of a product; of 1 without factors."""
+        if not factors:
+            return self.constant(1.0)
+        whole = factors[0]
+        for factor in factors[1:]:
+            whole = self.add("mul", whole, factor)
+        return whole
+
     def affine(self, a: Array, b: Array, rest: Array) -> list[int]:
         """The places of the rows of a x + b u + rest."""
         places = []

@@ -15,6 +15,9 @@ from lpvmpc._files import save
 from plants import cart_pole, cart_pole_formulas
 
 
+A_X, A_U, M = sp.symbols("a_x a_u m")
+
+
 def points(n, m, count=30):
     rng = np.random.default_rng(5)
     return [(rng.uniform(-2, 2, n), rng.uniform(-3, 3, m)) for _ in range(count)]
@@ -158,6 +161,35 @@ def test_of_sympy():
         lpvmpc.Plant.from_sympy([a, b], [v], f, parameters={g: 9.81})
 
 
+@pytest.mark.parametrize(
+    ("formula", "at", "value"),
+    [
+        # The exponential is 0, and the one in the common denominator was infinite.
+        (A_U - A_X * (1 + 0.5 * sp.exp(-((A_X / 0.01) ** 2))), 0.3, -0.3),
+        (A_U + 2 / (1 + sp.exp(-100 * A_X)), 8.0, 2.0),
+        (-3 * A_X / (2 * sp.sqrt(A_X) * (A_X - 2) ** 2), 4.0, -0.75),
+        (-1 / (A_X * (A_X + 1)), 1.0, -0.5),
+    ],
+)
+def test_fractions_of_sympy_stay_as_they_are_written(formula, at, value):
+    """They were NaN where the numerator and the denominator that SymPy makes of them are both infinite."""
+    assert lpvmpc.Plant.from_sympy([A_X], [A_U], [formula]).f([at], [0.0])[0] == pytest.approx(value, rel=1e-15)
+
+
+def test_conditions_of_sympy_may_occur_twice():
+    """What SymPy has in place of the second one had no counterpart."""
+    both = sp.And(A_X > 0, A_U < 1)
+    f = [
+        sp.Piecewise((A_X, A_X > 0), (0, True)) * A_U + sp.Piecewise((1, A_X > 0), (2, True)),
+        sp.Piecewise((A_U, both), (A_X, True)) - sp.Piecewise((3, both), (4, A_X <= 0), (5, sp.Or(A_X > 0, both)), (6, True)),
+    ]  # fmt: skip
+    plant = lpvmpc.Plant.from_sympy([A_X, M], [A_U], f)
+    for (x, m), (u,) in points(2, 1):
+        first = (x * u if x > 0 else 0) + (1 if x > 0 else 2)
+        second = (u - 3 if u < 1 else x - 5) if x > 0 else x - 4
+        assert plant.f([x, m], [u]).tolist() == pytest.approx([first, second], rel=1e-15)
+
+
 def test_of_matrices():
     rng = np.random.default_rng(1)
     a, b, c, d = (rng.normal(size=shape) for shape in ((3, 3), (3, 2), (2, 3), (2, 2)))
@@ -227,7 +259,6 @@ def test_what_a_plant_says_of_itself():
 
 X, U = ca.SX.sym("x", 2), ca.SX.sym("u")
 F = ca.vertcat(X[1], U)
-A_X, A_U, M = sp.symbols("a_x a_u m")
 
 
 def pieces(*given):
