@@ -194,15 +194,15 @@ def copied(given: Any) -> Any:
     return given
 
 
-def equally_long(one: Array, other: Array) -> tuple[Array, Array]:
-    """Two lists by stage, the last entry of the shorter one repeated."""
-    stages = max(len(one), len(other))
+def equally_long(*lists: Array) -> list[Array]:
+    """Lists by stage, the last entry of the shorter ones repeated."""
+    stages = max(len(one) for one in lists)
 
     def extended(array: Array) -> Array:
         missing = stages - len(array)
         return np.concatenate([array, np.repeat(array[-1:], missing, axis=0)]) if missing else array
 
-    return extended(one), extended(other)
+    return [extended(one) for one in lists]
 
 
 def _short(given: Any) -> str:

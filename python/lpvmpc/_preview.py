@@ -67,11 +67,10 @@ def _models(given: tuple[ArrayLike, ...], n: int, m: int) -> dict[str, Array]:
     """(A, B) or (A, B, c) by stage."""
     if not isinstance(given, (tuple, list)) or len(given) not in (2, 3):
         raise SettingError("matrices: they must be (A, B) or (A, B, c)")
-    a, b = equally_long(
+    parts = [
         matrices_by_stage("matrices, A", given[0], (n, n)),
         matrices_by_stage("matrices, B", given[1], (n, m)),
-    )
-    found = {"a": a, "b": b}
+    ]
     if len(given) == 3:
-        found["c"] = by_stage("matrices, c", given[2], n)
-    return found
+        parts.append(by_stage("matrices, c", given[2], n))
+    return dict(zip("abc", equally_long(*parts)))  # without c, if there is none

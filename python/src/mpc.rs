@@ -244,7 +244,7 @@ impl Known<'_> {
         let matrices = matrices.map(|(stage, (a, b))| StageMatrices {
             a,
             b,
-            affine: affine.get(stage).or(affine.last()).cloned(),
+            affine: affine.get(stage).cloned(),
         });
         Ok(Preview {
             y_ref: rows(self.y_ref.as_ref()),

@@ -551,6 +551,16 @@ def test_matrices_by_stage_take_the_place_of_the_plant():
         mpc.step([1, 0], matrices=(a,))
 
 
+def test_the_longest_of_the_matrices_says_how_many_stages_there_are():
+    """Of a c by stage beside one A and one B only the first was taken."""
+    mpc = lpvmpc.Mpc(double_integrator(), 0.1, 10, [1, 0.1], [0.5])
+    a, b, c = np.array([[1, 0.1], [0, 1]]), np.array([[0.005], [0.1]]), [[0.0, 0.0], [0.0, 0.0], [0.0, -0.3]]
+    plan = mpc.step([1, 0], matrices=(a, b, c))
+    for i in range(10):
+        after = a @ plan.x[i] + b @ plan.u[i] + c[min(i, 2)]
+        np.testing.assert_allclose(plan.x[i + 1], after, atol=1e-12)
+
+
 def test_what_was_given_may_change():
     plant = lpvmpc.Plant.from_matrices([[0, 1], [0, 0]], [[0], [1]], states=["place", "speed"])
     q, bounds = np.array([1.0, 0.1]), {"speed": (-0.5, 0.5)}
