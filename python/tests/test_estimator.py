@@ -74,6 +74,24 @@ def test_a_filter_is_scipys_regulator_dual():
     np.testing.assert_allclose(mpc.estimate.x - predicted, gain, rtol=0.02)
 
 
+def test_the_input_that_was_applied_keeps_its_known_disturbance():
+    """That of the sample was forgotten where `set_last_input` said what was applied, even if it was what was planned."""
+    t_s, push = 0.1, [0.0, 2.0]
+    mpc = lpvmpc.Mpc(
+        double_integrator(), t_s, 20, [1, 0.1], [0.1], u_bounds=([-1], [1]),
+        estimator=lpvmpc.Estimator({"position": 1e-2}, [0, 1e-4], delay=t_s),
+    )  # fmt: skip
+    mpc.observe(0.0, [0.0])
+    plan = mpc.decide([0, 0], disturbance=push)
+    mpc.set_last_input([0.5])
+    mpc.set(r=[0.2])
+    mpc.set_last_input(plan.u0)
+    # Without a reading, what the model makes of it: the input and the push act from 0.1 s on.
+    mpc.observe(0.3, [None])
+    force = plan.u0[0] + push[1]
+    np.testing.assert_allclose(mpc.estimate.x, [force * 0.2**2 / 2, force * 0.2], rtol=1e-9)
+
+
 def test_readings_by_name_and_what_became_of_them():
     mpc = controller(estimator=estimator(gate=lpvmpc.Gate(deviations=4.0, patience=3)))
     assert not mpc.decide([0, 0, 0, 0]).is_solved  # nothing was measured yet

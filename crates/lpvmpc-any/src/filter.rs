@@ -136,7 +136,8 @@ pub(crate) trait AnyFilter: Any + Send + Sync {
     fn disturbance(&self) -> (Vec<f64>, Vec<f64>);
     /// The input `u` was sent, and the disturbance `d` on the states is known to act with it.
     fn send(&mut self, u: &[f64], d: &[f64]);
-    /// The input `u` was sent in place of the last one; before the first one it acts already.
+    /// The input `u` was sent in place of the last one, under the same known disturbance; before the first one it acts
+    /// already.
     fn correct(&mut self, u: &[f64]);
     fn estimate(&self) -> Estimate;
 }
@@ -147,6 +148,8 @@ struct Filter<const NX: usize, const NU: usize, const NS: usize> {
     sizes: (usize, usize),
     estimator: Estimator<Sensed<NX, NU, NS>, f64, NX, NS, NS, NX, NX>,
     line: DelayLine<f64, NS>,
+    /// The disturbance on the states that is known to act with the last input.
+    known: Vec<f64>,
     start: SVector<f64, NX>,
 }
 
@@ -259,6 +262,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Filter<NX, NU, NS> {
             sizes: (n, m),
             estimator,
             line: DelayLine::allocate(commands),
+            known: Vec::new(),
             start,
         })
     }
@@ -272,6 +276,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnyFilter for Filter<NX,
     fn reset(&mut self) {
         self.estimator.begin_at(None, self.start);
         self.line.clear();
+        self.known.clear();
     }
 
     fn take_over(&mut self, previous: &dyn AnyFilter) {
@@ -279,6 +284,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnyFilter for Filter<NX,
         if let Some(previous) = previous.downcast_ref::<Self>() {
             self.estimator.take_over(&previous.estimator);
             self.line.copy_from(&previous.line);
+            self.known.clone_from(&previous.known);
         }
     }
 
@@ -329,10 +335,11 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnyFilter for Filter<NX,
     fn send(&mut self, u: &[f64], d: &[f64]) {
         let sent = joint::<NU, NS>(u, d);
         self.line.command(sent, self.settings.delay);
+        self.known = d.to_vec();
     }
 
     fn correct(&mut self, u: &[f64]) {
-        self.line.correct(joint::<NU, NS>(u, &[]));
+        self.line.correct(joint::<NU, NS>(u, &self.known));
     }
 
     fn estimate(&self) -> Estimate {
