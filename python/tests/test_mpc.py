@@ -251,6 +251,20 @@ def test_bounds_and_inputs_beyond_the_horizon_are_not_read():
     assert (told.u == free.u).all()
 
 
+def test_weights_that_are_symmetric_up_to_rounding_are_taken():
+    """They were refused, those of a step without a word but that of the plan's status."""
+    q = np.array([[1.0, 0.1], [0.1 + 1e-12, 1.0]])
+    even = (q + q.T) / 2
+    mpc, other = (lpvmpc.Mpc(double_integrator(), 0.1, 10, one, [0.5], terminal=5 * one) for one in (q, even))
+    assert mpc.step([1, 0]).u.tolist() == other.step([1, 0]).u.tolist()
+    mpc, other = (lpvmpc.Mpc(double_integrator(), 0.1, 10, [1, 1], [0.5], terminal=even) for _ in range(2))
+    plan = mpc.step([1, 0], q=[np.eye(2), q], r=[0.5])
+    assert plan.is_solved
+    assert plan.u.tolist() == other.step([1, 0], q=[np.eye(2), even], r=[0.5]).u.tolist()
+    with pytest.raises(lpvmpc.SettingError, match=r"terminal cost: P is not symmetric"):
+        mpc.set(terminal=[[1, 0.1], [0.2, 1]])
+
+
 def test_linear_costs_against_the_normal_equations():
     """The condensed problem of a linear plant without bounds, solved densely."""
     q, r, t_s, horizon = np.diag([1.0, 0.1]), 0.1, 0.1, 12
@@ -437,6 +451,9 @@ def make(**changes):
         (lambda: make().step([0] * 4, u_bounds=([1], [0])), "u_bounds, stage 0"),
         (lambda: make().step([0] * 4, parameters=[1.0]), "parameters"),
         (lambda: make().step([0] * 4, disturbance=[np.inf] * 4), "disturbance"),
+        # 2 - 0.4**2 / 0.05 < 0; the plan was "refused", and kept the bounds of the settings instead of the step's.
+        (lambda: make().step([0] * 4, u_bounds=([0.5], [0.8]), cross=[[0.4, 0, 0, 0]]), "cross, stage 0: .* Q - S'R"),
+        (lambda: make().step([0] * 4, cross=[[0.3, 0, 0, 0]], q=[2 * np.eye(4), np.eye(4)], r=R), "cross, stage 1"),
     ],
 )
 def test_what_makes_no_sense_is_refused(call, message):

@@ -126,11 +126,32 @@ impl Names {
         rest: f64,
     ) -> Result<SMatrix<f64, R, C>, MpcError> {
         self.check_matrix(axes, place, entries)?;
-        Ok(SMatrix::from_fn(|i, j| match entries.get((i, j)) {
-            Some(entry) => *entry,
-            None if i == j => rest,
-            None => 0.0,
-        }))
+        Ok(filled(entries, rest))
+    }
+
+    /// A matrix with rows and columns for these, symmetric up to rounding, of which the symmetric part is taken; `rest` as of
+    /// [`Self::matrix`].
+    pub fn symmetric<const K: usize>(
+        &self,
+        axis: Axis,
+        place: &str,
+        symbol: &'static str,
+        entries: &DMatrix<f64>,
+        rest: f64,
+    ) -> Result<SMatrix<f64, K, K>, MpcError> {
+        let entries = self.symmetric_part(axis, place, symbol, entries)?;
+        Ok(filled(&entries, rest))
+    }
+
+    fn symmetric_part(
+        &self,
+        axis: Axis,
+        place: &str,
+        symbol: &'static str,
+        entries: &DMatrix<f64>,
+    ) -> Result<DMatrix<f64>, MpcError> {
+        self.check_matrix((axis, axis), place, entries)?;
+        checked_symmetric(symbol, entries).map_err(|error| MpcError::new(place, error.to_string()))
     }
 
     /// A matrix of finite numbers, with rows and columns for these.
@@ -209,10 +230,9 @@ impl Names {
         symbol: &'static str,
         weight: &DMatrix<f64>,
     ) -> Result<(), MpcError> {
-        self.check_matrix((axis, axis), place, weight)?;
-        let refused = |error: MatrixError| MpcError::new(place, error.to_string());
-        let weight = checked_symmetric(symbol, weight).map_err(refused)?;
-        check_positive_semidefinite(symbol, &weight).map_err(refused)
+        let weight = self.symmetric_part(axis, place, symbol, weight)?;
+        check_positive_semidefinite(symbol, &weight)
+            .map_err(|error| MpcError::new(place, error.to_string()))
     }
 
     /// Q and R.
@@ -222,18 +242,16 @@ impl Names {
         q: &DMatrix<f64>,
         r: &DMatrix<f64>,
     ) -> Result<Weights<f64, NX, NU>, MpcError> {
-        let (states, inputs) = ((Axis::States, Axis::States), (Axis::Inputs, Axis::Inputs));
         let refused = |error: MatrixError| MpcError::new(place, error.to_string());
-        let weights = Weights {
-            q: self.matrix(states, &format!("{place}, q"), q, 0.0)?,
-            // An input that is left over must cost something to be none.
-            r: self.matrix(inputs, &format!("{place}, r"), r, 1.0)?,
-        };
-        let q = checked_symmetric("Q", q).map_err(refused)?;
+        let q = self.symmetric_part(Axis::States, &format!("{place}, q"), "Q", q)?;
+        let r = self.symmetric_part(Axis::Inputs, &format!("{place}, r"), "R", r)?;
         check_positive_semidefinite("Q", &q).map_err(refused)?;
-        let r = checked_symmetric("R", r).map_err(refused)?;
         check_positive_definite("R", &r).map_err(refused)?;
-        Ok(weights)
+        Ok(Weights {
+            q: filled(&q, 0.0),
+            // An input that is left over must cost something to be none.
+            r: filled(&r, 1.0),
+        })
     }
 
     /// Linear rows.
@@ -272,6 +290,15 @@ impl Names {
             soft: row.soft,
         })
     }
+}
+
+/// In the places that were compiled, with `rest` on the diagonal of what is left over.
+fn filled<const R: usize, const C: usize>(entries: &DMatrix<f64>, rest: f64) -> SMatrix<f64, R, C> {
+    SMatrix::from_fn(|i, j| match entries.get((i, j)) {
+        Some(entry) => *entry,
+        None if i == j => rest,
+        None => 0.0,
+    })
 }
 
 /// The price of exceeding a bound of `whose`.

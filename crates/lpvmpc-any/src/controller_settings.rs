@@ -68,8 +68,8 @@ pub(crate) fn controller_settings<const NX: usize, const NU: usize, const NS: us
             TerminalIngredient::Cost(names.matrix(axes, "terminal cost", &set.p, 0.0)?)
         }
         Terminal::Cost(p) => {
-            let axes = (Axis::States, Axis::States);
-            TerminalIngredient::Cost(names.matrix(axes, "terminal cost", p, 0.0)?)
+            let p = names.symmetric(Axis::States, "terminal cost", "P", p, 0.0)?;
+            TerminalIngredient::Cost(p)
         }
         Terminal::Lqr => TerminalIngredient::Cost(cost_to_go(
             plant,
@@ -202,12 +202,8 @@ fn cost_to_go<const NX: usize, const NU: usize, const NS: usize>(
         true => cost.join_last_input(&a_d, &b_d, settings.r_du.as_ref()),
         false => (a_d, b_d),
     };
-    // Without cross weight, of what the input is beside -R^-1 S x.
-    let along = { cost.r.clone().cholesky() }
-        .map(|r| r.solve(&cost.s))
-        .ok_or_else(|| refused("R is not positive definite".into()))?;
-    let q = &cost.q - cost.s.transpose() * &along;
-    let q = (&q + q.transpose()) * 0.5;
+    let without_cross = cost.without_cross();
+    let (along, q) = without_cross.ok_or_else(|| refused("R is not positive definite".into()))?;
     let lqr = lqr_discrete(&(a_d - &b_d * along), &b_d, &q, &cost.r);
     let lqr = lqr.map_err(|error| refused(error.to_string()))?;
     Ok(SMatrix::from_fn(|i, j| {
@@ -216,13 +212,36 @@ fn cost_to_go<const NX: usize, const NU: usize, const NS: usize>(
 }
 
 /// x'Q x + u'R u + 2 u'S x.
-struct StageCost {
-    q: DMatrix<f64>,
-    r: DMatrix<f64>,
-    s: DMatrix<f64>,
+pub(crate) struct StageCost {
+    pub q: DMatrix<f64>,
+    pub r: DMatrix<f64>,
+    pub s: DMatrix<f64>,
 }
 
 impl StageCost {
+    /// Of what the input is beside -R^-1 S x the cost has no cross weight: R^-1 S, and the weight of the state then,
+    /// Q - S'R^-1 S. `None` where R is not positive definite.
+    pub fn without_cross(&self) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+        let along = self.r.clone().cholesky()?.solve(&self.s);
+        let q = &self.q - self.s.transpose() * &along;
+        Some((along, (&q + q.transpose()) * 0.5))
+    }
+
+    /// Whether it is never negative, up to rounding.
+    pub fn is_semidefinite(&self) -> bool {
+        let Some((along, q)) = self.without_cross() else {
+            return false;
+        };
+        let n = q.nrows();
+        // That of the two terms which the weight of the state is the difference of.
+        let size = self.q.amax() + (self.s.transpose() * along).amax();
+        let scale = if size > 0.0 { size } else { 1.0 };
+        let rounding = 10.0 * n as f64 * f64::EPSILON * scale;
+        (q + DMatrix::identity(n, n) * rounding)
+            .cholesky()
+            .is_some()
+    }
+
     /// With the last input v as further states, v+ = u, and the cost of u - v.
     fn join_last_input(
         &mut self,

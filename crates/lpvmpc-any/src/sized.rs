@@ -226,7 +226,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         }
         let models = self.models(preview, acting)?;
         self.check_parameters(preview)?;
-        let mut lists = StageLists::new(&self.names, preview, models, self.settings.horizon)?;
+        let mut lists = StageLists::new(&self.names, preview, models, &self.settings)?;
         let mut tasks = self.tasks(preview)?;
         let target = self.aim(preview, &mut lists, tasks.as_mut());
         let u_first = tasks

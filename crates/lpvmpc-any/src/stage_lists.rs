@@ -1,9 +1,11 @@
 //! A preview in the places that were compiled.
 
 use crate::check::{Axis, Names};
+use crate::controller_settings::StageCost;
 use crate::error::MpcError;
 use crate::last_input::Sampled;
 use crate::preview::Preview;
+use crate::settings::MpcSettings;
 use lpvmpc::{Bounds, GeneralRow, Weights};
 use nalgebra::{DVector, SMatrix, SVector};
 
@@ -29,7 +31,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> StageLists<NX, NU, NS> {
         names: &Names,
         preview: &Preview,
         models: Vec<Sampled<NX, NU, NS>>,
-        horizon: usize,
+        settings: &MpcSettings,
     ) -> Result<Self, MpcError> {
         let axes = (Axis::Inputs, Axis::States);
         let mut lists = Self {
@@ -53,11 +55,33 @@ impl<const NX: usize, const NU: usize, const NS: usize> StageLists<NX, NU, NS> {
             disturbance: names.vectors(Axis::States, "disturbance", &preview.disturbance)?,
             models,
         };
-        lists.x_ref.truncate(horizon + 1);
-        lists.u_ref.truncate(horizon);
-        lists.x_bounds.truncate(horizon + 1);
+        check_cross(settings, preview)?;
+        lists.x_ref.truncate(settings.horizon + 1);
+        lists.u_ref.truncate(settings.horizon);
+        lists.x_bounds.truncate(settings.horizon + 1);
         Ok(lists)
     }
+}
+
+/// Refuses cross weights, of the right shapes, with which the cost of a stage would have no minimum.
+fn check_cross(settings: &MpcSettings, preview: &Preview) -> Result<(), MpcError> {
+    let stages = preview.cross.len().max(preview.weights.len());
+    for stage in 0..stages.min(settings.horizon) {
+        let Some(s) = held(&preview.cross, stage) else {
+            return Ok(());
+        };
+        let (q, r) = match held(&preview.weights, stage) {
+            Some((q, r)) => (q, r),
+            None => (&settings.q, &settings.r),
+        };
+        let (q, r, s) = (q.clone(), r.clone(), s.clone());
+        if !(StageCost { q, r, s }).is_semidefinite() {
+            let fault = "with the weights there Q - S'R^-1 S is not positive semidefinite, as it must be for the cost \
+                         to have a minimum";
+            return Err(MpcError::new(format!("cross, stage {stage}"), fault));
+        }
+    }
+    Ok(())
 }
 
 /// The entry that holds at a stage: the list's last one from where it ends.
