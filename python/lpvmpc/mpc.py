@@ -414,8 +414,8 @@ class Mpc:
         self._settings, self._designed_for = new, self._plant
 
     def set_parameters(self, **values: float) -> None:
-        """Other values of the plant's parameters from the next step on, all or none. The terminal cost stays what it
-        was, also in copies of the controller, until `set`.
+        """Other values of the plant's parameters from the next step on, all or none. The plant's equilibrium goes along
+        with them (`Plant.equilibrium`). The terminal cost stays what it was, also in copies of the controller, until `set`.
 
         Raises
         ------
@@ -504,6 +504,7 @@ class Mpc:
         self.__init__(designed_for, **settings)  # type: ignore[misc]
         if plant != designed_for:
             self.set_parameters(**plant.parameters)
+            self.reset()
 
     def __repr__(self) -> str:
         return f"<Mpc of {self._plant.name!r}: {self.horizon} samples of {self.t_s} s>"

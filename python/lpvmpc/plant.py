@@ -490,7 +490,9 @@ class Plant:
 
     @property
     def equilibrium(self) -> tuple[Array, Array] | None:
-        """The steady state (x, u) that was given."""
+        """The steady state (x, u): the one that was given, where the plant stands there with its parameters. With others
+        it is that state under the input which holds it, or, where none does, the state and input near both; None where the
+        plant stands nowhere near it within its bounds."""
         found = self._native.equilibrium
         return None if found is None else (np.array(found[0]), np.array(found[1]))
 
@@ -500,7 +502,7 @@ class Plant:
         return self._native.period
 
     def with_parameters(self, **values: float) -> Plant:
-        """This plant with other values of some parameters.
+        """This plant with other values of some parameters. Its `equilibrium` goes along with them.
 
         Raises
         ------
@@ -578,8 +580,8 @@ class Plant:
     # Where it goes.
 
     def to_json(self) -> str:
-        """The text of its file, which is read as the same plant to the last bit, with its parameters as they are
-        now."""
+        """The text of its file, which is read as the same plant to the last bit, with its parameters and its equilibrium as
+        they are now."""
         return self._native.to_json()
 
     def save(self, path: str | PathLike[str], overwrite: bool = False) -> None:
@@ -607,7 +609,7 @@ class Plant:
         return self._native.to_rust()
 
     def __getstate__(self) -> tuple[str, dict[str, float]]:
-        return self.to_json(), self.parameters
+        return self._native.made_from(), self.parameters
 
     def __setstate__(self, state: tuple[str, dict[str, float]]) -> None:
         text, parameters = state

@@ -60,6 +60,15 @@ impl Plant {
         self.inner.to_json()
     }
 
+    /// The text of the file of the plant that it was made from, with the parameters of then.
+    fn made_from(&self) -> PyResult<String> {
+        let given = self.data().parameters.iter();
+        let given: Vec<f64> = given.map(|parameter| parameter.value).collect();
+        let mut plant = self.inner.clone();
+        plant.set_parameters(&given).map_err(of_plant)?;
+        Ok(plant.to_json())
+    }
+
     fn to_rust(&self) -> String {
         self.inner.to_rust()
     }
@@ -180,7 +189,7 @@ impl Plant {
 
     #[getter]
     fn equilibrium(&self) -> Option<(Vec<f64>, Vec<f64>)> {
-        let equilibrium = self.data().equilibrium.as_ref()?;
+        let equilibrium = self.inner.equilibrium()?;
         Some((equilibrium.x.clone(), equilibrium.u.clone()))
     }
 

@@ -44,3 +44,12 @@ def double_integrator():
     return lpvmpc.Plant.from_matrices(
         [[0, 1], [0, 0]], [[0], [1]], states=["position", "speed"], inputs=["force"]
     )
+
+
+def hovering():
+    """A mass that a thrust holds up, of which the parameter is the mass."""
+    x, u, m = ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("m")
+    return lpvmpc.Plant.from_casadi(
+        x, u, ca.vertcat(x[1], u / m - 9.81), p=m, parameters={"m": 1.0}, states=["height", "speed"], inputs=["thrust"],
+        bounds={"thrust": (0, 20)}, equilibrium=([2, 0], [9.81]),
+    )  # fmt: skip

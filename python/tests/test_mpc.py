@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 import lpvmpc
-from plants import cart_pole, cart_pole_formulas, double_integrator
+from plants import cart_pole, cart_pole_formulas, double_integrator, hovering
 
 Q, R, T_S, N = np.diag([2.0, 5.0, 0.2, 0.2]), np.diag([0.05]), 0.05, 25
 
@@ -372,6 +372,22 @@ def test_copies_keep_the_terminal_cost_when_parameters_have_changed():
     designed = lpvmpc.Mpc(mpc.plant, T_S, 5, Q, R)
     assert (pickle.loads(pickle.dumps(mpc)).step(x).u == designed.step(x).u).all()
     assert (designed.step(x).u != again.step(x).u).any()
+
+
+def test_an_equilibrium_goes_along_with_the_parameters():
+    """The controller could not be copied, nor be set any more."""
+    mpc = lpvmpc.Mpc(hovering(), 0.1, 10, [1, 1], [0.1], du_bounds=([-0.1], [0.1]))
+    mpc.set_parameters(m=1.1)
+    mpc.reset()
+    for one in (mpc, pickle.loads(pickle.dumps(mpc)), copy.deepcopy(mpc)):
+        assert one.plant == mpc.plant
+        plan = one.step([2.0, 0.0])
+        np.testing.assert_allclose(plan.u, 1.1 * 9.81, rtol=1e-9)
+        np.testing.assert_allclose(plan.x, [[2, 0]] * 11, rtol=1e-9, atol=1e-12)
+    mpc.set(q=[2, 1])
+    fresh = lpvmpc.Mpc(hovering().with_parameters(m=1.1), 0.1, 10, [2, 1], [0.1], du_bounds=([-0.1], [0.1]))
+    mpc.reset()
+    assert (mpc.step([1.9, 0.0]).u == fresh.step([1.9, 0.0]).u).all()
 
 
 def test_controllers_work_side_by_side():

@@ -1,5 +1,6 @@
 """Plants from everywhere have the values of the program that they come from."""
 
+import copy
 import json
 import pickle
 from types import SimpleNamespace
@@ -12,7 +13,7 @@ import sympy as sp
 
 import lpvmpc
 from lpvmpc._files import save
-from plants import cart_pole, cart_pole_formulas
+from plants import cart_pole, cart_pole_formulas, hovering
 
 
 A_X, A_U, M = sp.symbols("a_x a_u m")
@@ -244,6 +245,24 @@ def test_files_and_pickles_hold_the_same_plant(tmp_path):
     again = pickle.loads(pickle.dumps(other))
     assert again == other and again != plant and hash(again) == hash(other)
     assert (again.f([0, 1, 0, 0], [1]) == other.f([0, 1, 0, 0], [1])).all()
+
+
+def test_an_equilibrium_goes_along_with_the_parameters():
+    """It stayed as it was, and files and copies of such a plant could not be read."""
+    given = hovering()
+    heavier = given.with_parameters(m=1.1)
+    x, u = heavier.equilibrium
+    assert x.tolist() == [2, 0] and u == pytest.approx([1.1 * 9.81], rel=1e-15)
+    for again in (lpvmpc.Plant.from_json(heavier.to_json()), pickle.loads(pickle.dumps(heavier)), copy.deepcopy(heavier)):
+        assert again == heavier and hash(again) == hash(heavier)
+        assert again.equilibrium[1] == u and again.f([1, 2], [3]).tolist() == heavier.f([1, 2], [3]).tolist()
+    assert lpvmpc.lqr(heavier, 0.1, [1, 1], [1]).u == u
+    # Copies find their way back to the last bit, and there may be none within the bounds.
+    for back in (heavier, pickle.loads(pickle.dumps(heavier))):
+        assert back.with_parameters(m=1.0) == given
+    too_heavy = given.with_parameters(m=3.0)
+    assert too_heavy.equilibrium is None
+    assert pickle.loads(pickle.dumps(too_heavy)) == lpvmpc.Plant.from_json(too_heavy.to_json()) == too_heavy
 
 
 def test_what_a_plant_says_of_itself():

@@ -33,7 +33,7 @@ pub fn firmware(
     shown: &Demonstration,
 ) -> Result<(Plant, FirmwareSettings), MpcError> {
     check(plant, settings)?;
-    let (x, u) = plant.data().operating_point();
+    let (x, u) = plant.operating_point();
     let p = match &settings.terminal {
         Terminal::Cost(p) => p.clone(),
         _ => lqr(plant, settings.t_s, (&settings.q, &settings.r), (&x, &u))?.p,

@@ -125,7 +125,9 @@ impl Mpc {
         self.set_parameters([(name, value)])
     }
 
-    /// Other values of parameters of the plant from the next step on, all or none. The terminal cost stays what it was.
+    /// Other values of parameters of the plant from the next step on, all or none. Its steady state goes along with them
+    /// ([`Plant::equilibrium`]); where it has none any more, what is about the last one stays there. The terminal cost stays
+    /// what it was.
     ///
     /// # Errors
     /// There is no such parameter, or the value is not finite; with these values the prediction's steps are too

@@ -339,11 +339,14 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
     }
 
     fn set_plant(&mut self, plant: &Plant) -> Result<(), MpcError> {
-        let model = Model::new(plant, self.settings.linear_models, self.rest)?;
-        check_prediction(plant, &self.settings, &model, &self.rest)?;
+        // Where it has none any more, it is about the one before.
+        let rest = SizedPlant::<NX, NU>::new(plant.clone())?.equilibrium();
+        let rest = rest.unwrap_or(self.rest);
+        let model = Model::new(plant, self.settings.linear_models, rest)?;
+        check_prediction(plant, &self.settings, &model, &rest)?;
         self.controller
             .set_model(Sampled::new(model, self.last_input));
-        self.plant = plant.clone();
+        (self.plant, self.rest) = (plant.clone(), rest);
         Ok(())
     }
 

@@ -309,9 +309,8 @@ fn truncated(error: ClaimError, n: usize) -> CertifyError {
 fn wanted(plant: &Plant, settings: &CertifySettings) -> Result<Vec<f64>, CertifyError> {
     let data = plant.data();
     let (n, m) = (data.states.len(), data.inputs.len());
-    let own = { data.equilibrium.as_ref() }.map(|own| (own.x.clone(), own.u.clone()));
-    let given = settings.equilibrium.clone().or(own);
-    let (x, u) = given.unwrap_or((vec![0.0; n], vec![0.0; m]));
+    let given = settings.equilibrium.clone();
+    let (x, u) = given.unwrap_or_else(|| plant.operating_point());
     check_length("equilibrium x", x.len(), n)?;
     check_length("equilibrium u", u.len(), m)?;
     let wanted = [x, u].concat();

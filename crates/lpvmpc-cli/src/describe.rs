@@ -96,7 +96,7 @@ impl Linearisation {
 /// Says what the plant of a file is.
 pub fn run(arguments: &PlantArguments) -> Result<String, CommandError> {
     let plant = load(&arguments.file)?;
-    let (x, u) = plant.data().operating_point();
+    let (x, u) = plant.operating_point();
     let found = Linearisation::new(&plant, &x, &u)?;
     Ok(match arguments.json {
         true => format!("{:#}\n", document(&plant, &found, (&x, &u))),

@@ -12,7 +12,7 @@ use serde_json::json;
 pub fn run(arguments: &ExperimentArguments) -> Result<String, CommandError> {
     let experiment = Experiment::load(&arguments.experiment)?;
     let (plant, settings) = (&experiment.plant, &experiment.settings);
-    let (x, u) = plant.data().operating_point();
+    let (x, u) = plant.operating_point();
     let residual = residual(plant, &x, &u)?;
     if !(residual <= AT_REST) {
         return Err(CommandError::NoResult(format!(

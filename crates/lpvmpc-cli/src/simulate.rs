@@ -141,7 +141,7 @@ fn time_table(run: &Run) -> Table {
 /// Sum over the samples of (x - x_ref)'Q (x - x_ref), without the inputs; where no reference is given, it is the plant's
 /// equilibrium, or zero.
 fn state_cost(experiment: &Experiment, run: &Run) -> f64 {
-    let (rest, _) = experiment.plant.data().operating_point();
+    let (rest, _) = experiment.plant.operating_point();
     let q = experiment.settings.q.diagonal();
     let samples = run.x.iter().take(run.u.len()).enumerate();
     let cost = samples.map(|(k, x)| {

@@ -1,6 +1,6 @@
 //! Whether a plant's data make sense.
 
-use crate::data::{PlantData, Signal};
+use crate::data::{Equilibrium, PlantData, Signal};
 use crate::error::PlantError;
 use crate::file::operations::MOST_OPERATIONS;
 use crate::operation::Operation;
@@ -74,7 +74,10 @@ pub(crate) fn check(plant: &PlantData) -> Result<(), PlantError> {
             results.check("embedding.c", c, states, "state", Allowed::Scheduling)?;
         }
     }
-    check_equilibrium(plant)
+    match &plant.equilibrium {
+        None => Ok(()),
+        Some(equilibrium) => check_equilibrium(plant, equilibrium),
+    }
 }
 
 /// Either a derivative, or a period and the state one period later.
@@ -303,10 +306,11 @@ impl Results<'_> {
     }
 }
 
-fn check_equilibrium(plant: &PlantData) -> Result<(), PlantError> {
-    let Some(equilibrium) = &plant.equilibrium else {
-        return Ok(());
-    };
+/// A finite number for each state and input, within its bounds.
+pub(crate) fn check_equilibrium(
+    plant: &PlantData,
+    equilibrium: &Equilibrium,
+) -> Result<(), PlantError> {
     for (name, values, signals) in [
         ("x", &equilibrium.x, &plant.states),
         ("u", &equilibrium.u, &plant.inputs),

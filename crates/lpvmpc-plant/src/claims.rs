@@ -1,13 +1,10 @@
 //! Whether what a file says of its own formulas is so.
 
+use crate::equilibrium;
 use crate::error::PlantError;
 use crate::plant::Plant;
-use lpvmpc::Dual;
-use nalgebra::Vector1;
 
-/// An equilibrium may be missed by so much of a state's size; an embedding by so much of the
-/// terms that it sums up.
-const EQUILIBRIUM: f64 = 1e-6;
+/// An embedding may be missed by so much of the terms that it sums up.
 const EMBEDDING: f64 = 1e-9;
 /// Points at which an embedding is compared with f.
 const POINTS: usize = 20;
@@ -15,56 +12,10 @@ const POINTS: usize = 20;
 /// # Errors
 /// The equilibrium is none, or the embedding is not f.
 pub(crate) fn check(plant: &Plant) -> Result<(), PlantError> {
-    check_equilibrium(plant)?;
+    if let Some(at) = &plant.data().equilibrium {
+        equilibrium::check(plant, at)?;
+    }
     check_embedding(plant)
-}
-
-fn check_equilibrium(plant: &Plant) -> Result<(), PlantError> {
-    let Some(equilibrium) = &plant.data().equilibrium else {
-        return Ok(());
-    };
-    // In discrete time it stands where it is one period later.
-    let discrete = plant.period().is_some();
-    let mut rates = plant.motion(&equilibrium.x, &equilibrium.u)?;
-    if discrete {
-        let pairs = rates.iter_mut().zip(&equilibrium.x);
-        pairs.for_each(|(next, x)| *next -= x);
-    }
-    // What f may be for states and inputs that are rounded.
-    let mut sizes = vec![1.0; rates.len()];
-    let fixed = |values: &[f64]| -> Vec<Dual<f64, 1>> {
-        values.iter().map(|value| Dual::fixed(*value)).collect()
-    };
-    let (states, inputs) = (equilibrium.x.len(), equilibrium.u.len());
-    for i in 0..states + inputs {
-        let (mut x, mut u) = (fixed(&equilibrium.x), fixed(&equilibrium.u));
-        let place = match i.checked_sub(states) {
-            None => &mut x[i],
-            Some(j) => &mut u[j],
-        };
-        *place = Dual::variables(&Vector1::new(place.value))[0];
-        let reach = 1.0 + place.value.abs();
-        for (size, rate) in sizes.iter_mut().zip(plant.motion(&x, &u)?) {
-            *size += rate.slopes[0].abs() * reach;
-        }
-    }
-    for ((signal, rate), size) in plant.data().states.iter().zip(rates).zip(sizes) {
-        // Negated, so that a NaN is no equilibrium.
-        if !(rate.abs() <= EQUILIBRIUM * size) {
-            let fault = match discrete {
-                false => format!(
-                    "it is none: the derivative of {} is {rate} there",
-                    signal.name
-                ),
-                true => format!(
-                    "it is none: {} changes by {rate} per period there",
-                    signal.name
-                ),
-            };
-            return Err(PlantError::new("equilibrium", fault));
-        }
-    }
-    Ok(())
 }
 
 fn check_embedding(plant: &Plant) -> Result<(), PlantError> {

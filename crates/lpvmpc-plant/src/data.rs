@@ -43,7 +43,7 @@ pub struct PlantData {
     /// The plant's own x_dot = A(s, p) x + B(s, p) u + c(s, p), or x+ of a plant in discrete time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub embedding: Option<EmbeddingData>,
-    /// A steady state within the bounds, f(x, u) = 0, or F(x, u) = x.
+    /// A steady state within the bounds, f(x, u) = 0, or F(x, u) = x, with the parameters' values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub equilibrium: Option<Equilibrium>,
 }
@@ -55,14 +55,6 @@ impl PlantData {
         match self.period {
             None => &self.derivative,
             Some(_) => &self.next,
-        }
-    }
-
-    /// State and input of the equilibrium; zeros where none is named.
-    pub fn operating_point(&self) -> (Vec<f64>, Vec<f64>) {
-        match &self.equilibrium {
-            Some(at) => (at.x.clone(), at.u.clone()),
-            None => (vec![0.0; self.states.len()], vec![0.0; self.inputs.len()]),
         }
     }
 

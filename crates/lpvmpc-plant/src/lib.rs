@@ -103,6 +103,7 @@ mod claims;
 mod code;
 mod data;
 mod derive;
+mod equilibrium;
 mod error;
 mod factorise;
 mod file;

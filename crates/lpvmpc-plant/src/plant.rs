@@ -1,11 +1,11 @@
 //! A plant that was checked and made ready for evaluation.
 
 use crate::check::check;
-use crate::data::PlantData;
+use crate::data::{Equilibrium, PlantData};
 use crate::error::PlantError;
 use crate::prepared::{Fixed, Prepared};
 use crate::tangent::TangentCode;
-use crate::{claims, file, source};
+use crate::{claims, equilibrium, file, source};
 use lpvmpc::Number;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -55,6 +55,8 @@ pub(crate) struct Values {
     pub motion: Fixed,
     pub output: Fixed,
     pub embedding: Option<EmbeddingValues>,
+    /// Worked out when it is first asked for: a step of a controller that is told parameters does without.
+    equilibrium: OnceLock<Option<Equilibrium>>,
 }
 
 /// The same of an embedding.
@@ -99,6 +101,7 @@ impl Formulas {
             motion: self.motion.fixed(&parameters),
             output: self.output.fixed(&parameters),
             embedding,
+            equilibrium: OnceLock::new(),
             parameters,
         }
     }
@@ -153,14 +156,16 @@ impl Plant {
         Self::from_json(&file::text(path.as_ref())?)
     }
 
-    /// The text of its file, which is read as the same plant to the last bit, with the parameters as they are now.
+    /// The text of its file, which is read as the same plant to the last bit, with the parameters as they are now and the
+    /// [equilibrium](Self::equilibrium) under these.
     pub fn to_json(&self) -> String {
         file::write(&self.present_data())
     }
 
-    /// [`Self::data`] with the parameters as they are now.
+    /// [`Self::data`] with parameters and equilibrium as they are now.
     fn present_data(&self) -> PlantData {
         let mut data = self.data().clone();
+        data.equilibrium = self.equilibrium().cloned();
         for (parameter, value) in data.parameters.iter_mut().zip(self.parameters()) {
             parameter.value = *value;
         }
@@ -186,7 +191,7 @@ impl Plant {
         source::print(self)
     }
 
-    /// What it was made from: names, units, bounds, formulas, and the values that parameters had then.
+    /// What it was made from: names, units, bounds, formulas, and the values that parameters and equilibrium had then.
     pub fn data(&self) -> &PlantData {
         &self.formulas.data
     }
@@ -198,6 +203,25 @@ impl Plant {
     /// The values of the parameters, in the order of [`PlantData::parameters`].
     pub fn parameters(&self) -> &[f64] {
         &self.values.parameters
+    }
+
+    /// The steady state. It is the one that was given, where the plant stands there with its parameters as they are now. With
+    /// others it is the same state under the nearest input that holds it, or the state and input near both where none does;
+    /// `None` where no such one is found within the bounds.
+    pub fn equilibrium(&self) -> Option<&Equilibrium> {
+        let found = { &self.values.equilibrium }.get_or_init(|| equilibrium::present(self));
+        found.as_ref()
+    }
+
+    /// State and input of the equilibrium; zeros where there is none.
+    pub fn operating_point(&self) -> (Vec<f64>, Vec<f64>) {
+        match self.equilibrium() {
+            Some(at) => (at.x.clone(), at.u.clone()),
+            None => {
+                let data = self.data();
+                (vec![0.0; data.states.len()], vec![0.0; data.inputs.len()])
+            }
+        }
     }
 
     /// From now on the parameter `name` has this `value`, in its unit.

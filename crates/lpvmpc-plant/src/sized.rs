@@ -84,9 +84,9 @@ impl<const NX: usize, const NU: usize> SizedPlant<NX, NU> {
         bounds(&self.plant.data().inputs)
     }
 
-    /// The steady state (x, u) of the file, zero in places that are left over.
+    /// The steady state (x, u), zero in places that are left over: see [`Plant::equilibrium`].
     pub fn equilibrium(&self) -> Option<(SVector<f64, NX>, SVector<f64, NU>)> {
-        let equilibrium = self.plant.data().equilibrium.as_ref()?;
+        let equilibrium = self.plant.equilibrium()?;
         Some((filled(&equilibrium.x), filled(&equilibrium.u)))
     }
 }

@@ -95,6 +95,61 @@ fn a_parameter_can_be_set_and_is_saved_as_it_is() {
     assert_eq!(plant.parameters(), [5.0]);
 }
 
+/// height_dot = speed + wind, speed_dot = thrust / mass - 9.81.
+fn hovering() -> Plant {
+    let hovering = r#"{
+        "schema": 1,
+        "name": "hovering",
+        "states": [{"name": "height"}, {"name": "speed"}],
+        "inputs": [{"name": "thrust", "upper": 20}],
+        "parameters": [{"name": "mass", "value": 1}, {"name": "wind", "value": 0}],
+        "operations": [
+            ["state", 1], ["parameter", 1], ["add", 0, 1], ["input", 0], ["parameter", 0], ["div", 3, 4],
+            ["constant", 9.81], ["sub", 5, 6]
+        ],
+        "derivative": [2, 7],
+        "equilibrium": {"x": [3, 0], "u": [9.81]}
+    }"#;
+    Plant::from_json(hovering).unwrap()
+}
+
+/// What was written had the new parameters beside the old equilibrium, and was refused.
+#[test]
+fn an_equilibrium_goes_along_with_the_parameters() {
+    let given = hovering();
+    let at = |mass: f64, wind: f64| {
+        let mut plant = given.clone();
+        plant.set_parameters(&[mass, wind]).unwrap();
+        let again = Plant::from_json(&plant.to_json()).unwrap();
+        assert_eq!(again, plant);
+        assert_eq!(again.equilibrium(), plant.equilibrium());
+        assert_eq!(again.to_json(), plant.to_json());
+        plant.equilibrium().cloned()
+    };
+    let found = at(1.1, 0.0).unwrap();
+    assert_eq!(found.x, [3.0, 0.0]);
+    assert!((found.u[0] - 1.1 * 9.81).abs() < 1e-14);
+    // No thrust holds a speed of 0 against the wind.
+    let found = at(1.1, 0.5).unwrap();
+    assert_eq!(found.x, [3.0, -0.5]);
+    assert!((found.u[0] - 1.1 * 9.81).abs() < 1e-14);
+    // More than the largest thrust.
+    assert_eq!(at(2.5, 0.0), None);
+    assert_eq!(at(1.0, 0.0), given.data().equilibrium);
+    let mut still = Plant::new(PlantData {
+        equilibrium: Some(Equilibrium {
+            x: vec![0.0],
+            u: vec![],
+        }),
+        ..drift(1.0, -1.0)
+    })
+    .unwrap();
+    assert!(still.equilibrium().is_some());
+    still.set_parameter("p", 0.0).unwrap();
+    assert_eq!(still.equilibrium(), None);
+    assert_eq!(Plant::from_json(&still.to_json()).unwrap(), still);
+}
+
 #[test]
 fn an_equilibrium_must_be_one() {
     let at = |x: f64| {
