@@ -295,6 +295,8 @@ def pieces(*given):
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, states=["a"]), "not 2 names"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, states=["a", "a"]), "a"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, units={"b": "m"}), "there is no 'b'"),
+        # Its bounds were put on both.
+        (lambda: lpvmpc.Plant.from_casadi(X, U, F, y=X[0], outputs=["x_0"]), r"outputs\[0\]: \"x_0\" is also the name of states"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, bounds={"u": (1, -1)}), "1"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, bounds={"u": 3}), r"\(lower, upper\)"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, bounds={"u": (float("nan"), 1)}), "NaN"),

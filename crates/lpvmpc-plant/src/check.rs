@@ -115,7 +115,6 @@ fn check_signals(plant: &PlantData) -> Result<(), PlantError> {
             return Err(PlantError::new(list, fault));
         }
     }
-    // Of one another; an output may be a state.
     let mut known = HashMap::new();
     let parameters = plant
         .parameters
@@ -123,18 +122,9 @@ fn check_signals(plant: &PlantData) -> Result<(), PlantError> {
         .map(|p| (p.name.as_str(), p.unit.as_str()));
     let named = numbered("states", plant.states.iter().map(name_and_unit))
         .chain(numbered("inputs", plant.inputs.iter().map(name_and_unit)))
-        .chain(numbered("parameters", parameters));
+        .chain(numbered("parameters", parameters))
+        .chain(numbered("outputs", plant.outputs.iter().map(name_and_unit)));
     for (place, (name, unit)) in named {
-        check_names(&place, name, unit)?;
-        if let Some(other) = known.insert(name, place.clone()) {
-            return Err(PlantError::new(
-                place,
-                format!("{name:?} is also the name of {other}"),
-            ));
-        }
-    }
-    let mut known = HashMap::new();
-    for (place, (name, unit)) in numbered("outputs", plant.outputs.iter().map(name_and_unit)) {
         check_names(&place, name, unit)?;
         if let Some(other) = known.insert(name, place.clone()) {
             return Err(PlantError::new(

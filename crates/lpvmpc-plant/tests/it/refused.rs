@@ -203,6 +203,11 @@ fn a_wrong_list_is_named() {
             "inputs[0]: \"rate\" is also the name of states[1]",
         ),
         (
+            "/outputs/0/name",
+            json!("rate"),
+            "outputs[0]: \"rate\" is also the name of states[1]",
+        ),
+        (
             "/inputs/0/name",
             json!(""),
             "inputs[0]: the name is missing",
