@@ -15,14 +15,20 @@ from .errors import SettingError
 Array = NDArray[np.float64]
 Kind = TypeVar("Kind")
 
+_TOO_LARGE = "it is too large; the largest number is 1.8e308"
+
 
 def numbers(place: str, given: ArrayLike, error: type[Exception] = SettingError) -> Array:
     """An array of real numbers."""
+    if np.ma.is_masked(given):
+        raise error(f"{place}: it has entries that are masked; every one must be a number")
     try:
         array = np.asarray(given)
         if np.iscomplexobj(array):
             raise ValueError
         return np.ascontiguousarray(array, dtype=np.float64)
+    except OverflowError:
+        raise error(f"{place}: {_TOO_LARGE}") from None
     except (TypeError, ValueError):
         raise error(f"{place}: {_short(given)} is no array of real numbers") from None
 
@@ -64,6 +70,8 @@ def number(place: str, given: Any, error: type[Exception] = SettingError) -> flo
     """A number."""
     try:
         return float(given)
+    except OverflowError:
+        raise error(f"{place}: {_TOO_LARGE}") from None
     except (TypeError, ValueError):
         raise error(f"{place}: it is {given!r}; it must be a number") from None
 
@@ -87,11 +95,13 @@ def listed(place: str, given: Any, what: str) -> list[Any]:
     raise SettingError(f"{place}: {given!r} is not {what}")
 
 
-def by_name(place: str, given: Any, what: str) -> Mapping[str, Any]:
-    """A dictionary with names as its keys; `what` it must be is for the message."""
+def by_name(
+    place: str, given: Any, what: str, error: type[Exception] = SettingError
+) -> Mapping[Any, Any]:
+    """A dictionary, as a rule with names as its keys; `what` it must be is for the message."""
     if isinstance(given, Mapping):
         return given
-    raise SettingError(f"{place}: {given!r} is not {what}")
+    raise error(f"{place}: {given!r} is not {what}")
 
 
 def instance(place: str, given: Any, kind: type[Kind], name: str | None = None) -> Kind:

@@ -122,7 +122,10 @@ def values(
     """The values of the parameters by name. The keys of a mapping are the `names`, or other ones in their order."""
     given = named(given)
     called = list(names)
-    values = list(() if given is None else ordered("parameters", given, names, PlantError))
+    try:
+        values = list(() if given is None else ordered("parameters", given, names, PlantError))
+    except TypeError:
+        raise PlantError(f"parameters: it is {given!r}; it must be a list, or values by name") from None
     if isinstance(given, Mapping):
         called, values = [str(one) for one in given], list(given.values())
     if len(values) != len(names):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import by_stage, equally_long, listed, matrices_by_stage, weights_by_stage
+from ._arrays import by_stage, equally_long, listed, matrices_by_stage, numbers, weights_by_stage
 from .constraints import bounds, row
 from .errors import SettingError
 from .plant import Plant, names_of
@@ -38,7 +38,7 @@ def to_native(
         if name in given:
             known[name] = by_stage(name, given[name], of)
     if "scheduling" in given:
-        size = (np.shape(given["scheduling"]) or (1,))[-1]
+        size = (numbers("scheduling", given["scheduling"]).shape or (1,))[-1]
         known["scheduling"] = by_stage("scheduling", given["scheduling"], size)
     for name, of in (("q", of_x), ("r", of_u), ("q_y", of_y), ("r_du", of_u)):
         if name in given:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ._arrays import column, number, weight, whole
+from ._arrays import column, listed, number, weight, whole
 from .certificate import Certificate
 from .constraints import changes, limits, prices, row
 from .design import lqr
@@ -60,6 +60,6 @@ def to_native(plant: Plant, given: Mapping[str, Any]) -> dict[str, Any]:
     settings["du_bounds"] = limits("du_bounds", given["du_bounds"], changes(plant))
     if isinstance(given["output_bounds"], Mapping):
         settings["output_bounds"] = prices("output_bounds", given["output_bounds"], outputs)
-    settings["rows"] = [row(plant, one) for one in given["rows"]]
+    settings["rows"] = [row(plant, one) for one in listed("rows", given["rows"], "a list of lpvmpc.Row")]
     del settings["estimator"]
     return settings

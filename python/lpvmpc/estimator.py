@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -128,7 +128,7 @@ def _by_state(
             if name not in names:
                 raise SettingError(f"{place}: there is no {name!r}; there are {', '.join(names)}")
         return [number(f"{place}, {name}", given.get(name, usual)) for name in names]
-    if np.ndim(given) == 0:
+    if not isinstance(given, Sequence) and np.ndim(given) == 0:
         return [number(place, given)] * len(names)
     found: list[float] = column(place, given, names).tolist()
     return found

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _lpvmpc
-from ._arrays import column, copied, instance, listed, named, number, ordered, whole
+from ._arrays import column, copied, instance, named, number, ordered, whole
 from ._preview import AHEAD
 from ._preview import to_native as preview_to_native
 from ._settings import designed
@@ -161,7 +161,7 @@ class Mpc:
         self._settings: dict[str, Any] = copied({
             "t_s": t_s, "horizon": horizon, "q": q, "r": r, "terminal": terminal,
             "x_bounds": x_bounds, "u_bounds": u_bounds, "state_bounds": state_bounds,
-            "u_ref": u_ref, "rows": tuple(listed("rows", rows, "a list of lpvmpc.Row")), "q_y": q_y, "y_bounds": y_bounds,
+            "u_ref": u_ref, "rows": rows, "q_y": q_y, "y_bounds": y_bounds,
             "output_bounds": output_bounds, "r_du": r_du, "du_bounds": du_bounds, "linear_models": linear_models, "nodes": nodes,
             "substeps": substeps, "method": method, "max_programs": max_programs, "first_programs": first_programs,
             "tolerance": tolerance, "estimator": estimator,

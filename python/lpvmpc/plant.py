@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _casadi, _lpvmpc, _plant_file, _sympy
 from ._files import save
-from ._arrays import column, number, table
+from ._arrays import by_name, column, number, table
 from ._tape import Tape
 from .errors import PlantError
 
@@ -354,7 +354,7 @@ class Plant:
         PlantError
             The expressions make no plant; the message names the place.
         """
-        values = {} if parameters is None else dict(parameters)
+        values = {} if parameters is None else by_name("parameters", parameters, "a dictionary of values by symbol", PlantError)
         leaves = {
             symbol: (leaf, i)
             for leaf, symbols in (("state", x), ("input", u), ("parameter", values))

@@ -274,11 +274,12 @@ def simulate(
     duration = number("duration", duration)
     if not (np.isfinite(duration) and duration > 0):
         raise SettingError(f"duration: it is {duration} s; it must be a positive number of seconds")
-    count = int(np.ceil(duration / period - 1e-9))
-    if count > MOST_SAMPLES:
+    samples = np.ceil(duration / period - 1e-9)
+    if samples > MOST_SAMPLES:
         raise SettingError(
-            f"duration: {duration} s are {count:.4g} samples of {period} s; there is room for {MOST_SAMPLES}"
+            f"duration: {duration} s are {samples:.4g} samples of {period} s; there is room for {MOST_SAMPLES}"
         )
+    count = int(samples)
     horizon = mpc.horizon if mpc is not None else 0
     reference = None if x_ref is None else _reference("x_ref", x_ref, names_of(states), count, period)
     estimator = None if mpc is None else mpc.estimator

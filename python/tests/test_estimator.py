@@ -165,6 +165,7 @@ def test_an_estimator_comes_and_goes_and_is_pickled():
         ({"disturbances": {"force": 1.0}}, "is no lpvmpc.Disturbance"),
         ({"disturbances": 1.0}, "disturbances: 1.0 is not lpvmpc.Disturbance by name"),
         ({"gate": 3.0}, "is no lpvmpc.Gate"),
+        ({"state_noise": [[1], [1, 2]]}, "estimator, state_noise: .* is no array of real numbers"),
         ({"gate": lpvmpc.Gate(patience=-1)}, "gate, patience"),
     ],
 )

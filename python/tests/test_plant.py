@@ -305,6 +305,8 @@ def pieces(*given):
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, parameters={"m": 1}), "parameters"),
         (lambda: rod({"mass": 2, "long": 0.5}), "p has mass, length, and no long"),
         (lambda: rod(["a", 1]), "parameters, mass: it is 'a'; it must be a number"),
+        (lambda: rod(2.0), "parameters: it is 2.0; it must be a list, or values by name"),
+        (lambda: lpvmpc.Plant.from_sympy([A_X], [A_U], [A_U], parameters=2.0), "parameters: 2.0 is not a dictionary"),
         (lambda: rod([np.nan, 1]), "parameters, mass: it is nan; it must be finite"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, bounds={"u": ("a", 1)}), "bounds, u, lower: it is 'a'"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, equilibrium=[0, 0, 0]), r"it must be \(x, u\)"),

@@ -191,6 +191,7 @@ def diverging(t, x):
         (lambda s: s([0] * 4, 1.0, sensors={"tilt": lpvmpc.Sensor(noise=-1)}), lpvmpc.SettingError, "noise"),
         (lambda s: s([0] * 4, 1.0, sensors="good"), lpvmpc.SettingError, "sensors: 'good' is not lpvmpc.Sensor by name"),
         (lambda s: s([0] * 4, 1.0, actuators=[1]), lpvmpc.SettingError, "actuators: .* is not lpvmpc.Actuator by name"),
+        (lambda s: s([0] * 4, 1e308), lpvmpc.SettingError, "duration: .* there is room for 10000000"),
         (lambda s: s([0] * 4, 1e12), lpvmpc.SettingError, "duration: .* there is room for 10000000"),
         (lambda s: s([0] * 4, 1.0, disturbances=["wind"]), lpvmpc.SettingError, r"disturbances\[0\]"),
         (lambda s: s([0] * 4, 1.0, disturbances=[lpvmpc.Load(1, 0, [0] * 4)]), lpvmpc.SettingError, "disturbance 0"),
