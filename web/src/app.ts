@@ -339,10 +339,11 @@ export class App {
   }
 
   private order(order: { running?: boolean; speed?: number }, source: Source = this.playback ?? this.engine): void {
-    if (!this.playback && this.facts.length === 0) return;
     this.lookedAt = undefined;
     [this.clock, this.clockAt] = [this.time(), performance.now()];
     this.speed = order.speed ?? this.speed;
+    // The robots that come next run at the speed that was chosen before.
+    if (!this.playback && this.facts.length === 0) return;
     if (order.running !== undefined) this.setRunning(order.running);
     this.isHeard = false;
     this.events.asked();

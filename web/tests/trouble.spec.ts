@@ -2,7 +2,7 @@
 
 import { expect } from "@playwright/test";
 import { followed } from "../src/pictures";
-import { drop, fill, fragment, open, openFile, openFlat, openSection, pass, pause, saved, scenario, setPush, table, test, until } from "./page";
+import { clock, drop, fill, fragment, open, openFile, openFlat, openSection, pass, pause, saved, scenario, setPush, table, test, until } from "./page";
 import { beforeEnd, expectSameUntil } from "./program";
 
 test("without the control loop's program the page says so", async ({ page }) => {
@@ -117,6 +117,22 @@ test("a controller that does not answer is ended, and the last settings that wor
   await page.locator("#play").click();
   await until(page, 0.5);
   await expect(page.locator("#message")).toBeHidden();
+});
+
+test("a speed that is chosen while there is no controller is that of the next run", async ({ page }) => {
+  await openFlat(page);
+  await page.locator("#play").click();
+  await until(page, 0.2);
+  await pause(page);
+  await openFile(page, "endless.toml", endless(await saved(page, "Save TOML")));
+  await expect(page.getByLabel("Horizon N", { exact: true })).toHaveValue("200");
+  await page.locator("#play").click();
+  await expect(page.locator("#message")).toContainText("was ended");
+  await page.locator("#speed").selectOption("0.02");
+  await scenario(page, "two-setpoints");
+  await page.locator("#play").click();
+  await page.waitForTimeout(2000);
+  expect(await clock(page)).toBeLessThan(0.5);
 });
 
 /** In front of the worker's program: every set-up takes four seconds to be taken in. */
