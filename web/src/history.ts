@@ -1,6 +1,6 @@
 // What one robot did, as far back as it is kept.
 
-import { NOW_WIDTH, ROW, ROW_WIDTH } from "./layout";
+import { NOW, NOW_WIDTH, ROW, ROW_WIDTH } from "./layout";
 import type { RobotBatch } from "./protocol";
 
 /** Samples that are kept; older ones make room, so that memory does not grow. */
@@ -28,6 +28,8 @@ export class History {
   status = "";
   statusFrom: { sample: number; text: string }[] = [];
   ending: string | undefined;
+  /** When it was seen to have stopped, s; absent while it runs. */
+  endedAt: number | undefined;
   down = false;
   private readonly width: number;
   private readonly data: Float64Array;
@@ -64,6 +66,7 @@ export class History {
     this.predictions = batch.prediction;
     this.activeBounds = batch.activeBounds;
     this.ending = batch.ending;
+    if (batch.ending !== undefined) this.endedAt ??= this.nowAt(0, NOW.time);
     this.down = batch.down;
     if (count > 0) this.keepPrediction();
   }

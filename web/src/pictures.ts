@@ -35,12 +35,21 @@ function joined(planes: Float64Array[], radius: number): Float32Array {
   return points;
 }
 
-/** Where the camera looks: at the middle of the robots that stand. Who fell rolls away, and is left
- *  behind; when nobody stands, it looks where it looked last. */
-export function followed(histories: Pick<History, "ending">[], poses: Pose[], last: FloorPoint): FloorPoint {
-  const standing = poses.filter((pose, i) => histories[i]?.ending === undefined && Number.isFinite(pose.x + pose.y));
+/** Where the camera looks: at the middle of the robots that stand at a time, s. Who fell rolls away, and
+ *  is left behind; when nobody stands, it looks where it looked last. */
+export function followed(histories: Pick<History, "endedAt">[], poses: Pose[], time: number, last: FloorPoint): FloorPoint {
+  const standing = poses.filter((pose, i) => time < (histories[i]?.endedAt ?? Infinity) && Number.isFinite(pose.x + pose.y));
   const mean = (value: (pose: Pose) => number) => standing.reduce((sum, pose) => sum + value(pose), 0) / standing.length;
   return standing.length > 0 ? { x: mean(({ x }) => x), y: mean(({ y }) => y) } : last;
+}
+
+/** Where a robot is to go now, or had to at a time that is looked back at, s. */
+export function goalOf(history: History, past: number | undefined, radius: number): FloorPoint {
+  const phi = (plane: number) =>
+    past === undefined || past >= history.nowAt(plane, NOW.time)
+      ? history.nowAt(plane, NOW.phiReference)
+      : history.at(Math.max(history.indexAt(past + 1e-9) - 1, 0), plane, ROW.phiReference);
+  return { x: phi(0) * radius, y: history.planes === 2 ? phi(1) * radius : 0 };
 }
 
 export class Pictures {
@@ -70,11 +79,7 @@ export class Pictures {
   /** Where the first robot is to go. */
   firstTarget(): FloorPoint {
     const history = this.app.histories[0];
-    return history ? this.goal(history) : { x: 0, y: 0 };
-  }
-
-  private goal(history: History): FloorPoint {
-    return { x: history.nowAt(0, NOW.phiReference) * this.radius, y: history.planes === 2 ? history.nowAt(1, NOW.phiReference) * this.radius : 0 };
+    return history ? goalOf(history, undefined, this.radius) : { x: 0, y: 0 };
   }
 
   forget(): void {
@@ -90,12 +95,13 @@ export class Pictures {
 
   at(time: number): { robots: RobotPicture[]; follow: FloorPoint } {
     const poses = this.app.histories.map((history) => poseAt(history, time, this.radius));
-    const robots = this.app.histories.map((history, i) => this.picture(history, poses[i] as Pose, i));
-    this.follow = followed(this.app.histories, poses, this.follow);
+    const past = this.app.isLookingBack ? time : undefined;
+    const robots = this.app.histories.map((history, i) => this.picture(history, poses[i] as Pose, past, i));
+    this.follow = followed(this.app.histories, poses, time, this.follow);
     return { robots, follow: this.follow };
   }
 
-  private picture(history: History, pose: Pose, i: number): RobotPicture {
+  private picture(history: History, pose: Pose, past: number | undefined, i: number): RobotPicture {
     const way = this.trails[i] ?? new Float32Array(0);
     const trail = new Float32Array(way.length + 2);
     trail.set(way);
@@ -103,10 +109,10 @@ export class Pictures {
     return {
       pose,
       // The last plan is for now.
-      prediction: history.ending === undefined && !this.app.isLookingBack ? predictedPoses(history, this.radius) : [],
+      prediction: history.ending === undefined && past === undefined ? predictedPoses(history, this.radius) : [],
       trail,
       reference: this.references[i] ?? new Float32Array(0),
-      goal: this.goal(history),
+      goal: goalOf(history, past, this.radius),
       lane: this.lane(i),
       colour: colourOf(this.app.robots[i]),
     };

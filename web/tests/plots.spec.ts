@@ -3,11 +3,12 @@
 import { expect } from "@playwright/test";
 import { History } from "../src/history";
 import { predictedPoses } from "../src/motion";
+import { goalOf } from "../src/pictures";
 import { columns } from "../src/plots/columns";
 import { drawPredictions, drawTime } from "../src/plots/marks";
 import { ticks, valueRange } from "../src/plots/range";
 import { STRIPS, type Strip } from "../src/plots/strips";
-import { ROW_WIDTH } from "../src/layout";
+import { ROW, ROW_WIDTH } from "../src/layout";
 import { clock, fill, open, openFlat, pause, saved, scenario, table, test, until } from "./page";
 
 /** The strip of phi, of theta and so on. */
@@ -159,6 +160,15 @@ test("a run can be looked back at while it does not run", async ({ page }) => {
   await page.locator("#play").click();
   await until(page, end + 0.2);
   expect(table(await saved(page, "Save CSV"))["t_s"]?.length).toBeGreaterThan(before);
+});
+
+test("looked back at, the target is that of then", () => {
+  const history = new History(1, 0.05, 0.4);
+  const rows = new Float64Array(2 * ROW_WIDTH);
+  [rows[ROW_WIDTH + ROW.time], rows[ROW_WIDTH + ROW.phiReference]] = [0.05, 10];
+  history.add({ rows, motors: new Float64Array(6), statuses: [], now: Float64Array.from([0.1, 0, 0, 0, 0, 20]), prediction: [], activeBounds: [], down: false });
+  const goals = [0, 0.04, 0.05, 0.09, 0.1, undefined].map((past) => goalOf(history, past, 0.1));
+  expect(goals.map(({ x }) => x)).toEqual([0, 0, 1, 1, 2, 2]);
 });
 
 test("fields and plots are in metres and degrees, or in rad", async ({ page }) => {

@@ -186,14 +186,16 @@ test("a fallen robot is said to lie on the floor, and no word covers another", a
 });
 
 test("the camera follows the robots that stand, and nobody's fall", () => {
-  const standing = { ending: undefined };
-  const fallen = { ending: "the robot has fallen" };
+  const standing = { endedAt: undefined };
+  const fallen = { endedAt: 4 };
   const at = (x: number, y: number) => ({ x, y, leanX: 0, leanY: 0 });
   const last = { x: 7, y: 7 };
-  expect(followed([standing, standing], [at(1, 0), at(3, 2)], last)).toEqual({ x: 2, y: 1 });
-  expect(followed([standing, fallen], [at(1, 0), at(300, 2)], last)).toEqual({ x: 1, y: 0 });
-  expect(followed([standing, standing], [at(1, 0), at(NaN, 2)], last)).toEqual({ x: 1, y: 0 });
-  expect(followed([fallen], [at(300, 2)], last)).toEqual(last);
+  expect(followed([standing, standing], [at(1, 0), at(3, 2)], 5, last)).toEqual({ x: 2, y: 1 });
+  expect(followed([standing, fallen], [at(1, 0), at(300, 2)], 5, last)).toEqual({ x: 1, y: 0 });
+  expect(followed([standing, standing], [at(1, 0), at(NaN, 2)], 5, last)).toEqual({ x: 1, y: 0 });
+  expect(followed([fallen], [at(300, 2)], 5, last)).toEqual(last);
+  // Whoever looks back sees those stand that fell later.
+  expect(followed([standing, fallen], [at(1, 0), at(3, 2)], 3, last)).toEqual({ x: 2, y: 1 });
 });
 
 test("where the clock is coarse the time per step is a mean", async ({ page }) => {
