@@ -8,9 +8,11 @@ export const CAPACITY = 60_000;
 /** Predictions that are kept to be compared with what happened. */
 const FAN = 8;
 
-/** The states that a plan leads through, four per sample, from `time` on. */
+/** The states that a plan leads through, four per sample, from `time` on. The sampling time, s, is that
+ *  of then. */
 export interface Prediction {
   time: number;
+  samplingTime: number;
   states: Float64Array;
 }
 
@@ -78,7 +80,7 @@ export class History {
     for (const [plane, fan] of this.fans.entries()) {
       const states = this.predictions[plane];
       if (states === undefined || states.length === 0) continue;
-      fan.push({ time: time + this.samplingTime, states });
+      fan.push({ time: time + this.samplingTime, samplingTime: this.samplingTime, states });
       if (fan.length > FAN) fan.shift();
     }
   }

@@ -19,8 +19,8 @@ function strip(title: string): Strip {
 }
 
 /** A robot at rest, with a plan. */
-function planning(states: number[]): History {
-  const history = new History(1, 0.05, 0.4);
+function planning(states: number[], samplingTime = 0.05): History {
+  const history = new History(1, samplingTime, 0.4);
   history.add({
     rows: new Float64Array(ROW_WIDTH), motors: new Float64Array(3), statuses: [], now: Float64Array.from([0.05, 0, 0, 0, 0, 0]),
     prediction: [Float64Array.from(states)], activeBounds: [""], down: false,
@@ -76,8 +76,7 @@ test("a plan beyond all bounds is drawn no further than just outside the axes", 
   // A long plan whose tilt grows without end, over two seconds and then for hours.
   for (const step of [0.05, 100]) {
     const states = Array.from({ length: 200 }, (_, i) => [0, (-10) ** (i / 4), 0, 0]).flat();
-    const history = planning(states);
-    history.samplingTime = step;
+    const history = planning(states, step);
     const { chart, points } = noting();
     drawPredictions(chart, 1, [{ history, colour: "red" }], 0);
     expect(points.length).toBeGreaterThan(0);
@@ -87,6 +86,19 @@ test("a plan beyond all bounds is drawn no further than just outside the axes", 
       expect(Math.abs(y)).toBeLessThan(1000);
     }
   }
+});
+
+test("an earlier plan stays where it was when the sampling time changes", () => {
+  const history = planning([0, 0, 0, 0, 0, 0, 0, 0]);
+  const ofEarlier = () => {
+    const { chart, points } = noting();
+    drawPredictions(chart, 1, [{ history, colour: "red" }], 0);
+    return points.slice(0, 2).map(([x]) => x);
+  };
+  // From the end of its first sample on.
+  expect(ofEarlier()).toEqual([52.5, 55]);
+  history.samplingTime = 0.5;
+  expect(ofEarlier()).toEqual([52.5, 55]);
 });
 
 test("what is not a number ends a plan, and leaves a gap in a curve", () => {

@@ -53,7 +53,7 @@ export function drawPredictions(chart: uPlot, component: number, shown: Shown[],
       ctx.lineWidth = ratio;
       ctx.globalAlpha = 0.35;
       ctx.setLineDash([]);
-      for (const { time, states } of history.fans[plane] ?? []) curve(time, states, history.samplingTime);
+      for (const { time, states, samplingTime } of history.fans[plane] ?? []) curve(time, states, samplingTime);
       ctx.globalAlpha = 0.9;
       ctx.setLineDash([3 * ratio, 3 * ratio]);
       const states = history.predictions[plane];
