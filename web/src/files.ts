@@ -51,10 +51,11 @@ export function readTrajectory(text: string, name: string): Recorded {
   let ending = "";
   for (const [i, line] of lines.slice(1).entries()) {
     const cells = line.split(",");
-    const number = (column: number, mayBeEmpty: boolean): number => {
+    const number = (column: number, mayBeUnknown: boolean): number => {
       const cell = (cells[column] ?? "").trim();
       const value = cell === "" ? NaN : Number(cell);
-      if (!Number.isFinite(value) && !(mayBeEmpty && cell === "")) {
+      // The program writes the cost of a sample without a plan as it is.
+      if (!Number.isFinite(value) && !(mayBeUnknown && ["", "inf", "-inf", "NaN"].includes(cell))) {
         throw new Error(`${name}, line ${i + 2}: "${cell}" in the column ${header[column] ?? column + 1} is not a number`);
       }
       return value;

@@ -3,6 +3,7 @@
 import { readFileSync } from "node:fs";
 import { expect, type Page } from "@playwright/test";
 import { readTrajectory } from "../src/files";
+import { ROW } from "../src/layout";
 import { Playback } from "../src/playback";
 import { clearMessage, drop, fill, fragment, openFile, openFlat, pass, pause, ready, saved, scenario, test, until } from "./page";
 
@@ -115,6 +116,16 @@ test("what a recording does not tell is a dash", async ({ page }) => {
   const values = page.locator("#plots figcaption > span");
   await expect(values.first()).toHaveText("0.000");
   for (const i of [5, 6, 7, 8]) await expect(values.nth(i)).toHaveText("\u2013");
+});
+
+test("a recorded cost that is not finite is unknown, as the page writes it", () => {
+  const [header, first, second, last] = recording(0, 2).split("\n");
+  const withCost = (cost: string) => [header, first?.replace(/,0,,,$/, `,0,${cost},,`), second, last].join("\n");
+  for (const cost of ["inf", "-inf", "NaN", ""]) {
+    expect(readTrajectory(withCost(cost), "program.csv").rows.map((row) => row[ROW.cost])).toEqual([NaN, NaN]);
+  }
+  expect(() => readTrajectory(withCost("much"), "program.csv")).toThrow('line 2: "much" in the column cost');
+  expect(() => readTrajectory(withCost("").replace("0.00,0,", "0.00,NaN,"), "program.csv")).toThrow("phi_rad");
 });
 
 test("the reference of a long recording reaches its end on the floor", () => {
