@@ -95,7 +95,8 @@ function isTable(value: unknown): value is Table {
 
 function inline(value: unknown): string {
   if (typeof value === "number") {
-    if (Number.isFinite(value)) return String(value);
+    // Written with all its digits, a large float would be an integer, and none that can be read.
+    if (Number.isFinite(value)) return Number.isInteger(value) && !Number.isSafeInteger(value) ? value.toExponential() : String(value);
     return Number.isNaN(value) ? "nan" : value > 0 ? "inf" : "-inf";
   }
   if (typeof value === "string") return JSON.stringify(value);

@@ -2,9 +2,11 @@
 
 import { readFileSync } from "node:fs";
 import { expect, type Page } from "@playwright/test";
+import { parse } from "smol-toml";
 import { readTrajectory } from "../src/files";
 import { ROW } from "../src/layout";
 import { Playback } from "../src/playback";
+import { toToml } from "../src/scenario";
 import { clearMessage, drop, fill, fragment, openFile, openFlat, pass, pause, ready, saved, scenario, test, until } from "./page";
 
 test("a link holds the whole set-up", async ({ page, context }) => {
@@ -126,6 +128,11 @@ test("a recorded cost that is not finite is unknown, as the page writes it", () 
   }
   expect(() => readTrajectory(withCost("much"), "program.csv")).toThrow('line 2: "much" in the column cost');
   expect(() => readTrajectory(withCost("").replace("0.00,0,", "0.00,NaN,"), "program.csv")).toThrow("phi_rad");
+});
+
+test("a large whole number in a file can be read again", () => {
+  const parsed = (value: number) => parse(toToml({ value } as never))["value"];
+  for (const value of [1e20, -1e20, 2 ** 53, 2 ** 60, 1e300, Number.MAX_SAFE_INTEGER, 5, 0.1]) expect(parsed(value)).toBe(value);
 });
 
 test("the reference of a long recording reaches its end on the floor", () => {
