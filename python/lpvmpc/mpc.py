@@ -306,7 +306,7 @@ class Mpc:
             When they were taken, s, on any clock.
         readings
             By name, also as a Series of pandas, or in the order of ``estimator.measured``; one that is missing is left out,
-            None or NaN.
+            None, NaN or masked.
 
         Returns
         -------
@@ -330,8 +330,8 @@ class Mpc:
             given = [readings.get(name) for name in names]
         else:
             known = ordered("readings", readings, names)
-            given = list(np.atleast_1d(np.asarray(known, dtype=object)))
-        values = [None if one is None else number("readings", one) for one in given]
+            given = np.atleast_1d(np.ma.asarray(known, dtype=object)).tolist()  # None where masked
+        values = [None if one is None or np.ma.is_masked(one) else number("readings", one) for one in given]
         missing = [None if one is None or np.isnan(one) else one for one in values]
         verdicts = self._native.observe(number("t", t), missing)
         return dict(zip(names, verdicts, strict=True))

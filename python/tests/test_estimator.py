@@ -108,6 +108,18 @@ def test_readings_by_name_and_what_became_of_them():
     np.testing.assert_array_equal(mpc.estimate.x, 0)
 
 
+def test_masked_readings_are_missing():
+    """What stands behind the mask was taken for a reading."""
+    masked = np.ma.array([9.0, 0.1], mask=[True, False])
+    for readings in (masked, {"tip_position": np.ma.masked, "tilt": 0.1}, [np.ma.masked, 0.1]):
+        mpc = controller(estimator=estimator())
+        assert mpc.observe(0.0, readings) == {"tip_position": "missing", "tilt": "used"}
+    one, other = (controller(estimator=estimator()) for _ in range(2))
+    one.observe(0.0, masked)
+    other.observe(0.0, [None, 0.1])
+    assert (one.estimate.x == other.estimate.x).all()
+
+
 def test_readings_and_variances_of_pandas_are_taken_by_their_names():
     """They were taken by their order."""
     noise = {"rate": 1e-2, "speed": 1e-3, "tilt": 1e-6, "position": 1e-5}
