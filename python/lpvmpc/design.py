@@ -66,8 +66,9 @@ def lqr(
     of_x, of_u = names_of(plant.states), names_of(plant.inputs)
     t_s = number("t_s", t_s)
     at = plant.equilibrium or (np.zeros(len(of_x)), np.zeros(len(of_u)))
-    x_eq = at[0] if x is None else column("x", x, of_x)
-    u_eq = at[1] if u is None else column("u", u, of_u)
+    # Copies: the law keeps them.
+    x_eq = at[0] if x is None else column("x", x, of_x).copy()
+    u_eq = at[1] if u is None else column("u", u, of_u).copy()
     for place, given in (("x", x_eq), ("u", u_eq)):
         if not np.isfinite(given).all():
             raise SettingError(f"{place}: it has an entry that is not finite")

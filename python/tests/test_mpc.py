@@ -660,6 +660,14 @@ def test_what_has_names_is_taken_by_them():
             plan(wrong)
 
 
+def test_a_law_has_arrays_of_its_own():
+    """What a user changed later changed the law."""
+    x, u = np.zeros(2), np.zeros(1)
+    law = lpvmpc.lqr(double_integrator(), 0.1, [1, 1], [1], x=x, u=u)
+    x[0], u[0] = 5.0, 7.0
+    assert law.x.tolist() == [0, 0] and law(0.0, [0, 0]).tolist() == [0]
+
+
 def test_laws_and_costs_take_vectors_of_their_size():
     plant = lpvmpc.Plant.from_matrices([[0, 1], [0, 0]], [[0], [1]])
     law = lpvmpc.lqr(plant, 0.1, [1, 1], [1])
