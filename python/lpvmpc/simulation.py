@@ -260,6 +260,12 @@ def simulate(
             raise SettingError(
                 f"controller: it is for {known_to_it[0]} states and {known_to_it[1]} inputs; the plant has {n} and {m}"
             )
+        for what, ours, theirs in (("states", states, mpc._states), ("inputs", inputs, mpc._inputs)):
+            if any(name in theirs and name != theirs[i] for i, name in enumerate(names_of(ours))):
+                raise SettingError(
+                    f"controller: its {what} are {', '.join(theirs)}, and those of the plant {', '.join(names_of(ours))}; what "
+                    "has the same name must stand at the same place"
+                )
         if t_s is not None and t_s != mpc.t_s:
             raise SettingError(f"t_s: it is {t_s} s, and that of the controller {mpc.t_s} s")
         period = mpc.t_s

@@ -211,6 +211,17 @@ def test_what_makes_no_sense_is_refused(call, error, message):
         call(simulate)
 
 
+def test_a_controller_of_a_plant_with_its_names_in_another_order_is_refused():
+    """Its states were taken for each other."""
+    f, g = [[0, 1], [0, 0]], [[0], [1]]
+    mpc = lpvmpc.Mpc(lpvmpc.Plant.from_matrices(f, g, states=["position", "speed"]), 0.1, 10, [1, 0.1], [0.1])
+    turned = lpvmpc.Plant.from_matrices([[0, 0], [1, 0]], [[1], [0]], states=["speed", "position"])
+    with pytest.raises(lpvmpc.SettingError, match="controller: its states are position, speed, and those of the plant speed"):
+        lpvmpc.simulate(turned, mpc, [0, 1], 0.5)
+    # A plant may call them as it likes.
+    assert lpvmpc.simulate(lpvmpc.Plant.from_matrices(f, g), mpc, [1, 0], 0.5).is_solved
+
+
 def test_runs_and_plans_are_equal_to_themselves():
     run, other = (lpvmpc.simulate(cart_pole(), controller(), [0] * 4, 0.2) for _ in range(2))
     assert run == run and run != other and run.plans[0] != other.plans[0]
