@@ -179,7 +179,6 @@ fn a_goal_that_is_zero_everywhere_has_a_result() {
         "measure = \"largest_tilt_rad\"\nstatistic = \"worst\"",
         "statistic = \"failure_share\"",
     );
-    let tuning = edited(&tuning, "evaluations = 40", "evaluations = 12");
     fs::write(here.join("tuning.toml"), tuning).unwrap();
     succeed(here, &["tune", "tuning.toml", "--out", "out"]);
     assert_eq!(files(&here.join("out")), ALL);
