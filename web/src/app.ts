@@ -28,8 +28,6 @@ export interface AppEvents {
   asked(): void;
 }
 
-/** Targets further away than this are slips of the pen, m. */
-const FARTHEST = 1000;
 /** Time between two predictions that are kept, s. */
 const FAN_INTERVAL = 0.4;
 
@@ -274,14 +272,24 @@ export class App {
     this.afterChanges(() => this.sendTarget(place()));
   }
 
+  /** Says no to what a file or a link could hold, and nothing would read back. */
+  private isPlausible(what: string, pairs: PhiPair[], limit: "most_ball_angle" | "most_tilt_rate", unit: string, scale = 1): boolean {
+    const most = this.setup["accept_unusual_values"] === true ? Number.MAX_VALUE : (this.facts[0]?.[limit] ?? 0);
+    if (pairs.every(({ x, y }) => Math.abs(x) <= most && Math.abs(y) <= most)) return true;
+    this.events.message(`${what} must be numbers, at most ${Number((most * scale).toPrecision(4))} ${unit}.`, "error");
+    return false;
+  }
+
+  private arePlaces(places: PhiPair[]): boolean {
+    return this.isPlausible("The x and y of a target", places, "most_ball_angle", "m", this.radius);
+  }
+
   private sendTarget(at: FloorPoint): void {
     if (!this.takesOrders()) return;
-    if (!(Math.hypot(at.x, at.y) <= FARTHEST)) {
-      this.events.message(`A target must be numbers, at most ${FARTHEST} m away.`, "error");
-      return;
-    }
+    const phi = this.phi(at);
+    if (!this.arePlaces([phi])) return;
     this.ordered = at;
-    this.tell<"target">({ kind: "target", phi: this.phi(at) }, ({ time_s, replaced }) => this.live.target(at, time_s, replaced));
+    this.tell<"target">({ kind: "target", phi }, ({ time_s, replaced }) => this.live.target(at, time_s, replaced));
     this.run(true);
   }
 
@@ -292,9 +300,10 @@ export class App {
 
   private sendPath({ points, from }: { points: FloorPoint[]; from: FloorPoint }): void {
     if (!this.takesOrders()) return;
-    this.ordered = undefined;
     const timed = timedPath(points, from);
     const called = timed.map((point) => ({ time_s: point.time_s, phi: this.phi(point) }));
+    if (!this.arePlaces(called.map(({ phi }) => phi))) return;
+    this.ordered = undefined;
     this.tell<"path">({ kind: "path", points: called }, (taken) =>
       this.live.path(timed.map((point) => ({ ...point, time_s: taken.time_s + point.time_s }))));
     this.run(true);
@@ -307,10 +316,7 @@ export class App {
 
   private sendPush(towards: FloorPoint): void {
     if (!this.takesOrders()) return;
-    if (!Number.isFinite(towards.x + towards.y)) {
-      this.events.message("A push must be a number, in rad/s.", "error");
-      return;
-    }
+    if (!this.isPlausible("The x and y of a push", [towards], "most_tilt_rate", "rad/s")) return;
     // The body leans towards +x where theta is negative.
     const push = { x: -towards.x, y: -towards.y };
     this.tell<"push">({ kind: "push", push }, ({ time_s }) => this.live.push(push.x, push.y, time_s));

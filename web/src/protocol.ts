@@ -57,6 +57,10 @@ export interface Taken {
 /** What holds for a robot during a run. */
 export interface RobotFacts {
   label: string;
+  /** No set-up has a target further away, rad. */
+  most_ball_angle: number;
+  /** No set-up has a harder push, rad/s. */
+  most_tilt_rate: number;
   planes: number;
   sampling_time: number;
   horizon: number;

@@ -179,6 +179,8 @@ function configure(setups: RobotSetup[], keep: boolean): Answers["configure"] {
   }
   const facts = robots.map(({ label, simulation }) => ({
     label,
+    most_ball_angle: simulation.most_ball_angle(),
+    most_tilt_rate: simulation.most_tilt_rate(),
     planes: simulation.planes(),
     sampling_time: simulation.sampling_time(),
     horizon: simulation.horizon(),

@@ -2,7 +2,7 @@
 
 import { readFileSync } from "node:fs";
 import { expect, type Download, type Page } from "@playwright/test";
-import { atOnce, clearMessage, clock, fill, largest, open, openFile, openFlat, pass, pause, ready, saved, scenario, settled, table, test, until, type Table } from "./page";
+import { atOnce, clearMessage, clock, fill, largest, open, openFile, openFlat, pass, pause, ready, saved, scenario, setPush, settled, table, test, until, type Table } from "./page";
 import { beforeEnd, expectSameUntil } from "./program";
 
 /** Presses at a place of the scene (parts of its size), moves by pixels, lets go. */
@@ -131,11 +131,40 @@ test("targets that wait for a change are those that were meant", async ({ page }
 test("a target that is no place is refused", async ({ page }) => {
   await openFlat(page);
   await fill(page, "Target X", "1e300");
-  await expect(page.locator("#message")).toContainText("at most 1000 m");
+  await expect(page.locator("#message")).toContainText("at most 54 m");
   await clearMessage(page);
   await fill(page, "Target X", "");
-  await expect(page.locator("#message")).toContainText("at most 1000 m");
+  await expect(page.locator("#message")).toContainText("at most 54 m");
   await expect(page.locator("#play")).toHaveText("Run");
+});
+
+test("an order that no file may hold is refused when it is given, unless the set-up means it", async ({ page }) => {
+  await openFlat(page);
+  const toml = await saved(page, "Save TOML");
+  const far = async () => {
+    await clearMessage(page);
+    await fill(page, "Target X", "55");
+  };
+  const hard = async () => {
+    await clearMessage(page);
+    await setPush(page, 101);
+    await page.getByRole("button", { name: "\u2192" }).click();
+    await settled(page);
+  };
+  await far();
+  await expect(page.locator("#message")).toContainText("at most 54 m");
+  await hard();
+  await expect(page.locator("#message")).toContainText("at most 100 rad/s");
+  await expect(page.locator("#play")).toHaveText("Run");
+  expect(await saved(page, "Save TOML")).toBe(toml);
+  await openFile(page, "unusual.toml", `accept_unusual_values = true\n${toml}`);
+  await settled(page);
+  await far();
+  await hard();
+  const unusual = await saved(page, "Save TOML");
+  expect(unusual).toContain("theta_dot_rad_s = -101");
+  await openFile(page, "again.toml", unusual.replace(/^title = .*$/m, 'title = "again"'));
+  await expect(page.locator("#title")).toHaveText("again");
 });
 
 /** The page's robot and the program's see an order when it comes, not before. The run does not end before

@@ -13,6 +13,7 @@ mod from_js;
 mod layout;
 mod page_files;
 
+use ballbot_scenario::plausible::{BALL_ANGLE, TILT_RATE};
 use ballbot_scenario::{Phase, PhiReference, PointTable, Prepared, Scenario, Session};
 use layout::{NOW, Now, ROW, row};
 use page_files::PageFiles;
@@ -201,6 +202,16 @@ impl Simulation {
         let replaced = self.session.set_targets(&[phi_x, phi_y]);
         let replaced = replaced.map_err(|error| error.to_string())?;
         Ok(replaced.into_iter().map(u8::from).collect())
+    }
+
+    /// A target further away is no ballbot's, and a file with it is refused, rad.
+    pub fn most_ball_angle(&self) -> f64 {
+        BALL_ANGLE.most
+    }
+
+    /// The same of a push, rad/s.
+    pub fn most_tilt_rate(&self) -> f64 {
+        TILT_RATE.most
     }
 
     /// From now on the ball has to follow straight lines between these angles, at these times.
