@@ -75,6 +75,8 @@ export class Live {
         { rates: { plane: "x", time_s, theta_dot_rad_s: theta_x } },
         ...(planes === 2 ? [{ rates: { plane: "y", time_s, theta_dot_rad_s: theta_y } }] : []),
       ]);
+      // A world that is there for the pushes alone is still ideal: without a plan the run ends.
+      if (made["world"] === undefined) made = withValue(made, "world.without_plan", "end");
       made = withValue(made, "world.pushes", [...(world.pushes ?? []), ...rates]);
     }
     return made;

@@ -3,7 +3,7 @@
 import { expect } from "@playwright/test";
 import { followed } from "../src/pictures";
 import { clock, drop, fill, fragment, open, openFile, openFlat, openSection, pass, pause, saved, scenario, setPush, table, test, until } from "./page";
-import { beforeEnd, expectSameUntil } from "./program";
+import { beforeEnd, expectSameUntil, simulated } from "./program";
 
 test("without the control loop's program the page says so", async ({ page }) => {
   await page.route("**/worker*.js", (route) => route.abort());
@@ -39,6 +39,21 @@ for (const name of ["tight-bounds", "lissajous"]) {
     await expect(page.locator("#message")).toContainText("End of the recording", { timeout: 30_000 });
   });
 }
+
+test("without a plan after a push, the file of an ideal world ends as the run did", async ({ page }) => {
+  await openFlat(page);
+  await scenario(page, "tight-bounds");
+  await page.locator("#play").click();
+  await until(page, 0.4);
+  await setPush(page, 8);
+  await page.getByRole("button", { name: "\u2192" }).click();
+  const ended = /no plan at t = ([\d.]+) s/;
+  await expect(page.locator("#alert")).toContainText(ended);
+  const [words = "", time] = ended.exec((await page.locator("#alert").textContent()) ?? "") ?? [];
+  const [csv, toml] = [await saved(page, "Save CSV"), await saved(page, "Save TOML")];
+  expectSameUntil(Number(time) - 1e-6, csv, toml);
+  expect(simulated(toml)("trajectory.csv")).toContain(words);
+});
 
 test("a push by hand stands in the file at its time", async ({ page }) => {
   await openFlat(page);

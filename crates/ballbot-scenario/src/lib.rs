@@ -45,7 +45,7 @@ pub use file::schema::{
 };
 pub use file::world_table::{
     ActuatorTable, AngleSensorTable, DelayTable, DeviationsTable, FloorTable, PlaneName, PushTable,
-    RateSensorTable, SensorsTable, WorldTable,
+    RateSensorTable, SensorsTable, WithoutPlan, WorldTable,
 };
 pub use prepare::excitation::Excitation;
 pub use prepare::files::Files;

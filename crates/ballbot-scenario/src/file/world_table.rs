@@ -14,6 +14,8 @@ pub struct WorldTable {
     /// whole fraction of it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensor_period_s: Option<f64>,
+    /// What happens when the controller has no plan.
+    pub without_plan: WithoutPlan,
     /// The sensors.
     pub sensors: SensorsTable,
     /// The drive.
@@ -38,6 +40,17 @@ pub struct WorldTable {
     /// What pushes the robot.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pushes: Vec<PushTable>,
+}
+
+/// What happens in a world when the controller has no plan.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WithoutPlan {
+    /// The torque that comes with the answer is applied.
+    #[default]
+    Apply,
+    /// The run ends, as in an ideal world.
+    End,
 }
 
 /// The sensors of a plane.

@@ -3,7 +3,7 @@
 use crate::error::ScenarioError;
 use crate::file::world_table::{
     ActuatorTable, AngleSensorTable, PlaneName, PushTable, RateSensorTable, SensorsTable,
-    WorldTable,
+    WithoutPlan, WorldTable,
 };
 use crate::number::{check, finite, not_negative, positive};
 use crate::prepare::excitation::Excitation;
@@ -142,7 +142,10 @@ impl WorldTable {
                 seed,
                 tolerances,
             },
-            without_plan: OnInfeasible::Apply,
+            without_plan: match self.without_plan {
+                WithoutPlan::Apply => OnInfeasible::Apply,
+                WithoutPlan::End => OnInfeasible::End,
+            },
             range: upright(),
             excitation: self.excitation(plane, files)?,
         })

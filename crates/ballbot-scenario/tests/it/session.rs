@@ -1,8 +1,8 @@
 //! A scenario run step by step is the run at once, and a person can take part in it.
 
 use ballbot_scenario::{
-    Phase, PointTable, Prepared, ReferenceTable, RunHooks, Scenario, ScenarioError, Session,
-    ShapingTable, TerminalTable, TorqueRateTable,
+    Phase, PlaneName, PointTable, Prepared, PushTable, ReferenceTable, RunHooks, Scenario,
+    ScenarioError, Session, ShapingTable, TerminalTable, TorqueRateTable, WithoutPlan, WorldTable,
 };
 use std::path::Path;
 use std::time::Duration;
@@ -145,6 +145,34 @@ fn a_fall_has_one_sample_per_period_in_every_plane() {
             assert!((t - k as f64 * t_s).abs() < 1e-9, "{name}, sample {k}: {t}");
         }
     }
+}
+
+/// Who pushes a robot in an ideal world writes a world into the file.
+#[test]
+fn a_world_that_ends_without_a_plan_has_the_run_of_an_ideal_one() {
+    let mut scenario = Scenario::load("tight-bounds").unwrap();
+    let mut by_hand = Session::new(prepared(&scenario).unwrap()).unwrap();
+    by_hand.push(0, 0.0, 8.0).unwrap();
+    let times = times_until_down(&mut by_hand);
+    let mut from_file = |without_plan| {
+        scenario.world = Some(WorldTable {
+            without_plan,
+            pushes: vec![PushTable::Rates {
+                plane: PlaneName::X,
+                time_s: 0.0,
+                phi_dot_rad_s: 0.0,
+                theta_dot_rad_s: 8.0,
+            }],
+            ..WorldTable::default()
+        });
+        Session::new(prepared(&scenario).unwrap()).unwrap()
+    };
+    let mut ending = from_file(WithoutPlan::End);
+    assert_eq!(times_until_down(&mut ending), times);
+    assert_eq!(ending.fall_in_words(), by_hand.fall_in_words());
+    let mut going_on = from_file(WithoutPlan::Apply);
+    times_until_down(&mut going_on);
+    assert_ne!(going_on.fall_in_words(), by_hand.fall_in_words());
 }
 
 #[test]
