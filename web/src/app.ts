@@ -289,7 +289,7 @@ export class App {
     const phi = this.phi(at);
     if (!this.arePlaces([phi])) return;
     this.ordered = at;
-    this.tell<"target">({ kind: "target", phi }, ({ time_s, replaced }) => this.live.target(at, time_s, replaced));
+    this.tell<"target">({ kind: "target", phi }, ({ time_s, dropped }) => this.live.target(at, time_s, dropped));
     this.run(true);
   }
 

@@ -36,14 +36,18 @@ const AXES: Axis[] = ["x", "y"];
 
 export class Live {
   private orders: Record<Axis, Order[]> = { x: [], y: [] };
+  /** The last of the scenario's set points whose smooth moves had not begun at the first order. */
+  private waiting: Record<Axis, number> = { x: 0, y: 0 };
   private pushes: { time_s: number; x: number; y: number }[] = [];
 
-  /** `replaced`, per plane: it takes the place of the one before, whose move had not begun. */
-  target(at: FloorPoint, time_s: number, replaced: boolean[]): void {
+  /** `dropped`, per plane: moves before this one that had not begun. */
+  target(at: FloorPoint, time_s: number, dropped: number[]): void {
     for (const [plane, axis] of AXES.entries()) {
       const orders = this.orders[axis];
+      const moves = dropped[plane] ?? 0;
+      if (orders.length === 0) this.waiting[axis] = moves;
       // A drag is one target: where it ended.
-      if (replaced[plane] || orders.at(-1)?.[0]?.time_s === time_s || orders.length >= MOST_EVENTS) orders.pop();
+      else if (moves > 0 || orders.at(-1)?.[0]?.time_s === time_s || orders.length >= MOST_EVENTS) orders.pop();
       orders.push([{ time_s, place: at[axis] }]);
     }
   }
@@ -59,6 +63,7 @@ export class Live {
 
   clear(): void {
     this.orders = { x: [], y: [] };
+    this.waiting = { x: 0, y: 0 };
     this.pushes = [];
   }
 
@@ -90,7 +95,11 @@ export class Live {
     const { reference } = setup as { reference: { set_points?: { points: Point[] }; planes?: { x: Reference; y: Reference } } };
     const own = (reference.planes?.[axis] ?? (axis === "x" ? reference : {})) as { set_points?: { points: Point[] } };
     const first = orders[0]?.[0]?.time_s ?? 0;
-    const before = (own.set_points?.points ?? [{ time_s: 0, phi_rad: 0 }]).filter(({ time_s }) => time_s < first);
+    const points = own.set_points?.points ?? [{ time_s: 0, phi_rad: 0 }];
+    const before = points.slice(0, points.length - this.waiting[axis]).filter(({ time_s }) => time_s < first);
+    // Where it was before all points is where the first move begins.
+    const start = points[0];
+    if (before.length === 0 && start && (first > 0 || setup.controller["shaping"])) before.push({ ...start, time_s: first - STEP });
     const all = [...before.map((point) => [point]), ...orders];
     return all.every(({ length }) => length === 1) ? { set_points: { points: all.flat() } } : { lines: { points: joined(all) } };
   }

@@ -41,8 +41,9 @@ export interface Answers {
   };
   step: null;
   target: Taken & {
-    /** Per plane: it takes the place of a target whose smooth move had not begun. */
-    replaced: boolean[];
+    /** Per plane: smooth moves that had not begun and are dropped for this one; at the first target those
+     *  of the scenario's own set points. */
+    dropped: number[];
   };
   path: Taken;
   push: Taken;

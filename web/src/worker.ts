@@ -224,7 +224,7 @@ function answer(call: Call): unknown {
       const taken = robots.map(({ simulation }) => simulation.set_target(call.phi.x, call.phi.y));
       referencesChanged = true;
       send();
-      return { time_s: timeOfOrder(), replaced: Array.from(taken[0] ?? [], (plane) => plane !== 0) };
+      return { time_s: timeOfOrder(), dropped: Array.from(taken[0] ?? []) };
     }
     case "path": {
       const from = timeOfOrder();

@@ -197,12 +197,16 @@ test("targets stand in the file as they were given", async ({ page }) => {
   expectSameUntil(changed, csv, toml.replace("horizon = 30", "horizon = 20"));
 });
 
-test("smooth moves are those of the file", async ({ page }) => {
-  await openFlat(page);
-  await blind(page, "single-setpoint");
+async function moveSmoothly(page: Page): Promise<void> {
   await page.locator(".panel").getByLabel("Terminal", { exact: true }).selectOption("discrete_riccati");
   await page.evaluate(() => document.querySelectorAll("details").forEach((section) => (section.open = true)));
   await page.locator(".panel").getByLabel("Set points as smooth moves", { exact: true }).check();
+}
+
+test("smooth moves are those of the file", async ({ page }) => {
+  await openFlat(page);
+  await blind(page, "single-setpoint");
+  await moveSmoothly(page);
   await page.locator("#play").click();
   await until(page, 0.4);
   await fill(page, "Target X", "0.4");
@@ -216,6 +220,34 @@ test("smooth moves are those of the file", async ({ page }) => {
   const steepest = Math.max(...reference.slice(1).map((value, i) => Math.abs(value - (reference[i] ?? value))));
   expect(steepest).toBeGreaterThan(0.05);
   expect(steepest).toBeLessThan(0.45);
+  expectSameUntil(beforeEnd(csv), csv, await saved(page, "Save TOML"));
+});
+
+test("set points whose smooth moves waited at the first target are not in the file", async ({ page }) => {
+  await openFlat(page);
+  await blind(page, "single-setpoint");
+  const points = "points = [{ time_s = 0.0, phi_rad = 0.0 }, { time_s = 0.1, phi_rad = 3.0 }, { time_s = 0.2, phi_rad = -2.0 }]";
+  const toml = (await saved(page, "Save TOML")).replace(/points = \[[^]*?\]$/m, points).replace('"endless"', '"three points"');
+  await openFile(page, "points.toml", toml);
+  await expect(page.locator("#title")).toHaveText("three points");
+  await moveSmoothly(page);
+  await page.locator("#play").click();
+  await until(page, 0.4);
+  await fill(page, "Target X", "0.2");
+  await pass(page, 2);
+  await pause(page);
+  const csv = await saved(page, "Save CSV");
+  expectSameUntil(beforeEnd(csv), csv, await saved(page, "Save TOML"));
+});
+
+test("a smooth move that is ordered before the run begins where the set-up does, in the file, too", async ({ page }) => {
+  await openFlat(page);
+  await blind(page, "single-setpoint");
+  await moveSmoothly(page);
+  await fill(page, "Target X", "0.4");
+  await pass(page, 1);
+  await pause(page);
+  const csv = await saved(page, "Save CSV");
   expectSameUntil(beforeEnd(csv), csv, await saved(page, "Save TOML"));
 });
 

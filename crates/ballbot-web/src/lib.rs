@@ -193,15 +193,15 @@ impl Simulation {
         matches!(self.session.phase(), Phase::Down(_))
     }
 
-    /// From now on the ball has to go to these angles. Says of each plane whether (1) or not (0) this
-    /// takes the place of an order whose smooth move had not begun.
+    /// From now on the ball has to go to these angles. Says of each plane how many smooth moves that had
+    /// not begun are dropped for this one.
     ///
     /// # Errors
     /// A number that is not finite.
-    pub fn set_target(&mut self, phi_x: f64, phi_y: f64) -> Result<Vec<u8>, String> {
-        let replaced = self.session.set_targets(&[phi_x, phi_y]);
-        let replaced = replaced.map_err(|error| error.to_string())?;
-        Ok(replaced.into_iter().map(u8::from).collect())
+    pub fn set_target(&mut self, phi_x: f64, phi_y: f64) -> Result<Vec<u32>, String> {
+        let dropped = self.session.set_targets(&[phi_x, phi_y]);
+        let dropped = dropped.map_err(|error| error.to_string())?;
+        Ok(dropped.into_iter().map(|moves| moves as u32).collect())
     }
 
     /// A target further away is no ballbot's, and a file with it is refused, rad.

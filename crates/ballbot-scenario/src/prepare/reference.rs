@@ -83,19 +83,25 @@ impl PhiReference {
     }
 
     /// Makes `point` the goal from its time on: at once, or within `limits` by a smooth move that
-    /// begins when the one under way has ended. What was to come later is dropped; says whether a
-    /// move was.
-    pub(crate) fn redirect(&mut self, point: PointTable, limits: Option<MoveLimits<f64>>) -> bool {
+    /// begins when the one under way has ended. What was to come later is dropped; says how many
+    /// moves.
+    pub(crate) fn redirect(&mut self, point: PointTable, limits: Option<MoveLimits<f64>>) -> usize {
         let Some(limits) = limits else {
             *self = Self::Steps(vec![point]);
-            return false;
+            return 0;
         };
         let now = point.time_s;
         let (mut from, mut free) = (self.at(now), now);
         let begun = |(begin, _): &(f64, _)| *begin < now - SAME_TIME;
         let (under_way, dropped) = match self {
-            Self::Moves(moves) => (moves.iter().copied().rfind(begun), !moves.iter().all(begun)),
-            _ => (None, false),
+            Self::Moves(moves) => {
+                let under_way = moves.iter().copied().rfind(begun);
+                (
+                    under_way,
+                    moves.iter().filter(|planned| !begun(planned)).count(),
+                )
+            }
+            _ => (None, 0),
         };
         if let Some((begin, planned)) = under_way {
             (from, free) = (planned.to, now.max(begin + planned.duration));

@@ -337,23 +337,24 @@ impl Session {
 
     /// From now on phi of each plane has to go to these values, rad: at once, or by a smooth move
     /// where the scenario asks for that. What is beyond the robot's planes is not heard. Says
-    /// of each plane whether this order takes the place of one whose move had not begun.
+    /// of each plane how many smooth moves that had not begun are dropped for this one: of the
+    /// order before or, at the first order, of the scenario's own set points.
     ///
     /// # Errors
     /// A target that is not a finite number.
-    pub fn set_targets(&mut self, targets: &[f64]) -> Result<Vec<bool>, ScenarioError> {
+    pub fn set_targets(&mut self, targets: &[f64]) -> Result<Vec<usize>, ScenarioError> {
         for target in targets {
             finite("target", *target)?;
         }
         let time_s = self.time();
-        let (moves, ordered) = (self.prepared.moves, self.ordered);
+        let moves = self.prepared.moves;
         self.ordered = true;
         let planes = self.prepared.planes.iter_mut().zip(targets);
-        let replaced = planes.map(|(plane, &phi_rad)| {
+        let dropped = planes.map(|(plane, &phi_rad)| {
             let point = PointTable { time_s, phi_rad };
-            plane.reference.redirect(point, moves) && ordered
+            plane.reference.redirect(point, moves)
         });
-        Ok(replaced.collect())
+        Ok(dropped.collect())
     }
 
     /// From now on the planes follow these references; their times count from the beginning of

@@ -209,12 +209,12 @@ fn targets_become_smooth_moves_where_the_scenario_asks_for_them() {
     scenario.reference = points(&[(0.0, 0.0)]);
     let mut by_hand = Session::new(prepared(&scenario).unwrap()).unwrap();
     run_until(&mut by_hand, 1.0);
-    assert_eq!(by_hand.set_targets(&[2.0]).unwrap(), [false]);
+    assert_eq!(by_hand.set_targets(&[2.0]).unwrap(), [0]);
     run_until(&mut by_hand, 1.5);
     // The second one waits for the first move's end, the third takes its place.
-    assert_eq!(by_hand.set_targets(&[5.0]).unwrap(), [false]);
+    assert_eq!(by_hand.set_targets(&[5.0]).unwrap(), [0]);
     run_until(&mut by_hand, 1.6);
-    assert_eq!(by_hand.set_targets(&[-1.0]).unwrap(), [true]);
+    assert_eq!(by_hand.set_targets(&[-1.0]).unwrap(), [1]);
     scenario.reference = points(&[(0.0, 0.0), (1.0, 2.0), (1.6, -1.0)]);
     let mut from_file = Session::new(prepared(&scenario).unwrap()).unwrap();
     run_until(&mut from_file, 1.6);
@@ -231,6 +231,24 @@ fn targets_become_smooth_moves_where_the_scenario_asks_for_them() {
     let after = by_hand.reconfigured(prepared(&scenario).unwrap()).unwrap();
     assert_eq!(after.targets().next().unwrap(), before);
     assert!(by_hand.set_targets(&[f64::NAN]).is_err());
+}
+
+#[test]
+fn the_first_order_drops_the_set_points_whose_moves_wait() {
+    let mut scenario = Scenario::load("single-setpoint").unwrap();
+    scenario.controller.shaping = Some(ShapingTable {
+        tilt_rad: 0.05,
+        phi_dot_rad_s: 3.0,
+    });
+    let points = [(0.0, 0.0), (0.1, 3.0), (0.2, -2.0), (0.3, 1.0)];
+    scenario.reference = ReferenceTable::SetPoints {
+        points: points
+            .map(|(time_s, phi_rad)| PointTable { time_s, phi_rad })
+            .to_vec(),
+    };
+    let mut session = Session::new(prepared(&scenario).unwrap()).unwrap();
+    run_until(&mut session, 0.5);
+    assert_eq!(session.set_targets(&[2.0]).unwrap(), [2]);
 }
 
 #[test]
