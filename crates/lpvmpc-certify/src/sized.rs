@@ -21,6 +21,8 @@ const MOST_LOWERED: u32 = 3;
 const MOST_HALVINGS: i32 = 8;
 /// What an equilibrium that is not exact is claimed to be known to, at best.
 const NEARLY: f64 = 1e-15;
+/// And from where the plant stands a claim's equilibrium may be as far as this, beside its size: what solving for it leaves.
+const FARTHEST: f64 = 1e-9;
 /// Up to so many states a box takes milliseconds, beyond up to a second.
 const FEW_STATES: usize = 8;
 /// A level that is higher by less is not worth a proof.
@@ -231,6 +233,14 @@ pub(crate) fn verify<const NX: usize, const NU: usize, const NS: usize>(
         if !(value.is_finite() && *within >= 0.0 && within.is_finite()) {
             let fault = "it must have finite numbers, and distances that are not negative";
             return Err(CertifyError::setting("equilibrium", fault));
+        }
+        // The law is about the numbers of the file, and the proof about where the plant stands.
+        let most = FARTHEST * (1.0 + value.abs());
+        if *within > most {
+            let fault = format!(
+                "the plant may stand {within} away from {value}; a claim about that number must be within {most}"
+            );
+            return Err(CertifyError::setting("equilibrium.within", fault));
         }
     }
     if !(certificate.t_s > 0.0 && certificate.t_s.is_finite()) {

@@ -238,6 +238,10 @@ impl Program {
             }
             _ => {}
         }
+        // That of zero and zero is zero for a plant, and any number from -1 to 1 as a slope.
+        if function == Binary::Bivariate(Bivariate::MeanSign) {
+            return None;
+        }
         let at = self.binary(function, x.at, y.at)?;
         if x.is_fixed() && y.is_fixed() {
             return Some(fixed(at, at));

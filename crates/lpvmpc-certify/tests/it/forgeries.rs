@@ -49,7 +49,15 @@ fn false_claims_are_told_from_those_that_could_not_be_shown() {
 
 #[test]
 fn what_makes_no_sense_is_refused() {
-    let cases: [(Forge, &str); 12] = [
+    let cases: [(Forge, &str); 13] = [
+        // Proved where the plant stands, which the law is not about.
+        (
+            |c| {
+                c.equilibrium.x[1] += 0.01;
+                c.equilibrium.within = vec![1e3; 3];
+            },
+            "equilibrium.within: the plant may stand 1000 away",
+        ),
         (|c| c.level = f64::NAN, "terminal.level"),
         (|c| c.level = -1.0, "terminal.level"),
         (|c| c.p[0][1] += 1e-9, "terminal.p is not symmetric"),

@@ -317,6 +317,11 @@ fn what_has_no_form_is_refused_by_its_place() {
             r#"["sinc", 0]"#,
             "`sinc`: no exact difference of it is known",
         ),
+        // Of zero and zero it is zero; as a slope any number from -1 to 1 would do.
+        (
+            r#"["mean_sign", 3, 3]"#,
+            "`mean_sign`: no exact difference of it is known",
+        ),
     ] {
         let ends = [(0.4, 0.4), (0.5, 0.5), (0.4, 0.4)];
         let refused = AboutEquilibrium::<2, 1, 3>::new(&plant(operation), &ends, 1.0);
