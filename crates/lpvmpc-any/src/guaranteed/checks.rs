@@ -5,6 +5,7 @@ use crate::error::MpcError;
 use crate::estimator::EstimatorSettings;
 use crate::settings::{Limits, MpcSettings, TerminalSet};
 use lpvmpc_plant::PlantData;
+use nalgebra::DMatrix;
 
 /// Whether the set is one for the plant, and for these settings.
 pub(super) fn check(
@@ -115,9 +116,7 @@ fn check_settings(settings: &MpcSettings, set: &TerminalSet) -> Result<(), MpcEr
             // Named with the weights.
             continue;
         }
-        let rest = proved - own;
-        let smallest = rest.symmetric_eigenvalues().min();
-        if !(smallest >= -1e-12 * proved.amax()) {
+        if !is_at_most(own, proved) {
             let fault = "it is larger than the certificate's, for which alone the decrease of the cost is proved";
             return Err(MpcError::new(place, fault));
         }
@@ -136,4 +135,15 @@ fn check_settings(settings: &MpcSettings, set: &TerminalSet) -> Result<(), MpcEr
         }
     }
     Ok(())
+}
+
+/// Whether `proved` - `own` is positive semidefinite, up to rounding of each weight by itself: they are of as many units as
+/// there are states, so none is rounding beside another.
+fn is_at_most(own: &DMatrix<f64>, proved: &DMatrix<f64>) -> bool {
+    let size = |i: usize| own[(i, i)].max(proved[(i, i)]).sqrt();
+    let unit = |i: usize| if size(i) > 0.0 { size(i) } else { 1.0 };
+    let rest = DMatrix::from_fn(own.nrows(), own.ncols(), |i, j| {
+        (proved[(i, j)] - own[(i, j)]) / unit(i) / unit(j)
+    });
+    rest.symmetric_eigenvalues().min() >= -1e-12
 }

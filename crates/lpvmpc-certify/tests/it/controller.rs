@@ -134,7 +134,17 @@ fn what_the_certificate_is_not_for_is_refused() {
             upper: vec![10.0, 0.05, 10.0, 10.0],
         });
     };
-    let cases: [(Change, &str); 6] = [
+    let cases: [(Change, &str); 7] = [
+        // Little beside the largest weight, and of another unit.
+        (
+            |s| {
+                if let Terminal::Certified(set) = &mut s.terminal {
+                    set.q[(0, 0)] = 1e12;
+                }
+                s.q[(3, 3)] += 0.1;
+            },
+            "q: it is larger than the certificate's",
+        ),
         (
             |s| s.t_s = 0.04,
             "t_s: it is 0.04 s, that of the certificate 0.05 s",
