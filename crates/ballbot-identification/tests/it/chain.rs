@@ -8,7 +8,7 @@ pub fn identified(laboratory: &Laboratory, seed: u64, config: &str) -> Identific
     identified_from(&csv(&laboratory.record(seed)), config)
 }
 
-fn identified_from(text: &str, config: &str) -> Identification {
+pub fn identified_from(text: &str, config: &str) -> Identification {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");
     std::fs::write(&path, text).unwrap();

@@ -1,7 +1,8 @@
 //! What is between two stretches of a log does not reach into them.
 
+use crate::chain::identified_from;
 use crate::laboratory::{Laboratory, Record, csv, healthy};
-use ballbot_identification::{Config, Identification, Parameter, Verdict, identify, log};
+use ballbot_identification::{Parameter, Verdict};
 
 fn laboratory() -> Laboratory {
     Laboratory {
@@ -9,17 +10,6 @@ fn laboratory() -> Laboratory {
         duration: 16.0,
         ..healthy()
     }
-}
-
-fn identified(text: &str, config: &str) -> Identification {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("log.csv");
-    std::fs::write(&path, text).unwrap();
-    let config = Config::parse(config).unwrap();
-    let recording = log::recording(&path, &config.log, &|_| ()).unwrap();
-    let choices = config.choices().unwrap();
-    let robot = identify(vec![recording], &config, choices, &|_| {}).unwrap();
-    robot.first().clone()
 }
 
 /// The record with its clock set anew, or ahead, after half of the rows.
@@ -42,8 +32,8 @@ fn a_clock_that_begins_anew_is_no_other_robot() {
     };
     let record = laboratory.record(3);
     let config = "[fit]\nheld_back = 0.0";
-    let ahead = identified(&with_clock(&record, 40.0), config);
-    let anew = identified(&with_clock(&record, -8.0), config);
+    let ahead = identified_from(&with_clock(&record, 40.0), config);
+    let anew = identified_from(&with_clock(&record, -8.0), config);
     assert_eq!(anew.simulated.len(), ahead.simulated.len());
     for parameter in Parameter::ALL {
         let (found, right) = (
@@ -76,7 +66,7 @@ fn a_missing_torque_is_not_read_by_the_segment_after_it() {
         let text = csv(&record).replace("NaN", "");
         let config =
             format!("[fit]\nheld_back = 0.0\n[parameters]\ndelay_s = {{ fixed = {delay:?} }}");
-        let found = identified(&text, &config);
+        let found = identified_from(&text, &config);
         for segment in &found.simulated {
             assert_eq!(segment.simulated.len(), segment.time.len(), "{delay} s");
         }
