@@ -85,12 +85,13 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
         let mut slope = product(r, &u) + product(s, x) + stage.linear_u + through + slope_u;
         let terms = transposed_sizes(&stage.b, &sizes);
         residual.largest = residual.largest.max(largest(&terms)).max(largest(&slope_u));
-        let terms = terms + slope_u.abs();
+        let mut most = T::zero();
         for side in here.iter_mut().filter(|side| side.role == Role::Held) {
             side.estimate = match side.input() {
                 None => side.base,
                 Some(j) => side.sign * core::mem::replace(&mut slope[j], T::zero()),
             };
+            most = most.max(side.excess());
         }
         residual.rest = residual.rest.max(largest(&slope));
         costate = transposed_times(&stage.a, &costate)
@@ -101,7 +102,10 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
             costate += transposed_product(&factor.feedback, &slope);
         }
         sizes = costate.abs() + slope_x.abs();
-        residual.contradicted |= here.iter().any(|side| contradicts(side, &sizes, &terms));
+        if most > T::zero() {
+            let terms = terms + slope_u.abs();
+            residual.contradicted |= here.iter().any(|side| contradicts(side, &sizes, &terms));
+        }
         costate += slope_x;
         *left = slope;
     }
