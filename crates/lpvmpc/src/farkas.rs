@@ -22,7 +22,7 @@ const ROUNDINGS: f64 = 100.0;
 /// ```
 ///
 /// which would be at most zero at a feasible point. The result is its least value over the inputs
-/// within their bounds; where an input has no bound, its g must vanish, up to
+/// within their bounds; where an input has no bound, or one of 1e20 or more, its g must vanish, up to
 /// eps^(2/3) of its terms. After
 /// [`Status::Infeasible`](crate::Status::Infeasible) the solution's active rows are such a proof.
 /// A `proof` with a soft bound or a multiplier of the wrong sign proves nothing: minus infinity.
@@ -67,7 +67,7 @@ pub fn infeasibility_margin<T: Scalar, const NX: usize, const NU: usize>(
                 bounds.upper[j]
             };
             largest = largest.max(*terms);
-            if limit.is_finite() {
+            if rows::is_limit(limit) {
                 least += *slope * limit;
                 size += *terms * limit.abs();
             } else if !(slope.abs() <= rounding * largest) {

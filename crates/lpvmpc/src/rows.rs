@@ -50,6 +50,13 @@ fn room_of_bound<T: Scalar>(lower: T, upper: T) -> T {
 
 /// Limits of this magnitude, and of so many times the other one, stand for none.
 const FAR: f64 = 1e10;
+/// And of this one, whatever the other is: programs without infinity write none as 1e20 or 1e30.
+const NONE: f64 = 1e20;
+
+/// Whether what is bounded stops at this limit.
+pub(crate) fn is_limit<T: Scalar>(limit: T) -> bool {
+    limit.abs() < convert(NONE)
+}
 
 /// The size against which a violation is measured: the larger limit, or 1, but for one that is so far away that it
 /// stands for none.

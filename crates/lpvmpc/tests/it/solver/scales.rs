@@ -4,7 +4,7 @@ use super::support::{capacity, cold, solve};
 use lpvmpc::{
     List, Ocp, Solution, Solver, SolverSettings, Status, WarmStart, infeasibility_margin,
 };
-use nalgebra::{Matrix1, Matrix2, Matrix2x1, Vector1, Vector2};
+use nalgebra::{Matrix1, Matrix2, Matrix2x1, Matrix3, Vector1, Vector2, Vector3};
 
 /// x+ = b u over `n` stages, each by itself: the costs q x^2 / 2 + w x and r u^2 / 2, and x within these limits.
 fn apart(n: usize, b: f64, (q, r): (f64, f64), w: f64, limits: (f64, f64)) -> Ocp<f64, 1, 1> {
@@ -102,6 +102,30 @@ fn a_proof_of_two_units_is_one() {
         solution.status
     );
     assert!(infeasibility_margin(&ocp, &solution.active) > 0.0);
+}
+
+/// What rounding leaves of a slope that vanishes, times a limit of 1e30 that stands for none, took the proof away.
+#[test]
+fn a_limit_that_stands_for_none_has_no_part_in_a_proof() {
+    for none in [f64::INFINITY, 1e20, 1e30, f64::MAX] {
+        let mut ocp = Ocp::<f64, 3, 1>::allocate(1);
+        ocp.x0 = Vector3::new(0.3, 0.7, -0.2);
+        ocp.stages[0].a = Matrix3::new(0.9, 0.3, 0.1, -0.2, 0.8, 0.4, 0.1, -0.3, 0.7);
+        ocp.stages[0].b = Vector3::new(0.7, 0.37, -0.13);
+        (ocp.common.q, ocp.common.r) = (Matrix3::identity(), Matrix1::new(1.0));
+        (ocp.common.u.lower[0], ocp.common.u.upper[0]) = (-none, none);
+        // One input cannot lead to three states.
+        ocp.terminal.x.lower = Vector3::new(0.9, -0.8, 0.5);
+        ocp.terminal.x.upper = Vector3::new(1.0, -0.7, 0.6);
+        let solution = solve(&ocp);
+        assert!(
+            matches!(solution.status, Status::Infeasible(_)),
+            "{none}: {}",
+            solution.status
+        );
+        assert!(infeasibility_margin(&ocp, &solution.active) > 0.0);
+        assert!(solution.u[0][0].is_finite());
+    }
 }
 
 /// A lower bound of plus infinity, which no number meets, was none where many bounds are active.
