@@ -4,6 +4,7 @@
 use crate::error::TuningError;
 use crate::judge::Ran;
 use crate::tuning::{Tuning, changes};
+use crate::values::{from_json, to_json};
 use ballbot_campaign::{Campaign, CampaignError};
 use ballbot_scenario::Files;
 use rayon::prelude::*;
@@ -37,14 +38,10 @@ pub struct Batch {
 impl Batch {
     /// Candidates in worlds, one candidate after the other.
     pub(crate) fn of(worlds: Worlds, candidates: &[&[Value]], range: Range<u64>) -> Self {
-        let json = |value: &Value| serde_json::to_value(value).unwrap_or_default();
         let each = |place| range.clone().map(move |world| (place, world));
         Self {
             worlds,
-            candidates: candidates
-                .iter()
-                .map(|values| values.iter().map(json).collect())
-                .collect(),
+            candidates: candidates.iter().map(|values| to_json(values)).collect(),
             loops: (0..candidates.len()).flat_map(each).collect(),
         }
     }
@@ -131,12 +128,4 @@ impl<'a, F: Files + Copy + Sync> Tuning<'a, F> {
         });
         Ok(ran.collect::<Result<_, _>>()?)
     }
-}
-
-/// Values as they stand in TOML. What came from it goes back into it.
-pub(crate) fn from_json(values: &[serde_json::Value]) -> Vec<Value> {
-    let values = values.iter();
-    values
-        .filter_map(|value| Value::try_from(value).ok())
-        .collect()
 }

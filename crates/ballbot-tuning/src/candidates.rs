@@ -6,6 +6,7 @@ use crate::journal::{Entry, Journal, State};
 use crate::judge::{Judged, Outcome, Ran};
 use crate::search::Problem;
 use crate::tuning::{Hooks, Tuning};
+use crate::values::to_json;
 use ballbot_campaign::Axis;
 use ballbot_scenario::Files;
 use std::collections::{HashMap, VecDeque};
@@ -95,10 +96,9 @@ impl<'a, 'b, F: Files + Copy + Sync, E: From<TuningError>> Candidates<'a, 'b, F,
     }
 
     fn entry(&self, values: &[Value], state: State, runs: u64, judged: &Judged) -> Entry {
-        let json = |value: &Value| serde_json::to_value(value).unwrap_or_default();
         Entry {
             candidate: self.entries.len(),
-            values: values.iter().map(json).collect(),
+            values: to_json(values),
             state,
             refused: None,
             runs,
@@ -229,12 +229,7 @@ impl<F: Files + Copy + Sync, E: From<TuningError>> Problem for Candidates<'_, '_
                 .collect::<Vec<Value>>()
         });
         let values: Vec<Vec<Value>> = values.collect();
-        let names = values.iter().map(|values| {
-            let json = values
-                .iter()
-                .map(|value| serde_json::to_value(value).unwrap_or_default());
-            name(&json.collect::<Vec<_>>())
-        });
+        let names = values.iter().map(|values| name(&to_json(values)));
         let names: Vec<String> = names.collect();
         // A lower bound that was enough once is not for every threshold.
         let is_known = |name: &String| {

@@ -28,6 +28,7 @@ mod search;
 mod source;
 mod statistic;
 mod tuning;
+mod values;
 
 pub use batch::{Batch, Run, Tried, Worlds};
 pub use compare::Comparison;

@@ -1,6 +1,6 @@
 //! A tuning that has passed its checks, and its search.
 
-use crate::batch::{Run, Worlds, from_json};
+use crate::batch::{Run, Worlds};
 use crate::candidates::Candidates;
 use crate::compare::{Comparison, compare};
 use crate::error::TuningError;
@@ -10,6 +10,7 @@ use crate::judge::{Judge, Outcome, Quantity, Ran};
 use crate::pareto;
 use crate::search::{self, Plan, Searched, value, weightings};
 use crate::source::TuningSource;
+use crate::values::from_json;
 use ballbot_campaign::{Axis, Campaign, Cell, is_within, named_seed};
 use ballbot_scenario::{Files, Scenario};
 use toml::Value;

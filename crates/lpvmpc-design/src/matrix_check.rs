@@ -210,18 +210,32 @@ pub(crate) fn unit(m: &DMatrix<f64>) -> f64 {
     }
 }
 
-/// M > 0 for a symmetric, finite M.
+/// M > 0 for a symmetric, finite M, whose entries may be of very different units.
 pub fn check_positive_definite(name: &'static str, m: &DMatrix<f64>) -> Result<(), MatrixError> {
-    let unit = unit(m);
-    let scaled = m / unit;
-    let smallest = smallest_eigenvalue(name, &scaled)?;
-    if smallest <= rounding_of_eigenvalues(&scaled) {
-        return Err(MatrixError::NotPositiveDefinite {
-            name,
-            smallest_eigenvalue: smallest * unit,
-        });
+    if let Some(scaled) = with_similar_diagonal(m)
+        && smallest_eigenvalue(name, &scaled)? > rounding_of_eigenvalues(&scaled)
+    {
+        return Ok(());
     }
-    Ok(())
+    let unit = unit(m);
+    Err(MatrixError::NotPositiveDefinite {
+        name,
+        smallest_eigenvalue: smallest_eigenvalue(name, &(m / unit))? * unit,
+    })
+}
+
+/// D M D with a diagonal D of powers of two and a diagonal between 1 and 4: definite as M is. `None` if it can be seen from
+/// its entries that M is not positive definite.
+fn with_similar_diagonal(m: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let diagonal = m.diagonal();
+    if !diagonal.iter().all(|entry| *entry > 0.0) {
+        return None;
+    }
+    let scale = diagonal.map(|entry| (-0.5 * entry.log2()).ceil().exp2());
+    let scaled = m.map_with_location(|i, j, entry| scale[i] * entry * scale[j]);
+    // |m_ij|^2 <= m_ii m_jj
+    let bounded = scaled.iter().all(|entry| entry.abs() <= 4.0);
+    bounded.then_some(scaled)
 }
 
 /// M >= 0 for a symmetric, finite M, up to the rounding of its eigenvalues.

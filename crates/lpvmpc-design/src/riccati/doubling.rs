@@ -8,6 +8,8 @@ use crate::modes::poles;
 
 /// Doubling steps allowed. A loop whose slowest pole is 1 - 1e-12 needs 45.
 const DOUBLING_CAP: usize = 60;
+/// A state's own cost stands still when a step changes it by less than this part: the next one squares what is left.
+const AT_REST: f64 = 1e-8;
 
 /// One state of the structure-preserving doubling algorithm for
 /// X = A'X (I + G X)^-1 A + H, with G = B R^-1 B' and H = Q at the start:
@@ -76,8 +78,10 @@ impl Doubling {
         })
     }
 
-    /// Doubles until H stands still; returns it with the number of steps.
+    /// Doubles until H stands still as a whole, to rounding, and the cost of each state by itself, which may be much
+    /// smaller; returns it with the number of steps. Where rounding keeps a small one moving, H as a whole will do.
     pub(super) fn run(mut self) -> Result<(DMatrix<f64>, usize), Stalled> {
+        let mut at_rest = false;
         for doublings in 1..=DOUBLING_CAP {
             let Some(next) = self.doubled() else {
                 return Err(Stalled {
@@ -85,11 +89,17 @@ impl Doubling {
                     doublings,
                 });
             };
-            let change = (&next.h - &self.h).norm();
+            let change = &next.h - &self.h;
             self = next;
-            if change <= f64::EPSILON * self.h.norm() {
+            at_rest = change.norm() <= f64::EPSILON * self.h.norm();
+            let (changes, costs) = (change.diagonal(), self.h.diagonal());
+            let mut each = changes.iter().zip(&costs);
+            if at_rest && each.all(|(change, cost)| change.abs() <= AT_REST * cost.abs()) {
                 return Ok((self.h, doublings));
             }
+        }
+        if at_rest {
+            return Ok((self.h, DOUBLING_CAP));
         }
         Err(Stalled {
             reason: "the iteration did not come to rest",

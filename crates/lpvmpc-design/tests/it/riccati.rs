@@ -53,6 +53,35 @@ fn scalar_equations_have_the_positive_root_of_their_quadratic() {
     }
 }
 
+/// Two states apart from each other, the slow one of which costs next to nothing beside the other: each has the root of
+/// its own quadratic.
+#[test]
+fn a_small_cost_beside_a_large_one_is_as_exact() {
+    for (large, small) in [(1e20, 1e-6), (1e8, 1e-10), (1.0, 1e-18)] {
+        let of = |x, y| DMatrix::from_diagonal(&nalgebra::dvector![x, y]);
+        let poles = [0.5_f64, 0.999];
+        let (a, b) = (of(poles[0], poles[1]), of(1.0, 1.0));
+        let q = of(large, small);
+        // Each input is worth as much as its state.
+        let r = q.clone();
+        let found = solve_dare(&problem(&a, &b, &q, &r)).unwrap();
+        let fast = [-3.0, -1e-3];
+        let continuous = solve_care(&problem(&of(fast[0], fast[1]), &b, &q, &r)).unwrap();
+        for i in 0..2 {
+            let weight = q[(i, i)];
+            // p^2 - a^2 p - 1 = 0 in units of the weight
+            let half = 0.5 * poles[i] * poles[i];
+            let root = half + (half * half + 1.0).sqrt();
+            let discrete = found.p[(i, i)] / weight;
+            assert!((discrete - root).abs() < 1e-9, "{discrete} for {root}");
+            // p^2 - 2 a p - 1 = 0
+            let root = fast[i] + (fast[i] * fast[i] + 1.0).sqrt();
+            let own = continuous.p[(i, i)] / weight;
+            assert!((own - root).abs() < 1e-9, "{own} for {root}");
+        }
+    }
+}
+
 #[test]
 fn a_double_integrator_has_its_closed_form() {
     // Q = diag(1, 0), R = 1: P = [sqrt 2, 1; 1, sqrt 2], K = [1, sqrt 2].

@@ -17,8 +17,12 @@ const CHANGED_SOFT: usize = 12;
 /// And when that step went so far.
 const FREE: f64 = 0.5;
 /// Where states and inputs are bounded, and none softly, only when it also leaves no more than one side undecided for so many
-/// that are active, or one.
-const CLEAR: usize = 8;
+/// that are active, or one,
+const CLEAR: usize = 32;
+/// and for so many once the products of slack and multiplier are this part of what they began with: of some points sides
+/// stay undecided for long.
+const CLEAR_LATE: usize = 8;
+const LATE: f64 = 1e-4;
 /// Once they were wrong, again when the products of slack and multiplier are this part of what they were.
 const NEARER: f64 = 0.01;
 /// Where the products of slack and multiplier begin, as a part of the largest cost of a stage.
@@ -40,8 +44,12 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
         false => (CERTAIN, usize::MAX),
     };
     // Where inputs and states bind each other, one wrong side makes many others seem so.
-    let clear = if side::are_mixed(sides) { CLEAR } else { 0 };
+    let (clear, clear_late) = match side::are_mixed(sides) {
+        true => (CLEAR, CLEAR_LATE),
+        false => (0, 0),
+    };
     let mut method = InteriorPoint::new(sides, tolerances.scale * convert(CENTRE));
+    let late = method.complementarity() * convert(LATE);
     let smallest = method.complementarity() * T::default_epsilon().powf(convert(0.6));
     let mut untried = true;
     let mut near_enough = convert(f64::INFINITY);
@@ -58,6 +66,10 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
         // The same roles, wrong, are as a rule wrong again.
         untried |= changed > 0;
         let settled = certain * changed <= active && changed <= most_changed;
+        let clear = match method.complementarity() > late {
+            true => clear,
+            false => clear_late,
+        };
         let likely = settled && clear * undecided <= active.max(clear);
         if untried && near && likely && part > convert(FREE) {
             untried = false;
