@@ -69,6 +69,13 @@ impl<T: Scalar, const NU: usize> DelayLine<T, NU> {
         self.length = 0;
     }
 
+    /// The input that acts now.
+    pub(crate) fn acting(&self) -> SVector<T, NU> {
+        let inputs = self.inputs.iter().take(self.length);
+        let begun = inputs.take_while(|(time, _)| *time <= T::zero());
+        begun.last().map_or_else(SVector::zeros, |(_, u)| *u)
+    }
+
     /// Time goes on by `duration` s.
     pub fn elapse(&mut self, duration: T) {
         for (time, _) in self.inputs.iter_mut().take(self.length) {

@@ -227,7 +227,7 @@ where
     /// from the stamp.
     ///
     /// Time begins with the first measurement, the estimate with the first reading, which corrects
-    /// the state that it starts from. An estimate that no reading has corrected for
+    /// the state that it starts from as it was when the reading was taken. An estimate that no reading has corrected for
     /// longer than [`Gate::longest_gap`], or that is not finite any more, is given up, and begins
     /// anew, from the state that the estimator was made with, with the first measurement that has a reading; so it does when the stamps go back by
     /// more than that. A measurement out of order changes nothing.
@@ -265,18 +265,38 @@ where
             Tick::NotFinite => return Observation::refused(readings, Verdict::NotFinite),
         }
         if self.lost.is_some() {
-            let usable = |reading: &Reading<T>| self.settings.gate.refuses(reading).is_none();
-            if !readings.iter().flatten().any(usable) {
-                return Observation::useless(readings, &self.settings.gate);
-            }
+            let gate = &self.settings.gate;
+            let usable = |reading: &&Reading<T>| {
+                gate.refuses(reading).is_none() && reading.age < longest_gap
+            };
+            let ages = readings.iter().flatten().filter(usable).map(|one| one.age);
+            let Some(oldest) = ages.reduce(|a, b| if a > b { a } else { b }) else {
+                return Observation::useless(readings, gate);
+            };
             begins = self.lost.take();
             if begins != Some(Restart::Start) {
                 self.reset(self.start);
             }
+            self.begin_earlier(oldest, line);
+        }
+        let verdicts = self.update(readings);
+        if begins.is_some() && !verdicts.iter().any(|verdict| verdict.is_used()) {
+            self.reset(self.start);
+            self.lost = begins.take();
         }
         Observation {
-            verdicts: self.update(readings),
+            verdicts,
             restart: begins,
+        }
+    }
+
+    /// The past begins `age` s ago: a late reading corrects the state as it was then.
+    // Seldom, so its room on the stack and its instructions are not those of every measurement.
+    #[cold]
+    #[inline(never)]
+    fn begin_earlier(&mut self, age: T, line: &DelayLine<T, NU>) {
+        if age > T::zero() {
+            self.advance(&line.acting(), age);
         }
     }
 
@@ -311,7 +331,8 @@ where
     ) -> Estimate<T, NX, ND> {
         let settings = &self.settings;
         let predictor = settings.predictor(duration);
-        let (a, b) = self.model.matrices(&self.model.scheduling(&from.z, u));
+        let v = u + settings.input_offset * from.d;
+        let (a, b) = self.model.matrices(&self.model.scheduling(&from.z, &v));
         let (a, b) = match self.model.period() {
             Some(period) => over_periods(&a, &b, periods(period, duration)),
             None => predictor.discretize(&a, &b, duration),
@@ -438,11 +459,19 @@ where
         estimate: &mut Estimate<T, NX, ND>,
         verdicts: &mut [Verdict; NY],
     ) -> bool {
-        let struck = self.settings.struck(readings);
+        let after_blow = |taken: &&Taken<T>| taken.trust == Trust::AfterBlow;
+        let struck = readings.iter().flatten().any(|taken| after_blow(&taken));
+        let struck = struck.then(|| {
+            let shown = readings.iter().enumerate().filter_map(|(i, taken)| {
+                let taken = taken.as_ref()?;
+                Some(self.error(i, taken.value, estimate).1)
+            });
+            self.settings.struck(shown)
+        });
         for (i, taken) in readings.iter().enumerate() {
-            if let Some(taken) = taken.filter(|taken| taken.trust == Trust::AfterBlow) {
+            if let (Some(taken), Some(struck)) = (taken.as_ref().filter(after_blow), &struck) {
                 let (error, c_z, _) = self.error(i, taken.value, estimate);
-                estimate.covariance.open(&struck, &c_z, error);
+                estimate.covariance.open(struck, &c_z, error);
             }
         }
         for (i, (place, verdict)) in readings.iter_mut().zip(verdicts).enumerate() {

@@ -1,12 +1,12 @@
 //! What defines an estimator besides its model, and what can be wrong with it.
 
 use super::Covariance;
-use super::history::{Estimate, Taken};
+use super::history::Estimate;
 use super::observation::Verdict;
 use crate::model::Scalar;
 use crate::predictor::Rk4;
 use core::fmt;
-use nalgebra::{RowSVector, SMatrix, SVector, convert};
+use nalgebra::{SMatrix, SVector, convert};
 
 /// Everything that defines an [`Estimator`](super::Estimator) besides its model.
 ///
@@ -206,16 +206,19 @@ impl<T: Scalar, const NX: usize, const NU: usize, const NY: usize, const ND: usi
 
     /// Which states a blow may have changed: what noise drives, which are the rates as a rule, and
     /// what is read at the same instant, so that it is found again at once. To doubt another one
-    /// would leave it to be guessed from errors of the model until a reading of it arrives.
-    pub(super) fn struck(&self, readings: &[Option<Taken<T>>; NY]) -> [bool; NX] {
-        let zero = T::zero();
-        let driven = self.state_noise.map(|noise| noise > zero);
-        core::array::from_fn(|state| {
-            let mut rows = self.c.row_iter().zip(readings);
-            let shows = |row: &RowSVector<T, NX>| row.get(state).is_some_and(|c| *c != zero);
-            driven.get(state) == Some(&true)
-                || rows.any(|(row, reading)| reading.is_some() && shows(&row.into_owned()))
-        })
+    /// would leave it to be guessed from errors of the model until a reading of it arrives. `shown` is
+    /// how each reading depends on the states.
+    pub(super) fn struck(&self, shown: impl Iterator<Item = SVector<T, NX>>) -> [bool; NX] {
+        let mut struck = [false; NX];
+        for (struck, noise) in struck.iter_mut().zip(&self.state_noise) {
+            *struck = *noise > T::zero();
+        }
+        for row in shown {
+            for (struck, c) in struck.iter_mut().zip(&row) {
+                *struck |= *c != T::zero();
+            }
+        }
+        struck
     }
 
     /// The covariance of (z, d) where x and d vary independently of each other. A disturbance

@@ -170,6 +170,53 @@ fn an_input_that_is_no_number_costs_the_estimate_and_not_the_estimator() {
     assert!((estimator.state()[0] - x[0]).abs() < 1e-3);
 }
 
+/// The first reading and the first after a gap were called stale where they were late: the estimate was the state that it
+/// was made with, and passed for one.
+#[test]
+fn an_estimate_begins_with_late_readings_too() {
+    let late = 2;
+    let mut estimator =
+        Observer::allocate(PENDULUM, settings(), Vector2::zeros(), INSTANTS).unwrap();
+    let mut line = DelayLine::allocate(4);
+    let mut x = Vector2::new(0.2, 0.0);
+    let mut past = vec![];
+    for k in 0..300 {
+        past.push(x[0]);
+        let missing = (100..160).contains(&k);
+        let taken = past.len().checked_sub(1 + late).filter(|_| !missing);
+        let reading = taken.map(|taken| Reading {
+            value: past[taken],
+            age: late as f64 * T_S,
+        });
+        let seen = estimator.observe(UNIX + f64::from(k) * T_S, &mut line, &[reading]);
+        let restart = match k {
+            2 => Some(Restart::Start),
+            160 => Some(Restart::Gap),
+            _ => None,
+        };
+        assert_eq!(seen.restart, restart, "sample {k}");
+        assert_eq!(seen.verdicts[0].is_used(), reading.is_some(), "sample {k}");
+        if !estimator.is_lost() {
+            let deviation = estimator.covariance().zz[(0, 0)].sqrt();
+            let error = (estimator.state()[0] - x[0]).abs();
+            assert!(error < 3.0 * deviation, "sample {k}: {error}, {deviation}");
+        }
+        let u = Vector1::new(-30.0 * x[0] - 8.0 * x[1]);
+        line.command(u, 0.0);
+        x = Rk4 { substeps: 1 }.advance(&PENDULUM, &x, &u, T_S);
+    }
+    // With a memory of the present alone nothing can be taken in, so there is no estimate.
+    let mut present = Observer::allocate(PENDULUM, settings(), Vector2::zeros(), 1).unwrap();
+    let reading = [Some(Reading {
+        value: 0.2,
+        age: 0.02,
+    })];
+    let seen = present.observe(UNIX, &mut DelayLine::allocate(4), &reading);
+    assert_eq!((seen.verdicts[0], seen.restart), (Verdict::Stale, None));
+    assert!(present.is_lost());
+    assert_eq!(present.state(), Vector2::zeros());
+}
+
 #[test]
 fn a_clock_tells_what_passes_and_refuses_what_does_not() {
     let mut clock = Clock::default();

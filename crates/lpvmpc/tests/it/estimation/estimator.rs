@@ -331,3 +331,35 @@ fn a_late_reading_corrects_the_state_as_it_was() {
     deceived.update(&[Some(Reading::fresh(0.2))]);
     assert!((in_time.state() - deceived.state()).norm() > 1e-3);
 }
+
+/// The covariance follows the model at the input that acts, known or found; it followed it at the commanded one.
+#[test]
+fn the_covariance_is_that_at_the_input_that_acts() {
+    /// A mass whose friction grows with the input.
+    struct Sticking;
+    impl LpvModel<f64, 2, 1, 1> for Sticking {
+        fn scheduling(&self, _: &Vector2<f64>, u: &Vector1<f64>) -> Vector1<f64> {
+            *u
+        }
+        fn matrices(&self, s: &Vector1<f64>) -> (Matrix2<f64>, Vector2<f64>) {
+            (
+                Matrix2::new(0.0, 1.0, 0.0, -4.0 - s[0]),
+                Vector2::new(0.0, 1.0),
+            )
+        }
+    }
+    let [told, found] = [2.0, 0.0].map(|commanded| {
+        let mut estimator =
+            Observer::allocate(Sticking, settings(), Vector2::zeros(), INSTANTS).unwrap();
+        let (mut x, acts) = (Vector2::zeros(), Vector1::new(2.0));
+        for _ in 0..3000 {
+            estimator.update(&[Some(Reading::fresh(x[0]))]);
+            estimator.advance(&Vector1::new(commanded), 0.01);
+            x = Rk4 { substeps: 1 }.advance(&Sticking, &x, &acts, 0.01);
+        }
+        let all = commanded + estimator.input_disturbance()[0];
+        assert!((all - 2.0).abs() < 1e-3, "{all}");
+        estimator.covariance().zz
+    });
+    assert!((told - found).amax() < 1e-3 * told.amax(), "{told}{found}");
+}

@@ -2,8 +2,8 @@
 
 use super::pendulum::{INSTANTS, Observer, PENDULUM, settings};
 use crate::pendulum::Pendulum;
-use lpvmpc::{EstimatorSettings, Gate, Reading, Rk4, Verdict};
-use nalgebra::{Vector1, Vector2};
+use lpvmpc::{EstimatorSettings, Gate, LpvModel, Reading, Rk4, Verdict};
+use nalgebra::{Matrix1x2, Matrix2, Vector1, Vector2};
 
 const T_S: f64 = 0.01;
 
@@ -136,4 +136,42 @@ fn one_bad_sample_now_and_then_is_not_a_blow() {
         assert_eq!(estimator.update(&[Some(Reading::fresh(value))]), [verdict]);
     }
     assert!(estimator.state().norm() < 1e-3);
+}
+
+/// The blow opened the states that C shows, which is not read where a sensor is a function of the state.
+#[test]
+fn a_blow_is_found_by_a_sensor_that_is_a_function() {
+    /// The pendulum with its angle as such a sensor.
+    struct Seen;
+    impl LpvModel<f64, 2, 1, 1> for Seen {
+        fn scheduling(&self, x: &Vector2<f64>, u: &Vector1<f64>) -> Vector1<f64> {
+            PENDULUM.scheduling(x, u)
+        }
+        fn matrices(&self, s: &Vector1<f64>) -> (Matrix2<f64>, Vector2<f64>) {
+            PENDULUM.matrices(s)
+        }
+        fn sensor(&self, i: usize, x: &Vector2<f64>) -> Option<(f64, Vector2<f64>)> {
+            (i == 0).then(|| (x[0], Vector2::x()))
+        }
+    }
+    let rows = settings();
+    let none = EstimatorSettings {
+        c: Matrix1x2::zeros(),
+        ..rows
+    };
+    let mut by_row = Observer::allocate(PENDULUM, rows, Vector2::zeros(), INSTANTS).unwrap();
+    let mut seen = Observer::allocate(Seen, none, Vector2::zeros(), INSTANTS).unwrap();
+    let mut blows = 0;
+    for k in 0..200 {
+        let angle = if k < 100 { 0.0 } else { 0.3 };
+        let reading = [Some(Reading::fresh(angle))];
+        let verdict = by_row.update(&reading);
+        assert_eq!(seen.update(&reading), verdict, "update {k}");
+        assert!((seen.state() - by_row.state()).norm() < 1e-12, "update {k}");
+        blows += usize::from(k >= 100 && verdict == [Verdict::UsedAfterBlow]);
+        let u = Vector1::new(-9.81 * angle.sin());
+        by_row.advance(&u, T_S);
+        seen.advance(&u, T_S);
+    }
+    assert!(blows > 0);
 }
