@@ -208,7 +208,8 @@ where
         self.belief.take_over(&previous.belief);
         self.commands.copy_from(&previous.commands);
         self.commanded = previous.commanded;
-        (self.share, self.start) = (previous.share, previous.start);
+        self.set_share(previous.share);
+        self.start = previous.start;
         self.window.copy_from(&previous.window);
         let ramped = previous.planner.next_input();
         let next = ramped.unwrap_or(previous.commanded);

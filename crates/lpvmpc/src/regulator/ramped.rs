@@ -32,6 +32,8 @@ pub struct Ramped<
     input: SVector<T, NU>,
     /// Its rate, in input units per second.
     rate: SVector<T, NU>,
+    /// What the input may be; the rate of a program without a solution does not see to it.
+    allowed: Bounds<T, NU>,
 }
 
 impl<P, T, const NX: usize, const NU: usize, const NS: usize, const NXU: usize>
@@ -51,6 +53,7 @@ where
             start: SVector::repeat(convert(f64::NAN)),
             input: SVector::zeros(),
             rate: SVector::zeros(),
+            allowed: Bounds::none(),
         }
     }
 
@@ -104,6 +107,7 @@ where
         let join = RampedInput::<P, NX>::join::<T, NU, NXU>;
         let controller = &mut self.controller;
         let ControllerSettings { x, u, .. } = *controller.settings();
+        self.allowed = *allowed;
         let allowed = shifted(allowed, disturbance);
         let x = Bounds {
             lower: join(&Self::state_of(&x.lower), &allowed.lower),
@@ -139,9 +143,10 @@ where
     }
 
     fn input(&mut self, period: T) -> SVector<T, NU> {
-        let step = self.rate * period;
-        self.input += step;
-        self.input - step * convert::<f64, T>(0.5)
+        let before = self.input;
+        self.input = self.allowed.project(&(before + self.rate * period));
+        // The mean over the period.
+        self.input - (self.input - before) * convert::<f64, T>(0.5)
     }
 
     fn next_of_ramp(&mut self, period: T) -> Option<SVector<T, NU>> {
@@ -179,6 +184,7 @@ where
 
     fn take_over(&mut self, previous: &Self, commanded: &SVector<T, NU>) {
         (self.input, self.rate) = (*commanded, previous.rate);
+        self.allowed = previous.allowed;
         self.start = previous.start;
         self.window.copy_from(&previous.window);
         self.controller.take_over(&previous.controller);
