@@ -184,13 +184,8 @@ where
         clock: &dyn Fn() -> Duration,
         log: &mut dyn FnMut(LogRow<NY, NU>),
     ) -> Result<Sample<NX, NU>, Termination> {
+        self.in_range()?;
         let (t, x) = (self.world.time(), *self.world.state());
-        let sides = self.range.lower.iter().zip(self.range.upper.iter());
-        // NaN in the state is the regulator's to refuse.
-        let outside = |(value, (lower, upper)): (&f64, _)| value < lower || value > upper;
-        if let Some(component) = x.iter().zip(sides).position(outside) {
-            return Err(Termination::OutOfRange { t, component });
-        }
         let mut observation = self.regulator.observe(self.world.measurement());
         let before = clock();
         let command = self.regulator.decide(reference);
@@ -201,7 +196,7 @@ where
         let guaranteed = command.guarantee.is_some();
         let usable = match self.without_plan {
             OnInfeasible::End => guaranteed || status.is_solved(),
-            OnInfeasible::Apply => status != Status::NotFinite,
+            OnInfeasible::Apply => x.iter().all(|value| value.is_finite()),
         };
         if !usable {
             return Err(Termination::NoPlan { t, status });
@@ -229,6 +224,21 @@ where
             gap: command.gap,
             guarantee: command.guarantee,
         })
+    }
+
+    /// Whether the plant's state is in the [`range`](Self::range).
+    ///
+    /// # Errors
+    /// [`Termination::OutOfRange`] names the first component that is not.
+    pub fn in_range(&self) -> Result<(), Termination> {
+        let (t, x) = (self.world.time(), self.world.state());
+        let sides = self.range.lower.iter().zip(self.range.upper.iter());
+        // NaN in the state is the regulator's to refuse.
+        let outside = |(value, (lower, upper)): (&f64, _)| value < lower || value > upper;
+        match x.iter().zip(sides).position(outside) {
+            Some(component) => Err(Termination::OutOfRange { t, component }),
+            None => Ok(()),
+        }
     }
 
     /// One sample of the sensors.
@@ -298,6 +308,9 @@ where
             }
         }
         (course.progress)(k + 1);
+    }
+    if let (Termination::Complete, Err(late)) = (&termination, closed_loop.in_range()) {
+        termination = late;
     }
     let final_time = closed_loop.world.time();
     let trajectory = Trajectory {
