@@ -5,7 +5,8 @@ use crate::regulator::OutputFeedback;
 use crate::shares::PlaneTorques;
 use crate::wheels::Wheels;
 use lpvmpc::{
-    Command, Measurement, Number, Observation, Planner, Regulator, Scalar, Status, Verdict,
+    Clock, Command, Measurement, Number, Observation, Planner, Regulator, Restart, Scalar, Status,
+    Tick, Verdict,
 };
 use nalgebra::{SVector, Vector1, Vector2, Vector3, Vector4, convert};
 
@@ -69,14 +70,16 @@ pub struct RobotRegulator<T: Scalar + Number, K: Planner<T, 4, 1>> {
     yaw: YawLaw<T>,
     /// Measured heading, rad, and its rate, rad/s.
     heading: Vector2<T>,
-    /// Stamp of the last measurement, s.
-    time: f64,
+    /// Time of the heading.
+    clock: Clock,
     /// Torques of the planes and of yaw, N m.
     torques: Vector3<T>,
     /// What each plane had for its last plan, N m.
     shares: [T; 2],
     /// What each plane decided at the last sample.
     commands: [Option<Command<T, 4, 1>>; 2],
+    /// Why each plane began anew with the last measurement.
+    restarts: [Option<Restart>; 2],
 }
 
 impl<T: Scalar + Number, K: Planner<T, 4, 1>> RobotRegulator<T, K> {
@@ -96,11 +99,12 @@ impl<T: Scalar + Number, K: Planner<T, 4, 1>> RobotRegulator<T, K> {
             limits,
             yaw,
             heading: Vector2::new(heading, T::zero()),
-            time: 0.0,
+            clock: Clock::default(),
             torques: Vector3::zeros(),
             // There is no last plan: as if it had been cut off.
             shares: [T::zero(); 2],
             commands: [None; 2],
+            restarts: [None; 2],
         }
     }
 
@@ -112,6 +116,11 @@ impl<T: Scalar + Number, K: Planner<T, 4, 1>> RobotRegulator<T, K> {
     /// The cost J of the last plan of the plane `index`.
     pub fn cost_of(&self, index: usize) -> Option<T> {
         Some(self.planes.get(index)?.cost())
+    }
+
+    /// Why each plane began anew with the last measurement; `None` for one that went on.
+    pub fn restarts(&self) -> &[Option<Restart>; 2] {
+        &self.restarts
     }
 
     /// The wheels.
@@ -163,37 +172,51 @@ impl<T: Scalar + Number, K: Planner<T, 4, 1>> Regulator<T, 10, 3, 10> for RobotR
     fn observe(&mut self, measurement: &Measurement<T, 10>) -> Observation<10> {
         let Measurement { t, readings } = measurement;
         let mut verdicts = [Verdict::Missing; 10];
-        let mut restart = None;
-        let planes = self.planes.iter_mut().zip(readings.chunks_exact(4));
-        for ((plane, readings), verdicts) in planes.zip(verdicts.chunks_exact_mut(4)) {
+        let planes = self.planes.iter_mut().zip(&mut self.restarts);
+        let planes = planes.zip(readings.chunks_exact(4));
+        for (((plane, restart), readings), verdicts) in planes.zip(verdicts.chunks_exact_mut(4)) {
             let of_plane = plane.observe(&Measurement {
                 t: *t,
                 readings: core::array::from_fn(|i| readings.get(i).copied().flatten()),
             });
             verdicts.copy_from_slice(&of_plane.verdicts);
-            restart = restart.or(of_plane.restart);
+            *restart = of_plane.restart;
         }
+        let [x, y] = self.restarts;
+        let restart = x.or(y);
+        let refused = match self.clock.tick::<T>(*t) {
+            Tick::First | Tick::Elapsed(_) => None,
+            // Out of order, unless the planes take it for another clock.
+            Tick::Backward(_) if restart.is_none() => Some(Verdict::Stale),
+            Tick::Backward(_) => {
+                self.clock.reset();
+                self.clock.tick::<T>(*t);
+                None
+            }
+            Tick::NotFinite => Some(Verdict::NotFinite),
+        };
         let of_heading = readings.iter().zip(&mut verdicts).skip(HEADING);
         for (place, (reading, verdict)) in self.heading.iter_mut().zip(of_heading) {
-            match reading {
-                Some(reading) if reading.value.is_finite() => {
+            match (reading, refused) {
+                (Some(_), Some(refused)) => *verdict = refused,
+                (Some(reading), None) if reading.value.is_finite() => {
                     (*place, *verdict) = (reading.value, Verdict::Used);
                 }
-                Some(_) => *verdict = Verdict::NotFinite,
-                None => {}
+                (Some(_), None) => *verdict = Verdict::NotFinite,
+                (None, _) => {}
             }
         }
-        self.time = *t;
         Observation { verdicts, restart }
     }
 
     fn decide(&mut self, reference: &dyn Fn(f64) -> RobotState<T>) -> Command<T, 10, 3> {
-        let x_ref = reference(self.time);
+        let x_ref = reference(self.clock.now().unwrap_or(0.0));
         let MotorLimits { motor, yaw } = self.limits;
         let target = x_ref.fixed_rows::<2>(HEADING).into_owned();
         let wanted = self.yaw.torque(&self.heading, &target);
         let turns = wanted.is_finite();
-        self.torques[2] = if turns {
+        // A limit that is NaN lets nothing through.
+        self.torques[2] = if turns && yaw > T::zero() {
             wanted.max(-yaw).min(yaw)
         } else {
             T::zero()
@@ -251,9 +274,9 @@ impl<T: Scalar + Number, K: Planner<T, 4, 1>> Regulator<T, 10, 3, 10> for RobotR
         for (plane, before) in self.planes.iter_mut().zip(&previous.planes) {
             plane.take_over(before);
         }
-        (self.heading, self.time) = (previous.heading, previous.time);
+        (self.heading, self.clock) = (previous.heading, previous.clock);
         (self.torques, self.shares) = (previous.torques, previous.shares);
-        self.commands = previous.commands;
+        (self.commands, self.restarts) = (previous.commands, previous.restarts);
     }
 
     /// The sum over the planes.

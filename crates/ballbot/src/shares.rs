@@ -59,7 +59,11 @@ impl<T: Scalar> PlaneTorques<T> {
     /// What a plane needs: the largest torque of its last plan, N m, or infinite where that
     /// was cut off by the `bound` N m that it had.
     pub fn need(plan: impl IntoIterator<Item = T>, bound: T) -> T {
-        let largest = |most: T, torque: T| most.max(torque.abs());
+        let largest = |most: T, torque: T| {
+            let torque = torque.abs();
+            let stays = torque <= most || !most.is_finite();
+            if stays { most } else { torque }
+        };
         let most = plan.into_iter().fold(T::zero(), largest);
         // Negated, so that a plan that is NaN counts as cut off.
         if !(most < bound * convert(1.0 - 1e-3)) {

@@ -189,7 +189,8 @@ impl<T: Scalar + Number> Wheels<T> {
             let planes = Vector2::new(row[0], row[1]).norm();
             (motor - row[2].abs() * yaw.abs()) / planes
         });
-        let least = |least: T, radius| least.min(radius);
+        // A motor that is NaN makes all of them NaN, which must not be passed over.
+        let least = |least: T, radius: T| if least <= radius { least } else { radius };
         PlaneTorques::new(radii.fold(convert(f64::INFINITY), least))
     }
 

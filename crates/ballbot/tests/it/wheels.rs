@@ -361,3 +361,16 @@ fn a_heading_turns_and_turns_back() {
     let pair = Vector2::new(0.3, -1.7);
     assert!((heading.to_robot(&heading.to_floor(&pair)) - pair).norm() < 1e-15);
 }
+
+/// A limit that is no number left everything, and a plan that is none needed nothing.
+#[test]
+fn what_is_no_number_leaves_nothing() {
+    let wheels = Wheels::<f64>::paper();
+    for (motor, yaw) in [(f64::NAN, 0.0), (1.0, f64::NAN)] {
+        assert_eq!(wheels.plane_torques(motor, yaw).alone(), 0.0);
+    }
+    for plan in [[f64::NAN, 0.1], [0.1, f64::NAN]] {
+        assert_eq!(PlaneTorques::need(plan, 1.0), f64::INFINITY);
+    }
+    assert_eq!(PlaneTorques::need([-0.2, 0.1], 1.0), 0.2);
+}
