@@ -135,10 +135,21 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
         1 => ["run", ""],
         _ => ["run of the x plane", "run of the y plane"],
     };
-    let early = runs
+    let shared = prepared.motors.is_some();
+    let mut early = runs
         .into_iter()
         .zip(&trajectories)
-        .find(|(_, run)| run.termination != Termination::Complete);
+        .zip(&prepared.planes)
+        .filter(|((_, run), _)| run.termination != Termination::Complete);
+    // Planes that share their motors end together; where one left its range, that is the one to tell of.
+    let fell = early
+        .clone()
+        .find(|((_, run), plane)| !plane.world.range.contains(&run.final_state, 0.0));
+    let early = match (shared, fell) {
+        (true, None) => early.next().map(|((_, run), _)| ("run", run)),
+        (true, Some((of_plane, _))) => Some(of_plane),
+        (false, _) => early.next().map(|(of_plane, _)| of_plane),
+    };
     match early {
         None => Ok(Simulated {
             prepared,

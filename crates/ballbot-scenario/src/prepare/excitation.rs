@@ -21,9 +21,12 @@ impl Excitation {
     pub(crate) fn read(path: PathBuf) -> Result<Self, ScenarioError> {
         let series = TimeSeries::read(path, ["t_s", "torque_excitation_nm"])?;
         let mut steps: Vec<(f64, f64)> = series.rows().collect();
-        if let [.., (before, _), (last, _)] = steps[..] {
-            steps.push((2.0 * last - before, 0.0));
-        }
+        let [.., (before, _), (last, _)] = steps[..] else {
+            let problem =
+                "there is one row only, so it is not known when its torque ends; add one of zero";
+            return Err(series.problem(None, problem.to_owned()));
+        };
+        steps.push((2.0 * last - before, 0.0));
         Ok(Self {
             steps: steps.into(),
         })

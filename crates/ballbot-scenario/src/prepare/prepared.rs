@@ -24,7 +24,7 @@ pub struct Prepared {
     pub title: String,
     /// The prediction model.
     pub ballbot: Ballbot<f64>,
-    /// The torque map to the motors.
+    /// The torque map to the motors that the controller counts on.
     pub wheels: Wheels<f64>,
     /// The controller's settings; those of the plain problem where another one is posed.
     pub settings: ballbot::ControllerSettings<f64>,
@@ -120,7 +120,7 @@ impl Scenario {
                 let check = |robot: &_| self.check_robot("world.parameters", robot);
                 world.real_robot(&model, check, files)?
             }
-            None => ballbot,
+            None => (ballbot, wheels),
         };
         let bounds = self.bounds.check()?;
         let references = reference::resolve(&self.reference, &ballbot.geometry, duration, files)?;
@@ -240,7 +240,7 @@ impl Scenario {
     fn planes(
         &self,
         references: Vec<PhiReference>,
-        robot: &Ballbot<f64>,
+        robot: &(Ballbot<f64>, Wheels<f64>),
         (t_s, tolerances): (f64, Tolerances),
         files: &dyn Files,
     ) -> Result<Vec<Plane>, ScenarioError> {

@@ -47,7 +47,8 @@ impl TimeSeries {
         self.time.iter().copied().zip(self.values.iter().copied())
     }
 
-    fn problem(&self, line: Option<u64>, problem: String) -> ScenarioError {
+    /// What is wrong with the file.
+    pub(crate) fn problem(&self, line: Option<u64>, problem: String) -> ScenarioError {
         ScenarioError::CsvFile {
             path: self.path.clone(),
             line,

@@ -9,7 +9,7 @@ use crate::number::{check, finite, not_negative, positive};
 use crate::prepare::excitation::Excitation;
 use crate::prepare::files::Files;
 use crate::prepare::known_robot::KnownRobot;
-use ballbot::{Ballbot, Disturbed};
+use ballbot::{Ballbot, Disturbed, Wheels};
 use lpvmpc::Bounds;
 use lpvmpc_sim::{Actuator, Disturbance, OnInfeasible, Plant, Sensor, Tolerances, WorldSettings};
 use nalgebra::{Vector1, Vector2, Vector4};
@@ -28,6 +28,8 @@ pub struct Robot {
     pub mechanics: Disturbed<f64>,
     /// A torque on top of what the drive delivers, N m.
     pub torque_bias: f64,
+    /// Its torque map to the motors.
+    pub wheels: Wheels<f64>,
 }
 
 impl Plant<4, 1, 2> for Robot {
@@ -54,11 +56,16 @@ pub struct PlaneWorld {
 
 impl PlaneWorld {
     /// A world without faults.
-    pub(crate) fn ideal(ballbot: Ballbot<f64>, t_s: f64, tolerances: Tolerances) -> Self {
+    pub(crate) fn ideal(
+        (ballbot, wheels): (Ballbot<f64>, Wheels<f64>),
+        t_s: f64,
+        tolerances: Tolerances,
+    ) -> Self {
         Self {
             robot: Robot {
                 mechanics: Disturbed::level(ballbot),
                 torque_bias: 0.0,
+                wheels,
             },
             settings: WorldSettings::ideal(t_s, tolerances),
             without_plan: OnInfeasible::End,
@@ -76,7 +83,7 @@ fn upright() -> Bounds<f64, 4> {
 }
 
 impl WorldTable {
-    /// The robot that is there, before `robot` changes it; `model` is the controller's.
+    /// The robot that is there, before `robot` changes it, and its wheels; `model` is the controller's.
     ///
     /// # Errors
     /// The parameters cannot be used, or have no covariance to draw from.
@@ -85,7 +92,7 @@ impl WorldTable {
         model: &KnownRobot,
         check: impl Fn(&KnownRobot) -> Result<(), ScenarioError>,
         files: &dyn Files,
-    ) -> Result<Ballbot<f64>, ScenarioError> {
+    ) -> Result<(Ballbot<f64>, Wheels<f64>), ScenarioError> {
         let read = match &self.parameters {
             Some(parameters) => {
                 let robot = parameters.read("world.parameters", files)?;
@@ -95,26 +102,29 @@ impl WorldTable {
             None => None,
         };
         let robot = read.as_ref().unwrap_or(model);
-        match (self.draw, &robot.uncertainty) {
-            (None, _) => Ok(robot.ballbot),
-            (Some(seed), Some(uncertainty)) => uncertainty.draw(&robot.ballbot, seed),
-            (Some(seed), None) => Err(ScenarioError::value(
-                "world.draw",
-                seed,
-                "the robot's parameters have no covariance; name a parameters.toml of `ballbot \
+        let ballbot = match (self.draw, &robot.uncertainty) {
+            (None, _) => robot.ballbot,
+            (Some(seed), Some(uncertainty)) => uncertainty.draw(&robot.ballbot, seed)?,
+            (Some(seed), None) => {
+                return Err(ScenarioError::value(
+                    "world.draw",
+                    seed,
+                    "the robot's parameters have no covariance; name a parameters.toml of `ballbot \
                  identify` as parameters",
-            )),
-        }
+                ));
+            }
+        };
+        Ok((ballbot, robot.wheels))
     }
 
-    /// The world of one plane; `ballbot` is the robot that is there.
+    /// The world of one plane; `ballbot` is the robot that is there, on its `wheels`.
     ///
     /// # Errors
     /// [`ScenarioError`] with the key, or an excitation that cannot be read.
     pub(crate) fn prepare(
         &self,
         plane: PlaneName,
-        ballbot: &Ballbot<f64>,
+        (ballbot, wheels): &(Ballbot<f64>, Wheels<f64>),
         t_s: f64,
         tolerances: Tolerances,
         files: &dyn Files,
@@ -131,6 +141,7 @@ impl WorldTable {
             robot: Robot {
                 mechanics,
                 torque_bias: self.actuator.bias_nm,
+                wheels: *wheels,
             },
             settings: WorldSettings {
                 period,

@@ -1,8 +1,8 @@
 //! What a whole robot's samples are to its planes and motors.
 
 use crate::run::excited_robot::ExcitedRobot;
-use ballbot::{AnyPlanner, Heading, RobotRegulator, plane_of};
-use lpvmpc::Observation;
+use ballbot::{AnyPlanner, Heading, RobotRegulator, Wheels, plane_of};
+use lpvmpc::{Observation, Restart};
 use lpvmpc_sim::{LogRow, Sample};
 use nalgebra::{Vector1, Vector3};
 
@@ -45,16 +45,17 @@ pub(crate) fn sample_of_plane(
     })
 }
 
-/// One plane's row of the whole robot's log: the motors' torques as the plane feels them at the true
-/// `heading`, rad.
+/// One plane's row of the whole robot's log: the motors' torques as the plane feels them on the robot's true
+/// `wheels` and `heading`, rad, and the plane's own `restart`.
 pub(crate) fn log_of_plane(
-    regulator: &WholeRegulator,
+    wheels: &Wheels<f64>,
     index: usize,
     row: &LogRow<10, 3>,
+    restart: Option<Restart>,
     heading: f64,
 ) -> LogRow<4, 1> {
     let felt = |motors: &Vector3<f64>| {
-        let torques = regulator.wheels().virtual_torques(motors).xy();
+        let torques = wheels.virtual_torques(motors).xy();
         Vector1::new(Heading::new(heading).to_floor(&torques)[index])
     };
     LogRow {
@@ -62,7 +63,7 @@ pub(crate) fn log_of_plane(
         readings: std::array::from_fn(|i| row.readings[4 * index + i]),
         observation: Observation {
             verdicts: std::array::from_fn(|i| row.observation.verdicts[4 * index + i]),
-            restart: row.observation.restart,
+            restart,
         },
         commanded: felt(&row.commanded),
         applied: felt(&row.applied),

@@ -1,7 +1,6 @@
 //! Both planes and the heading as one plant on three motors, and its world.
 
 use crate::prepare::heading::Turning;
-use crate::prepare::prepared::Prepared;
 use crate::prepare::three_motors::ThreeMotors;
 use crate::prepare::world::{PlaneWorld, Robot};
 use ballbot::{HEADING, Heading, RobotState, Wheels, plane_of};
@@ -41,7 +40,6 @@ impl Plant<10, 3, 4> for WholeRobot {
 
 /// The planes' worlds as one, with the whole robot in it.
 pub(crate) fn whole_world(
-    prepared: &Prepared,
     motors: &ThreeMotors,
     [x, y]: [&PlaneWorld; 2],
 ) -> (WholeRobot, WorldSettings<10, 3, 10, 4>) {
@@ -76,7 +74,8 @@ pub(crate) fn whole_world(
     });
     let robot = WholeRobot {
         planes: [x.robot, y.robot],
-        wheels: prepared.wheels,
+        // Of one robot, in both planes the same.
+        wheels: x.robot.wheels,
         turning: motors.turning,
     };
     let settings = WorldSettings {

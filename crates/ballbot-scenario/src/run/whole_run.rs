@@ -39,12 +39,14 @@ impl Prepared {
                     break;
                 }
             };
+            let restarts = closed_loop.regulator.take_restarts();
             let regulator = &closed_loop.regulator;
             for (index, (samples, log)) in samples.iter_mut().zip(&mut logs).enumerate() {
+                let wheels = &planes[index].world.robot.wheels;
                 samples.extend(sample_of_plane(regulator, index, &sample));
-                log.extend(rows.iter().map(|row| {
+                log.extend(rows.iter().zip(&restarts).map(|(row, restarts)| {
                     let heading = sample.x[HEADING] + sample.x[HEADING + 1] * (row.t - sample.t);
-                    log_of_plane(regulator.regulator(), index, row, heading)
+                    log_of_plane(wheels, index, row, restarts[index], heading)
                 }));
             }
             robot_log.extend(rows);
@@ -55,6 +57,9 @@ impl Prepared {
                 torques: sample.u,
             });
             (hooks.progress)(planes.len() * (k + 1));
+        }
+        if let (Termination::Complete, Err(late)) = (&termination, closed_loop.in_range()) {
+            termination = late;
         }
         let final_time = closed_loop.world.time();
         let (x, x_ref) = (closed_loop.world.state(), reference(final_time));
@@ -104,7 +109,7 @@ impl Prepared {
             )
         };
         let regulators = [plane()?, plane()?];
-        let (robot, settings) = whole_world(self, motors, [&x.world, &y.world]);
+        let (robot, settings) = whole_world(motors, [&x.world, &y.world]);
         let mut start = State::zeros();
         for (index, plane) in [x, y].into_iter().enumerate() {
             start

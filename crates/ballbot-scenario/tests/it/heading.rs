@@ -1,8 +1,11 @@
 //! Both planes and yaw as one robot with three motors, each with its limit.
 
 use ballbot::{AnyPlanner, HEADING, PlanePlanner, RobotRegulator, RobotState, plane_feedback};
-use ballbot_scenario::{MotorsTable, Prepared, Record, RunHooks, Scenario, StateTable, WorldTable};
-use lpvmpc::{Measurement, Reading, Regulator, Status};
+use ballbot_scenario::{
+    EstimatorTable, MotorsTable, ParameterTable, Parameters, Prepared, Problem, Record, RunHooks,
+    Scenario, StateTable, TorqueRateTable, WorldTable,
+};
+use lpvmpc::{Measurement, Reading, Regulator, Status, Verdict};
 use lpvmpc_sim::Termination;
 use std::path::Path;
 
@@ -146,6 +149,134 @@ fn with_a_wrong_heading_it_falls() {
         matches!(termination, Termination::OutOfRange { .. }),
         "{termination:?}"
     );
+    // A run that ends with that sample ends with the fall; it was complete.
+    scenario.duration_s = record.planes[0].trajectory.final_time;
+    let (prepared, ended) = run(&scenario);
+    assert_eq!(prepared.samples, record.planes[0].trajectory.samples.len());
+    assert_eq!(ended.planes[0].trajectory.termination, *termination);
+}
+
+/// The simulated robot had the wheels of the model, whatever its own parameters said.
+#[test]
+fn on_other_wheels_than_the_model_s_it_falls() {
+    let mut scenario = example();
+    let Parameters::Table(mut real) = scenario.parameters.clone() else {
+        unreachable!("a table")
+    };
+    let mut with = |real: &ParameterTable| {
+        scenario.world = Some(WorldTable {
+            parameters: Some(Parameters::Table(*real)),
+            ..WorldTable::default()
+        });
+        run(&scenario).1
+    };
+    assert!(stands(&with(&real)));
+    real.wheels_reversed = [true; 3];
+    let record = with(&real);
+    assert!(!stands(&record));
+    // What a plane feels is the opposite of what was decided for it.
+    let (sample, row) = (
+        &record.planes[0].trajectory.samples[0],
+        &record.planes[0].log[0],
+    );
+    assert!(sample.u[0].abs() > 0.01);
+    assert!((row.commanded[0] + sample.u[0]).abs() < 1e-9);
+}
+
+/// A plane's log told of the other one's beginning.
+#[test]
+fn each_plane_s_log_tells_of_its_own_beginning() {
+    let mut scenario = example();
+    scenario.duration_s = 1.0;
+    scenario.controller.estimator = Some(EstimatorTable::default());
+    let mut world = WorldTable::default();
+    for dropout in [
+        &mut world.sensors.phi.dropout,
+        &mut world.sensors.theta.dropout,
+        &mut world.sensors.theta_dot.dropout,
+    ] {
+        *dropout = 0.9;
+    }
+    let mut apart = 0;
+    for seed in 0..8 {
+        world.seed = seed;
+        scenario.world = Some(world.clone());
+        let (_, record) = run(&scenario);
+        let begins = [0, 1].map(|index: usize| {
+            let log = &record.planes[index].log;
+            let first = log.iter().position(|row| {
+                let mut verdicts = row.observation.verdicts.iter();
+                verdicts.any(|verdict| verdict.is_used())
+            });
+            let told = log.iter().position(|row| row.observation.restart.is_some());
+            assert_eq!(told, first, "seed {seed}, plane {index}");
+            told
+        });
+        apart += usize::from(begins[0] != begins[1]);
+    }
+    assert!(apart > 2, "{apart}");
+}
+
+/// A measurement out of order, or without a time, set the heading back.
+#[test]
+fn a_heading_out_of_order_is_refused() {
+    let prepared = example().prepare(Path::new(".")).expect("valid");
+    let estimator = EstimatorTable::default();
+    let mut scenario = example();
+    scenario.controller.estimator = Some(estimator);
+    let filtered = scenario.prepare(Path::new(".")).expect("valid");
+    let readings = |heading: f64| {
+        let mut readings = [Some(Reading::fresh(0.0)); 10];
+        readings[HEADING] = Some(Reading::fresh(heading));
+        readings
+    };
+    let mut robot = regulator(&filtered);
+    let mut see = |t: f64, heading: f64| {
+        let readings = readings(heading);
+        let seen = robot.observe(&Measurement { t, readings });
+        (seen.verdicts[HEADING], robot.heading())
+    };
+    assert_eq!(see(1.0, 0.1), (Verdict::Used, 0.1));
+    assert_eq!(see(0.9, 0.5), (Verdict::Stale, 0.1));
+    assert_eq!(see(f64::NAN, 0.5), (Verdict::NotFinite, 0.1));
+    assert_eq!(see(1.1, 0.2), (Verdict::Used, 0.2));
+    // Another clock, by which the planes begin anew, too.
+    assert_eq!(see(-9.0, 0.3), (Verdict::Used, 0.3));
+    assert_eq!(see(-8.9, 0.4), (Verdict::Used, 0.4));
+    // Without a filter any time that goes back is another clock's.
+    let mut direct = regulator(&prepared);
+    for (t, heading) in [(1.0, 0.1), (0.9, 0.5)] {
+        let readings = readings(heading);
+        direct.observe(&Measurement { t, readings });
+        assert_eq!(direct.heading(), heading);
+    }
+}
+
+/// A plane whose bounds must not change keeps to its own; one that took over from a plane with a share kept that for ever.
+#[test]
+fn a_share_is_not_handed_to_a_planner_that_has_none() {
+    let mut scenario = example();
+    let feedback = |scenario: &Scenario| {
+        let prepared = scenario.prepare(Path::new(".")).expect("valid");
+        let (u, t_s) = (prepared.settings.u, prepared.settings.t_s);
+        let planner = match &prepared.problem {
+            Problem::Ramped(settings) => PlanePlanner::Ramped(*settings),
+            _ => PlanePlanner::Held(prepared.settings),
+        };
+        plane_feedback(&prepared.ballbot, &planner, &prepared.feedback, &u, t_s).expect("valid")
+    };
+    let mut held = feedback(&scenario);
+    held.set_share(nalgebra::Vector1::new(0.01));
+    scenario.controller.torque_rate = Some(TorqueRateTable {
+        limit_nm_s: 20.0,
+        weight: 0.02,
+    });
+    let mut ramped = feedback(&scenario);
+    ramped.take_over(&held);
+    let readings = [0.0, 0.1, 0.0, 0.0].map(|value| Some(Reading::fresh(value)));
+    ramped.observe(&Measurement { t: 0.0, readings });
+    let command = ramped.decide(&|_| nalgebra::Vector4::zeros(), &mut ());
+    assert!(command.u[0].abs() > 0.1, "{}", command.u);
 }
 
 /// Where planes share their motors it used to be left out without a word.
@@ -153,7 +284,11 @@ fn with_a_wrong_heading_it_falls() {
 fn an_excitation_is_added_to_the_torque_of_the_x_plane_however_the_robot_stands() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("excited-whole-robot");
     std::fs::create_dir_all(&folder).expect("writable");
-    let rows = (0..40).map(|i| format!("{},{}\n", 0.05 * f64::from(i), 0.3 * f64::from(i).sin()));
+    // Torques that change between two samples of the control; the record said the next one.
+    let rows = (0..40).map(|i| {
+        let t = 0.0125 + 0.05 * f64::from(i);
+        format!("{t},{}\n", 0.3 * f64::from(i).sin())
+    });
     let text = format!("t_s,torque_excitation_nm\n{}", rows.collect::<String>());
     std::fs::write(folder.join("torque.csv"), text).expect("writable");
     let mut scenario = example();
@@ -172,6 +307,7 @@ fn an_excitation_is_added_to_the_torque_of_the_x_plane_however_the_robot_stands(
     let mut with = |excitation: Option<&str>| {
         scenario.world = Some(WorldTable {
             excitation: excitation.map(Into::into),
+            sensor_period_s: Some(0.0125),
             ..WorldTable::default()
         });
         let mut alone = scenario.clone();
@@ -181,7 +317,7 @@ fn an_excitation_is_added_to_the_torque_of_the_x_plane_however_the_robot_stands(
     let [still, _] = with(None);
     let [together, alone] = with(Some("torque.csv"));
     let torque = |run: &lpvmpc_sim::Recording<4, 1, 4>, k: usize| run.trajectory.samples[k].u[0];
-    assert!((torque(&together[0], 2) - torque(&still[0], 2)).abs() > 0.05);
+    assert!((torque(&together[0], 3) - torque(&still[0], 3)).abs() > 0.05);
     for (together, alone) in together.iter().zip(&alone) {
         assert_eq!(together.trajectory.samples.len(), 120);
         for (a, b) in together

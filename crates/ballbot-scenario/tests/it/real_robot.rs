@@ -265,6 +265,20 @@ fn a_controller_that_knows_the_friction_follows_better() {
     assert!(knowing < 0.5 * ignorant, "{knowing} and {ignorant}");
 }
 
+/// Its torque acted to the end of the run.
+#[test]
+fn an_excitation_of_one_row_is_refused() {
+    file("robot.toml", ROBOT);
+    file("excitation.csv", "t_s,torque_excitation_nm\n0.0,0.3\n");
+    let mut scenario = scenario("robot.toml");
+    scenario.world = Some(WorldTable {
+        excitation: Some("excitation.csv".into()),
+        ..WorldTable::default()
+    });
+    let error = scenario.prepare(folder().as_path()).expect_err("refused");
+    assert!(error.to_string().contains("one row only"), "{error}");
+}
+
 #[test]
 fn an_excitation_comes_on_top_and_ends() {
     file("robot.toml", ROBOT);

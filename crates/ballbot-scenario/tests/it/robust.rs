@@ -6,6 +6,7 @@ use ballbot_scenario::{
     DeviationsTable, DisturbancesTable, Prepared, RunHooks, Scenario, SensorsTable,
     TorqueRateTable, WorldTable,
 };
+use lpvmpc::Status;
 use lpvmpc_sim::{Recording, Termination};
 use std::path::Path;
 
@@ -209,6 +210,34 @@ fn it_follows_a_metre_with_sensors_of_different_rates_late_and_stale() {
     // 1 % of the samples are missing; stale readings come at any time.
     assert!((delivered(0) - 0.99).abs() < 0.01, "{}", delivered(0));
     assert!((delivered(1) - 0.25).abs() < 0.03, "{}", delivered(1));
+}
+
+/// Without readings there is no plan, and the torque is zero until there are; the run ended there.
+#[test]
+fn a_world_goes_on_until_there_are_readings() {
+    let mut scenario = example("push-and-move");
+    let sensors = &mut world(&mut scenario).sensors;
+    (sensors.phi.delay_s, sensors.theta.delay_s) = (0.005, 0.005);
+    sensors.theta_dot.delay_s = 0.005;
+    let (prepared, recordings) = stands(&scenario);
+    let first = &recordings[0].trajectory.samples[0];
+    assert_eq!((first.status, first.u[0]), (Status::NotFinite, 0.0));
+    let error = rms_mm(&prepared, &recordings[0], 6.0, 10.0);
+    assert!(error < 20.0, "{error} mm");
+
+    // Without a torque the robot stands for so long, where it begins upright.
+    scenario.duration_s = 1.0;
+    let sensors = &mut world(&mut scenario).sensors;
+    for dropout in [
+        &mut sensors.phi.dropout,
+        &mut sensors.theta.dropout,
+        &mut sensors.theta_dot.dropout,
+    ] {
+        *dropout = 1.0;
+    }
+    let (_, recordings) = stands(&scenario);
+    let samples = &recordings[0].trajectory.samples;
+    assert!(samples.iter().all(|sample| sample.u[0] == 0.0));
 }
 
 #[test]
