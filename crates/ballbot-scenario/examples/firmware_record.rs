@@ -17,7 +17,7 @@
 use ballbot::{Ballbot, Geometry, Wheel, Wheels};
 use ballbot_scenario::{Plane, Prepared, Problem, RunHooks, Scenario, ThreeMotors};
 use lpvmpc::{Iterations, Predictor, Reading, Scheduling, TerminalIngredient};
-use lpvmpc_sim::Trajectory;
+use lpvmpc_sim::{LogRow, Trajectory};
 use std::error::Error;
 use std::fmt::Write;
 use std::{env, path::Path};
@@ -71,12 +71,51 @@ fn check_plan(prepared: &Prepared) -> Result<(), Box<dyn Error>> {
             !matches!(settings.scheduling, Scheduling::Predicted),
             "controller.model = \"linear\": take \"lpv\"",
         ),
+        (
+            !prepared.feedback.preview,
+            "controller.preview = false: leave it out",
+        ),
+    ])
+}
+
+/// Torques on their way and instants that the firmware remembers of a plane: `COMMANDS` and `INSTANTS` in
+/// `firmware/src/robot.rs`, which is built for another target.
+const ROOM: (f64, f64) = (4.0, 16.0);
+
+/// What the firmware's memory of a robot has no room for.
+fn check_room(
+    prepared: &Prepared,
+    period: f64,
+    rows: &[LogRow<10, 3>],
+) -> Result<(), Box<dyn Error>> {
+    let (commands, instants) = ROOM;
+    let delay = (prepared.feedback.delay / prepared.settings.t_s - 1e-9).ceil();
+    let oldest = prepared.feedback.estimator.map_or(0.0, |it| it.gate.oldest);
+    let readings = rows.iter().flat_map(|row| row.readings).flatten();
+    let ages = readings
+        .map(|reading| reading.age)
+        .filter(|age| *age <= oldest);
+    // A change of the torque in between is an instant, too.
+    let passed = 2.0 * ages.fold(0.0, f64::max) / period;
+    refuse(&[
+        (
+            delay + 2.0 > commands,
+            "memory for the torques on their way during controller.delay_s: take two samples at most",
+        ),
+        (
+            passed > instants,
+            "memory for readings that late: lower controller.estimator.oldest_s or world.sensors...delay_s",
+        ),
     ])
 }
 
 /// What a robot whose planes share their motors does not have.
 fn check_descent(prepared: &Prepared) -> Result<(), Box<dyn Error>> {
     let settings = &prepared.settings;
+    let first = match settings.iterations {
+        Iterations::Descent { first, most, .. } => first != most,
+        Iterations::Fixed(_) => false,
+    };
     let quadratic = |price: &lpvmpc::Penalty<f64>| price.quadratic != 0.0;
     refuse(&[
         (
@@ -87,6 +126,7 @@ fn check_descent(prepared: &Prepared) -> Result<(), Box<dyn Error>> {
             settings.soft_x.iter().flatten().any(quadratic),
             "quadratic prices of state bounds: leave them at 0",
         ),
+        (first, "controller.iterations.descent.first: leave it out"),
     ])
 }
 
@@ -236,9 +276,11 @@ fn whole_robot(
     let estimator = prepared.feedback.estimator.ok_or("it has no estimator")?;
     let plane = prepared.planes.first().ok_or("it has no plane")?;
     let period = plane.world.settings.period;
-    if record.robot_log.len() < samples {
+    let per_sample = (prepared.settings.t_s / period).round() as usize;
+    if record.robot_log.len() < samples * per_sample {
         return Err("the run ended early".into());
     }
+    check_room(prepared, period, &record.robot_log)?;
     let mut text = format!(
         "//! The robot of `{name}` and what its sensors deliver in the first {samples} samples.\n\
          //! Written by `firmware_record {name} {samples}`, an example of `ballbot-scenario`.\n\n\
