@@ -2,6 +2,7 @@
 
 mod covariance;
 mod history;
+mod innovation;
 mod memory;
 mod observation;
 mod settings;
@@ -291,8 +292,7 @@ where
     }
 
     /// The past begins `age` s ago: a late reading corrects the state as it was then.
-    // Seldom, so its room on the stack and its instructions are not those of every measurement.
-    #[cold]
+    #[cold] // Seldom: its room on the stack is not that of every measurement.
     #[inline(never)]
     fn begin_earlier(&mut self, age: T, line: &DelayLine<T, NU>) {
         if age > T::zero() {
@@ -496,25 +496,5 @@ where
             estimate.d += k_d * error;
         }
         true
-    }
-
-    /// How far the `value` of sensor `i` is from what is expected, and how that depends on z and d.
-    fn error(
-        &self,
-        i: usize,
-        value: T,
-        estimate: &Estimate<T, NX, ND>,
-    ) -> (T, SVector<T, NX>, SVector<T, ND>) {
-        let state = estimate.z - self.settings.state_offset * estimate.d;
-        if let Some((expected, c_z)) = self.model.sensor(i, &state) {
-            let c_d = -(self.settings.state_offset.transpose() * c_z);
-            return (value - expected, c_z, c_d);
-        }
-        // Not `row(i)`, which could panic.
-        let rows = self.settings.c.row_iter().nth(i);
-        let c_z = rows.map_or_else(SVector::zeros, |row| row.transpose());
-        let c_d = -(self.settings.state_offset.transpose() * c_z);
-        let expected = c_z.dot(&estimate.z) + c_d.dot(&estimate.d);
-        (value - expected, c_z, c_d)
     }
 }
