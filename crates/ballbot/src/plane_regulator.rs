@@ -7,8 +7,8 @@ use crate::regulator::{
 };
 use crate::regulator_error::RegulatorError;
 use lpvmpc::{
-    BoundId, Bounds, Command, FeedbackMemory, FeedbackSettings, Measurement, Observation, Planner,
-    RampedInput, Regulator, Standalone,
+    BoundId, Bounds, Command, DelayLine, FeedbackMemory, FeedbackSettings, Measurement,
+    Observation, Planner, RampedInput, Regulator, Standalone,
 };
 use nalgebra::{Vector1, Vector4};
 
@@ -67,15 +67,6 @@ fn planner(
     })
 }
 
-/// Torques that are on their way at once, one every `interval` s: see [`lpvmpc::DelayLine`].
-fn commands(delay: f64, interval: f64) -> usize {
-    const ROUNDING: usize = 1;
-    let count = (delay / interval).ceil();
-    // A torque whose delay is infinite never acts.
-    let count = if count.is_finite() { count } else { 0.0 };
-    count as usize + 2 + ROUNDING
-}
-
 /// The feedback of one plane around a planner of any kind. `torque` are the bounds of the commanded
 /// torque (N m), `period` is that of the sensors, s.
 ///
@@ -100,7 +91,8 @@ pub fn plane_feedback(
         AnyPlanner::Ramped(..) => period,
         AnyPlanner::Held(..) | AnyPlanner::Guaranteed(..) => planner.t_s(),
     };
-    let memory = FeedbackMemory::allocate(commands(feedback.delay, interval), planner.horizon());
+    let places = DelayLine::<f64, 1>::places(feedback.delay, interval);
+    let memory = FeedbackMemory::allocate(places, planner.horizon());
     let settings = FeedbackSettings {
         delay: feedback.delay,
         period,
@@ -167,33 +159,5 @@ impl Regulator<f64, 4, 1, 4> for PlaneRegulator {
 
     fn active_bound(&self, i: usize) -> Option<BoundId> {
         self.0.active_bound(i)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::commands;
-    use lpvmpc::DelayLine;
-    use nalgebra::Vector1;
-
-    /// Beyond 256 torques on their way the oldest was forgotten before it acted.
-    #[test]
-    fn no_torque_is_forgotten_on_its_way() {
-        for (delay, interval, late) in [(0.02, 2e-5, 1000), (0.3, 0.001, 300), (0.0, 0.05, 0)] {
-            let mut line = DelayLine::<f64, 1>::allocate(commands(delay, interval));
-            for k in 0..3000 {
-                line.command(Vector1::new(f64::from(k)), delay);
-                let mut next = None;
-                line.for_each(interval, |duration, u| {
-                    if duration > 0.5 * interval {
-                        next = Some(u[0]);
-                    }
-                });
-                let acts = f64::from((k - late).max(0));
-                let next = next.expect("one acts");
-                assert!((next - acts).abs() <= 1.0, "{next} in place of {acts}");
-                line.elapse(interval);
-            }
-        }
     }
 }

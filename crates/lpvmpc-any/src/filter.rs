@@ -256,7 +256,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Filter<NX, NU, NS> {
                 EstimatorError::Gate => MpcError::new(place("gate"), error.to_string()),
                 _ => MpcError::new("estimator", error.to_string()),
             })?;
-        let commands = (delay / mpc.t_s).ceil() as usize + 3;
+        let commands = DelayLine::<f64, NS>::places(delay, mpc.t_s);
         Ok(Self {
             settings: settings.clone(),
             sizes: (n, m),

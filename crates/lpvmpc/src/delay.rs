@@ -2,12 +2,11 @@
 
 use crate::list::List;
 use crate::model::Scalar;
-use nalgebra::SVector;
+use nalgebra::{SVector, try_convert};
 
 /// The inputs that have been commanded and what is left of their delay.
 ///
-/// With a delay of d and a command every t_s, it needs places for d / t_s + 2 of them. When there is
-/// no room, the oldest input is forgotten.
+/// How many places it needs, [`DelayLine::places`] says. When there is no room, the oldest input is forgotten.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
 pub struct DelayLine<T: 'static, const NU: usize> {
@@ -29,6 +28,16 @@ impl<T: Scalar, const NU: usize> DelayLine<T, NU> {
     #[cfg(feature = "alloc")]
     pub fn allocate(commands: usize) -> Self {
         Self::new(List::repeat((T::zero(), SVector::zeros()), commands))
+    }
+
+    /// Places for the inputs that are on their way at once with this delay, s, and a command every `interval` s: one more acts,
+    /// and one is new.
+    pub fn places(delay: T, interval: T) -> usize {
+        const ROUNDING: usize = 1;
+        let count = try_convert::<T, f64>((delay / interval).ceil());
+        // An input whose delay is infinite never acts.
+        let count = count.filter(|count| count.is_finite());
+        count.map_or(0, |count| count as usize) + 2 + ROUNDING
     }
 
     /// Takes over the inputs of another line, the last ones if there are not places for all.

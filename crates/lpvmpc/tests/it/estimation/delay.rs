@@ -51,3 +51,30 @@ fn without_room_the_oldest_input_is_forgotten() {
     none.elapse(1.0);
     none.for_each(0.1, |_, u| assert_eq!(u[0], 0.0));
 }
+
+/// With 256 places the oldest of more inputs on their way was forgotten before it acted.
+#[test]
+fn no_input_is_forgotten_on_its_way() {
+    for (delay, interval, late) in [(0.02, 2e-5, 1000), (0.3, 0.001, 300), (0.0, 0.05, 0)] {
+        let places = DelayLine::<f64, 1>::places(delay, interval);
+        assert!((late..=late + 4).contains(&places), "{places}");
+        let mut line = DelayLine::<f64, 1>::allocate(places);
+        for k in 0..3000 {
+            line.command(Vector1::new(k as f64), delay);
+            let mut next = None;
+            line.for_each(interval, |duration, u| {
+                if duration > 0.5 * interval {
+                    next = Some(u[0]);
+                }
+            });
+            let acts = k.max(late) - late;
+            let next = next.expect("one acts");
+            assert!(
+                (next - acts as f64).abs() <= 1.0,
+                "{next} in place of {acts}"
+            );
+            line.elapse(interval);
+        }
+    }
+    assert_eq!(DelayLine::<f32, 1>::places(f32::INFINITY, 0.01), 3);
+}
