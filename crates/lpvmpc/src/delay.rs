@@ -31,13 +31,14 @@ impl<T: Scalar, const NU: usize> DelayLine<T, NU> {
     }
 
     /// Places for the inputs that are on their way at once with this delay, s, and a command every `interval` s: one more acts,
-    /// and one is new.
+    /// and one is new. Of more than a million, which no plant waits for, the oldest are forgotten.
     pub fn places(delay: T, interval: T) -> usize {
         const ROUNDING: usize = 1;
+        const MOST: f64 = 1e6;
         let count = try_convert::<T, f64>((delay / interval).ceil());
         // An input whose delay is infinite never acts.
         let count = count.filter(|count| count.is_finite());
-        count.map_or(0, |count| count as usize) + 2 + ROUNDING
+        count.map_or(0, |count| count.min(MOST) as usize) + 2 + ROUNDING
     }
 
     /// Takes over the inputs of another line, the last ones if there are not places for all.

@@ -44,10 +44,7 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
         false => (CERTAIN, usize::MAX),
     };
     // Where inputs and states bind each other, one wrong side makes many others seem so.
-    let (clear, clear_late) = match side::are_mixed(sides) {
-        true => (CLEAR, CLEAR_LATE),
-        false => (0, 0),
-    };
+    let mixed = side::are_mixed(sides);
     let mut method = InteriorPoint::new(sides, tolerances.scale * convert(CENTRE));
     let late = method.complementarity() * convert(LATE);
     let smallest = method.complementarity() * T::default_epsilon().powf(convert(0.6));
@@ -66,9 +63,10 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
         // The same roles, wrong, are as a rule wrong again.
         untried |= changed > 0;
         let settled = certain * changed <= active && changed <= most_changed;
-        let clear = match method.complementarity() > late {
-            true => clear,
-            false => clear_late,
+        let clear = match (mixed, method.complementarity() > late) {
+            (false, _) => 0,
+            (true, true) => CLEAR,
+            (true, false) => CLEAR_LATE,
         };
         let likely = settled && clear * undecided <= active.max(clear);
         if untried && near && likely && part > convert(FREE) {

@@ -76,5 +76,8 @@ fn no_input_is_forgotten_on_its_way() {
             line.elapse(interval);
         }
     }
-    assert_eq!(DelayLine::<f32, 1>::places(f32::INFINITY, 0.01), 3);
+    for none in [f64::INFINITY, f64::NAN, -1.0] {
+        assert_eq!(DelayLine::<f64, 1>::places(none, 0.01), 3);
+    }
+    assert_eq!(DelayLine::<f64, 1>::places(1e300, 0.01), 1_000_003);
 }
