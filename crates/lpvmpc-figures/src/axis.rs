@@ -7,6 +7,10 @@ const NEAR: f64 = 0.75;
 /// Room between the data and the frame, as part of the span.
 const ROOM: f64 = 0.05;
 
+/// Where one unit is as long on both axes, the shorter span is at least this part of the longer one: what is flatter would
+/// be a line without room for its ticks.
+const LEAST_SHARE: f64 = 1.0 / 3.0;
+
 /// Largest size of a value in view, and inverse of the smallest span: beyond it the arithmetic of
 /// the ticks would overflow.
 const LARGEST: f64 = 1e290;
@@ -42,6 +46,20 @@ impl Axis {
         match self.scale {
             Scale::Linear => value,
             Scale::Log => value.log10(),
+        }
+    }
+
+    fn span(&self) -> f64 {
+        self.upper - self.lower
+    }
+
+    /// Widened about its middle to `span`, where it is shorter.
+    fn at_least(self, span: f64) -> Self {
+        let missing = (span - self.span()).max(0.0) / 2.0;
+        Self {
+            lower: self.lower - missing,
+            upper: self.upper + missing,
+            ..self
         }
     }
 
@@ -84,6 +102,13 @@ impl Axes {
             scale: panel.y_scale,
             lower,
             upper,
+        };
+        let (x, y) = match (panel.equal_aspect, panel.y_scale) {
+            (true, Scale::Linear) => (
+                x.at_least(LEAST_SHARE * y.span()),
+                y.at_least(LEAST_SHARE * x.span()),
+            ),
+            _ => (x, y),
         };
 
         for (axis, name) in [(x, "horizontal"), (y, "vertical")] {

@@ -388,3 +388,20 @@ proptest! {
         }
     }
 }
+
+/// A path that is a thousand times as long as wide was drawn as a line, its ticks over each other.
+#[test]
+fn a_flat_path_has_room_for_its_ticks() {
+    for (x, y) in [
+        ([0.0, 1.0, 2.0], [0.0, 1e-3, 0.0]),
+        ([0.0, 1e-3, 0.0], [0.0, 1.0, 2.0]),
+    ] {
+        let mut panel = panel(&x, &y, LINE);
+        panel.equal_aspect = true;
+        let axes = axis::Axes::of(&panel).unwrap();
+        let spans = [axes.x, axes.y].map(|axis| axis.upper - axis.lower);
+        let [short, long] = [spans[0].min(spans[1]), spans[0].max(spans[1])];
+        assert!((short / long - 1.0 / 3.0).abs() < 1e-12, "{spans:?}");
+        assert!(x.iter().all(|x| axes.x.contains(*x)) && y.iter().all(|y| axes.y.contains(*y)));
+    }
+}
