@@ -3,7 +3,7 @@
 use crate::controller_settings::limits;
 use crate::error::MpcError;
 use crate::linearise::lqr;
-use crate::settings::{Limits, LinearModels, MpcSettings, StateBounds, Terminal};
+use crate::settings::{FIRST_PROGRAMS, Limits, LinearModels, MpcSettings, StateBounds, Terminal};
 use lpvmpc::Iterations;
 use lpvmpc_plant::{FirmwareSettings, Plant, PlantError, Signal};
 use nalgebra::DMatrix;
@@ -55,10 +55,12 @@ pub fn firmware(
 
 /// A program has the usual settings, apart from those that it prints.
 fn check(plant: &Plant, settings: &MpcSettings) -> Result<(), MpcError> {
-    let (tolerance, most) = match settings.iterations {
+    let (tolerance, most, first) = match settings.iterations {
         Iterations::Descent {
-            tolerance, most, ..
-        } => (tolerance, most),
+            tolerance,
+            most,
+            first,
+        } => (tolerance, most, first),
         Iterations::Fixed(_) => return Err(refused("method", "a descent")),
     };
     match &settings.terminal {
@@ -92,6 +94,12 @@ fn check(plant: &Plant, settings: &MpcSettings) -> Result<(), MpcError> {
             "max_programs",
             most == Iterations::<f64>::MOST,
             "the usual number",
+        ),
+        (
+            "first_programs",
+            // Beside the usual number the one that the program has.
+            [FIRST_PROGRAMS, Iterations::<f64>::MOST].contains(&first),
+            "left out",
         ),
         ("u_ref", settings.u_ref.is_none(), "left out"),
         ("rows", settings.rows.is_empty(), "left out"),

@@ -49,6 +49,18 @@ pub enum Command {
     Firmware(FirmwareArguments),
 }
 
+impl Command {
+    /// Whether the results are in files, and what is printed tells of them.
+    pub fn reports_files(&self) -> bool {
+        match self {
+            Self::Simulate(given) => !given.json,
+            Self::Certify(given) => given.out.is_some(),
+            Self::Firmware(_) => true,
+            _ => false,
+        }
+    }
+}
+
 /// A plant.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lpvmpc plant cart-pole.json --json")]

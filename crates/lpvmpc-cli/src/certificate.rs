@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 pub fn certify(arguments: &CertifyArguments) -> Result<String, CommandError> {
     let experiment = Experiment::load(&arguments.experiment)?;
     if let Some(out) = &arguments.out {
-        output::check_separate(out, experiment.files().iter().map(PathBuf::as_path))?;
+        output::check_separate(out, experiment.sources().iter().map(PathBuf::as_path))?;
     }
     let settings = &experiment.settings;
     let pair = |limits: &Option<lpvmpc_any::Limits>| {

@@ -1,7 +1,7 @@
 //! The table of an experiment that says what is measured in place of the state, as `lpvmpc.Estimator` of the Python
 //! package does.
 
-use crate::experiment::{check_name, components, names};
+use crate::experiment::{Table, check_name, components, names};
 use lpvmpc_any::{Disturbance, EstimatorSettings, Gate};
 use lpvmpc_plant::PlantData;
 use serde::Deserialize;
@@ -17,11 +17,11 @@ pub struct EstimatorTable {
     measured: InOrder<f64>,
     state_noise: ByState,
     #[serde(default)]
-    disturbances: InOrder<DisturbanceTable>,
+    disturbances: InOrder<Table<DisturbanceTable>>,
     delay: Option<f64>,
     start: Option<Vec<f64>>,
     initial_state: Option<ByState>,
-    gate: Option<GateTable>,
+    gate: Option<Table<GateTable>>,
 }
 
 #[derive(Deserialize)]
@@ -146,7 +146,7 @@ impl EstimatorTable {
         if let Some(start) = &self.start {
             components(&place("start"), start, &data.states)?;
         }
-        let disturbance = |(on, table): &(String, DisturbanceTable)| {
+        let disturbance = |(on, Table(table)): &(String, Table<DisturbanceTable>)| {
             let usual = Disturbance::new(on, table.noise);
             Disturbance {
                 initial: table.initial.unwrap_or(usual.initial),
@@ -155,7 +155,7 @@ impl EstimatorTable {
         };
         let gate = match &self.gate {
             None => usual.gate,
-            Some(given) => Gate {
+            Some(Table(given)) => Gate {
                 deviations: given.deviations.unwrap_or(usual.gate.deviations),
                 patience: given.patience.unwrap_or(usual.gate.patience),
                 oldest: given.oldest.unwrap_or(usual.gate.oldest),

@@ -1,6 +1,7 @@
 //! An experiment: a plant from a file, its controller, and what happens to it.
 
 mod signals;
+mod table;
 mod world;
 
 use crate::arguments::{Example, ExampleArguments};
@@ -20,6 +21,7 @@ pub use signals::{check_name, components, names};
 use signals::{limits, weights};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+pub use table::Table;
 use world::World;
 
 /// The files of the example.
@@ -76,11 +78,11 @@ struct File {
     plant: String,
     x0: Vec<f64>,
     duration: f64,
-    controller: Controller,
+    controller: Table<Controller>,
     #[serde(default)]
-    reference: Vec<Reference>,
+    reference: Vec<Table<Reference>>,
     #[serde(default)]
-    world: World,
+    world: Table<World>,
 }
 
 /// Bounds by name.
@@ -128,7 +130,7 @@ struct Controller {
     max_programs: Option<usize>,
     first_programs: Option<usize>,
     tolerance: Option<f64>,
-    estimator: Option<EstimatorTable>,
+    estimator: Option<Table<EstimatorTable>>,
 }
 
 #[derive(Deserialize)]
@@ -190,10 +192,9 @@ impl Experiment {
 }
 
 impl Experiment {
-    /// The files that it was read from, and that of its certificate.
-    pub fn files(&self) -> Vec<PathBuf> {
-        let read = [self.path.clone(), self.plant_file.clone()];
-        read.into_iter().chain(self.certificate.clone()).collect()
+    /// The files that it was read from. That of its certificate is not among them: it is read for a guaranteed loop alone.
+    pub fn sources(&self) -> [PathBuf; 2] {
+        [self.path.clone(), self.plant_file.clone()]
     }
 
     /// What its controller or its world refuses, in words that name its file.
@@ -219,12 +220,16 @@ impl File {
                 self.name
             ));
         }
-        let settings = self.controller.settings(&plant)?;
-        let estimator = { self.controller.estimator.as_ref() }
-            .map(|estimator| estimator.settings(data))
+        let (Table(controller), Table(world)) = (self.controller, self.world);
+        let references: Vec<Reference> = { self.reference.into_iter() }
+            .map(|Table(reference)| reference)
+            .collect();
+        let settings = controller.settings(&plant)?;
+        let estimator = { controller.estimator.as_ref() }
+            .map(|Table(estimator)| estimator.settings(data))
             .transpose()?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let certificate = self.controller.certificate.map(|file| folder.join(file));
+        let certificate = controller.certificate.map(|file| folder.join(file));
         components("x0", &self.x0, &data.states)?;
         let given = limits("x0", &None, &data.states)?;
         let bounds = settings.x_bounds.as_ref().unwrap_or(&given);
@@ -246,14 +251,15 @@ impl File {
             ));
         }
         let samples = (self.duration / settings.t_s - 1e-9).ceil();
-        if !(self.duration > 0.0 && samples <= MOST_SAMPLES) {
+        if !(1.0..=MOST_SAMPLES).contains(&samples) {
             return Err(format!(
-                "duration = {}: it must be a positive number of seconds, with at most {MOST_SAMPLES} samples",
+                "duration = {}: it must be a positive number of seconds, with at least one sample and at most \
+                 {MOST_SAMPLES}",
                 short(self.duration)
             ));
         }
         let mut before = f64::NEG_INFINITY;
-        for (i, reference) in self.reference.iter().enumerate() {
+        for (i, reference) in references.iter().enumerate() {
             let place = format!("reference {}", i + 1);
             components(&format!("{place}, x"), &reference.x, &data.states)?;
             if !(reference.time.is_finite() && reference.time > before) {
@@ -264,7 +270,7 @@ impl File {
             }
             before = reference.time;
         }
-        if let Some(first) = self.reference.first()
+        if let Some(first) = references.first()
             && first.time > 0.0
         {
             let time = short(first.time);
@@ -273,14 +279,14 @@ impl File {
             ));
         }
         let mut real = plant.clone();
-        for (name, value) in &self.world.parameters {
+        for (name, value) in &world.parameters {
             let known = data.parameters.iter().map(|one| one.name.as_str());
             check_name("world.parameters", name, known)?;
             let set = real.set_parameter(name, *value);
             set.map_err(|error| format!("world.parameters: {error}"))?;
         }
         let measured = estimator.as_ref().map(|one| one.measured.as_slice());
-        let world = self.world.settings(settings.t_s, &data.states, measured)?;
+        let world = world.settings(settings.t_s, &data.states, measured)?;
         Ok(Experiment {
             path: path.to_owned(),
             plant_file: path.parent().unwrap_or(Path::new("")).join(&self.plant),
@@ -292,7 +298,7 @@ impl File {
             world,
             x0: self.x0,
             samples: samples as usize,
-            references: self.reference,
+            references,
             plant,
         })
     }

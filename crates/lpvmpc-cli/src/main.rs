@@ -45,6 +45,7 @@ fn main() -> ExitCode {
         progress::silence();
     }
     match run(&arguments) {
+        Ok(_) if arguments.quiet && arguments.command.reports_files() => ExitCode::SUCCESS,
         Ok(text) => output::print(&text),
         Err(error) => output::fail(&error, false),
     }
@@ -55,11 +56,7 @@ fn run(arguments: &Arguments) -> Result<String, CommandError> {
     match &arguments.command {
         Command::Plant(given) => describe::run(given),
         Command::Example(given) => Ok(experiment::example(given).to_owned()),
-        Command::Simulate(given) => {
-            let text = simulate::run(given)?;
-            let is_report = arguments.quiet && !given.json;
-            Ok(if is_report { String::new() } else { text })
-        }
+        Command::Simulate(given) => simulate::run(given),
         Command::Bench(given) => simulate::bench(given),
         Command::Lqr(given) => gain::run(given),
         Command::Certify(given) => certificate::certify(given),

@@ -77,7 +77,15 @@ pub fn run(arguments: &SimulateArguments) -> Result<String, CommandError> {
     }
     Ok(match arguments.json {
         true => format!("{summary:#}\n"),
-        false => report(&experiment, &run, &out),
+        false => {
+            let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+            let told = report(&experiment, &run);
+            format!(
+                "{told}\nWritten: {} with {}\n",
+                out.display(),
+                names.join(", ")
+            )
+        }
     })
 }
 
@@ -181,7 +189,7 @@ fn summary(experiment: &Experiment, run: &Run) -> Value {
     summary
 }
 
-fn report(experiment: &Experiment, run: &Run, out: &std::path::Path) -> String {
+fn report(experiment: &Experiment, run: &Run) -> String {
     let statuses: Vec<String> = { run.statuses.iter() }
         .map(|(status, count)| format!("{status} {count}"))
         .collect();
@@ -206,15 +214,13 @@ fn report(experiment: &Experiment, run: &Run, out: &std::path::Path) -> String {
     };
     format!(
         "{}: {} samples of {} s\n  plans            {}\n  bounds exceeded  {broken}\n  \
-         cost of states   {}, without the inputs\n{found}\n{}\nWritten: {} with {}\n",
+         cost of states   {}, without the inputs\n{found}\n{}",
         experiment.name,
         run.u.len(),
         short(experiment.settings.t_s),
         statuses.join(", "),
         short(state_cost(experiment, run)),
         time_table(run),
-        out.display(),
-        FILES.join(", ")
     )
 }
 

@@ -1,7 +1,7 @@
 //! The table `[world]`: what happens to the plant.
 
-use super::Experiment;
 use super::signals::{check_name, components, names};
+use super::{Experiment, Table};
 use lpvmpc_any::{Push, Quantity, Sensor, WorldSettings};
 use lpvmpc_plant::Signal;
 use lpvmpc_terminal::table::short;
@@ -15,8 +15,8 @@ pub(super) struct World {
     delay: f64,
     noise: BTreeMap<String, f64>,
     seed: u64,
-    jump: Vec<Jump>,
-    load: Vec<Load>,
+    jump: Vec<Table<Jump>>,
+    load: Vec<Table<Load>>,
 }
 
 #[derive(Deserialize)]
@@ -46,12 +46,12 @@ impl World {
             true => Err(format!("{place}.{key} = {time}: the run begins at 0 s")),
             false => Ok(()),
         };
-        for (i, jump) in self.jump.iter().enumerate() {
+        for (i, Table(jump)) in self.jump.iter().enumerate() {
             let place = format!("world.jump {}", i + 1);
             components(&place, &jump.change, states)?;
             begins(&place, "time", jump.time)?;
         }
-        for (i, load) in self.load.iter().enumerate() {
+        for (i, Table(load)) in self.load.iter().enumerate() {
             let place = format!("world.load {}", i + 1);
             components(&place, &load.load, states)?;
             begins(&place, "end", load.end)?;
@@ -76,11 +76,11 @@ impl World {
             }
         };
         let is_ideal = measured.is_none() && self.noise.is_empty();
-        let jumps = self.jump.into_iter().map(|jump| Push::Jump {
+        let jumps = self.jump.into_iter().map(|Table(jump)| Push::Jump {
             time: jump.time,
             change: jump.change,
         });
-        let loads = self.load.into_iter().map(|load| Push::Load {
+        let loads = self.load.into_iter().map(|Table(load)| Push::Load {
             from: load.start,
             until: load.end,
             load: load.load,

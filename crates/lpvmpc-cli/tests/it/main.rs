@@ -437,6 +437,14 @@ fn a_loop_is_guaranteed_by_a_certificate_that_is_proved_first() {
     fs::write(path.join("both.toml"), both).unwrap();
     let message = fail(path, &["simulate", "both.toml"]);
     assert!(message.contains("stands in place of terminal"), "{message}");
+
+    // A certificate that was not proved is designed anew in its place, and the sources are not.
+    let again = ["certify", "with.toml", "--out"];
+    let message = fail(path, &[&again[..], &["pendulum.json"]].concat());
+    assert!(message.contains("would be lost"), "{message}");
+    let said = succeed(path, &[&again[..], &["c.json", "--quiet"]].concat());
+    assert!(said.is_empty(), "{said}");
+    succeed(path, &["verify", "c.json", "pendulum.json"]);
 }
 
 /// A cart whose position no formula reads: its references are seen ahead, and one that the certificate says nothing of is
@@ -714,6 +722,10 @@ fn a_controller_is_printed_as_a_program() {
         ),
         ("terminal = \"equality\"", "terminal: on a microcontroller"),
         ("r_du = [0.1]", "r_du: on a microcontroller"),
+        (
+            "first_programs = 20",
+            "first_programs: on a microcontroller it must be left out",
+        ),
         ("certificate = \"c.json\"", "there is no guaranteed loop"),
         (
             "estimator = { measured = { tilt = 1 }, state_noise = 1 }",
@@ -734,7 +746,70 @@ fn a_controller_is_printed_as_a_program() {
         let weight = format!("{}", *weight as f32);
         assert!(main.contains(&weight), "{weight} is not in {main}");
     }
+    let quiet = [
+        "firmware",
+        "pendulum.toml",
+        "--lpvmpc",
+        crate_folder,
+        "-q",
+        "--out",
+        "quiet",
+    ];
+    assert!(succeed(path, &quiet).is_empty());
     let again = print("pendulum.toml", crate_folder);
     let message = String::from_utf8_lossy(&again.stderr);
     assert!(message.contains("robot: it is there already"), "{message}");
+}
+
+/// What stands in a list behind the entries of a table was left out.
+#[test]
+fn a_list_does_not_stand_for_a_table() {
+    let folder = pendulum();
+    let path = folder.path();
+    let text = fs::read_to_string(path.join("pendulum.toml")).unwrap();
+    let estimator = |more: &str| {
+        let table = format!("estimator = {{ measured = {{ tilt = 1 }}, state_noise = 1, {more} }}");
+        changed(&text, "r = [0.1]", &format!("r = [0.1]\n{table}"))
+    };
+    for refused in [
+        estimator("gate = [5.0, 3, 0.1, 0.5, 99]"),
+        estimator("disturbances = { torque = [0.1, 1.0, 7.0] }"),
+        changed(
+            &text,
+            "[controller]",
+            "reference = [[0.0, [0, 0], 5.0]]\n[controller]",
+        ),
+        format!("{text}[world]\njump = [[0.5, [0, 0], 1]]\n"),
+        changed(&text, "[controller]", "world = [{}]\n[controller]"),
+    ] {
+        fs::write(path.join("bad.toml"), &refused).unwrap();
+        let message = fail(path, &["simulate", "bad.toml"]);
+        assert!(message.contains("expected a table"), "{refused}\n{message}");
+    }
+    for taken in [
+        estimator("gate = { deviations = 5.0 }, disturbances = { torque = { noise = 0.1 } }"),
+        format!("{text}[world]\njump = [{{ time = 0.5, change = [0, 0] }}]\n"),
+    ] {
+        fs::write(path.join("good.toml"), taken).unwrap();
+        succeed(path, &["simulate", "good.toml"]);
+    }
+    assert!(!path.join("bad").exists());
+}
+
+#[test]
+fn a_run_has_a_sample_and_names_the_files_that_it_wrote() {
+    let folder = pendulum();
+    let path = folder.path();
+    let said = succeed(path, &["simulate", "pendulum.toml"]);
+    assert!(
+        said.ends_with("with trajectory.csv, summary.json, figure.svg, figure.png\n"),
+        "{said}"
+    );
+    let text = fs::read_to_string(path.join("pendulum.toml")).unwrap();
+    for duration in ["1e-12", "0", "-1", "nan"] {
+        let none = changed(&text, "duration = 2", &format!("duration = {duration}"));
+        fs::write(path.join("none.toml"), none).unwrap();
+        let message = fail(path, &["simulate", "none.toml"]);
+        assert!(message.contains("at least one sample"), "{message}");
+    }
 }
