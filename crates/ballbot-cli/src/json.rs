@@ -5,6 +5,7 @@ use ballbot::Ballbot;
 use nalgebra::{Complex, DMatrix};
 use serde::Serialize;
 use serde_json::{Map, Value, json, to_value};
+use std::path::Path;
 
 /// The rows of a matrix.
 pub fn matrix(matrix: &DMatrix<f64>) -> Value {
@@ -35,6 +36,11 @@ pub fn extend(document: &mut Value, more: &impl Serialize) {
     if let (Some(document), Ok(Value::Object(more))) = (document.as_object_mut(), to_value(more)) {
         document.extend(more);
     }
+}
+
+/// A path; what of it is no UTF-8, which JSON has no place for, is shown as a replacement character.
+pub fn path(path: &Path) -> Value {
+    path.to_string_lossy().into()
 }
 
 /// The document as text.

@@ -105,7 +105,7 @@ pub fn run(arguments: &CertifyArguments) -> Result<String, CommandError> {
     let paths = names.map(|name| arguments.out.join(name));
     if arguments.json {
         let mut document = document(&certificate, &proof);
-        document["files"] = json!(paths);
+        document["files"] = paths.iter().map(|path| json::path(path)).collect();
         return Ok(json::text(&document));
     }
     Ok(format!(

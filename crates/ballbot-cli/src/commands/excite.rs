@@ -188,6 +188,6 @@ fn document(task: &ExcitationTask, excitation: &Excitation, out: &Path) -> Value
         "largest_travel_m": excitation.travel,
         "noise": task.noise.as_slice(),
         "parameters": parameters.collect::<Map<_, _>>(),
-        "file": out,
+        "file": json::path(out),
     })
 }

@@ -100,7 +100,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, CommandError> {
     Ok(if arguments.json {
         let mut document = serde_json::json!({});
         json::extend(&mut document, &robot.summary());
-        document["folder"] = serde_json::json!(folder.path());
+        document["folder"] = json::path(folder.path());
         document["files"] = serde_json::json!(files);
         json::text(&document)
     } else {

@@ -95,9 +95,17 @@ impl LqrArguments {
 pub fn run(arguments: &LqrArguments) -> Result<String, CommandError> {
     let ballbot = arguments.model.robot.ballbot()?;
     let linear = arguments.model.upright(&ballbot);
-    let substeps = match arguments.substeps {
-        Some(substeps) => substeps,
-        None => accurate_rk4_substeps(&linear.a, arguments.ts).map_err(RegulatorError::from)?,
+    let time = if arguments.continuous {
+        Time::Continuous
+    } else {
+        let substeps = match arguments.substeps {
+            Some(substeps) => substeps,
+            None => accurate_rk4_substeps(&linear.a, arguments.ts).map_err(RegulatorError::from)?,
+        };
+        Time::Sampled {
+            t_s: arguments.ts,
+            predictor: Rk4 { substeps },
+        }
     };
     let (q, r) = arguments.weights(&ballbot)?;
     let problem = RegulatorProblem {
@@ -105,14 +113,7 @@ pub fn run(arguments: &LqrArguments) -> Result<String, CommandError> {
         ballbot,
         q,
         r,
-        time: if arguments.continuous {
-            Time::Continuous
-        } else {
-            Time::Sampled {
-                t_s: arguments.ts,
-                predictor: Rk4 { substeps },
-            }
-        },
+        time,
     };
     let regulator = problem.solve()?;
     Ok(if arguments.json {

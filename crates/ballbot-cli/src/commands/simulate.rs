@@ -103,6 +103,10 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
     };
     let results = RESULTS.iter().map(|name| folder.path().join(name));
     let read = arguments.options.files(&arguments.scenario)?;
+    // A result of an earlier run may be what this one follows.
+    results
+        .clone()
+        .try_for_each(|path| output::check_separate(&path, read.iter().map(PathBuf::as_path)))?;
     let others: Vec<PathBuf> = results.chain(read).collect();
     logs.iter()
         .try_for_each(|path| output::check_separate(path, others.iter().map(PathBuf::as_path)))?;
@@ -129,7 +133,7 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
         // All sums, means and largest values are over this time, from 0 s on.
         "window_s": prepared.end(),
         "planes": metrics,
-        "folder": folder.path(),
+        "folder": json::path(folder.path()),
     });
     let runs = match trajectories.len() {
         1 => ["run", ""],
@@ -150,23 +154,28 @@ pub fn complete(arguments: &SimulateArguments) -> Result<Simulated, CommandError
         (true, Some((of_plane, _))) => Some(of_plane),
         (false, _) => early.next().map(|(of_plane, _)| of_plane),
     };
+    let log = rows
+        .first()
+        .filter(|_| arguments.logs_to_standard_output())
+        .map(|log| recorded::log_csv(log));
     match early {
         None => Ok(Simulated {
             prepared,
             trajectories,
             summary,
             document,
-            log: rows
-                .first()
-                .filter(|_| arguments.logs_to_standard_output())
-                .map(|log| recorded::log_csv(log)),
+            log,
         }),
-        Some((what, run)) => Err(CommandError::EndedEarly {
-            what,
-            termination: words::termination(&run.termination),
-            state: run.final_state.into(),
-            folder: folder.path().to_owned(),
-        }),
+        Some((what, run)) => {
+            // What was recorded is kept, wherever it goes to. That the run ended early is an error however this ends.
+            let _ = log.map(|log| output::print(&log));
+            Err(CommandError::EndedEarly {
+                what,
+                termination: words::termination(&run.termination),
+                state: run.final_state.into(),
+                folder: folder.path().to_owned(),
+            })
+        }
     }
 }
 

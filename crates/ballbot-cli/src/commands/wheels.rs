@@ -76,7 +76,7 @@ pub fn run(arguments: &WheelsArguments) -> Result<String, CommandError> {
         let off = check.off_deg;
         let rest = if seen.len() == 3 { "" } else { TOLD_APART };
         return Ok(format!(
-            "{table}\norder, sense and azimuths agree with [log.wheels]: {off:.1} degrees off{rest}"
+            "{table}\norder, sense and azimuths agree with [log.wheels]: {off:.1} degrees off{rest}\n"
         ));
     }
     Err(CommandError::Wheels(format!(

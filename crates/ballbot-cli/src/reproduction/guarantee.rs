@@ -52,8 +52,8 @@ fn gap_sheet(guarantee: &Guarantee) -> Sheet {
 /// Cost and time of the guarantee. Scenario 3 asks for its set point from the beginning on;
 /// in scenario 1 the loop without a guarantee knows of a set point one horizon ahead.
 fn price_sheet(guarantee: &Guarantee) -> Sheet {
-    let title = "The price of the guarantee: stage-consistent predictor, two steps per sample; \
-                 costs and largest values over the whole 4 s";
+    let title = "The price of the guarantee: stage-consistent predictor, of two steps per sample where \
+                 nothing is guaranteed and of four where it is; costs and largest values over the whole 4 s";
     let headers = [
         "",
         "closed-loop cost",

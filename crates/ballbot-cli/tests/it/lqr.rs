@@ -1,6 +1,6 @@
 //! `ballbot lqr`, against the independently computed gains.
 
-use crate::{assert_close, assert_says, ballbot, failure, json, numbers, text};
+use crate::{assert_close, assert_says, ballbot, fail, failure, json, numbers, succeed, text};
 use serde_json::Value;
 
 fn diagonal(p: &Value) -> Vec<f64> {
@@ -257,4 +257,18 @@ fn numbers_are_for_people() {
             .max();
         assert!(longest <= Some(12), "{printed}");
     }
+}
+
+/// A robot that falls too fast for the usual sampling time, which is none in continuous time.
+#[test]
+fn a_continuous_regulator_needs_no_sampling_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = "accept_unusual_values = true\n[parameters]\nb1_m2 = 0.0257\nb2_m2 = 0.0079\nb3_m2 = 0.1284\n\
+                 b4_m2_s = 0.02\ncentre_of_mass_m = 0.2978\nball_radius_m = 0.12\nwheel_radius_m = 0.55\n\
+                 gravity_m_s2 = 1e6\n";
+    std::fs::write(folder.path().join("fast.toml"), robot).unwrap();
+    let sampled = ["lqr", "--parameters", "fast.toml"];
+    assert_says(&fail(folder.path(), &sampled, 1), &["too long"]);
+    let continuous = [&sampled[..], &["--continuous"]].concat();
+    assert_says(&succeed(folder.path(), &continuous), &["continuous time"]);
 }

@@ -87,6 +87,7 @@ fn wheels_as_they_are_said_agree() {
     for all in [false, true] {
         let said = succeeds(&command(&config, &logs, all));
         assert_says(&said, &["agree with [log.wheels]", "m1", "along x, seen"]);
+        assert!(said.ends_with('\n'), "{said}");
     }
 }
 

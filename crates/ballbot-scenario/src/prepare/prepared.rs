@@ -150,6 +150,13 @@ impl Scenario {
             ));
         }
         let samples = (duration / settings.t_s - 1e-9).ceil();
+        if !(samples >= 1.0) {
+            return Err(ScenarioError::value(
+                "duration_s",
+                duration,
+                "it must be at least one sample, of controller.t_s",
+            ));
+        }
         if samples > MOST_SAMPLES {
             return Err(ScenarioError::value(
                 "duration_s",

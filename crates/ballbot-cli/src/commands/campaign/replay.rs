@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &ReplayArguments) -> Result<String, CommandError> {
     if arguments.json {
         let cells = cells.map(|(column, cell)| (column.name.clone(), value(cell)));
         let mut document: Map<String, Value> = cells.collect();
-        document.insert("folder".to_owned(), json!(out));
+        document.insert("folder".to_owned(), json::path(&out));
         return Ok(json::text(&Value::Object(document)));
     }
     let mut table = Table::new(["", "value"]);

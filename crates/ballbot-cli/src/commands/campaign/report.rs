@@ -52,7 +52,7 @@ pub(super) fn all(
     }
     let mut document = json!(summary);
     document["known_as_asked"] = json!(known);
-    document["folder"] = json!(results.path());
+    document["folder"] = json::path(results.path());
     let mut files = vec![(SUMMARY.to_owned(), json::text(&document).into_bytes())];
     for Drawing { name, figure } in campaign_figures::all(campaign, &file, &summary)? {
         files.extend(figure.files(name)?);
@@ -179,7 +179,7 @@ pub(super) fn rare(
         "runs": found.runs,
         "levels": found.levels,
     });
-    document["folder"] = json!(results.path());
+    document["folder"] = json::path(results.path());
     let files = [
         (SUMMARY.to_owned(), json::text(&document).into_bytes()),
         (LEVELS.to_owned(), level_rows(&found, rare).into_bytes()),

@@ -81,7 +81,7 @@ pub(super) fn write(
     };
     let figures = drawn.all(report.comparisons.as_deref().unwrap_or_default());
     let mut document = report.json();
-    document["folder"] = json!(results.path());
+    document["folder"] = json::path(results.path());
     let mut files = vec![
         (SUMMARY.to_owned(), json::text(&document).into_bytes()),
         (CANDIDATES.to_owned(), report.candidates().into_bytes()),

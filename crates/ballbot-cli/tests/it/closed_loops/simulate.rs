@@ -2,7 +2,7 @@
 
 use super::recorded::{self, assert_figure};
 use super::{edited, files, with_section};
-use crate::{assert_says, fail, succeed};
+use crate::{assert_says, ballbot_in, fail, succeed};
 use ballbot_scenario::{Scenario, builtin};
 use serde_json::Value;
 use std::path::Path;
@@ -375,7 +375,7 @@ fn what_comes_after_the_end_is_told() {
     let told = |sets: &[&str]| {
         let sets = sets.iter().flat_map(|set| ["--set", set]);
         let arguments: Vec<&str> = ["simulate", "one-metre"].into_iter().chain(sets).collect();
-        let output = crate::ballbot_in(folder.path(), &arguments);
+        let output = ballbot_in(folder.path(), &arguments);
         assert!(output.status.success());
         String::from_utf8(output.stderr).unwrap()
     };
@@ -513,4 +513,71 @@ fn a_log_takes_the_place_of_nothing() {
     }
     assert_eq!(files(folder.path()), before);
     succeed(folder.path(), &["simulate", "my.toml", "--log", "log.csv"]);
+}
+
+/// A result of an earlier run that this one follows.
+#[test]
+fn results_take_the_place_of_nothing_that_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    succeed(here, &["simulate", "two-setpoints", "--out", "out/x"]);
+    let trajectory = here.join("out/x/trajectory.csv");
+    let before = std::fs::read(&trajectory).unwrap();
+    let shown = shown("two-setpoints");
+    let follow = with_section(
+        &shown,
+        "[reference.set_points]",
+        "# The simulated",
+        "[reference.csv]\npath = \"out/x/trajectory.csv\"",
+    );
+    std::fs::write(here.join("follow.toml"), follow).unwrap();
+    let message = fail(here, &["simulate", "follow.toml", "--out", "out/x"], 1);
+    assert_says(&message, &["trajectory.csv", "would be lost"]);
+    assert_eq!(std::fs::read(&trajectory).unwrap(), before);
+}
+
+#[test]
+fn a_log_on_standard_output_is_kept_when_the_run_ends_early() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = [
+        "simulate",
+        "one-metre",
+        "--set",
+        "initial_state.theta_rad=0.6",
+    ];
+    let to_file = [&run[..], &["--log", "log.csv"]].concat();
+    fail(folder.path(), &to_file, 1);
+    let ended = ballbot_in(folder.path(), &[&run[..], &["--log", "-"]].concat());
+    assert_eq!(ended.status.code(), Some(1));
+    assert_eq!(
+        ended.stdout,
+        std::fs::read(folder.path().join("log.csv")).unwrap()
+    );
+}
+
+/// A folder whose name JSON cannot have.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_path_that_is_no_text_is_shown_as_far_as_it_is() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    let out = std::ffi::OsStr::from_bytes(b"caf\xe9");
+    let ended = std::process::Command::new(env!("CARGO_BIN_EXE_ballbot"))
+        .current_dir(folder.path())
+        .args(["simulate", "two-setpoints", "--json", "--out"])
+        .arg(out)
+        .output()
+        .unwrap();
+    let document: Value = serde_json::from_slice(&ended.stdout).unwrap();
+    assert_eq!(document["folder"], "caf\u{fffd}");
+}
+
+#[test]
+fn a_run_without_a_sample_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = ["simulate", "two-setpoints", "--set", "duration_s=1e-12"];
+    assert_says(
+        &fail(folder.path(), &run, 1),
+        &["duration_s", "at least one sample"],
+    );
 }
