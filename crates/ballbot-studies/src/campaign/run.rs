@@ -109,20 +109,27 @@ pub(super) struct Loop<'a> {
 }
 
 impl<'a> Loop<'a> {
-    /// A state drawn evenly from the certified set around phi = 0, or from its `edge`.
+    /// A state drawn evenly from the certified set, or from its `edge`, around rest at phi = 0, or at the angle next to it
+    /// about which the set is within the bounds.
     pub fn start(
         prepared: &Prepared,
         edge: bool,
         random: &mut Random,
     ) -> Result<Vector4<f64>, ScenarioError> {
-        let GuaranteedSettings { terminal, .. } = settings(prepared)?;
+        let GuaranteedSettings {
+            terminal,
+            set_points: [lower, upper],
+            direction: phi,
+            ..
+        } = settings(prepared)?;
+        let rest = phi * 0.0_f64.max(*lower).min(*upper);
         let direction = Vector4::from_fn(|_, _| random.normal()).normalize();
         let part = random.uniform().powf(0.25);
         let radius = terminal.level.sqrt() * if edge { 1.0 } else { part };
         // With P = L L', x = L^-T y has x'Px = |y|^2.
         let factor = terminal.p.cholesky().map(|factor| factor.l().transpose());
         let state = factor.and_then(|root| root.solve_upper_triangular(&(direction * radius)));
-        state.ok_or_else(no_certificate)
+        state.map(|state| rest + state).ok_or_else(no_certificate)
     }
 
     /// The loop of `prepared` with the changes of `variant`.

@@ -88,3 +88,24 @@ fn the_number_of_threads_changes_nothing() {
         .unwrap();
     assert_ne!(one[0].records, other[0].records);
 }
+
+/// Starts were drawn around phi = 0, wherever the bounds are.
+#[test]
+fn a_campaign_starts_within_bounds_that_are_not_around_zero() {
+    for bounds in [[5.0, 50.0], [-1.0, 50.0]] {
+        let mut scenario = Scenario::load("far-setpoints").unwrap();
+        scenario.bounds.phi_rad = bounds;
+        let few = Campaign {
+            runs: 20,
+            other_runs: 1,
+            samples: 30,
+            ..SMALL
+        };
+        let scenarios = Scenarios::of(scenario.prepare(Path::new(".")).unwrap()).unwrap();
+        let outcomes = few.run(&scenarios, &|_| ()).unwrap();
+        for Outcome { variant, tally, .. } in outcomes {
+            let broken = tally.broken_promises();
+            assert!(!variant.is_nominal() || broken == 0, "{variant}: {tally:?}");
+        }
+    }
+}
