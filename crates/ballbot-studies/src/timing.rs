@@ -10,7 +10,7 @@ pub use problems::{PROBLEMS, time_problems};
 
 use crate::StudyError;
 use ballbot::{Controller, ControllerSettings};
-use ballbot_scenario::{Prepared, Scenario, ScenarioError};
+use ballbot_scenario::{Prepared, Problem, Scenario, ScenarioError};
 use lpvmpc::{
     GuaranteedController, GuaranteedIterations, Iterations, Reference, Solver, TerminalIngredient,
 };
@@ -257,12 +257,26 @@ impl DescentTimes {
 /// in an ideal world.
 ///
 /// # Errors
-/// The controller refuses its settings or the plant cannot be integrated.
+/// The loop is a guaranteed one or plans the torque's rate, the controller refuses its settings, or the plant cannot be
+/// integrated.
 pub fn time(
     name: &str,
     prepared: &Prepared,
     watch: Stopwatch<'_>,
 ) -> Result<SequenceTimes, StudyError> {
+    let unsuitable = match prepared.problem {
+        Problem::Plain => None,
+        Problem::Ramped(_) => Some(
+            "the times are of a controller that plans the torque: leave [controller.torque_rate] out",
+        ),
+        Problem::Guaranteed(_) => Some(
+            "the times are of a controller without a guarantee, which has other settings than this one; without a \
+             scenario the guaranteed step is timed along far-setpoints",
+        ),
+    };
+    if let Some(reason) = unsuitable {
+        return Err(StudyError::Unsuitable(reason));
+    }
     let mut record = Record::default();
     for plane in 0..prepared.planes.len() {
         time_plane(prepared, plane, watch, &mut record)?;
@@ -303,7 +317,9 @@ fn time_plane(
     let mut other_work = OtherWork::new();
     let stride = prepared.samples.div_ceil(COLD_SAMPLES);
     for k in 0..prepared.samples {
-        let at = |i: usize| plane.state_reference((k + i) as f64 * t_s);
+        // Without preview the present reference is that of all stages.
+        let seen = if prepared.feedback.preview { 1 } else { 0 };
+        let at = |i: usize| plane.state_reference((k + seen * i) as f64 * t_s);
         let stages: Vec<_> = (0..horizon).map(at).collect();
         let reference = Reference {
             stages: &stages,

@@ -27,7 +27,8 @@ Times the quadratic program alone (QP) and the controller's whole step on this m
 loops of the built-in scenarios; the quadratic program alone on sequences of larger problems, longer
 horizons and many active bounds; and the guaranteed step against the plain one. Each sample is
 repeated and its shortest time counts, so that all it needs is in the cache. The columns `cold` are
-after a sweep of 48 MB, as when other work runs between two samples.")]
+after a sweep of 48 MB, as when other work runs between two samples. A scenario of one's own must be
+one without a guarantee and without [controller.torque_rate].")]
 pub struct BenchArguments {
     /// A built-in scenario or a TOML file [default: four of the built-in ones, and problems of other sizes]
     pub scenario: Option<String>,
@@ -54,11 +55,9 @@ pub fn run(arguments: &BenchArguments) -> Result<String, CommandError> {
     let file = arguments.json.as_deref();
     let file = file.filter(|path| *path != Path::new("-"));
     if let Some(path) = file {
-        let read = match &arguments.scenario {
-            Some(name) => arguments.options.files(name)?,
-            None => Vec::new(),
-        };
-        output::check_separate(path, read.iter().map(PathBuf::as_path))?;
+        let read = names.iter().map(|name| arguments.options.files(name));
+        let read: Vec<_> = read.collect::<Result<_, _>>()?;
+        output::check_separate(path, read.iter().flatten().map(PathBuf::as_path))?;
     }
     let start = Instant::now();
     let clock = || start.elapsed();

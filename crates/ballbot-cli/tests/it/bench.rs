@@ -1,6 +1,6 @@
 //! `ballbot bench`.
 
-use crate::{failure, json};
+use crate::{assert_says, fail, failure, json};
 
 #[test]
 fn every_sequence_has_its_times() {
@@ -37,4 +37,38 @@ fn a_time_needs_a_pass() {
 #[test]
 fn a_scenario_that_does_not_exist_has_no_times() {
     assert!(failure(&["bench", "no-such-scenario"], 1).contains("no-such-scenario"));
+}
+
+/// Times would have taken the place of the robot that they are of.
+#[test]
+fn times_take_the_place_of_no_robot() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = folder.path().join("robot.toml");
+    let text = "[parameters]\nb1_m2 = 0.0257\nb2_m2 = 0.0079\nb3_m2 = 0.1284\nb4_m2_s = 0.02\n\
+                centre_of_mass_m = 0.2978\nball_radius_m = 0.12\nwheel_radius_m = 0.55\ngravity_m_s2 = 9.81\n";
+    std::fs::write(&robot, text).unwrap();
+    let named = ["--set", "parameters=\"robot.toml\""];
+    for given in [&["--parameters", "robot.toml"][..], &named] {
+        let bench = [&["bench", "--passes", "1", "--json", "robot.toml"], given].concat();
+        let message = fail(folder.path(), &bench, 1);
+        assert_says(&message, &["robot.toml", "would be lost"]);
+        assert_eq!(std::fs::read_to_string(&robot).unwrap(), text);
+    }
+}
+
+/// What would be timed has other settings than these scenarios.
+#[test]
+fn controllers_of_another_kind_are_not_timed_as_plain_ones() {
+    let set = [
+        "--passes",
+        "1",
+        "--set",
+        "controller.torque_rate.limit_nm_s=20",
+    ];
+    let ramped = [&["bench", "two-setpoints"], &set[..]].concat();
+    assert_says(&failure(&ramped, 1), &["torque_rate"]);
+    assert_says(
+        &failure(&["bench", "far-setpoints", "--passes", "1"], 1),
+        &["without a guarantee"],
+    );
 }
