@@ -1,7 +1,7 @@
 //! `ballbot rehearse`: from an excitation to a controller, on a simulated robot.
 
 use super::CommandError;
-use super::simulate::{self, Simulated};
+use super::simulate::{self, SimulateArguments, Simulated};
 use crate::arguments::{Arguments, Command};
 use crate::json;
 use crate::output;
@@ -122,6 +122,7 @@ pub fn run(arguments: &RehearseArguments) -> Result<String, CommandError> {
             .map_err(|error| CommandError::Usage(error.to_string()))?;
         let said = match line.command {
             Command::Simulate(arguments) => {
+                check_log(&arguments)?;
                 let run = simulate::complete(&arguments)?;
                 let said = run.summary.clone();
                 runs.push(run);
@@ -143,10 +144,22 @@ pub fn run(arguments: &RehearseArguments) -> Result<String, CommandError> {
     if arguments.json {
         let parameter = |(name, real, found): &(&str, f64, f64)| json!({ "name": name, "true": real, "identified": found });
         let parameters: Vec<Value> = parameters.iter().map(parameter).collect();
-        let document = json!({ "folder": folder, "parameters": parameters, "runs": errors });
+        let document =
+            json!({ "folder": json::path(folder), "parameters": parameters, "runs": errors });
         return Ok(json::text(&document));
     }
     Ok(text + &parameter_table(&parameters).to_string() + &error_table(&errors).to_string())
+}
+
+/// The next stage reads one log: of a run with two planes there would be two, beside one of an earlier rehearsal.
+fn check_log(arguments: &SimulateArguments) -> Result<(), CommandError> {
+    let scenario = &arguments.scenario;
+    if arguments.log.is_some() && arguments.options.prepare(scenario)?.planes.len() > 1 {
+        return Err(CommandError::Impossible(format!(
+            "{scenario}: its reference has two planes; a rehearsal identifies the robot from the log of one"
+        )));
+    }
+    Ok(())
 }
 
 fn robot(folder: &Path, name: &str) -> Result<Ballbot<f64>, CommandError> {
@@ -198,7 +211,8 @@ struct Error {
     /// run.
     from_s: f64,
     until_s: f64,
-    rms_distance_mm: f64,
+    /// `None` where the run ends before it.
+    rms_distance_mm: Option<f64>,
     largest_tilt_rad: f64,
 }
 
@@ -210,13 +224,14 @@ impl Error {
         let [from_s, until_s] = window(run.prepared.planes.first(), end);
         let squares = planes().map(|(_, trajectory)| mean_square(trajectory, [from_s, until_s]));
         let geometry = &run.prepared.ballbot.geometry;
-        let distance = geometry.position(squares.sum::<f64>().sqrt());
+        let distance = squares.sum::<Option<f64>>();
+        let distance = distance.map(|square| geometry.position(square.sqrt()));
         let tilts = planes().flat_map(|(_, trajectory)| trajectory.states());
         Self {
             run: run.prepared.title.clone(),
             from_s,
             until_s,
-            rms_distance_mm: 1000.0 * distance,
+            rms_distance_mm: distance.map(|metres| 1000.0 * metres),
             largest_tilt_rad: tilts.fold(0.0_f64, |most, x| most.max(x[1].abs())),
         }
     }
@@ -227,7 +242,9 @@ fn error_table(errors: &[Error]) -> Table {
     for error in errors {
         table.row([
             error.run.clone(),
-            format!("{:.1}", error.rms_distance_mm),
+            error
+                .rms_distance_mm
+                .map_or("the run ends before".to_owned(), |mm| format!("{mm:.1}")),
             format!(
                 "{} to {}",
                 recorded::time(error.from_s),
@@ -239,10 +256,11 @@ fn error_table(errors: &[Error]) -> Table {
     table
 }
 
-/// The time of the plane's move, else of the whole run up to `end`, s.
+/// The time of the plane's move, as far as the run goes on if it begins within it, else of the whole run up to `end`, s.
 fn window(plane: Option<&Plane>, end: f64) -> [f64; 2] {
     match plane.map(|plane| &plane.reference) {
         Some(PhiReference::MinimumJerk(points)) => match (points.first(), points.last()) {
+            (Some(first), Some(last)) if first.time_s < end => [first.time_s, last.time_s.min(end)],
             (Some(first), Some(last)) => [first.time_s, last.time_s],
             _ => [0.0, end],
         },
@@ -250,12 +268,13 @@ fn window(plane: Option<&Plane>, end: f64) -> [f64; 2] {
     }
 }
 
-/// Mean square of phi - phi_ref in a time window, rad^2.
-fn mean_square(trajectory: &Trajectory<4, 1>, [from, until]: [f64; 2]) -> f64 {
+/// Mean square of phi - phi_ref in a time window, rad^2; `None` without a sample in it.
+fn mean_square(trajectory: &Trajectory<4, 1>, [from, until]: [f64; 2]) -> Option<f64> {
     let samples = trajectory.samples.iter();
     let samples = samples.filter(|sample| sample.t >= from && sample.t <= until);
     let errors: Vec<f64> = samples
         .map(|sample| sample.x[0] - sample.x_ref[0])
         .collect();
-    errors.iter().map(|error| error * error).sum::<f64>() / errors.len().max(1) as f64
+    let sum = errors.iter().map(|error| error * error).sum::<f64>();
+    (!errors.is_empty()).then(|| sum / errors.len() as f64)
 }

@@ -1,6 +1,6 @@
 //! `ballbot rehearse`: the whole chain, and what its controller must withstand.
 
-use crate::{assert_says, fail, succeed};
+use crate::{assert_says, ballbot_in, fail, succeed};
 use ballbot_scenario::{DeviationsTable, Parameters, Prepared, RunHooks, Scenario, WorldTable};
 use lpvmpc_sim::{Termination, Trajectory};
 use std::path::{Path, PathBuf};
@@ -193,4 +193,50 @@ fn a_log_of_the_users_is_kept() {
         listed.lines().collect::<Vec<_>>(),
         ["excitation.csv", "log.csv"]
     );
+}
+
+/// Of a move that the run ends in, or before.
+#[test]
+fn distances_are_over_the_time_of_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in [
+        "true-robot.toml",
+        "my-robot.toml",
+        "record.toml",
+        "move.toml",
+        "lissajous.toml",
+    ] {
+        std::fs::copy(REHEARSED.join(name), folder.path().join(name)).unwrap();
+    }
+    let path = folder.path().join("move.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let duration = text
+        .lines()
+        .find(|line| line.starts_with("duration_s"))
+        .unwrap();
+    for (duration_s, over, none) in [("8.0", "6 to 8", false), ("5.0", "6 to 10", true)] {
+        std::fs::write(
+            &path,
+            text.replace(duration, &format!("duration_s = {duration_s}")),
+        )
+        .unwrap();
+        let ended = ballbot_in(folder.path(), &["rehearse", "--out", "."]);
+        let said = String::from_utf8(ended.stdout).unwrap();
+        let row = said.lines().find(|line| line.contains(over));
+        let row = row.unwrap_or_else(|| panic!("{said}"));
+        assert_eq!(row.contains("the run ends before"), none, "{row}");
+    }
+
+    // A log of an earlier rehearsal is not taken for that of two planes.
+    let path = folder.path().join("record.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let two = crate::closed_loops::edited(
+        &text,
+        "[reference.set_points]\npoints = [{ time_s = 0.0, phi_rad = 0.0 }]",
+        "[reference.lissajous]\namplitude_x_m = 0.1\namplitude_y_m = 0.1\n\
+         angular_frequency_x_rad_s = 0.3\nangular_frequency_y_rad_s = 0.4",
+    );
+    std::fs::write(&path, two).unwrap();
+    let message = fail(folder.path(), &["rehearse", "--out", "."], 1);
+    assert_says(&message, &["record.toml", "two planes"]);
 }
