@@ -118,7 +118,7 @@ export interface Batch {
   /** The run has reached the end of its scenario. */
   complete: boolean;
   robots: RobotBatch[];
-  /** Per robot, per plane: phi_ref at equidistant times over the run, for the floor. Sent when it changed. */
+  /** Per robot, per plane: phi_ref along its way, for the floor. Sent when it changed. */
   references?: Float64Array[][];
 }
 

@@ -6,6 +6,7 @@ import builtin from "../../crates/ballbot-scenario/src/builtin/terminal-certific
 import { parse } from "smol-toml";
 import type { Answers, Batch, Call, FromWorker, RobotBatch, RobotSetup, ToWorker } from "./protocol";
 import { Recorder } from "./recorder";
+import { referencesOn } from "./reference";
 import type { Scenario } from "./scenario";
 
 interface Robot {
@@ -23,8 +24,6 @@ const TICK = 4;
 const LONGEST_ABSENCE = 100;
 /** Time between two batches, ms: one per frame of the screen. */
 const BATCH = 15;
-/** Points of a reference on the floor. */
-const REFERENCE_POINTS = 400;
 /** Samples after which a browser has seen which code is called often. */
 const WARM_UP = 400;
 /** At most this much is spent on them, ms. */
@@ -60,11 +59,7 @@ function send(): void {
     robots: robots.map(({ recorder, simulation }): RobotBatch => recorder.take(simulation)),
   };
   if (referencesChanged) {
-    batch.references = robots.map(({ simulation }) =>
-      Array.from({ length: simulation.planes() }, (_, plane) =>
-        simulation.reference(plane, REFERENCE_POINTS),
-      ),
-    );
+    batch.references = robots.map(({ simulation }) => referencesOn(simulation));
   }
   restarted = false;
   referencesChanged = false;
@@ -133,9 +128,11 @@ function advance(): void {
 }
 
 /** Browsers run a module's code as it comes, and optimise what is called often: without these
- *  steps, which nobody sees, the first ones of a run take three times as long as the later ones. */
-function warmUp({ setup }: RobotSetup): void {
-  const simulation = new Simulation(setup, certificate);
+ *  steps, which nobody sees, the first ones of a run take three times as long as the later ones. The
+ *  set-up is not prepared again, which may take longer than the page waits where it has asked nothing. */
+function warmUp(): void {
+  const simulation = robots[0]?.simulation.afresh();
+  if (simulation === undefined) return;
   try {
     const end = performance.now() + MOST_WARM_UP;
     for (let k = 0; k < WARM_UP && performance.now() < end; k++) simulation.step();
@@ -172,10 +169,9 @@ function configure(setups: RobotSetup[], keep: boolean): Answers["configure"] {
   }
   // After the answer, which tells the page how many robots there are.
   queueMicrotask(send);
-  const first = setups[0];
-  if (!warm && first !== undefined) {
+  if (!warm) {
     warm = true;
-    setTimeout(() => warmUp(first));
+    setTimeout(warmUp);
   }
   const facts = robots.map(({ label, simulation }) => ({
     label,

@@ -69,6 +69,17 @@ impl Simulation {
         Ok(Self { session })
     }
 
+    /// The same at time zero, without preparing the scenario again, which may take seconds.
+    ///
+    /// # Errors
+    /// As the constructor.
+    pub fn afresh(&self) -> Result<Simulation, String> {
+        let session = Session::new(self.session.prepared().clone());
+        Ok(Self {
+            session: session.map_err(|error| error.to_string())?,
+        })
+    }
+
     /// The same robot where it stands, under another scenario.
     ///
     /// # Errors
@@ -150,15 +161,18 @@ impl Simulation {
         states.iter().flat_map(|x| x.iter().copied()).collect()
     }
 
-    /// phi_ref of a plane at `count` times, evenly from zero to the scenario's end.
-    pub fn reference(&self, plane: usize, count: usize) -> Vec<f64> {
-        let step = self.duration() / count.saturating_sub(1).max(1) as f64;
+    /// The times at which pieces of phi_ref of a plane begin and end, in order.
+    pub fn knots(&self, plane: usize) -> Vec<f64> {
         let plane = self.session.planes().get(plane);
-        let at = |plane: &ballbot_scenario::Plane| {
-            let times = (0..count).map(|i| i as f64 * step);
-            times.map(|t| plane.reference.at(t)).collect()
-        };
-        plane.map_or_else(Vec::new, at)
+        plane.map_or_else(Vec::new, |plane| plane.reference.knots(self.duration()))
+    }
+
+    /// phi_ref of a plane at these times.
+    pub fn reference(&self, plane: usize, times: &[f64]) -> Vec<f64> {
+        let plane = self.session.planes().get(plane);
+        plane.map_or_else(Vec::new, |plane| {
+            times.iter().map(|&t| plane.reference.at(t)).collect()
+        })
     }
 
     /// What the controllers said at the last sample.

@@ -51,6 +51,21 @@ impl PhiReference {
         }
     }
 
+    /// The times at which its pieces begin and end, s, in order. It rests before the first and after
+    /// the last; what never rests is one piece, from zero to `end`.
+    pub fn knots(&self, end: f64) -> Vec<f64> {
+        match self {
+            Self::Sine(_) => vec![0.0, end],
+            Self::Steps(points) | Self::MinimumJerk(points) | Self::Interpolated(points) => {
+                points.iter().map(|point| point.time_s).collect()
+            }
+            Self::Moves(moves) => moves
+                .iter()
+                .flat_map(|(begin, planned)| [*begin, begin + planned.duration])
+                .collect(),
+        }
+    }
+
     /// The goal in rad of the shaped move that is under way at the time `t` (s), if one is.
     pub fn on_its_way_to(&self, t: f64) -> Option<f64> {
         let Self::Moves(moves) = self else {

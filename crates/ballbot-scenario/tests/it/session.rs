@@ -234,6 +234,27 @@ fn targets_become_smooth_moves_where_the_scenario_asks_for_them() {
 }
 
 #[test]
+fn a_reference_rests_outside_its_pieces() {
+    let mut scenario = Scenario::load("single-setpoint").unwrap();
+    scenario.controller.terminal = TerminalTable::DiscreteRiccati;
+    scenario.controller.shaping = Some(ShapingTable {
+        tilt_rad: 0.1,
+        phi_dot_rad_s: 8.0,
+    });
+    let mut session = Session::new(prepared(&scenario).unwrap()).unwrap();
+    run_until(&mut session, 1.0);
+    session.set_targets(&[3.0]).unwrap();
+    let reference = &session.planes()[0].reference;
+    let knots = reference.knots(1.0);
+    let (first, last) = (knots[0], knots[knots.len() - 1]);
+    assert!(knots.is_sorted() && last > 1.0, "{knots:?}");
+    assert_eq!(reference.at(first), reference.at(first - 1.0));
+    assert_eq!(reference.at(last), 3.0);
+    let lissajous = prepared(&Scenario::load("lissajous").unwrap()).unwrap();
+    assert_eq!(lissajous.planes[1].reference.knots(7.0), [0.0, 7.0]);
+}
+
+#[test]
 fn the_first_order_drops_the_set_points_whose_moves_wait() {
     let mut scenario = Scenario::load("single-setpoint").unwrap();
     scenario.controller.shaping = Some(ShapingTable {
