@@ -295,11 +295,14 @@ export class App {
 
   /** Sends the robots along a line from where they stand. */
   path(line: () => { points: FloorPoint[]; from: FloorPoint }): void {
-    this.afterChanges(() => this.sendPath(line()));
+    this.afterChanges(() => this.sendPath(line));
   }
 
-  private sendPath({ points, from }: { points: FloorPoint[]; from: FloorPoint }): void {
+  private sendPath(line: () => { points: FloorPoint[]; from: FloorPoint }): void {
     if (!this.takesOrders()) return;
+    // It begins where they stand now, not where they are seen while somebody looks back.
+    this.lookedAt = undefined;
+    const { points, from } = line();
     const timed = timedPath(points, from);
     const called = timed.map((point) => ({ time_s: point.time_s, phi: this.phi(point) }));
     if (!this.arePlaces(called.map(({ phi }) => phi))) return;
@@ -376,6 +379,7 @@ export class App {
 
   reset(): void {
     void this.attempt(async () => {
+      this.lookedAt = undefined;
       if (this.playback) this.playback.reset();
       else await this.configure(this.setup, this.robots, false);
     });

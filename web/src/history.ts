@@ -16,6 +16,17 @@ export interface Prediction {
   states: Float64Array;
 }
 
+/** The first of `length` places that is not before what is looked for. */
+function bisect(length: number, isBefore: (place: number) => boolean): number {
+  let [low, high] = [0, length];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (isBefore(middle)) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}
+
 export class History {
   /** Samples in the buffer. */
   length = 0;
@@ -101,7 +112,8 @@ export class History {
   /** The status of the sample `index`. */
   statusAt(index: number): string {
     const sample = this.total - this.length + index;
-    return this.statusFrom.findLast(({ sample: from }) => from <= sample)?.text ?? "";
+    const after = bisect(this.statusFrom.length, (place) => (this.statusFrom[place]?.sample ?? 0) <= sample);
+    return this.statusFrom[after - 1]?.text ?? "";
   }
 
   /** A value of the state now: time, phi, theta, phi_dot, theta_dot, phi_ref. */
@@ -111,13 +123,6 @@ export class History {
 
   /** The first sample at or after the time, s. */
   indexAt(time: number): number {
-    let low = 0;
-    let high = this.length;
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (this.at(middle, 0, ROW.time) < time) low = middle + 1;
-      else high = middle;
-    }
-    return low;
+    return bisect(this.length, (index) => this.at(index, 0, ROW.time) < time);
   }
 }

@@ -17,7 +17,7 @@ import { FlatView } from "./scene/flat";
 import { Pointer } from "./scene/pointer";
 import { SolidView } from "./scene/solid";
 import { readTheme, type FloorPoint, type View } from "./scene/view";
-import { StatusList } from "./status";
+import { endingsInWords, StatusList } from "./status";
 import { connectExplanations } from "./explanations";
 import { storedSystem, storeSystem, type UnitSystem } from "./units";
 
@@ -144,13 +144,14 @@ const pointer = new Pointer(view, {
 
 /** Statuses, reasons of falls, target, clock. */
 function showWords(time: number): void {
-  status.show(app.histories.map((history, i) => ({
+  const past = app.isLookingBack ? time : undefined;
+  const lines = app.histories.map((history, i) => ({
     label: app.robots[i]?.label ?? "",
     colour: app.robots[i]?.colour ?? "--robot-lpv",
     history,
-  })), app.isLookingBack ? time : undefined);
-  const fallen = app.histories.flatMap(({ ending }, i) => (ending === undefined ? [] : [`${app.robots[i]?.label}: ${ending}`]));
-  const text = fallen.join("\n");
+  }));
+  status.show(lines, past);
+  const text = endingsInWords(lines, past);
   const alert = byId("alert");
   if (alert.textContent !== text) alert.textContent = text;
   alert.hidden = text === "";

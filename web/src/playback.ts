@@ -5,6 +5,7 @@ import { NOW, NOW_WIDTH, ROW, ROW_WIDTH } from "./layout";
 import type { Batch, RunOrder } from "./protocol";
 import type { Source } from "./engine";
 import { LINE_POINTS } from "./scene/lines";
+import { isGood } from "./status";
 
 export class Playback implements Source {
   onBatch: (batch: Batch) => void = () => {};
@@ -107,7 +108,6 @@ export class Playback implements Source {
     }
     const complete = this.atEnd();
     const ending = this.planes.find((plane) => plane.ending !== "")?.ending;
-    const statuses = this.planes[0]?.statuses ?? [];
     this.onBatch({
       clock: this.clock,
       running: this.running,
@@ -118,8 +118,8 @@ export class Playback implements Source {
         {
           rows,
           motors: new Float64Array(count * 3).fill(NaN),
-          statuses: Array.from({ length: count }, (_, i) => ({ from: i, text: statuses[from + i] ?? "" })).filter(
-            ({ text }, i) => from + i === 0 || text !== statuses[from + i - 1],
+          statuses: Array.from({ length: count }, (_, i) => ({ from: i, text: this.statusOf(from + i) })).filter(
+            ({ text }, i) => from + i === 0 || text !== this.statusOf(from + i - 1),
           ),
           now: this.now(),
           prediction: this.planes.map(() => new Float64Array(0)),
@@ -132,11 +132,18 @@ export class Playback implements Source {
     this.restarted = false;
   }
 
+  /** The status of the plane that needs attention, if one does, as the control loop says it of a robot. */
+  private statusOf(index: number): string {
+    const statuses = this.planes.map((plane) => plane.statuses[index] ?? "");
+    return statuses.find((status) => !isGood(status)) ?? statuses[0] ?? "";
+  }
+
   private now(): Float64Array {
     const now = new Float64Array(this.planes.length * NOW_WIDTH);
     for (const [plane, { rows, final }] of this.planes.entries()) {
+      // Where the shorter plane ends the longer one still has a row; its own final state comes later.
       const row = rows[this.index];
-      if (this.index < this.samples && row) {
+      if (row) {
         now.set(row.subarray(0, NOW.phiReference), plane * NOW_WIDTH);
         now[plane * NOW_WIDTH + NOW.phiReference] = row[ROW.phiReference] ?? 0;
       } else now.set(final, plane * NOW_WIDTH);

@@ -1,12 +1,17 @@
 // What the controllers do, in words and numbers, over the scene.
 
 import type { History } from "./history";
-import { ROW } from "./layout";
+import { NOW, ROW } from "./layout";
 import { usualStepInWords } from "./steptime";
 import { TERMS } from "./terms";
 
 /** What a controller says of a plan that needs no attention; nothing before the first. */
 const GOOD = new Set(["", "solved", "converged", "improved", "no improvement found"]);
+
+/** Whether what a controller says of a plan needs no attention. */
+export function isGood(status: string): boolean {
+  return GOOD.has(status);
+}
 
 /** How many bounds are active in the last plans, and which. */
 function activeBounds(history: History): string {
@@ -23,14 +28,23 @@ function activeBounds(history: History): string {
 }
 
 /** What a robot does, and whether that needs no attention. */
-function state(history: History, at: number | undefined): { text: string; isGood: boolean } {
-  if (at !== undefined) {
-    const status = history.statusAt(Math.max(history.indexAt(at + 1e-9) - 1, 0));
-    return { text: status || "ready", isGood: GOOD.has(status) };
-  }
-  // A controller that still answers does not make a robot stand.
-  if (history.down) return { text: "on the floor", isGood: false };
-  return { text: (history.status || "ready") + activeBounds(history), isGood: GOOD.has(history.status) && history.ending === undefined };
+export function stateOf(history: History, at: number | undefined): { text: string; isGood: boolean } {
+  // A controller that still answers does not make a robot stand. Its time ends on the floor.
+  if (history.down && (at ?? Infinity) >= history.nowAt(0, NOW.time)) return { text: "on the floor", isGood: false };
+  const status = at === undefined ? history.status : history.statusAt(Math.max(history.indexAt(at + 1e-9) - 1, 0));
+  // The bounds are those of the last plan.
+  const bounds = at === undefined ? activeBounds(history) : "";
+  return { text: (status || "ready") + bounds, isGood: isGood(status) && !hasEnded(history, at) };
+}
+
+/** It does not stand any more: now, or at a time that is looked back at, s. */
+function hasEnded({ ending, endedAt = Infinity }: History, at: number | undefined): boolean {
+  return ending !== undefined && (at === undefined || at >= endedAt);
+}
+
+/** Why robots do not stand any more, a line for each. */
+export function endingsInWords(lines: Line[], at: number | undefined): string {
+  return lines.filter(({ history }) => hasEnded(history, at)).map(({ label, history }) => `${label}: ${history.ending}`).join("\n");
 }
 
 export interface Line {
@@ -51,7 +65,7 @@ export class StatusList {
       if (!name || !words || !time) continue;
       name.textContent = label;
       name.className = `dot ${colour.slice(2)}`;
-      const { text, isGood } = state(history, at);
+      const { text, isGood } = stateOf(history, at);
       words.textContent = text;
       words.title = `Active bounds: ${TERMS.activeBound}`;
       time.textContent = history.down ? "" : usualStepInWords(history);

@@ -4,8 +4,9 @@ import { readFileSync } from "node:fs";
 import { expect, type Page } from "@playwright/test";
 import { parse } from "smol-toml";
 import { readTrajectory } from "../src/files";
-import { ROW } from "../src/layout";
+import { NOW, NOW_WIDTH, ROW } from "../src/layout";
 import { Playback } from "../src/playback";
+import type { Batch } from "../src/protocol";
 import { toToml } from "../src/scenario";
 import { clearMessage, drop, fill, fragment, openFile, openFlat, pass, pause, ready, saved, scenario, test, until } from "./page";
 
@@ -143,6 +144,33 @@ test("the reference of a long recording reaches its end on the floor", () => {
   expect([reference?.[0], reference?.at(-1)]).toEqual([0, 9999]);
   const gaps = [...(reference ?? [])].slice(1).map((value, i) => value - (reference?.[i] ?? NaN));
   expect([Math.min(...gaps), Math.max(...gaps)]).toEqual([4, 5]);
+});
+
+test("of two recorded planes of different length the longer one stays where it was when the other ended", () => {
+  const short = readTrajectory(recording(0, 2).replace(/,0,,,$/m, ",0,,solved,").replace(/,,,$/, ",,no plan,"), "x.csv");
+  const long = readTrajectory(recording(0, 5).replace("0.05,0,0,0,0,0,0,,,", "0.05,0,0,0,0,0,0,,infeasible,").replace("0.10,0,", "0.10,1,").replace("0.25,0,", "0.25,9,"), "y.csv");
+  const playback = new Playback([short, long]);
+  let last: Batch | undefined;
+  const statuses: string[] = [];
+  playback.onBatch = (batch) => {
+    last = batch;
+    for (const { text } of batch.robots[0]?.statuses ?? []) statuses.push(text);
+  };
+  for (let i = 0; i < 3; i++) playback.step();
+  const now = last?.robots[0]?.now;
+  expect([now?.[NOW.time], now?.[NOW_WIDTH + NOW.time], now?.[NOW_WIDTH + NOW.phi]]).toEqual([0.1, 0.1, 1]);
+  // Of each sample what needs attention in either plane.
+  expect(statuses).toEqual(["solved", "infeasible"]);
+});
+
+test("a recording that is looked back at begins anew at its beginning", async ({ page }) => {
+  await openFlat(page);
+  await openFile(page, "trajectory.csv", recording(0, 20));
+  await expect(page.locator("#message")).toContainText("End of the recording");
+  await page.getByRole("slider", { name: "Look back" }).fill("0.5");
+  await expect(page.locator("#clock")).toHaveText("0.50 s");
+  await page.locator("#reset").click();
+  await expect(page.locator("#clock")).toHaveText("0.00 s");
 });
 
 /** Animation frames that are asked for between two frames of the screen. */

@@ -114,8 +114,17 @@ test("what is not a number ends a plan, and leaves a gap in a curve", () => {
     rows: new Float64Array(ROW_WIDTH).fill(NaN).map((value, i) => (i === 0 ? 0.05 : value)), motors: new Float64Array(3), statuses: [],
     now: Float64Array.from([0.1, 0, 0, 0, 0, Infinity]), prediction: [], activeBounds: [""], down: false,
   });
-  const [, ...curves] = columns(strip("phi:"), [{ history, colour: "red" }], 0, 0);
+  const [, ...curves] = columns(strip("phi:"), [{ history, colour: "red" }], 0, [0, 8]);
   expect(curves).toEqual([[0, null, 0], [0, null, null]]);
+});
+
+test("a short window of a long run is drawn sample by sample, and no further", () => {
+  const history = new History(1, 0.01, 1000);
+  const rows = new Float64Array(20_000 * ROW_WIDTH).map((_, i) => (i % ROW_WIDTH === ROW.time ? Math.floor(i / ROW_WIDTH) / 100 : 0));
+  history.add({ rows, motors: new Float64Array(60_000), statuses: [], now: Float64Array.from([200, 0, 0, 0, 0, 0]), prediction: [], activeBounds: [""], down: false });
+  const times = (window: [number, number]) => [...columns(strip("phi:"), [{ history, colour: "red" }], 0, window)[0]];
+  expect(times([1, 9])).toEqual(Array.from({ length: 802 }, (_, i) => (99 + i) / 100));
+  expect(times([193, 201]).at(-1)).toBe(200);
 });
 
 test("the line at the present has no dashes", () => {
@@ -169,8 +178,24 @@ test("a run can be looked back at while it does not run", async ({ page }) => {
   expect((await values(page))[0]).toBeCloseTo(0, 6);
   // What follows is what would have followed.
   const before = table(await saved(page, "Save CSV"))["t_s"]?.length ?? NaN;
-  await page.locator("#play").click();
+  // A path that is drawn meanwhile begins where the robot stands, not where it is seen.
+  await page.getByText("Draw path").click();
+  const box = await page.locator("#scene").boundingBox();
+  if (!box) throw new Error("no scene");
+  await page.mouse.move(box.x + box.width * 0.3, box.y + box.height * 0.85);
+  await page.mouse.down();
+  await page.mouse.move(box.x + box.width * 0.4, box.y + box.height * 0.85, { steps: 4 });
+  await page.mouse.up();
   await until(page, end + 0.2);
+  const run = table(await saved(page, "Save CSV"));
+  const first = run["t_s"]?.findIndex((time) => time >= end - 0.05) ?? -1;
+  expect(first).toBeGreaterThan(0);
+  for (const reference of run["phi_ref_rad"]?.slice(first, first + 3) ?? []) expect(Math.abs(0.12 * reference - 0.5)).toBeLessThan(0.2);
+  await pause(page);
+  const later = await clock(page);
+  await slider.fill("0");
+  await page.locator("#play").click();
+  await until(page, later + 0.2);
   expect(table(await saved(page, "Save CSV"))["t_s"]?.length).toBeGreaterThan(before);
 });
 

@@ -1,7 +1,10 @@
 // What goes wrong is said, and what was there stays.
 
 import { expect } from "@playwright/test";
+import { History } from "../src/history";
+import { ROW, ROW_WIDTH } from "../src/layout";
 import { followed } from "../src/pictures";
+import { endingsInWords, stateOf } from "../src/status";
 import { clock, drop, fill, fragment, open, openFile, openFlat, openSection, pass, pause, saved, scenario, setPush, table, test, until } from "./page";
 import { beforeEnd, expectSameUntil, simulated } from "./program";
 
@@ -206,6 +209,19 @@ test("a fallen robot is said to lie on the floor, and no word covers another", a
   for (const [i, box] of boxes.entries()) {
     for (const other of boxes.slice(i + 1)) expect(Math.min(box.bottom, other.bottom) - Math.max(box.top, other.top)).toBeLessThanOrEqual(0);
   }
+});
+
+test("looked back at, a robot stands until it fell", () => {
+  const history = new History(1, 0.05, 0.4);
+  const rows = new Float64Array(20 * ROW_WIDTH);
+  for (let i = 0; i < 20; i++) rows[i * ROW_WIDTH + ROW.time] = 0.05 * i;
+  const rest = { motors: new Float64Array(60), statuses: [{ from: 0, text: "solved" }], prediction: [], activeBounds: [], ending: "fallen" };
+  history.add({ ...rest, rows, now: Float64Array.from([1, 0, 2, 0, 0, 0]), down: true });
+  expect([undefined, 0.5, 1, 3].map((at) => stateOf(history, at))).toEqual([
+    { text: "on the floor", isGood: false }, { text: "solved", isGood: true }, { text: "on the floor", isGood: false }, { text: "on the floor", isGood: false },
+  ]);
+  const lines = [{ label: "LQR", colour: "", history }];
+  expect([undefined, 0.5, 1].map((at) => endingsInWords(lines, at))).toEqual(["LQR: fallen", "", "LQR: fallen"]);
 });
 
 test("the camera follows the robots that stand, and nobody's fall", () => {

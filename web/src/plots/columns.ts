@@ -27,17 +27,21 @@ export function valuesAt(strip: Strip, history: History, index: number, plane: n
   return [history.at(index, plane, strip.column ?? ROW.phi)];
 }
 
-/** One column of times, then the columns of every robot. Robots may have stopped early. */
-export function columns(strip: Strip, shown: Shown[], chosen: number, start: number): uPlot.AlignedData {
+/** One column of times, then the columns of every robot, for a chart from `start` to `end`, s. Robots may have
+ *  stopped early. */
+export function columns(strip: Strip, shown: Shown[], chosen: number, [start, end]: [number, number]): uPlot.AlignedData {
   const longest = shown.map(({ history }) => history).reduce<History | undefined>(
     (most, history) => (most === undefined || history.total > most.total ? history : most), undefined);
   if (!longest || longest.length === 0) return [[], ...emptyColumns(strip, shown.length)];
   const from = Math.max(longest.indexAt(start) - 1, 0);
-  const stride = Math.max(Math.ceil((longest.length - from) / MOST_POINTS), 1);
+  // The curves lead out of the chart on both sides.
+  const until = Math.min(longest.indexAt(end) + 1, longest.length);
+  const stride = Math.max(Math.ceil((until - from) / MOST_POINTS), 1);
   const indices: number[] = [];
-  for (let i = from; i < longest.length; i += stride) indices.push(i);
-  const end = longest.nowAt(0, NOW.time);
-  const times = [...indices.map((i) => longest.at(i, 0, ROW.time)), end];
+  for (let i = from; i < until; i += stride) indices.push(i);
+  const times = indices.map((i) => longest.at(i, 0, ROW.time));
+  const reachesNow = until === longest.length;
+  if (reachesNow) times.push(longest.nowAt(0, NOW.time));
   const made: (number | null)[][] = [];
   for (const { history } of shown) {
     const offset = longest.total - longest.length - (history.total - history.length);
@@ -50,14 +54,14 @@ export function columns(strip: Strip, shown: Shown[], chosen: number, start: num
     const final = strip.held ? valuesAt(strip, history, last, plane) : [history.nowAt(plane, strip.column ?? ROW.phi)];
     for (let curve = 0; curve < final.length; curve++) {
       const values = known.map((all) => all[curve] ?? NaN);
-      values.push(history === longest ? (final[curve] ?? NaN) : NaN);
+      if (reachesNow) values.push(history === longest ? (final[curve] ?? NaN) : NaN);
       made.push(withGaps(values));
     }
   }
   if (strip.reference) {
     const plane = planeOf(longest, chosen);
     const values = indices.map((i) => longest.at(i, plane, ROW.phiReference));
-    values.push(longest.nowAt(plane, NOW.phiReference));
+    if (reachesNow) values.push(longest.nowAt(plane, NOW.phiReference));
     made.push(withGaps(values));
   }
   return [times, ...made] as uPlot.AlignedData;

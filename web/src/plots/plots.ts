@@ -221,7 +221,7 @@ export class Plots {
   draw(time: number): void {
     this.time = time;
     for (const [index, strip] of STRIPS.entries()) {
-      this.charts[index]?.setData(columns(strip, this.shown, this.plane, this.timeRange()[0]), true);
+      this.charts[index]?.setData(columns(strip, this.shown, this.plane, this.timeRange()), true);
     }
     this.showValues();
   }
