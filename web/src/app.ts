@@ -53,6 +53,8 @@ export class App {
   private readonly engine = new Engine();
   private readonly live = new Live();
   private facts: RobotFacts[] = [];
+  /** The planes of the set-up, also while a recording is played and after the controller was ended. */
+  private ownPlanes = 1;
   private clock = 0;
   private clockAt = 0;
   /** The time that is looked back at while nothing runs, s. */
@@ -178,7 +180,7 @@ export class App {
     this.playback = undefined;
     this.lookedAt = undefined;
     [this.setup, this.robots, this.facts] = [setup, robots, facts];
-    this.planes = facts[0]?.planes ?? 1;
+    this.planes = this.ownPlanes = facts[0]?.planes ?? 1;
     if (!kept) {
       this.live.clear();
       this.ordered = undefined;
@@ -457,9 +459,8 @@ export class App {
     return Math.max(0, ...this.histories.map((history) => history.nowAt(0, NOW.time)));
   }
 
-  /** The robots' planes, also while a recording of others is played. */
   private withOrders(): Scenario {
-    return this.live.into(this.setup, this.facts[0]?.planes ?? 1);
+    return this.live.into(this.setup, this.ownPlanes);
   }
 
   /** The set-up as a file for `ballbot simulate`: the first robot, with what was done to it. */

@@ -34,6 +34,8 @@ export class Engine implements Source {
   /** Looks since the last word from the worker; `undefined` before its first one, for which a slow
    *  line may need its time. */
   private silentFor: number | undefined;
+  /** The worker's script could not be loaded. */
+  private isMissing = false;
 
   constructor() {
     setInterval(() => this.look(), LOOK);
@@ -43,7 +45,10 @@ export class Engine implements Source {
     const worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
     worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.receive(data);
     // A script that cannot be loaded leaves no message.
-    worker.onerror = ({ message }) => this.fail(message || "the controller's program cannot be loaded");
+    worker.onerror = ({ message }) => {
+      this.isMissing = this.silentFor === undefined;
+      this.fail(message || "the controller's program cannot be loaded");
+    };
     return worker;
   }
 
@@ -61,6 +66,12 @@ export class Engine implements Source {
 
   /** Asks the worker; rejects with its message. */
   call<K extends Call["kind"]>(call: Extract<Call, { kind: K }>): Promise<Answers[K]> {
+    if (this.isMissing) {
+      // It would never answer; the line may be there again.
+      this.isMissing = false;
+      this.worker.terminate();
+      this.worker = this.start();
+    }
     const id = this.nextId++;
     this.worker.postMessage({ id, call });
     return new Promise((resolve, reject) => this.waiting.set(id, { resolve, reject }));

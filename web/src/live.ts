@@ -34,6 +34,12 @@ type Order = { time_s: number; place: number }[];
 type Axis = "x" | "y";
 const AXES: Axis[] = ["x", "y"];
 
+/** What of a set-up's own reference goes into the file: set points and lines. */
+interface Own {
+  set_points?: { points: Point[] };
+  lines?: { points: Point[] };
+}
+
 export class Live {
   private orders: Record<Axis, Order[]> = { x: [], y: [] };
   /** The last of the scenario's set points whose smooth moves had not begun at the first order. */
@@ -87,20 +93,22 @@ export class Live {
     return made;
   }
 
-  /** The scenario's set points until the first order, then the orders. */
+  /** The scenario's set points or lines until the first order, then the orders. */
   private reference(setup: Scenario, axis: Axis): Reference {
     const { ball_radius_m } = setup.parameters;
     const orders = this.orders[axis].map((order) =>
       order.map(({ time_s, place }): Point => ({ time_s, phi_rad: place / ball_radius_m })));
-    const { reference } = setup as { reference: { set_points?: { points: Point[] }; planes?: { x: Reference; y: Reference } } };
-    const own = (reference.planes?.[axis] ?? (axis === "x" ? reference : {})) as { set_points?: { points: Point[] } };
+    const { reference } = setup as { reference: Own & { planes?: { x: Own; y: Own } } };
+    const own = reference.planes?.[axis] ?? (axis === "x" ? reference : {});
     const first = orders[0]?.[0]?.time_s ?? 0;
-    const points = own.set_points?.points ?? [{ time_s: 0, phi_rad: 0 }];
-    const before = points.slice(0, points.length - this.waiting[axis]).filter(({ time_s }) => time_s < first);
+    const points = (own.lines ?? own.set_points)?.points ?? [{ time_s: 0, phi_rad: 0 }];
+    const reached = points.slice(0, points.length - this.waiting[axis]).filter(({ time_s }) => time_s < first);
+    // The line that is under way at the first order is followed up to there.
+    const before = own.lines && reached.length > 0 ? [points.slice(0, reached.length + 1)] : reached.map((point) => [point]);
     // Where it was before all points is where the first move begins.
     const start = points[0];
-    if (before.length === 0 && start && (first > 0 || setup.controller["shaping"])) before.push({ ...start, time_s: first - STEP });
-    const all = [...before.map((point) => [point]), ...orders];
+    if (before.length === 0 && start && (first > 0 || setup.controller["shaping"])) before.push([{ ...start, time_s: first - STEP }]);
+    const all = [...before, ...orders];
     return all.every(({ length }) => length === 1) ? { set_points: { points: all.flat() } } : { lines: { points: joined(all) } };
   }
 }

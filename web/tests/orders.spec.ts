@@ -267,6 +267,22 @@ test("a path and a target after it stand in the file", async ({ page }) => {
   expectSameUntil(beforeEnd(csv), csv, toml, "trajectory_x.csv");
 });
 
+test("a set-up's own lines are followed in the file up to the first order", async ({ page }) => {
+  await openFlat(page);
+  await blind(page, "single-setpoint");
+  const lines = "[reference.lines]\npoints = [{ time_s = 0.1, phi_rad = 0.5 }, { time_s = 0.4, phi_rad = 2.0 }, { time_s = 9.0, phi_rad = 4.0 }]";
+  const toml = (await saved(page, "Save TOML")).replace(/\[reference\.set_points\]\npoints = \[[^]*?\]$/m, lines).replace('"endless"', '"three lines"');
+  await openFile(page, "lines.toml", toml);
+  await expect(page.locator("#title")).toHaveText("three lines");
+  await page.locator("#play").click();
+  await until(page, 0.8);
+  await fill(page, "Target X", "0.2");
+  await pass(page, 0.8);
+  await pause(page);
+  const csv = await saved(page, "Save CSV");
+  expectSameUntil(beforeEnd(csv), csv, await saved(page, "Save TOML"));
+});
+
 test("the skip link goes to the set-up and says nothing", async ({ page }) => {
   await openFlat(page);
   await page.locator(".skip").focus();

@@ -126,9 +126,11 @@ test("a controller that does not answer is ended, and the last settings that wor
   const worked = await saved(page, "Save TOML");
   await openFile(page, "endless.toml", endless(worked));
   await expect(page.getByLabel("Horizon N", { exact: true })).toHaveValue("200");
-  await page.locator("#play").click();
+  await fill(page, "Target Y", "0.5");
   await expect(page.locator("#message")).toContainText("did not answer for 2 s and was ended");
   await expect(page.locator("#play")).toHaveText("Run");
+  // What was done in both planes is still there.
+  expect(await saved(page, "Save TOML")).toContain("[reference.planes.y");
   await page.getByRole("button", { name: "Go on with the last settings that worked" }).click();
   await expect(page.getByLabel("Horizon N", { exact: true })).toHaveValue("20");
   expect(await saved(page, "Save TOML")).toBe(worked);
@@ -209,6 +211,24 @@ test("a fallen robot is said to lie on the floor, and no word covers another", a
   for (const [i, box] of boxes.entries()) {
     for (const other of boxes.slice(i + 1)) expect(Math.min(box.bottom, other.bottom) - Math.max(box.top, other.top)).toBeLessThanOrEqual(0);
   }
+});
+
+test("where the program for another controller cannot be loaded, the page says so and goes on", async ({ page }) => {
+  await openFlat(page);
+  const toml = await saved(page, "Save TOML");
+  await openFile(page, "endless.toml", endless(toml));
+  await expect(page.getByLabel("Horizon N", { exact: true })).toHaveValue("200");
+  await page.route("**/worker*.js", (route) => route.abort());
+  await page.locator("#play").click();
+  await expect(page.locator("#message")).toContainText("program cannot be loaded");
+  await openFile(page, "drive.toml", toml);
+  await expect(page.locator("#message")).toContainText("program cannot be loaded");
+  expect(await saved(page, "Save TOML")).toContain("horizon = 200");
+  await page.unroute("**/worker*.js");
+  await openFile(page, "drive.toml", toml);
+  await expect(page.getByLabel("Horizon N", { exact: true })).toHaveValue("20");
+  await page.locator("#play").click();
+  await until(page, 0.3);
 });
 
 test("looked back at, a robot stands until it fell", () => {
