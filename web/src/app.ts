@@ -16,6 +16,8 @@ import { PAPER_SHAPE, type FloorPoint } from "./scene/view";
 
 export interface AppEvents {
   message(text: string, kind: "error" | "info", offer?: Offer): void;
+  /** Another set-up was opened. */
+  opened(): void;
   /** The set-up or the choice of robots changed. */
   setup(): void;
   /** New histories: what was drawn is void. */
@@ -100,11 +102,7 @@ export class App {
     this.forgetWorker();
     this.events.message(text, "error", working && {
       label: "Go on with the last settings that worked",
-      take: () => void this.attempt(async () => {
-        await this.configure(working.setup, working.robots, false);
-        this.preset = working.preset;
-        this.show();
-      }),
+      take: () => void this.attempt(() => this.open(working.setup, working.robots, working.preset)),
     });
   }
 
@@ -217,8 +215,13 @@ export class App {
 
   private async takeIn(toml: string, preset: string, robots?: string[]): Promise<void> {
     const setup = await this.engine.call({ kind: "parse", toml });
-    await this.configure(setup, robotsNamed(robots ?? [setup.controller.model]), false);
+    await this.open(setup, robotsNamed(robots ?? [setup.controller.model]), preset);
+  }
+
+  private async open(setup: Scenario, robots: RobotKind[], preset: string): Promise<void> {
+    await this.configure(setup, robots, false);
     this.preset = preset;
+    this.events.opened();
     this.show();
   }
 

@@ -25,10 +25,15 @@ const FIELDS = "select, textarea, input:not([type=radio], [type=checkbox], [type
 /** Here the space bar has a meaning of its own; a radio button that is chosen already has none for it. */
 const TAKE_SPACE = "button, summary, input[type=checkbox], input[type=radio]:not(:checked)";
 
+/** With these the key is the browser's or the system's. */
+function isShortcut({ ctrlKey, metaKey, altKey }: KeyboardEvent): boolean {
+  return ctrlKey || metaKey || altKey;
+}
+
 export function connectKeys(scene: HTMLElement, actions: KeyActions): void {
   scene.addEventListener("keydown", (event) => {
     const arrow = ARROWS[event.key];
-    if (!arrow) return;
+    if (!arrow || isShortcut(event)) return;
     event.preventDefault();
     const [x, y] = arrow;
     if (event.shiftKey) actions.push(x * PUSH, y * PUSH);
@@ -38,7 +43,8 @@ export function connectKeys(scene: HTMLElement, actions: KeyActions): void {
     const { target } = event;
     const key = event.key.toLowerCase();
     const elsewhere = target instanceof HTMLElement && target.closest(key === " " ? `${FIELDS}, ${TAKE_SPACE}` : FIELDS);
-    if (elsewhere || event.ctrlKey || event.metaKey || event.altKey) return;
+    // What is behind an open dialogue is out of reach.
+    if (elsewhere || isShortcut(event) || document.querySelector("dialog[open]")) return;
     if (key === " ") actions.toggle();
     else if (key === ".") actions.step();
     else if (key === "r") actions.reset();

@@ -47,7 +47,7 @@ const view = makeView();
 document.body.classList.add(`view-${view.kind}`);
 const plots = new Plots(byId("plots"), () => redraw());
 const status = new StatusList(byId("status"));
-const app = new App({ message: (text, kind, offer) => messages.show(text, kind, offer), setup: setupShown, restarted, running: runningShown, ended, asked });
+const app = new App({ message: (text, kind, offer) => messages.show(text, kind, offer), opened: () => panel?.opened(), setup: setupShown, restarted, running: runningShown, ended, asked });
 const pictures = new Pictures(app);
 let panel: Panel | undefined;
 let shownShape = "";
@@ -155,10 +155,9 @@ function showWords(time: number): void {
   const alert = byId("alert");
   if (alert.textContent !== text) alert.textContent = text;
   alert.hidden = text === "";
-  const toMillimetres = (length: number) => Math.round(length * 1000) / 1000 / app.radius;
   const target = wanted();
   // A target that was typed may still wait for a change.
-  if (app.isSettled) panel?.showTarget(toMillimetres(target.x), toMillimetres(target.y));
+  if (app.isSettled) panel?.showTarget(target.x / app.radius, target.y / app.radius);
   byId("clock").textContent = `${time.toFixed(2)} s`;
 }
 

@@ -37,6 +37,8 @@ export const ROBOTS: RobotKind[] = [
     colour: "--robot-lqr",
     derive: (setup) => {
       const made = withController(setup, { model: "linear", horizon: 1, terminal: "discrete_riccati" });
+      // With a bounded rate it would be a law of five states, which knows another bound.
+      delete made.controller["torque_rate"];
       const none: [number, number] = [-Infinity, Infinity];
       made.bounds = { ...made.bounds, phi_rad: none, theta_rad: none, phi_dot_rad_s: none, theta_dot_rad_s: none };
       return made;

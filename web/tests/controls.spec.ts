@@ -1,7 +1,7 @@
 // Every control does what it says: the set-up that is saved has its value, and the run shows it.
 
 import { expect } from "@playwright/test";
-import { atOnce, fill, largest, openFlat, openSection, pass, saved, scenario, settled, table, test, until } from "./page";
+import { atOnce, fill, largest, openFile, openFlat, openSection, pass, saved, scenario, settled, table, test, until } from "./page";
 
 const NUMBERS: [section: string, label: string, typed: string, key: string, value: number][] = [
   ["Controller", "Horizon N", "35", "horizon", 35],
@@ -20,7 +20,7 @@ const NUMBERS: [section: string, label: string, typed: string, key: string, valu
   ["World", "Torque limit", "2", "limit_nm", 2],
   ["On a real robot", "Known delay", "15", "delay_s", 0.015],
   ["Controller", "QPs", "2", "most", 2],
-  ["World", "Seed", "7", "seed", 7],
+  ["World", "Seed", "1234567", "seed", 1234567],
 ];
 
 test("numbers go into the set-up", async ({ page }) => {
@@ -31,6 +31,7 @@ test("numbers go into the set-up", async ({ page }) => {
     const toml = await saved(page, "Save TOML");
     const found = [...toml.matchAll(new RegExp(`^${key} = (.*)$`, "gm"))].map(([, number]) => Number(number));
     expect(found.some((number) => Math.abs(number - value) < 1e-12), `${label}: ${found}`).toBe(true);
+    await expect(page.locator(".panel").getByLabel(label, { exact: true })).toHaveValue(typed);
   }
   for (const [i, name] of ["phi", "theta", "phi_dot", "theta_dot"].entries()) await fill(page, `Q ${name}`, String(i + 2));
   expect(await saved(page, "Save TOML")).toContain("q = [2, 3, 4, 5]");
@@ -106,6 +107,56 @@ test("predictor, estimator, moves, torque rate and motors go into the set-up", a
   await expect(page.locator("#message")).toContainText("two planes on shared motors");
   await expect(panel.getByLabel("Motor limits known", { exact: true })).not.toBeChecked();
   expect(problems).toEqual([]);
+});
+
+test("what a file has of a key stays when one of its numbers changes, and comes back when its kind does", async ({ page }) => {
+  await openFlat(page);
+  const drive = await saved(page, "Save TOML");
+  const open = async (name: string, line: string) => {
+    await openFile(page, "mine.toml", drive.replace(/^title = .*$/m, `title = "${name}"`).replace(/^horizon = .*$/m, `$&\n${line}`));
+    await expect(page.locator("#title")).toHaveText(name);
+  };
+  await open("fixed", "iterations = { fixed = 2 }");
+  await fill(page, "QPs", "3");
+  expect(await saved(page, "Save TOML")).toMatch(/^fixed = 3$/m);
+  await open("descent", "iterations = { descent = { most = 2, first = 9, tolerance = 0.01 } }");
+  await fill(page, "QPs", "3");
+  const toml = await saved(page, "Save TOML");
+  for (const line of ["most = 3", "first = 9", "tolerance = 0.01"]) expect(toml).toContain(line);
+  await open("estimator", "estimator = { disturbances = { torque_and_tilt = { torque_drift_nm = 0.05, tilt_drift_rad = 0.004 } } }");
+  const finds = page.locator(".panel").getByLabel("Finds", { exact: true });
+  await openSection(page, "On a real robot");
+  const found = await saved(page, "Save TOML");
+  expect(found).toContain("torque_and_tilt");
+  await finds.selectOption("none");
+  await settled(page);
+  await finds.selectOption("torque_and_tilt");
+  await settled(page);
+  expect(await saved(page, "Save TOML")).toBe(found);
+});
+
+test("tables of one set-up are none of the next", async ({ page }) => {
+  await openFlat(page);
+  await scenario(page, "two-setpoints");
+  expect(await saved(page, "Save TOML")).toContain("linear_model");
+  await scenario(page, "drive");
+  await page.locator(".panel").getByLabel("Terminal", { exact: true }).selectOption("continuous_riccati");
+  await settled(page);
+  expect(await saved(page, "Save TOML")).not.toContain("linear_model");
+});
+
+test("the LQR knows no bounded rate", async ({ page }) => {
+  await openFlat(page);
+  await scenario(page, "single-setpoint-terminal");
+  await page.locator(".panel").getByLabel("Terminal", { exact: true }).selectOption("discrete_riccati");
+  await openSection(page, "On a real robot");
+  await page.locator(".panel").getByLabel("Bounded torque rate", { exact: true }).check();
+  await page.locator(".panel").getByLabel("LQR", { exact: true }).check();
+  await page.locator(".panel").getByLabel("LPV MPC", { exact: true }).uncheck();
+  await settled(page);
+  const toml = await saved(page, "Save TOML");
+  expect(toml).toMatch(/^horizon = 1$/m);
+  expect(toml).not.toContain("torque_rate");
 });
 
 test("the guaranteed loop runs, and says where it belongs", async ({ page }) => {
@@ -211,6 +262,20 @@ test("the keyboard is enough", async ({ page }) => {
       .map((element) => element.outerHTML),
   );
   expect(unnamed).toEqual([]);
+});
+
+test("keys of the browser are the browser's, and what is behind a dialogue is out of reach", async ({ page }) => {
+  await openFlat(page);
+  await page.locator("#step").click();
+  await expect(page.locator("#clock")).toHaveText("0.05 s");
+  await page.locator("#scene").focus();
+  for (const key of ["Control+ArrowRight", "Meta+ArrowRight"]) await page.keyboard.press(key);
+  await page.locator("#explain").click();
+  for (const key of [".", "r"]) await page.keyboard.press(key);
+  await page.keyboard.press("Escape");
+  await settled(page);
+  expect(await page.locator("#clock").textContent()).toBe("0.05 s");
+  expect(await page.getByLabel("Target X", { exact: true }).inputValue()).toBe("0");
 });
 
 test("shortcuts go on after a click, and a field keeps its keys", async ({ page }) => {

@@ -227,6 +227,9 @@ test("fields and plots are in metres and degrees, or in rad", async ({ page }) =
   await fill(page, "Target X", "2");
   await until(page, 3);
   expect((await values(page))[0]).toBeCloseTo(2, 1);
+  await fill(page, "Target X", "1.005");
+  await expect(panel.getByLabel("Target X", { exact: true })).toHaveValue("1.005");
+  await fill(page, "Target X", "2");
   await panel.getByLabel("Units", { exact: true }).selectOption("metres");
   await expect(panel.getByLabel("Target X", { exact: true })).toHaveValue("0.24");
   await theta.fill("45");

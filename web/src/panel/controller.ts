@@ -25,7 +25,7 @@ export function controllerFields(form: Form): HTMLElement[] {
 
 /** Quadratic programs per sample: at most so many where each is an improvement, exactly so many with the paper's predictor. */
 function programs(form: Form): HTMLElement {
-  let frozen = false;
+  let table: { fixed?: number; descent?: { most?: number } } = {};
   const field = numberField(
     {
       label: "QPs",
@@ -34,12 +34,13 @@ function programs(form: Form): HTMLElement {
       step: 1,
       cleared: () => form.change("controller.iterations", undefined),
     },
-    (count) => form.change("controller.iterations", frozen ? { fixed: count } : { descent: { most: count } }),
+    (count) => form.change("controller.iterations", table.fixed !== undefined ? { fixed: count } : { descent: { ...table.descent, most: count } }),
   );
   form.watch(({ controller }) => {
-    frozen = kindOf(controller["predictor"]) === "rk4" || kindOf(controller.terminal) === "certified";
-    const { fixed, descent } = (controller["iterations"] ?? {}) as { fixed?: number; descent?: { most?: number } };
-    field.set(fixed ?? descent?.most ?? NaN);
+    const frozen = kindOf(controller["predictor"]) === "rk4" || kindOf(controller.terminal) === "certified";
+    // Where the set-up leaves the choice to the controller: which of the two it takes.
+    table = (controller["iterations"] ?? (frozen ? { fixed: NaN } : {})) as typeof table;
+    field.set(table.fixed ?? table.descent?.most ?? NaN);
   });
   return field.element;
 }
@@ -53,19 +54,14 @@ const TERMINALS: [kind: string, text: string][] = [
   ["cost", "P of the file"],
 ];
 
-/** Tables of a file, such as its certificate, come back when their kind is chosen again. */
 function terminal(form: Form): HTMLElement {
-  const known = new Map<string, unknown>([["certified", { certified: {} }], ["continuous_riccati", { continuous_riccati: {} }]]);
-  form.watch(({ controller }) => {
-    const kind = kindOf(controller.terminal);
-    if (kind !== undefined) known.set(kind, controller.terminal);
-  });
+  const known = form.remembered("controller.terminal", [["certified", { certified: {} }], ["continuous_riccati", { continuous_riccati: {} }]]);
   return form.choice(
     "controller.terminal",
     { label: "Terminal", title: "The certified set belongs to the built-in robot and to t_s = 50 ms" },
     TERMINALS,
     (value) => kindOf(value as string | object | undefined) ?? "discrete_riccati",
-    (kind) => known.get(kind) ?? kind,
+    (kind) => known(kind) ?? kind,
   );
 }
 
@@ -118,12 +114,13 @@ export function feedbackFields(form: Form): HTMLElement[] {
 
 function estimator(form: Form): HTMLElement {
   const key = (name: string) => `controller.estimator.${name}`;
+  const known = form.remembered(key("disturbances"), [["none", "none"]]);
   const disturbances = form.choice(
     key("disturbances"),
     { label: "Finds", title: "Constants that then leave no error in phi" },
     [["default", "torque and tilt offset"], ["none", "nothing"], ["torque_and_tilt", "as in the file"]],
     (value) => kindOf(value as string | object | undefined) ?? "default",
-    (kind) => (kind === "none" ? "none" : undefined),
+    known,
   );
   return form.table("controller.estimator", { label: "Estimator (Kalman filter)" }, {},
     form.optional(key("phi_noise_rad"), { label: "Noise phi", quantity: "ball" }),

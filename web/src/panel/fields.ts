@@ -38,8 +38,9 @@ function row(spec: FieldSpec, ...controls: HTMLElement[]): HTMLElement {
   return line;
 }
 
-/** Text of a number field; an infinite bound is an empty field. */
+/** Text of a number field, whole numbers with all their digits; an infinite bound is an empty field. */
 function shown(value: number): string {
+  if (Number.isSafeInteger(value)) return String(value);
   return Number.isFinite(value) ? String(Number(value.toPrecision(5))) : "";
 }
 
@@ -67,6 +68,8 @@ export interface NumberSpec extends FieldSpec {
   min?: number;
   max?: number;
   step?: number;
+  /** No more digits after the point are shown. */
+  decimals?: number;
   /** The slider moves in decades. */
   logarithmic?: boolean;
   /** What an empty field means; without it an empty field is not accepted. */
@@ -133,8 +136,9 @@ export function numberField(spec: NumberSpec, changed: (value: number) => void):
   const line = slides ? row(spec, input, slider) : row(spec, input);
   const set = (value: number) => {
     [now, answered] = [value, true];
-    display(shown(value / factor));
-    if (!held) slider.value = String(toSlider(value / factor));
+    const inUnit = value / factor;
+    display(shown(spec.decimals === undefined ? inUnit : Number(inUnit.toFixed(spec.decimals))));
+    if (!held) slider.value = String(toSlider(inUnit));
   };
   return {
     element: line,

@@ -1,6 +1,6 @@
 // Fields that show and change values of the set-up, each by its path.
 
-import { valueAt, type Range, type Scenario } from "../scenario";
+import { kindOf, valueAt, type Range, type Scenario } from "../scenario";
 import { unitOf, type Quantity, type Unit, type UnitSystem } from "../units";
 import { checkField, choiceField, numberField, rangeField, type FieldSpec, type Measured, type NumberSpec } from "./fields";
 
@@ -15,6 +15,7 @@ export interface FormNumber extends NumberSpec {
 
 export class Form {
   private readonly shows: ((setup: Scenario) => void)[] = [];
+  private readonly forgets: (() => void)[] = [];
   private readonly measures: ((unit: (quantity: Quantity) => Unit) => void)[] = [];
 
   /** `change` sets a value of the set-up; `undefined` leaves the key out. */
@@ -27,6 +28,24 @@ export class Form {
   /** Calls back with every set-up that is shown. */
   watch(show: (setup: Scenario) => void): void {
     this.shows.push(show);
+  }
+
+  /** Another set-up was opened: tables of the one before are none of it. */
+  opened(): void {
+    for (const forget of this.forgets) forget();
+  }
+
+  /** What the key at a path held last, by its kind, since the set-up was opened: tables of a file come back
+   *  when their kind is chosen again. `initial` is for kinds that it has not had. */
+  remembered(path: string, initial: [kind: string, value: unknown][]): (kind: string) => unknown {
+    let known = new Map(initial);
+    this.forgets.push(() => (known = new Map(initial)));
+    this.watch((setup) => {
+      const value = valueAt(setup, path) as string | object | undefined;
+      const kind = kindOf(value);
+      if (kind !== undefined) known.set(kind, value);
+    });
+    return (kind) => known.get(kind);
   }
 
   /** From now on in these units, for a robot with this ball radius, m. */

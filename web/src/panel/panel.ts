@@ -47,7 +47,7 @@ export class Panel {
       { label: "Units", title: "Of fields and plots. Files hold rad; the weights Q and R are for rad, rad/s and N m" },
       [["metres", "m and degrees"], ["radians", "rad"]], (system) => actions.units(system as UnitSystem));
     const target = (label: string, order: (phi: number) => void) => {
-      const spec: NumberSpec = { label, quantity: "ball", min: -25, max: 25 };
+      const spec: NumberSpec = { label, quantity: "ball", min: -25, max: 25, decimals: 4 };
       return this.form.measured(spec, numberField(spec, order));
     };
     this.targetFields = [target("Target X", (x) => actions.target({ x })), target("Target Y", (y) => actions.target({ y }))];
@@ -102,6 +102,11 @@ export class Panel {
       strength.element,
       buttons(push("\u2190", "Push towards -x", -1, 0), push("\u2192", "Push towards +x", 1, 0), push("\u2191", "Push towards +y", 0, 1), push("\u2193", "Push towards -y", 0, -1)),
     ];
+  }
+
+  /** Another set-up was opened. */
+  opened(): void {
+    this.form.opened();
   }
 
   /** Shows this set-up. */

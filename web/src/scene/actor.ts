@@ -1,11 +1,9 @@
 // Everything in three dimensions that belongs to one robot: itself, its plan, its way.
 
 import { Color, LineBasicMaterial, Mesh, MeshBasicMaterial, PointsMaterial, RingGeometry, Scene } from "three";
-import { FloorLine, LINE_POINTS } from "./lines";
+import { FloorLine } from "./lines";
 import { Robot, toScene } from "./robot";
 import type { RobotPicture, Shape, Theme } from "./view";
-
-const PLAN_POINTS = 256;
 
 export class Actor {
   readonly robot: Robot;
@@ -20,11 +18,11 @@ export class Actor {
       new LineBasicMaterial({ color: new Color(hex), transparent: true, opacity });
     this.robot = new Robot(shape, theme, colour, false);
     this.ghost = new Robot(shape, theme, colour, true);
-    this.trail = new FloorLine(line(colour, 0.75), LINE_POINTS, 0.004);
-    this.reference = new FloorLine(line(theme.reference, 0.9), LINE_POINTS, 0.003);
+    this.trail = new FloorLine(line(colour, 0.75), 0.004);
+    this.reference = new FloorLine(line(theme.reference, 0.9), 0.003);
     this.plan = new FloorLine(
       new PointsMaterial({ color: new Color(colour), size: 5, sizeAttenuation: false, transparent: true, opacity: 0.9 }),
-      PLAN_POINTS, 0.006,
+      0.006,
     );
     const { ballRadius: r } = shape;
     this.goal = new Mesh(

@@ -7,7 +7,7 @@ import type { FloorPoint } from "./view";
 
 /** Reach of the grid, m. */
 const HALF = 12;
-/** Points of the longest line. */
+/** Points of the longest line; a plan has at most 1000 samples. */
 export const LINE_POINTS = 2048;
 
 /** A line on the floor whose points change. */
@@ -15,9 +15,9 @@ export class FloorLine {
   readonly object: Line | Points;
   private readonly positions: BufferAttribute;
 
-  constructor(material: LineBasicMaterial | PointsMaterial, capacity: number, private readonly height: number) {
+  constructor(material: LineBasicMaterial | PointsMaterial, private readonly height: number) {
     const geometry = new BufferGeometry();
-    this.positions = new BufferAttribute(new Float32Array(3 * capacity), 3);
+    this.positions = new BufferAttribute(new Float32Array(3 * LINE_POINTS), 3);
     this.positions.setUsage(DynamicDrawUsage);
     geometry.setAttribute("position", this.positions);
     this.object = material instanceof PointsMaterial ? new Points(geometry, material) : new Line(geometry, material);

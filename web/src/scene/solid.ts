@@ -7,7 +7,7 @@ import {
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Actor } from "./actor";
 import { Arrow } from "./arrow";
-import { FloorLine, gridLines, LINE_POINTS } from "./lines";
+import { FloorLine, gridLines } from "./lines";
 import { toScene } from "./robot";
 import { FloorScale } from "./scale";
 import { PAPER_SHAPE, type FloorPoint, type Picture, type Shape, type Theme, type View } from "./view";
@@ -65,7 +65,7 @@ export class SolidView implements View {
     this.sun.shadow.bias = -0.0006;
     const box = this.sun.shadow.camera;
     [box.left, box.right, box.bottom, box.top, box.near, box.far] = [-1.6, 1.6, -1.6, 1.6, 0.5, 8];
-    this.stroke = new FloorLine(new LineBasicMaterial({ color: new Color(theme.ink) }), LINE_POINTS, 0.01);
+    this.stroke = new FloorLine(new LineBasicMaterial({ color: new Color(theme.ink) }), 0.01);
     this.scale = new FloorScale(theme);
     this.scene.add(this.push.group, this.scale.group, this.floor, this.sun, this.sun.target, this.sky, this.stroke.object);
     this.camera.position.set(0.9, 1.35, 2.9);
