@@ -13,6 +13,7 @@ mod positive;
 mod rows;
 mod runge_kutta;
 mod series;
+mod sinc;
 mod taylor_map;
 mod taylor_model;
 

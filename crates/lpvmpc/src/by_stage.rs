@@ -5,8 +5,8 @@
 
 use crate::at_stage::AtStage;
 use crate::controller::next_state;
-use crate::descent::Along;
 use crate::embedding::Tangent;
+use crate::linearization::Along;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Bounds, GeneralRow, SoftBounds};
 use crate::outputs::Outputs;

@@ -10,8 +10,8 @@
 
 use crate::by_stage::PlantByStage;
 use crate::controller::Controller;
-use crate::descent::{Along, States};
 use crate::hard_bounds::DEAR;
+use crate::linearization::{Along, States};
 use crate::list::List;
 use crate::memory::Capacity;
 use crate::model::{LpvModel, Scalar};

@@ -3,7 +3,8 @@
 
 use crate::by_stage::PlantByStage;
 use crate::controller::Controller;
-use crate::descent::{Along, Outcome};
+use crate::descent::Outcome;
+use crate::linearization::Along;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::{Ocp, Stage};
 use crate::outputs;

@@ -7,7 +7,7 @@
 
 use crate::by_stage::PlantByStage;
 use crate::controller::Controller;
-use crate::descent::Along;
+use crate::linearization::Along;
 use crate::model::{LpvModel, Scalar};
 use crate::outputs;
 use crate::plan::{Aim, Prices, at};

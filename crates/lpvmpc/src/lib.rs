@@ -80,6 +80,7 @@ mod held_inputs;
 mod kkt;
 mod last_plan;
 mod line_search;
+mod linearization;
 mod list;
 mod many_bounds;
 mod memory;

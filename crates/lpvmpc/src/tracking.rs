@@ -2,7 +2,7 @@
 
 use crate::by_stage::{CostByStage, PlantByStage};
 use crate::controller::Controller;
-use crate::descent::Along;
+use crate::linearization::Along;
 use crate::model::{LpvModel, Scalar};
 use crate::ocp::Ocp;
 use crate::outputs;

@@ -3,8 +3,9 @@
 
 use crate::by_stage::PlantByStage;
 use crate::controller::{Controller, Reference, next_state};
-use crate::descent::{Along, Outcome, States};
+use crate::descent::Outcome;
 use crate::first_plan::First;
+use crate::linearization::{Along, States};
 use crate::model::{LpvModel, Scalar};
 use crate::plan::{Aim, Prices, at};
 use crate::preview::Preview;
