@@ -221,8 +221,15 @@ pub(crate) fn slack<T: Scalar, const NX: usize, const NU: usize>(
 ) -> T {
     let x = trajectory.state(ocp, bound.stage);
     let u = trajectory.u.get(bound.stage);
-    let (normal_x, normal_u) = normal(ocp, bound);
-    let value = normal_x.dot(&x) + u.map_or(T::zero(), |u| normal_u.dot(u));
+    let value = match bound.quantity {
+        Quantity::State(j) => x.get(j).copied(),
+        Quantity::Input(j) => u.and_then(|u| u.get(j)).copied(),
+        Quantity::Row(j) => {
+            let u = u.filter(|_| bound.stage < ocp.length());
+            ocp.row(bound.stage, j).map(|row| row.value(&x, u))
+        }
+    };
+    let value = value.unwrap_or(T::zero());
     let (lower, upper) = limits(ocp, bound);
     match bound.side {
         Side::Lower | Side::Equality => value - lower,
@@ -376,6 +383,10 @@ pub(crate) struct Places(u32);
 impl Places {
     pub fn add(&mut self, stage: usize) {
         self.0 |= 1 << (stage % 32);
+    }
+
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
     }
 
     fn may_be_at(self, stage: usize) -> bool {

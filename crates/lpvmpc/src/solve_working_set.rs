@@ -13,34 +13,42 @@ use nalgebra::convert;
 impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     /// Starts from the rows that were active before, `shift` stages earlier. Rows whose
     /// multiplier would have the wrong sign are dropped, so this never changes the result.
+    ///
+    /// Returns whether it did: of rows that are active one is violated without them, so where none is, they tell
+    /// nothing.
     pub fn warm_start<const NX: usize>(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
         factors: &[StageFactor<T, NX, NU>],
         trajectory: &Trajectory<'_, T, NX, NU>,
-        before: &ActiveSet<T>,
-        shift: usize,
-    ) -> Result<(), Status<T>> {
-        for row in before.iter() {
+        (before, shift): (&ActiveSet<T>, usize),
+    ) -> Result<bool, Status<T>> {
+        let known = |row: ActiveRow<T>| {
             let hard = row.part == Part::Hard && row.bound.side != Side::Equality;
-            let Some(stage) = row.bound.stage.checked_sub(shift) else {
-                continue;
-            };
+            let stage = row.bound.stage.checked_sub(shift)?;
             // The state at stage 0 is given, the input at the end does not exist.
             let free = match row.bound.quantity {
                 Quantity::State(_) => stage > 0 && stage <= ocp.length(),
                 Quantity::Input(_) => stage < ocp.length(),
                 Quantity::Row(_) => stage <= ocp.length(),
             };
-            if !hard || !free || self.working.is_full() {
-                continue;
+            if !hard || !free {
+                return None;
             }
             let bound = BoundId { stage, ..row.bound };
-            // The bound may have gone, or become soft, since. One that the trajectory without bounds keeps is inactive as
-            // a rule where active rows change from sample to sample; if not, it is found in less time than dropped.
+            // The bound may have gone, or become soft, since.
             let slack = rows::slack(ocp, trajectory, &bound);
-            let expected = slack.is_finite() && (before.doubted == 0 || slack < T::zero());
-            if !expected || rows::soft_price(ocp, &bound).is_some() {
+            let holds = slack.is_finite() && rows::soft_price(ocp, &bound).is_none();
+            holds.then_some((bound, slack < T::zero()))
+        };
+        let known = || before.iter().filter_map(known);
+        if !known().any(|(_, violated)| violated) {
+            return Ok(false);
+        }
+        for (bound, violated) in known() {
+            // One that the trajectory without bounds keeps is inactive as a rule where active rows change from sample to
+            // sample; if not, it is found in less time than dropped.
+            if !violated && before.doubted > 0 || self.working.is_full() {
                 continue;
             }
             rows::form_row(ocp, factors, bound, Part::Hard, None, &mut self.candidate);
@@ -50,7 +58,8 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
                 self.working.append(&self.candidate, &self.direction);
             }
         }
-        self.solve_working_set(ocp, factors, trajectory)
+        self.solve_working_set(ocp, factors, trajectory)?;
+        Ok(true)
     }
 
     /// After the last violated bound: removes what rounding has left in the optimality
@@ -178,10 +187,13 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         copy(&mut self.rest, &self.v);
         let (working, resting) = (self.working.rows(), &self.resting);
         let mut places = Places::default();
-        working
-            .iter()
-            .for_each(|row| places.add(row.active.bound.stage));
-        resting.iter().for_each(|row| places.add(row.bound.stage));
+        let rows = working.iter().map(Terms::reported);
+        rows.chain(resting.iter())
+            .filter(|row| row.multiplier != T::zero())
+            .for_each(|row| places.add(row.bound.stage));
+        if places.is_empty() {
+            return;
+        }
         let active_at = |stage: usize| {
             let here = working
                 .iter()

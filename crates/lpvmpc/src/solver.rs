@@ -336,15 +336,14 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         let Some(shift) = shift else {
             return Ok(());
         };
-        let needed = !solution.active.is_empty()
-            && self
-                .dual
-                .most_violated(ocp, &trajectory(solution))
-                .is_some();
-        if needed {
-            let trajectory = trajectory(solution);
-            self.dual
-                .warm_start(ocp, &self.factors, &trajectory, &solution.active, shift)?;
+        if solution.active.is_empty() || self.dual.kept {
+            return Ok(());
+        }
+        let before = (&solution.active, shift);
+        let begun = self
+            .dual
+            .warm_start(ocp, &self.factors, &trajectory(solution), before)?;
+        if begun {
             self.roll_out(ocp, solution)?;
         }
         Ok(())
