@@ -343,7 +343,6 @@ impl ExcitationTask {
             };
             if right { Ok(()) } else { Err(error) }
         };
-        let positive = || "positive".to_owned();
         within(
             "the rate",
             self.rate,
@@ -351,7 +350,13 @@ impl ExcitationTask {
             1e5,
             "from 5 to 100000 Hz".to_owned(),
         )?;
-        within("the lowest frequency", self.band.0, 1e-3, 1e4, positive())?;
+        within(
+            "the lowest frequency",
+            self.band.0,
+            1e-3,
+            1e4,
+            "from 0.001 to 10000 Hz".to_owned(),
+        )?;
         within(
             "the highest frequency",
             self.band.1,

@@ -171,6 +171,6 @@ pub fn read(path: &Path, columns: &Columns, progress: Progress<'_>) -> Result<Lo
     let located = |problem| LogError::at(path, problem);
     let mut findings = Vec::new();
     let table = table::read(path, columns, &mut findings, progress).map_err(located)?;
-    let run = diagnosis::run(path, &table, columns, &mut findings).map_err(located)?;
+    let run = diagnosis::run(path, table, columns, &mut findings).map_err(located)?;
     Ok(Log { run, findings })
 }

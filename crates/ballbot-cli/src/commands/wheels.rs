@@ -44,7 +44,8 @@ pub struct CheckArguments {
     /// The same of a turn about the vertical, counter-clockwise seen from above
     #[arg(long, value_name = "LOG.csv")]
     pub turn: Option<PathBuf>,
-    /// Columns, units, azimuths: the table [log.wheels]
+    /// Columns, units, azimuths: the table [log.wheels]. Logs of pushes are read whole: from_s, until_s and leave_out
+    /// are of those of `ballbot identify`
     #[arg(long, value_name = "FILE.toml")]
     pub config: PathBuf,
 }

@@ -23,7 +23,7 @@ pub(super) struct Names<'a>([&'a str; 5]);
 
 pub(super) fn run(
     path: &Path,
-    table: &Table,
+    mut table: Table,
     columns: &Columns,
     findings: &mut Vec<Finding>,
 ) -> Result<Run, Problem> {
@@ -46,7 +46,7 @@ pub(super) fn run(
         &columns.theta_dot.column,
         torque_name,
     ]);
-    let (time, mut breaks) = stamps::check(table, &names, findings)?;
+    let (time, mut breaks) = stamps::check(&table, &names, findings)?;
     let out = time.iter().enumerate();
     let out = out.filter(|(_, time)| !columns.takes(**time));
     let out: Vec<usize> = out.map(|(row, _)| row).collect();
@@ -59,12 +59,11 @@ pub(super) fn run(
     let length = time.last().copied().unwrap_or_default();
     let beyond = columns.leave_out.iter().filter(|[from, _]| *from > length);
     findings.extend(beyond.map(|&[from, to]| Finding::NothingLeftOut { from, to, length }));
-    missing(
-        table,
-        &names,
-        !columns.theta_dot.column.is_empty(),
-        findings,
-    )?;
+    // What is left out must say nothing of the rest: where it is the larger part, it would be the middle.
+    table.forget(&out);
+    let table = &table;
+    let has_rate = !columns.theta_dot.column.is_empty();
+    missing(table, &names, has_rate, &out, findings)?;
     sensors::constant(table, &names)?;
     let [_, phi, theta, theta_dot, torque] = &table.columns;
     let angle;
@@ -144,14 +143,15 @@ fn integrated(time: &[f64], rate: &[f64], breaks: &mut [bool]) -> Vec<f64> {
     angle
 }
 
-/// Values that are not there.
+/// Values that are not there, in the rows that are not left `out` (in their order).
 fn missing(
     table: &Table,
     names: &Names<'_>,
     has_rate: bool,
+    out: &[usize],
     findings: &mut Vec<Finding>,
 ) -> Result<(), Problem> {
-    let rows = table.lines.len();
+    let rows = table.lines.len() - out.len();
     for (place, values) in table.columns.iter().enumerate().skip(1) {
         if place == 3 && !has_rate {
             continue;
@@ -159,7 +159,7 @@ fn missing(
         let mut missing = values
             .iter()
             .enumerate()
-            .filter(|(_, value)| value.is_nan());
+            .filter(|(row, value)| value.is_nan() && out.binary_search(row).is_err());
         let Some((first, _)) = missing.next() else {
             continue;
         };

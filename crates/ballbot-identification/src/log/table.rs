@@ -23,6 +23,21 @@ pub(super) struct Table {
     pub(super) rate_of_ball: bool,
 }
 
+impl Table {
+    /// Takes all but the time of these rows away, as if it were missing.
+    pub(super) fn forget(&mut self, rows: &[usize]) {
+        let [_, measured @ ..] = &mut self.columns;
+        for column in measured.iter_mut().chain([&mut self.commanded]) {
+            for &row in rows {
+                // There may be no second torque.
+                if let Some(value) = column.get_mut(row) {
+                    *value = f64::NAN;
+                }
+            }
+        }
+    }
+}
+
 /// A column that is read.
 struct Source {
     place: usize,

@@ -11,6 +11,7 @@ mod creep;
 mod excite;
 mod integration;
 mod laboratory;
+mod left_out;
 mod long;
 mod malformed;
 mod planes;

@@ -48,10 +48,12 @@ pub(super) fn jumps(
         let excess = |i: usize| {
             let before = changes[i.saturating_sub(1)];
             let after = changes[(i + 1).min(changes.len() - 1)];
-            // At either end a neighbour is the change itself: only the other one counts.
+            // At either end a neighbour is the change itself, beside what is missing there is none: only the
+            // other one counts.
             let neighbours = match i {
                 0 => after,
-                _ if i + 1 == changes.len() => before,
+                _ if i + 1 == changes.len() || after.is_nan() => before,
+                _ if before.is_nan() => after,
                 _ => 0.5 * (before + after),
             };
             let largest = changes[i].abs() >= before.abs().max(after.abs());
@@ -164,7 +166,7 @@ const SATURATED_PART: f64 = 0.02;
 /// Saturation, and what was asked for against what acted.
 pub(super) fn torque(table: &Table, findings: &mut Vec<Finding>) {
     let torque = &table.columns[4];
-    let rows = torque.len() as f64;
+    let rows = torque.iter().filter(|value| !value.is_nan()).count() as f64;
     let limit = torque
         .iter()
         .fold(0.0_f64, |limit, value| limit.max(value.abs()));
