@@ -6,7 +6,7 @@ use crate::error::CampaignError;
 use crate::file::{CampaignFile, LimitsTable, OnRefused};
 use crate::fingerprint;
 use crate::fixed::fixed;
-use crate::inputs::{Input, Inputs, child, named_seed};
+use crate::inputs::{Input, Inputs, child, is_within, named_seed};
 use crate::measure::{Ending, Measure, Measured};
 use ballbot_scenario::{Document, Files, Prepared, Record, RunHooks, ScenarioError, words};
 use rayon::prelude::*;
@@ -178,28 +178,11 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
         let file = &source.file;
         let (inputs, runs) = Inputs::new(&file.vary, file.design, file.seed, runs_of(file))?;
         let fixed = source.fixed();
-        let varied = |key: &str| {
-            inputs
-                .all
-                .iter()
-                .any(|input| input.keys.iter().any(|k| k == key))
-        };
-        if let Some((key, value)) = fixed.iter().find(|(key, _)| varied(key)) {
-            let expected = "it varies, too; leave one of them out";
-            return Err(CampaignError::value(
-                format!("set.{key}"),
-                value.to_string(),
-                expected,
-            ));
-        }
-        let has_world = source.scenario.root().get("world").is_some()
-            || fixed.iter().any(|(key, _)| is_of_world(key))
-            || inputs
-                .all
-                .iter()
-                .flat_map(|input| &input.keys)
-                .any(|key| is_of_world(key));
-        let given = file.same_noise || varied(NOISE) || fixed.iter().any(|(key, _)| key == NOISE);
+        check_fixed(&fixed, &inputs)?;
+        let keys = || inputs.keys().chain(fixed.iter().map(|(key, _)| key));
+        let has_world =
+            source.scenario.root().get("world").is_some() || keys().any(|key| is_of_world(key));
+        let given = file.same_noise || keys().any(|key| key == NOISE);
         let campaign = Self {
             noise: (has_world && !given).then(|| named_seed(file.seed, NOISE)),
             measures: measures(file)?,
@@ -214,7 +197,32 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
         check_success(file, &campaign.measures)?;
         check_goal(file, &campaign.inputs)?;
         campaign.check_first()?;
+        let success = file.success.keys();
+        let success = success.map(|measure| (format!("success.{measure}"), *measure));
+        let rare = file.rare.iter();
+        let rare = rare.map(|rare| ("rare.measure".to_owned(), rare.measure));
+        for (place, measure) in success.chain(rare) {
+            if let Some(reason) = campaign.never_measured(measure) {
+                return Err(CampaignError::value(place, measure.name(), reason));
+            }
+        }
         Ok(campaign)
+    }
+
+    /// Why none of the runs has this measure; nothing where one may have it. Of many runs the first ones
+    /// are looked at.
+    fn never_measured(&self, measure: Measure) -> Option<&'static str> {
+        let mut never = None;
+        for run in 0..self.runs.min(ATTEMPTS) {
+            // What is no scenario has no measures, and says nothing of the others.
+            if let Ok(prepared) = self.scenario(&self.draw(run)) {
+                never = measure.never_in(&prepared);
+                if never.is_none() {
+                    break;
+                }
+            }
+        }
+        never
     }
 
     /// A key that is none is wrong in all runs: where the first one is no scenario, the campaign
@@ -449,8 +457,7 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
     }
 
     /// Runs the runs from `from` to before `until` on all threads of the pool it is called in and
-    /// hands their rows over in their order; before each part `wanted` is asked whether to go on. A
-    /// part is what is in memory.
+    /// hands their rows over in their order, part by part. A part is what is in memory.
     ///
     /// # Errors
     /// As [`run`](Self::run); what `each` says.
@@ -481,6 +488,24 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
 fn runs_of(file: &CampaignFile) -> Option<u64> {
     file.runs
         .or(file.rare.map(|rare| u64::from(rare.level_runs)))
+}
+
+/// Nothing that is the same in all runs is in what varies.
+fn check_fixed(fixed: &[(String, Value)], inputs: &Inputs) -> Result<(), CampaignError> {
+    for (key, value) in fixed {
+        let Some(other) = inputs.keys().find(|other| is_within(key, other)) else {
+            continue;
+        };
+        let expected = match key == other {
+            true => "it varies, too; leave one of them out".to_owned(),
+            false => {
+                format!("it stands in `{other}`, which varies as a whole; leave one of them out")
+            }
+        };
+        let (place, value) = (format!("set.{key}"), value.to_string());
+        return Err(CampaignError::value(place, value, expected));
+    }
+    Ok(())
 }
 
 /// Whether a scenario with this key has a world, and so noise.

@@ -5,7 +5,7 @@ use toml::Value;
 /// What a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Finite numbers.
+    /// Numbers: of measures finite ones.
     Real,
     /// Whole numbers.
     Whole,
@@ -39,7 +39,7 @@ impl Column {
 pub enum Cell {
     /// There is none: a run that was refused has no measures.
     Missing,
-    /// A finite number.
+    /// A number, and no NaN. A value of the scenario may be infinite, such as a bound that is none.
     Real(f64),
     /// A whole number.
     Whole(i64),
@@ -56,8 +56,9 @@ impl Cell {
     /// The value in a column of this kind.
     pub(crate) fn of(value: &Value, kind: Kind) -> Self {
         match (value, kind) {
-            (Value::Float(number), _) => Self::real(*number),
-            (Value::Integer(number), Kind::Real) => Self::real(*number as f64),
+            (Value::Float(number), _) if number.is_nan() => Self::Missing,
+            (Value::Float(number), _) => Self::Real(*number),
+            (Value::Integer(number), Kind::Real) => Self::Real(*number as f64),
             (Value::Integer(number), _) => Self::Whole(*number),
             (Value::Boolean(flag), _) => Self::Flag(*flag),
             (Value::String(text), _) => Self::Text(text.clone()),
@@ -65,8 +66,8 @@ impl Cell {
         }
     }
 
-    /// The number, or nothing where it is none.
-    pub(crate) fn real(number: f64) -> Self {
+    /// What was measured, or nothing where it is no finite number.
+    pub(crate) fn measured(number: f64) -> Self {
         match number.is_finite() {
             true => Self::Real(number),
             false => Self::Missing,

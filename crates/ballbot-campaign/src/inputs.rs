@@ -87,6 +87,11 @@ impl Inputs {
         Ok((inputs, runs))
     }
 
+    /// The keys of the scenario that vary.
+    pub fn keys(&self) -> impl Iterator<Item = &String> {
+        self.all.iter().flat_map(|input| &input.keys)
+    }
+
     /// The columns of the inputs.
     pub fn columns(&self) -> impl Iterator<Item = Column> {
         let name = |input: &Input| input.keys.first().cloned().unwrap_or_default();
@@ -212,8 +217,7 @@ pub fn is_within(key: &str, other: &str) -> bool {
 }
 
 fn check_keys(all: &[Input]) -> Result<(), CampaignError> {
-    let keys = all.iter().flat_map(|input| &input.keys);
-    let keys: Vec<&String> = keys.collect();
+    let keys: Vec<&String> = all.iter().flat_map(|input| &input.keys).collect();
     for (i, key) in keys.iter().enumerate() {
         let inside = |other: &str| is_within(key, other);
         if let Some(other) = keys

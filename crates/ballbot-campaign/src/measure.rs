@@ -99,16 +99,41 @@ impl Measure {
         matches!(self, Self::MeanStepUs | Self::LongestStepUs)
     }
 
+    /// Whether it counts samples, of which a run has as many as its sampling time leaves.
+    pub fn counts_samples(self) -> bool {
+        matches!(
+            self,
+            Self::Infeasible | Self::Violations | Self::NotGuaranteed
+        )
+    }
+
     /// Whether an empty cell of a run that came to its end says that the time never comes.
     pub(crate) fn may_never_come(self) -> bool {
         matches!(self, Self::SettlingS)
     }
 
+    /// Why no run of a scenario has it; nothing where one may have it.
+    pub(crate) fn never_in(self, prepared: &Prepared) -> Option<&'static str> {
+        let last = prepared.samples.saturating_sub(1) as f64 * prepared.settings.t_s;
+        let changes =
+            |plane: &Plane| plane.reference.at(last) != plane.reference.at(prepared.end());
+        match self {
+            Self::NotGuaranteed if prepared.guaranteed().is_none() => Some(
+                "the loop has no guarantee, so there is no such number; infeasible and violations are of any loop",
+            ),
+            Self::SettlingS if prepared.planes.iter().any(changes) => Some(
+                "the reference changes until the end, so nothing settles; rms_error_rad and final_error_rad are of \
+                 any reference",
+            ),
+            _ => None,
+        }
+    }
+
     /// What its column holds.
     pub fn kind(self) -> Kind {
-        match self {
-            Self::Infeasible | Self::Violations | Self::NotGuaranteed => Kind::Whole,
-            _ => Kind::Real,
+        match self.counts_samples() {
+            true => Kind::Whole,
+            false => Kind::Real,
         }
     }
 }
@@ -184,7 +209,7 @@ impl Measured {
             Kind::Whole => self
                 .count(measure)
                 .map_or(Cell::Missing, |count| Cell::Whole(count as i64)),
-            _ => Cell::real(self.number(measure)),
+            _ => Cell::measured(self.number(measure)),
         }
     }
 

@@ -52,7 +52,9 @@ pub fn all<F: Files + Copy + Sync>(
     let mut inputs = Vec::new();
     for found in &summary.sensitivities {
         let values = ran(results.first_cells(&found.input, RUNS)?);
-        let values: Option<Vec<f64>> = values.map(|cell| cell.number()).collect();
+        // What is infinite has no place on an axis.
+        let place = |cell: Cell| cell.number().filter(|number| number.is_finite());
+        let values: Option<Vec<f64>> = values.map(place).collect();
         inputs.extend(values.map(|values| Input {
             name: found.input.clone(),
             values,

@@ -52,6 +52,34 @@ fn mistakes_are_named() {
             ["set.controller.horizon", "varies"],
         ),
         (
+            // It was ignored.
+            edited("duration_s = 1.0", "\"controller.q.0\" = 9.0")
+                + "[[vary]]\nkey = \"controller.q\"\nlist = [[1.0, 1.0, 1.0, 1.0]]\n",
+            [
+                "set.controller.q.0 = 9.0",
+                "stands in `controller.q`, which varies",
+            ],
+        ),
+        (
+            // All runs used to be failures.
+            edited(
+                "largest_tilt_rad.at_most = 0.5",
+                "not_guaranteed.at_most = 0",
+            ),
+            ["success.not_guaranteed", "no guarantee"],
+        ),
+        (
+            edited("largest_tilt_rad.at_most = 0.5", "settling_s.at_most = 0.5")
+                .replace("\"single-setpoint\"", "\"lissajous\"")
+                .replace("initial_state.theta_rad", "world.floor.slope_x_deg"),
+            ["success.settling_s", "changes until the end"],
+        ),
+        (
+            edited("runs = 24\n", "").replace("[success]\nlargest_tilt_rad.at_most = 0.5\n", "")
+                + "[rare]\nmeasure = \"not_guaranteed\"\nabove = 0.0\n",
+            ["rare.measure = not_guaranteed", "no guarantee"],
+        ),
+        (
             edited("largest_tilt_rad.at_most", "largest_tilt.at_most"),
             ["largest_tilt", "largest_tilt_rad"],
         ),

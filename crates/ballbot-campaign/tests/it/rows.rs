@@ -99,6 +99,20 @@ fn tables_in_set_are_keys_with_dots() {
     assert_eq!(phi, 0.5);
 }
 
+/// It was an empty cell.
+#[test]
+fn an_infinite_value_that_is_drawn_is_in_the_results() {
+    let text = "title = \"Values\"\nscenario = \"single-setpoint\"\n[set]\nduration_s = 0.1\n\
+         [[vary]]\nkey = \"bounds.theta_dot_rad_s.1\"\ngrid = [5.0, inf]\n";
+    with(text, |campaign| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("runs.parquet");
+        write_whole(campaign, &path);
+        let found = numbers(campaign, &read(&path), "bounds.theta_dot_rad_s.1");
+        assert_eq!(found, [5.0, f64::INFINITY]);
+    });
+}
+
 /// They were looked for in the current folder.
 #[test]
 fn files_for_a_built_in_scenario_are_beside_the_campaign() {

@@ -67,6 +67,7 @@ pub(super) fn write(
             let cells: Vec<_> = tuning.cells(&tuning.values(entry)).collect();
             cells[axis]
                 .number()
+                .filter(|number| number.is_finite())
                 .unwrap_or_else(|| place(tuning, axis, entry))
         });
         all.collect()
@@ -106,7 +107,7 @@ pub(super) fn write(
     }
 }
 
-/// The place of a value that is no number in its list.
+/// The place in its list of a value that is no finite number.
 fn place(tuning: &Own<'_>, axis: usize, entry: &Entry) -> f64 {
     let value = tuning.values(entry).into_iter().nth(axis);
     let unit = value.and_then(|value| tuning.axes()[axis].unit(&value));
