@@ -1,5 +1,6 @@
 //! What a candidate is worth: its goals and limits over the worlds, and one number for the search.
 
+use crate::comparable;
 use crate::error::TuningError;
 use crate::file::{GoalTable, Statistic, TuningFile};
 use ballbot_campaign::{Cell, Column, Ending, Measure, Row};
@@ -144,7 +145,7 @@ impl Judge {
                 goal.statistic,
                 goal.at_most,
             )?;
-            check_measure(&format!("goal[{i}]"), &quantity, file)?;
+            comparable::check_goal(&format!("goal[{i}]"), &quantity, file)?;
             let is_same = |other: &GoalTable| {
                 (other.measure, other.statistic) == (goal.measure, goal.statistic)
             };
@@ -162,10 +163,11 @@ impl Judge {
             let place = format!("limit[{i}]");
             let quantity =
                 judge.quantity(&place, limit.measure, limit.statistic, Some(limit.at_most))?;
-            check_measure(&place, &quantity, file)?;
+            comparable::check_limit(&place, &quantity, file)?;
             judge.limits.push(quantity);
         }
-        for measure in file.worlds.success.keys() {
+        for (measure, limits) in &file.worlds.success {
+            comparable::check_success(*measure, limits, file)?;
             judge.index(*measure);
         }
         Ok(judge)
@@ -324,37 +326,6 @@ impl Judge {
             format!("{quantity} {value:.4}{most}")
         });
         words.collect::<Vec<_>>().join(", ")
-    }
-}
-
-/// What no candidate can be compared by.
-fn check_measure(place: &str, quantity: &Quantity, file: &TuningFile) -> Result<(), TuningError> {
-    let refused = |measure: Measure, expected: &str| {
-        Err(TuningError::value(
-            format!("{place}.measure"),
-            measure.name(),
-            expected,
-        ))
-    };
-    let weighs = |key: &str| {
-        ["controller.q", "controller.r"]
-            .iter()
-            .any(|weight| ballbot_campaign::is_within(key, weight))
-    };
-    match quantity.measure {
-        Some(measure) if measure.is_time() => refused(
-            measure,
-            "a time of this machine differs from run to run, so nothing could be repeated",
-        ),
-        Some(Measure::EndS) => refused(
-            Measure::EndS,
-            "a run should last; the statistic failure_share says how many do not",
-        ),
-        Some(Measure::ClosedLoopCost) if file.parameters.keys().any(|key| weighs(key)) => refused(
-            Measure::ClosedLoopCost,
-            "each candidate would be measured by its own weights; take rms_error_rad and rms_torque_nm",
-        ),
-        _ => Ok(()),
     }
 }
 

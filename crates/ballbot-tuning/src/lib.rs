@@ -16,6 +16,7 @@
 
 mod batch;
 mod candidates;
+mod comparable;
 mod compare;
 mod document;
 mod error;

@@ -293,6 +293,9 @@ impl<'a, F: Files + Copy + Sync> Tuning<'a, F> {
 
 /// Candidates, at most.
 const MOST_EVALUATIONS: u64 = 1_000_000;
+/// Generations without an improvement, at most. Where few values are allowed, all have been tried soon, and nothing
+/// but patience ends a search.
+const MOST_PATIENCE: u32 = 10_000;
 /// Runs of a candidate, at most; what is decided by more is a campaign.
 const MOST_RUNS: u64 = 100_000;
 
@@ -335,12 +338,9 @@ fn check_search(search: &SearchTable, goals: usize, dimensions: usize) -> Result
         );
         return refused("evaluations", search.evaluations.to_string(), &expected);
     }
-    if search.patience == 0 {
-        return refused(
-            "patience",
-            "0".to_owned(),
-            "it must be 1 or more generations",
-        );
+    if !(1..=MOST_PATIENCE).contains(&search.patience) {
+        let expected = format!("it must be from 1 to {MOST_PATIENCE} generations");
+        return refused("patience", search.patience.to_string(), &expected);
     }
     Ok(())
 }

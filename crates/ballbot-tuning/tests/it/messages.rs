@@ -145,6 +145,11 @@ fn mistakes_are_named() {
             ["search.step = 0.0", "above 0"],
         ),
         (
+            "patience = 3",
+            "patience = 10001",
+            ["search.patience = 10001", "from 1 to 10000 generations"],
+        ),
+        (
             "uniform = [-0.1, 0.1]",
             "uniform = [0.1, -0.1]",
             ["vary[0]", "the smaller one first"],
@@ -168,6 +173,65 @@ fn mistakes_are_named() {
         "{}",
         message(&goals)
     );
+}
+
+/// A candidate with a longer sampling time won with fewer samples to be summed or counted, and `also` hid
+/// weights.
+#[test]
+fn what_does_not_mean_the_same_for_all_candidates_is_refused() {
+    let of_period = TWO_GOALS
+        .replace(
+            "\"controller.q.0\" = { log_uniform = [20.0, 2000.0] }\n",
+            "",
+        )
+        .replace(
+            "\"controller.r\" = { log_uniform = [100.0, 10000.0] }",
+            "\"controller.t_s\" = { list = [0.025, 0.05] }",
+        );
+    let goal = "measure = \"rms_torque_nm\"";
+    let success = "largest_tilt_rad.at_most = 0.6";
+    for (from, to, parts) in [
+        (
+            goal,
+            "measure = \"closed_loop_cost\"",
+            [
+                "goal[1].measure = closed_loop_cost",
+                "a longer controller.t_s",
+            ],
+        ),
+        (
+            goal,
+            "measure = \"violations\"",
+            ["goal[1].measure = violations", "a longer controller.t_s"],
+        ),
+        (
+            success,
+            "infeasible.at_most = 3",
+            ["worlds.success.infeasible", "a longer controller.t_s"],
+        ),
+    ] {
+        let said = message(&of_period.replace(from, to));
+        for part in parts {
+            assert!(said.contains(part), "{to}: {said}");
+        }
+    }
+    let none = of_period
+        .replace(success, "violations.at_most = 0")
+        .replace(
+            "statistic = \"failure_share\"",
+            "measure = \"infeasible\"\nstatistic = \"worst\"",
+        );
+    let (_folder, source) = crate::written(&none);
+    Tuning::new(&source, source.folder(), PROGRAM).unwrap();
+
+    let hidden = of_period
+        .replace(goal, "measure = \"closed_loop_cost\"")
+        .replace(
+            "\"controller.t_s\" = { list = [0.025, 0.05] }",
+            "\"initial_state.phi_dot_rad_s\" = { uniform = [0.0, 9.0], start = 1.0, also = [\"controller.q.0\"] }",
+        );
+    let said = message(&hidden);
+    assert!(said.contains("own weights"), "{said}");
 }
 
 /// A table in `[worlds.set]` used to stand for all keys below it.
