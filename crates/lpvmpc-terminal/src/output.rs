@@ -33,6 +33,7 @@ impl FileError {
 static WRITES: Mutex<Writes> = Mutex::new(Writes {
     temporary: Vec::new(),
     drafts: Vec::new(),
+    draft_folders: Vec::new(),
     folders: Vec::new(),
     done: Vec::new(),
 });
@@ -42,7 +43,9 @@ struct Writes {
     temporary: Vec<PathBuf>,
     /// Drafts under temporary names.
     drafts: Vec<PathBuf>,
-    /// Folders made for them, the outer ones first.
+    /// Folders made for drafts, the outer ones first.
+    draft_folders: Vec<PathBuf>,
+    /// Folders made for the other files, the outer ones first.
     folders: Vec<PathBuf>,
     /// Files that are in their places.
     done: Vec<PathBuf>,
@@ -54,14 +57,24 @@ impl Writes {
         WRITES.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Makes the folder and those above it that are missing.
-    fn make(&mut self, folder: &Path) -> io::Result<()> {
-        let missing = folder
-            .ancestors()
-            .take_while(|above| !above.as_os_str().is_empty() && above.symlink_metadata().is_err());
-        let missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
-        self.folders.extend(missing.into_iter().rev());
-        fs::create_dir_all(folder)
+    /// Begins a draft under its temporary name.
+    fn begin(&mut self, file: &Path, temporary: &Path) -> io::Result<fs::File> {
+        if let Some(folder) = file.parent() {
+            make(folder, &mut self.draft_folders)?;
+        }
+        let opened = fs::File::create(temporary)?;
+        self.drafts.push(temporary.to_owned());
+        Ok(opened)
+    }
+
+    /// Takes away the folders that were made for drafts and hold nothing.
+    fn leave_drafts(&mut self) {
+        let made = std::mem::take(&mut self.draft_folders).into_iter().rev();
+        let kept = made.filter(|folder| fs::remove_dir(folder).is_err());
+        let kept: Vec<PathBuf> = kept.collect();
+        if !self.drafts.is_empty() {
+            self.draft_folders = kept.into_iter().rev().collect();
+        }
     }
 
     /// Takes away what is not in its place, and the folders that were made for it alone.
@@ -77,12 +90,24 @@ impl Writes {
     }
 }
 
+/// Makes the folder and those above it that are missing, and adds them to those that were `made`.
+fn make(folder: &Path, made: &mut Vec<PathBuf>) -> io::Result<()> {
+    let missing = folder
+        .ancestors()
+        .take_while(|above| !above.as_os_str().is_empty() && above.symlink_metadata().is_err());
+    let missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
+    made.extend(missing.into_iter().rev());
+    fs::create_dir_all(folder)
+}
+
 /// Ends all writing, for a program that is about to end: what is half-written goes. Returns the files
 /// that were written.
 pub fn abandon() -> Vec<PathBuf> {
     let mut writes = Writes::lock();
     let drafts = std::mem::take(&mut writes.drafts);
     writes.temporary.extend(drafts);
+    let folders = std::mem::take(&mut writes.draft_folders);
+    writes.folders.extend(folders);
     writes.take_back();
     let done = std::mem::take(&mut writes.done);
     // Nothing is written from here on.
@@ -91,7 +116,7 @@ pub fn abandon() -> Vec<PathBuf> {
 }
 
 /// A file that is written bit by bit, and takes its place when it is whole. One that is dropped before
-/// leaves nothing behind.
+/// leaves nothing behind, nor a folder that was made for it.
 #[derive(Debug)]
 pub struct Draft {
     path: PathBuf,
@@ -114,16 +139,17 @@ impl Draft {
             }
         };
         let mut writes = Writes::lock();
-        if let Some(folder) = file.parent() {
-            fs::create_dir_all(folder).map_err(FileError::at(path))?;
+        match writes.begin(&file, &temporary) {
+            Ok(opened) => Ok(Self {
+                path: file,
+                temporary,
+                file: opened,
+            }),
+            Err(error) => {
+                writes.leave_drafts();
+                Err(FileError::at(path)(error))
+            }
         }
-        let opened = fs::File::create(&temporary).map_err(FileError::at(path))?;
-        writes.drafts.push(temporary.clone());
-        Ok(Self {
-            path: file,
-            temporary,
-            file: opened,
-        })
     }
 
     /// What is written into.
@@ -155,6 +181,7 @@ impl Drop for Draft {
         writes.drafts.retain(|draft| *draft != self.temporary);
         // Of one that has taken its place there is none.
         let _ = fs::remove_file(&self.temporary);
+        writes.leave_drafts();
     }
 }
 
@@ -302,7 +329,7 @@ fn write_then_rename(
     for ((path, content), place) in files.iter().zip(places) {
         if let Place::File { file, temporary } = place {
             if let Some(directory) = file.parent() {
-                writes.make(directory).map_err(FileError::at(path))?;
+                make(directory, &mut writes.folders).map_err(FileError::at(path))?;
             }
             writes.temporary.push(temporary.clone());
             fs::write(temporary, content).map_err(FileError::at(path))?;
@@ -485,8 +512,11 @@ mod tests {
         let draft = Draft::create(&path).unwrap();
         (&mut draft.file()).write_all(b"half").unwrap();
         assert!(!path.exists());
+        // A folder that was made for drafts alone goes with the last of them.
+        let other = Draft::create(&folder.path().join("new").join("deep").join("more")).unwrap();
         drop(draft);
-        assert_eq!(fs::read_dir(folder.path().join("new")).unwrap().count(), 0);
+        drop(other);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
         let draft = Draft::create(&path).unwrap();
         (&mut draft.file()).write_all(b"whole").unwrap();
         draft.commit().unwrap();

@@ -113,6 +113,10 @@ impl ResultFolder {
         for name in &written {
             self.check(name)?;
         }
+        if !drafts.is_empty() {
+            // What comes after them may fail, and they are this program's all the same.
+            self.claim(&drafts.iter().map(|(name, _)| *name).collect::<Vec<_>>())?;
+        }
         for (_, draft) in drafts {
             draft.commit()?;
         }
@@ -200,5 +204,28 @@ mod tests {
         assert_eq!(names(&path), expected);
         let list = fs::read_to_string(path.join(".ballbot-files")).unwrap();
         assert_eq!(list, "a.csv\nc.csv\nother.csv\n");
+    }
+
+    /// The rows stood in their place and in no list, and the next run refused the folder as another's.
+    #[test]
+    fn an_end_that_fails_leaves_a_folder_that_can_be_used_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new");
+        let results = ResultFolder::open("ballbot", &path, &["rows"]).unwrap();
+        let draft = Draft::create(&path.join("rows")).unwrap();
+        fs::write(path.join("blocked"), "mine").unwrap();
+        let files = [file("blocked/summary.json")];
+        results
+            .write_with(vec![("rows", draft)], &files, &[])
+            .unwrap_err();
+        let again = ResultFolder::open("ballbot", &path, &["rows"]).unwrap();
+        let draft = Draft::create(&path.join("rows")).unwrap();
+        again
+            .write_with(vec![("rows", draft)], &[file("summary.json")], &[])
+            .unwrap();
+        assert_eq!(
+            names(&path),
+            [".ballbot-files", "blocked", "rows", "summary.json"]
+        );
     }
 }
