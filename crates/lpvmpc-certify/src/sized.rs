@@ -8,6 +8,7 @@ use crate::settings::CertifySettings;
 use lpvmpc_certificate::{
     ClaimError, MOST_BOXES, Proof, SampledClaim, TerminalClaim, TerminalProblem,
 };
+use lpvmpc_design::checked_symmetric;
 use lpvmpc_plant::{AboutEquilibrium, Plant, Signal};
 use nalgebra::{DMatrix, SMatrix, SVector};
 
@@ -51,6 +52,8 @@ pub(crate) fn certify<const NX: usize, const NU: usize, const NS: usize>(
 ) -> Result<Certificate, CertifyError> {
     let data = plant.data();
     let (n, m) = (data.states.len(), data.inputs.len());
+    let q = weight(&settings.q, n, "q")?;
+    let r = with_ones(weight(&settings.r, m, "r")?, m);
     let wanted = wanted(plant, settings)?;
     let ends: Vec<(f64, f64)> = wanted.iter().map(|value| (*value, *value)).collect();
     let about = About::<NX, NU, NS>::new(plant, &ends, spare_rate(settings.t_s))?;
@@ -65,8 +68,8 @@ pub(crate) fn certify<const NX: usize, const NU: usize, const NS: usize>(
     let u_limits = limits(&settings.u_bounds, &data.inputs, n, "u_bounds")?;
     let problem = TerminalProblem {
         t_s: settings.t_s,
-        q: placed(&settings.q, n, "q")?,
-        r: with_ones(placed(&settings.r, m, "r")?, m),
+        q,
+        r,
         state_limits: filled(&x_limits),
         input_limits: filled(&u_limits),
         contraction: 0.0,
@@ -393,6 +396,18 @@ fn placed<const N: usize>(
     Ok(SMatrix::from_fn(|i, j| {
         matrix.get((i, j)).copied().unwrap_or(0.0)
     }))
+}
+
+/// The symmetric part of a weight that is symmetric up to rounding, in more places: of a claim's the entries are
+/// mirrored exactly.
+fn weight<const N: usize>(
+    matrix: &DMatrix<f64>,
+    count: usize,
+    place: &'static str,
+) -> Result<SMatrix<f64, N, N>, CertifyError> {
+    let symmetric = checked_symmetric(place, matrix);
+    let symmetric = symmetric.map_err(|error| CertifyError::setting("weights", error))?;
+    placed(&symmetric, count, place)
 }
 
 /// With one on the diagonal behind `count` rows.

@@ -72,6 +72,31 @@ fn the_cost_falls_and_bounds_hold() {
     assert!(center.within.iter().all(|within| *within < 1e-10));
 }
 
+/// Weights that were worked out are symmetric to rounding; they were refused after all the work.
+#[test]
+fn weights_are_symmetric_up_to_rounding() {
+    let mut settings = CertifySettings {
+        trials: 0,
+        ..reactor_settings()
+    };
+    let plant = reactor();
+    settings.q[(0, 1)] = 1e-3;
+    settings.q[(1, 0)] = 1e-3 * (1.0 + f64::EPSILON);
+    assert_ne!(settings.q, settings.q.transpose());
+    let certificate = certify(&plant, &settings, &|_| ()).unwrap();
+    assert_eq!(certificate.q[0][1], certificate.q[1][0]);
+    verify(&certificate, &plant, &|_| ()).unwrap();
+
+    // And what is not is refused before any work, of a plant of which nothing can be certified.
+    settings.q[(1, 0)] = -1e-3;
+    settings.x_bounds = Some((vec![0.0; 2], vec![0.0; 2]));
+    let message = certify(&plant, &settings, &|_| ()).unwrap_err().to_string();
+    assert!(
+        message.starts_with("weights: q is not symmetric"),
+        "{message}"
+    );
+}
+
 #[test]
 fn a_document_is_proved_again_from_its_text() {
     let (plant, certificate) = &*REACTOR;
