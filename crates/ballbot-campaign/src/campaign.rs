@@ -1,122 +1,21 @@
 //! A campaign that has passed its checks, and its runs.
 
 use crate::cell::{Cell, Column, Kind, Row};
+use crate::checks::{check_fixed, check_goal, check_success, measures};
 use crate::distribution::Distribution;
 use crate::error::CampaignError;
 use crate::file::{CampaignFile, LimitsTable, OnRefused};
 use crate::fingerprint;
-use crate::fixed::fixed;
-use crate::inputs::{Input, Inputs, child, is_within, named_seed};
+use crate::inputs::{Input, Inputs, child, named_seed};
 use crate::measure::{Ending, Measure, Measured};
-use ballbot_scenario::{Document, Files, Prepared, Record, RunHooks, ScenarioError, words};
+use crate::source::Source;
+use ballbot_scenario::{Files, Prepared, Record, RunHooks, ScenarioError};
 use rayon::prelude::*;
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 use toml::Value;
 
 /// A clock that any thread may read.
 pub type Clock<'a> = &'a (dyn Fn() -> Duration + Sync);
-
-/// A campaign's file with the scenario that it names.
-#[derive(Clone, Debug)]
-pub struct Source {
-    path: PathBuf,
-    text: String,
-    file: CampaignFile,
-    scenario: Document,
-    /// Where files are looked for that the scenario names.
-    folder: PathBuf,
-    /// Values from elsewhere that may name files.
-    also: Vec<Value>,
-}
-
-impl Source {
-    /// Reads a campaign, and the scenario it names, which is built in or a file beside it.
-    ///
-    /// # Errors
-    /// A file cannot be read, or is no campaign or no scenario.
-    pub fn load(path: &Path) -> Result<Self, CampaignError> {
-        Self::parse(
-            words::read_text(path).map_err(CampaignError::at(path))?,
-            path,
-        )
-    }
-
-    /// A campaign's text, as if it stood in the file `path`.
-    ///
-    /// # Errors
-    /// As [`load`](Self::load).
-    pub fn parse(text: String, path: &Path) -> Result<Self, CampaignError> {
-        let file: CampaignFile =
-            words::from_toml(&text).map_err(|error| CampaignError::Syntax {
-                path: path.to_owned(),
-                message: words::toml_message(&error.to_string()),
-            })?;
-        Self::of(path, text, file, Vec::new())
-    }
-
-    /// A campaign that stands in a file of another kind at `path`, whose whole text is `text`; `also`
-    /// are values in it that may name files, beside those of the campaign. Reads the scenario.
-    ///
-    /// # Errors
-    /// The scenario cannot be read, or is none.
-    pub fn of(
-        path: &Path,
-        text: String,
-        file: CampaignFile,
-        also: Vec<Value>,
-    ) -> Result<Self, CampaignError> {
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let beside = folder.join(&file.scenario);
-        let named = match beside.is_file() {
-            true => beside.to_string_lossy().into_owned(),
-            false => file.scenario.clone(),
-        };
-        let scenario = Document::load(&named)?;
-        // A built-in scenario is nowhere: what it is given stands beside the campaign.
-        let file_of_scenario = Some(Path::new(&named)).filter(|path| path.is_file());
-        let folder = file_of_scenario.and_then(Path::parent).unwrap_or(folder);
-        Ok(Self {
-            path: path.to_owned(),
-            text,
-            file,
-            scenario,
-            folder: folder.to_owned(),
-            also,
-        })
-    }
-
-    /// Where the campaign is.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// What stands in it.
-    pub fn file(&self) -> &CampaignFile {
-        &self.file
-    }
-
-    /// The scenario.
-    pub fn scenario(&self) -> &Document {
-        &self.scenario
-    }
-
-    /// The keys of the scenario that are the same in all runs: those of `[set]`, tables in it as keys with
-    /// dots.
-    pub fn fixed(&self) -> Vec<(String, Value)> {
-        fixed(&self.scenario, &self.file.set)
-    }
-
-    /// Values from elsewhere that may name files.
-    pub(crate) fn also(&self) -> &[Value] {
-        &self.also
-    }
-
-    /// The folder that the scenario's paths are relative to.
-    pub fn folder(&self) -> &Path {
-        &self.folder
-    }
-}
 
 /// A campaign that has passed its checks. Run `i` is a function of the campaign and `i` alone: of no
 /// order, thread or shard.
@@ -175,18 +74,24 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
     /// # Errors
     /// A value that makes no sense, with its key.
     pub fn new(source: &'a Source, files: F, program: &str) -> Result<Self, CampaignError> {
-        let file = &source.file;
+        let file = source.file();
         let (inputs, runs) = Inputs::new(&file.vary, file.design, file.seed, runs_of(file))?;
         let fixed = source.fixed();
         check_fixed(&fixed, &inputs)?;
         let keys = || inputs.keys().chain(fixed.iter().map(|(key, _)| key));
         let has_world =
-            source.scenario.root().get("world").is_some() || keys().any(|key| is_of_world(key));
+            source.scenario().root().get("world").is_some() || keys().any(|key| is_of_world(key));
         let given = file.same_noise || keys().any(|key| key == NOISE);
         let campaign = Self {
             noise: (has_world && !given).then(|| named_seed(file.seed, NOISE)),
             measures: measures(file)?,
-            fingerprint: fingerprint::of(source, program, &source.text, &source.scenario, &inputs),
+            fingerprint: fingerprint::of(
+                source,
+                program,
+                source.text(),
+                source.scenario(),
+                &inputs,
+            ),
             program: program.to_owned(),
             source,
             files,
@@ -228,7 +133,7 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
     /// A key that is none is wrong in all runs: where the first one is no scenario, the campaign
     /// ends, or another one must be.
     fn check_first(&self) -> Result<(), CampaignError> {
-        let attempts = match self.source.file.refused {
+        let attempts = match self.source.file().refused {
             OnRefused::Stop => 1,
             OnRefused::Count => self.runs.min(ATTEMPTS),
         };
@@ -347,7 +252,7 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
             .collect();
         changes.extend(self.inputs.changes(&drawn.values));
         changes.extend(drawn.seed.map(|seed| (NOISE, Value::Integer(seed as i64))));
-        self.source.scenario.with(&changes)?.prepare(self.files)
+        self.source.scenario().with(&changes)?.prepare(self.files)
     }
 
     fn refused(&self, drawn: &Drawn, source: ScenarioError) -> CampaignError {
@@ -374,7 +279,7 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
         });
         match ran {
             Ok(measured) => Ok(Some(measured)),
-            Err(_) if self.source.file.refused == OnRefused::Count => Ok(None),
+            Err(_) if self.source.file().refused == OnRefused::Count => Ok(None),
             Err(error) => Err(self.refused(drawn, error)),
         }
     }
@@ -453,7 +358,7 @@ impl<'a, F: Files + Copy + Sync> Campaign<'a, F> {
                     && limits.at_most.is_none_or(|most| number <= most)
             })
         };
-        measured.ending == Ending::Complete && self.source.file.success.iter().all(kept)
+        measured.ending == Ending::Complete && self.source.file().success.iter().all(kept)
     }
 
     /// Runs the runs from `from` to before `until` on all threads of the pool it is called in and
@@ -490,24 +395,6 @@ fn runs_of(file: &CampaignFile) -> Option<u64> {
         .or(file.rare.map(|rare| u64::from(rare.level_runs)))
 }
 
-/// Nothing that is the same in all runs is in what varies.
-fn check_fixed(fixed: &[(String, Value)], inputs: &Inputs) -> Result<(), CampaignError> {
-    for (key, value) in fixed {
-        let Some(other) = inputs.keys().find(|other| is_within(key, other)) else {
-            continue;
-        };
-        let expected = match key == other {
-            true => "it varies, too; leave one of them out".to_owned(),
-            false => {
-                format!("it stands in `{other}`, which varies as a whole; leave one of them out")
-            }
-        };
-        let (place, value) = (format!("set.{key}"), value.to_string());
-        return Err(CampaignError::value(place, value, expected));
-    }
-    Ok(())
-}
-
 /// Whether a scenario with this key has a world, and so noise.
 fn is_of_world(key: &str) -> bool {
     key == "world" || key.starts_with("world.")
@@ -517,80 +404,3 @@ fn is_of_world(key: &str) -> bool {
 const ATTEMPTS: u64 = 100;
 /// Runs that are in memory at a time.
 const PART: u64 = 4096;
-
-fn measures(file: &CampaignFile) -> Result<Vec<Measure>, CampaignError> {
-    let Some(named) = &file.measure else {
-        let all = Measure::ALL.into_iter();
-        return Ok(all.filter(|measure| !measure.is_time()).collect());
-    };
-    let repeated = named
-        .iter()
-        .enumerate()
-        .find(|(i, measure)| named[..*i].contains(measure));
-    match repeated {
-        Some((_, measure)) => Err(CampaignError::value(
-            "measure",
-            measure.name(),
-            "it is there twice",
-        )),
-        None => Ok(named.clone()),
-    }
-}
-
-/// What the campaign is to end with.
-fn check_goal(file: &CampaignFile, inputs: &Inputs) -> Result<(), CampaignError> {
-    if let Some(stop) = &file.stop {
-        stop.check()?;
-    }
-    let Some(rare) = &file.rare else {
-        return Ok(());
-    };
-    rare.check()?;
-    let refused = |value: &str, expected: &str| Err(CampaignError::value("rare", value, expected));
-    if file.stop.is_some() || !file.success.is_empty() || file.runs.is_some() {
-        let expected = "a rare failure has its own numbers; leave runs, [success] and [stop] out";
-        return refused("(given)", expected);
-    }
-    if file.refused == OnRefused::Count {
-        let expected = "of a rare failure no draw is left out; give the inputs bounds within which each \
-                        draw makes a scenario";
-        return Err(CampaignError::value("refused", "\"count\"", expected));
-    }
-    if inputs.grid_points > 1 || inputs.all.is_empty() {
-        let expected = "its inputs need distributions, and a grid is none";
-        return refused("(given)", expected);
-    }
-    Ok(())
-}
-
-fn check_success(file: &CampaignFile, measures: &[Measure]) -> Result<(), CampaignError> {
-    for (measure, limits) in &file.success {
-        let LimitsTable { at_least, at_most } = *limits;
-        let key = format!("success.{measure}");
-        let finite = [at_least, at_most]
-            .into_iter()
-            .flatten()
-            .all(f64::is_finite);
-        let ordered = match (at_least, at_most) {
-            (Some(least), Some(most)) => least <= most,
-            (None, None) => false,
-            _ => true,
-        };
-        if !(finite && ordered) {
-            let sides = [("at_least", at_least), ("at_most", at_most)].into_iter();
-            let given = sides.filter_map(|(name, limit)| Some(format!("{name} = {:?}", limit?)));
-            let value = given.collect::<Vec<_>>().join(", ");
-            let expected = "it needs at_least or at_most or both, finite and in this order";
-            return Err(CampaignError::value(key, value, expected));
-        }
-        if measure.is_time() {
-            let expected = "a time differs from run to run, so no run could be repeated by it";
-            return Err(CampaignError::value(key, "(given)", expected));
-        }
-        if !measures.contains(measure) {
-            let expected = "it must be in `measure`, too, so that the results say why a run failed";
-            return Err(CampaignError::value(key, "(given)", expected));
-        }
-    }
-    Ok(())
-}

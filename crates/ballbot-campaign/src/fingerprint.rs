@@ -1,9 +1,9 @@
 //! What results were made of, and by which program, as one digest.
 
-use crate::campaign::Source;
 use crate::distribution::Distribution;
 use crate::inputs::Inputs;
 use crate::results::hexadecimal;
+use crate::source::Source;
 use ballbot_scenario::{Document, words};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;

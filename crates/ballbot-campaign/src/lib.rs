@@ -34,6 +34,7 @@
 mod axis;
 mod campaign;
 mod cell;
+mod checks;
 mod distribution;
 mod error;
 mod file;
@@ -47,12 +48,13 @@ mod rare;
 mod results;
 mod sensitivity;
 mod shard;
+mod source;
 mod stopping;
 mod subset;
 mod summary;
 
 pub use axis::Axis;
-pub use campaign::{Campaign, Clock, Drawn, Replay, Source};
+pub use campaign::{Campaign, Clock, Drawn, Replay};
 pub use cell::{Cell, Column, Kind, Row};
 pub use error::CampaignError;
 pub use file::{
@@ -64,5 +66,6 @@ pub use measure::{Ending, Measure};
 pub use results::{RowFile, RowWriter};
 pub use sensitivity::{Sensitivity, sensitivity};
 pub use shard::{MOST_SHARDS, Shard, Shards, shard_files};
+pub use source::Source;
 pub use subset::{Level, Point, RareEstimate, Subset};
 pub use summary::{MOST_LOOKED_AT, MeasureSummary, Summary};
