@@ -1,5 +1,10 @@
 //! A torque that identifies the parameters of a stabilised robot, and how well it will identify them.
 
+mod check;
+mod error;
+
+pub use error::ExcitationError;
+
 use crate::config::{Config, ConfigError};
 use crate::covariance::{inverse, of_parameters};
 use crate::estimate::{Task, problem};
@@ -10,10 +15,8 @@ use crate::parameter_file::Identified;
 use crate::poles::linear_model;
 use crate::segments::segments;
 use crate::suspects::Tables;
-use crate::words::{number, percent};
 use ballbot::Geometry;
-use lpvmpc_design::number_text;
-use lpvmpc_design::{RiccatiError, lqr_continuous, poles};
+use lpvmpc_design::lqr_continuous;
 use nalgebra::{DMatrix, DVector, Vector3, Vector4};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
@@ -84,100 +87,14 @@ impl Excitation {
     }
 }
 
-/// Why there is no excitation.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ExcitationError {
-    /// A number out of range.
-    #[error("{what} is {value}: it must be {expected}", value = number_text(*value))]
-    Value {
-        /// What it is.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-        /// What would be right.
-        expected: String,
-    },
-    /// No loop holds the robot.
-    #[error(
-        "no linear-quadratic regulator holds a robot with these parameters: {0}. Give masses or \
-         parameters in a configuration, or the gains of your loop"
-    )]
-    Regulator(#[from] RiccatiError),
-    /// The robot has no linear model.
-    #[error(
-        "a robot with these parameters has no linear model: its mass matrix cannot be inverted"
-    )]
-    NoLinearModel,
-    /// The loop is unstable without any excitation.
-    #[error(
-        "the loop u = -K x, K = ({}, {}, {}, {}) does not hold the robot that is expected: it has a \
-         pole at +{} 1/s. The gains belong to another robot, have the other sign or another unit (N m \
-         per rad and per rad/s), or the robot is not what is expected (--config, --parameters)",
-        number(gain[0]), number(gain[1]), number(gain[2]), number(gain[3]), number(*pole)
-    )]
-    UnstableLoop {
-        /// The gains.
-        gain: [f64; 4],
-        /// The real part of the pole, 1/s.
-        pole: f64,
-    },
-    /// What the tilt leaves of the torque tells nothing.
-    #[error(
-        "only {} N m of the {} N m are left before the robot leans {} degrees: that excitation tells \
-         nothing. The loop hardly holds the robot that is expected: check its gains, or allow more \
-         tilt (--tilt-limit)",
-        number(*left), number(*wanted), number(limit.to_degrees())
-    )]
-    Useless {
-        /// What is left of the torque, N m.
-        left: f64,
-        /// What was asked for, N m.
-        wanted: f64,
-        /// The tilt limit, rad.
-        limit: f64,
-    },
-    /// The log would not tell what it is recorded for.
-    #[error(
-        "a log with that excitation would determine {} only to within {}: a larger torque (--amplitude) or a longer \
-         log (--length) is needed",
-        parameter.words(), percent(*relative)
-    )]
-    TellsNothing {
-        /// What it would not tell.
-        parameter: Parameter,
-        /// Expected standard deviation over the value.
-        relative: f64,
-    },
-    /// The loop does not hold the robot.
-    #[error(
-        "the loop does not hold the robot within {limit:.3} rad, however small the torque: the gains \
-         or the parameters are wrong"
-    )]
-    Unstable {
-        /// The tilt limit, rad.
-        limit: f64,
-    },
-}
-
 /// The tilt is brought to within this part of its limit.
 const MARGIN: f64 = 0.95;
 
 /// A robot that leans so far has fallen, rad.
 const FALLEN: f64 = 1.5;
 
-/// A loop with a pole right of this lets the robot drift or fall, 1/s.
-const SLOWEST: f64 = 1e-6;
-
 /// If less than this part of the torque is left, of a usual one if more was asked for, something is wrong.
 const LEAST_LEFT: f64 = 0.02;
-
-/// An expected standard deviation relative to the value from which on a log is not worth recording.
-const LEAST_PRECISE: f64 = 0.5;
-
-/// An hour at 1 kHz has 3.6 million rows.
-const MOST_ROWS: f64 = 4e6;
-/// Cosines of all rows: some seconds' work.
-const MOST_TERMS: f64 = 1e9;
 
 /// Fading in and out, s: no jump of the torque.
 const FADE: f64 = 1.0;
@@ -293,119 +210,6 @@ impl ExcitationTask {
     /// What is done with each parameter: what no sensor tells is held.
     pub fn choices(&self) -> Values<Choice> {
         self.choices.with_sensors(self.gyroscope)
-    }
-
-    /// The gains hold the robot that is expected, its delay aside.
-    fn check_loop(&self, gain: &Vector4<f64>) -> Result<(), ExcitationError> {
-        let linear = linear_model(&self.robot, self.geometry);
-        let (a, b) = linear.ok_or(ExcitationError::NoLinearModel)?;
-        let closed = a - b * gain.transpose();
-        let found = poles(&DMatrix::from_column_slice(4, 4, closed.as_slice()));
-        let worst = found.map_or(f64::INFINITY, |poles| {
-            poles
-                .iter()
-                .fold(f64::NEG_INFINITY, |most, pole| most.max(pole.re))
-        });
-        if worst < SLOWEST {
-            return Ok(());
-        }
-        Err(ExcitationError::UnstableLoop {
-            gain: (*gain).into(),
-            pole: worst,
-        })
-    }
-
-    /// The body's inertias and mass are told, if they are to be found.
-    fn check_precision(&self, deviations: &Values) -> Result<(), ExcitationError> {
-        let choices = self.choices();
-        for parameter in [Parameter::B1, Parameter::B3, Parameter::TorqueGain] {
-            let relative = (deviations[parameter] / self.robot[parameter]).abs();
-            let told = relative <= LEAST_PRECISE;
-            if choices[parameter].is_free() && !told {
-                return Err(ExcitationError::TellsNothing {
-                    parameter,
-                    relative,
-                });
-            }
-        }
-        Ok(())
-    }
-
-    fn check(&self) -> Result<(), ExcitationError> {
-        let nyquist = 0.5 * self.rate;
-        let shortest = (2.0 * FADE + self.segment).max(2.0 / self.band.0);
-        let within = |what, value: f64, least: f64, most: f64, expected: String| {
-            let right = (least..=most).contains(&value);
-            let error = ExcitationError::Value {
-                what,
-                value,
-                expected,
-            };
-            if right { Ok(()) } else { Err(error) }
-        };
-        within(
-            "the rate",
-            self.rate,
-            5.0,
-            1e5,
-            "from 5 to 100000 Hz".to_owned(),
-        )?;
-        within(
-            "the lowest frequency",
-            self.band.0,
-            1e-3,
-            1e4,
-            "from 0.001 to 10000 Hz".to_owned(),
-        )?;
-        within(
-            "the highest frequency",
-            self.band.1,
-            self.band.0,
-            nyquist,
-            format!("from the lowest one to half of the rate, {nyquist} Hz"),
-        )?;
-        within(
-            "the number of harmonics",
-            self.harmonics as f64,
-            2.0,
-            1e4,
-            "from 2 to 10000".to_owned(),
-        )?;
-        within(
-            "the torque",
-            self.amplitude,
-            1e-6,
-            1e6,
-            "from 1e-6 to 1e6 N m".to_owned(),
-        )?;
-        within(
-            "the tilt limit in degrees",
-            self.tilt_limit.to_degrees(),
-            0.06,
-            57.0,
-            "from 0.06 to 57".to_owned(),
-        )?;
-        within(
-            "the length",
-            self.duration,
-            shortest,
-            3600.0,
-            format!("from {shortest:.1} s (two periods of the lowest frequency) to an hour"),
-        )?;
-        within(
-            "the number of rows, length times rate,",
-            self.rows() as f64,
-            1.0,
-            MOST_ROWS,
-            format!("at most {MOST_ROWS}: a shorter length or a lower rate"),
-        )?;
-        within(
-            "the number of rows times that of the harmonics",
-            self.rows() as f64 * self.harmonics as f64,
-            1.0,
-            MOST_TERMS,
-            format!("at most {MOST_TERMS}: fewer harmonics, a shorter length or a lower rate"),
-        )
     }
 
     /// Rows of the whole length.
