@@ -87,7 +87,8 @@ impl Plant {
         if settings.horizon == 0 {
             return Err(PlantError::new("horizon", "it has at least one sample"));
         }
-        let name = type_name(&data.name);
+        // With its module: the program has types of its own.
+        let name = format!("plant::{}", type_name(&data.name));
         let (schedulings, model, make) = match &data.embedding {
             Some(embedding) => (
                 embedding.scheduling.len(),
@@ -118,7 +119,6 @@ impl Plant {
             .collect();
         let values = [
             ("TEXT", text(&data.name)),
-            ("TYPE", name),
             ("NX", states.to_string()),
             ("NU", inputs.to_string()),
             ("NS", schedulings.to_string()),

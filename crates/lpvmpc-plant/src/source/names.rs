@@ -44,7 +44,21 @@ impl Names {
     }
 }
 
-/// The name of a type: "cart-pole" becomes CartPole.
+/// Types that the printed source has from elsewhere.
+const TYPES: [&str; 10] = [
+    "Bivariate",
+    "Default",
+    "Dynamics",
+    "Elementary",
+    "Embedding",
+    "Number",
+    "Option",
+    "SMatrix",
+    "SVector",
+    "Self",
+];
+
+/// The name of a type: "cart-pole" becomes CartPole, "number" PlantNumber.
 pub(crate) fn type_name(name: &str) -> String {
     let words = name.split(|c: char| !c.is_ascii_alphanumeric());
     let camel: String = words
@@ -55,7 +69,7 @@ pub(crate) fn type_name(name: &str) -> String {
         })
         .collect();
     let begins = camel.starts_with(|c: char| c.is_ascii_uppercase());
-    if begins && camel != "Self" {
+    if begins && !TYPES.contains(&&*camel) {
         camel
     } else {
         format!("Plant{camel}")

@@ -97,6 +97,26 @@ fn a_changed_parameter_is_printed() {
     );
 }
 
+/// The source of a plant called "number" was no Rust: it has a trait of that name.
+#[test]
+fn the_type_of_a_plant_has_no_name_that_its_source_has_from_elsewhere() {
+    for like in ["cart-pole", "functions"] {
+        let mut data = plant(like).data().clone();
+        let source = plant(like).to_rust();
+        let imports = source.lines().filter(|line| line.starts_with("use "));
+        let words = imports.flat_map(|line| line.split(|c: char| !c.is_ascii_alphanumeric()));
+        let types = words.filter(|word| word.starts_with(|c: char| c.is_ascii_uppercase()));
+        for name in types.chain(["Default", "Option"]) {
+            data.name = name.into();
+            let source = Plant::new(data.clone()).unwrap().to_rust();
+            assert!(
+                source.contains(&format!("pub struct Plant{name} {{")),
+                "{source}"
+            );
+        }
+    }
+}
+
 /// Whatever the names are, they become names of Rust, each once.
 #[test]
 fn any_name_becomes_a_name_of_rust() {
