@@ -150,6 +150,10 @@ struct Filter<const NX: usize, const NU: usize, const NS: usize> {
     line: DelayLine<f64, NS>,
     /// The disturbance on the states that is known to act with the last input.
     known: Vec<f64>,
+    /// The plant's period in discrete time, s.
+    period: Option<f64>,
+    /// The time of the first readings, s, from which its periods count.
+    first: Option<f64>,
     start: SVector<f64, NX>,
 }
 
@@ -263,8 +267,22 @@ impl<const NX: usize, const NU: usize, const NS: usize> Filter<NX, NU, NS> {
             estimator,
             line: DelayLine::allocate(commands),
             known: Vec::new(),
+            period: plant.period(),
+            first: None,
             start,
         })
+    }
+
+    /// The time of readings that were taken at `t`. In discrete time, where the plant has no state in between, it is the
+    /// nearest of its periods: rounded from reading to reading, several within a period would take none or too many.
+    fn instant(&mut self, t: f64) -> f64 {
+        match self.period {
+            Some(period) if t.is_finite() => {
+                let first = *self.first.get_or_insert(t);
+                first + ((t - first) / period).round() * period
+            }
+            _ => t,
+        }
     }
 }
 
@@ -277,6 +295,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnyFilter for Filter<NX,
         self.estimator.begin_at(None, self.start);
         self.line.clear();
         self.known.clear();
+        self.first = None;
     }
 
     fn take_over(&mut self, previous: &dyn AnyFilter) {
@@ -285,6 +304,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnyFilter for Filter<NX,
             self.estimator.take_over(&previous.estimator);
             self.line.copy_from(&previous.line);
             self.known.clone_from(&previous.known);
+            self.first = previous.first;
         }
     }
 
@@ -306,6 +326,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnyFilter for Filter<NX,
             let reading = readings.get(i).copied().flatten();
             reading.map(Reading::fresh)
         });
+        let t = self.instant(t);
         let observation = self.estimator.observe(t, &mut self.line, &readings);
         let verdicts = observation.verdicts[..count].to_vec();
         Ok((verdicts, observation.restart.is_some()))

@@ -23,7 +23,7 @@ mod checks;
 mod motion;
 mod program;
 
-use crate::check::Names;
+use crate::check::{Axis, Names};
 use crate::controller_settings::limits;
 use crate::error::MpcError;
 use crate::plan::{Plan, Target};
@@ -92,6 +92,8 @@ impl Guarantee {
         checks::check(&names, data, settings, set)?;
         let x_bounds = limits(&settings.x_bounds, &data.states);
         let u_bounds = limits(&settings.u_bounds, &data.inputs);
+        names.check_limits(Axis::States, "x_bounds", &x_bounds)?;
+        names.check_limits(Axis::Inputs, "u_bounds", &u_bounds)?;
         let of_states = (set.x.as_slice(), set.state_limits.as_slice());
         checks::check_reach("x_bounds", &names.states, of_states, &x_bounds)?;
         let of_inputs = (set.u.as_slice(), set.input_limits.as_slice());
@@ -113,6 +115,17 @@ impl Guarantee {
             last: None,
             cut: None,
         }))
+    }
+
+    /// Goes on from the plan of one with other settings, if that is about the same set: what that plan is worth, and
+    /// whether it keeps the bounds, is asked anew at every sample.
+    pub fn take_over(&mut self, previous: &Self) {
+        if (&self.set, self.horizon) == (&previous.set, previous.horizon) {
+            self.last.clone_from(&previous.last);
+            self.refuge.clone_from(&previous.refuge);
+            self.stride = previous.stride;
+            self.cut.clone_from(&previous.cut);
+        }
     }
 
     pub fn reset(&mut self) {

@@ -448,9 +448,9 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
     ) -> Option<Bounds<f64, NU>> {
         let change = tasks.du_bounds.first()?;
         let before = *lists.u_bounds.first().unwrap_or(&self.bounds.u);
-        let mut first = before;
+        let (mut first, applied) = (before, self.applied());
         for j in 0..self.names.inputs.len() {
-            let last = self.applied[j];
+            let last = applied[j];
             let (lower, upper) = (last + change.lower[j], last + change.upper[j]);
             // What the input's own bounds ask for comes first.
             let within = |bound: f64| bound.max(before.lower[j]).min(before.upper[j]);

@@ -77,7 +77,7 @@ impl Mpc {
     }
 
     /// Other settings from the next step on. Horizon and sampling time stay. Where changes of the input begin or
-    /// cease to count, the next step is made without the last plan.
+    /// cease to count, and with another certified terminal set, the next step is made without the last plan.
     ///
     /// # Errors
     /// As [`new`](Self::new); the controller is as it was then.
@@ -98,7 +98,10 @@ impl Mpc {
     ) -> Result<(), MpcError> {
         check_count(settings.substeps)?;
         let plant = self.sized.plant();
-        let guarantee = Guarantee::new(plant, settings)?;
+        let mut guarantee = Guarantee::new(plant, settings)?;
+        if let (Some(guarantee), Some(previous)) = (&mut guarantee, &self.guarantee) {
+            guarantee.take_over(previous);
+        }
         let filter = self.filter(plant, (settings, guarantee.is_some()), estimator)?;
         if places(plant, settings).0 <= self.sized.places() {
             self.sized.set_settings(settings)?;
@@ -110,7 +113,9 @@ impl Mpc {
             }
             // The last inputs need more places.
             let mut larger = sized(plant, settings)?;
-            larger.set_last_input(&self.sized.last_input())?;
+            if let Some(last) = self.sized.last_input() {
+                larger.set_last_input(&last)?;
+            }
             self.sized = larger;
         }
         (self.guarantee, self.filter) = (guarantee, filter);
@@ -206,7 +211,7 @@ impl Mpc {
 
     /// Takes in the readings of the time `t` (s, on any clock), in the order of
     /// [`EstimatorSettings::measured`], `None` where one is missing; and says what became of each. May be called more often
-    /// than once a sample.
+    /// than once a sample; in discrete time they are then of the plant's nearest period, counted from the first readings.
     ///
     /// # Errors
     /// There is no estimator, or not as many readings.
@@ -252,10 +257,7 @@ impl Mpc {
             }
         };
         let known = preview.disturbance.first();
-        filter.send(
-            &self.sized.last_input(),
-            known.map_or(&[], |d| d.as_slice()),
-        );
+        filter.send(&plan.first_input(), known.map_or(&[], |d| d.as_slice()));
         Ok(plan)
     }
 

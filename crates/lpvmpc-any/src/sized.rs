@@ -37,8 +37,8 @@ pub(crate) trait AnySize: Send + Sync {
     fn forget_plan(&mut self);
     /// The plant, with its parameters as they are now.
     fn plant(&self) -> &Plant;
-    /// The input that was applied last.
-    fn last_input(&self) -> Vec<f64>;
+    /// The input that was applied last; `None` before the first step, when it is that of the plant's steady state.
+    fn last_input(&self) -> Option<Vec<f64>>;
     /// The settings as they are now.
     fn settings(&self) -> &MpcSettings;
     /// The places for states.
@@ -73,8 +73,8 @@ pub(crate) struct Sized<const NX: usize, const NU: usize, const NS: usize> {
     room: usize,
     /// Where the last input stands among the states, if it does.
     pub last_input: Option<LastInput>,
-    /// The input that was applied last.
-    pub applied: SVector<f64, NU>,
+    /// The input that was applied last; `None` before the first step.
+    applied: Option<SVector<f64, NU>>,
     /// The parameters by stage of which the last step was told, for which the prediction's steps are short enough.
     sound: Vec<Vec<f64>>,
 }
@@ -163,9 +163,14 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             workspace,
             room,
             last_input,
-            applied: rest.1,
+            applied: None,
             sound: Vec::new(),
         })
+    }
+
+    /// The input that was applied last; before the first step that of the plant's steady state.
+    pub fn applied(&self) -> SVector<f64, NU> {
+        self.applied.unwrap_or(self.rest.1)
     }
 
     /// The prices of the states' bounds where those that are `told` by stage are dearer than those of the settings.
@@ -222,7 +227,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         preview: &Preview,
     ) -> Result<Plan, MpcError> {
         if let Some(last) = &self.last_input {
-            last.write(&mut x, &self.applied);
+            last.write(&mut x, &self.applied());
         }
         let models = self.models(preview, acting)?;
         self.check_parameters(preview)?;
@@ -267,7 +272,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         let controller = &mut self.controller;
         controller.step_with(&x, &preview_of_controller, &mut self.workspace);
         let cost = controller.tracking_cost_with(&x, &preview_of_controller);
-        self.applied = controller.solution().first_input();
+        self.applied = Some(controller.solution().first_input());
         let target = target.or_else(|| {
             let found = self.controller.target()?;
             Some(Target {
@@ -326,7 +331,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
             .map_err(refused)?;
         let last_input = made.model.last_input;
         controller.set_model(made.model);
-        if last_input != self.last_input {
+        if last_input.is_some() != self.last_input.is_some() {
             // The plan's states are others.
             controller.reset();
         }
@@ -351,13 +356,13 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
     }
 
     fn set_last_input(&mut self, u: &[f64]) -> Result<(), MpcError> {
-        self.applied = self.names.finite(Axis::Inputs, "last input", u)?;
+        self.applied = Some(self.names.finite(Axis::Inputs, "last input", u)?);
         Ok(())
     }
 
     fn reset(&mut self) {
         self.controller.reset();
-        self.applied = self.rest.1;
+        self.applied = None;
     }
 
     fn forget_plan(&mut self) {
@@ -368,8 +373,9 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
         &self.plant
     }
 
-    fn last_input(&self) -> Vec<f64> {
-        self.applied.as_slice()[..self.names.inputs.len()].to_vec()
+    fn last_input(&self) -> Option<Vec<f64>> {
+        let applied = self.applied.as_ref()?.as_slice();
+        Some(applied[..self.names.inputs.len()].to_vec())
     }
 
     fn settings(&self) -> &MpcSettings {
@@ -381,6 +387,6 @@ impl<const NX: usize, const NU: usize, const NS: usize> AnySize for Sized<NX, NU
     }
 
     fn apply(&mut self, u: &[f64]) {
-        self.applied = SVector::from_fn(|j, _| u.get(j).copied().unwrap_or(0.0));
+        self.applied = Some(SVector::from_fn(|j, _| u.get(j).copied().unwrap_or(0.0)));
     }
 }

@@ -34,10 +34,6 @@ pub(super) fn check_reach(
     (at, reach): (&[f64], &[f64]),
     bounds: &Limits,
 ) -> Result<(), MpcError> {
-    if bounds.lower.len() != names.len() || bounds.upper.len() != names.len() {
-        // Named with the other settings.
-        return Ok(());
-    }
     for i in 0..names.len() {
         let (lower, upper) = (at[i] - reach[i], at[i] + reach[i]);
         // Rounding apart, since the limits were made of such bounds.

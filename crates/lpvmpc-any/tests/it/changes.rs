@@ -240,6 +240,70 @@ fn they_may_begin_and_cease_to_count() {
     );
 }
 
+/// Something that hovers under its thrust: height and speed.
+fn hovering() -> Plant {
+    let text = r#"{"schema": 1, "name": "hovering",
+        "states": [{"name": "height", "unit": "m"}, {"name": "speed", "unit": "m/s"}],
+        "inputs": [{"name": "thrust", "unit": "N"}],
+        "parameters": [{"name": "mass", "unit": "kg", "value": 1}],
+        "operations": [["state", 1], ["input", 0], ["parameter", 0], ["div", 1, 2], ["constant", 9.81],
+            ["sub", 3, 4]],
+        "derivative": [0, 5], "equilibrium": {"x": [0, 0], "u": [9.81]}}"#;
+    Plant::from_json(text).unwrap()
+}
+
+/// The input before the first step is that of the plant's steady state, which goes along with the parameters: it stayed with
+/// those of before, and a loop that hovered already began with a change.
+#[test]
+fn the_input_before_the_first_step_holds_the_plant_with_its_present_parameters() {
+    let settings = MpcSettings {
+        r_du: Some(dmatrix![1.0]),
+        ..MpcSettings::new(0.05, 10, &[1.0, 0.1], &[0.01])
+    };
+    let first = |mpc: &mut Mpc| {
+        let plan = mpc.step(&[0.0; 2], &Preview::default()).unwrap();
+        plan.first_input()[0]
+    };
+    let mut mpc = Mpc::new(&hovering(), &settings).unwrap();
+    mpc.set_parameter("mass", 2.0).unwrap();
+    let u = first(&mut mpc);
+    assert!((u - 19.62).abs() < 1e-6, "{u}");
+    // What was applied stays what it was.
+    mpc.set_last_input(&[9.81]).unwrap();
+    mpc.set_parameter("mass", 1.0).unwrap();
+    let u = first(&mut mpc);
+    assert!((u - 9.81).abs() < 1e-6, "{u}");
+}
+
+/// Other Runge-Kutta steps threw the plan away where changes of the input count, and a descent began anew.
+#[test]
+fn the_plan_goes_on_with_other_runge_kutta_steps() {
+    let settings = MpcSettings {
+        u_bounds: limits(&[10.0]),
+        r_du: Some(dmatrix![0.01]),
+        ..MpcSettings::new(0.05, 20, &[1.0, 10.0, 0.1, 0.1], &[0.01])
+    };
+    let mut mpc = Mpc::new(&cart_pole(), &settings).unwrap();
+    let to = Preview::to(&[3.0, 0.0, 0.0, 0.0]);
+    let begin = mpc.step(&[0.0; 4], &to).unwrap();
+    let next: Vec<f64> = begin.x.row(1).iter().copied().collect();
+    let finer = MpcSettings {
+        substeps: 2,
+        ..settings.clone()
+    };
+    mpc.set_settings(&finer).unwrap();
+    let goes_on = mpc.step(&next, &to).unwrap();
+    mpc.reset();
+    mpc.set_last_input(&begin.first_input()).unwrap();
+    let anew = mpc.step(&next, &to).unwrap();
+    assert!(
+        goes_on.problems < anew.problems,
+        "{} {}",
+        goes_on.problems,
+        anew.problems
+    );
+}
+
 #[test]
 fn what_makes_no_sense_is_refused() {
     let refused = |settings: MpcSettings| Mpc::new(&chain::<12, 4>(), &settings).err();

@@ -359,3 +359,32 @@ fn what_makes_no_sense_is_refused() {
     );
     assert!(mpc.observe(0.0, &[None]).is_err());
 }
+
+/// A plant in discrete time has no state between its periods: readings there are of the nearest one. Each time between them was
+/// rounded by itself, so that in ten of them the model took ten steps or none.
+#[test]
+fn a_plant_in_discrete_time_takes_a_step_for_each_period_however_often_it_is_observed() {
+    let matrices = Matrices {
+        a: dmatrix![1.0, 0.1; 0.0, 1.0],
+        b: dmatrix![0.005; 0.1],
+        period: Some(0.1),
+        ..Matrices::default()
+    };
+    let plant = Plant::new(PlantData::of_matrices("mass", &matrices).unwrap()).unwrap();
+    let settings = MpcSettings::new(0.1, 10, &[1.0, 0.1], &[0.1]);
+    let moving = EstimatorSettings {
+        start: Some(vec![0.0, 1.0]),
+        ..EstimatorSettings::new(&["x0"], &[1e6], &[0.0, 0.0])
+    };
+    for parts in [1, 2, 3, 5] {
+        let mut mpc = Mpc::new(&plant, &settings).unwrap();
+        mpc.set_estimator(Some(&moving)).unwrap();
+        mpc.observe(7.0, &[Some(0.0)]).unwrap();
+        for k in 1..=10 * parts {
+            let t = 7.0 + 0.1 * f64::from(k) / f64::from(parts);
+            mpc.observe(t, &[None]).unwrap();
+        }
+        let x = mpc.estimate().unwrap().x;
+        assert!((x[0] - 1.0).abs() < 1e-5, "{parts}: {x:?}");
+    }
+}

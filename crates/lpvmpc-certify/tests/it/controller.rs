@@ -116,6 +116,39 @@ fn the_rest_of_the_plan_is_taken_where_programs_are_no_better() {
     assert!(x.norm() < 0.1, "{x}");
 }
 
+/// Other settings forgot the plan, whose rest is better than what poor programs find.
+#[test]
+fn the_plan_goes_on_with_other_settings() {
+    let (plant, _) = &*CART_POLE;
+    let model = AlongMotion::<_, 5>(SizedPlant::<4, 1>::new(plant.clone()).unwrap());
+    let mut poor = cart_pole_settings();
+    poor.iterations = Iterations::Fixed(1);
+    poor.q *= 1e-6;
+    poor.r *= 1e-6;
+    let mut random = random();
+    let mut kept = 0;
+    for _ in 0..20 {
+        let x = Vector4::new(
+            0.9 * random(),
+            0.35 * random(),
+            1.5 * random(),
+            2.0 * random(),
+        );
+        let mut mpc = Mpc::new(plant, &cart_pole_settings()).unwrap();
+        let plan = mpc.step(x.as_slice(), &Preview::default()).unwrap();
+        if !plan.decision.unwrap().is_guaranteed() {
+            continue;
+        }
+        let u = SVector::<f64, 1>::new(plan.u[(0, 0)]);
+        let x = advance(&model, &x, &u, 0.05, EXACT).unwrap();
+        mpc.set_settings(&poor).unwrap();
+        let plan = mpc.step(x.as_slice(), &Preview::default()).unwrap();
+        assert!(plan.decision.unwrap().is_guaranteed(), "{}", plan.status);
+        kept += usize::from(plan.decision == Some(Decision::Candidate));
+    }
+    assert!(kept >= 4, "{kept}");
+}
+
 #[test]
 fn what_the_certificate_is_not_for_is_refused() {
     let (plant, certificate) = &*CART_POLE;
@@ -134,7 +167,13 @@ fn what_the_certificate_is_not_for_is_refused() {
             upper: vec![10.0, 0.05, 10.0, 10.0],
         });
     };
-    let cases: [(Change, &str); 7] = [
+    let short: Change = |s| {
+        s.x_bounds = Some(Limits {
+            lower: vec![-1.0; 3],
+            upper: vec![1.0; 3],
+        });
+    };
+    let cases: [(Change, &str); 10] = [
         // Little beside the largest weight, and of another unit.
         (
             |s| {
@@ -156,6 +195,18 @@ fn what_the_certificate_is_not_for_is_refused() {
         (
             |s| s.r[(0, 0)] = 3.0,
             "r: it is larger than the certificate's",
+        ),
+        (|s| s.q[(0, 0)] = f64::NAN, "q: "),
+        // What does not fit was looked at as if it did.
+        (short, "x_bounds, lower: it has 3 entries; there must be 4"),
+        (
+            |s| {
+                s.u_bounds = Some(Limits {
+                    lower: vec![],
+                    upper: vec![],
+                })
+            },
+            "u_bounds, lower: it has 0 entries; there must be 1",
         ),
         (narrow, "x_bounds: angle is bounded by -0.05 to 0.05"),
         (
