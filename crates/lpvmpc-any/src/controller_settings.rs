@@ -269,12 +269,13 @@ impl StageCost {
     }
 }
 
-/// Prices of exceeding the bounds of outputs, each with its signal's place in the plant.
+/// Prices of exceeding the bounds of outputs, each with its signal's place in the plant, of an output that of the dearest of
+/// its bounds.
 pub(crate) fn output_prices<const NX: usize, const NU: usize, const NS: usize>(
     plant: &Plant,
     names: &Names,
     settings: &MpcSettings,
-    (limits, of_controller): (&Limits, &ControllerSettings<f64, NX, NU, NS>),
+    (bounds, of_controller): (&[&Limits], &ControllerSettings<f64, NX, NU, NS>),
     (x, u): (SVector<f64, NX>, SVector<f64, NU>),
 ) -> Vec<Option<Penalty<f64>>> {
     let count = names.outputs.len();
@@ -304,16 +305,19 @@ pub(crate) fn output_prices<const NX: usize, const NU: usize, const NS: usize>(
                     cost / row.norm_squared().powi(2)
                 });
                 let of_weight = q_y.map_or(0.0, |q_y| q_y[(k, k)] * samples);
-                let bounds = Bounds {
-                    lower: Vector1::new(limits.lower[k]),
-                    upper: Vector1::new(limits.upper[k]),
-                };
                 let largest = [of_motion + of_weight, settings.q.amax(), settings.r.amax()];
                 let cost = match largest[0] > 0.0 {
                     true => largest[0],
                     false => largest[1].max(largest[2]),
                 };
-                exact_prices(&Matrix1::new(cost), &bounds)[0]
+                let prices = bounds.iter().filter_map(|limits| {
+                    let bounds = Bounds {
+                        lower: Vector1::new(limits.lower[k]),
+                        upper: Vector1::new(limits.upper[k]),
+                    };
+                    exact_prices(&Matrix1::new(cost), &bounds)[0]
+                });
+                prices.max_by(|one, other| one.linear.total_cmp(&other.linear))
             });
             prices.collect()
         }

@@ -8,7 +8,7 @@ use crate::linear_model::LinearModel;
 use crate::model::Model;
 use crate::plan::Target;
 use crate::preview::{Preview, StageMatrices};
-use crate::settings::{LinearModels, MpcSettings, StateBounds};
+use crate::settings::{Limits, LinearModels, MpcSettings, StateBounds};
 use crate::sized::Sized;
 use crate::stage_lists::{StageLists, by_stage, held};
 use crate::target::{Wanted, nearest};
@@ -98,6 +98,12 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         })
     }
 
+    /// Whether measured disturbances are in the models: these act on the plant, not on the last input, and where matrices
+    /// are given their rates are not those of the model.
+    fn disturbs_models(&self, preview: &Preview) -> bool {
+        self.last_input.is_some() || !preview.matrices.is_empty()
+    }
+
     /// The models of the samples; none where they are the controller's.
     pub fn models(
         &self,
@@ -115,12 +121,12 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         for (stage, s) in preview.scheduling.iter().enumerate() {
             self.check_scheduling(&format!("scheduling, stage {stage}"), s)?;
         }
-        // Disturbances act on the plant, not on the last input.
-        let disturbances = match self.last_input {
-            Some(_) => self
-                .names
-                .vectors(Axis::States, "disturbance", &preview.disturbance)?,
-            None => Vec::new(),
+        let disturbances = match self.disturbs_models(preview) {
+            true => {
+                let given = &preview.disturbance;
+                self.names.vectors(Axis::States, "disturbance", given)?
+            }
+            false => Vec::new(),
         };
         let counts = [
             plants.len(),
@@ -142,7 +148,13 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
                 let known = held(&disturbances, i).copied();
                 let found = acting.map(|(_, disturbance)| disturbance);
                 let parts = [known, found].into_iter().flatten();
-                model.rates.disturbance = parts.reduce(|sum, part| sum + part);
+                let disturbance = parts.reduce(|sum, part| sum + part);
+                model.rates.disturbance = match held(&matrices, i) {
+                    Some(sampled) if plant.period().is_none() => {
+                        disturbance.map(|rate| sampled.of_rate(&rate, self.settings.t_s))
+                    }
+                    _ => disturbance,
+                };
                 model.rates.beside = acting.map(|(beside, _)| beside);
                 Ok(model)
             })
@@ -262,7 +274,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         if du_bounds.is_empty() {
             du_bounds.extend(settings.du_bounds.clone());
         }
-        let any = |list: &[crate::settings::Limits], k: usize| {
+        let any = |list: &[Limits], k: usize| {
             list.iter()
                 .any(|limits| limits.lower[k].is_finite() || limits.upper[k].is_finite())
         };
@@ -275,11 +287,12 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             return Ok(None);
         }
         let of_controller = self.controller.settings();
+        let kept: Vec<&Limits> = y_bounds.iter().chain([&own]).collect();
         let prices = output_prices(
             &self.plant,
             names,
             settings,
-            (&own, of_controller),
+            (&kept, of_controller),
             self.rest,
         );
         let mut plants = self.plants(preview)?;
@@ -312,11 +325,13 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         let weighted = tasks
             .as_ref()
             .is_some_and(|tasks| !tasks.y_factors.is_empty());
-        let disturbed = lists.disturbance.clone();
-        if self.last_input.is_some() {
-            // They are in the models.
-            lists.disturbance.clear();
-        }
+        let disturbed = match self.disturbs_models(preview) {
+            true => {
+                lists.disturbance.clear();
+                Vec::new()
+            }
+            false => lists.disturbance.clone(),
+        };
         if self.last_input.is_none() && !weighted {
             return None;
         }
@@ -327,14 +342,14 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
         };
         let last = self.settings.horizon - 1;
         let mut found = None;
-        if given.is_empty() {
+        // Without a reference of the state it is where the outputs are nearest to theirs, whatever input costs nothing.
+        let by_outputs = lists.x_ref.is_empty() && weighted && !preview.y_ref.is_empty();
+        if given.is_empty() || by_outputs {
             let model = held(&lists.models, last).unwrap_or(self.controller.model());
             let mut model = model.rates.clone();
-            if self.last_input.is_none() {
-                let parts = [model.disturbance, held(&disturbed, last).copied()];
-                let parts = parts.into_iter().flatten();
-                model.disturbance = parts.reduce(|sum, part| sum + part);
-            }
+            let parts = [model.disturbance, held(&disturbed, last).copied()];
+            let parts = parts.into_iter().flatten();
+            model.disturbance = parts.reduce(|sum, part| sum + part);
             found = self.stand(preview, lists, tasks.as_deref_mut(), &model);
         }
         if let Some(tasks) = tasks
@@ -349,10 +364,11 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
             let y = plant.output(&x.as_slice()[..n], &u.as_slice()[..m]);
             tasks.y_ref = vec![DVector::from_vec(y.unwrap_or_default())];
         }
-        let u_ref = match (&found, given.is_empty()) {
-            (Some((_, u)), _) => vec![*u],
-            (None, true) => vec![SVector::zeros()],
-            (None, false) => given,
+        let is_given = !given.is_empty();
+        let u_ref = match (&found, is_given) {
+            (_, true) => given,
+            (Some((_, u)), false) => vec![*u],
+            (None, false) => vec![SVector::zeros()],
         };
         let first = lists.x_ref.first().copied();
         let rests = lists.x_ref.iter().all(|x_ref| Some(*x_ref) == first);
@@ -373,7 +389,7 @@ impl<const NX: usize, const NU: usize, const NS: usize> Sized<NX, NU, NS> {
                 .collect();
         }
         lists.u_ref = u_ref;
-        found.map(|(x, u)| Target {
+        found.filter(|_| !is_given).map(|(x, u)| Target {
             x: x.as_slice()[..self.names.states.len()].to_vec(),
             u: u.as_slice()[..self.names.inputs.len()].to_vec(),
         })

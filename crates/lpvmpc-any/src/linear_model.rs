@@ -13,6 +13,15 @@ pub(crate) struct LinearModel<const NX: usize, const NU: usize> {
     pub period: Option<f64>,
 }
 
+impl<const NX: usize, const NU: usize> LinearModel<NX, NU> {
+    /// What a constant `rate`, in state units per second, adds over a sample of `t_s` seconds after which the state is that
+    /// of these matrices: the mean of what it adds at the sample's end and of what becomes of it from its beginning on. Between
+    /// the samples nothing is known of the model; of a double integrator it is exact.
+    pub fn of_rate(&self, rate: &SVector<f64, NX>, t_s: f64) -> SVector<f64, NX> {
+        (rate + self.a * rate) * (t_s / 2.0)
+    }
+}
+
 impl<const NX: usize, const NU: usize, const NS: usize> LpvModel<f64, NX, NU, NS>
     for LinearModel<NX, NU>
 {

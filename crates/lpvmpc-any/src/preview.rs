@@ -36,13 +36,14 @@ pub struct Preview {
     pub y_ref: Vec<DVector<f64>>,
     /// Q_y, where the settings have one.
     pub q_y: Vec<DMatrix<f64>>,
-    /// Bounds of the outputs.
+    /// Bounds of the outputs, as soft or hard as [`MpcSettings::output_bounds`](crate::MpcSettings::output_bounds) says.
     pub y_bounds: Vec<Limits>,
     /// R_du, where the settings have one.
     pub r_du: Vec<DMatrix<f64>>,
     /// Bounds of the changes of the input, where the settings have any.
     pub du_bounds: Vec<Limits>,
-    /// Linear models x+ = A x + B u + c over the samples, in place of the plant.
+    /// Linear models x+ = A x + B u + c over the samples, in place of the plant. In continuous time a disturbance d then
+    /// adds (I + A) d t_s / 2: the mean of what it adds at the end of a sample and from its beginning on.
     pub matrices: Vec<StageMatrices>,
     /// Scheduling from outside: the plant's own embedding x_dot = A(s) x + B(s) u + c(s) at these s, whatever its state.
     pub scheduling: Vec<DVector<f64>>,

@@ -3,10 +3,10 @@
 use crate::plants::{cart_pole, limits};
 use crate::quadratic::{Affine, Quadratic};
 use ballbot::Ballbot;
-use lpvmpc::{LpvModel, Rk4};
+use lpvmpc::{Dynamics, LpvModel, Number, Rk4};
 use lpvmpc_any::{Mpc, MpcSettings, Preview, StageMatrices, Terminal};
 use lpvmpc_plant::{Plant, PlantData};
-use nalgebra::{DMatrix, DVector, SMatrix, Vector3, dmatrix, dvector};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector3, dmatrix, dvector};
 
 const HORIZON: usize = 20;
 
@@ -81,7 +81,11 @@ fn plans_with_matrices_by_stage_are_those_of_clarabel() {
         let pushed: Vec<_> = models
             .iter()
             .cloned()
-            .map(|(a, b, c)| (a, b, c + &push))
+            .map(|(a, b, c)| {
+                // A rate, over a sample, as the mean of what it adds at its end and from its beginning on.
+                let added = (&push + &a * &push) * (settings.t_s / 2.0);
+                (a, b, c + added)
+            })
             .collect();
         let best = optimum(&settings, &pushed, &x0);
         let matrices = models.iter().cloned().map(|(a, b, c)| StageMatrices {
@@ -101,6 +105,51 @@ fn plans_with_matrices_by_stage_are_those_of_clarabel() {
             best,
             &x0,
         );
+    }
+}
+
+/// A mass that a force moves: position and speed.
+struct Mass;
+
+impl Dynamics<2, 1> for Mass {
+    fn f<N: Number>(&self, x: &SVector<N, 2>, u: &SVector<N, 1>) -> SVector<N, 2> {
+        SVector::from([x[1], u[0]])
+    }
+}
+
+/// A disturbance is a rate of the plant, whether the plant or its matrices over the samples are told: with these it counted
+/// 1 / t_s times as much.
+#[test]
+fn a_disturbance_is_the_same_with_the_matrices_of_the_plant_itself() {
+    let plant = Plant::new(PlantData::of_dynamics("mass", &Mass)).unwrap();
+    let t_s = 0.05;
+    let itself = StageMatrices {
+        a: dmatrix![1.0, t_s; 0.0, 1.0],
+        b: dmatrix![0.5 * t_s * t_s; t_s],
+        affine: None,
+    };
+    for (r_du, u_ref) in [(None, None), (None, Some(0.0)), (Some(0.4), None)] {
+        let settings = MpcSettings {
+            r_du: r_du.map(|r| dmatrix![r]),
+            u_ref: u_ref.map(|u| dvector![u]),
+            ..MpcSettings::new(t_s, HORIZON, &[4.0, 0.3], &[0.2])
+        };
+        let preview = Preview {
+            disturbance: vec![dvector![0.0, 2.0], dvector![0.0, -1.0]],
+            ..Preview::default()
+        };
+        let step = |preview: &Preview| {
+            let mut mpc = Mpc::new(&plant, &settings).unwrap();
+            mpc.step(&[0.3, -0.1], preview).unwrap()
+        };
+        let plan = step(&preview);
+        let told = step(&Preview {
+            matrices: vec![itself.clone()],
+            ..preview
+        });
+        assert!(plan.is_solved() && told.is_solved(), "{}", told.status);
+        assert!((plan.u - told.u).amax() < 1e-8);
+        assert!((plan.x - told.x).amax() < 1e-8);
     }
 }
 

@@ -420,3 +420,62 @@ fn what_makes_no_sense_is_refused() {
         assert_eq!(found, expected);
     }
 }
+
+/// Bounds of outputs that only a step has were hard, although bounds of outputs are soft as a rule: what they ask for in
+/// vain had no plan.
+#[test]
+fn bounds_of_outputs_that_only_a_step_has_are_soft_as_those_of_the_settings() {
+    let within = Limits {
+        lower: vec![f64::NEG_INFINITY, f64::NEG_INFINITY],
+        upper: vec![0.1, f64::INFINITY],
+    };
+    let settings = MpcSettings {
+        u_bounds: limits(&[0.2]),
+        ..MpcSettings::new(0.2, HORIZON, &[1.0, 0.1], &[0.3])
+    };
+    let own = MpcSettings {
+        y_bounds: Some(within.clone()),
+        ..settings.clone()
+    };
+    let x0 = [1.0, 1.0];
+    let expected = linear(&own).step(&x0, &Preview::default()).unwrap();
+    assert!(expected.active_bounds().contains("exceeded"));
+    let told = Preview {
+        y_bounds: vec![within],
+        ..Preview::default()
+    };
+    let plan = linear(&settings).step(&x0, &told).unwrap();
+    assert_eq!(plan, expected);
+    let hard = MpcSettings {
+        output_bounds: StateBounds::Hard,
+        ..settings
+    };
+    assert!(!linear(&hard).step(&x0, &told).unwrap().is_solved());
+}
+
+/// Without a reference of the states they are wanted where the outputs are nearest to theirs, also where it is said which input
+/// costs nothing: then they were wanted at rest.
+#[test]
+fn states_follow_the_reference_of_outputs_whatever_input_costs_nothing() {
+    let matrices = Matrices {
+        a: dmatrix![1.0, 0.1; 0.0, 1.0],
+        b: dmatrix![0.005; 0.1],
+        c: Some(dmatrix![1.0, 0.0]),
+        period: Some(0.1),
+        ..Matrices::default()
+    };
+    let plant = Plant::new(PlantData::of_matrices("mass", &matrices).unwrap()).unwrap();
+    let settings = MpcSettings {
+        q_y: Some(dmatrix![1.0]),
+        ..MpcSettings::new(0.1, HORIZON, &[1.0, 0.1], &[0.1])
+    };
+    let mut mpc = Mpc::new(&plant, &settings).unwrap();
+    let told = Preview {
+        u_ref: vec![dvector![0.0]],
+        ..Preview::to_outputs(&[2.0])
+    };
+    let plan = mpc.step(&[2.0, 0.0], &told).unwrap();
+    // It stands there, and that costs nothing.
+    assert!(plan.cost < 1e-9 && plan.u.amax() < 1e-6, "{}", plan.u);
+    assert_eq!(plan.target, None);
+}
