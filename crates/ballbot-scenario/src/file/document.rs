@@ -68,16 +68,15 @@ impl Document {
 
     /// What stands at `key`, with its tables and places in lists, separated by dots
     /// (`controller.t_s`, `bounds.torque_nm.1`), or its default; everything, with every default, at the
-    /// empty key. `None` where there is neither.
+    /// empty key; a table with every default of its own. `None` where there is neither.
     pub fn value(&self, key: &str) -> Option<Value> {
-        let given = match key {
-            "" => None,
-            key => entry(&self.tree, key).cloned(),
-        };
-        given.or_else(|| {
-            let all = Value::try_from(&self.scenario).ok()?;
-            entry(&all, key).cloned()
-        })
+        let given = entry(&self.tree, key);
+        if let Some(value) = given.filter(|value| !has_table(value)) {
+            return Some(value.clone());
+        }
+        let all = Value::try_from(&self.scenario).ok();
+        let whole = all.as_ref().and_then(|all| entry(all, key));
+        whole.or(given).cloned()
     }
 
     /// The scenario with values at keys replaced or added: what many runs that differ in a few values
@@ -157,6 +156,15 @@ impl Document {
         self.text = toml::to_string(&scenario).map_err(|error| syntax(&self.origin, &error))?;
         self.scenario = scenario;
         Ok(())
+    }
+}
+
+/// Whether something is a table, or a list with one, which may leave out what has a default.
+fn has_table(value: &Value) -> bool {
+    match value {
+        Value::Table(_) => true,
+        Value::Array(list) => list.iter().any(has_table),
+        _ => false,
     }
 }
 

@@ -55,6 +55,20 @@ fn what_is_not_given_has_its_default() {
     assert_eq!(document.value("controller.nothing"), None);
 }
 
+/// Tables were without what they leave out, unless they were left out themselves.
+#[test]
+fn a_table_has_every_default() {
+    let document = two_setpoints();
+    let all = document.value("").unwrap();
+    let key = "controller";
+    let (given, whole) = (&document.root()[key], document.value(key).unwrap());
+    assert_eq!(whole, all[key]);
+    assert!(whole.as_table().unwrap().len() > given.as_table().unwrap().len());
+    for (key, value) in given.as_table().unwrap() {
+        assert!(whole.get(key).is_some(), "{key} = {value}");
+    }
+}
+
 /// Whose entries would be taken for the table's keys in the order in which they happen to be declared.
 #[test]
 fn a_list_in_place_of_a_table_is_refused() {
