@@ -132,20 +132,25 @@ def table(place: str, given: ArrayLike, error: type[Exception] = SettingError) -
     array = numbers(place, given, error)
     if array.ndim != 2:
         raise error(f"{place}: it has {array.ndim} dimensions; it must have 2")
+    return finite(place, array, error)
+
+
+def finite(place: str, array: Array, error: type[Exception] = SettingError) -> Array:
+    """The array, all of whose entries are finite."""
     if not np.isfinite(array).all():
         raise error(f"{place}: it has an entry that is not finite")
     return array
 
 
-def _both_ordered(place: str, given: Any, names: Sequence[str]) -> Any:
-    """A matrix, rows and columns in the order of the names, or its diagonal."""
-    found = ordered(place, given, names)
-    return ordered(place, found.T, names).T if hasattr(found, "columns") else found
+def _both_ordered(place: str, given: Any, rows: Sequence[str], columns: Sequence[str]) -> Any:
+    """A matrix, rows and columns in the order of their names, or its diagonal."""
+    found = ordered(place, given, columns)
+    return ordered(place, found.T, rows).T if hasattr(found, "columns") else found
 
 
 def weight(place: str, given: ArrayLike, names: Sequence[str]) -> Array:
     """A weight matrix: given whole, or by its diagonal."""
-    array, size = numbers(place, _both_ordered(place, given, names)), len(names)
+    array, size = numbers(place, _both_ordered(place, given, names, names)), len(names)
     if array.ndim == 0 and size == 1:
         array = array.reshape(1)
     if array.shape == (size,):
@@ -173,13 +178,13 @@ def by_stage(place: str, given: ArrayLike, of: Sequence[str] | int) -> Array:
 
 def weights_by_stage(place: str, given: ArrayLike, names: Sequence[str]) -> Array:
     """A weight matrix for each stage; one, or the diagonal of one, is a single stage."""
-    shape = (len(names), len(names))
-    return matrices_by_stage(place, _both_ordered(place, given, names), shape)
+    return matrices_by_stage(place, given, names, names)
 
 
-def matrices_by_stage(place: str, given: ArrayLike, shape: tuple[int, int]) -> Array:
-    """A matrix for each stage; one matrix, or the diagonal of one, is a single stage."""
-    array = numbers(place, given)
+def matrices_by_stage(place: str, given: ArrayLike, rows: Sequence[str], columns: Sequence[str]) -> Array:
+    """A matrix for each stage, whose rows and columns have these names; one matrix, or the diagonal of one, is a single
+    stage."""
+    array, shape = numbers(place, _both_ordered(place, given, rows, columns)), (len(rows), len(columns))
     if shape[0] == shape[1] and array.shape == (shape[0],):
         array = np.diag(array)
     if array.shape == shape:

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 _Array = NDArray[np.float64]
+MOST_BYTES: int
+
 _Column = tuple[str, str, float | None, float | None]
 
 @final

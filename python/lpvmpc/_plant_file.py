@@ -54,10 +54,10 @@ def text(
             if given is None:
                 continue
             limit = number(f"bounds, {one}, {key}", given, PlantError)
-            if np.isnan(limit):
-                raise PlantError(f"bounds: the {key} one of {one} is NaN")
             if np.isfinite(limit):
                 entry[key] = limit
+            elif limit != (-np.inf if key == "lower" else np.inf):
+                raise PlantError(f"bounds: the {key} one of {one} is {'NaN' if np.isnan(limit) else limit}")
         return entry
 
     data: dict[str, Any] = {

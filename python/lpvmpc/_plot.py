@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import MissingPackageError, SettingError
 
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .simulation import Run
+
+Array = NDArray[np.float64]
 
 # Of Okabe and Ito's palette, which colour-blind readers can tell apart.
 _BLUE, _VERMILION, _GREY = "#0072B2", "#D55E00", "#7f7f7f"
@@ -74,7 +77,7 @@ def _draw(panel: Axes, run: Run, name: str) -> None:
         panel.step(run.t, held, where="post", color=_BLUE, lw=1.4)
     else:
         panel.plot(run.t[: len(values)], values, color=_BLUE, lw=1.4)
-    low, high = min(map(np.min, shown)), max(map(np.max, shown))
+    low, high = span(shown)
     lower, upper = run.bounds.get(name, (-np.inf, np.inf))
     _shade(panel, low, high, lower, upper)
     label = name.replace("_", " ")
@@ -83,6 +86,13 @@ def _draw(panel: Axes, run: Run, name: str) -> None:
     panel.spines[["top", "right"]].set_visible(False)
     if len(shown) > 1:
         panel.legend(loc="best", frameon=False, fontsize="small")
+
+
+def span(parts: Sequence[Array]) -> tuple[float, float]:
+    """The least and the largest of what is finite; zero where nothing is."""
+    values = np.concatenate([np.zeros(0), *(np.ravel(part) for part in parts)])
+    values = values[np.isfinite(values)]
+    return (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
 
 
 def _shade(panel: Axes, low: float, high: float, lower: float, upper: float) -> None:

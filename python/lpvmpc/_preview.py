@@ -27,7 +27,6 @@ def to_native(
 ) -> dict[str, Any]:
     """What a step of a controller with these settings is told, of which what is None is left out."""
     of_x, of_u, of_y = names_of(plant.states), names_of(plant.inputs), names_of(plant.outputs)
-    n, m = len(of_x), len(of_u)
     told = {"x_ref": x_ref, **ahead}
     given = {name: one for name, one in told.items() if one is not None}
     known: dict[str, Any] = {"x_ref": None}
@@ -44,7 +43,7 @@ def to_native(
         if name in given:
             known[name] = weights_by_stage(name, given[name], of)
     if "cross" in given:
-        known["cross"] = matrices_by_stage("cross", given["cross"], (m, n))
+        known["cross"] = matrices_by_stage("cross", given["cross"], of_u, of_x)
     if ("q" in given) != ("r" in given):
         raise SettingError("q, r: give both or neither")
     if "q" in given:
@@ -59,18 +58,18 @@ def to_native(
             for stage in stages
         ]
     if "matrices" in given:
-        known |= _models(given["matrices"], n, m)
+        known |= _models(given["matrices"], of_x, of_u)
     return known
 
 
-def _models(given: tuple[ArrayLike, ...], n: int, m: int) -> dict[str, Array]:
+def _models(given: tuple[ArrayLike, ...], of_x: list[str], of_u: list[str]) -> dict[str, Array]:
     """(A, B) or (A, B, c) by stage."""
     if not isinstance(given, (tuple, list)) or len(given) not in (2, 3):
         raise SettingError("matrices: they must be (A, B) or (A, B, c)")
     parts = [
-        matrices_by_stage("matrices, A", given[0], (n, n)),
-        matrices_by_stage("matrices, B", given[1], (n, m)),
+        matrices_by_stage("matrices, A", given[0], of_x, of_x),
+        matrices_by_stage("matrices, B", given[1], of_x, of_u),
     ]
     if len(given) == 3:
-        parts.append(by_stage("matrices, c", given[2], n))
+        parts.append(by_stage("matrices, c", given[2], of_x))
     return dict(zip("abc", equally_long(*parts)))  # without c, if there is none

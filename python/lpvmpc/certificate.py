@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _lpvmpc
 from ._arrays import column, numbers, ordered
-from ._files import save
+from ._files import read, save
 from .errors import SettingError
 
 Array = NDArray[np.float64]
@@ -41,11 +40,11 @@ class Certificate:
         Raises
         ------
         OSError
-            The file cannot be read.
+            The file cannot be read, or is no text.
         CertificateError
             It is no certificate, or was changed after it was written.
         """
-        return cls(Path(path).read_text(encoding="utf-8"))
+        return cls(read(path))
 
     def save(self, path: str | PathLike[str], overwrite: bool = False) -> None:
         """Writes its file.

@@ -228,7 +228,8 @@ class Mpc:
 
         Everything but `x` may be given by stage, an array with one more dimension in front, from the present
         stage on; from where it ends its last entry holds. So one vector is a value for the whole horizon. Of a Series of
-        pandas the index, of a DataFrame the columns may be the names of what the numbers are of, in any order.
+        pandas the index, of a DataFrame the columns, of one that is a matrix its rows, too, may be the names of what the numbers are of, in any
+        order.
 
         Parameters
         ----------
@@ -270,10 +271,10 @@ class Mpc:
             Other weights, where the settings have any: (k,), (k, k) or (stages, k, k), and so on.
         y_bounds, du_bounds
             (lower, upper) of outputs and of changes, each (k,) or (stages, k), and (m,) or (stages, m); or by name, as
-            `x_bounds`.
+            `x_bounds`. Those of outputs are as soft or hard as `output_bounds` of `Mpc` says.
         matrices
             (A, B) or (A, B, c) of x+ = A x + B u + c over the samples, in place of the plant: (n, n) or
-            (stages, n, n), and so on.
+            (stages, n, n), and so on. In continuous time a `disturbance` d, per second, then adds (I + A) d t_s / 2.
         scheduling
             The scheduling of the plant's own embedding, whatever the state: (s,) or (stages, s).
 
@@ -303,7 +304,8 @@ class Mpc:
         Parameters
         ----------
         t
-            When they were taken, s, on any clock.
+            When they were taken, s, on any clock. Of a plant in discrete time they are of its nearest period, counted from
+            the first readings.
         readings
             By name, also as a Series of pandas, or in the order of ``estimator.measured``; one that is missing is left out,
             None, NaN or masked.

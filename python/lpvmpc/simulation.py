@@ -100,16 +100,16 @@ class Run:
         Raises
         ------
         SettingError
-            A shape does not fit.
+            A shape does not fit, or a number is not finite.
         """
-        from ._arrays import by_stage, weight
+        from ._arrays import by_stage, finite, weight
 
         n, m = self.x.shape[1], self.u.shape[1]
         of_x, of_u = names_of(self.plant.states), names_of(self.plant.inputs)
-        q_matrix, r_matrix = weight("q", q, of_x), weight("r", r, of_u)
+        q_matrix, r_matrix = finite("q", weight("q", q, of_x)), finite("r", weight("r", r, of_u))
         rest = np.zeros(n) if self.plant.equilibrium is None else self.plant.equilibrium[0]
         e = self.x[:-1] - (rest if self.x_ref is None else self.x_ref)
-        known = np.zeros((1, m)) if u_ref is None else by_stage("u_ref", u_ref, of_u)
+        known = np.zeros((1, m)) if u_ref is None else finite("u_ref", by_stage("u_ref", u_ref, of_u))
         if len(known) not in (1, len(self.u)):
             raise SettingError(f"u_ref: it has {len(known)} rows; the run has {len(self.u)} samples")
         v = self.u - known
@@ -117,7 +117,8 @@ class Run:
 
     def to_dataframe(self) -> Any:
         """A pandas ``DataFrame`` with the time in s as its index and a column for each state, input, output
-        and reference; the last row, the end, has no input.
+        and reference, ``position_ref`` of a state ``position`` (with one more ``_`` where a signal has that name); the last
+        row, the end, has no input.
 
         Raises
         ------
@@ -136,7 +137,10 @@ class Run:
             for i, signal in enumerate(signals):
                 values = np.full(len(self.t), np.nan)
                 values[: len(table)] = table[:, i]
-                columns[signal.name + suffix] = values
+                name = signal.name + suffix
+                while name in columns:
+                    name += "_"
+                columns[name] = values
 
         put(self.plant.states, self.x)
         put(self.plant.inputs, self.u)
@@ -281,6 +285,8 @@ def simulate(
     if not (np.isfinite(duration) and duration > 0):
         raise SettingError(f"duration: it is {duration} s; it must be a positive number of seconds")
     samples = np.ceil(duration / period - 1e-9)
+    if samples < 1:
+        raise SettingError(f"duration: it is {duration} s; it must be at least one sample of {period} s")
     if samples > MOST_SAMPLES:
         raise SettingError(
             f"duration: {duration} s are {samples:.4g} samples of {period} s; there is room for {MOST_SAMPLES}"

@@ -17,6 +17,9 @@ use pyo3::prelude::*;
 
 #[pymodule]
 mod _lpvmpc {
+    /// Most bytes of a file that is read as a whole.
+    #[pymodule_export]
+    const MOST_BYTES: u64 = ballbot_scenario::words::MOST_BYTES;
     #[pymodule_export]
     use super::ballbot::{
         Scenario, bench, campaign_example, certify_scenario, count_guarantee, excite,

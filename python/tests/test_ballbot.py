@@ -38,6 +38,8 @@ def test_keys_are_read_and_changed(scenario: ballbot.Scenario) -> None:
     points[0].phi_rad = 1.25
     assert scenario["reference.set_points.points.0.phi_rad"] == 1.25
     assert set(scenario) == set(scenario.to_dict())
+    # A table has its defaults, whether one reads it or the whole.
+    assert scenario.controller.to_dict() == scenario.to_dict()["controller"]
 
 
 @pytest.mark.parametrize(
@@ -147,6 +149,9 @@ def test_two_planes(tmp_path: Path) -> None:
         assert len(run.plot(kind).axes) == panels
     figure = run.plot("path")
     figure.savefig(tmp_path / "path.png")
+    # Of one or two samples there were too few points to find the scale of a curve.
+    scenario.duration_s = scenario.controller.t_s
+    assert scenario.simulate().plot().axes
     x, y = figure.axes[0].lines[0].get_data()
     assert np.allclose(x, run.metres_per_rad * run["x.phi"]) and np.allclose(y, run.metres_per_rad * run["y.phi"])
     matplotlib.pyplot.close("all")
@@ -165,6 +170,9 @@ def test_a_figure_shows_the_run(scenario: ballbot.Scenario) -> None:
     assert {low, high} <= {float(np.asarray(line.get_ydata())[0]) for line in shown["θ [rad]"].lines[1:]}
     with pytest.raises(lpvmpc.ScenarioError, match="must be one of run, plans"):
         run.plot("path")
+    scenario.update({"accept_unusual_values": True, "initial_state.theta_rad": 1.7})
+    with pytest.raises(lpvmpc.ScenarioError, match="no sample that a figure could show"):
+        scenario.simulate().plot()
     guaranteed = ballbot.Scenario.builtin("far-setpoints")
     guaranteed.duration_s = 1.0
     run = guaranteed.simulate()
@@ -191,6 +199,32 @@ def test_campaigns_are_checked(tmp_path: Path) -> None:
     found = ballbot.campaign(SHORT | {"scenario": "mine.toml"}, folder=tmp_path)
     assert len(found) == 4 and found.to_dataframe()["success"].all()
     assert ballbot.campaign_example().startswith("#")
+
+
+def test_files_that_are_no_texts_are_named(tmp_path: Path) -> None:
+    binary = tmp_path / "binary"
+    binary.write_bytes(b"\xff\xfe")
+    endless = Path("/dev/zero")
+    for path, said in ((binary, "binary: it is not text in UTF-8"), (endless, "/dev/zero: it has more than 64 MiB")):
+        if not path.exists():
+            continue
+        for read in (lpvmpc.Certificate.load, ballbot.campaign):
+            with pytest.raises(OSError, match=said):
+                read(path)
+        with pytest.raises(lpvmpc.SettingError, match=f"config: .*{said}"):
+            ballbot.excite(path)
+
+
+def test_columns_may_have_gaps_and_are_named_where_they_are_none(tmp_path: Path) -> None:
+    """What is masked was taken for a reading."""
+    from lpvmpc.ballbot.identification import _csv
+
+    phi = np.ma.masked_equal([0.5, 99.0, 1.5], 99.0)
+    gaps: Any = {"t_s": [0.0, 0.1, 0.2], "phi_rad": phi, "theta_rad": np.array([None, 1.0, 2.0], dtype=object)}
+    assert _csv(0, gaps).splitlines()[1:] == ["0.0,0.5,", "0.1,,1.0", "0.2,1.5,2.0"]
+    for wrong in (["a", "b", "c"], [1j, 2.0, 3.0]):
+        with pytest.raises(lpvmpc.SettingError, match=r"recordings\[0\], phi_rad: .* is no array of real numbers"):
+            ballbot.identify([gaps | {"phi_rad": np.array(wrong, dtype=object)}])
 
 
 def test_what_cannot_be_identified_is_told(tmp_path: Path) -> None:

@@ -634,6 +634,10 @@ def test_what_has_names_is_taken_by_them():
     assert (plan(pd.Series(x), pd.DataFrame(moving)).u == plan(x, moving).u).all()
     parameters = pd.Series({"half_length": 0.6, "cart_mass": 1.1, "pole_mass": 0.2})
     of_y = ["tip_height", "tip_position"]
+    cross = pd.DataFrame([[0.01, 0.02, 0.0, 0.03]], index=["force"], columns=table.columns)
+    a = pd.DataFrame(np.eye(4) + T_S * np.diag([1.0, 1.0], 2), index=table.columns, columns=table.columns)
+    b = pd.DataFrame([0, 0, T_S, -T_S], index=table.columns, columns=["force"])
+    other = ["rate", "tilt", "position", "speed"]
     weights = pd.DataFrame(Q, index=by_name.index[::-1], columns=by_name.index[::-1])
     for named, numbers in (
         ({"parameters": parameters}, {"parameters": [1.1, 0.2, 0.6]}),
@@ -644,8 +648,13 @@ def test_what_has_names_is_taken_by_them():
         ({"q": weights.loc[by_name.index], "r": [0.1]}, {"q": Q, "r": [0.1]}),
         ({"x_bounds": (by_name - 9, pd.Series(x + 9))}, {"x_bounds": (x - 9, x + 9)}),
         ({"u_bounds": pd.Series({"force": (-3, 3)})}, {"u_bounds": {"force": (-3, 3)}}),
+        ({"cross": cross[by_name.index]}, {"cross": cross.to_numpy()}),
+        ({"matrices": (a.loc[by_name.index, other], b.loc[by_name.index], by_name)}, {"matrices": (a, b, x)}),
     ):
         assert (plan(**named).u == plan(**numbers).u).all()
+    for told in ({"cross": cross.rename(columns={"tilt": "angle"})}, {"matrices": (a, b.rename(index={"tilt": "angle"}))}):
+        with pytest.raises(lpvmpc.SettingError, match="its names are position, angle, speed, rate; they must be"):
+            plan(**told)
     assert (plant.f(by_name, pd.Series({"force": 1.0})) == plant.f(x, [1.0])).all()
     for row in (pd.Series({"speed": 1.0}), pd.Series([0.0, 0, 1, 0])):
         told = plan(rows=[[lpvmpc.Row("slow", x=row, upper=0.1)]])

@@ -300,6 +300,9 @@ def pieces(*given):
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, bounds={"u": (1, -1)}), "1"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, bounds={"u": 3}), r"\(lower, upper\)"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, bounds={"u": (float("nan"), 1)}), "NaN"),
+        # They were taken for none.
+        (lambda: lpvmpc.Plant.from_casadi(X, U, F, bounds={"u": (float("inf"), None)}), "the lower one of u is inf"),
+        (lambda: lpvmpc.Plant.from_casadi(X, U, F, bounds={"u": (None, -float("inf"))}), "the upper one of u is -inf"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, equilibrium=([0, 1], [0])), "equilibrium"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, equilibrium=([0], [0])), "equilibrium, x"),
         (lambda: lpvmpc.Plant.from_casadi(X, U, F, parameters={"m": 1}), "parameters"),

@@ -132,8 +132,35 @@ def test_the_record():
         for x, u in zip(run.x[:-1], run.u)
     )
     assert run.cost(Q, R) == pytest.approx(cost)
+    for place, given in (("q", ([np.nan] * 4, R)), ("r", (Q, [np.inf])), ("u_ref", (Q, R, [np.nan]))):
+        with pytest.raises(lpvmpc.SettingError, match=f"{place}: it has an entry that is not finite"):
+            run.cost(*given)
     with pytest.raises(KeyError, match="height"):
         run["height"]
+
+
+def test_a_signal_that_is_called_as_a_reference_keeps_its_column():
+    """The reference took its place."""
+    plant = lpvmpc.Plant.from_matrices(
+        [[0, 1], [0, 0]], [[0], [1]], [[2, 0]], states=["position", "speed"], outputs=["position_ref"]
+    )
+    frame = lpvmpc.simulate(plant, lambda t, x: [0.0], [1, 0], 0.3, [5, 0], t_s=0.1).to_dataframe()
+    assert frame["position_ref"].iloc[0] == 2 and frame["position_ref_"].iloc[0] == 5
+    assert len(set(frame.columns)) == len(frame.columns) == 6
+
+
+def test_a_figure_shows_what_has_a_value():
+    """Of an output without a value somewhere, matplotlib refused the limits."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    plant = lpvmpc.Plant.from_casadi(x, u, u, y=ca.vertcat(ca.sqrt(x), ca.log(-1 - x**2)), states=["x"], inputs=["u"])
+    run = lpvmpc.simulate(plant, lambda t, x: [-1.0], [0.5], 1.0, t_s=0.1)
+    assert np.isnan(run["y_0"]).any() and np.isnan(run["y_1"]).all()
+    panels = run.plot().axes
+    assert panels[2].get_ylim()[1] == pytest.approx(np.sqrt(0.5) * 1.08, rel=0.05) and len(panels) == 4
+    matplotlib.pyplot.close("all")
 
 
 def test_figure():
@@ -180,6 +207,7 @@ def diverging(t, x):
         (lambda s: s([0, 0, 0, np.nan], 1.0), lpvmpc.SettingError, "x: rate is NaN"),
         (lambda s: s([0] * 4, 0.0), lpvmpc.SettingError, "duration"),
         (lambda s: s([0] * 4, np.inf), lpvmpc.SettingError, "duration"),
+        (lambda s: s([0] * 4, 1e-12), lpvmpc.SettingError, "duration: it is 1e-12 s; it must be at least one sample"),
         (lambda s: s([0] * 4, 1.0, [0, 1]), lpvmpc.SettingError, "x_ref"),
         (lambda s: s([0] * 4, 1.0, lambda t: [t]), lpvmpc.SettingError, "x_ref at 0 s"),
         (lambda s: s([0] * 4, 1.0, u_ref=np.zeros((9, 2))), lpvmpc.SettingError, r"u_ref: .* \(1,\), \(samples, 1\) or"),

@@ -2,7 +2,9 @@
 
 use lpvmpc::{BoundId, Observation, Quantity, Restart, Side, Status, Verdict};
 use lpvmpc_sim::Termination;
-pub use lpvmpc_words::{check_lists, from_toml, nearest, read, read_text, toml_message};
+pub use lpvmpc_words::{
+    MOST_BYTES, check_lists, from_toml, nearest, read, read_text, toml_message,
+};
 
 /// Names of the states, in their order.
 pub const STATES: [&str; 4] = ["phi", "theta", "phi_dot", "theta_dot"];

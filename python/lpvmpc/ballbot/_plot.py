@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._plot import new_figure
+from .._plot import new_figure, span
 from ..errors import ScenarioError
 
 if TYPE_CHECKING:
@@ -216,8 +216,8 @@ def _with_beginning(
             draw(panel)
         lines = [line for line in pair[1].lines if np.size(line.get_xdata()) > 2]
         values = [(np.asarray(one.get_xdata()), np.asarray(one.get_ydata())) for one in lines]
-        whole = _span([y for _, y in values])
-        later = _span([y[x >= begun] for x, y in values])
+        whole = span([y for _, y in values])
+        later = span([y[x >= begun] for x, y in values])
         after.append(later)
         dominates |= whole[1] - whole[0] > _DOMINATES * (later[1] - later[0])
     if dominates:
@@ -225,7 +225,7 @@ def _with_beginning(
         axes[0, 1].set_title("the whole run, at the scale of what follows", fontsize="medium")
         for (first, whole_run), (low, high) in zip(axes, after, strict=True):
             first.set_xlim(t[0], begun)
-            room = 0.06 * (high - low)
+            room = 0.06 * max(high - low, 1e-12)
             whole_run.set_ylim(low - room, high + room)
             _rescale(first, begun)
         shown = axes
@@ -241,15 +241,10 @@ def _with_beginning(
     return _finished(figure, title or run.title, list(shown.ravel()), list(shown[-1]), None)
 
 
-def _span(parts: Sequence[Array]) -> tuple[float, float]:
-    values = np.concatenate(parts)
-    return float(np.min(values)), float(np.max(values))
-
-
 def _rescale(panel: Axes, end: float) -> None:
     """To what is drawn until `end`."""
     lines = [line for line in panel.lines if np.size(line.get_xdata()) > 2]
-    low, high = _span(
+    low, high = span(
         [np.asarray(one.get_ydata())[np.asarray(one.get_xdata()) <= end] for one in lines]
     )
     room = 0.06 * max(high - low, 1e-12)
@@ -258,7 +253,7 @@ def _rescale(panel: Axes, end: float) -> None:
 
 def _shade(panel: Axes, bounds: tuple[float, float]) -> None:
     """Shades what is beyond bounds that the curves come near to."""
-    low, high = _span([np.asarray(line.get_ydata(), dtype=np.float64) for line in panel.lines])
+    low, high = span([np.asarray(line.get_ydata(), dtype=np.float64) for line in panel.lines])
     height = max(high - low, 1e-12)
     bottom, top = low - 0.06 * height, high + 0.06 * height
     lower, upper = bounds

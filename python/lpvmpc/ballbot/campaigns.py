@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _lpvmpc
+from .._files import read
 from .._progress import reported
 from ..errors import ScenarioError, SettingError
 from ._values import pandas, plain
@@ -77,7 +78,7 @@ def campaign(
     Raises
     ------
     OSError
-        The file cannot be read.
+        The file cannot be read, or is no text.
     ScenarioError
         It is no campaign; the message names the place and what would be right. Or a run draws what makes no scenario.
 
@@ -94,7 +95,7 @@ def campaign(
         content, path = plain(campaign), Path(folder) / "the campaign"
     else:
         path = Path(campaign)
-        content = path.read_text(encoding="utf-8")
+        content = read(path)
     if not 0 <= threads <= 1024:
         raise SettingError(f"threads: it is {threads}; it must be from 0 to 1024")
     with reported(progress) as report, TemporaryDirectory(prefix="lpvmpc-") as temporary:

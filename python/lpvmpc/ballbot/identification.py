@@ -16,14 +16,15 @@ from .. import _lpvmpc
 from .._arrays import column, listed, numbers, numbers_or_none, whole
 from .._progress import reported
 from ..errors import IdentificationError, SettingError
-from .._files import save
+from .._files import read, save
 from ._values import plain
 from .run import Run, SensorLog
 
 Array = NDArray[np.float64]
 
 Recording = Union[str, PathLike[str], Run, SensorLog, Mapping[str, ArrayLike]]
-"""The path of a CSV file; a run of one plane, or what its sensors delivered; or columns by name."""
+"""The path of a CSV file; a run of one plane, or what its sensors delivered; or columns by name, with NaN, None or a masked
+entry where a reading is missing."""
 
 Config = Union[str, PathLike[str], Mapping[str, Any]]
 """The path of a configuration (TOML), or its keys and values."""
@@ -302,7 +303,7 @@ def _content(config: Config | None) -> tuple[Any, str] | None:
     if isinstance(config, Mapping):
         return plain(config), "config"
     try:
-        return Path(config).read_text(encoding="utf-8"), fspath(config)
+        return read(config), fspath(config)
     except OSError as error:
         raise SettingError(f"config: {error}") from error
 
@@ -329,7 +330,7 @@ def _path(place: int, recording: Recording, folder: str) -> str:
 
 
 def _csv(place: int, columns: Mapping[str, ArrayLike]) -> str:
-    arrays = {name: np.asarray(column, dtype=np.float64) for name, column in columns.items()}
+    arrays = {name: _readings(f"recordings[{place}], {name}", column) for name, column in columns.items()}
     shapes = {name: array.shape for name, array in arrays.items()}
     if len(set(shapes.values())) != 1 or len(next(iter(shapes.values()))) != 1:
         raise SettingError(f"recordings[{place}]: its columns have the shapes {shapes}; they must be equally long")
@@ -338,6 +339,12 @@ def _csv(place: int, columns: Mapping[str, ArrayLike]) -> str:
         for row in zip(*arrays.values(), strict=True)
     )
     return "\n".join([",".join(arrays), *rows]) + "\n"
+
+
+def _readings(place: str, column: ArrayLike) -> Array:
+    """The readings of a column, NaN where one is missing: masked, or None."""
+    # As objects, since whole numbers have no NaN.
+    return numbers(place, np.ma.asarray(column, dtype=object).filled(np.nan) if np.ma.is_masked(column) else column)
 
 
 def _part(place: int, part: Any, logs: int) -> tuple[int | None, float, float]:

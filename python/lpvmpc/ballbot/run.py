@@ -261,7 +261,7 @@ class Run:
         MissingPackageError
             matplotlib is not installed.
         ScenarioError
-            There is no such figure of this run.
+            There is no such figure of this run, or it has no sample: the robot had fallen at its beginning.
         """
         from . import _plot
 
@@ -269,6 +269,8 @@ class Run:
         if self.motors is not None:
             drawn |= {"path": _plot.path, "motors": _plot.motors}
         kind = kind or "run"
+        if len(self.t) < 2:
+            raise ScenarioError("the run has no sample that a figure could show")
         if kind not in drawn:
             raise ScenarioError(f"kind = {kind!r}: it must be one of {', '.join(drawn)}")
         return drawn[kind](self, figure)
