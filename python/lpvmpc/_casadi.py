@@ -8,7 +8,7 @@ from ._tape import Tape
 from .errors import MissingPackageError, PlantError
 
 if TYPE_CHECKING:
-    from .plant import Embedding
+    from ._sources import Embedding
 
 
 def casadi() -> Any:

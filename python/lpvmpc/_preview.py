@@ -22,6 +22,13 @@ AHEAD = (
 """What a step may be told besides the reference."""
 
 
+def check_names(ahead: Mapping[str, Any]) -> None:
+    """Refuses what a step is not told by any of these names."""
+    for name in ahead:
+        if name not in AHEAD:
+            raise SettingError(f"{name}: a step takes no such thing; there are {', '.join(AHEAD)}")
+
+
 def to_native(
     plant: Plant, settings: Mapping[str, Any], x_ref: ArrayLike | None, ahead: Mapping[str, Any]
 ) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import by_name, column, instance, named, number
+from ._arrays import by_name, column, instance, named, number, ordered
 from .errors import SettingError
 from .plant import Plant, Signal, names_of
 
@@ -117,6 +117,24 @@ def to_native(plant: Plant, given: Estimator) -> dict[str, Any]:
             number(f"{place}, gate, longest_gap", gate.longest_gap),
         ),
     }
+
+
+def readings_to_native(
+    names: Sequence[str], readings: Mapping[str, float | None] | ArrayLike
+) -> list[float | None]:
+    """Readings, by the names of what is measured or in their order, as the native half takes them: None where one is
+    missing."""
+    readings = named(readings)
+    if isinstance(readings, Mapping):
+        for name in readings:
+            if name not in names:
+                raise SettingError(f"readings: {name!r} is not measured; what is, is {', '.join(names)}")
+        given = [readings.get(name) for name in names]
+    else:
+        known = ordered("readings", readings, names)
+        given = np.atleast_1d(np.ma.asarray(known, dtype=object)).tolist()  # None where masked
+    values = [None if one is None or np.ma.is_masked(one) else number("readings", one) for one in given]
+    return [None if one is None or np.isnan(one) else one for one in values]
 
 
 def _by_state(

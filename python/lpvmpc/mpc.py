@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _lpvmpc
-from ._arrays import column, copied, instance, named, number, ordered, whole
-from ._preview import AHEAD
+from ._arrays import column, copied, instance, number, whole
+from ._preview import check_names
 from ._preview import to_native as preview_to_native
 from ._settings import designed
 from ._settings import to_native as settings_to_native
 from .constraints import Limits, Penalty, Row, kept
 from .errors import SettingError
-from .estimator import Estimate, Estimator
+from .estimator import Estimate, Estimator, readings_to_native
 from .estimator import to_native as estimator_to_native
 from .plan import Plan
 from .plant import Plant, names_of
@@ -322,20 +322,8 @@ class Mpc:
         SettingError
             The controller has no estimator, or there are not as many readings.
         """
-        names, readings = self._measured(), named(readings)
-        if isinstance(readings, Mapping):
-            for name in readings:
-                if name not in names:
-                    raise SettingError(
-                        f"readings: {name!r} is not measured; what is, is {', '.join(names)}"
-                    )
-            given = [readings.get(name) for name in names]
-        else:
-            known = ordered("readings", readings, names)
-            given = np.atleast_1d(np.ma.asarray(known, dtype=object)).tolist()  # None where masked
-        values = [None if one is None or np.ma.is_masked(one) else number("readings", one) for one in given]
-        missing = [None if one is None or np.isnan(one) else one for one in values]
-        verdicts = self._native.observe(number("t", t), missing)
+        names = self._measured()
+        verdicts = self._native.observe(number("t", t), readings_to_native(names, readings))
         return dict(zip(names, verdicts, strict=True))
 
     def decide(self, x_ref: ArrayLike | None = None, **ahead: Any) -> Plan:
@@ -359,9 +347,7 @@ class Mpc:
         SettingError
             The controller has no estimator; or as `step`.
         """
-        for name in ahead:
-            if name not in AHEAD:
-                raise SettingError(f"{name}: a step takes no such thing; there are {', '.join(AHEAD)}")
+        check_names(ahead)
         self._measured()
         known = preview_to_native(self._plant, self._settings, x_ref, ahead)
         return Plan(*self._native.decide(known))

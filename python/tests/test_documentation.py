@@ -22,7 +22,8 @@ def test_everything_public_is_described():
     public = {name: getattr(module, name) for module in (lpvmpc, lpvmpc.ballbot) for name in module.__all__}
     for name, thing in public.items():
         assert thing.__doc__, name
-        for member, value in vars(thing).items() if isinstance(thing, type) else ():
+        own = [kind for kind in getattr(thing, "__mro__", ()) if kind.__module__.startswith("lpvmpc")]
+        for member, value in (one for kind in own for one in vars(kind).items()):
             if not member.startswith("_") and (callable(value) or isinstance(value, property)):
                 assert value.__doc__, f"{name}.{member}"
 
