@@ -5,7 +5,7 @@ use crate::adjoint::Adjoint;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::rows;
-use crate::solution::{ActiveSet, Part, Side};
+use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side};
 use crate::solver_settings::default_tolerance;
 use nalgebra::{SVector, convert};
 
@@ -79,6 +79,41 @@ pub fn infeasibility_margin<T: Scalar, const NX: usize, const NU: usize>(
     least += sum;
     size += sizes;
     least - T::default_epsilon() * convert(ROUNDINGS) * size
+}
+
+/// Lists in a `proof` the bounds of inputs that it rests on, each with the multiplier that makes the sum of the violations no
+/// longer depend on that input, as far as there are places. By how much the bounds contradict each other stays the same.
+pub(crate) fn list_input_bounds<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    proof: &mut ActiveSet<T>,
+) {
+    let rounding: T = default_tolerance();
+    let mut largest = T::zero();
+    let mut adjoint = Adjoint::new(ocp, None, proof);
+    while let Some(at) = adjoint.step(proof) {
+        let terms = at.dynamics + at.rows.abs();
+        for (j, (slope, terms)) in at.gradient.iter().zip(terms.iter()).enumerate() {
+            largest = largest.max(*terms);
+            let side = if *slope > T::zero() {
+                Side::Lower
+            } else {
+                Side::Upper
+            };
+            let bound = BoundId {
+                stage: at.stage,
+                quantity: Quantity::Input(j),
+                side,
+            };
+            if slope.abs() > rounding * largest {
+                proof.push(ActiveRow {
+                    bound,
+                    part: Part::Hard,
+                    multiplier: slope.abs(),
+                    exceeded: false,
+                });
+            }
+        }
+    }
 }
 
 /// a'b, and the sum of the sizes of its terms.

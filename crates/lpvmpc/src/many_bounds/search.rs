@@ -3,7 +3,9 @@
 use super::exchange::{Program, Tolerances};
 use super::interior_point::{Foretold, InteriorPoint, STUCK};
 use super::side::{self, BoundSide};
+use crate::farkas::list_input_bounds;
 use crate::model::Scalar;
+use crate::ocp::Ocp;
 use crate::solution::{ActiveRow, ActiveSet, Part, Status};
 use crate::solver::infeasible;
 use nalgebra::convert;
@@ -25,6 +27,9 @@ const CLEAR_LATE: usize = 8;
 const LATE: f64 = 1e-4;
 /// Once they were wrong, again when the products of slack and multiplier are this part of what they were.
 const NEARER: f64 = 0.01;
+/// Of a proof that there is no point within all bounds the multipliers above the first of these parts of the largest that
+/// are a proof, too.
+const LARGEST: [f64; 5] = [0.5, 0.1, 0.01, 1e-3, 1e-5];
 /// Where the products of slack and multiplier begin, as a part of the largest cost of a stage.
 const CENTRE: f64 = 0.01;
 
@@ -93,11 +98,10 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
             let ended = !(part > convert(1e-6));
             // Where no point satisfies all bounds, multipliers grow until they are a proof of it. To look whether
             // they are takes as long as a step.
-            if ended || stuck.is_power_of_two() {
-                list_multipliers(sides, proof);
-                if let Some(infeasible) = infeasible(span.ocp, proof) {
-                    return Some(Err(infeasible));
-                }
+            if (ended || stuck.is_power_of_two())
+                && let Some(infeasible) = prove(span.ocp, sides, proof)
+            {
+                return Some(Err(infeasible));
             }
             if ended {
                 return None;
@@ -107,9 +111,28 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
     None
 }
 
+/// The verdict that the problem is infeasible, if the multipliers are a `proof`: all that are no rounding, or, so that it
+/// names what contradicts each other, the few largest that are one, and the bounds of inputs that it rests on.
+fn prove<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    sides: &[BoundSide<T>],
+    proof: &mut ActiveSet<T>,
+) -> Option<Status<T>> {
+    let all = T::default_epsilon().sqrt();
+    let mut of_largest = |share| {
+        list_multipliers(sides, share, proof);
+        infeasible(ocp, proof)
+    };
+    of_largest(all)?;
+    let few = LARGEST.into_iter().map(convert);
+    let verdict = few.chain([all]).find_map(of_largest);
+    list_input_bounds(ocp, proof);
+    verdict
+}
+
 /// Lists the hard bounds of states and rows with the multipliers of the interior-point method, as far as
-/// there are places and they count.
-fn list_multipliers<T: Scalar>(sides: &[BoundSide<T>], list: &mut ActiveSet<T>) {
+/// there are places and they are more than a `share` of the largest.
+fn list_multipliers<T: Scalar>(sides: &[BoundSide<T>], share: T, list: &mut ActiveSet<T>) {
     list.clear();
     let multipliers = sides.iter().filter(|side| side.may_contradict());
     let multipliers = multipliers.map(|side| (side.bound, side.interior.multiplier, side.size));
@@ -120,7 +143,7 @@ fn list_multipliers<T: Scalar>(sides: &[BoundSide<T>], list: &mut ActiveSet<T>) 
             most.max(multiplier * size)
         });
     for (bound, multiplier, size) in multipliers {
-        if multiplier * size > largest * T::default_epsilon().sqrt() {
+        if multiplier * size > largest * share {
             list.push(ActiveRow {
                 bound,
                 part: Part::Hard,

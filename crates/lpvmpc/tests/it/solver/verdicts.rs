@@ -5,8 +5,8 @@ use super::support::census::Counts;
 use super::support::precision::single;
 use super::support::{kind, solve, solve_with};
 use lpvmpc::{
-    ActiveSet, Bounds, Common, List, Ocp, Penalty, Scalar, Solution, SolverSettings, Status,
-    WarmStart, infeasibility_margin, kkt_residual,
+    ActiveSet, Bounds, Common, List, Ocp, Penalty, Quantity, Scalar, Side, Solution,
+    SolverSettings, Status, WarmStart, infeasibility_margin, kkt_residual,
 };
 use lpvmpc_testkit::rng::Rng;
 use nalgebra::{DMatrix, SMatrix, SVector};
@@ -155,7 +155,7 @@ fn the_earliest_cause_is_named_and_proved() {
     let Status::Infeasible(bound) = solution.status else {
         panic!("{}", solution.status);
     };
-    assert_eq!(bound.quantity, lpvmpc::Quantity::State(0));
+    assert_eq!(bound.quantity, Quantity::State(0));
     assert!(bound.stage < 12, "{bound}");
     assert!(infeasibility_margin(&ocp, &solution.active) > 0.0);
     // With room for the start the same multipliers prove nothing.
@@ -163,6 +163,44 @@ fn the_earliest_cause_is_named_and_proved() {
     assert!(infeasibility_margin(&ocp, &solution.active) <= 0.0);
     assert!(infeasibility_margin(&ocp, &ActiveSet::with_capacity(0)) <= 0.0);
     assert_eq!(kind(&solve(&ocp).status), "solved");
+}
+
+/// A cart that is too fast for the end of its track. The proof was all bounds that the interior-point method had a multiplier
+/// for, those of the other end of the track among them, and the bound of the input, without which there is no contradiction,
+/// was not in it.
+#[test]
+fn a_proof_names_what_contradicts_each_other() {
+    for (x0, target) in [([0.48, 2.0], 1.0), ([0.2, 1.5], 0.5), ([0.4, 3.0], 1.0)] {
+        let mut ocp = Ocp::<f64, 2, 1>::allocate(30);
+        ocp.x0 = SVector::from(x0);
+        let q = SMatrix::from_diagonal(&SVector::from([1.0, 0.1]));
+        for stage in &mut ocp.stages {
+            stage.a = SMatrix::from_row_slice(&[1.0, 0.1, 0.0, 1.0]);
+            stage.b = SMatrix::from([[0.005, 0.1]]);
+            stage.linear_x = SVector::from([-target, 0.0]);
+        }
+        (ocp.common.q, ocp.common.r) = (q, SMatrix::from([[0.01]]));
+        (ocp.terminal.p, ocp.terminal.linear_x) = (q, SVector::from([-target, 0.0]));
+        ocp.common.u = Bounds {
+            lower: SVector::from([-1.0]),
+            upper: SVector::from([1.0]),
+        };
+        (ocp.common.x.lower[0], ocp.common.x.upper[0]) = (-0.2, 0.5);
+        ocp.terminal.x = ocp.common.x;
+        let solution = answer(&ocp);
+        assert_eq!(kind(&solution.status), "infeasible");
+        assert!(infeasibility_margin(&ocp, &solution.active) > 0.0);
+        let mut inputs = 0;
+        for row in solution.active.iter() {
+            let side = match row.bound.quantity {
+                Quantity::Input(_) => Side::Lower,
+                _ => Side::Upper,
+            };
+            inputs += usize::from(side == Side::Lower);
+            assert_eq!(row.bound.side, side, "{x0:?}: {}", row.bound);
+        }
+        assert!(inputs > 0, "{x0:?}");
+    }
 }
 
 /// A soft bound of a state makes no terminal equality of it soft: what cannot be reached is proved to be out of reach.
