@@ -125,7 +125,13 @@ impl fmt::Display for Arrangement {
             changes.push(format!("wheel {} turns the other way", wheel + 1));
         }
         if self.turned_deg != 0.0 {
-            changes.push(format!("all azimuths are {:+} degrees", self.turned_deg));
+            let which = if self.turned_deg < 0.0 {
+                "smaller"
+            } else {
+                "larger"
+            };
+            let by = self.turned_deg.abs();
+            changes.push(format!("all azimuths are {by} degrees {which}"));
         }
         f.write_str(&changes.join(", "))
     }

@@ -273,7 +273,10 @@ fn whole_robot(
 ) -> Result<String, Box<dyn Error>> {
     let record = prepared.record(&RunHooks::NONE)?;
     let samples = prepared.samples;
-    let estimator = prepared.feedback.estimator.ok_or("it has no estimator")?;
+    let estimator = prepared.feedback.estimator.ok_or(
+        "it has no estimator, which a robot whose planes share their motors needs; write a table \
+         [controller.estimator], or leave out [controller.motors]",
+    )?;
     let plane = prepared.planes.first().ok_or("it has no plane")?;
     let period = plane.world.settings.period;
     let per_sample = (prepared.settings.t_s / period).round() as usize;

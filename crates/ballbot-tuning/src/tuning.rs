@@ -180,6 +180,13 @@ impl<'a, F: Files + Copy + Sync> Tuning<'a, F> {
         changes(&self.axes, values)
     }
 
+    /// Whether the start may be another than what the scenario says: a parameter has one of its own, or other keys that get
+    /// its value.
+    pub fn starts_elsewhere(&self) -> bool {
+        let mut tables = self.source.file().parameters.values();
+        tables.any(|table| table.start.is_some() || !table.also.is_empty())
+    }
+
     /// Searches. `done` are the entries of a journal, which are not run again; but the start is, so that
     /// a machine that computes differently is found out.
     ///

@@ -30,7 +30,7 @@ Examples:
   ballbot campaign example > my-campaign.toml  a campaign of your own: what varies, what is measured
   ballbot campaign my-campaign.toml            runs it
   ballbot campaign my-campaign.toml --shards 16 --cluster hyperqueue    on a cluster
-  ballbot campaign replay my-campaign.toml --run 4711    one of its runs, with a figure
+  ballbot campaign replay my-campaign.toml --run 17      one of its runs, with a figure
 
 A file with the key `scenario` is a campaign of your own: docs/campaigns.md. It writes runs.parquet,
 runs.csv (one row per run), summary.json and figures; the same file gives the same rows on any number

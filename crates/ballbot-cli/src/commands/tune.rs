@@ -27,7 +27,7 @@ Examples:
   ballbot tune example > my-tuning.toml      a commented tuning, to be changed
   ballbot tune my-tuning.toml                searches; results in out/my-tuning
   ballbot tune my-tuning.toml                after an interrupt: goes on where it was
-  ballbot tune my-tuning.toml --candidate 71 with another one of the Pareto front
+  ballbot tune my-tuning.toml --candidate 71 with another one, of the Pareto front
   ballbot tune my-tuning.toml --shards 16 --cluster hyperqueue    on a cluster
 
 Searches over keys of a scenario (weights, horizon, sampling time, drifts of the estimator) for goals

@@ -105,7 +105,10 @@ fn azimuths_that_are_a_quarter_turn_off_are_told() {
         let said = fails(&command(&config, &logs, all));
         assert_says(
             &said,
-            &["not as [log.wheels] says", "all azimuths are +90 degrees"],
+            &[
+                "not as [log.wheels] says",
+                "all azimuths are 90 degrees larger",
+            ],
         );
     }
     let said = fails(&command(&config, &logs, true));

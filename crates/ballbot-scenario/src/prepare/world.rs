@@ -106,12 +106,15 @@ impl WorldTable {
             (None, _) => robot.ballbot,
             (Some(seed), Some(uncertainty)) => uncertainty.draw(&robot.ballbot, seed)?,
             (Some(seed), None) => {
-                return Err(ScenarioError::value(
-                    "world.draw",
-                    seed,
-                    "the robot's parameters have no covariance; name a parameters.toml of `ballbot \
-                 identify` as parameters",
-                ));
+                let (whose, key) = match read {
+                    Some(_) => ("of world.parameters", "world.parameters, or leave that out"),
+                    None => ("the robot's parameters", "parameters"),
+                };
+                let expected = format!(
+                    "{whose} have no covariance to draw from; name a parameters.toml of `ballbot \
+                     identify` as {key}"
+                );
+                return Err(ScenarioError::value("world.draw", seed, expected));
             }
         };
         Ok((ballbot, robot.wheels))

@@ -188,7 +188,17 @@ fn there_must_be_a_covariance_to_draw_from() {
     };
     assert_says(
         &draw("robot.toml"),
-        &["world.draw", "no covariance", "identify"],
+        &["world.draw", "no covariance", "identify", "as parameters"],
+    );
+    let mut of_world = scenario("robot.toml");
+    of_world.world = Some(WorldTable {
+        draw: Some(1),
+        parameters: Some(of_world.parameters.clone()),
+        ..WorldTable::default()
+    });
+    assert_says(
+        &refusal(&of_world),
+        &["world.draw", "of world.parameters", "leave that out"],
     );
     for (name, from, to, words) in [
         ("negative.toml", "[1e-6,", "[-1e-6,", "negative variances"),

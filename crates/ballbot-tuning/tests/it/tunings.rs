@@ -179,6 +179,19 @@ fn what_is_found_is_better_and_its_text_is_that_scenario() {
     });
 }
 
+/// Where nothing was better than a `start` of the tuning's own, there was no scenario of it.
+#[test]
+fn a_start_of_ones_own_is_not_what_the_scenario_says() {
+    let starts_elsewhere = |text: &str| {
+        let (_folder, source) = written(text);
+        let tuning = Tuning::new(&source, source.folder(), PROGRAM).unwrap();
+        tuning.starts_elsewhere()
+    };
+    assert!(!starts_elsewhere(TWO_GOALS));
+    let with_start = TWO_GOALS.replace("[20.0, 2000.0] }", "[20.0, 2000.0], start = 30.0 }");
+    assert!(starts_elsewhere(&with_start));
+}
+
 #[test]
 fn values_that_make_no_scenario_are_refused_candidates_and_a_start_that_makes_none_is_an_error() {
     let text = TWO_GOALS.replace(

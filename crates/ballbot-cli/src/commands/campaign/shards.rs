@@ -1,6 +1,6 @@
 //! Parts of a campaign: run, counted and put together.
 
-use super::whole::{RowFiles, counted, pool};
+use super::whole::{PARQUET, RowFiles, counted, pool};
 use super::{CampaignArguments, Own, report, room};
 use crate::commands::CommandError;
 use crate::commands::hyperqueue::ranges;
@@ -77,7 +77,7 @@ impl Plan {
     /// The plan of a folder that has one.
     fn of(out: &Path) -> Result<Self, CommandError> {
         Self::read(out)?.ok_or_else(|| {
-            CommandError::Usage(format!(
+            CommandError::Impossible(format!(
                 "{} has no shards: `ballbot campaign FILE --shard 1/16 --out {}` runs the first of 16",
                 out.display(),
                 out.display()
@@ -329,8 +329,12 @@ pub(super) fn status(arguments: &StatusArguments) -> Result<String, CommandError
         .iter()
         .for_each(|problem| text += &format!("broken: {problem}\n"));
     if done == plan.shards as usize {
+        let already = match out.join(PARQUET).exists() {
+            true => "results are there already; again, ",
+            false => "",
+        };
         text += &format!(
-            "put them together with `ballbot campaign merge {}`\n",
+            "{already}put them together with `ballbot campaign merge {}`\n",
             out.display()
         );
     }

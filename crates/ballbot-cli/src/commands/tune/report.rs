@@ -91,7 +91,7 @@ pub(super) fn write(
             report.page(&html::figures(&figures)?).into_bytes(),
         ),
     ];
-    if found.chosen != 0 {
+    if found.chosen != 0 || tuning.starts_elsewhere() {
         let folder = tuning.source().folder();
         let renamed = |name: &str| moved::name(name, folder, results.path());
         let text = with_files(&tuning.document(&report.values)?, &renamed)?;
@@ -175,7 +175,7 @@ impl Report<'_> {
     /// What the comparison says, in a sentence.
     fn verdict(&self) -> String {
         if self.found.chosen == 0 {
-            return "nothing is better than the start, which stays".to_owned();
+            return "nothing is better than the start".to_owned();
         }
         let Some(comparisons) = &self.comparisons else {
             return "nothing in the worlds is random, so there are none that the search has not seen"

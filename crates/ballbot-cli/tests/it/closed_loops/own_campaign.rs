@@ -339,10 +339,13 @@ fn what_does_not_go_is_refused() {
         (vec!["--shard", "1/2"], "campaign of your own"),
         (vec!["mine.toml", "--shard", "3/2"], "3/2"),
         (vec!["mine.toml", "--cluster", "hyperqueue"], "--shards"),
-        (vec!["status", "."], "has no shards"),
     ] {
         let arguments = [vec!["campaign"], arguments].concat();
         assert_says(&fail(here, &arguments, 2), &[part]);
+    }
+    for command in ["status", "merge"] {
+        let said = fail(here, &["campaign", command, "nowhere"], 1);
+        assert_says(&said, &["nowhere has no shards"]);
     }
     // So many rows that no disk has room for them, and as many as are asked about.
     fs::write(
