@@ -307,11 +307,16 @@ fn is_alone(points: &[Point], index: usize) -> bool {
     points.get(index).is_some_and(finite) && !before && !after
 }
 
-/// Each value is held until the next point.
+/// Each value is held until the next point, but for one of an unknown place.
 fn held(points: &[Point]) -> Vec<Point> {
-    let corners = points
-        .windows(2)
-        .flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]);
+    let corners = points.windows(2).flat_map(|pair| {
+        let value = if pair[0].0.is_finite() {
+            pair[0].1
+        } else {
+            f64::NAN
+        };
+        [pair[0], (pair[1].0, value)]
+    });
     corners.chain(points.last().copied()).collect()
 }
 
@@ -378,6 +383,30 @@ mod tests {
             corners,
             [(0.0, 1.0), (1.0, 1.0), (1.0, 3.0), (2.0, 3.0), (2.0, 2.0)]
         );
+    }
+
+    #[test]
+    fn a_value_of_an_unknown_place_is_not_held() {
+        let corners = held(&[(f64::NAN, 1.0), (1.0, 3.0)]);
+        assert!(
+            corners[1].1.is_nan() && corners[2] == (1.0, 3.0),
+            "{corners:?}"
+        );
+    }
+
+    #[test]
+    fn a_line_from_far_outside_ends_at_the_edge() {
+        let area = Rect {
+            left: 0.0,
+            top: 0.0,
+            width: 10.0,
+            height: 10.0,
+        };
+        for far in [1e18, -1e18] {
+            let pieces = clipped(&[(5.0, far), (5.0, 4.0), (far, 4.0)], &area);
+            let edge = if far > 0.0 { 10.0 } else { 0.0 };
+            assert_eq!(pieces, [[(5.0, edge), (5.0, 4.0), (edge, 4.0)]]);
+        }
     }
 
     #[test]

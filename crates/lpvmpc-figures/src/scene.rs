@@ -158,30 +158,46 @@ impl Rect {
     /// The part of the segment from `a` to `b` inside (Liang and Barsky 1984).
     pub fn clip(&self, a: Point, b: Point) -> Option<(Point, Point)> {
         let (dx, dy) = (b.0 - a.0, b.1 - a.1);
-        let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
-        for (slope, distance) in [
-            (-dx, a.0 - self.left),
-            (dx, self.right() - a.0),
-            (-dy, a.1 - self.top),
-            (dy, self.bottom() - a.1),
-        ] {
+        // The parts of the segment at which it crosses an edge into and out of the area, with that edge.
+        let (mut enter, mut leave) = ((0.0_f64, None), (1.0_f64, None));
+        let edges = [
+            (-dx, a.0 - self.left, Edge::At(self.left)),
+            (dx, self.right() - a.0, Edge::At(self.right())),
+            (-dy, a.1 - self.top, Edge::Level(self.top)),
+            (dy, self.bottom() - a.1, Edge::Level(self.bottom())),
+        ];
+        for (slope, distance, edge) in edges {
+            let part = distance / slope;
             if slope == 0.0 {
                 if distance < 0.0 {
                     return None;
                 }
-            } else if slope < 0.0 {
-                enter = enter.max(distance / slope);
-            } else {
-                leave = leave.min(distance / slope);
+            } else if slope < 0.0 && part > enter.0 {
+                enter = (part, Some(edge));
+            } else if slope > 0.0 && part < leave.0 {
+                leave = (part, Some(edge));
             }
         }
-        let at = |part: f64| (a.0 + part * dx, a.1 + part * dy);
-        (enter <= leave).then(|| {
-            let start = if enter > 0.0 { at(enter) } else { a };
-            let end = if leave < 1.0 { at(leave) } else { b };
+        // What comes from far outside is rounded by more than the area is large.
+        let crossing = |part: f64, edge: Edge| match edge {
+            Edge::At(x) => (x, (a.1 + part * dy).clamp(self.top, self.bottom())),
+            Edge::Level(y) => ((a.0 + part * dx).clamp(self.left, self.right()), y),
+        };
+        (enter.0 <= leave.0).then(|| {
+            let start = enter.1.map_or(a, |edge| crossing(enter.0, edge));
+            let end = leave.1.map_or(b, |edge| crossing(leave.0, edge));
             (start, end)
         })
     }
+}
+
+/// A side of an area.
+#[derive(Clone, Copy)]
+enum Edge {
+    /// Upright, at this x.
+    At(f64),
+    /// Level, at this y.
+    Level(f64),
 }
 
 impl Scene {
