@@ -115,9 +115,9 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         let mut least = -T::one();
         rows::violated_bounds(ocp, trajectory, &mut |candidate| {
             // Negated, so that a violation that is NaN counts; it stays the worst.
-            if worst.is_none_or(|worst| worst.slack.is_finite())
-                && !(candidate.violation <= self.tolerance)
-                && !(candidate.rank <= least)
+            if !(candidate.rank <= least)
+                && worst.is_none_or(|worst| worst.slack.is_finite())
+                && !(candidate.violation() <= self.tolerance)
                 && let Some(part) = self.free_part(&candidate)
             {
                 least = candidate.rank;
@@ -126,16 +126,17 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         });
         for row in self.resting.iter().filter(|row| row.exceeded) {
             let slack = rows::slack(ocp, trajectory, &row.bound);
-            let violation = slack / rows::size(ocp, &row.bound);
+            let limits = rows::limits(ocp, &row.bound);
+            let violation = slack / rows::size_of_bound(limits.0, limits.1);
             let rank = slack / rows::room(ocp, &row.bound);
-            if violation > self.tolerance && rank > least {
+            if rank > least && violation > self.tolerance {
                 least = rank;
                 worst = Some(Candidate {
                     bound: row.bound,
                     part: row.part,
                     soft: rows::soft_price(ocp, &row.bound),
                     slack,
-                    violation,
+                    limits,
                     rank,
                 });
             }
@@ -145,11 +146,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
 
     /// The part of the candidate's price that is neither in the working set nor exceeded.
     fn free_part(&self, candidate: &Candidate<T>) -> Option<Part> {
-        let held = |part| {
-            let same = |row: &ActiveRow<T>| row.bound == candidate.bound && row.part == part;
-            self.working.rows().iter().any(|row| same(&row.active))
-                || self.resting.iter().any(|row| same(&row))
-        };
+        let held = |part| self.has(&candidate.bound, part);
         match candidate.soft {
             None => (!held(Part::Hard)).then_some(Part::Hard),
             Some(price) if price.linear > T::zero() && !held(Part::Linear) => Some(Part::Linear),
@@ -160,6 +157,14 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
                     .then_some(Part::Quadratic)
             }
         }
+    }
+
+    /// Whether this part of the bound's price is in the working set or exceeded.
+    #[inline(never)]
+    fn has(&self, bound: &BoundId, part: Part) -> bool {
+        let same = |row: &ActiveRow<T>| row.bound == *bound && row.part == part;
+        self.working.rows().iter().any(|row| same(&row.active))
+            || self.resting.at(bound.stage).any(|row| same(&row))
     }
 
     /// Makes every component of the terminal equality a row that is always active.
@@ -360,7 +365,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         violated: &Candidate<T>,
         slack: T,
     ) -> Result<(), Status<T>> {
-        let violation = violated.violation * (slack / violated.slack).abs();
+        let violation = violated.violation() * (slack / violated.slack).abs();
         if violation <= self.loosest && violated.part == Part::Hard {
             self.rest(self.candidate.terms.reported())
         } else {

@@ -3,7 +3,7 @@
 use crate::model::Scalar;
 use crate::ocp::{Common, Ocp};
 use crate::rows::{self, Trajectory};
-use crate::small_matrix::transposed_sizes;
+use crate::small_matrix::{product, transposed_sizes, transposed_times};
 use crate::solution::ActiveSet;
 use nalgebra::SVector;
 
@@ -42,8 +42,8 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> Adjoint<'a, T, NX, NU> {
         let stage = ocp.length();
         let (mut costate, _) = rows::gradient(ocp, active.at(stage));
         if let Some(trajectory) = trajectory {
-            let end = &ocp.terminal;
-            costate += end.p * trajectory.state(ocp, stage) + end.linear_x;
+            let (end, x) = (&ocp.terminal, trajectory.state(ocp, stage));
+            costate += product(&end.p, &x) + end.linear_x;
         }
         Self {
             ocp,
@@ -59,14 +59,14 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> Adjoint<'a, T, NX, NU> {
         let stage = self.ocp.stages.get(self.stage)?;
         let costate = self.costate;
         let (rows_x, rows_u) = rows::gradient(self.ocp, active.at(self.stage));
-        let mut gradient = stage.b.tr_mul(&costate) + rows_u;
-        self.costate = stage.a.tr_mul(&costate) + rows_x;
+        let mut gradient = transposed_times(&stage.b, &costate) + rows_u;
+        self.costate = transposed_times(&stage.a, &costate) + rows_x;
         if let Some(trajectory) = self.trajectory {
             let x = trajectory.state(self.ocp, self.stage);
             let u = trajectory.u.get(self.stage)?;
             let Common { q, r, s, .. } = self.ocp.common_at(self.stage);
-            gradient += r * u + s * x + stage.linear_u;
-            self.costate += q * x + s.tr_mul(u) + stage.linear_x;
+            gradient += product(r, u) + product(s, &x) + stage.linear_u;
+            self.costate += product(q, &x) + transposed_times(s, u) + stage.linear_x;
         }
         Some(AdjointStage {
             stage: self.stage,
@@ -75,5 +75,19 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> Adjoint<'a, T, NX, NU> {
             dynamics: transposed_sizes(&stage.b, &costate),
             rows: rows_u,
         })
+    }
+
+    /// Of a single input that holds component `j` of the state behind the stage that was visited last: what one more unit
+    /// of that state costs. The input has no gradient then.
+    pub fn hold_state(&mut self, at: &AdjointStage<T, NX, NU>, j: usize) -> T {
+        let Some(stage) = self.ocp.stages.get(at.stage) else {
+            return T::zero();
+        };
+        let component = |column: &[T; NX]| column.get(j).copied().unwrap_or(T::zero());
+        let slope = at.gradient[0] / component(&stage.b.data.0[0]);
+        for (costate, a) in self.costate.data.0[0].iter_mut().zip(&stage.a.data.0) {
+            *costate -= component(a) * slope;
+        }
+        slope
     }
 }

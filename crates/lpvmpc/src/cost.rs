@@ -43,9 +43,20 @@ fn price_of_rows<T: Scalar, const NX: usize, const NU: usize>(
     x: &SVector<T, NX>,
     u: Option<&SVector<T, NU>>,
 ) -> T {
-    if ocp.rows_per_stage == 0 {
-        return T::zero();
+    // Most programs have none, which is not worth a call.
+    match ocp.rows_per_stage {
+        0 => T::zero(),
+        _ => price_of_some_rows(ocp, stage, x, u),
     }
+}
+
+#[inline(never)]
+fn price_of_some_rows<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    stage: usize,
+    x: &SVector<T, NX>,
+    u: Option<&SVector<T, NU>>,
+) -> T {
     ocp.rows_of(stage).iter().fold(T::zero(), |total, row| {
         let price = row.soft.map_or(T::zero(), |penalty| {
             penalty.of(excess(row.value(x, u), row.lower, row.upper))

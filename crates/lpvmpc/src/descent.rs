@@ -235,7 +235,7 @@ where
         };
         workspace
             .solver
-            .solve(&workspace.ocp, &settings, &mut self.solution);
+            .solve_for_factors(&workspace.ocp, &settings, &mut self.solution);
         self.problems += 1;
         self.take_feedback(workspace);
     }

@@ -108,10 +108,11 @@ fn primal<T: Scalar, const NX: usize, const NU: usize>(
     rows::violated_bounds(ocp, trajectory, &mut |candidate| {
         if candidate.soft.is_none() {
             // Relative to the bound's size, but at least to 1.
-            let relative = if candidate.violation >= -candidate.slack {
+            let violation = candidate.violation();
+            let relative = if violation >= -candidate.slack {
                 -candidate.slack
             } else {
-                candidate.violation
+                violation
             };
             largest = larger(largest, relative);
         }

@@ -23,8 +23,10 @@ mod search;
 mod side;
 mod span;
 mod start;
+mod turns;
 
 pub(crate) use side::BoundSide;
+pub(crate) use turns::cap_with_later_turn;
 
 use crate::list::List;
 use crate::model::Scalar;
@@ -42,6 +44,7 @@ use retries::AllRetries;
 use search::search;
 use side::Role;
 use span::Span;
+use turns::{AtOnce, Turn};
 
 /// So many factorisations for each guess of the interior-point method that is tried.
 const TRIAL: usize = 5;
@@ -59,44 +62,6 @@ const STAGES: usize = 16;
 /// no answer: one in so many.
 const SHARE: usize = 4;
 
-/// When it has its turn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Turn {
-    /// Before the dual method, if there are many bounds.
-    First,
-    /// After it has come to no end in as many changes as it was given, or at all.
-    Later,
-}
-
-/// What comes of it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum AtOnce<T> {
-    /// It was not tried, and nothing has changed.
-    Untried,
-    /// No bound is violated: the trajectory without bounds is the answer.
-    Kept,
-    /// The solution, or the proof that there is none.
-    Done(Result<(), Status<T>>),
-    /// Neither: the trajectory without bounds is in the solution, and the active rows are those to begin with: of the last
-    /// solution at their new stages, if they are to be begun with. It has a later turn after so many changes, if any.
-    InVain(Option<usize>),
-}
-
-/// The least cap with which a problem with so many `entries` of state and input has a later turn.
-pub(crate) fn cap_with_later_turn(entries: usize) -> usize {
-    SHARE * MOST_FACTORISATIONS * entries
-}
-
-/// Changes of the active set, out of a `cap` for all, that are kept back until a problem with so many `entries` of state
-/// and input has had its later turn: all but those of the phase; none where it has no such turn, since the dual method
-/// would lack them.
-pub(crate) fn kept_for_later_turn(cap: usize, entries: usize) -> usize {
-    if cap < cap_with_later_turn(entries) {
-        return 0;
-    }
-    cap - MOST_FACTORISATIONS * entries
-}
-
 /// Memory of the phase, beside the step that knows it: a solver without it has no machine code for it.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
@@ -107,7 +72,8 @@ pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
     retries: AllRetries,
     /// Whether its turn in this solve was put off.
     put_off: bool,
-    pub run: Run<T, NX, NU>,
+    /// The solver with it.
+    pub in_turns: InTurns<T, NX, NU>,
     /// Takes down the last answer, before it is overwritten.
     pub keep: fn(&mut Self, &Solution<T, NX, NU>),
 }
@@ -136,17 +102,15 @@ impl<T, const NX: usize, const NU: usize> ManyBoundsPlace<T, NX, NU> {
     }
 }
 
-/// Solves the problem, or proves that it is infeasible; counts changes of the active set. A turn begins with the
-/// trajectory without bounds in the solution; where the active rows of the last one are to be begun with, they are so many
-/// stages later.
-type Run<T, const NX: usize, const NU: usize> = fn(
-    &mut ManyBounds<T, NX, NU>,
+/// Solves the problem, whose trajectory without bounds is in the solution, or proves that it is infeasible; counts changes
+/// of the active set.
+type InTurns<T, const NX: usize, const NU: usize> = fn(
     &mut Solver<T, NX, NU>,
     &Ocp<T, NX, NU>,
     Option<usize>,
     &mut Solution<T, NX, NU>,
-    (Turn, &mut usize),
-) -> AtOnce<T>;
+    &mut usize,
+) -> Result<(), Status<T>>;
 
 impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
     pub fn new(places: [ManyBoundsPlace<T, NX, NU>; 2], sides: List<BoundSide<T>>) -> Self {
@@ -155,7 +119,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             sides,
             retries: AllRetries::default(),
             put_off: false,
-            run: Self::solve,
+            in_turns: Solver::solve_in_turns,
             keep: Self::keep_states,
         }
     }
@@ -174,6 +138,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         }
     }
 
+    /// Solves the problem, or proves that it is infeasible; counts changes of the active set. A turn begins with the
+    /// trajectory without bounds in the solution; where the active rows of the last one are to be begun with, they are so many
+    /// stages later.
     fn solve(
         &mut self,
         solver: &mut Solver<T, NX, NU>,

@@ -1,5 +1,6 @@
 //! The memory of solver and controller: how much of it a horizon takes, and where it comes from.
 
+use crate::held_bounds::{HeldAt, HeldBound};
 use crate::list::List;
 use crate::many_bounds::{BoundSide, ManyBounds, ManyBoundsPlace};
 use crate::model::Scalar;
@@ -68,7 +69,7 @@ pub struct SolverMemory<T: 'static, const NX: usize, const NU: usize> {
     /// One for each stage.
     pub(crate) factors: List<StageFactor<T, NX, NU>>,
     /// Inputs at their bounds, one for each stage.
-    pub(crate) held: List<[Option<Side>; NU]>,
+    pub(crate) held: List<HeldAt<NU>>,
     /// What the dual method works with.
     pub(crate) dual: DualMemory<T, NU>,
     /// Of the first phase: no entry, or one.
@@ -142,7 +143,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
         let numbers = || List::repeat(T::zero(), rows);
         Self {
             factors: List::repeat(StageFactor::zeros(), stages),
-            held: List::repeat([None; NU], stages),
+            held: List::repeat([HeldBound::NOTHING; NU], stages),
             dual: DualMemory {
                 deviations: core::array::from_fn(|_| deviations()),
                 terms: List::repeat(Terms::empty(), rows),
@@ -251,7 +252,7 @@ fn sides_of<const NX: usize, const NU: usize>(capacity: Capacity) -> usize {
 pub struct SolverArrays<T, const NX: usize, const NU: usize, const N: usize, const M: usize> {
     factors: [StageFactor<T, NX, NU>; N],
     deviations: [[SVector<T, NU>; N]; 4],
-    held: [[Option<Side>; NU]; N],
+    held: [HeldAt<NU>; N],
     terms: [Terms<T>; M],
     resting: [PackedRow<T>; M],
     basis: [[SVector<T, NU>; N]; M],
@@ -288,7 +289,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const M: usize
         Self {
             factors: [StageFactor::zeros(); N],
             deviations: [[SVector::zeros(); N]; 4],
-            held: [[None; NU]; N],
+            held: [[HeldBound::NOTHING; NU]; N],
             terms: [Terms::empty(); M],
             resting: [PackedRow::empty(); M],
             basis: [[SVector::zeros(); N]; M],

@@ -69,13 +69,15 @@ impl<T: Scalar, const K: usize> Bounds<T, K> {
         let (lower, upper) = (&self.lower.data.0[0], &self.upper.data.0[0]);
         let sides = lower.iter().zip(upper);
         let value = &value.data.0[0];
-        // Without early exit, so that the comparisons need no branches.
-        value
-            .iter()
-            .zip(sides)
-            .fold(true, |hold, (v, (lower, upper))| {
+        let mut values = value.iter().zip(sides);
+        if cfg!(feature = "alloc") {
+            // Without early exit the comparisons need no branches.
+            values.fold(true, |hold, (v, (lower, upper))| {
                 hold & (*v >= *lower) & (*v <= *upper)
             })
+        } else {
+            values.all(|(v, (lower, upper))| *v >= *lower && *v <= *upper)
+        }
     }
 
     /// `value` moved into the bounds; a component that is not finite becomes the admissible

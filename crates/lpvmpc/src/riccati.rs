@@ -12,7 +12,8 @@ use crate::ocp::{Common, Stage};
 use crate::products::{self, Vectors};
 use crate::products::{Compiled, Products};
 use crate::small_matrix::{
-    add_product, mirror, product, transposed, transposed_product, transposed_times,
+    add_product, add_symmetric_product, mirror, product, transposed, transposed_product,
+    transposed_times,
 };
 use nalgebra::{SMatrix, SVector};
 
@@ -290,6 +291,42 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         };
     }
 
+    /// Of a single input, behind [`Self::eliminate`]: makes it what takes component `j` of the next state to
+    /// `value`, whatever that costs.
+    pub(crate) fn hold_state(
+        &mut self,
+        stage: &Stage<T, NX, NU>,
+        j: usize,
+        value: T,
+        cost_to_go: &mut CostToGo<T, NX>,
+    ) -> Result<(), BadPivot<T>> {
+        let component = |column: &[T; NX]| column.get(j).copied().unwrap_or(T::zero());
+        let b = component(&stage.b.data.0[0]);
+        let per_unit = T::one() / b;
+        if !per_unit.is_finite() {
+            return Err(BadPivot(b));
+        }
+        // It differs from the best input by e + d'x, and half of the square of that by H is what it costs more.
+        let root = self.inverse_factor[(0, 0)];
+        let h = T::one() / (root * root);
+        let mut d = SVector::<T, NX>::zeros();
+        let laws = self.feedback.data.0.iter_mut().zip(&stage.a.data.0);
+        for (d, (law, a)) in d.data.0[0].iter_mut().zip(laws) {
+            let held = -component(a) * per_unit;
+            *d = held - law[0];
+            law[0] = held;
+        }
+        let held = (value - component(&stage.c.data.0[0])) * per_unit;
+        let e = held - self.feedforward[0];
+        self.feedforward[0] = held;
+        self.inverse_factor[(0, 0)] = T::zero();
+        let CostToGo { quadratic, linear } = cost_to_go;
+        add_symmetric_product(quadratic, &d, &transposed(&(d * h)));
+        mirror(quadratic);
+        *linear += d * (h * e);
+        Ok(())
+    }
+
     /// The input at the state `x` with the normalised deviation `v`.
     #[inline(always)]
     pub fn policy(&self, x: &SVector<T, NX>, v: &SVector<T, NU>) -> SVector<T, NU> {
@@ -375,5 +412,70 @@ impl<T: Scalar, const K: usize> UnitFactor<T, K> {
             inverse,
             reciprocals,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix2, RowVector2, Vector2};
+
+    /// The cost-to-go in front of a stage whose input holds a state is the cost of the stage and of what comes behind it
+    /// under the law that keeps that state where it is, from any state.
+    #[test]
+    fn an_input_that_holds_a_state_costs_what_its_law_costs() {
+        let stage = Stage::<f64, 2, 1> {
+            a: Matrix2::new(1.0, 0.1, -0.3, 0.9),
+            b: Vector2::new(0.02, 0.4),
+            c: Vector2::new(0.1, -0.2),
+            linear_x: Vector2::new(0.5, -1.0),
+            linear_u: SVector::from_element(0.7),
+        };
+        let weights = Common::<f64, 2, 1> {
+            q: Matrix2::new(2.0, 0.3, 0.3, 1.0),
+            r: SMatrix::from_element(0.5),
+            s: RowVector2::new(0.1, -0.2),
+            ..Common::default()
+        };
+        let behind = CostToGo {
+            quadratic: Matrix2::new(3.0, -0.5, -0.5, 4.0),
+            linear: Vector2::new(-2.0, 1.0),
+        };
+        let value = |cost: &CostToGo<f64, 2>, x: &Vector2<f64>| {
+            (cost.quadratic * x / 2.0 + cost.linear).dot(x)
+        };
+        for (j, level) in [(0, 0.8), (1, -0.6)] {
+            let mut factor = StageFactor::zeros();
+            let mut cost_to_go = behind;
+            factor.eliminate(&stage, &weights, &mut cost_to_go).unwrap();
+            factor
+                .hold_state(&stage, j, level, &mut cost_to_go)
+                .unwrap();
+            let cost = |x: &Vector2<f64>| {
+                let u = factor.policy(x, &SVector::from_element(7.0));
+                let next = stage.next(x, &u);
+                assert!((next[j] - level).abs() < 1e-12);
+                let of_stage = (weights.q * x / 2.0 + stage.linear_x).dot(x)
+                    + (weights.r * u / 2.0 + weights.s * x + stage.linear_u).dot(&u);
+                of_stage + value(&behind, &next)
+            };
+            let at_zero = cost(&Vector2::zeros());
+            for x in [Vector2::new(1.0, 0.0), Vector2::new(-0.4, 2.0)] {
+                let difference = cost(&x) - at_zero - value(&cost_to_go, &x);
+                assert!(difference.abs() < 1e-10, "{j}: {difference}");
+            }
+            let Err(BadPivot(pivot)) = factor.hold_state(
+                &Stage {
+                    b: Vector2::zeros(),
+                    ..stage
+                },
+                j,
+                level,
+                &mut cost_to_go,
+            ) else {
+                panic!("an input that does not move the state");
+            };
+            assert_eq!(pivot, 0.0);
+        }
     }
 }

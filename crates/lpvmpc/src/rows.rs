@@ -31,10 +31,17 @@ pub(crate) struct Candidate<T> {
     pub soft: Option<Penalty<T>>,
     /// Distance inside the bound; negative outside.
     pub slack: T,
-    /// `-slack` in units of the bound's own size: what is compared with the tolerance.
-    pub violation: T,
+    /// Lower and upper limit.
+    pub limits: (T, T),
     /// `-slack` in units of the bound's room: by what candidates are ranked.
     pub rank: T,
+}
+
+impl<T: Scalar> Candidate<T> {
+    /// `-slack` in units of the bound's own size: what is compared with the tolerance.
+    pub fn violation(&self) -> T {
+        self.slack.abs() / size_of_bound(self.limits.0, self.limits.1)
+    }
 }
 
 /// The size by which violations are ranked: half the width of the bound, which does not depend on
@@ -135,7 +142,7 @@ fn violated_side<T: Scalar>(
             part: Part::Hard,
             soft: *soft,
             slack,
-            violation: -slack / size_of_bound(lower, upper),
+            limits: (lower, upper),
             rank: -slack / room_of_bound(lower, upper),
         });
     }
@@ -175,9 +182,20 @@ fn violated_rows<T: Scalar, const NX: usize, const NU: usize>(
     u: Option<&SVector<T, NU>>,
     visit: &mut impl FnMut(Candidate<T>),
 ) {
-    if ocp.rows_per_stage == 0 {
-        return;
+    // Most programs have none, which is not worth a call.
+    if ocp.rows_per_stage > 0 {
+        visit_violated_rows(ocp, stage, x, u, visit);
     }
+}
+
+#[inline(never)]
+fn visit_violated_rows<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    stage: usize,
+    x: &SVector<T, NX>,
+    u: Option<&SVector<T, NU>>,
+    visit: &mut impl FnMut(Candidate<T>),
+) {
     for (j, row) in ocp.rows_of(stage).iter().enumerate() {
         let sides = (row.lower, row.upper);
         violated_side(

@@ -129,6 +129,15 @@ pub(crate) fn transposed_times<T: Scalar, const R: usize, const C: usize>(
     v: &SVector<T, R>,
 ) -> SVector<T, C> {
     let mut out = SVector::zeros();
+    if !cfg!(feature = "alloc") {
+        // A microcontroller has neither the registers for two sums nor units that would wait.
+        for (out, column) in out.data.0[0].iter_mut().zip(&a.data.0) {
+            for (a, v) in column.iter().zip(&v.data.0[0]) {
+                *out += *a * *v;
+            }
+        }
+        return out;
+    }
     let (pairs, last) = v.data.0[0].as_chunks::<2>();
     for (out, column) in out.data.0[0].iter_mut().zip(&a.data.0) {
         let (columns, rest) = column.as_chunks::<2>();

@@ -109,6 +109,8 @@ pub struct ActiveSet<T: 'static> {
     len: usize,
     /// For so many solves more its rows are not expected to be active again unless they are violated.
     pub(crate) doubted: u8,
+    /// And for so many they are not held by the factorisation.
+    pub(crate) not_held: u8,
 }
 
 impl<T: Scalar> PartialEq for ActiveSet<T> {
@@ -191,6 +193,7 @@ impl<T: Scalar> ActiveSet<T> {
             rows,
             len: 0,
             doubted: 0,
+            not_held: 0,
         }
     }
 
@@ -205,6 +208,7 @@ impl<T: Scalar> ActiveSet<T> {
         copy(&mut self.rows, &other.rows);
         self.len = other.len.min(self.rows.len());
         self.doubted = other.doubted;
+        self.not_held = other.not_held;
     }
 
     /// The active rows, in no particular order.
@@ -414,6 +418,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solution<T, NX, NU> {
         self.status = Status::Solved;
         self.active.clear();
         self.active.doubted = 0;
+        self.active.not_held = 0;
         self.changes = 0;
     }
 

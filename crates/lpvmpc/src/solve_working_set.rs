@@ -23,25 +23,10 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         trajectory: &Trajectory<'_, T, NX, NU>,
         (before, shift): (&ActiveSet<T>, usize),
     ) -> Result<bool, Status<T>> {
-        let known = |row: ActiveRow<T>| {
-            let hard = row.part == Part::Hard && row.bound.side != Side::Equality;
-            let stage = row.bound.stage.checked_sub(shift)?;
-            // The state at stage 0 is given, the input at the end does not exist.
-            let free = match row.bound.quantity {
-                Quantity::State(_) => stage > 0 && stage <= ocp.length(),
-                Quantity::Input(_) => stage < ocp.length(),
-                Quantity::Row(_) => stage <= ocp.length(),
-            };
-            if !hard || !free {
-                return None;
-            }
-            let bound = BoundId { stage, ..row.bound };
-            // The bound may have gone, or become soft, since.
-            let slack = rows::slack(ocp, trajectory, &bound);
-            let holds = slack.is_finite() && rows::soft_price(ocp, &bound).is_none();
-            holds.then_some((bound, slack < T::zero()))
+        let known = || {
+            let known = |row| known_row(ocp, trajectory, &row, shift);
+            before.iter().filter_map(known)
         };
-        let known = || before.iter().filter_map(known);
         if !known().any(|(_, violated)| violated) {
             return Ok(false);
         }
@@ -202,6 +187,33 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         };
         rows::subtract(ocp, factors, places, active_at, &mut self.rest);
     }
+}
+
+/// The bound of an active row, `shift` stages earlier, and whether the trajectory violates it; `None` where it is none to
+/// begin with.
+#[inline(never)]
+fn known_row<T: Scalar, const NX: usize, const NU: usize>(
+    ocp: &Ocp<T, NX, NU>,
+    trajectory: &Trajectory<'_, T, NX, NU>,
+    row: &ActiveRow<T>,
+    shift: usize,
+) -> Option<(BoundId, bool)> {
+    let hard = row.part == Part::Hard && row.bound.side != Side::Equality;
+    let stage = row.bound.stage.checked_sub(shift)?;
+    // The state at stage 0 is given, the input at the end does not exist.
+    let free = match row.bound.quantity {
+        Quantity::State(_) => stage > 0 && stage <= ocp.length(),
+        Quantity::Input(_) => stage < ocp.length(),
+        Quantity::Row(_) => stage <= ocp.length(),
+    };
+    if !hard || !free {
+        return None;
+    }
+    let bound = BoundId { stage, ..row.bound };
+    // The bound may have gone, or become soft, since.
+    let slack = rows::slack(ocp, trajectory, &bound);
+    let holds = slack.is_finite() && rows::soft_price(ocp, &bound).is_none();
+    holds.then_some((bound, slack < T::zero()))
 }
 
 /// What is missing for `row` to hold with equality on the trajectory.

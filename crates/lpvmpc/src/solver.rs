@@ -4,9 +4,9 @@
 use crate::active_set::DualActiveSet;
 use crate::cost::cost;
 use crate::farkas::infeasibility_margin;
-use crate::held_inputs::{HeldInputs, eliminate_held};
+use crate::held_bounds::{HeldBounds, eliminate_held};
 use crate::list::List;
-use crate::many_bounds::{AtOnce, ManyBounds, Turn, kept_for_later_turn};
+use crate::many_bounds::ManyBounds;
 #[cfg(feature = "alloc")]
 use crate::memory::Capacity;
 use crate::memory::SolverMemory;
@@ -22,7 +22,18 @@ use nalgebra::SVector;
 /// Up to one change in vain for so many known rows is few. After more of them the known rows are doubted
 const FEW_WASTED: usize = 4;
 /// for so many solves.
-const DOUBT: u8 = 8;
+pub(crate) const DOUBT: u8 = 8;
+
+/// What a search begins with.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Start {
+    /// No active rows.
+    Nothing,
+    /// Those of the last answer, so many stages earlier.
+    Last(usize),
+    /// No rows beside the bounds that are held; whoever holds them judges the answer.
+    Held,
+}
 
 /// The solver with its memory, for `NX` states and `NU` inputs. No answer depends on the solves
 /// before, but how often many bounds are tried at once does; one solver serves any number of problems. Where a problem needs more places for active bounds than
@@ -32,10 +43,10 @@ const DOUBT: u8 = 8;
 pub struct Solver<T: 'static, const NX: usize, const NU: usize> {
     pub(crate) factors: List<StageFactor<T, NX, NU>>,
     pub(crate) dual: DualActiveSet<T, NU>,
-    /// None but within [`Solver::search_with_held_inputs`].
-    pub(crate) held: HeldInputs<NU>,
+    /// None but within [`Solver::search_with_held_inputs`] and [`Solver::solve_from_last`].
+    pub(crate) held: HeldBounds<NU>,
     /// The phase for many bounds, if there is memory for it; no entry or one.
-    many_bounds: List<ManyBounds<T, NX, NU>>,
+    pub(crate) many_bounds: List<ManyBounds<T, NX, NU>>,
     /// The longest horizon that there is memory for.
     stages: usize,
 }
@@ -48,7 +59,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             stages,
             factors: memory.factors,
             dual: DualActiveSet::new(memory.dual),
-            held: HeldInputs::none(memory.held),
+            held: HeldBounds::none(memory.held),
             many_bounds: memory.many_bounds,
         }
     }
@@ -71,6 +82,31 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU>,
     ) {
+        let mut settings = *settings;
+        let mut spent = 0;
+        if NU == 1
+            && let Some(shift) = shift_of_last(&settings, solution)
+        {
+            (spent, settings.warm_start) =
+                match self.solve_from_last(ocp, &settings, shift, solution) {
+                    Ok(()) => return,
+                    Err(tried) => tried,
+                };
+            let cap = settings.max_changes.unwrap_or(default_cap(ocp));
+            settings.max_changes = Some(cap.saturating_sub(spent));
+        }
+        self.solve_for_factors(ocp, &settings, solution);
+        solution.changes += spent;
+    }
+
+    /// The same for who needs the factors of the problem itself, too.
+    #[inline(never)]
+    pub(crate) fn solve_for_factors(
+        &mut self,
+        ocp: &Ocp<T, NX, NU>,
+        settings: &SolverSettings<T>,
+        solution: &mut Solution<T, NX, NU>,
+    ) {
         let factorized = self.factorize(ocp);
         self.solve_factorized(factorized, ocp, settings, solution);
     }
@@ -85,69 +121,26 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         settings: &SolverSettings<T>,
         solution: &mut Solution<T, NX, NU>,
     ) {
-        let tolerance = Some(settings.tolerance).filter(|t| *t > T::zero() && t.is_finite());
-        let cap = settings.max_changes.unwrap_or(default_cap(ocp));
-        self.dual
-            .reset(tolerance.unwrap_or_else(default_tolerance), cap);
+        self.begin(ocp, settings);
         let mut spent = 0;
-        let room = self.stages.min(solution.u.len()).min(solution.x.len());
-        let factorized = if ocp.horizon.max(1) > room.min(ocp.stages.len()) {
-            Err(Status::HorizonTooLong)
-        } else {
-            factorized
+        let factorized = match self.has_room(ocp, solution) {
+            true => factorized,
+            false => Err(Status::HorizonTooLong),
         };
         if let Some(phase) = self.many_bounds.first_mut() {
             let keep = phase.keep;
             keep(phase, solution);
         }
-        let mut shift = shift_of_last(settings, solution);
+        let shift = shift_of_last(settings, solution);
         if shift.is_none() {
             // Nothing is known that could be doubted.
-            solution.active.doubted = 0;
+            (solution.active.doubted, solution.active.not_held) = (0, 0);
         }
         let begun = factorized.and_then(|()| self.roll_out(ocp, solution));
-        let outcome = begun.and_then(|()| {
-            // Where all bounds at once were not tried, or not yet, they are when the search gets long, or rounding has ended it.
-            let phase = self.many_bounds.first();
-            let mut kept_back = match phase.is_some_and(|phase| phase.has_room(ocp)) {
-                true => kept_for_later_turn(cap, NX + NU),
-                false => 0,
-            };
-            match self.solve_at_once(ocp, shift, solution, (Turn::First, &mut spent)) {
-                AtOnce::Done(outcome) => return outcome,
-                AtOnce::Kept => self.dual.kept = true,
-                AtOnce::InVain(changes) => {
-                    shift = Some(0);
-                    if let Some(changes) = changes {
-                        kept_back = self.dual.changes_left().saturating_sub(changes);
-                    } else if spent > 0 {
-                        kept_back = 0;
-                    }
-                }
-                AtOnce::Untried => {}
-            }
-            loop {
-                self.dual.keep_back(kept_back);
-                let one_by_one = self.solve_one_by_one(ocp, shift, solution, &mut spent);
-                let long = matches!(one_by_one, Err(Status::MaxChanges));
-                let ended = !(long || matches!(one_by_one, Err(Status::Inaccurate(_))));
-                if kept_back == 0 || ended {
-                    return one_by_one;
-                }
-                self.dual.give_back(core::mem::take(&mut kept_back));
-                self.dual.begin_again();
-                shift = None;
-                // Held inputs may have left factors of their own.
-                self.factorize(ocp)?;
-                self.roll_out(ocp, solution)?;
-                let later = (Turn::Later, &mut spent);
-                if let AtOnce::Done(outcome) = self.solve_at_once(ocp, shift, solution, later) {
-                    return outcome;
-                }
-                if !long {
-                    return one_by_one;
-                }
-            }
+        let in_turns = self.many_bounds.first().map(|phase| phase.in_turns);
+        let outcome = begun.and_then(|()| match in_turns {
+            Some(in_turns) => in_turns(self, ocp, shift, solution, &mut spent),
+            None => self.solve_one_by_one(ocp, shift, solution, &mut spent),
         });
         solution.changes = spent;
         solution.status = match outcome {
@@ -162,28 +155,23 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         };
     }
 
-    /// What the phase for many bounds, if there is memory for one, makes of the problem. In its first turn the
-    /// trajectory without bounds is in the solution.
-    #[inline(never)]
-    fn solve_at_once(
-        &mut self,
-        ocp: &Ocp<T, NX, NU>,
-        shift: Option<usize>,
-        solution: &mut Solution<T, NX, NU>,
-        turn: (Turn, &mut usize),
-    ) -> AtOnce<T> {
-        let mut phase = core::mem::replace(&mut self.many_bounds, List::empty());
-        let outcome = phase.first_mut().map_or(AtOnce::Untried, |phase| {
-            let run = phase.run;
-            run(phase, self, ocp, shift, solution, turn)
-        });
-        self.many_bounds = phase;
-        outcome
+    /// Whether there is memory for the horizon of `ocp`.
+    pub(crate) fn has_room(&self, ocp: &Ocp<T, NX, NU>, solution: &Solution<T, NX, NU>) -> bool {
+        let room = self.stages.min(solution.u.len()).min(solution.x.len());
+        ocp.horizon.max(1) <= room.min(ocp.stages.len())
+    }
+
+    /// Back to no active bounds.
+    pub(crate) fn begin(&mut self, ocp: &Ocp<T, NX, NU>, settings: &SolverSettings<T>) {
+        let tolerance = Some(settings.tolerance).filter(|t| *t > T::zero() && t.is_finite());
+        let cap = settings.max_changes.unwrap_or(default_cap(ocp));
+        self.dual
+            .reset(tolerance.unwrap_or_else(default_tolerance), cap);
     }
 
     /// The dual method, from the trajectory without bounds; with held inputs where rounding ends it.
     #[inline(always)]
-    fn solve_one_by_one(
+    pub(crate) fn solve_one_by_one(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
         shift: Option<usize>,
@@ -191,14 +179,15 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         spent: &mut usize,
     ) -> Result<(), Status<T>> {
         let warm = shift.is_some() && !solution.active.is_empty();
-        let mut outcome = self.search(ocp, shift, solution);
+        let start = shift.map_or(Start::Nothing, Start::Last);
+        let mut outcome = self.search(ocp, start, solution);
         *spent += self.dual.changes;
         if warm && matches!(outcome, Err(Status::Inaccurate(_))) {
             // A start must not decide whether there is an answer.
             solution.active.clear();
             self.dual.begin_again();
             let begun = self.roll_out(ocp, solution);
-            outcome = begun.and_then(|()| self.search(ocp, None, solution));
+            outcome = begun.and_then(|()| self.search(ocp, Start::Nothing, solution));
             *spent += self.dual.changes;
         }
         match outcome {
@@ -230,12 +219,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         verdict
     }
 
-    /// The dual method, from the trajectory of the deviations as they are, and, with a `shift`, the active rows of
-    /// the solution so many stages earlier.
+    /// The dual method, from the trajectory of the deviations as they are.
     pub(crate) fn search(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
-        shift: Option<usize>,
+        start: Start,
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
         if ocp.terminal.equality.is_some() {
@@ -244,12 +232,15 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 .impose_terminal_equality(ocp, &self.factors, &x_n)?;
             self.roll_out(ocp, solution)?;
         }
-        self.warm_start(ocp, shift, solution)?;
+        if let Start::Last(shift) = start {
+            self.warm_start(ocp, shift, solution)?;
+        }
 
         loop {
             let trajectory = trajectory(solution);
             match self.dual.most_violated(ocp, &trajectory) {
                 Some(violated) => self.dual.satisfy(ocp, &self.factors, &violated)?,
+                None if start == Start::Held => break,
                 None if self.dual.refine(ocp, &self.factors, &trajectory)? => {}
                 None => break,
             }
@@ -263,7 +254,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         if !solution.cost.is_finite() {
             return Err(Status::NotFinite);
         }
-        let known = shift.map_or(0, |_| solution.active.len());
+        let known = match start {
+            Start::Last(_) => solution.active.len(),
+            _ => 0,
+        };
         if !self.dual.report(&mut solution.active) {
             return Err(Status::WorkingSetFull);
         }
@@ -294,9 +288,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             .zip(first_mut(&mut self.factors, n));
         for (stage, (data, factor)) in stages.enumerate().rev() {
             let weights = ocp.common_at(stage);
-            match self.held.of(stage) {
+            match self.held.at(stage) {
                 None => factor.eliminate(data, weights, &mut cost_to_go),
-                Some(held) => eliminate_held(factor, data, weights, held, &mut cost_to_go),
+                Some(held) => eliminate_held(factor, (ocp, stage), held, &mut cost_to_go),
             }
             .map_err(|bad| failed_pivot(stage, bad.0))?;
         }
@@ -330,12 +324,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     fn warm_start(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
-        shift: Option<usize>,
+        shift: usize,
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
-        let Some(shift) = shift else {
-            return Ok(());
-        };
         if solution.active.is_empty() || self.dual.kept {
             return Ok(());
         }

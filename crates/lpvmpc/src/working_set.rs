@@ -388,10 +388,11 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
 
 /// Moves the lines of `width` entries behind `position`, up to `len`, one place forward.
 fn close_gap<V>(entries: &mut [V], position: usize, len: usize, width: usize) {
-    if let Some(used) = entries.get_mut(position * width..len * width)
-        && width <= used.len()
-    {
-        used.rotate_left(width);
+    let used = entries.get_mut(position * width..len * width);
+    let used = used.unwrap_or_default();
+    // What a rotation by any number of places takes is a kilobyte of machine code.
+    for k in width..used.len() {
+        used.swap(k - width, k);
     }
 }
 

@@ -5,6 +5,7 @@ mod support;
 mod campaign;
 mod changes;
 mod fuzz;
+mod last_bounds;
 mod many_bounds;
 mod memory;
 mod motion_limits;

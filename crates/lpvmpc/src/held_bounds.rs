@@ -1,23 +1,24 @@
-//! Inputs that are held at a bound by the factorisation, instead of as rows of the dual method.
+//! Bounds that are held by the factorisation, instead of as rows of the dual method.
 //!
 //! A bound as a row is met by pushing the regulator away from what it would ask for. Where that is
 //! many times the bound, the bound drowns in the rounding of the difference. An input that is held is
-//! no unknown any more: it is exact, and the regulator is that of the other inputs.
+//! no unknown any more: it is exact, and the regulator is that of the other inputs. A single input can
+//! hold a state behind its stage instead, whatever that costs.
 
 use crate::adjoint::Adjoint;
 use crate::list::List;
 use crate::model::Scalar;
 #[cfg(feature = "alloc")]
 use crate::ocp::Bounds;
-use crate::ocp::{Common, Ocp, Stage};
+use crate::ocp::{Common, Ocp};
 use crate::riccati::{Adjustment, BadPivot, CostToGo, StageFactor, StageMinimum};
-use crate::rows::Trajectory;
 #[cfg(feature = "alloc")]
 use crate::rows::size_of_bound;
+use crate::rows::{self, Trajectory};
 #[cfg(feature = "alloc")]
 use crate::small_matrix::transposed_product;
 use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
-use crate::solver::Solver;
+use crate::solver::{Solver, Start};
 
 /// Searches with held inputs; two are enough in `f64`, more than ten are rare in `f32`.
 const MOST_SEARCHES: usize = 20;
@@ -25,41 +26,74 @@ const MOST_SEARCHES: usize = 20;
 #[cfg(feature = "alloc")]
 const CHANGES_PER_LOOK: usize = 64;
 
-/// For every input of every stage: the bound that it is held at, if any.
+/// What an input holds at a bound: nothing, itself, or, if it is a single one, a component of the next state. In a byte, of
+/// which a microcontroller has few.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct HeldBound(u8);
+
+impl HeldBound {
+    pub const NOTHING: Self = Self(0);
+
+    /// The input itself, or the component `state` of the next state.
+    fn new(state: Option<usize>, side: Side) -> Self {
+        let side = if side == Side::Upper { 2 } else { 1 };
+        let place = state.map_or(Some(0), |j| u8::try_from(j + 1).ok());
+        place
+            .filter(|place| *place < 64)
+            .map_or(Self::NOTHING, |place| Self(place << 2 | side))
+    }
+
+    /// The component of the next state, or none for the input itself, and the side.
+    fn get(self) -> Option<(Option<usize>, Side)> {
+        let side = match self.0 & 3 {
+            0 => return None,
+            1 => Side::Lower,
+            _ => Side::Upper,
+        };
+        Some((usize::from(self.0 >> 2).checked_sub(1), side))
+    }
+}
+
+/// What the inputs of a stage hold.
+pub(crate) type HeldAt<const NU: usize> = [HeldBound; NU];
+
+/// What is held at every stage.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
-pub(crate) struct HeldInputs<const NU: usize> {
-    sides: List<[Option<Side>; NU]>,
+pub(crate) struct HeldBounds<const NU: usize> {
+    stages: List<HeldAt<NU>>,
     any: bool,
 }
 
-/// What the multipliers of the held inputs say.
-struct Verdict<T> {
-    /// Inputs were let go.
-    released: bool,
+/// What the multipliers of the held bounds say.
+pub(crate) struct Verdict<T> {
+    /// Bounds were let go.
+    pub released: bool,
     /// All others found a place among the active rows.
-    listed: bool,
-    /// What is left of the gradient in the inputs that are not held, relative to its largest term.
-    rest: T,
+    pub listed: bool,
+    /// What is left of the gradient in the inputs that hold nothing, relative to its largest term.
+    pub rest: T,
 }
 
-impl<const NU: usize> HeldInputs<NU> {
-    /// None of the stages in `sides`.
-    pub fn none(mut sides: List<[Option<Side>; NU]>) -> Self {
-        sides.fill([None; NU]);
-        Self { sides, any: false }
+impl<const NU: usize> HeldBounds<NU> {
+    /// None, in memory for as many stages as these.
+    pub fn none(mut stages: List<HeldAt<NU>>) -> Self {
+        stages.fill([HeldBound::NOTHING; NU]);
+        Self { stages, any: false }
     }
 
     pub fn release_all(&mut self) {
-        self.sides.fill([None; NU]);
+        self.stages.fill([HeldBound::NOTHING; NU]);
         self.any = false;
     }
 
-    /// The sides at `stage`; `None` where no input is held.
+    /// What is held at `stage`; `None` where nothing is.
     #[inline(always)]
-    pub fn of(&self, stage: usize) -> Option<&[Option<Side>; NU]> {
+    pub fn at(&self, stage: usize) -> Option<&HeldAt<NU>> {
         if self.any {
-            self.sides.get(stage)
+            self.stages
+                .get(stage)
+                .filter(|held| **held != [HeldBound::NOTHING; NU])
         } else {
             None
         }
@@ -69,21 +103,40 @@ impl<const NU: usize> HeldInputs<NU> {
     fn take_in<T: Scalar>(&mut self, rows: impl Iterator<Item = ActiveRow<T>>) -> bool {
         let mut news = false;
         for row in rows {
-            let BoundId { stage, side, .. } = row.bound;
-            if let Quantity::Input(j) = row.bound.quantity
-                && let Some(place) = self.sides.get_mut(stage).and_then(|held| held.get_mut(j))
-            {
-                news |= *place != Some(side);
-                *place = Some(side);
+            if let Quantity::Input(_) = row.bound.quantity {
+                news |= self.hold(row.bound);
             }
         }
+        news
+    }
+
+    /// Holds a bound, if there is an input that can, instead of what it holds; whether that is news.
+    #[inline(never)]
+    pub fn hold(&mut self, bound: BoundId) -> bool {
+        let BoundId {
+            stage,
+            quantity,
+            side,
+        } = bound;
+        let (stage, input, state) = match quantity {
+            Quantity::Input(j) => (Some(stage), j, None),
+            Quantity::State(j) if NU == 1 => (stage.checked_sub(1), 0, Some(j)),
+            _ => return false,
+        };
+        let held = stage.and_then(|stage| self.stages.get_mut(stage));
+        let Some(place) = held.and_then(|held| held.get_mut(input)) else {
+            return false;
+        };
+        let bound = HeldBound::new(state, side);
+        let news = *place != bound;
+        *place = bound;
         self.any |= news;
         news
     }
 
-    /// Lets go of the inputs that are pulled into their bounds, by the cost of `trajectory` and the rows
+    /// Lets go of the bounds that are not needed, by the cost of `trajectory` and the rows
     /// `active`, or by these rows alone: their multiplier is below zero. The others join `active`.
-    fn release<T: Scalar, const NX: usize>(
+    pub fn release<T: Scalar, const NX: usize>(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
         trajectory: Option<&Trajectory<'_, T, NX, NU>>,
@@ -95,23 +148,27 @@ impl<const NU: usize> HeldInputs<NU> {
         let mut adjoint = Adjoint::new(ocp, trajectory, active);
         while let Some(at) = adjoint.step(active) {
             largest = largest.max(at.dynamics.amax()).max(at.rows.amax());
-            let Some(held) = self.sides.get_mut(at.stage) else {
+            let Some(held) = self.stages.get_mut(at.stage) else {
                 continue;
             };
             for (j, (place, slope)) in held.iter_mut().zip(at.gradient.iter()).enumerate() {
-                let Some(side) = *place else {
+                let Some((state, side)) = place.get() else {
                     rest = rest.max(slope.abs());
                     continue;
                 };
-                let multiplier = if side == Side::Upper { -*slope } else { *slope };
+                let (slope, stage, quantity) = match state {
+                    None => (*slope, at.stage, Quantity::Input(j)),
+                    Some(j) => (adjoint.hold_state(&at, j), at.stage + 1, Quantity::State(j)),
+                };
+                let multiplier = if side == Side::Upper { -slope } else { slope };
                 if multiplier < -tolerance * largest {
-                    *place = None;
+                    *place = HeldBound::NOTHING;
                     released = true;
                 } else {
                     listed &= active.push(ActiveRow {
                         bound: BoundId {
-                            stage: at.stage,
-                            quantity: Quantity::Input(j),
+                            stage,
+                            quantity,
                             side,
                         },
                         part: Part::Hard,
@@ -133,21 +190,35 @@ impl<const NU: usize> HeldInputs<NU> {
     }
 }
 
-/// [`StageFactor::eliminate`] with the inputs that have a side in `held` as constants, which no deviation
-/// moves.
+/// [`StageFactor::eliminate`] with what is `held`: inputs are constants, which no deviation moves, and so is the state
+/// behind `stage`.
 #[cold]
 #[inline(never)]
 pub(crate) fn eliminate_held<T: Scalar, const NX: usize, const NU: usize>(
     factor: &mut StageFactor<T, NX, NU>,
-    stage: &Stage<T, NX, NU>,
-    common: &Common<T, NX, NU>,
-    held: &[Option<Side>; NU],
+    (ocp, stage): (&Ocp<T, NX, NU>, usize),
+    held: &HeldAt<NU>,
     cost_to_go: &mut CostToGo<T, NX>,
 ) -> Result<(), BadPivot<T>> {
+    let common = ocp.common_at(stage);
+    let Some(data) = ocp.stages.get(stage) else {
+        return Ok(());
+    };
+    if let [Some((Some(j), side))] = held.map(HeldBound::get)[..] {
+        let bound = BoundId {
+            stage: stage + 1,
+            quantity: Quantity::State(j),
+            side,
+        };
+        factor.eliminate(data, common, cost_to_go)?;
+        let (lower, upper) = rows::limits(ocp, &bound);
+        let value = if side == Side::Upper { upper } else { lower };
+        return factor.hold_state(data, j, value, cost_to_go);
+    }
     let constants = Constants { held, common };
-    factor.eliminate_adjusted(stage, common, cost_to_go, Some(&constants))?;
+    factor.eliminate_adjusted(data, common, cost_to_go, Some(&constants))?;
     for (j, side) in held.iter().enumerate() {
-        if side.is_some() {
+        if *side != HeldBound::NOTHING {
             factor.inverse_factor[(j, j)] = T::zero();
         }
     }
@@ -156,7 +227,7 @@ pub(crate) fn eliminate_held<T: Scalar, const NX: usize, const NU: usize>(
 
 /// Inputs that are constants of a stage.
 struct Constants<'a, T, const NX: usize, const NU: usize> {
-    held: &'a [Option<Side>; NU],
+    held: &'a HeldAt<NU>,
     common: &'a Common<T, NX, NU>,
 }
 
@@ -165,9 +236,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Adjustment<T, NX, NU>
 {
     fn adjust(&self, minimum: &mut StageMinimum<T, NX, NU>) {
         let bounds = &self.common.u;
-        for (j, side) in self.held.iter().enumerate() {
-            match side {
-                Some(Side::Upper) => minimum.hold(j, bounds.upper[j]),
+        for (j, held) in self.held.iter().enumerate() {
+            match held.get() {
+                Some((_, Side::Upper)) => minimum.hold(j, bounds.upper[j]),
                 Some(_) => minimum.hold(j, bounds.lower[j]),
                 None => {}
             }
@@ -322,7 +393,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         }
         self.dual.begin_again();
         let begun = self.roll_out(ocp, solution);
-        let outcome = begun.and_then(|()| self.search(ocp, Some(0), solution));
+        let outcome = begun.and_then(|()| self.search(ocp, Start::Last(0), solution));
         *spent += self.dual.changes;
         outcome
     }

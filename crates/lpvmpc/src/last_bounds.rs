@@ -1,0 +1,142 @@
+//! The bounds of the last answer, a sample or a program later, as the first guess of what is active.
+//!
+//! Most of them are active again. Held by the factorisation they take no rows: with a single input, which is all that is
+//! tried here, a factorisation and a pass along the horizon, however many they are. What is active besides is found as
+//! ever, and the multipliers tell which of the guess were wrong. The answer is the same as from nothing, or none.
+
+use crate::held_bounds::Verdict;
+use crate::model::Scalar;
+use crate::ocp::Ocp;
+use crate::rows::{self, Trajectory};
+use crate::solution::{ActiveRow, Part, Side, Solution, Status};
+use crate::solver::{DOUBT, Solver, Start, trajectory};
+use crate::solver_settings::{SolverSettings, WarmStart};
+use nalgebra::convert;
+
+/// Fewer bounds are as well rows.
+const FEWEST: usize = 3;
+/// More are for the phase for many bounds; what rounds along so many held states is no answer as a rule.
+const MOST: usize = 16;
+/// A guess that takes more than one change for so many known bounds is no good.
+const KNOWN_PER_CHANGE: usize = 4;
+/// So many guesses, each from the answer to the one before.
+const MOST_GUESSES: usize = 2;
+/// A bound whose multiplier is less than this part of the largest may be gone, and is found at less cost than let go.
+const FADING: f64 = 1e-3;
+/// So many times the rounding of a number are the rounding of a pass along the horizon.
+const ROUNDINGS: f64 = 1e3;
+
+impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
+    /// Solves `ocp` with the bounds of the last answer, `shift` stages earlier, held. The factors are not those of the
+    /// problem itself.
+    ///
+    /// # Errors
+    /// It has no answer, after so many changes of the active set; and with what the search for one is begun best.
+    #[inline(never)]
+    pub(crate) fn solve_from_last(
+        &mut self,
+        ocp: &Ocp<T, NX, NU>,
+        settings: &SolverSettings<T>,
+        shift: usize,
+        solution: &mut Solution<T, NX, NU>,
+    ) -> Result<(), (usize, WarmStart)> {
+        let begun = &mut solution.active;
+        let wrong_lately = begun.doubted.max(begun.not_held) > 0;
+        begun.not_held = begun.not_held.saturating_sub(1);
+        if wrong_lately || !self.has_room(ocp, solution) || !self.hold_last(ocp, shift, solution) {
+            return Err((0, settings.warm_start));
+        }
+        self.begin(ocp, settings);
+        let later = self.dual.changes_left();
+        let few = FEWEST.max(solution.active.len() / KNOWN_PER_CHANGE);
+        self.dual.keep_back(later.saturating_sub(few));
+        let (mut spent, mut begin_with) = (0, settings.warm_start);
+        let mut solved = false;
+        for _ in 0..MOST_GUESSES {
+            let searched = self
+                .factorize(ocp)
+                .and_then(|()| self.roll_out(ocp, solution))
+                .and_then(|()| self.search(ocp, Start::Held, solution));
+            spent += self.dual.changes;
+            if searched.is_err() {
+                break;
+            }
+            begin_with = WarmStart::Same;
+            let Solution { x, u, active, .. } = solution;
+            let point = Trajectory { x, u };
+            let tolerance = self.dual.tolerance;
+            let verdict = self.held.release(ocp, Some(&point), active, tolerance);
+            if !verdict.released {
+                solved = self.is_answer(ocp, &verdict, solution);
+                break;
+            }
+            solution.active.not_held = DOUBT;
+            self.dual.begin_again();
+            if !self.hold_last(ocp, 0, solution) {
+                break;
+            }
+        }
+        self.held.release_all();
+        solution.changes = spent;
+        solution.status = Status::Solved;
+        if solved {
+            return Ok(());
+        }
+        solution.active.not_held = DOUBT;
+        Err((spent, begin_with))
+    }
+
+    /// Holds what was active `shift` stages earlier and is not fading; whether that is worth it.
+    fn hold_last(
+        &mut self,
+        ocp: &Ocp<T, NX, NU>,
+        shift: usize,
+        solution: &Solution<T, NX, NU>,
+    ) -> bool {
+        let active = &solution.active;
+        if !(FEWEST..=MOST).contains(&active.len()) {
+            return false;
+        }
+        self.held.release_all();
+        let larger = |most: T, row: ActiveRow<T>| most.max(row.multiplier);
+        let least = active.iter().fold(T::zero(), larger) * convert(FADING);
+        let mut held = 0;
+        for mut row in active.iter() {
+            // Soft bounds have multipliers that end, and equalities are rows as ever.
+            if row.part != Part::Hard || row.bound.side == Side::Equality {
+                held = 0;
+                break;
+            }
+            let Some(stage) = row.bound.stage.checked_sub(shift) else {
+                continue;
+            };
+            row.bound.stage = stage;
+            let lasting = row.multiplier > least && rows::soft_price(ocp, &row.bound).is_none();
+            if lasting && self.held.hold(row.bound) {
+                held += 1;
+            }
+        }
+        if held < FEWEST {
+            self.held.release_all();
+        }
+        held >= FEWEST
+    }
+
+    /// Whether all that is active holds, and nothing else pulls at an input.
+    fn is_answer(
+        &self,
+        ocp: &Ocp<T, NX, NU>,
+        verdict: &Verdict<T>,
+        solution: &Solution<T, NX, NU>,
+    ) -> bool {
+        let point = trajectory(solution);
+        let tolerance = T::default_epsilon() * convert(ROUNDINGS);
+        verdict.listed
+            && verdict.rest <= tolerance
+            && solution.active.iter().all(|row| {
+                row.part == Part::Hard
+                    && rows::slack(ocp, &point, &row.bound).abs()
+                        <= tolerance * rows::size(ocp, &row.bound)
+            })
+    }
+}
