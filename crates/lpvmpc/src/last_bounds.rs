@@ -48,8 +48,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         }
         self.begin(ocp, settings);
         let later = self.dual.changes_left();
-        let few = FEWEST.max(solution.active.len() / KNOWN_PER_CHANGE);
-        self.dual.keep_back(later.saturating_sub(few));
+        self.dual
+            .keep_back(later.saturating_sub(few(solution.active.len())));
         let (mut spent, mut begin_with) = (0, settings.warm_start);
         let mut solved = false;
         for _ in 0..MOST_GUESSES {
@@ -100,11 +100,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         self.held.release_all();
         let larger = |most: T, row: ActiveRow<T>| most.max(row.multiplier);
         let least = active.iter().fold(T::zero(), larger) * convert(FADING);
-        let mut held = 0;
+        let (mut held, mut other) = (0, 0);
         for mut row in active.iter() {
             // Soft bounds have multipliers that end, and equalities are rows as ever.
             if row.part != Part::Hard || row.bound.side == Side::Equality {
-                held = 0;
+                other = usize::MAX;
                 break;
             }
             let Some(stage) = row.bound.stage.checked_sub(shift) else {
@@ -114,12 +114,15 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             let lasting = row.multiplier > least && rows::soft_price(ocp, &row.bound).is_none();
             if lasting && self.held.hold(row.bound) {
                 held += 1;
+            } else {
+                other += 1;
             }
         }
-        if held < FEWEST {
+        let worth = held >= FEWEST && other <= few(active.len());
+        if !worth {
             self.held.release_all();
         }
-        held >= FEWEST
+        worth
     }
 
     /// Whether all that is active holds, and nothing else pulls at an input.
@@ -130,13 +133,19 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         solution: &Solution<T, NX, NU>,
     ) -> bool {
         let point = trajectory(solution);
-        let tolerance = T::default_epsilon() * convert(ROUNDINGS);
+        let rounding = T::default_epsilon() * convert(ROUNDINGS);
+        let tolerance = self.dual.tolerance.min(rounding);
         verdict.listed
-            && verdict.rest <= tolerance
+            && verdict.rest <= rounding
             && solution.active.iter().all(|row| {
                 row.part == Part::Hard
                     && rows::slack(ocp, &point, &row.bound).abs()
                         <= tolerance * rows::size(ocp, &row.bound)
             })
     }
+}
+
+/// Changes of the active set that a good guess of so many bounds may take.
+fn few(known: usize) -> usize {
+    FEWEST.max(known / KNOWN_PER_CHANGE)
 }

@@ -436,6 +436,9 @@ pub(crate) fn clip_inputs<T: Scalar, const NX: usize, const NU: usize>(
     let length = ocp.horizon.max(1).min(solution.u.len());
     let inputs = solution.u.get_mut(..length).unwrap_or_default();
     for (i, u) in inputs.iter_mut().enumerate() {
-        *u = ocp.common_at(i).u.project(u);
+        let bounds = &ocp.common_at(i).u;
+        if !(bounds.hold_at(u) && is_finite(u)) {
+            *u = bounds.project(u);
+        }
     }
 }

@@ -284,7 +284,7 @@ where
         workspace.solution.active.doubted = 0;
         workspace
             .solver
-            .solve(&workspace.ocp, &settings, &mut workspace.solution);
+            .solve_for_factors(&workspace.ocp, &settings, &mut workspace.solution);
     }
 }
 

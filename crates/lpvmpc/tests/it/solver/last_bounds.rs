@@ -2,9 +2,10 @@
 
 use super::support::{agree, capacity, cold, solve};
 use lpvmpc::{Ocp, Penalty, Solution, Solver, SolverSettings, Status, WarmStart, kkt_residual};
+use lpvmpc_testkit::clarabel::{self, Verdict};
 use lpvmpc_testkit::problems::{Family, problem};
 use lpvmpc_testkit::rng::Rng;
-use nalgebra::SVector;
+use nalgebra::{Matrix2, Matrix2x1, SMatrix, SVector, Vector2};
 
 /// How often a problem with three active bounds or more was solved without a change of them, out of how many.
 #[derive(Debug, Default)]
@@ -133,4 +134,70 @@ fn no_more_changes_than_there_may_be() {
         }
     }
     assert!(capped > 100, "{capped}");
+}
+
+/// A cart on its way to a place ahead, no faster and with no more force than it may have, with the program of its present
+/// state.
+fn cart(rng: &mut Rng, horizon: usize) -> Ocp<f64, 2, 1> {
+    let h = 0.05 + 0.1 * rng.uniform(0.0, 1.0);
+    let mut ocp = Ocp::<f64, 2, 1>::allocate(horizon);
+    ocp.horizon = horizon;
+    let target = Vector2::new(1.0 + 4.0 * rng.uniform(0.0, 1.0), 0.0);
+    ocp.common.q = Matrix2::new(1.0, 0.0, 0.0, 0.1);
+    ocp.common.r = SMatrix::from_element(0.01 + 0.1 * rng.uniform(0.0, 1.0));
+    ocp.terminal.p = ocp.common.q * 10.0;
+    for stage in ocp.stages.iter_mut() {
+        stage.a = Matrix2::new(1.0, h, 0.0, 1.0);
+        stage.b = Matrix2x1::new(h * h / 2.0, h);
+        stage.linear_x = -ocp.common.q * target;
+    }
+    ocp.terminal.linear_x = -ocp.terminal.p * target;
+    ocp.common.x.upper = Vector2::new(f64::INFINITY, 0.5 + rng.uniform(0.0, 1.0));
+    ocp.common.x.lower = -ocp.common.x.upper;
+    ocp.terminal.x = ocp.common.x;
+    ocp.common.u.upper[0] = 0.5 + 2.0 * rng.uniform(0.0, 1.0);
+    ocp.common.u.lower = -ocp.common.u.upper;
+    ocp
+}
+
+/// Closed loops, each sample begun with the answer to the one before: the cost is Clarabel's, which shares nothing with this
+/// solver, and most samples with three active bounds or more take one change of them at most. As rows they took one each.
+#[test]
+fn carts_at_their_limits_take_few_changes() {
+    let (mut few, mut many) = (0, 0);
+    for seed in 0..24 {
+        let mut rng = Rng::new(seed);
+        let horizon = 8 + rng.index(20);
+        let mut ocp = cart(&mut rng, horizon);
+        let room = capacity(&ocp);
+        let mut solver = Solver::allocate(room);
+        let mut solution = Solution::allocate(room);
+        let settings = SolverSettings {
+            warm_start: WarmStart::Shifted,
+            ..cold()
+        };
+        for sample in 0..40 {
+            solver.solve(&ocp, &settings, &mut solution);
+            assert_eq!(solution.status, Status::Solved, "{seed} {sample}");
+            let Verdict::Solved { primal } = clarabel::solve(&ocp).unwrap() else {
+                panic!("{seed} {sample}: Clarabel has no answer");
+            };
+            let size = 1.0 + primal.abs();
+            assert!(
+                (solution.cost - primal).abs() < 1e-6 * size,
+                "{seed} {sample}: {} for {primal}",
+                solution.cost
+            );
+            assert!(kkt_residual(&ocp, &solution).largest() < 1e-12);
+            if (3..=16).contains(&solution.active.len()) {
+                many += 1;
+                few += usize::from(solution.changes <= 1);
+            }
+            let noise = Vector2::new(rng.uniform(0.0, 1.0) - 0.5, rng.uniform(0.0, 1.0) - 0.5);
+            ocp.x0 = ocp.stages[0].next(&ocp.x0, &solution.u[0]) + noise * 1e-3;
+            ocp.x0[1] = ocp.x0[1].clamp(ocp.common.x.lower[1], ocp.common.x.upper[1]);
+        }
+    }
+    println!("{few} of {many}");
+    assert!(many > 100 && 2 * few > many, "{few} of {many}");
 }
