@@ -392,7 +392,9 @@ fn close_gap<V>(entries: &mut [V], position: usize, len: usize, width: usize) {
     let used = used.unwrap_or_default();
     // What a rotation by any number of places takes is a kilobyte of machine code.
     for k in width..used.len() {
-        used.swap(k - width, k);
+        if let Ok([before, here]) = used.get_disjoint_mut([k - width, k]) {
+            core::mem::swap(before, here);
+        }
     }
 }
 
