@@ -6,7 +6,7 @@ use crate::many_bounds::{BoundSide, ManyBounds, ManyBoundsPlace};
 use crate::model::Scalar;
 use crate::ocp::{Common, GeneralRow, Stage};
 use crate::riccati::StageFactor;
-use crate::solution::{PackedRow, Side};
+use crate::solution::PackedRow;
 use crate::working_set::Terms;
 use nalgebra::{SMatrix, SVector};
 
@@ -68,7 +68,7 @@ impl Capacity {
 pub struct SolverMemory<T: 'static, const NX: usize, const NU: usize> {
     /// One for each stage.
     pub(crate) factors: List<StageFactor<T, NX, NU>>,
-    /// Inputs at their bounds, one for each stage.
+    /// What inputs hold at bounds, one for each stage.
     pub(crate) held: List<HeldAt<NU>>,
     /// What the dual method works with.
     pub(crate) dual: DualMemory<T, NU>,
@@ -105,7 +105,7 @@ impl<T, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
         }: Capacity,
     ) -> usize {
         let input = size_of::<SVector<T, NU>>();
-        let stage = size_of::<StageFactor<T, NX, NU>>() + size_of::<[Option<Side>; NU]>();
+        let stage = size_of::<StageFactor<T, NX, NU>>() + size_of::<HeldAt<NU>>();
         let row = size_of::<Terms<T>>() + (rows + 5) * size_of::<T>();
         stages * (stage + (rows + 4) * input) + rows * row + active * size_of::<PackedRow<T>>()
     }
@@ -172,8 +172,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
-    /// The same with memory for many active bounds, in problems of up to `N` stages whose bounds have up to
-    /// `B` finite sides.
+    /// The same for many active bounds, in problems of up to `N` stages whose bounds have up to `B` finite sides.
     pub fn with_many_bounds<const N: usize, const B: usize>(
         self,
         arrays: &'static mut ManyBoundsArrays<T, NX, NU, N, B>,
