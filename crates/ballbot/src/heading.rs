@@ -1,6 +1,6 @@
 //! The heading: between the directions of the floor and those of the robot.
 
-use lpvmpc::Scalar;
+use lpvmpc::{Number, Scalar};
 use nalgebra::Vector2;
 
 /// The robot's x axis is turned by the heading from the floor's, counter-clockwise seen from
@@ -17,10 +17,10 @@ pub struct Heading<T> {
     cos: T,
 }
 
-impl<T: Scalar> Heading<T> {
+impl<T: Scalar + Number> Heading<T> {
     /// The heading `angle` in rad.
     pub fn new(angle: T) -> Self {
-        let (sin, cos) = angle.sin_cos();
+        let (sin, cos) = Number::sin_cos(angle);
         Self { sin, cos }
     }
 

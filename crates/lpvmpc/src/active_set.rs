@@ -16,6 +16,9 @@ use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Statu
 use crate::working_set::{Direction, Row, Terms, WorkingSet};
 use nalgebra::{SVector, convert};
 
+/// A bound of which less of the violation is left is left for the next look along the trajectory.
+const LEFT: f64 = 0.5;
+
 /// Scratch memory and state of the dual method.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]
@@ -39,12 +42,17 @@ pub(crate) struct DualActiveSet<T: 'static, const NU: usize> {
     pub(crate) loosest: T,
     pub changes: usize,
     max_changes: usize,
+    /// An entry of v differs by no more from the sum of multiplier * alpha over the active rows, which rounding allows for;
+    /// infinity where that is not known.
+    pub(crate) unexplained: T,
     /// Refinements that are left.
     pub(crate) refinements: usize,
     /// Sign of the candidate's multiplier where it contradicts the working set; zero before.
     contradicting: T,
     /// Whether it is known of the minimiser without bounds that it keeps them all.
     pub kept: bool,
+    /// Whether every change is followed by a look along the trajectory.
+    pub one_at_a_time: bool,
 }
 
 /// Why a step along the direction ends.
@@ -76,9 +84,11 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
             loosest: T::zero(),
             changes: 0,
             max_changes: 0,
+            unexplained: T::zero(),
             refinements: 0,
             contradicting: T::zero(),
             kept: false,
+            one_at_a_time: false,
         }
     }
 
@@ -90,10 +100,12 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         self.tolerance = tolerance;
         self.loosest = tolerance.max(T::default_epsilon().sqrt());
         self.changes = 0;
+        self.unexplained = T::zero();
         self.max_changes = max_changes;
         self.refinements = 3;
         self.contradicting = T::zero();
         self.kept = false;
+        self.one_at_a_time = false;
     }
 
     /// Back to the minimiser without bounds, with the changes that are left.
@@ -102,16 +114,16 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         self.reset(self.tolerance, left);
     }
 
-    /// The bound that is violated most, if any is.
+    /// The bound that is violated most, and the one that is violated most of those before it along the horizon.
     pub fn most_violated<const NX: usize>(
         &self,
         ocp: &Ocp<T, NX, NU>,
         trajectory: &Trajectory<'_, T, NX, NU>,
-    ) -> Option<Candidate<T>> {
+    ) -> [Option<Candidate<T>>; 2] {
+        let [mut worst, mut earlier]: [Option<Candidate<T>>; 2] = [None; 2];
         if self.kept {
-            return None;
+            return [worst, earlier];
         }
-        let mut worst: Option<Candidate<T>> = None;
         let mut least = -T::one();
         rows::violated_bounds(ocp, trajectory, &mut |candidate| {
             // Negated, so that a violation that is NaN counts; it stays the worst.
@@ -121,7 +133,10 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
                 && let Some(part) = self.free_part(&candidate)
             {
                 least = candidate.rank;
-                worst = Some(Candidate { part, ..candidate });
+                earlier = worst.replace(Candidate { part, ..candidate });
+                if self.one_at_a_time {
+                    earlier = None;
+                }
             }
         });
         for row in self.resting.iter().filter(|row| row.exceeded) {
@@ -131,6 +146,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
             let rank = slack / rows::room(ocp, &row.bound);
             if rank > least && violation > self.tolerance {
                 least = rank;
+                earlier = None;
                 worst = Some(Candidate {
                     bound: row.bound,
                     part: row.part,
@@ -141,7 +157,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
                 });
             }
         }
-        worst
+        [worst, earlier]
     }
 
     /// The part of the candidate's price that is neither in the working set nor exceeded.
@@ -204,18 +220,48 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         Ok(())
     }
 
-    /// Takes the candidate into the working set, dropping rows whose multiplier forbids it.
+    /// Takes the bound that is violated most into the working set, and with it the `earlier` one if it is still violated
+    /// then, which saves a rollout.
     pub fn satisfy<const NX: usize>(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
         factors: &[StageFactor<T, NX, NU>],
         violated: &Candidate<T>,
+        earlier: Option<Candidate<T>>,
     ) -> Result<(), Status<T>> {
+        self.form(ocp, factors, violated);
+        let step = self.take_in(violated)?;
+        if let (Some(mut earlier), Some(step)) = (earlier, step) {
+            self.form(ocp, factors, &earlier);
+            let before = earlier.slack;
+            earlier.slack += self.candidate.dot(&self.direction.primal) * step;
+            if earlier.slack < before * convert(LEFT) && earlier.violation() > self.tolerance {
+                self.take_in(&earlier)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the row of the bound to the candidate.
+    fn form<const NX: usize>(
+        &mut self,
+        ocp: &Ocp<T, NX, NU>,
+        factors: &[StageFactor<T, NX, NU>],
+        violated: &Candidate<T>,
+    ) {
         let Candidate {
             bound, part, soft, ..
         } = *violated;
         rows::form_row(ocp, factors, bound, part, soft, &mut self.candidate);
+    }
+
+    /// Takes the candidate, whose bound is `violated`, into the working set, dropping rows whose multiplier forbids it.
+    /// Returns how far v has moved along the direction, if that was the only one.
+    #[inline(never)]
+    fn take_in(&mut self, violated: &Candidate<T>) -> Result<Option<T>, Status<T>> {
+        let bound = violated.bound;
         let mut slack = violated.slack;
+        let mut single = true;
         if !slack.is_finite() {
             // The trajectory is finite: a bound at plus or minus infinity, or no number at all.
             return Err(if slack < T::zero() {
@@ -236,10 +282,12 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
                 return Err(Status::NotFinite);
             }
             if self.is_rounding(slack) {
-                return self.rest(self.candidate.terms.reported());
+                self.rest(self.candidate.terms.reported())?;
+                return Ok(None);
             }
             let Some((step, end)) = self.step_length(slack) else {
-                return self.accept_rounding_or_fail(violated, slack);
+                self.accept_rounding_or_fail(violated, slack)?;
+                return Ok(None);
             };
             if !step.is_finite() {
                 return Err(Status::NotFinite);
@@ -250,15 +298,17 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
                 StepEnd::Full if self.working.is_full() => return Err(Status::WorkingSetFull),
                 StepEnd::Full => {
                     self.working.append(&self.candidate, &self.direction);
-                    return Ok(());
+                    return Ok(single.then_some(step));
                 }
                 StepEnd::Cap => {
                     let row = self.candidate.terms;
-                    return self.release(&row);
+                    self.release(&row)?;
+                    return Ok(None);
                 }
                 StepEnd::Blocked(position) => {
                     let row = self.working.remove(position);
                     self.release(&row)?;
+                    single = false;
                 }
             }
         }
@@ -268,8 +318,9 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     /// holds as well as the working rows that it depends on.
     fn is_rounding(&self, slack: T) -> bool {
         let squares = self.v.iter().map(|v| v.norm_squared());
-        let length = squares.fold(T::zero(), |sum, square| sum + square).sqrt();
-        -slack <= self.direction.noise * length
+        let length_squared = squares.fold(T::zero(), |sum, square| sum + square);
+        let length = slack / self.direction.noise;
+        length * length <= length_squared
     }
 
     /// Changes of the active set that are still allowed.
@@ -415,6 +466,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
             row.active.multiplier -= step * *rate;
         }
         self.candidate.terms.active.multiplier += step;
+        self.unexplained += self.direction.noise * step.abs();
         for (v, change) in self.v.iter_mut().zip(self.direction.primal.iter()) {
             *v += change * step;
         }

@@ -2,7 +2,7 @@
 
 use crate::model::Scalar;
 use crate::ocp::{Common, Ocp};
-use crate::rows::{self, Trajectory};
+use crate::rows::{self, Places, Trajectory};
 use crate::small_matrix::{product, transposed_sizes, transposed_times};
 use crate::solution::ActiveSet;
 use nalgebra::SVector;
@@ -15,6 +15,7 @@ pub(crate) struct Adjoint<'a, T: 'static, const NX: usize, const NU: usize> {
     /// Derivative of the Lagrangian in x_`stage`, through what comes after it.
     pub costate: SVector<T, NX>,
     stage: usize,
+    places: Places,
 }
 
 /// What the pass finds at a stage.
@@ -45,11 +46,14 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> Adjoint<'a, T, NX, NU> {
             let (end, x) = (&ocp.terminal, trajectory.state(ocp, stage));
             costate += product(&end.p, &x) + end.linear_x;
         }
+        let mut places = Places::default();
+        active.stages().for_each(|stage| places.add(stage));
         Self {
             ocp,
             trajectory,
             costate,
             stage,
+            places,
         }
     }
 
@@ -58,9 +62,15 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> Adjoint<'a, T, NX, NU> {
         self.stage = self.stage.checked_sub(1)?;
         let stage = self.ocp.stages.get(self.stage)?;
         let costate = self.costate;
-        let (rows_x, rows_u) = rows::gradient(self.ocp, active.at(self.stage));
-        let mut gradient = transposed_times(&stage.b, &costate) + rows_u;
-        self.costate = transposed_times(&stage.a, &costate) + rows_x;
+        let mut gradient = transposed_times(&stage.b, &costate);
+        self.costate = transposed_times(&stage.a, &costate);
+        let mut rows = SVector::zeros();
+        if self.places.may_be_at(self.stage) {
+            let (rows_x, rows_u) = rows::gradient(self.ocp, active.at(self.stage));
+            gradient += rows_u;
+            self.costate += rows_x;
+            rows = rows_u;
+        }
         if let Some(trajectory) = self.trajectory {
             let x = trajectory.state(self.ocp, self.stage);
             let u = trajectory.u.get(self.stage)?;
@@ -73,7 +83,7 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> Adjoint<'a, T, NX, NU> {
             costate,
             gradient,
             dynamics: transposed_sizes(&stage.b, &costate),
-            rows: rows_u,
+            rows,
         })
     }
 

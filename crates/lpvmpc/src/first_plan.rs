@@ -15,7 +15,18 @@ use crate::workspace::Workspace;
 use nalgebra::{SMatrix, SVector, convert};
 
 /// Parts of the way to the set point to which the regulator is sent where there is no plan.
-const PARTS: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.01, 0.0];
+#[inline(always)]
+fn parts<T: Scalar>() -> [T; 6] {
+    // Number by number: see `steps` of a line search.
+    [
+        convert(1.0),
+        convert(0.3),
+        convert(0.1),
+        convert(0.03),
+        convert(0.01),
+        convert(0.0),
+    ]
+}
 /// Stages of the regulator, at least.
 const REGULATOR: usize = 20;
 /// A plan that costs more by so many times what the last one did is no longer the only candidate.
@@ -120,9 +131,10 @@ where
         let mut away = (x - aim.end()).component_mul(&indifferent);
         let merit = self.merit(aim, Prices::none());
         let mut found_one = false;
-        let mut parts = PARTS.iter();
+        let every = parts::<T>();
+        let mut parts = every.iter();
         while let Some(part) = parts.next() {
-            let x_aim = aim.end() + away * (T::one() - convert::<f64, T>(*part));
+            let x_aim = aim.end() + away * (T::one() - *part);
             let most = best.unwrap_or(convert(f64::INFINITY));
             let cost = self.roll_out_plan(x, &merit, most, &mut workspace.trial, &|i, x| {
                 let bounds = aim.own.u(i, &self.settings.u);
@@ -146,7 +158,7 @@ where
                 }
                 // The regulator leads to nothing finite: last, the input of the reference, held.
                 (feedback, away) = (SMatrix::zeros(), SVector::zeros());
-                parts = PARTS[..1].iter();
+                parts = every[..1].iter();
             }
         }
         best

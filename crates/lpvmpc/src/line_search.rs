@@ -9,7 +9,18 @@ use crate::working_set::copy;
 use nalgebra::{SVector, convert};
 
 /// Parts of the way to a program's answer that are tried; beyond it only where damping holds it back.
-const STEPS: [f64; 6] = [LONGEST_STEP, 1.0, 0.5, 0.25, 0.1, 0.03];
+#[inline(always)]
+fn steps<T: Scalar>() -> [T; 6] {
+    // Number by number: a list of `f64` would be converted one after the other while the program runs.
+    [
+        convert(LONGEST_STEP),
+        convert(1.0),
+        convert(0.5),
+        convert(0.25),
+        convert(0.1),
+        convert(0.03),
+    ]
+}
 /// Part of the expected gain that a step has to bring (Armijo's condition).
 const SUFFICIENT: f64 = 1e-4;
 /// The longest of them.
@@ -34,8 +45,7 @@ where
         let Self {
             policy, rollout, ..
         } = self;
-        let steps = STEPS.into_iter().map(convert::<f64, T>);
-        for step in steps.filter(|step| *step <= longest) {
+        for step in steps::<T>().into_iter().filter(|step| *step <= longest) {
             // Beyond the answer, all that was expected of it.
             let part = if step > T::one() {
                 T::one()

@@ -407,7 +407,7 @@ impl Places {
         self.0 == 0
     }
 
-    fn may_be_at(self, stage: usize) -> bool {
+    pub fn may_be_at(self, stage: usize) -> bool {
         self.0 >> (stage % 32) & 1 == 1
     }
 }
@@ -426,14 +426,20 @@ pub(crate) fn subtract<
     v: &mut [SVector<T, NU>],
 ) {
     let n = ocp.length();
-    let (mut costate, _) = gradient(ocp, active_at(n));
-    let stages = ocp.stages.iter().zip(factors).zip(v.iter_mut());
-    for (i, ((stage, factor), v)) in stages.enumerate().take(n).rev() {
-        *v += step_back(stage, factor, &mut costate);
+    let mut costate = SVector::zeros();
+    for i in (0..=n).rev() {
+        let stage = ocp.stages.get(i).zip(factors.get(i)).filter(|_| i < n);
+        let mut here = stage.zip(v.get_mut(i));
+        if let Some(((stage, factor), v)) = &mut here {
+            **v += step_back(stage, factor, &mut costate);
+        }
         if places.may_be_at(i) {
             let (rows_x, rows_u) = gradient(ocp, active_at(i));
-            *v += factor.inverse_factor * rows_u;
-            costate += factor.feedback.tr_mul(&rows_u) + rows_x;
+            costate += rows_x;
+            if let Some(((_, factor), v)) = &mut here {
+                **v += factor.inverse_factor * rows_u;
+                costate += factor.feedback.tr_mul(&rows_u);
+            }
         }
     }
 }

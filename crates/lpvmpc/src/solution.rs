@@ -226,6 +226,12 @@ impl<T: Scalar> ActiveSet<T> {
             .map(PackedRow::unpack)
     }
 
+    /// The stage of each row.
+    pub(crate) fn stages(&self) -> impl Iterator<Item = usize> {
+        let rows = first(&self.rows, self.len).iter();
+        rows.map(|row| usize::from(row.stage))
+    }
+
     /// How many rows are active.
     pub fn len(&self) -> usize {
         self.len

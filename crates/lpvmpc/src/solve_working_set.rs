@@ -62,9 +62,12 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         }
         let (defect, bound) = self.worst_defect(ocp, trajectory);
         let largest = self.v.iter().fold(T::zero(), |m, v| m.max(v.amax()));
-        self.find_unexplained(ocp, factors);
-        let rest = self.rest.iter().fold(T::zero(), |m, v| m.max(v.amax()));
-        if defect <= self.tolerance && rest <= self.tolerance * largest {
+        let negligible = self.tolerance * largest;
+        if !(self.unexplained <= negligible) {
+            self.find_unexplained(ocp, factors);
+            self.unexplained = self.rest.iter().fold(T::zero(), |m, v| m.max(v.amax()));
+        }
+        if defect <= self.tolerance && self.unexplained <= negligible {
             return Ok(false);
         }
         if self.refinements > 0 {
@@ -119,6 +122,7 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         factors: &[StageFactor<T, NX, NU>],
         trajectory: &Trajectory<'_, T, NX, NU>,
     ) -> Result<(), Status<T>> {
+        self.unexplained = convert(f64::INFINITY);
         loop {
             self.find_unexplained(ocp, factors);
             for (step, row) in self.step.iter_mut().zip(self.working.rows()) {

@@ -179,23 +179,29 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         spent: &mut usize,
     ) -> Result<(), Status<T>> {
         let warm = shift.is_some() && !solution.active.is_empty();
-        let start = shift.map_or(Start::Nothing, Start::Last);
-        let mut outcome = self.search(ocp, start, solution);
-        *spent += self.dual.changes;
-        if warm && matches!(outcome, Err(Status::Inaccurate(_))) {
-            // A start must not decide whether there is an answer.
+        let mut start = shift.map_or(Start::Nothing, Start::Last);
+        loop {
+            let mut outcome = self.search(ocp, start, solution);
+            *spent += self.dual.changes;
+            // A microcontroller has no flash for more than one beginning from nothing.
+            let last = self.dual.one_at_a_time || !(warm || cfg!(feature = "alloc"));
+            if let Err(Status::Inaccurate(bound)) = outcome
+                && (last || !warm)
+            {
+                outcome = match self.prove(ocp, &mut solution.active) {
+                    Some(infeasible) => Err(infeasible),
+                    None => self.search_with_held_inputs(ocp, solution, bound, spent),
+                };
+            }
+            if last || !matches!(outcome, Err(Status::Inaccurate(_))) {
+                return outcome;
+            }
+            // Neither the start nor the order of the changes must decide whether there is an answer.
+            start = Start::Nothing;
             solution.active.clear();
             self.dual.begin_again();
-            let begun = self.roll_out(ocp, solution);
-            outcome = begun.and_then(|()| self.search(ocp, Start::Nothing, solution));
-            *spent += self.dual.changes;
-        }
-        match outcome {
-            Err(Status::Inaccurate(bound)) => match self.prove(ocp, &mut solution.active) {
-                Some(infeasible) => Err(infeasible),
-                None => self.search_with_held_inputs(ocp, solution, bound, spent),
-            },
-            known => known,
+            self.dual.one_at_a_time = true;
+            self.roll_out(ocp, solution)?;
         }
     }
 
@@ -239,10 +245,12 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         loop {
             let trajectory = trajectory(solution);
             match self.dual.most_violated(ocp, &trajectory) {
-                Some(violated) => self.dual.satisfy(ocp, &self.factors, &violated)?,
-                None if start == Start::Held => break,
-                None if self.dual.refine(ocp, &self.factors, &trajectory)? => {}
-                None => break,
+                [Some(violated), earlier] => {
+                    self.dual.satisfy(ocp, &self.factors, &violated, earlier)?;
+                }
+                _ if start == Start::Held => break,
+                _ if self.dual.refine(ocp, &self.factors, &trajectory)? => {}
+                _ => break,
             }
             self.roll_out(ocp, solution)?;
             #[cfg(feature = "alloc")]

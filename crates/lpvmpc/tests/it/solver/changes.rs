@@ -110,7 +110,7 @@ fn the_default_cap_grows_with_the_problem() {
 /// A search on 200 stages that a constant for short horizons has cut off, where bounds are taken one by one.
 #[test]
 fn a_long_horizon_gets_the_changes_that_it_needs() {
-    let mut ocp = saturated::<4, 1>(&mut Rng::new(2), 200, 0);
+    let mut ocp = saturated::<4, 1>(&mut Rng::new(12), 200, 0);
     ocp.horizon = 200;
     let Both {
         at_once: (mut at_once, mut answer),
@@ -142,11 +142,12 @@ fn a_long_horizon_gets_the_changes_that_it_needs() {
 }
 
 /// Inputs that cannot hold the plant over the horizon: their bounds drowned in rounding, which the search noticed only at its
-/// end. Of these problems 6 were solved, and all of them took 19 836 changes.
+/// end. Which of these problems are solved depends on the order of sums and changes; of the first dozen it was 6 and then 9, of
+/// all of them 32 before an order of changes had a second one behind it.
 #[test]
 fn a_search_that_rounding_leads_astray_ends() {
     let (mut solved, mut changes) = (0, 0);
-    for seed in 0..12 {
+    for seed in 0..60 {
         let mut ocp = saturated::<4, 2>(&mut Rng::new(seed), 120, 0);
         ocp.horizon = 120;
         let a = DMatrix::from_column_slice(4, 4, ocp.stages[0].a.as_slice());
@@ -161,7 +162,7 @@ fn a_search_that_rounding_leads_astray_ends() {
         solved += usize::from(solution.status == Status::Solved);
     }
     assert!(
-        solved >= 8 && changes < 16_000,
+        solved >= 40 && changes < 80_000,
         "{solved} solved, {changes}"
     );
 }
