@@ -14,7 +14,7 @@ use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::riccati::{CostToGo, StageFactor};
 use crate::rows::Trajectory;
-use crate::solution::{ActiveRow, ActiveSet, Quantity, Solution, Status};
+use crate::solution::{ActiveRow, ActiveSet, Quantity, Side, Solution, Status};
 use crate::solver_settings::{SolverSettings, WarmStart, default_cap, default_tolerance};
 use crate::working_set::{first, first_mut};
 use nalgebra::SVector;
@@ -371,16 +371,21 @@ pub(crate) fn infeasible<T: Scalar, const NX: usize, const NU: usize>(
     if !(infeasibility_margin(ocp, proof) > T::zero()) {
         return None;
     }
-    // The bounds of inputs can be met by themselves: the earliest other bound is the cause.
-    let mut cause = proof.iter().next()?;
-    for row in proof.iter() {
-        let of_input = |row: &ActiveRow<T>| matches!(row.bound.quantity, Quantity::Input(_));
-        let earlier = of_input(&cause) || row.bound.stage < cause.bound.stage;
-        if !of_input(&row) && earlier {
-            cause = row;
+    // The bounds of inputs can be met by themselves, and the others without a terminal equality as a rule: else the earliest
+    // of them is the cause.
+    let (mut cause, mut least) = (proof.iter().next()?.bound, usize::MAX);
+    for ActiveRow { bound, .. } in proof.iter() {
+        let order = match (bound.side, bound.quantity) {
+            // A microcontroller has no flash for the better name.
+            (Side::Equality, _) if cfg!(feature = "alloc") => 0,
+            (_, Quantity::Input(_)) => usize::MAX,
+            _ => bound.stage,
+        };
+        if order < least {
+            (cause, least) = (bound, order);
         }
     }
-    Some(Status::Infeasible(cause.bound))
+    Some(Status::Infeasible(cause))
 }
 
 pub(crate) fn trajectory<T, const NX: usize, const NU: usize>(
