@@ -107,7 +107,12 @@ def test_an_infeasible_problem_is_said_in_the_plant_s_names():
         plant, 0.1, 20, [1, 1], [1], u_bounds=([-1], [1]), x_bounds={"position": (None, 0.5)},
         state_bounds="hard",
     )  # fmt: skip
+    # Stage 1 is out of reach already: 0.4 + 0.1 * 2 - 0.1**2 / 2 = 0.595.
     plan = mpc.step([0.4, 2.0])
+    assert plan.status == "infeasible" and not plan.is_solved
+    assert plan.message == "infeasible: position <= 0.5 at stage 1 against force >= -1 at stage 0"
+    # Stopping takes 1.5**2 / 2 = 1.125.
+    plan = mpc.step([0.0, 1.5])
     assert plan.status == "infeasible" and not plan.is_solved
     assert plan.message.startswith("infeasible: position <= 0.5 at stage")
     assert "against force >= -1 at stages 0 to" in plan.message
