@@ -230,3 +230,64 @@ fn defect<T: Scalar, const NX: usize, const NU: usize>(
     let own = if row.mirrored { -slack } else { slack };
     own + row.compliance * row.active.multiplier
 }
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use crate::memory::Capacity;
+    use crate::ocp::{Bounds, Stage};
+    use crate::solution::Solution;
+    use crate::solver::{Solver, Start};
+    use crate::solver_settings::SolverSettings;
+    use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+
+    /// What the steps say rounding leaves unexplained is no less than what is found, and small enough to tell.
+    #[test]
+    fn no_more_is_unexplained_than_the_steps_allow_for() {
+        let room = Capacity {
+            stages: 20,
+            rows: 40,
+            active: 120,
+            ..Capacity::default()
+        };
+        let mut compared = 0;
+        for k in 0..60 {
+            let part = f64::from(k) / 60.0;
+            let mut ocp = Ocp::<f64, 2, 1>::allocate(20);
+            ocp.horizon = 20;
+            ocp.x0 = Vector2::new(1.0 - part, 2.0 * part - 0.8);
+            ocp.stages.fill(Stage {
+                a: Matrix2::new(1.0, 0.1, 0.3 * part, 1.0),
+                b: Vector2::new(0.005, 0.1),
+                ..Stage::new()
+            });
+            ocp.common.q = Matrix2::identity();
+            ocp.common.r = SMatrix::from_element(0.01);
+            ocp.terminal.p = Matrix2::identity() * 10.0;
+            let sides = |limit: f64| (SVector::repeat(-limit), SVector::repeat(limit));
+            let (lower, upper) = sides(2.0 + part);
+            ocp.common.u = Bounds { lower, upper };
+            ocp.common.x.lower[1] = -0.5;
+            let mut solver = Solver::allocate(room);
+            let mut solution = Solution::allocate(room);
+            solver.begin(&ocp, &SolverSettings::default());
+            solver.factorize(&ocp).unwrap();
+            solver.roll_out(&ocp, &mut solution).unwrap();
+            // Without a refinement, which looks.
+            if solver.search(&ocp, Start::Held, &mut solution).is_err() {
+                continue;
+            }
+            let Solver { dual, factors, .. } = &mut solver;
+            if dual.working.rows().len() < 2 {
+                continue;
+            }
+            dual.find_unexplained(&ocp, factors);
+            let found = dual.rest.iter().fold(0.0_f64, |most, v| most.max(v.amax()));
+            let largest = dual.v.iter().fold(0.0_f64, |most, v| most.max(v.amax()));
+            assert!(found <= dual.unexplained, "{k}: {found:e}");
+            assert!(dual.unexplained <= 1e-10 * largest, "{k}: {largest:e}");
+            compared += 1;
+        }
+        assert!(compared > 20, "{compared}");
+    }
+}

@@ -169,7 +169,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             .reset(tolerance.unwrap_or_else(default_tolerance), cap);
     }
 
-    /// The dual method, from the trajectory without bounds; with held inputs where rounding ends it.
+    /// The dual method, from the trajectory without bounds; with held inputs where rounding ends it, and with another order
+    /// of its changes.
     #[inline(always)]
     pub(crate) fn solve_one_by_one(
         &mut self,
