@@ -42,8 +42,7 @@ pub(crate) struct DualActiveSet<T: 'static, const NU: usize> {
     pub(crate) loosest: T,
     pub changes: usize,
     max_changes: usize,
-    /// An entry of v differs by no more from the sum of multiplier * alpha over the active rows, which rounding allows for;
-    /// infinity where that is not known.
+    /// An entry of v differs by no more from the sum of multiplier * alpha over the active rows, which rounding allows for.
     pub(crate) unexplained: T,
     /// Refinements that are left.
     pub(crate) refinements: usize,

@@ -267,7 +267,7 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
     fn noise(&self, direction: &Direction<T, NU>) -> T {
         let rows = self.rows().iter().zip(direction.dual.iter());
         let terms = rows.fold(direction.size, |sum, (row, d)| sum + d.abs() * row.size);
-        T::default_epsilon() * convert(8.0) * terms
+        rounding::<T>() * terms
     }
 
     /// Adds `row`, whose `direction` is current. The set must not be full.
@@ -340,15 +340,19 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
     }
 
     /// The shortest change of v that changes the working rows' slacks, elastic parts included,
-    /// by L `step`: v and the multipliers move by it. `step` is overwritten.
-    pub fn shift(&mut self, step: &mut [T], v: &mut [SVector<T, NU>]) {
+    /// by L `step`: v and the multipliers move by it. `step` is overwritten. Returns by how much the two may differ for
+    /// rounding.
+    pub fn shift(&mut self, step: &mut [T], v: &mut [SVector<T, NU>]) -> T {
         for (s, q) in step.iter().zip(self.basis()) {
             add(v, q, *s);
         }
         self.solve_upper(step);
+        let mut terms = T::zero();
         for (row, change) in self.rows_mut().iter_mut().zip(step.iter()) {
             row.active.multiplier += *change;
+            terms += change.abs() * row.size;
         }
+        rounding::<T>() * terms
     }
 
     /// step += Q `v`
@@ -384,6 +388,11 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
             }
         }
     }
+}
+
+/// What rounding makes of a sum of rows, relative to the sum of their lengths.
+fn rounding<T: Scalar>() -> T {
+    T::default_epsilon() * convert(8.0)
 }
 
 /// Moves the lines of `width` entries behind `position`, up to `len`, one place forward.
