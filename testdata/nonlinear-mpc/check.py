@@ -1,9 +1,9 @@
-"""How far rows of random-starts.csv are from the same loops computed with more effort.
+"""How far rows of the tables of random starts are from the same loops computed with more effort.
 
     python check.py [--raised] INDEX...
 
-The loops are computed again with a tolerance of 1e-10 and all cold starts at every sample; `--raised`: with prices of the
-state bounds that rise with the way to the set point, as in scenarios.
+The loops are computed again with a tolerance of 1e-10 and all cold starts at every sample; `--raised`: those of
+random-starts-raised.csv, whose prices of the state bounds rise with the way to the set point.
 """
 import csv
 import sys
@@ -12,7 +12,7 @@ import numpy as np
 
 from closed_loop import Loop, Nonlinear
 from model import R_BALL, Design
-from random_starts import DURATION, TABLE
+from random_starts import DURATION, RAISED_TABLE, TABLE
 
 
 class Thorough(Nonlinear):
@@ -24,7 +24,7 @@ class Thorough(Nonlinear):
 
 if __name__ == "__main__":
     options = {"tolerance": 1e-10, "raised": "--raised" in sys.argv}
-    with open(TABLE) as table:
+    with open(RAISED_TABLE if options["raised"] else TABLE) as table:
         rows = list(csv.DictReader(table))
     indices = (int(word) for word in sys.argv[1:] if word != "--raised")
     for row in (rows[index] for index in indices):

@@ -1,6 +1,9 @@
 """Random horizons, sampling times, set points and starts: appends to random-starts.csv.
 
-    python random_starts.py [COUNT]
+    python random_starts.py [--raised] [COUNT]
+
+With --raised the prices of the state bounds rise with the way to the set point, as in scenarios, and the table is
+random-starts-raised.csv.
 
 The cases follow from the seed alone and are written in order. A table that was left in the middle
 goes on where it ends, up to COUNT rows (1000 without it).
@@ -19,6 +22,7 @@ SEED = 20251
 COUNT = 1000
 DURATION = 8.0
 TABLE = "random-starts.csv"
+RAISED_TABLE = "random-starts-raised.csv"
 
 
 def cases():
@@ -40,12 +44,16 @@ def cases():
 
 
 if __name__ == "__main__":
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else COUNT
+    words = sys.argv[1:]
+    raised = "--raised" in words
+    counts = [int(word) for word in words if word != "--raised"]
+    count = counts[0] if counts else COUNT
+    path = RAISED_TABLE if raised else TABLE
     done = 0
-    if os.path.exists(TABLE):
-        with open(TABLE) as table:
+    if os.path.exists(path):
+        with open(path) as table:
             done = sum(1 for _ in table) - 1
-    with open(TABLE, "a") as table:
+    with open(path, "a") as table:
         if table.tell() == 0:
             print(
                 "index,horizon,t_s_s,distance_m,theta0_rad,phi_dot0_rad_s,theta_dot0_rad_s,"
@@ -59,7 +67,7 @@ if __name__ == "__main__":
             begin = time.monotonic()
             horizon, t_s, distance, *start = case
             goal = np.array([distance / R_BALL, 0.0, 0.0, 0.0])
-            loops = both(Design(t_s), horizon, np.array([0.0, *start]), goal, DURATION)
+            loops = both(Design(t_s), horizon, np.array([0.0, *start]), goal, DURATION, raised=raised)
             row = (index, *case, DURATION, *values(*loops))
             print(*map(repr, row), sep=",", file=table, flush=True)
             print(f"{index} {horizon} {t_s}: {time.monotonic() - begin:.1f} s", file=sys.stderr)

@@ -5,7 +5,7 @@ mod case;
 mod run;
 mod summary;
 
-pub use case::{Case, distances, narrow_bounds, random_starts};
+pub use case::{Case, distances, narrow_bounds, random_starts, rising_prices};
 pub use run::{Outcome, guaranteed_cost, run, run_all};
 pub use summary::Summary;
 

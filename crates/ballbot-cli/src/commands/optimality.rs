@@ -9,7 +9,7 @@ use crate::table::Table;
 use ballbot_studies::StudyError;
 use ballbot_studies::optimality::{
     Case, Outcome, Summary, distances, guaranteed_cost, narrow_bounds, quantile, random_starts,
-    run_all,
+    rising_prices, run_all,
 };
 use clap::Args;
 use lpvmpc::Iterations;
@@ -28,8 +28,8 @@ The LPV controller with its defaults, from rest and from random starts, with set
 10 m away that are given at t = 0, horizons of 10 to 80 samples and sampling times of 10 to 50 ms, and
 from rest within narrower bounds. Its closed-loop costs are divided by those of nonlinear MPC on the same
 problem, which another program (testdata/nonlinear-mpc, IPOPT) has solved to convergence at every sample.
-In the first two sets the prices of state bounds are the same everywhere; in scenarios and within the
-narrower bounds they rise with the way. Writes a row per case and figures.")]
+In the first two sets the prices of state bounds are the same everywhere; in the others, the random
+starts once more and the narrower bounds, they rise with the way, as in scenarios. Writes a row per case and figures.")]
 pub struct OptimalityArguments {
     /// Most quadratic programs per sample [default: that of scenarios]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
@@ -62,6 +62,7 @@ pub fn run(arguments: &OptimalityArguments) -> Result<String, CommandError> {
     let sets = [
         ("from rest", distances()?),
         ("random starts", random_starts()?),
+        ("rising prices", rising_prices()?),
         ("narrow bounds", narrow_bounds()?),
     ];
     let mut table = Table::new([

@@ -98,7 +98,7 @@ pub fn run(case: &Case, iterations: Iterations<f64>) -> Result<Outcome, StudyErr
     } = prepared;
     settings.iterations = iterations;
     // As in the reference's problem.
-    settings.raise_prices = case.bounds.is_some();
+    settings.raise_prices = case.raised;
     let controller = Controller::allocate(ballbot, settings);
     let mut controller = controller.map_err(ScenarioError::from)?;
     let mut workspace = controller.workspace();
