@@ -182,7 +182,8 @@ fn nonsense_in_problems<const NX: usize, const NU: usize>() {
             let residual = kkt_residual(&ocp, &solution);
             let multipliers = solution.active.iter().map(|row| row.multiplier.abs());
             let forces = multipliers.fold(1.0, f64::max);
-            assert!(residual.largest() <= 1e-6 * forces, "{k}: {residual:?}");
+            let limit = (1e-6 * forces).min(1e-4).max(1e-9 * forces);
+            assert!(residual.largest() <= limit, "{k}: {residual:?}");
         }
         statuses.add(kind(&solution.status));
     }
