@@ -16,7 +16,7 @@ use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Statu
 use crate::working_set::{Direction, Row, Terms, WorkingSet};
 use nalgebra::{SVector, convert};
 
-/// A bound of which less of the violation is left is left for the next look along the trajectory.
+/// An earlier bound with less than this part of its violation left waits for the next look along the trajectory.
 const LEFT: f64 = 0.5;
 
 /// Scratch memory and state of the dual method.

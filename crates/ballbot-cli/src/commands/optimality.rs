@@ -29,7 +29,8 @@ The LPV controller with its defaults, from rest and from random starts, with set
 from rest within narrower bounds. Its closed-loop costs are divided by those of nonlinear MPC on the same
 problem, which another program (testdata/nonlinear-mpc, IPOPT) has solved to convergence at every sample.
 In the first two sets the prices of state bounds are the same everywhere; in the others, the random
-starts once more and the narrower bounds, they rise with the way, as in scenarios. Writes a row per case and figures.")]
+starts once more and the narrower bounds, they rise with the way, as in scenarios. Writes a row per
+case and figures.")]
 pub struct OptimalityArguments {
     /// Most quadratic programs per sample [default: that of scenarios]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
