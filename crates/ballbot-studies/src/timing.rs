@@ -138,6 +138,8 @@ pub struct GuaranteedTimes {
     pub descent_us: Times,
     /// Of a descent, from the measured state to its answer, with everything else prepared.
     pub feedback_us: Times,
+    /// The same after other work, of 48 MB, between `prepare` and `feedback`.
+    pub feedback_cold_us: Times,
     /// A descent towards a set point 2.5 m away, given at once: several programs per sample.
     pub far_descent_us: Times,
     /// With artificial set point, certified terminal set and acceptance test; one quadratic
@@ -203,6 +205,7 @@ pub fn time_guaranteed(watch: Stopwatch<'_>) -> Result<GuaranteedTimes, StudyErr
         plain_us: Times::new(plain_us),
         descent_us: descent.step,
         feedback_us: descent.feedback,
+        feedback_cold_us: descent.feedback_cold,
         far_descent_us: far.step,
         guaranteed_us: Times::new(guaranteed_us),
     })
@@ -212,6 +215,7 @@ pub fn time_guaranteed(watch: Stopwatch<'_>) -> Result<GuaranteedTimes, StudyErr
 struct DescentTimes {
     step: Times,
     feedback: Times,
+    feedback_cold: Times,
 }
 
 impl DescentTimes {
@@ -226,18 +230,26 @@ impl DescentTimes {
         let controller = Control::allocate(prepared.ballbot, settings);
         let mut controller = controller.map_err(ScenarioError::from)?;
         let mut workspace = controller.workspace();
-        let (mut step, mut feedback) = (Vec::new(), Vec::new());
+        let (mut step, mut feedback, mut feedback_cold) = (Vec::new(), Vec::new(), Vec::new());
+        let mut other_work = OtherWork::new();
+        let stride = samples.div_ceil(COLD_SAMPLES);
         let mut x = Vector4::zeros();
         for k in 0..samples {
             let reference = Reference::constant(Vector4::new(wanted(k), 0.0, 0.0, 0.0));
             let before = controller.clone();
-            feedback.push(watch.shortest(|| {
+            let mut answer = |other_work: Option<&mut OtherWork>| {
                 controller.clone_from(&before);
                 controller.prepare(&reference, &mut workspace);
+                other_work.map(OtherWork::sweep);
                 let start = watch.time();
                 black_box(controller.feedback(black_box(&x), &reference, &mut workspace));
                 watch.time() - start
-            }));
+            };
+            feedback.push(watch.shortest(|| answer(None)));
+            if k % stride == 0 {
+                let cold = watch.shortest_cold(|| answer(Some(&mut other_work)));
+                feedback_cold.push(cold);
+            }
             step.push(watch.shortest(|| {
                 controller.clone_from(&before);
                 let start = watch.time();
@@ -249,6 +261,7 @@ impl DescentTimes {
         Ok(Self {
             step: Times::new(step),
             feedback: Times::new(feedback),
+            feedback_cold: Times::new(feedback_cold),
         })
     }
 }

@@ -48,8 +48,6 @@ pub(crate) struct DualActiveSet<T: 'static, const NU: usize> {
     pub(crate) refinements: usize,
     /// Sign of the candidate's multiplier where it contradicts the working set; zero before.
     contradicting: T,
-    /// Whether it is known of the minimiser without bounds that it keeps them all.
-    pub kept: bool,
     /// Whether every change is followed by a look along the trajectory.
     pub one_at_a_time: bool,
 }
@@ -86,7 +84,6 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
             unexplained: T::zero(),
             refinements: 0,
             contradicting: T::zero(),
-            kept: false,
             one_at_a_time: false,
         }
     }
@@ -103,7 +100,6 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         self.max_changes = max_changes;
         self.refinements = 3;
         self.contradicting = T::zero();
-        self.kept = false;
         self.one_at_a_time = false;
     }
 
@@ -120,9 +116,6 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         trajectory: &Trajectory<'_, T, NX, NU>,
     ) -> [Option<Candidate<T>>; 2] {
         let [mut worst, mut earlier]: [Option<Candidate<T>>; 2] = [None; 2];
-        if self.kept {
-            return [worst, earlier];
-        }
         let mut least = -T::one();
         rows::violated_bounds(ocp, trajectory, &mut |candidate| {
             // Negated, so that a violation that is NaN counts; it stays the worst.

@@ -37,7 +37,7 @@ use crate::solver::{Solver, trajectory};
 use crate::working_set::{copy, first_mut};
 use answer::{list, report};
 use exchange::{Patience, Program, Tolerances, exchange};
-use expected::Expected;
+use expected::{Expected, Violated};
 use last_answer::{Kind, LastAnswer};
 use nalgebra::SVector;
 use retries::AllRetries;
@@ -74,8 +74,6 @@ pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
     put_off: bool,
     /// The solver with it.
     pub in_turns: InTurns<T, NX, NU>,
-    /// Takes down the last answer, before it is overwritten.
-    pub keep: fn(&mut Self, &Solution<T, NX, NU>),
 }
 
 /// Places for the factors of the problem with the sides' costs, and for a trajectory.
@@ -102,8 +100,7 @@ impl<T, const NX: usize, const NU: usize> ManyBoundsPlace<T, NX, NU> {
     }
 }
 
-/// Solves the problem, whose trajectory without bounds is in the solution, or proves that it is infeasible; counts changes
-/// of the active set.
+/// Solves the factorised problem, or proves that it is infeasible; counts changes of the active set.
 type InTurns<T, const NX: usize, const NU: usize> = fn(
     &mut Solver<T, NX, NU>,
     &Ocp<T, NX, NU>,
@@ -120,7 +117,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             retries: AllRetries::default(),
             put_off: false,
             in_turns: Solver::solve_in_turns,
-            keep: Self::keep_states,
         }
     }
 
@@ -130,11 +126,16 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         ocp.terminal.equality.is_none() && self.places.iter().all(fits)
     }
 
-    /// The states of the last answer, if bounds are active in it, as long as nothing else needs the place.
-    fn keep_states(&mut self, last: &Solution<T, NX, NU>) {
-        if !last.active.is_empty() {
-            let [place, _] = &mut self.places;
-            copy(&mut place.x, &last.x);
+    /// Takes down what a solve overwrites: the states of the last answer, if bounds are active in it, as long as nothing
+    /// else needs the place. Without an answer to go on from, nothing is known of the solves before.
+    fn begin(&mut self, last: Option<&Solution<T, NX, NU>>) {
+        match last {
+            None => self.retries = AllRetries::default(),
+            Some(last) if last.active.is_empty() => {}
+            Some(last) => {
+                let [place, _] = &mut self.places;
+                copy(&mut place.x, &last.x);
+            }
         }
     }
 
@@ -153,21 +154,18 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         if !self.has_room(ocp) {
             return AtOnce::Untried;
         }
-        let later = turn == Turn::Later;
         let was_put_off = core::mem::take(&mut self.put_off);
-        if !later && shift.is_none() {
-            // Without an answer to go on from, nothing is known of the solves before.
-            self.retries = AllRetries::default();
-        }
+        let (later, violated) = match turn {
+            Turn::First(violated) => (false, violated),
+            Turn::Later => (true, Violated::new(ocp, solution)),
+        };
         let known = shift.map_or(0, |_| solution.active.len());
-        let mut expected = Expected::new(ocp, solution, known);
+        let mut expected = Expected::new(ocp, &violated, &solution.active, known);
         if later || solver.dual.changes_left() < cap_with_later_turn(NX + NU) {
             expected.changes_first = None;
         }
         if later {
             (expected.many, expected.saturated) = (true, false);
-        } else if expected.violated == 0 {
-            return AtOnce::Kept;
         } else if !expected.is_due(&mut self.retries) {
             return AtOnce::Untried;
         }
@@ -184,7 +182,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         };
         let (left, before) = (solver.dual.changes_left(), *spent);
         let (factorisations, most) = match turn {
-            Turn::First => {
+            Turn::First(_) => {
                 let many = (expected.bounds / BOUNDS).max(n / STAGES);
                 (many.clamp(least, MOST_FOR_MANY), left / SHARE)
             }
@@ -256,7 +254,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         };
         self.put_off = outcome.is_none() && expected.many && expected.changes_first.is_some();
         let learns = match turn {
-            Turn::First => !(expected.saturated || self.put_off),
+            Turn::First(_) => !(expected.saturated || self.put_off),
             Turn::Later => was_put_off,
         };
         if learns {

@@ -77,17 +77,20 @@ impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
     }
 
     /// Those of a sample whose goal is `way` from where the state is: those of the settings, raised where they are to be.
-    /// `a` is the plant's matrix where the sample begins.
+    /// `a` is the plant's matrix where the sample begins. Where no bound is soft, neither one of the settings nor one `of_stages`, there
+    /// is nothing to raise.
     // Of its own, not within the step, whose registers it would take.
     #[inline(never)]
     pub fn new<const NU: usize, const NS: usize>(
         settings: &ControllerSettings<T, NX, NU, NS>,
         terminal: &TerminalIngredient<T, NX>,
+        of_stages: bool,
         way: &SVector<T, NX>,
         a: impl FnOnce() -> SMatrix<T, NX, NX>,
     ) -> Self {
         let mut prices = Self::given(&settings.soft_x);
         if settings.raise_prices
+            && (of_stages || prices.common != [None; NX])
             && let TerminalIngredient::Cost(p) = terminal
         {
             prices.least = of_way(settings, p, way, &a());

@@ -127,20 +127,18 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             true => factorized,
             false => Err(Status::HorizonTooLong),
         };
-        if let Some(phase) = self.many_bounds.first_mut() {
-            let keep = phase.keep;
-            keep(phase, solution);
-        }
         let shift = shift_of_last(settings, solution);
         if shift.is_none() {
             // Nothing is known that could be doubted.
             (solution.active.doubted, solution.active.not_held) = (0, 0);
         }
-        let begun = factorized.and_then(|()| self.roll_out(ocp, solution));
         let in_turns = self.many_bounds.first().map(|phase| phase.in_turns);
-        let outcome = begun.and_then(|()| match in_turns {
+        let outcome = factorized.and_then(|()| match in_turns {
             Some(in_turns) => in_turns(self, ocp, shift, solution, &mut spent),
-            None => self.solve_one_by_one(ocp, shift, solution, &mut spent),
+            None => {
+                self.roll_out(ocp, solution)?;
+                self.solve_one_by_one(ocp, shift, solution, &mut spent)
+            }
         });
         solution.changes = spent;
         solution.status = match outcome {
@@ -257,16 +255,27 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             #[cfg(feature = "alloc")]
             self.check_rounding(ocp)?;
         }
+        let known = match start {
+            Start::Last(_) => solution.active.len(),
+            _ => 0,
+        };
+        self.accept(ocp, known, solution)
+    }
+
+    /// The trajectory is the answer, after a search that began with so many `known` rows.
+    #[inline(never)]
+    pub(crate) fn accept(
+        &self,
+        ocp: &Ocp<T, NX, NU>,
+        known: usize,
+        solution: &mut Solution<T, NX, NU>,
+    ) -> Result<(), Status<T>> {
         // What the tolerance or rounding lets through is no input for an actuator.
         clip_inputs(ocp, solution);
         solution.cost = cost(ocp, solution);
         if !solution.cost.is_finite() {
             return Err(Status::NotFinite);
         }
-        let known = match start {
-            Start::Last(_) => solution.active.len(),
-            _ => 0,
-        };
         if !self.dual.report(&mut solution.active) {
             return Err(Status::WorkingSetFull);
         }
@@ -336,7 +345,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         shift: usize,
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
-        if solution.active.is_empty() || self.dual.kept {
+        if solution.active.is_empty() {
             return Ok(());
         }
         let before = (&solution.active, shift);

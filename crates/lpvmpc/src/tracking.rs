@@ -28,7 +28,8 @@ where
     ) {
         let (settings, own) = (&self.settings, &aim.own);
         let terminal = own.terminal().unwrap_or(&settings.terminal);
-        self.soft = SoftPrices::new(settings, terminal, &(x - aim.end()), || {
+        let of_stages = own.soft_x(0).is_some();
+        self.soft = SoftPrices::new(settings, terminal, of_stages, &(x - aim.end()), || {
             self.begins_along(x, aim)
         });
         self.pose_bounds(aim, workspace);

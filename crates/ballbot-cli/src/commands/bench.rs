@@ -121,7 +121,8 @@ fn guaranteed_table(times: &GuaranteedTimes) -> Table {
     let rows = [
         ("plain, the same predictor, one program", times.plain_us),
         ("plain, descent", times.descent_us),
-        ("plain, descent: feedback alone", times.feedback_us),
+        ("plain, descent: feedback", times.feedback_us),
+        ("plain, descent: feedback, cold", times.feedback_cold_us),
         ("plain, descent, 2.5 m at once", times.far_descent_us),
         ("guaranteed", times.guaranteed_us),
     ];

@@ -27,6 +27,18 @@ fn every_sequence_has_its_times() {
         let many = name.starts_with("many") || name.starts_with("long");
         assert_eq!(active > 30, many, "{name}: {active} active");
     }
+    for of in [
+        "plain_us",
+        "descent_us",
+        "feedback_us",
+        "feedback_cold_us",
+        "far_descent_us",
+        "guaranteed_us",
+    ] {
+        let time = |statistic: &str| result["guarded"][of][statistic].as_f64().unwrap();
+        let [median, p99, max] = ["median", "p99", "max"].map(time);
+        assert!(0.0 < median && median <= p99 && p99 <= max, "{of}");
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use super::retries::AllRetries;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::rows;
-use crate::solution::{Quantity, Solution};
+use crate::solution::{ActiveSet, Quantity, Solution};
 use crate::solver::trajectory;
 
 /// With so many violated bounds a few factorisations cost less than a pass for each bound.
@@ -37,10 +37,40 @@ const LITTLE: usize = 2;
 /// becomes active.
 const LITTLE_OF_ONE: usize = 4;
 
+/// What the trajectory without bounds violates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Violated {
+    /// How many bounds.
+    pub bounds: usize,
+    /// How many of inputs.
+    inputs: usize,
+    /// Whether one is soft.
+    soft: bool,
+}
+
+impl Violated {
+    /// By the trajectory in `solution`.
+    #[inline(never)]
+    pub fn new<T: Scalar, const NX: usize, const NU: usize>(
+        ocp: &Ocp<T, NX, NU>,
+        solution: &Solution<T, NX, NU>,
+    ) -> Self {
+        let (mut bounds, mut inputs, mut soft) = (0, 0, false);
+        rows::violated_bounds(ocp, &trajectory(solution), &mut |candidate| {
+            bounds += 1;
+            inputs += usize::from(matches!(candidate.bound.quantity, Quantity::Input(_)));
+            soft |= candidate.soft.is_some();
+        });
+        Self {
+            bounds,
+            inputs,
+            soft,
+        }
+    }
+}
+
 /// What can be told from the trajectory without bounds, and from the last answer.
 pub(super) struct Expected {
-    /// How many are violated.
-    pub violated: usize,
     /// How many bounds.
     pub bounds: usize,
     /// Whether these are many enough for the interior-point method.
@@ -58,19 +88,19 @@ pub(super) struct Expected {
 }
 
 impl Expected {
-    /// Of the trajectory without bounds in `solution`, whose active rows are those of the last answer: `known` of them, or
-    /// 0 if they are not to be begun with.
+    /// Where the trajectory without bounds has `violated` these, and `last` are the active rows of the last answer: `known`
+    /// of them, or 0 if they are not to be begun with.
     pub fn new<T: Scalar, const NX: usize, const NU: usize>(
         ocp: &Ocp<T, NX, NU>,
-        solution: &Solution<T, NX, NU>,
+        violated: &Violated,
+        last: &ActiveSet<T>,
         known: usize,
     ) -> Self {
-        let (mut violated, mut inputs, mut soft) = (0, 0, false);
-        rows::violated_bounds(ocp, &trajectory(solution), &mut |candidate| {
-            violated += 1;
-            inputs += usize::from(matches!(candidate.bound.quantity, Quantity::Input(_)));
-            soft |= candidate.soft.is_some();
-        });
+        let Violated {
+            bounds: violated,
+            inputs,
+            soft,
+        } = *violated;
         let takes_more = soft || NU == 1 && known > 0;
         let enough = match (NU == 1 && soft, known) {
             (true, 0) => ocp.length().clamp(ALL_SOFT, MORE),
@@ -79,7 +109,7 @@ impl Expected {
             (false, _) => MANY,
         };
         // Where several inputs act together, general rows that were active are taken over one by one in less time.
-        let rows = NU > 1 && guess::mostly_rows(&solution.active);
+        let rows = NU > 1 && guess::mostly_rows(last);
         // As a rule most of those that are known hold again, and others are violated only as long as they do not.
         let little = if NU == 1 { LITTLE_OF_ONE } else { LITTLE };
         let tells = !rows && little * known >= violated;
@@ -95,7 +125,6 @@ impl Expected {
             _ => (limits < MANY_LIMITS, CHANGES_FIRST),
         };
         Self {
-            violated,
             bounds,
             changes_first: (few_hold && one_by_one).then_some(changes),
             many: bounds >= enough,

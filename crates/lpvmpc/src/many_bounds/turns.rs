@@ -1,5 +1,6 @@
 //! The phase for many bounds and the dual method in turns.
 
+use super::expected::Violated;
 use super::{MOST_FACTORISATIONS, ManyBounds, SHARE};
 use crate::list::List;
 use crate::model::Scalar;
@@ -10,8 +11,8 @@ use crate::solver::Solver;
 /// When it has its turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Turn {
-    /// Before the dual method, if there are many bounds.
-    First,
+    /// Before the dual method, if there are many bounds, where the trajectory without bounds violates these.
+    First(Violated),
     /// After it has come to no end in as many changes as it was given, or at all.
     Later,
 }
@@ -21,8 +22,6 @@ pub(super) enum Turn {
 pub(super) enum AtOnce<T> {
     /// It was not tried, and nothing has changed.
     Untried,
-    /// No bound is violated: the trajectory without bounds is the answer.
-    Kept,
     /// The solution, or the proof that there is none.
     Done(Result<(), Status<T>>),
     /// Neither: the trajectory without bounds is in the solution, and the active rows are those to begin with: of the last
@@ -46,12 +45,36 @@ pub(super) fn kept_for_later_turn(cap: usize, entries: usize) -> usize {
 }
 
 impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
-    /// Solves the problem, whose trajectory without bounds is in the solution, or proves that it is infeasible; counts
-    /// changes of the active set. With a `shift` the active rows of the last answer are those to begin with, so many
-    /// stages later.
+    /// Solves the factorised problem, or proves that it is infeasible; counts changes of the active set. With a `shift` the
+    /// active rows of the last answer are those to begin with, so many stages later.
     pub(super) fn solve_in_turns(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
+        shift: Option<usize>,
+        solution: &mut Solution<T, NX, NU>,
+        spent: &mut usize,
+    ) -> Result<(), Status<T>> {
+        if let Some(phase) = self.many_bounds.first_mut() {
+            phase.begin(shift.map(|_| &*solution));
+        }
+        self.roll_out(ocp, solution)?;
+        // Bounds are not all that a trajectory without a terminal equality may violate.
+        let free = ocp.terminal.equality.is_none();
+        let violated = free.then(|| Violated::new(ocp, solution));
+        if violated.is_some_and(|violated| violated.bounds == 0) {
+            // No more machine code than this has to be at hand where no bound is active.
+            return self.accept(ocp, 0, solution);
+        }
+        self.take_turns(ocp, violated, shift, solution, spent)
+    }
+
+    /// The same, where the trajectory without bounds, or a terminal equality, is in the solution and has `violated` these
+    /// bounds; `None` with an equality.
+    #[inline(never)]
+    fn take_turns(
+        &mut self,
+        ocp: &Ocp<T, NX, NU>,
+        violated: Option<Violated>,
         mut shift: Option<usize>,
         solution: &mut Solution<T, NX, NU>,
         spent: &mut usize,
@@ -62,9 +85,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             true => kept_for_later_turn(self.dual.changes_left(), NX + NU),
             false => 0,
         };
-        match self.solve_at_once(ocp, shift, solution, (Turn::First, spent)) {
+        let at_once = violated.map_or(AtOnce::Untried, |violated| {
+            self.solve_at_once(ocp, shift, solution, (Turn::First(violated), spent))
+        });
+        match at_once {
             AtOnce::Done(outcome) => return outcome,
-            AtOnce::Kept => self.dual.kept = true,
             AtOnce::InVain(changes) => {
                 shift = Some(0);
                 if let Some(changes) = changes {

@@ -113,7 +113,7 @@ fn so_do_those_of_a_step_in_two_parts() {
     assert_posed(memory.ocp(), expected(&settings, next - end));
 }
 
-/// Prices of a preview are raised, too.
+/// Prices of a preview are raised, too, whether the settings have some or not.
 #[test]
 fn so_do_those_of_a_preview() {
     let settings = soft(Iterations::default());
@@ -132,15 +132,17 @@ fn so_do_those_of_a_preview() {
         soft_x: &stages,
         ..Preview::new(Reference::constant(end))
     };
-    let mut tried = controller(settings);
-    let plan = tried.step_with(&Vector4::zeros(), &preview, &mut memory);
-    assert!(plan.status.is_solved(), "{}", plan.status);
     // So far away the way alone makes the price.
     let expected = expected(&settings, -end);
-    for common in memory.ocp().own.iter().take(N) {
-        assert_close(posed(&common.soft_x), expected);
+    for soft_x in [settings.soft_x, [None; 4]] {
+        let mut tried = controller(Settings { soft_x, ..settings });
+        let plan = tried.step_with(&Vector4::zeros(), &preview, &mut memory);
+        assert!(plan.status.is_solved(), "{}", plan.status);
+        for common in memory.ocp().own.iter().take(N) {
+            assert_close(posed(&common.soft_x), expected);
+        }
+        assert_close(posed(&memory.ocp().terminal.soft_x), expected);
     }
-    assert_close(posed(&memory.ocp().terminal.soft_x), expected);
 }
 
 /// Where the way is too long for the number type, or there is no cost of the end, prices are those of the settings.
