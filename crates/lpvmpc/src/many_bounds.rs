@@ -211,7 +211,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         let mut found = false;
         if let Some(shift) = shift.filter(|_| known > 0) {
             guess::again(sides, &solution.active, shift);
-            if (expected.many || expected.familiar) && self.retries.repeats.are_due() {
+            if expected.many && self.retries.repeats.are_due() {
                 let last = LastAnswer {
                     kind: Kind::new::<T, NU>(sides, expected.rows),
                     shift,

@@ -135,9 +135,10 @@ pub(super) struct Patience {
     pub guesses: usize,
     /// as long as no more sides than these are wrong.
     pub wrong: usize,
-    /// From one that is nearly right, so many exchanges of one stage alone: where states and inputs that are held bind
-    /// each other, what is wrong at later stages may follow from what is wrong at the first of them.
-    pub steps: usize,
+    /// At last, what is wrong with one that is nearly right is exchanged at the first of its stages alone, as long as that
+    /// leaves less than half as many wrong: where states and inputs that are held bind each other, what is wrong at later
+    /// stages may follow from it.
+    pub first_alone: bool,
 }
 
 impl Patience {
@@ -147,12 +148,12 @@ impl Patience {
         few: 4,
         guesses: 2,
         wrong: 4,
-        steps: 0,
+        first_alone: false,
     };
     /// Of the last sample's inputs and states where these bind each other.
     pub const BINDING: Self = Self {
         guesses: 0,
-        steps: 6,
+        first_alone: true,
         ..Self::NEAR
     };
     /// Of the last sample's inputs and states, held, more where several inputs act together, since no step of the
@@ -161,7 +162,7 @@ impl Patience {
         few: 2,
         guesses: 7,
         wrong: usize::MAX,
-        steps: 0,
+        first_alone: false,
     };
     /// The same of soft bounds, of whose three roles more are wrong.
     pub const SOFT: Self = Self {
@@ -189,7 +190,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
     let mut most = (active / patience.few).max(2);
     let (mut last, mut fewest) = (usize::MAX, usize::MAX);
     let closely = side::are_mixed(sides);
-    let (mut nearly, mut one_by_one) = (false, false);
+    let (mut nearly, mut alone) = (false, false);
     // Of soft bounds the multipliers decide whether they hold or are exceeded. And rounding may have grown along the
     // horizon until what follows from a trajectory as it is goes in circles.
     let mut careful = side::any_soft(sides);
@@ -246,15 +247,18 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
                     && is_of_the_plant(program, tolerances.violation);
             }
         }
-        if one_by_one && wrong <= NEARLY_RIGHT && patience.steps > 0 {
-            patience.steps -= 1;
+        if alone {
+            if 2 * wrong >= last {
+                break;
+            }
+            last = wrong;
             keep_first_changes(sides);
             continue;
         }
         let much_worse = wrong / WORSE > fewest;
         fewest = fewest.min(wrong);
         // A guess from near by is right after a few exchanges, each of which leaves fewer sides wrong.
-        if wrong <= most && !one_by_one {
+        if wrong <= most {
             most = wrong - wrong / 4;
         } else if last < usize::MAX
             && patience.guesses > 0
@@ -262,8 +266,8 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
             && !much_worse
         {
             patience.guesses -= 1;
-        } else if nearly && patience.steps > 0 && !one_by_one {
-            one_by_one = true;
+        } else if nearly {
+            (alone, last) = (true, wrong);
             guess::nearest(sides);
             continue;
         } else {
@@ -280,7 +284,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
         }
         careful |= wrong >= last;
         last = wrong;
-        if wrong <= NEARLY_RIGHT && patience.steps > 0 {
+        if wrong <= NEARLY_RIGHT && patience.first_alone {
             nearly = true;
             let first = first_change(sides);
             for side in sides.iter_mut() {

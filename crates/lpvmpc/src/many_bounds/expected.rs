@@ -26,11 +26,11 @@ const MANY_KNOWN: usize = 64;
 const ALL_SOFT: usize = 20;
 /// And so many where some are known.
 const KNOWN_SOFT: usize = 16;
-/// So many of several inputs, and states, that were held by the last answer are worth a guess, which is right more often
-/// than not.
-const FAMILIAR: usize = 20;
 /// And so many inputs that the regulator saturates, where there is one of each stage.
 const MANY_SATURATED: usize = 8;
+/// Where fewer are violated, none of them soft, so many times as many known ones are enough for the interior-point method: more
+/// become active than are violated, but the dual method begins with those that are known.
+const KNOWN: usize = 2;
 /// Where fewer bounds were active before than one for so many that are violated, they tell little of what to expect.
 const LITTLE: usize = 2;
 /// Of a single input a bound that is met keeps others: while a speed stays at its limit only half of what is violated
@@ -73,12 +73,12 @@ impl Violated {
 pub(super) struct Expected {
     /// How many bounds.
     pub bounds: usize,
-    /// Whether these are many enough for the interior-point method.
+    /// Whether these are many enough for the phase.
     pub many: bool,
+    /// Whether they are for the interior-point method.
+    search: bool,
     /// How many changes the dual method has before the interior-point method, if it should come first.
     pub changes_first: Option<usize>,
-    /// Whether the last answer is worth a guess, although they are fewer.
-    pub familiar: bool,
     /// Whether the inputs that the regulator saturates are worth a guess.
     pub saturated: bool,
     /// Whether most of the bounds of the last answer are of rows that bind several inputs.
@@ -128,7 +128,7 @@ impl Expected {
             bounds,
             changes_first: (few_hold && one_by_one).then_some(changes),
             many: bounds >= enough,
-            familiar: tells && !takes_more && known >= FAMILIAR,
+            search: takes_more || violated >= enough || bounds >= KNOWN * enough,
             // Those are nearly right where a single input moves the states.
             saturated: NU == 1 && 2 * inputs > violated && inputs >= MANY_SATURATED,
             rows,
@@ -138,13 +138,13 @@ impl Expected {
 
     /// Whether the interior-point method is worth a try before the dual one.
     pub fn search_is_due(&self) -> bool {
-        self.many && self.changes_first.is_none()
+        self.many && self.search && self.changes_first.is_none()
     }
 
     /// Whether it is worth a try now.
     pub fn is_due(&mut self, retries: &mut AllRetries) -> bool {
         self.saturated = self.saturated && retries.saturations.are_due();
-        self.saturated || (self.many || self.familiar) && retries.turns.are_due()
+        self.saturated || self.many && retries.turns.are_due()
     }
 
     /// More changes than these the phase is not worth: of a single input the dual method needs one for each bound, half
