@@ -232,6 +232,7 @@ impl DescentTimes {
         let mut workspace = controller.workspace();
         let (mut step, mut feedback, mut feedback_cold) = (Vec::new(), Vec::new(), Vec::new());
         let mut other_work = OtherWork::new();
+        // Between the set point's jumps, of which there are few.
         let stride = samples.div_ceil(COLD_SAMPLES);
         let mut x = Vector4::zeros();
         for k in 0..samples {
@@ -246,7 +247,7 @@ impl DescentTimes {
                 watch.time() - start
             };
             feedback.push(watch.shortest(|| answer(None)));
-            if k % stride == 0 {
+            if k % stride == stride / 2 {
                 let cold = watch.shortest_cold(|| answer(Some(&mut other_work)));
                 feedback_cold.push(cold);
             }

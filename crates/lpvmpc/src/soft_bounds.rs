@@ -77,8 +77,8 @@ impl<T: Scalar, const NX: usize> SoftPrices<T, NX> {
     }
 
     /// Those of a sample whose goal is `way` from where the state is: those of the settings, raised where they are to be.
-    /// `a` is the plant's matrix where the sample begins. Where no bound is soft, neither one of the settings nor one `of_stages`, there
-    /// is nothing to raise.
+    /// `a` is the plant's matrix where the sample begins; `of_stages`: whether stages have prices of their own. Where neither
+    /// they nor the settings have any, there is nothing to raise.
     // Of its own, not within the step, whose registers it would take.
     #[inline(never)]
     pub fn new<const NU: usize, const NS: usize>(

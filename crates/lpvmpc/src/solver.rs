@@ -262,7 +262,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         self.accept(ocp, known, solution)
     }
 
-    /// The trajectory is the answer, after a search that began with so many `known` rows.
+    /// Takes the trajectory as the answer, with its inputs moved into their bounds; hands over its cost and the active rows, and
+    /// judges the `known` ones, so many, that the search began with.
     #[inline(never)]
     pub(crate) fn accept(
         &self,

@@ -135,9 +135,9 @@ pub(super) struct Patience {
     pub guesses: usize,
     /// as long as no more sides than these are wrong.
     pub wrong: usize,
-    /// At last, what is wrong with one that is nearly right is exchanged at the first of its stages alone, as long as that
-    /// leaves less than half as many wrong: where states and inputs that are held bind each other, what is wrong at later
-    /// stages may follow from it.
+    /// At last, what is wrong with one that is nearly right is exchanged at the first of its stages alone, as long as each
+    /// guess has less than half as many wrong sides as the one before it: where states and inputs that are held bind each
+    /// other, what is wrong at later stages may follow from it.
     pub first_alone: bool,
 }
 

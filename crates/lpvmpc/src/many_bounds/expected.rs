@@ -28,9 +28,9 @@ const ALL_SOFT: usize = 20;
 const KNOWN_SOFT: usize = 16;
 /// And so many inputs that the regulator saturates, where there is one of each stage.
 const MANY_SATURATED: usize = 8;
-/// Where fewer are violated, none of them soft, so many times as many known ones are enough for the interior-point method: more
-/// become active than are violated, but the dual method begins with those that are known.
-const KNOWN: usize = 2;
+/// Of several inputs, where too few are violated for the interior-point method, and none that is soft, it comes after the dual
+/// method, which begins with the known bounds, too, while these are fewer than so many times as many.
+const MANY_MORE_KNOWN: usize = 2;
 /// Where fewer bounds were active before than one for so many that are violated, they tell little of what to expect.
 const LITTLE: usize = 2;
 /// Of a single input a bound that is met keeps others: while a speed stays at its limit only half of what is violated
@@ -38,7 +38,7 @@ const LITTLE: usize = 2;
 const LITTLE_OF_ONE: usize = 4;
 
 /// What the trajectory without bounds violates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Violated {
     /// How many bounds.
     pub bounds: usize,
@@ -75,8 +75,6 @@ pub(super) struct Expected {
     pub bounds: usize,
     /// Whether these are many enough for the phase.
     pub many: bool,
-    /// Whether they are for the interior-point method.
-    search: bool,
     /// How many changes the dual method has before the interior-point method, if it should come first.
     pub changes_first: Option<usize>,
     /// Whether the inputs that the regulator saturates are worth a guess.
@@ -119,6 +117,7 @@ impl Expected {
         // About twice as many were violated as are known.
         let limits = if tells { 2 * known } else { violated };
         let few_hold = !soft && 2 * inputs < violated && hard_states(ocp) > NU;
+        let mostly_known = !takes_more && violated < enough && bounds < MANY_MORE_KNOWN * enough;
         let (one_by_one, changes) = match NU {
             1 if tells => (known < MANY_KNOWN, known + CHANGES_OF_ONE),
             1 => (limits < MORE, known + CHANGES_OF_ONE),
@@ -126,9 +125,8 @@ impl Expected {
         };
         Self {
             bounds,
-            changes_first: (few_hold && one_by_one).then_some(changes),
+            changes_first: (few_hold && one_by_one || mostly_known).then_some(changes),
             many: bounds >= enough,
-            search: takes_more || violated >= enough || bounds >= KNOWN * enough,
             // Those are nearly right where a single input moves the states.
             saturated: NU == 1 && 2 * inputs > violated && inputs >= MANY_SATURATED,
             rows,
@@ -138,7 +136,7 @@ impl Expected {
 
     /// Whether the interior-point method is worth a try before the dual one.
     pub fn search_is_due(&self) -> bool {
-        self.many && self.search && self.changes_first.is_none()
+        self.many && self.changes_first.is_none()
     }
 
     /// Whether it is worth a try now.

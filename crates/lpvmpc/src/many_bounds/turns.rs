@@ -9,7 +9,7 @@ use crate::solution::{Solution, Status};
 use crate::solver::Solver;
 
 /// When it has its turn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub(super) enum Turn {
     /// Before the dual method, if there are many bounds, where the trajectory without bounds violates these.
     First(Violated),
@@ -58,18 +58,18 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             phase.begin(shift.map(|_| &*solution));
         }
         self.roll_out(ocp, solution)?;
-        // Bounds are not all that a trajectory without a terminal equality may violate.
+        // With a terminal equality a trajectory that keeps all bounds may still be no answer.
         let free = ocp.terminal.equality.is_none();
         let violated = free.then(|| Violated::new(ocp, solution));
         if violated.is_some_and(|violated| violated.bounds == 0) {
-            // No more machine code than this has to be at hand where no bound is active.
+            // Where no bound is violated, a cold cache has to fetch no machine code beyond this.
             return self.accept(ocp, 0, solution);
         }
         self.take_turns(ocp, violated, shift, solution, spent)
     }
 
-    /// The same, where the trajectory without bounds, or a terminal equality, is in the solution and has `violated` these
-    /// bounds; `None` with an equality.
+    /// The same, from the trajectory without bounds and without a terminal equality, which is in the solution. It has
+    /// `violated` these bounds; `None` where there is an equality, with which all at once have no turn.
     #[inline(never)]
     fn take_turns(
         &mut self,
