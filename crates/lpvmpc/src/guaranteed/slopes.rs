@@ -76,10 +76,13 @@ where
         x: &SVector<T, NX>,
         u: &SVector<T, NU>,
     ) -> Slopes<T, NX, NU> {
-        let settings = &self.settings;
-        let known = self.slopes.iter().skip(i).take(2);
-        let found = known.copied().find(|known| known.serve(x, u, settings));
-        let found = found.unwrap_or_else(|| SampleSlopes {
+        let serves = |known: &SampleSlopes<T, NX, NU>| known.serve(x, u, &self.settings);
+        // As a rule it is this sample's own, which stay where they are.
+        if let Some(own) = self.slopes.get(i).filter(|own| serves(own)) {
+            return own.slopes;
+        }
+        let next = self.slopes.get(i + 1).filter(|next| serves(next)).copied();
+        let found = next.unwrap_or_else(|| SampleSlopes {
             x: *x,
             u: *u,
             slopes: self.differentiate(x, u),
