@@ -26,7 +26,7 @@ Examples:
 Times the quadratic program alone (QP) and the controller's whole step on this machine, along closed
 loops of the built-in scenarios; the quadratic program alone on sequences of larger problems, longer
 horizons and many active bounds; and the guaranteed step against the plain one. Each sample is
-repeated and its shortest time counts, so that all it needs is in the cache. The columns `cold` are
+repeated and its shortest time counts, so that all it needs is in the cache. What is called `cold` is
 after a sweep of 48 MB, as when other work runs between two samples. A scenario of one's own must be
 one without a guarantee and without [controller.torque_rate].")]
 pub struct BenchArguments {

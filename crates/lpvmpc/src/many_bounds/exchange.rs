@@ -135,10 +135,10 @@ pub(super) struct Patience {
     pub guesses: usize,
     /// as long as no more sides than these are wrong.
     pub wrong: usize,
-    /// At last, what is wrong with one that is nearly right is exchanged at the first of its stages alone, as long as each
-    /// guess has less than half as many wrong sides as the one before it: where states and inputs that are held bind each
-    /// other, what is wrong at later stages may follow from it.
-    pub first_alone: bool,
+    /// From one that is nearly right, so many exchanges of one stage alone, as long as none leaves more sides wrong than the
+    /// one before: where states and inputs that are held bind each other, what is wrong at later stages may follow from
+    /// what is wrong at the first of them.
+    pub steps: usize,
 }
 
 impl Patience {
@@ -148,12 +148,12 @@ impl Patience {
         few: 4,
         guesses: 2,
         wrong: 4,
-        first_alone: false,
+        steps: 0,
     };
     /// Of the last sample's inputs and states where these bind each other.
     pub const BINDING: Self = Self {
         guesses: 0,
-        first_alone: true,
+        steps: 6,
         ..Self::NEAR
     };
     /// Of the last sample's inputs and states, held, more where several inputs act together, since no step of the
@@ -162,7 +162,7 @@ impl Patience {
         few: 2,
         guesses: 7,
         wrong: usize::MAX,
-        first_alone: false,
+        steps: 0,
     };
     /// The same of soft bounds, of whose three roles more are wrong.
     pub const SOFT: Self = Self {
@@ -190,7 +190,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
     let mut most = (active / patience.few).max(2);
     let (mut last, mut fewest) = (usize::MAX, usize::MAX);
     let closely = side::are_mixed(sides);
-    let (mut nearly, mut alone) = (false, false);
+    let (mut nearly, mut one_by_one) = (false, false);
     // Of soft bounds the multipliers decide whether they hold or are exceeded. And rounding may have grown along the
     // horizon until what follows from a trajectory as it is goes in circles.
     let mut careful = side::any_soft(sides);
@@ -247,11 +247,12 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
                     && is_of_the_plant(program, tolerances.violation);
             }
         }
-        if alone {
-            if 2 * wrong >= last {
+        if one_by_one {
+            if wrong > last || patience.steps == 0 {
                 break;
             }
             last = wrong;
+            patience.steps -= 1;
             keep_first_changes(sides);
             continue;
         }
@@ -267,7 +268,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
         {
             patience.guesses -= 1;
         } else if nearly {
-            (alone, last) = (true, wrong);
+            (one_by_one, last) = (true, wrong);
             guess::nearest(sides);
             continue;
         } else {
@@ -284,7 +285,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
         }
         careful |= wrong >= last;
         last = wrong;
-        if wrong <= NEARLY_RIGHT && patience.first_alone {
+        if wrong <= NEARLY_RIGHT && patience.steps > 0 {
             nearly = true;
             let first = first_change(sides);
             for side in sides.iter_mut() {
