@@ -320,6 +320,11 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
         self.max_changes - self.changes
     }
 
+    /// No more than so many are allowed in all.
+    pub fn allow_at_most(&mut self, changes: usize) {
+        self.max_changes = self.max_changes.min(changes);
+    }
+
     /// So many of them are for later, or another method.
     pub fn keep_back(&mut self, changes: usize) {
         self.max_changes = self.max_changes.saturating_sub(changes);

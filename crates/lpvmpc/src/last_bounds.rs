@@ -17,8 +17,8 @@ use nalgebra::convert;
 const FEWEST: usize = 3;
 /// More are for the phase for many bounds; what rounds along so many held states is no answer as a rule.
 const MOST: usize = 16;
-/// A guess that takes more than one change for so many known bounds is no good.
-const KNOWN_PER_CHANGE: usize = 4;
+/// A guess that takes more changes is no good.
+const MOST_CHANGES: usize = 4;
 /// So many guesses, each from the answer to the one before.
 const MOST_GUESSES: usize = 2;
 /// A bound whose multiplier is less than this part of the largest may be gone, and is found at less cost than let go.
@@ -47,9 +47,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             return Err((0, settings.warm_start));
         }
         self.begin(ocp, settings);
-        let later = self.dual.changes_left();
-        self.dual
-            .keep_back(later.saturating_sub(few(solution.active.len())));
+        self.dual.allow_at_most(MOST_CHANGES);
         let (mut spent, mut begin_with) = (0, settings.warm_start);
         let mut solved = false;
         for _ in 0..MOST_GUESSES {
@@ -118,7 +116,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 other += 1;
             }
         }
-        let worth = held >= FEWEST && other <= few(active.len());
+        let worth = held >= FEWEST && other <= MOST_CHANGES;
         if !worth {
             self.held.release_all();
         }
@@ -143,9 +141,4 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                         <= tolerance * rows::size(ocp, &row.bound)
             })
     }
-}
-
-/// Changes of the active set that a good guess of so many bounds may take.
-fn few(known: usize) -> usize {
-    FEWEST.max(known / KNOWN_PER_CHANGE)
 }

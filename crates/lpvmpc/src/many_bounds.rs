@@ -36,6 +36,7 @@ use crate::solution::{Solution, Status};
 use crate::solver::{Solver, trajectory};
 use crate::working_set::{copy, first_mut};
 use answer::{list, report};
+use core::cell::Cell;
 use exchange::{Patience, Program, Tolerances, exchange};
 use expected::{Expected, Violated};
 use last_answer::{Kind, LastAnswer};
@@ -180,7 +181,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             true => MOST_FOR_MANY,
             false => MOST_FACTORISATIONS,
         };
-        let (left, before) = (solver.dual.changes_left(), *spent);
+        let spent = Cell::from_mut(spent);
+        let (left, before) = (solver.dual.changes_left(), spent.get());
         let (factorisations, most) = match turn {
             Turn::First(_) => {
                 let many = (expected.bounds / BOUNDS).max(n / STAGES);
@@ -195,7 +197,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             let with_these = before + ((NX + NU) * (factorised + stages)).div_ceil(n);
             let allowed = with_these <= cap;
             if allowed {
-                (factorised, *spent) = (factorised + stages, with_these);
+                factorised += stages;
+                spent.set(with_these);
             }
             allowed
         };
@@ -211,7 +214,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         let mut found = false;
         if let Some(shift) = shift.filter(|_| known > 0) {
             guess::again(sides, &solution.active, shift);
-            if expected.many && self.retries.repeats.are_due() {
+            if expected.worth_repeating && self.retries.repeats.are_due() {
                 let last = LastAnswer {
                     kind: Kind::new::<T, NU>(sides, expected.rows),
                     shift,
@@ -236,6 +239,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             found = exchange(&mut program, sides, &tolerances, Patience::FAR, || count(n));
             self.retries.saturations.learn(found);
         }
+        let guessed = spent.get();
         let outcome = if found {
             Some(Ok(()))
         } else if !expected.search_is_due() {
@@ -246,10 +250,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             search(&mut program, sides, &tolerances, trials, proof, || count(n))
         };
         let outcome = match outcome {
-            Some(Ok(())) => {
-                self.retries.repeats.learn_wrong(guess::wrong(sides));
-                report(&program, sides, solution).then_some(Ok(()))
-            }
+            Some(Ok(())) => report(&program, sides, solution).then_some(Ok(())),
             other => other,
         };
         self.put_off = outcome.is_none() && expected.many && expected.changes_first.is_some();
@@ -261,13 +262,13 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             let most = expected.worth::<NU>(side::any_soft(sides));
             self.retries
                 .turns
-                .learn(outcome.is_some() && *spent - before <= most);
+                .learn(outcome.is_some() && spent.get() - guessed <= most);
         }
         solver.dual.v.fill(SVector::zeros());
         if let Some(outcome) = outcome {
             return AtOnce::Done(outcome);
         }
-        let left = left.saturating_sub(*spent - before);
+        let left = left.saturating_sub(spent.get() - before);
         solver.dual.reset(solver.dual.tolerance, left);
         // What it was made from was finite.
         solver.roll_out(ocp, solution).ok();

@@ -242,6 +242,13 @@ impl<T: Scalar> ActiveSet<T> {
         self.len == 0
     }
 
+    /// Whether any of the rows is a bound: a terminal equality is active without being known.
+    pub(crate) fn has_bounds(&self) -> bool {
+        // The bit is in no other side.
+        let is_bound = |row: &PackedRow<T>| row.kind >> 2 & Side::Equality as u8 == 0;
+        first(&self.rows, self.len).iter().any(is_bound)
+    }
+
     /// Forgets all rows, so that the next solve starts cold.
     pub fn clear(&mut self) {
         self.len = 0;

@@ -177,8 +177,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         solution: &mut Solution<T, NX, NU>,
         spent: &mut usize,
     ) -> Result<(), Status<T>> {
-        let warm = shift.is_some() && !solution.active.is_empty();
-        let mut start = shift.map_or(Start::Nothing, Start::Last);
+        let warm = shift.is_some() && solution.active.has_bounds();
+        let mut start = match shift {
+            Some(shift) if warm => Start::Last(shift),
+            _ => Start::Nothing,
+        };
         loop {
             let mut outcome = self.search(ocp, start, solution);
             *spent += self.dual.changes;
@@ -346,9 +349,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         shift: usize,
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
-        if solution.active.is_empty() {
-            return Ok(());
-        }
         let before = (&solution.active, shift);
         let begun = self
             .dual

@@ -24,8 +24,6 @@ const CHANGES_OF_ONE: usize = 32;
 const MANY_KNOWN: usize = 64;
 /// So many soft ones of a single input, where all that can hold are violated: the dual method adds and drops them again.
 const ALL_SOFT: usize = 20;
-/// And so many where some are known.
-const KNOWN_SOFT: usize = 16;
 /// And so many inputs that the regulator saturates, where there is one of each stage.
 const MANY_SATURATED: usize = 8;
 /// Of several inputs, where too few are violated for the interior-point method, and none that is soft, it comes after the dual
@@ -75,6 +73,8 @@ pub(super) struct Expected {
     pub bounds: usize,
     /// Whether these are many enough for the phase.
     pub many: bool,
+    /// Whether enough are known for a guess: fewer the dual method takes over in less time.
+    pub worth_repeating: bool,
     /// How many changes the dual method has before the interior-point method, if it should come first.
     pub changes_first: Option<usize>,
     /// Whether the inputs that the regulator saturates are worth a guess.
@@ -102,7 +102,7 @@ impl Expected {
         let takes_more = soft || NU == 1 && known > 0;
         let enough = match (NU == 1 && soft, known) {
             (true, 0) => ocp.length().clamp(ALL_SOFT, MORE),
-            (true, _) => KNOWN_SOFT,
+            (true, _) => ALL_SOFT,
             (false, _) if takes_more => MORE,
             (false, _) => MANY,
         };
@@ -127,6 +127,7 @@ impl Expected {
             bounds,
             changes_first: (few_hold && one_by_one || mostly_known).then_some(changes),
             many: bounds >= enough,
+            worth_repeating: bounds.min(known) >= enough,
             // Those are nearly right where a single input moves the states.
             saturated: NU == 1 && 2 * inputs > violated && inputs >= MANY_SATURATED,
             rows,

@@ -106,9 +106,3 @@ pub(super) fn nearest<T: Scalar>(sides: &mut [BoundSide<T>]) {
         side.role = side.nearest_role;
     }
 }
-
-/// How many sides have another role than that which is known.
-pub(super) fn wrong<T: Scalar>(sides: &[BoundSide<T>]) -> usize {
-    let wrong = |side: &&BoundSide<T>| side.role != side.known_role;
-    sides.iter().filter(wrong).count()
-}

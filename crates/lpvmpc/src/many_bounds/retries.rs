@@ -2,8 +2,6 @@
 
 /// It is tried after 0, 0, 1, 3 and then 7 samples without, the more often in a row it was in vain.
 const MISSES: u32 = 5;
-/// Or as soon as no more bounds of a guess would have been wrong.
-const ALMOST: usize = 4;
 
 /// What has come to nothing in the solves before.
 #[derive(Clone, Copy, Debug, Default)]
@@ -39,13 +37,6 @@ impl Retries {
         self.misses = if found { 0 } else { self.misses + 1 }.min(MISSES);
         self.pause = ((1 << self.misses) / 4_u32).saturating_sub(1);
     }
-
-    /// How many bounds of the guess are not as in the answer.
-    pub fn learn_wrong(&mut self, wrong: usize) {
-        if self.pause > 0 && wrong <= ALMOST {
-            *self = Self::default();
-        }
-    }
 }
 
 #[cfg(test)]
@@ -70,18 +61,6 @@ mod tests {
         assert_eq!(pauses, [0, 0, 0, 1, 3, 7, 7, 7]);
         assert_eq!(pause(&mut retries), 7);
         retries.learn(true);
-        assert_eq!(pause(&mut retries), 0);
-    }
-
-    #[test]
-    fn what_would_have_done_is_tried_at_once() {
-        let mut retries = Retries::default();
-        (0..5).for_each(|_| retries.learn(false));
-        retries.learn_wrong(ALMOST + 1);
-        assert!(!retries.are_due());
-        retries.learn_wrong(ALMOST);
-        assert!(retries.are_due());
-        retries.learn(false);
         assert_eq!(pause(&mut retries), 0);
     }
 }
