@@ -7,6 +7,7 @@
 
 import argparse
 import pathlib
+import statistics
 
 import results
 
@@ -68,6 +69,24 @@ def verdict(files):
                    f"{1 / min(worst):.2f} times at most.")
 
 
+def warm_starts(files):
+    """What a start from the answer before saves, over the sequences with active bounds."""
+    both = [(times["lpvmpc"], times["lpvmpc, cold"], key) for key, (_, times) in files.items()
+            if key[3] > 0 and {"lpvmpc", "lpvmpc, cold"} <= times.keys()]
+    if not both:
+        return ""
+    medians = [warm.median / cold.median for warm, cold, _ in both]
+    worst = [warm.worst / cold.worst for warm, cold, _ in both]
+    slower = [(ratio, key) for ratio, (_, _, key) in zip(medians, both) if ratio > 1.02]
+    text = (f"Warm divided by cold, geometric means over the {len(both)} sequences with active bounds: median "
+            f"{statistics.geometric_mean(medians):.2f}, worst {statistics.geometric_mean(worst):.2f}. The median is "
+            f"more than 2 % longer in {len(slower)}")
+    if slower:
+        most, (size, horizon, kind, share) = max(slower)
+        text += f", {most:.2f} times at most ({size}, N = {horizon}, {kind}, share {share:g})"
+    return text + f"; the worst time is {max(worst):.2f} times as long at most."
+
+
 def riccati_table(lines):
     """Our solver without bounds beside the faster form of HPIPM's recursion."""
     sizes = {}
@@ -97,6 +116,7 @@ def main():
         f"A call that does next to nothing, part of each time [us]: {calls}. Largest residual of the "
         f"optimality conditions at our answers: {residual:.1e}.",
         verdict(files),
+        warm_starts(files),
     ]))
     whole = "\n\n".join([
         "# Solvers on the problem files", "Written by `tables.py`; what is timed is said in README.md.",

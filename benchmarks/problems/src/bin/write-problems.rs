@@ -1,7 +1,7 @@
 //! Writes the sequences on which solvers are compared into a folder:
 //!
 //! ```text
-//! write-problems FOLDER [size=4x1,8x2] [horizon=20,50] [kind=inputs,soft] [share=0,0.4]
+//! write-problems FOLDER [size=4x1,8x2] [horizon=20,50] [kind=inputs,soft] [share=0,0.4] [seed=1,2]
 //! ```
 //!
 //! A file that is there already is kept.
@@ -14,14 +14,15 @@ use lpvmpc_sequences::{Kind, Recipe};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// Problems of a sequence, from one seed.
+/// Problems of a sequence.
 const SAMPLES: usize = 12;
-const SEED: u64 = 1;
 
-const KEYS: [&str; 4] = ["size", "horizon", "kind", "share"];
+const KEYS: [&str; 5] = ["size", "horizon", "kind", "share", "seed"];
 const SIZES: [&str; 4] = ["4x1", "8x2", "12x4", "16x6"];
 const HORIZONS: [&str; 4] = ["20", "50", "100", "200"];
 const SHARES: [&str; 6] = ["0", "0.1", "0.2", "0.4", "0.6", "0.8"];
+/// The one whose files have no seed in their names.
+const SEED: &str = "1";
 
 /// What to write of everything.
 struct Selection {
@@ -32,7 +33,7 @@ struct Selection {
 impl Selection {
     fn from_arguments(mut arguments: impl Iterator<Item = String>) -> Result<Self, String> {
         let folder = arguments.next().filter(|word| !word.starts_with('-')).ok_or(
-            "usage: write-problems FOLDER [size=4x1,...] [horizon=20,...] [kind=inputs,...] [share=0,...]",
+            "usage: write-problems FOLDER [size=4x1,...] [horizon=20,...] [kind=inputs,...] [share=0,...] [seed=1,...]",
         )?;
         let chosen: Vec<String> = arguments.collect();
         let known = |word: &String| {
@@ -77,15 +78,21 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let kind =
                     kind.ok_or_else(|| format!("kind {name}: it must be one of {kinds:?}"))?;
                 for share in selection.of("share", &SHARES) {
-                    let recipe = Recipe {
-                        kind,
-                        horizon: horizon.parse()?,
-                        samples: SAMPLES,
-                        share: share.parse()?,
-                        seed: SEED,
-                    };
-                    let path = format!("{size}-N{horizon}-{name}-{share}.qps");
-                    write_one(size, &recipe, &selection.folder.join(path))?;
+                    for seed in selection.of("seed", &[SEED]) {
+                        let recipe = Recipe {
+                            kind,
+                            horizon: horizon.parse()?,
+                            samples: SAMPLES,
+                            share: share.parse()?,
+                            seed: seed.parse()?,
+                        };
+                        let of_seed = match seed {
+                            SEED => String::new(),
+                            other => format!("-seed{other}"),
+                        };
+                        let path = format!("{size}-N{horizon}-{name}-{share}{of_seed}.qps");
+                        write_one(size, &recipe, &selection.folder.join(path))?;
+                    }
                 }
             }
         }
