@@ -242,11 +242,11 @@ impl<T: Scalar> ActiveSet<T> {
         self.len == 0
     }
 
-    /// Whether any of the rows is a bound: a terminal equality is active without being known.
-    pub(crate) fn has_bounds(&self) -> bool {
-        // The bit is in no other side.
-        let is_bound = |row: &PackedRow<T>| row.kind >> 2 & Side::Equality as u8 == 0;
-        first(&self.rows, self.len).iter().any(is_bound)
+    /// Whether the rows are those of a terminal equality alone, which are active without being known.
+    pub(crate) fn is_terminal_equality(&self) -> bool {
+        // Its rows come first, and the bit is in no other side.
+        let of_equality = |row: &PackedRow<T>| row.kind >> 2 & Side::Equality as u8 != 0;
+        first(&self.rows, self.len).last().is_some_and(of_equality)
     }
 
     /// Forgets all rows, so that the next solve starts cold.

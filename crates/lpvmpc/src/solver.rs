@@ -177,11 +177,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         solution: &mut Solution<T, NX, NU>,
         spent: &mut usize,
     ) -> Result<(), Status<T>> {
-        let warm = shift.is_some() && solution.active.has_bounds();
-        let mut start = match shift {
-            Some(shift) if warm => Start::Last(shift),
-            _ => Start::Nothing,
-        };
+        let warm = shift.is_some() && !solution.active.is_empty();
+        let mut start = shift.map_or(Start::Nothing, Start::Last);
         loop {
             let mut outcome = self.search(ocp, start, solution);
             *spent += self.dual.changes;
@@ -368,6 +365,7 @@ fn shift_of_last<T: Scalar, const NX: usize, const NU: usize>(
     match settings.warm_start {
         // After a failure the active rows are none, or a proof.
         _ if !last.status.is_solved() => None,
+        _ if last.active.is_terminal_equality() => None,
         WarmStart::Cold => None,
         WarmStart::Same => Some(0),
         WarmStart::Shifted => Some(1),

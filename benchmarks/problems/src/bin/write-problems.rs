@@ -12,7 +12,9 @@ use lpvmpc_problems::header::Header;
 use lpvmpc_problems::layout::Sizes;
 use lpvmpc_sequences::{Kind, Recipe};
 use std::error::Error;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 /// Problems of a sequence.
 const SAMPLES: usize = 12;
@@ -81,10 +83,10 @@ fn main() -> Result<(), Box<dyn Error>> {
                     for seed in selection.of("seed", &[SEED]) {
                         let recipe = Recipe {
                             kind,
-                            horizon: horizon.parse()?,
+                            horizon: number("horizon", horizon)?,
                             samples: SAMPLES,
-                            share: share.parse()?,
-                            seed: seed.parse()?,
+                            share: number("share", share)?,
+                            seed: number("seed", seed)?,
                         };
                         let of_seed = match seed {
                             SEED => String::new(),
@@ -98,6 +100,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     Ok(())
+}
+
+fn number<T: FromStr<Err: Display>>(key: &str, text: &str) -> Result<T, String> {
+    text.parse()
+        .map_err(|reason| format!("{key}={text}: it must be a number ({reason})"))
 }
 
 /// Makes and writes a sequence. A recipe for which there is none is said and left out: not every share
