@@ -90,7 +90,10 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
             (program.u, program.x),
         );
         if part < convert(FREE) && method.complementarity() < smallest {
-            // Rounding decides now.
+            // Rounding decides now which of the last few sides hold; the dual method begins with what is foretold.
+            sides
+                .iter_mut()
+                .for_each(|side| side.known_role = side.last_role);
             return None;
         }
         if part < convert(STUCK) {
