@@ -4,7 +4,8 @@
 //! all rows before it. Here all of them are guessed at once. A guess comes from the last sample, or from an
 //! interior-point method that goes on until it can be told which bounds will be active. The program in
 //! which these hold says which of them should not, and which are missing; that takes a few factorisations,
-//! however many bounds there are. Where it finds nothing the dual method begins as it would have without it.
+//! however many bounds there are. Where it finds nothing the dual method begins as it would have without it, or,
+//! where rounding has ended it, with what it foretells.
 //! Where few bounds are expected, or it cannot be told, the dual method begins; the interior-point method has a later turn
 //! when the changes that the dual method is given for it have not led to the end: many bounds are active after all, or few
 //! contradict each other.
