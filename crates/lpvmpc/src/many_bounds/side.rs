@@ -35,7 +35,8 @@ pub(crate) struct BoundSide<T> {
     pub role: Role,
     /// The role that the interior-point method foretells, or that of the guess before.
     pub last_role: Role,
-    /// The role that it had in the last solution, where that is begun with.
+    /// The role that the dual method begins with where the phase finds nothing: that of the last solution, where that is
+    /// begun with, or what was foretold when rounding ended the interior-point method.
     pub known_role: Role,
     /// The role in the last guess that was nearly right, with what was wrong at its first stage exchanged: exchanges stage
     /// by stage begin with it.
