@@ -1,7 +1,7 @@
 //! What a trajectory is missing for a minimum of the program that the sides of the bounds make of the problem.
 
 use super::newton::{gradient, step_back};
-use super::side::{BoundSide, Role, split_off_mut};
+use super::side::{BoundSide, Role, are_inputs, split_off_mut};
 use super::span::Span;
 use crate::model::Scalar;
 use crate::ocp::Common;
@@ -46,7 +46,7 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
     let mut residual = Residual {
         rest: T::zero(),
         largest: T::zero(),
-        followed: sides.iter().all(|side| side.input().is_some()),
+        followed: are_inputs(sides),
         contradicted: false,
     };
     let rounding = T::default_epsilon().powf(convert(ROUNDING));

@@ -11,11 +11,11 @@ use crate::solver::infeasible;
 use nalgebra::convert;
 
 /// The roles that a step foretells are tried when one in so many of the active sides, or fewer, has changed
-/// its since the step before; of three roles, where bounds are soft, it is harder to foretell the right one.
+/// its since the step before;
 const CERTAIN: usize = 8;
-const CERTAIN_SOFT: usize = 10;
-/// and no more than these in all.
-const CHANGED_SOFT: usize = 12;
+/// where bounds are soft, or states and inputs bind each other, no more than these in all: there one that is wrong makes others
+/// seem so.
+const MOST_CHANGED: usize = 12;
 /// And when that step went so far.
 const FREE: f64 = 0.5;
 /// Where states and inputs are bounded, and none softly, only when it also leaves no more than one side undecided for so many
@@ -25,13 +25,20 @@ const CLEAR: usize = 32;
 /// stay undecided for long.
 const CLEAR_LATE: usize = 8;
 const LATE: f64 = 1e-4;
-/// Once they were wrong, again when the products of slack and multiplier are this part of what they were.
+/// Once they were wrong, again when the products of slack and multiplier are this part of what they were,
 const NEARER: f64 = 0.01;
+/// or, where states and inputs bind each other, when one side is undecided, or has changed its role, for so many then.
+const CLEARER: usize = 4;
 /// Of a proof that there is no point within all bounds the multipliers above the first of these parts of the largest that
 /// are a proof, too.
 const LARGEST: [f64; 5] = [0.5, 0.1, 0.01, 1e-3, 1e-5];
-/// Where the products of slack and multiplier begin, as a part of the largest cost of a stage.
+/// Where the products of slack and multiplier begin, as a part of the largest cost of a stage: the smaller, the less the
+/// sides bind each other. Those of inputs alone,
+const CENTRE_OF_INPUTS: f64 = 0.003;
+/// of soft bounds, and of states or rows,
 const CENTRE: f64 = 0.01;
+/// of states and inputs, none of them soft.
+const CENTRE_OF_MIXED: f64 = 0.05;
 
 /// The interior-point method, until the roles that it foretells are right, which is tried so many times at most, or
 /// its multipliers prove that the problem is infeasible.
@@ -44,17 +51,22 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
     mut count: impl FnMut() -> bool,
 ) -> Option<Result<(), Status<T>>> {
     let span = program.span;
-    let (certain, most_changed) = match side::any_soft(sides) {
-        true => (CERTAIN_SOFT, CHANGED_SOFT),
-        false => (CERTAIN, usize::MAX),
-    };
-    // Where inputs and states bind each other, one wrong side makes many others seem so.
     let mixed = side::are_mixed(sides);
-    let mut method = InteriorPoint::new(sides, tolerances.scale * convert(CENTRE));
+    let most_changed = match mixed || side::any_soft(sides) {
+        true => MOST_CHANGED,
+        false => usize::MAX,
+    };
+    let centre = match mixed {
+        true => CENTRE_OF_MIXED,
+        false if side::are_inputs(sides) => CENTRE_OF_INPUTS,
+        false => CENTRE,
+    };
+    let mut method = InteriorPoint::new(sides, tolerances.scale * convert(centre));
     let late = method.complementarity() * convert(LATE);
     let smallest = method.complementarity() * T::default_epsilon().powf(convert(0.6));
     let mut untried = true;
     let mut near_enough = convert(f64::INFINITY);
+    let mut doubtful_then = usize::MAX;
     let mut part = T::zero();
     let mut stuck = 0_usize;
     while trials > 0 && count() {
@@ -64,10 +76,12 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
             active,
             undecided,
         } = predicted.ok()?;
-        let near = method.complementarity() <= near_enough;
+        let doubtful = changed + undecided;
+        let clearer = mixed && CLEARER * doubtful <= doubtful_then;
+        let near = clearer || method.complementarity() <= near_enough;
         // The same roles, wrong, are as a rule wrong again.
         untried |= changed > 0;
-        let settled = certain * changed <= active && changed <= most_changed;
+        let settled = CERTAIN * changed <= active && changed <= most_changed;
         let clear = match (mixed, method.complementarity() > late) {
             (false, _) => 0,
             (true, true) => CLEAR,
@@ -77,6 +91,7 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
         if untried && near && likely && part > convert(FREE) {
             untried = false;
             near_enough = method.complementarity() * convert(NEARER);
+            doubtful_then = doubtful;
             trials -= 1;
             if method.try_foretold(program, sides, tolerances, &mut count) {
                 return Some(Ok(()));

@@ -279,6 +279,11 @@ pub(super) fn any_soft<T>(sides: &[BoundSide<T>]) -> bool {
     sides.iter().any(|side| side.soft.is_some())
 }
 
+/// Whether all are of inputs.
+pub(super) fn are_inputs<T: Scalar>(sides: &[BoundSide<T>]) -> bool {
+    sides.iter().all(|side| side.input().is_some())
+}
+
 /// Whether there are hard ones of inputs and of states.
 pub(super) fn are_mixed<T>(sides: &[BoundSide<T>]) -> bool {
     let of_input = |side: &BoundSide<T>| matches!(side.bound.quantity, Quantity::Input(_));
