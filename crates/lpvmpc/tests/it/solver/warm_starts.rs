@@ -93,16 +93,17 @@ fn of_three<const NX: usize, const NU: usize>(kind: Kind, horizon: usize) -> [us
     [0, 1].map(|i| counts.iter().map(|of| of[i]).sum())
 }
 
-/// Points on their way keep almost all that holds them at their limits. Over long horizons a loop takes at most 155
-/// factorisations, three eighths of what it takes from nothing, since what is nearly right is looked at more closely, one
-/// stage after the other; of a short horizon a third is solved by itself where the whole is wrong.
+/// Points on their way keep almost all that holds them at their limits. Over long horizons a loop takes at most
+/// three eighths of the factorisations that it takes from nothing, and less than a third of the 455 and 489 that these took
+/// from nothing once, since what is nearly right is looked at more closely, one stage after the other; of a short horizon a
+/// third is solved by itself where the whole is wrong.
 #[test]
 fn points_at_their_limits_begin_with_what_holds_them() {
-    for [with, without] in [
-        of_three::<4, 1>(Kind::Motion, 100),
-        of_three::<8, 2>(Kind::Motion, 100),
+    for ([with, without], most) in [
+        (of_three::<4, 1>(Kind::Motion, 100), 130),
+        (of_three::<8, 2>(Kind::Motion, 100), 155),
     ] {
-        assert!(with <= 155, "{with} for {without}");
+        assert!(with <= most, "{with} for {without}");
         assert!(8 * with < 3 * without, "{with} for {without}");
     }
     let [with, without] = of_three::<16, 6>(Kind::Motion, 20);
