@@ -134,9 +134,10 @@ pub use guaranteed::{
 };
 pub use kkt::{KktResidual, kkt_residual};
 pub use list::List;
+pub use many_bounds::ManyBoundsArrays;
 pub use memory::{
-    Capacity, ControllerArrays, ControllerMemory, ManyBoundsArrays, SolverArrays, SolverMemory,
-    WorkspaceArrays, WorkspaceMemory,
+    Capacity, ControllerArrays, ControllerMemory, SolverArrays, SolverMemory, WorkspaceArrays,
+    WorkspaceMemory,
 };
 pub use model::{LpvModel, Scalar};
 pub use number::{Bivariate, Dual, Elementary, Number, SincSlope};

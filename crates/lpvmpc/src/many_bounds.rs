@@ -16,6 +16,7 @@ mod expected;
 mod guess;
 mod interior_point;
 mod last_answer;
+mod memory;
 mod newton;
 mod residual;
 mod retries;
@@ -26,7 +27,7 @@ mod span;
 mod start;
 mod turns;
 
-pub(crate) use side::BoundSide;
+pub use memory::ManyBoundsArrays;
 pub(crate) use turns::cap_with_later_turn;
 
 use crate::list::List;
@@ -40,11 +41,12 @@ use answer::{list, report};
 use core::cell::Cell;
 use exchange::{Patience, Program, Tolerances, exchange};
 use expected::{Expected, Violated};
+use interior_point::{AllUnknowns, BoundUnknowns};
 use last_answer::{Kind, LastAnswer};
 use nalgebra::SVector;
 use retries::AllRetries;
 use search::search;
-use side::Role;
+use side::{BoundSide, Role};
 use span::Span;
 use turns::{AtOnce, Turn};
 
@@ -71,6 +73,7 @@ pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
     /// Where a Newton step is kept while a guess is tried, and where the guess is.
     places: [ManyBoundsPlace<T, NX, NU>; 2],
     sides: List<BoundSide<T>>,
+    unknowns: List<BoundUnknowns<T>>,
     retries: AllRetries,
     /// Whether its turn in this solve was put off.
     put_off: bool,
@@ -112,10 +115,15 @@ type InTurns<T, const NX: usize, const NU: usize> = fn(
 ) -> Result<(), Status<T>>;
 
 impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
-    pub fn new(places: [ManyBoundsPlace<T, NX, NU>; 2], sides: List<BoundSide<T>>) -> Self {
+    pub fn new(
+        places: [ManyBoundsPlace<T, NX, NU>; 2],
+        sides: List<BoundSide<T>>,
+        unknowns: List<BoundUnknowns<T>>,
+    ) -> Self {
         Self {
             places,
             sides,
+            unknowns,
             retries: AllRetries::default(),
             put_off: false,
             in_turns: Solver::solve_in_turns,
@@ -211,6 +219,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             u: &mut place.u,
             x: &mut place.x,
             spare: (&mut spare.factors, &mut spare.u, &mut spare.x),
+            unknowns: AllUnknowns::new(&mut self.unknowns),
         };
         let mut found = false;
         if let Some(shift) = shift.filter(|_| known > 0) {

@@ -2,7 +2,7 @@
 
 use crate::held_bounds::{HeldAt, HeldBound};
 use crate::list::List;
-use crate::many_bounds::{BoundSide, ManyBounds, ManyBoundsPlace};
+use crate::many_bounds::{ManyBounds, ManyBoundsArrays};
 use crate::model::Scalar;
 use crate::ocp::{Common, GeneralRow, Stage};
 use crate::riccati::StageFactor;
@@ -156,94 +156,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
             #[cfg(target_arch = "wasm32")]
             many_bounds: List::empty(),
             #[cfg(not(target_arch = "wasm32"))]
-            many_bounds: List::repeat(
-                ManyBounds::new(
-                    core::array::from_fn(|_| ManyBoundsPlace {
-                        factors: List::repeat(StageFactor::zeros(), stages),
-                        u: List::repeat(SVector::zeros(), stages),
-                        x: List::repeat(SVector::zeros(), stages),
-                    }),
-                    List::repeat(BoundSide::empty(), sides_of::<NX, NU>(capacity)),
-                ),
-                1,
-            ),
+            many_bounds: List::repeat(ManyBounds::allocate(capacity), 1),
         }
     }
-}
-
-impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
-    /// The same for many active bounds, in problems of up to `N` stages whose bounds have up to `B` finite sides.
-    pub fn with_many_bounds<const N: usize, const B: usize>(
-        self,
-        arrays: &'static mut ManyBoundsArrays<T, NX, NU, N, B>,
-    ) -> Self {
-        let ManyBoundsArrays {
-            places,
-            sides,
-            phase,
-        } = arrays;
-        let places = places.each_mut().map(|(factors, u, x)| ManyBoundsPlace {
-            factors: List::Static(factors),
-            u: List::Static(u),
-            x: List::Static(x),
-        });
-        *phase = [ManyBounds::new(places, List::Static(sides))];
-        Self {
-            many_bounds: List::Static(phase),
-            ..self
-        }
-    }
-}
-
-/// Memory with which problems with many active bounds are solved in less time, for `N` stages and `B` finite
-/// sides of bounds: twice the bounded states, inputs and general rows of all stages as a rule. On
-/// the heap it is always there, but for WebAssembly. Where it is not, neither is its machine code; the
-/// answers are the same.
-#[derive(Debug)]
-pub struct ManyBoundsArrays<
-    T: 'static,
-    const NX: usize,
-    const NU: usize,
-    const N: usize,
-    const B: usize,
-> {
-    places: [Place<T, NX, NU, N>; 2],
-    sides: [BoundSide<T>; B],
-    /// What is made of the others once they are lent.
-    phase: [ManyBounds<T, NX, NU>; 1],
-}
-
-/// Factors and a trajectory, inputs and states.
-type Place<T, const NX: usize, const NU: usize, const N: usize> = (
-    [StageFactor<T, NX, NU>; N],
-    [SVector<T, NU>; N],
-    [SVector<T, NX>; N],
-);
-
-impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const B: usize> Default
-    for ManyBoundsArrays<T, NX, NU, N, B>
-{
-    #[inline(always)]
-    fn default() -> Self {
-        Self {
-            places: [(
-                [StageFactor::zeros(); N],
-                [SVector::zeros(); N],
-                [SVector::zeros(); N],
-            ); 2],
-            sides: [BoundSide::empty(); B],
-            phase: [ManyBounds::new(
-                core::array::from_fn(|_| ManyBoundsPlace::empty()),
-                List::empty(),
-            )],
-        }
-    }
-}
-
-/// Finite sides of bounds that problems of this capacity may have.
-#[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
-fn sides_of<const NX: usize, const NU: usize>(capacity: Capacity) -> usize {
-    2 * (capacity.stages + 1) * (NX + NU + capacity.general_rows)
 }
 
 /// The same as arrays, for memory that is known when a program is built: `N` stages, `M` rows.

@@ -3,7 +3,8 @@
 use super::plan::PlannedStage;
 use super::slopes::SampleSlopes;
 use crate::list::List;
-use crate::memory::{Capacity, ManyBoundsArrays, SolverArrays, SolverMemory};
+use crate::many_bounds::ManyBoundsArrays;
+use crate::memory::{Capacity, SolverArrays, SolverMemory};
 use crate::model::Scalar;
 use crate::ocp::{Common, Stage};
 use crate::solution::PackedRow;

@@ -6,6 +6,7 @@
 //! the multipliers remove what rounding has left in the optimality conditions.
 
 use super::guess;
+use super::interior_point::AllUnknowns;
 use super::newton;
 use super::residual::{self, Residual};
 use super::roles::{
@@ -25,10 +26,14 @@ use nalgebra::{SVector, convert};
 const REFINEMENTS: usize = 40;
 /// Held sides come nearer when what is left of their distances is at most this part.
 const COMES_NEARER: f64 = 0.8;
+/// They stand when it is this part.
+const STANDS: f64 = 0.99;
 /// Held sides come nearer in one mode where this part of their ratio from pass to pass is all that it changes by.
 const SAME_RATIO: f64 = 0.02;
 /// With so many wrong sides a guess is nearly right, and worth a closer look.
 const NEARLY_RIGHT: usize = 8;
+/// One that is right but for what is smaller than a loose tolerance is exchanged so many times more often.
+const MORE_GUESSES: usize = 4;
 /// A guess with more wrong sides than so many times the fewest before has gone astray.
 const WORSE: usize = 3;
 /// Distances of held sides that are rounding, in units of the smallest number beside one.
@@ -107,6 +112,8 @@ pub(super) struct Program<'a, T: 'static, const NX: usize, const NU: usize> {
     pub x: &'a mut [SVector<T, NX>],
     /// Other places for factors and trajectory.
     pub spare: Places<'a, T, NX, NU>,
+    /// Of the interior-point method.
+    pub unknowns: AllUnknowns<'a, T>,
 }
 
 impl<T, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
@@ -195,7 +202,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
     // horizon until what follows from a trajectory as it is goes in circles.
     let mut careful = side::any_soft(sides);
     let loose: T = convert(1e-6);
-    let loose = tolerances.violation.max(loose);
+    let mut loose = tolerances.violation.max(loose);
     while count() {
         for side in sides.iter_mut() {
             (side.base, side.weight) = match side.role {
@@ -245,6 +252,12 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
                 return near
                     && !residual.contradicted
                     && is_of_the_plant(program, tolerances.violation);
+            }
+            if loose > tolerances.violation {
+                // What is left to exchange is too small for a loose look, which would find it right again.
+                (loose, careful) = (tolerances.violation, true);
+                patience.guesses += MORE_GUESSES;
+                most = most.max(wrong);
             }
         }
         if one_by_one {
@@ -395,8 +408,10 @@ fn refine<T: Scalar, const NX: usize, const NU: usize>(
         }
         let half: T = convert(0.5);
         let shrinks = worst < least * half || missed < last_missed * convert(COMES_NEARER);
-        // Rounding may hide what one pass has done, not what two have.
-        let at_rest = !shrinks && stalled;
+        // Rounding may hide what one pass has done, not what two have; where it is enough that does not matter, nor where all that
+        // is left is a distance that does not change.
+        let stands = unexplained <= enough && missed >= last_missed * convert(STANDS);
+        let at_rest = stands || (!shrinks && (stalled || worst <= tolerance));
         if at_rest {
             let may_be_rounding = missed > T::zero() && missed <= tolerances.violation;
             if !(waits && may_be_rounding) {

@@ -5,15 +5,25 @@
 //! Newton step towards slack * multiplier = target is a linear-quadratic program in which each side acts
 //! with a multiplier that is linear in its distance.
 
+mod at_stages;
+mod step;
+mod unknowns;
+mod way;
+
+pub(super) use at_stages::AllUnknowns;
+pub(crate) use unknowns::BoundUnknowns;
+pub(super) use unknowns::Interior;
+pub(super) use way::Foretold;
+
 use super::exchange::{Patience, Program, Tolerances, exchange};
 use super::newton;
-use super::side::{BoundSide, Interior, Role, Target};
-use super::span::Span;
-use super::start;
+use super::side::BoundSide;
+use super::start::Start;
 use crate::model::Scalar;
-use crate::riccati::{BadPivot, StageFactor};
-use crate::rows::Trajectory;
-use nalgebra::{SVector, convert};
+use crate::riccati::BadPivot;
+use nalgebra::convert;
+use unknowns::Target;
+use way::Prediction;
 
 /// Part of the way to the nearest zero that a step may take.
 const NEARLY: f64 = 0.995;
@@ -24,127 +34,44 @@ pub(super) const STUCK: f64 = 0.1;
 /// Where none can, the next step goes farther from products so many times larger.
 const LARGER: f64 = 10.0;
 
-/// Between the parts of its slack and of its multiplier that a step leaves there is less than this where it does not say
-/// clearly which of them goes to zero.
-const UNDECIDED: f64 = 0.4;
-
-/// Multiplier of a side at d = 0 in a Newton step towards `target`, and how fast it falls with d.
-#[inline(always)]
-fn multiplier<T: Scalar>(side: &BoundSide<T>, target: Target<T>) -> (T, T) {
-    let at = &side.interior;
-    let of = |value: T, multiplier: T, target: T| {
-        let inverse = T::one() / value;
-        (multiplier + target * inverse, multiplier * inverse)
-    };
-    let (base, weight) = of(at.slack, at.multiplier, target.slack);
-    let Some(price) = side.soft else {
-        return (base, weight);
-    };
-    let (base_of_rest, weight_of_rest) = of(at.excess, at.rest, target.excess);
-    let rest = price.quadratic + weight_of_rest;
-    let share = weight / (weight + rest);
-    (
-        base - share * (base + base_of_rest - price.linear),
-        share * rest,
-    )
-}
-
-/// What a side comes to in that step at its distance.
-#[inline(always)]
-fn step_to<T: Scalar>(side: &BoundSide<T>, target: Target<T>) -> Interior<T> {
-    let at = &side.interior;
-    let multiplier = side.multiplier_at(side.distance);
-    let Some(price) = side.soft else {
-        return Interior {
-            slack: side.distance,
-            multiplier,
-            excess: T::zero(),
-            rest: T::zero(),
-        };
-    };
-    // The products' linearisation, and how slack and excess, and both multipliers, belong together.
-    let slack = at.slack + (target.slack - at.slack * multiplier) / at.multiplier;
-    let excess = slack - side.distance;
-    Interior {
-        slack,
-        multiplier,
-        excess,
-        rest: price.linear + price.quadratic * excess - multiplier,
-    }
-}
-
-/// What a step says of the roles of the sides.
-pub(super) struct Foretold {
-    /// How many are not those of the step before.
-    pub changed: usize,
-    /// How many sides are active.
-    pub active: usize,
-    /// Of how many sides the step does not say clearly whether they are active.
-    pub undecided: usize,
-}
-
-/// Where the method stands. Between its calls every side is free, and has the cost of a Newton step towards
-/// complementarity zero.
+/// Where the method stands. Between its calls the bounds have the costs of a Newton step towards complementarity zero.
 pub(super) struct InteriorPoint<T> {
     /// Mean of slack * multiplier.
     complementarity: T,
     count: T,
     /// Whether hard bounds may contradict each other: those of inputs alone cannot.
     may_contradict: bool,
-    prediction: Prediction<T>,
-}
-
-/// What there is to know of the way to a prediction.
-#[derive(Clone, Copy)]
-struct Prediction<T> {
-    /// Where the first unknown is zero.
-    part: Part<T>,
-    /// How fast the sum of slack * multiplier changes with each of the two, and with both.
-    primal: T,
-    dual: T,
-    both: T,
-}
-
-impl<T: Scalar> Prediction<T> {
-    fn begin() -> Self {
-        Self {
-            part: Part::far(),
-            primal: T::zero(),
-            dual: T::zero(),
-            both: T::zero(),
-        }
-    }
-
-    /// Takes a side into account, which is to go from `at` to `to`; returns the products of its steps.
-    #[inline(always)]
-    fn add(&mut self, at: &Interior<T>, to: &Interior<T>, soft: bool) -> Target<T> {
-        self.part.keep_above_zero(at, to, soft);
-        let (slack, multiplier) = (to.slack - at.slack, to.multiplier - at.multiplier);
-        let (excess, rest) = (to.excess - at.excess, to.rest - at.rest);
-        let products = Target {
-            slack: slack * multiplier,
-            excess: excess * rest,
-        };
-        self.primal += slack * at.multiplier + excess * at.rest;
-        self.dual += multiplier * at.slack + rest * at.excess;
-        self.both += products.slack + products.excess;
-        products
-    }
-
-    /// The change of the sum of slack * multiplier where that first unknown is zero.
-    fn change(&self) -> T {
-        let Part { primal, dual } = self.part.shortened(T::one());
-        primal * self.primal + dual * self.dual + primal * dual * self.both
-    }
+    prediction: Option<Prediction<T>>,
 }
 
 impl<T: Scalar> InteriorPoint<T> {
-    /// Begins at a trajectory whose distances are known, with products of slack and multiplier of the size
-    /// of `cost`, larger where bounds are violated by several times their size.
-    pub fn new(sides: &mut [BoundSide<T>], cost: T) -> Self {
-        start::place(sides, cost);
-        sides.iter_mut().for_each(free);
-        Self::at(sides)
+    /// Begins at a trajectory on which the sides are measured, with products of slack and multiplier of the size of `cost`,
+    /// larger where bounds are violated by several times their size; `None` where there are not enough places.
+    pub fn new<const NX: usize, const NU: usize>(
+        program: &mut Program<'_, T, NX, NU>,
+        sides: &[BoundSide<T>],
+        cost: T,
+    ) -> Option<Self> {
+        let start = Start::new(sides, cost);
+        let (mut sum, mut count) = (T::zero(), T::zero());
+        program.unknowns.set(sides, |side| {
+            let at = start.of(side);
+            sum += at.product();
+            count += if side.soft.is_some() {
+                convert(2.0)
+            } else {
+                T::one()
+            };
+            at
+        })?;
+        let bounds = program.unknowns.bounds_mut().iter_mut();
+        bounds.for_each(BoundUnknowns::weigh);
+        Some(Self {
+            complementarity: sum / count,
+            count,
+            may_contradict: sides.iter().any(BoundSide::may_contradict),
+            prediction: None,
+        })
     }
 
     /// Mean of slack * multiplier.
@@ -152,94 +79,37 @@ impl<T: Scalar> InteriorPoint<T> {
         self.complementarity
     }
 
-    /// Where the sides' unknowns are.
-    fn at(sides: &[BoundSide<T>]) -> Self {
-        let (mut sum, mut count) = (T::zero(), T::zero());
-        for side in sides {
-            sum += side.interior.product();
-            count += T::one();
-            if side.soft.is_some() {
-                count += T::one();
-            }
-        }
-        Self {
-            complementarity: sum / count,
-            count,
-            may_contradict: sides.iter().any(BoundSide::may_contradict),
-            prediction: Prediction::begin(),
-        }
-    }
-
-    /// A Newton step towards complementarity zero: leaves its factors, the trajectory that it leads to, and in every
-    /// side, as `last_role`, the role that it foretells.
+    /// A Newton step towards complementarity zero: leaves its factors, and the trajectory that it leads to; what it foretells
+    /// of the sides.
     pub fn predict<const NX: usize, const NU: usize>(
         &mut self,
-        span: &Span<'_, T, NX, NU>,
-        sides: &mut [BoundSide<T>],
-        factors: &mut [StageFactor<T, NX, NU>],
-        (u, x): (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
+        program: &mut Program<'_, T, NX, NU>,
     ) -> Result<Foretold, BadPivot<T>> {
-        newton::factorize(span, sides, factors)?;
-        newton::roll_out(span, factors, (u, x));
-        Ok(self.foretell(span, sides, &Trajectory { x, u }))
+        step::factorize(program)?;
+        newton::roll_out(&program.span, program.factors, (program.u, program.x));
+        let (prediction, foretold) = step::foretell(program);
+        self.prediction = Some(prediction);
+        Ok(foretold)
     }
 
     /// Tries the roles that the prediction in `program` foretells, in its other places; whether they, or what they are
-    /// exchanged for, are right. Where they are not, program and sides are again those of the prediction.
+    /// exchanged for, are right. Where they are not, the program is again that of the prediction.
     pub fn try_foretold<const NX: usize, const NU: usize>(
-        &mut self,
         program: &mut Program<'_, T, NX, NU>,
         sides: &mut [BoundSide<T>],
         tolerances: &Tolerances<T>,
         count: impl FnMut() -> bool,
     ) -> bool {
-        program.change_places();
-        sides.iter_mut().for_each(|side| side.role = side.last_role);
-        if exchange(program, sides, tolerances, Patience::NEAR, count) {
-            return true;
-        }
-        program.change_places();
-        sides.iter_mut().for_each(free);
-        let (x, u) = (&*program.x, &*program.u);
-        self.foretell(&program.span, sides, &Trajectory { x, u });
-        false
-    }
-
-    fn foretell<const NX: usize, const NU: usize>(
-        &mut self,
-        span: &Span<'_, T, NX, NU>,
-        sides: &mut [BoundSide<T>],
-        trajectory: &Trajectory<'_, T, NX, NU>,
-    ) -> Foretold {
-        let mut foretold = Foretold {
-            changed: 0,
-            active: 0,
-            undecided: 0,
-        };
-        let mut prediction = Prediction::begin();
-        let undecided: T = convert(UNDECIDED);
-        newton::measure_each(span, sides, trajectory, |side| {
-            let at = &side.interior;
-            let to = step_to(side, Target::zero());
-            // What goes to zero first, relative to where it is: both parts add up to the product.
-            let (slack, multiplier) = (to.slack * at.multiplier, to.multiplier * at.slack);
-            let holds = slack < multiplier;
-            let gap = (slack - multiplier).abs();
-            foretold.undecided += usize::from(gap < undecided * at.slack * at.multiplier);
-            let exceeded = side.soft.is_some() && to.rest * at.excess < to.excess * at.rest;
-            let role = match (exceeded, holds) {
-                (true, _) => Role::Exceeded,
-                (false, true) => Role::Held,
-                (false, false) => Role::Free,
-            };
-            side.estimate = to.multiplier.max(T::zero());
-            side.target = prediction.add(at, &to, side.soft.is_some());
-            foretold.changed += usize::from(role != side.last_role);
-            foretold.active += usize::from(role != Role::Free);
-            side.last_role = role;
+        program.unknowns.visit(sides, |side, known| {
+            side.role = known.role;
+            side.estimate = known.predicted.max(T::zero());
         });
-        self.prediction = prediction;
-        foretold
+        program.change_places();
+        let found = exchange(program, sides, tolerances, Patience::NEAR, count);
+        if !found {
+            program.change_places();
+        }
+        found
     }
 
     /// The corrector: the trajectory of the prediction moves on, and the sides' unknowns go towards it as far
@@ -250,150 +120,54 @@ impl<T: Scalar> InteriorPoint<T> {
     /// bounds that contradict each other the multipliers are to grow instead.
     pub fn correct<const NX: usize, const NU: usize>(
         &mut self,
-        span: &Span<'_, T, NX, NU>,
-        sides: &mut [BoundSide<T>],
-        factors: &[StageFactor<T, NX, NU>],
-        v: &mut [SVector<T, NU>],
-        mut trajectory: (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
+        program: &mut Program<'_, T, NX, NU>,
     ) -> T {
         let sum = self.complementarity * self.count;
-        let ratio = ((sum + self.prediction.change()) / sum).max(T::zero());
+        let predicted = self.prediction.map_or(sum, |way| way.sum(sum));
+        let ratio = (predicted / sum).max(T::zero());
         let center = ratio * ratio * ratio * self.complementarity;
         let with_products = |predicted: Target<T>| Target {
             slack: center - predicted.slack,
             excess: center - predicted.excess,
         };
-        let mut part = aim(span, sides, factors, v, &mut trajectory, with_products);
-        let shortest = part.shortest();
-        let stuck = shortest < convert(STUCK);
-        if shortest < convert(SHORT) && !(stuck && self.may_contradict) {
+        let mut part = step::aim(program, with_products).shortened(convert(NEARLY));
+        let stuck = part.shortest() < convert(STUCK);
+        if part.shortest() < convert(SHORT) && !(stuck && self.may_contradict) {
             let times = if stuck { LARGER } else { 1.0 };
             let product = self.complementarity * convert(times);
             let equal = Target {
                 slack: product,
                 excess: product,
             };
-            part = aim(span, sides, factors, v, &mut trajectory, |_| equal);
+            part = step::aim(program, |_| equal).shortened(convert(NEARLY));
         }
-        let mut sum = T::zero();
-        for side in sides.iter_mut() {
-            side.interior = along(&side.interior, &step_to(side, side.target), part);
-            sum += side.interior.product();
-            weigh(side);
+        let mut sums = [T::zero(); 2];
+        for bound in program.unknowns.bounds_mut() {
+            bound.advance(part, &mut sums);
         }
-        self.complementarity = sum / self.count;
+        self.complementarity = (sums[0] + sums[1]) / self.count;
         part.shortest()
-    }
-}
-
-/// Moves the trajectory to where the sides' products come to the `target` of each, which follows from the one that it has;
-/// returns how far their unknowns may go there.
-fn aim<T: Scalar, const NX: usize, const NU: usize>(
-    span: &Span<'_, T, NX, NU>,
-    sides: &mut [BoundSide<T>],
-    factors: &[StageFactor<T, NX, NU>],
-    v: &mut [SVector<T, NU>],
-    (u, x): &mut (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
-    target: impl Fn(Target<T>) -> Target<T>,
-) -> Part<T> {
-    let change = |side: &mut BoundSide<T>| {
-        side.target = target(side.target);
-        let base = multiplier(side, side.target).0;
-        base - core::mem::replace(&mut side.base, base)
-    };
-    newton::shift(span, factors, sides, change, v, (u, x));
-    let mut part = Part::far();
-    newton::measure_each(span, sides, &Trajectory { x, u }, |side| {
-        let corrected = step_to(side, side.target);
-        part.keep_above_zero(&side.interior, &corrected, side.soft.is_some());
-    });
-    part.shortened(convert(NEARLY))
-}
-
-/// No guess says what becomes of the side.
-fn free<T: Scalar>(side: &mut BoundSide<T>) {
-    side.role = Role::Free;
-    weigh(side);
-}
-
-/// Gives the side the cost that it has in a Newton step towards complementarity zero.
-#[inline(always)]
-fn weigh<T: Scalar>(side: &mut BoundSide<T>) {
-    (side.base, side.weight) = multiplier(side, Target::zero());
-}
-
-/// Parts of a way.
-#[derive(Clone, Copy)]
-struct Part<T> {
-    /// Of slacks and excesses.
-    primal: T,
-    /// Of multipliers.
-    dual: T,
-}
-
-impl<T: Scalar> Part<T> {
-    /// Beyond any that counts.
-    fn far() -> Self {
-        let far = convert(1e3);
-        Self {
-            primal: far,
-            dual: far,
-        }
-    }
-
-    /// Not beyond where a side's first unknown is zero, on its way from `at` to `to`.
-    #[inline(always)]
-    fn keep_above_zero(&mut self, at: &Interior<T>, to: &Interior<T>, soft: bool) {
-        let keep = |part: &mut T, at: T, to: T| {
-            // Seldom, so that the processor foresees it; never where `to` is not below `at`, which is above zero.
-            if at < *part * (at - to) {
-                *part = at / (at - to);
-            }
-        };
-        keep(&mut self.primal, at.slack, to.slack);
-        keep(&mut self.dual, at.multiplier, to.multiplier);
-        if soft {
-            keep(&mut self.primal, at.excess, to.excess);
-            keep(&mut self.dual, at.rest, to.rest);
-        }
-    }
-
-    /// Times `factor`, at most the whole way.
-    fn shortened(self, factor: T) -> Self {
-        Self {
-            primal: (self.primal * factor).min(T::one()),
-            dual: (self.dual * factor).min(T::one()),
-        }
-    }
-
-    fn shortest(self) -> T {
-        self.primal.min(self.dual)
-    }
-}
-
-fn along<T: Scalar>(at: &Interior<T>, to: &Interior<T>, part: Part<T>) -> Interior<T> {
-    let Part { primal, dual } = part.shortened(T::one());
-    let between = |at: T, to: T, part: T| at + (to - at) * part;
-    Interior {
-        slack: between(at.slack, to.slack, primal),
-        multiplier: between(at.multiplier, to.multiplier, dual),
-        excess: between(at.excess, to.excess, primal),
-        rest: between(at.rest, to.rest, dual),
     }
 }
 
 #[cfg(all(test, feature = "alloc"))]
 mod tests {
     use super::*;
+    use crate::list::List;
     use crate::many_bounds::side;
-    use crate::ocp::{Bounds, Ocp, Penalty};
+    use crate::many_bounds::span::Span;
+    use crate::ocp::{Bounds, GeneralRow, Ocp, Penalty};
+    use crate::riccati::StageFactor;
+    use crate::rows::Trajectory;
+    use alloc::format;
+    use alloc::string::String;
     use alloc::vec;
     use alloc::vec::Vec;
     use nalgebra::{Matrix2, Vector1, Vector2};
 
     const N: usize = 12;
 
-    /// A double integrator pushed against the bounds of its input and, softly, of its speed.
+    /// A double integrator pushed against the bounds of its input, softly of its speed, and of a sum of all.
     fn problem() -> Ocp<f64, 2, 1> {
         let mut ocp = Ocp::allocate(N);
         ocp.x0 = Vector2::new(9.0, -1.0);
@@ -412,22 +186,29 @@ mod tests {
             linear: 1.0,
             quadratic: 10.0,
         });
+        ocp.common.x.upper[0] = 10.0;
+        ocp.rows_per_stage = 1;
+        let row = GeneralRow {
+            x: Vector2::new(0.1, 1.0),
+            u: Vector1::new(0.5),
+            lower: -1.2,
+            upper: 2.0,
+            soft: None,
+        };
+        ocp.rows = List::repeat(row, N + 1);
         ocp.terminal.p = Matrix2::identity();
+        ocp.terminal.x.upper[1] = 0.3;
         ocp
     }
 
-    /// Factors, trajectory and sides of a Newton step are what they were after its guess has been tried in vain.
-    #[test]
-    fn a_guess_in_vain_leaves_the_step_as_it_was() {
+    /// The problem's sides, measured on its trajectory without bounds, and the method that begins there.
+    fn begin(
+        test: impl FnOnce(&mut InteriorPoint<f64>, &mut Program<'_, f64, 2, 1>, &mut [BoundSide<f64>]),
+    ) -> Option<()> {
         let ocp = problem();
-        let mut sides = vec![BoundSide::empty(); 6 * (N + 1)];
-        let count = side::collect(&ocp, &mut sides).unwrap();
+        let mut sides = vec![BoundSide::empty(); 8 * (N + 1)];
+        let count = side::collect(&ocp, &mut sides).unwrap_or_default();
         sides.truncate(count);
-        let tolerances = Tolerances {
-            violation: 1e-10,
-            scale: 1.0,
-            penalty: 1e6,
-        };
         let place = || {
             (
                 vec![StageFactor::zeros(); N],
@@ -438,10 +219,10 @@ mod tests {
         let ((mut factors, mut u, mut x), mut spare) = (place(), place());
         let mut v = u.clone();
         let span = Span::whole(&ocp);
-        newton::factorize(&span, &sides, &mut factors).unwrap();
+        assert!(newton::factorize(&span, &sides, &mut factors).is_ok());
         newton::roll_out(&span, &factors, (&mut u, &mut x));
         newton::measure(&span, &mut sides, &Trajectory { x: &x, u: &u });
-        let mut method = InteriorPoint::new(&mut sides, 1.0);
+        let mut bounds = vec![BoundUnknowns::empty(); 8 * (N + 1)];
         let mut program = Program {
             span,
             v: &mut v,
@@ -449,36 +230,131 @@ mod tests {
             u: &mut u,
             x: &mut x,
             spare: (&mut spare.0, &mut spare.1, &mut spare.2),
+            unknowns: AllUnknowns::new(&mut bounds),
         };
-        for _ in 0..2 {
-            method
-                .predict(&span, &mut sides, program.factors, (program.u, program.x))
-                .unwrap();
-            let of = |side: &BoundSide<f64>| {
-                let numbers = [side.base, side.weight, side.distance, side.estimate];
-                let roles = (side.role, side.last_role);
-                (roles, numbers, side.target.slack, side.target.excess)
-            };
-            let step = |program: &Program<'_, f64, 2, 1>, sides: &[BoundSide<f64>]| {
-                let policies = program.factors.iter();
-                let policies = policies.map(|f| (f.feedback, f.feedforward, f.inverse_factor));
-                (
-                    policies.collect::<Vec<_>>(),
-                    (program.u.to_vec(), program.x.to_vec()),
-                    sides.iter().map(of).collect::<Vec<_>>(),
-                )
-            };
-            let (before, change) = (step(&program, &sides), method.prediction.change());
-            // One factorisation, which shows that the guess is wrong, and no more to exchange it.
-            let mut left = 1;
-            let count = || core::mem::replace(&mut left, 0) > 0;
-            assert!(!method.try_foretold(&mut program, &mut sides, &tolerances, count));
-            assert_eq!(left, 0);
-            assert_ne!(program.spare.1.to_vec(), before.1.0);
-            assert_eq!(step(&program, &sides), before);
-            assert_eq!(method.prediction.change(), change);
-            let trajectory = (&mut *program.u, &mut *program.x);
-            method.correct(&span, &mut sides, program.factors, program.v, trajectory);
+        let mut method = InteriorPoint::new(&mut program, &sides, 1.0)?;
+        test(&mut method, &mut program, &mut sides);
+        Some(())
+    }
+
+    /// Factors, trajectory and unknowns of a Newton step are what they were after its guess has been tried in vain.
+    #[test]
+    fn a_guess_in_vain_leaves_the_step_as_it_was() {
+        let tolerances = Tolerances {
+            violation: 1e-10,
+            scale: 1.0,
+            penalty: 1e6,
+        };
+        let begun = begin(|method, program, sides| {
+            for _ in 0..2 {
+                method.predict(program).unwrap();
+                let step = |program: &Program<'_, f64, 2, 1>| {
+                    let factors = program.factors.iter();
+                    let factors = factors.map(|f| (f.feedback, f.feedforward, f.inverse_factor));
+                    let unknowns: String = format!("{:?}", program.unknowns.bounds());
+                    let trajectory = (program.u.to_vec(), program.x.to_vec());
+                    (factors.collect::<Vec<_>>(), trajectory, unknowns)
+                };
+                let before = step(program);
+                // One factorisation, which shows that the guess is wrong, and no more to exchange it.
+                let mut left = 1;
+                let count = || core::mem::replace(&mut left, 0) > 0;
+                let found = InteriorPoint::try_foretold(program, sides, &tolerances, count);
+                assert!(!found);
+                assert_eq!(left, 0);
+                assert_ne!(program.spare.1.to_vec(), before.1.0);
+                assert_eq!(step(program), before);
+                method.correct(program);
+            }
+        });
+        assert!(begun.is_some());
+    }
+
+    /// What the inputs cost, and what the sides' multipliers add to it.
+    fn lagrangian(
+        ocp: &Ocp<f64, 2, 1>,
+        u: &[Vector1<f64>],
+        sides: &[(BoundSide<f64>, f64)],
+    ) -> f64 {
+        let mut states = vec![ocp.x0];
+        for (stage, u) in ocp.stages.iter().zip(u) {
+            states.push(stage.a * states[states.len() - 1] + stage.b * u);
         }
+        let of_inputs: f64 = u.iter().map(|u| 0.05 * u[0] * u[0]).sum();
+        let of_states: f64 = states.iter().map(|x| 0.5 * x.norm_squared()).sum();
+        let of_sides = sides.iter().map(|(side, multiplier)| {
+            let stage = side.bound.stage;
+            multiplier * side.distance_of(side.value(ocp, &states[stage], u.get(stage)))
+        });
+        of_inputs + of_states - of_sides.sum::<f64>()
+    }
+
+    /// A prediction solves the linearised optimality conditions: the Lagrangian with its multipliers is at its minimum, which
+    /// differences show, and every product is zero to first order. What is gone of the way leaves all unknowns above zero.
+    #[test]
+    fn a_prediction_solves_the_linearised_conditions() {
+        let begun = begin(|method, program, sides| {
+            let mut last = 0.0;
+            for step in 0..20 {
+                let at = program.unknowns.copied(sides);
+                let products: f64 = at.iter().map(|(_, known)| known.at.product()).sum();
+                let pairs = sides.len() + sides.iter().filter(|side| side.soft.is_some()).count();
+                let mean = products / pairs as f64;
+                assert!((method.complementarity() / mean - 1.0).abs() < 1e-12);
+                last = mean;
+                // Closer, multipliers are differences of numbers that are many times larger.
+                if last < 1e-6 {
+                    break;
+                }
+                method.predict(program).unwrap();
+                let ocp = program.span.ocp;
+                let known = program.unknowns.copied(sides);
+                let multipliers: Vec<_> = known
+                    .iter()
+                    .map(|(side, of)| (*side, of.predicted))
+                    .collect();
+                for i in 0..N {
+                    let moved = |by: f64| {
+                        let mut u = program.u.to_vec();
+                        u[i][0] += by;
+                        lagrangian(ocp, &u, &multipliers)
+                    };
+                    let slope = (moved(0.5) - moved(-0.5)).abs();
+                    assert!(slope < 1e-9 * moved(0.0).abs(), "{step}, {i}: {slope}");
+                }
+                for (side, of) in &known {
+                    let (stage, at) = (side.bound.stage, of.at);
+                    assert!(at.slack > 0.0 && at.multiplier > 0.0);
+                    let x = program.span.state(
+                        &Trajectory {
+                            x: program.x,
+                            u: program.u,
+                        },
+                        stage,
+                    );
+                    let distance = side.distance_of(side.value(ocp, x, program.u.get(stage)));
+                    let slack = at.slack * (1.0 - of.predicted / at.multiplier);
+                    let Some(price) = side.soft else {
+                        assert!(
+                            (slack - distance).abs() < 1e-9 * (1.0 + at.slack),
+                            "{step}: {}",
+                            side.bound
+                        );
+                        continue;
+                    };
+                    assert!(at.excess > 0.0 && at.rest > 0.0);
+                    let excess = slack - distance;
+                    let rest = price.linear + price.quadratic * excess - of.predicted;
+                    let product = at.excess * rest + at.rest * excess - at.excess * at.rest;
+                    assert!(
+                        product.abs() < 1e-9 * (1.0 + at.rest) * (1.0 + at.excess),
+                        "{step}: {product}"
+                    );
+                }
+                assert!(method.correct(program) > 0.1);
+            }
+            assert!(last < 1e-6, "{last}");
+        });
+        assert!(begun.is_some());
     }
 }

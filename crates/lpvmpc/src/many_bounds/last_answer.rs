@@ -163,6 +163,7 @@ mod tests {
     use super::*;
     use crate::list::List;
     use crate::many_bounds::exchange::Tolerances;
+    use crate::many_bounds::interior_point::{AllUnknowns, BoundUnknowns};
     use crate::many_bounds::side::{self, Role};
     use crate::memory::Capacity;
     use crate::ocp::{Bounds, GeneralRow};
@@ -255,6 +256,7 @@ mod tests {
             };
             let [free, mut one, mut other] = [place(), place(), place()];
             let (mut factors, mut v) = (free.0, free.1);
+            let mut unknowns = vec![BoundUnknowns::empty(); 8 * (N + 1)];
             newton::factorize(&span, &[], &mut factors).unwrap();
             let mut program = Program {
                 span,
@@ -263,6 +265,7 @@ mod tests {
                 u: &mut one.1,
                 x: &mut one.2,
                 spare: (&mut other.0, &mut other.1, &mut other.2),
+                unknowns: AllUnknowns::new(&mut unknowns),
             };
             let tolerances = Tolerances {
                 violation: 1e-10,

@@ -1,9 +1,7 @@
 //! The linear-quadratic program that the sides of the bounds make of the problem: its factors and its
 //! trajectory.
 
-use super::side::{
-    BoundSide, Role, by_bound, split_first_mut, split_off, split_off_mut, split_states,
-};
+use super::side::{BoundSide, Role, by_bound, split_first_mut, split_off, split_states};
 use super::span::Span;
 use crate::model::Scalar;
 use crate::ocp::{Ocp, Stage};
@@ -260,28 +258,6 @@ pub(super) fn gradient<T: Scalar, const NX: usize, const NU: usize>(
         }
     }
     sum
-}
-
-/// Adds to the trajectory what `change` of the sides' multipliers makes of its minimum.
-pub(super) fn shift<T: Scalar, const NX: usize, const NU: usize>(
-    span: &Span<'_, T, NX, NU>,
-    factors: &[StageFactor<T, NX, NU>],
-    sides: &mut [BoundSide<T>],
-    mut change: impl FnMut(&mut BoundSide<T>) -> T,
-    v: &mut [SVector<T, NU>],
-    trajectory: (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
-) {
-    let ocp = span.ocp;
-    let mut before = sides;
-    let end = split_off_mut(&mut before, ocp.length());
-    let (mut costate, _) = gradient(ocp, end, &mut change);
-    let stages = span.stages().zip(span.of(factors)).zip(span.of_mut(v));
-    for (((i, stage), factor), v) in stages.rev() {
-        let (slope_x, slope_u) = gradient(ocp, split_off_mut(&mut before, i), &mut change);
-        *v = step_back(stage, factor, &slope_u, &mut costate);
-        costate += slope_x;
-    }
-    deviate(span, factors, v, trajectory, &mut []);
 }
 
 /// The deviation that takes the gradient `slope` in the input, and what the costate means for it, away; the

@@ -1,7 +1,7 @@
 //! The way of the interior-point method to a guess that is right, or to a proof that there is no point within all bounds.
 
 use super::exchange::{Program, Tolerances};
-use super::interior_point::{Foretold, InteriorPoint, STUCK};
+use super::interior_point::{AllUnknowns, Foretold, InteriorPoint, STUCK};
 use super::side::{self, BoundSide};
 use crate::farkas::list_input_bounds;
 use crate::model::Scalar;
@@ -45,7 +45,6 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
     proof: &mut ActiveSet<T>,
     mut count: impl FnMut() -> bool,
 ) -> Option<Result<(), Status<T>>> {
-    let span = program.span;
     let mixed = side::are_mixed(sides);
     let most_changed = match side::any_soft(sides) {
         true => MOST_CHANGED,
@@ -56,7 +55,7 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
         false if side::are_inputs(sides) => CENTRE_OF_INPUTS,
         false => CENTRE,
     };
-    let mut method = InteriorPoint::new(sides, tolerances.scale * convert(centre));
+    let mut method = InteriorPoint::new(program, sides, tolerances.scale * convert(centre))?;
     let smallest = method.complementarity() * T::default_epsilon().powf(convert(0.6));
     let mut untried = true;
     let mut near_enough = convert(f64::INFINITY);
@@ -64,40 +63,34 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
     let mut part = T::zero();
     let mut stuck = 0_usize;
     while trials > 0 && count() {
-        let predicted = method.predict(&span, sides, program.factors, (program.u, program.x));
         let Foretold {
             changed,
             active,
             undecided,
-        } = predicted.ok()?;
+        } = method.predict(program).ok()?;
         let doubtful = changed + undecided;
         let clearer = mixed && CLEARER * doubtful <= doubtful_then;
         let near = clearer || method.complementarity() <= near_enough;
         // The same roles, wrong, are as a rule wrong again.
         untried |= changed > 0;
         let settled = CERTAIN * changed <= active && changed <= most_changed;
-        let likely = settled && !(mixed && undecided > MOST_UNDECIDED);
+        // Rounding is about to end the method: then better now than not at all.
+        let late = method.complementarity() < smallest;
+        let likely = settled && (!mixed || late || undecided <= MOST_UNDECIDED);
         if untried && near && likely && part > convert(FREE) {
             untried = false;
             near_enough = method.complementarity() * convert(NEARER);
             doubtful_then = doubtful;
             trials -= 1;
-            if method.try_foretold(program, sides, tolerances, &mut count) {
+            if InteriorPoint::try_foretold(program, sides, tolerances, &mut count) {
                 return Some(Ok(()));
             }
         }
-        part = method.correct(
-            &span,
-            sides,
-            program.factors,
-            program.v,
-            (program.u, program.x),
-        );
+        part = method.correct(program);
         if part < convert(FREE) && method.complementarity() < smallest {
             // Rounding decides now which of the last few sides hold; the dual method begins with what is foretold.
-            sides
-                .iter_mut()
-                .for_each(|side| side.known_role = side.last_role);
+            let unknowns = &program.unknowns;
+            unknowns.visit(sides, |side, known| side.known_role = known.role);
             return None;
         }
         if part < convert(STUCK) {
@@ -106,7 +99,7 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
             // Where no point satisfies all bounds, multipliers grow until they are a proof of it. To look whether
             // they are takes as long as a step.
             if (ended || stuck.is_power_of_two())
-                && let Some(infeasible) = prove(span.ocp, sides, proof)
+                && let Some(infeasible) = prove(&program.unknowns, program.span.ocp, sides, proof)
             {
                 return Some(Err(infeasible));
             }
@@ -121,10 +114,12 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
 /// The verdict that the problem is infeasible, if the multipliers are a `proof`: all that are no rounding, or, so that it
 /// names what contradicts each other, the few largest that are one, and the bounds of inputs that it rests on.
 fn prove<T: Scalar, const NX: usize, const NU: usize>(
+    unknowns: &AllUnknowns<'_, T>,
     ocp: &Ocp<T, NX, NU>,
-    sides: &[BoundSide<T>],
+    sides: &mut [BoundSide<T>],
     proof: &mut ActiveSet<T>,
 ) -> Option<Status<T>> {
+    unknowns.visit(sides, |side, known| side.estimate = known.at.multiplier);
     let all = T::default_epsilon().sqrt();
     let mut of_largest = |share| {
         list_multipliers(sides, share, proof);
@@ -142,7 +137,7 @@ fn prove<T: Scalar, const NX: usize, const NU: usize>(
 fn list_multipliers<T: Scalar>(sides: &[BoundSide<T>], share: T, list: &mut ActiveSet<T>) {
     list.clear();
     let multipliers = sides.iter().filter(|side| side.may_contradict());
-    let multipliers = multipliers.map(|side| (side.bound, side.interior.multiplier, side.size));
+    let multipliers = multipliers.map(|side| (side.bound, side.estimate, side.size));
     // In units of the cost, since multipliers are of as many units as what is bounded.
     let largest = multipliers
         .clone()

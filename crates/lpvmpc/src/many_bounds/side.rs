@@ -33,7 +33,7 @@ pub(crate) struct BoundSide<T> {
     pub size: T,
     pub soft: Option<Penalty<T>>,
     pub role: Role,
-    /// The role that the interior-point method foretells, or that of the guess before.
+    /// The role in the guess before.
     pub last_role: Role,
     /// The role that the dual method begins with where the phase finds nothing: that of the last solution, where that is
     /// begun with, or what was foretold when rounding ended the interior-point method.
@@ -48,55 +48,6 @@ pub(crate) struct BoundSide<T> {
     pub distance: T,
     /// Multiplier of the guess.
     pub estimate: T,
-    /// Of the interior-point method.
-    pub interior: Interior<T>,
-    /// What the step is to come to; after a prediction, the products of its changes.
-    pub target: Target<T>,
-}
-
-/// A side's unknowns in the interior-point method, all above zero, or a step of them.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Interior<T> {
-    /// d + s.
-    pub slack: T,
-    pub multiplier: T,
-    /// s, of a soft side.
-    pub excess: T,
-    /// Multiplier of s >= 0.
-    pub rest: T,
-}
-
-/// What a side is to come to in a Newton step: slack * multiplier, and excess * rest.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Target<T> {
-    pub slack: T,
-    pub excess: T,
-}
-
-impl<T: Scalar> Target<T> {
-    pub fn zero() -> Self {
-        Self {
-            slack: T::zero(),
-            excess: T::zero(),
-        }
-    }
-}
-
-impl<T: Scalar> Interior<T> {
-    /// What goes to zero.
-    pub fn product(&self) -> T {
-        self.slack * self.multiplier + self.excess * self.rest
-    }
-
-    fn zero() -> Self {
-        let zero = T::zero();
-        Self {
-            slack: zero,
-            multiplier: zero,
-            excess: zero,
-            rest: zero,
-        }
-    }
 }
 
 impl<T: Scalar> BoundSide<T> {
@@ -133,8 +84,6 @@ impl<T: Scalar> BoundSide<T> {
             weight: T::zero(),
             distance: T::zero(),
             estimate: T::zero(),
-            interior: Interior::zero(),
-            target: Target::zero(),
         }
     }
 

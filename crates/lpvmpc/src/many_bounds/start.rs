@@ -1,6 +1,7 @@
 //! Where the interior-point method begins.
 
-use super::side::{BoundSide, Interior};
+use super::interior_point::Interior;
+use super::side::BoundSide;
 use crate::model::Scalar;
 use nalgebra::convert;
 
@@ -19,20 +20,39 @@ const UNDECIDED_SOFT: f64 = 0.5;
 /// Its price is that of an excess of at least this part of the bound's size.
 const EXCESS: f64 = 0.1;
 
-/// Places the unknowns of every side, whose distance is known, with products of slack and multiplier of the size of
-/// `cost`, larger where bounds are violated by several times their size.
-pub(super) fn place<T: Scalar>(sides: &mut [BoundSide<T>], cost: T) {
-    let worst = sides.iter().fold(T::zero(), |worst, side| {
-        worst.max(-side.distance / side.size)
-    });
-    let times = worst * convert(PER_VIOLATION);
-    let times = times.max(T::one()).min(convert(LARGEST));
-    let cost = cost * times;
-    let least_of_hard = convert::<f64, T>(LEAST).max(worst * convert(LEAST_OF_WORST));
-    for side in sides.iter_mut() {
-        side.interior = match side.soft {
+/// What the unknowns begin with.
+pub(super) struct Start<T> {
+    /// The largest violation, in its bound's size.
+    worst: T,
+    /// How many times larger the products are for it.
+    times: T,
+    /// The products.
+    cost: T,
+}
+
+impl<T: Scalar> Start<T> {
+    /// For sides whose distance is known, with products of slack and multiplier of the size of `cost`, larger where bounds
+    /// are violated by several times their size.
+    pub fn new(sides: &[BoundSide<T>], cost: T) -> Self {
+        let worst = sides.iter().fold(T::zero(), |worst, side| {
+            worst.max(-side.distance / side.size)
+        });
+        let times = worst * convert(PER_VIOLATION);
+        let times = times.max(T::one()).min(convert(LARGEST));
+        Self {
+            worst,
+            times,
+            cost: cost * times,
+        }
+    }
+
+    /// The unknowns that a side begins with.
+    pub fn of(&self, side: &BoundSide<T>) -> Interior<T> {
+        let Self { worst, times, cost } = *self;
+        match side.soft {
             None => {
-                let slack = side.distance.max(side.size * least_of_hard);
+                let least = convert::<f64, T>(LEAST).max(worst * convert(LEAST_OF_WORST));
+                let slack = side.distance.max(side.size * least);
                 Interior {
                     slack,
                     multiplier: cost / slack,
@@ -47,7 +67,7 @@ pub(super) fn place<T: Scalar>(sides: &mut [BoundSide<T>], cost: T) {
                 let product = price * far * times * convert(UNDECIDED_SOFT);
                 centred(side.distance, price, product.max(cost))
             }
-        };
+        }
     }
 }
 
