@@ -201,6 +201,8 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
     // Of soft bounds the multipliers decide whether they hold or are exceeded. And rounding may have grown along the
     // horizon until what follows from a trajectory as it is goes in circles.
     let mut careful = side::any_soft(sides);
+    // Once, since what has to be held again would be let go again.
+    let mut released = false;
     let loose: T = convert(1e-6);
     let mut loose = tolerances.violation.max(loose);
     while count() {
@@ -240,8 +242,9 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
                 tolerances.violation,
                 tolerances.violation * residual.largest,
             );
-            if wrong == 0 && !near {
+            if wrong == 0 && !near && !released {
                 wrong = release_unmet(sides, tolerances.violation);
+                released = true;
             }
             if wrong == 0 {
                 // Those that the residual is judged with: a weight makes much of a distance that is hardly more than
