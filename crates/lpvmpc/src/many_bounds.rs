@@ -26,6 +26,7 @@ mod side;
 mod span;
 mod start;
 mod turns;
+mod weighted;
 
 pub use memory::ManyBoundsArrays;
 pub(crate) use turns::cap_with_later_turn;

@@ -1,6 +1,7 @@
 //! Guesses of the active bounds: those of the last answer, and inputs that the regulator saturates.
 
-use super::side::{self, BoundSide, Role};
+use super::side::{BoundSide, Role};
+use super::weighted::{split_first_mut, split_off_mut};
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
@@ -22,7 +23,7 @@ pub(super) fn saturated<T: Scalar, const NX: usize, const NU: usize>(
     let stages = ocp.stages.iter().zip(factors).enumerate();
     for (i, (stage, factor)) in stages.take(ocp.length()).skip(begin) {
         let mut u = factor.policy(&x, &at_rest);
-        for side in side::split_first_mut(&mut sides, i) {
+        for side in split_first_mut(&mut sides, i) {
             if let Some(j) = side.input() {
                 side.role = Role::Free;
                 if side.distance_of(u[j]) < T::zero() {
@@ -53,7 +54,7 @@ pub(super) fn tail<T: Scalar, const NX: usize, const NU: usize>(
         .filter(|_| shift > 0)
         .and_then(|before| last.get(before))
     {
-        let end = side::split_off_mut(&mut sides, begin);
+        let end = split_off_mut(&mut sides, begin);
         saturated(ocp, factors, end, (begin, *x));
     }
 }

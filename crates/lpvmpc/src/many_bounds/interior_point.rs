@@ -5,12 +5,12 @@
 //! Newton step towards slack * multiplier = target is a linear-quadratic program in which each side acts
 //! with a multiplier that is linear in its distance.
 
-mod at_stages;
+mod all_unknowns;
 mod step;
 mod unknowns;
 mod way;
 
-pub(super) use at_stages::AllUnknowns;
+pub(super) use all_unknowns::AllUnknowns;
 pub(crate) use unknowns::BoundUnknowns;
 pub(super) use unknowns::Interior;
 pub(super) use way::Foretold;
@@ -85,7 +85,8 @@ impl<T: Scalar> InteriorPoint<T> {
         &mut self,
         program: &mut Program<'_, T, NX, NU>,
     ) -> Result<Foretold, BadPivot<T>> {
-        step::factorize(program)?;
+        let bounds = program.unknowns.bounds();
+        newton::factorize(&program.span, bounds, program.factors)?;
         newton::roll_out(&program.span, program.factors, (program.u, program.x));
         let (prediction, foretold) = step::foretell(program);
         self.prediction = Some(prediction);

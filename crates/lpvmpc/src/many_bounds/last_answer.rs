@@ -257,7 +257,7 @@ mod tests {
             let [free, mut one, mut other] = [place(), place(), place()];
             let (mut factors, mut v) = (free.0, free.1);
             let mut unknowns = vec![BoundUnknowns::empty(); 8 * (N + 1)];
-            newton::factorize(&span, &[], &mut factors).unwrap();
+            newton::factorize(&span, &sides[..0], &mut factors).unwrap();
             let mut program = Program {
                 span,
                 v: &mut v,

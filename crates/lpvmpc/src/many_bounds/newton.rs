@@ -1,8 +1,9 @@
 //! The linear-quadratic program that the sides of the bounds make of the problem: its factors and its
 //! trajectory.
 
-use super::side::{BoundSide, Role, by_bound, split_first_mut, split_off, split_states};
+use super::side::BoundSide;
 use super::span::Span;
+use super::weighted::{Weighted, split_first_mut, split_off};
 use crate::model::Scalar;
 use crate::ocp::{Ocp, Stage};
 use crate::riccati::{Adjustment, BadPivot, CostToGo, StageFactor, StageMinimum};
@@ -13,10 +14,10 @@ use crate::small_matrix::{
 use crate::solution::Quantity;
 use nalgebra::SVector;
 
-/// The factors of the problem with the cost of every side's multiplier; inputs that are held are constants.
-pub(super) fn factorize<T: Scalar, const NX: usize, const NU: usize>(
+/// The factors of the problem with the costs of its bounds; inputs that are held are constants.
+pub(super) fn factorize<T: Scalar, W: Weighted<T>, const NX: usize, const NU: usize>(
     span: &Span<'_, T, NX, NU>,
-    sides: &[BoundSide<T>],
+    bounds: &[W],
     factors: &mut [StageFactor<T, NX, NU>],
 ) -> Result<(), BadPivot<T>> {
     let ocp = span.ocp;
@@ -24,159 +25,119 @@ pub(super) fn factorize<T: Scalar, const NX: usize, const NU: usize>(
         quadratic: ocp.terminal.p,
         linear: ocp.terminal.linear_x,
     };
-    let mut before = sides;
-    let (of_states, of_rows) = split_states(split_off(&mut before, ocp.length()));
-    add_states(of_states, &mut cost_to_go);
-    add_rows(ocp, of_rows, &mut cost_to_go);
+    let mut before = bounds;
+    add_to_cost_to_go(ocp, split_off(&mut before, ocp.length()), &mut cost_to_go);
     let stages = span.stages().zip(span.of_mut(factors));
     for ((i, stage), factor) in stages.rev() {
-        let (of_states, others) = split_states(split_off(&mut before, i));
-        eliminate(ocp, i, stage, others, factor, &mut cost_to_go)?;
-        add_states(of_states, &mut cost_to_go);
-        add_rows(ocp, others, &mut cost_to_go);
+        let here = split_off(&mut before, i);
+        eliminate(ocp, i, stage, here, factor, &mut cost_to_go)?;
+        add_to_cost_to_go(ocp, here, &mut cost_to_go);
     }
     Ok(())
 }
 
 #[inline(never)]
-fn eliminate<T: Scalar, const NX: usize, const NU: usize>(
+fn eliminate<T: Scalar, W: Weighted<T>, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
     i: usize,
     stage: &Stage<T, NX, NU>,
-    sides: &[BoundSide<T>],
+    bounds: &[W],
     factor: &mut StageFactor<T, NX, NU>,
     cost_to_go: &mut CostToGo<T, NX>,
 ) -> Result<(), BadPivot<T>> {
-    if let Some(input) = constant_input(sides) {
+    if let Some(input) = constant_input(bounds) {
         factor.pass(stage, ocp.common_at(i), cost_to_go, &input);
         return Ok(());
     }
-    let costs = Costs { ocp, sides };
+    let costs = Costs { ocp, bounds };
     factor.eliminate_adjusted(stage, ocp.common_at(i), cost_to_go, Some(&costs))?;
-    for side in sides {
-        if let (Some(j), Role::Held) = (side.input(), side.role) {
-            factor.inverse_factor[(j, j)] = T::zero();
-        }
+    for (j, _) in held_inputs(bounds) {
+        factor.inverse_factor[(j, j)] = T::zero();
     }
     Ok(())
 }
 
+/// The inputs that are held, and where.
+#[inline(always)]
+fn held_inputs<T, W: Weighted<T>>(bounds: &[W]) -> impl Iterator<Item = (usize, T)> {
+    bounds.iter().filter_map(|bound| match bound.quantity() {
+        Quantity::Input(j) => Some((j, bound.held_input()?)),
+        _ => None,
+    })
+}
+
 /// The input of a stage, if all of it is held and there are no rows.
-fn constant_input<T: Scalar, const NU: usize>(sides: &[BoundSide<T>]) -> Option<SVector<T, NU>> {
-    let mut held = 0;
-    let mut input = SVector::zeros();
-    for bound in by_bound(sides) {
-        match bound.first()?.bound.quantity {
-            Quantity::Input(j) => {
-                input[j] = bound.iter().find(|side| side.role == Role::Held)?.limit;
-                held += 1;
-            }
-            Quantity::Row(_) => return None,
-            Quantity::State(_) => {}
-        }
+fn constant_input<T: Scalar, W: Weighted<T>, const NU: usize>(
+    bounds: &[W],
+) -> Option<SVector<T, NU>> {
+    if matches!(bounds.last()?.quantity(), Quantity::Row(_)) {
+        return None;
     }
-    (held == NU).then_some(input)
+    let mut input = SVector::zeros();
+    let mut held = [false; NU];
+    for (j, value) in held_inputs(bounds) {
+        (input[j], held[j]) = (value, true);
+    }
+    held.iter().all(|held| *held).then_some(input)
 }
 
-/// The costs of a stage's sides.
-struct Costs<'a, T: 'static, const NX: usize, const NU: usize> {
+/// The costs of a stage's bounds that have to do with the input.
+struct Costs<'a, T: 'static, W, const NX: usize, const NU: usize> {
     ocp: &'a Ocp<T, NX, NU>,
-    sides: &'a [BoundSide<T>],
+    bounds: &'a [W],
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize> Adjustment<T, NX, NU> for Costs<'_, T, NX, NU> {
+impl<T: Scalar, W: Weighted<T>, const NX: usize, const NU: usize> Adjustment<T, NX, NU>
+    for Costs<'_, T, W, NX, NU>
+{
     #[inline(always)]
     fn adjust(&self, minimum: &mut StageMinimum<T, NX, NU>) {
-        for bound in by_bound(self.sides) {
-            add_to_minimum(self.ocp, bound, minimum);
+        for bound in self.bounds {
+            let (weight, pull) = bound.weight_and_pull();
+            match bound.quantity() {
+                Quantity::Input(j) => {
+                    minimum.hessian[(j, j)] += weight;
+                    minimum.g[j] -= pull;
+                }
+                Quantity::Row(j) if weight != T::zero() || pull != T::zero() => {
+                    if let Some(row) = self.ocp.row(bound.stage(), j) {
+                        add_outer_product(&mut minimum.hessian, &row.u, weight, &row.u);
+                        add_outer_product(&mut minimum.g_x, &row.x, weight, &row.u);
+                        add_scaled(&mut minimum.g, &row.u, -pull);
+                    }
+                }
+                _ => {}
+            }
         }
         // At last, for rows may have a part in the inputs that are held.
-        for side in self.sides.iter().filter(|side| side.role == Role::Held) {
-            if let Some(j) = side.input() {
-                minimum.hold(j, side.limit);
-            }
+        for (j, value) in held_inputs(self.bounds) {
+            minimum.hold(j, value);
         }
     }
 }
 
-/// The part of the cost of a bound's sides that has to do with the input.
-#[inline(always)]
-fn add_to_minimum<T: Scalar, const NX: usize, const NU: usize>(
+/// The parts of their costs that have to do with the state alone.
+fn add_to_cost_to_go<T: Scalar, W: Weighted<T>, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
-    sides: &[BoundSide<T>],
-    minimum: &mut StageMinimum<T, NX, NU>,
-) {
-    let Some(side) = sides.first() else {
-        return;
-    };
-    match side.bound.quantity {
-        Quantity::Input(j) => {
-            let (weight, pull) = sum_of_weights_and_pulls(sides);
-            minimum.hessian[(j, j)] += weight;
-            minimum.g[j] -= pull;
-        }
-        Quantity::Row(j) => {
-            let (weight, pull) = sum_of_weights_and_pulls(sides);
-            if let Some(row) = ocp.row(side.bound.stage, j) {
-                add_outer_product(&mut minimum.hessian, &row.u, weight, &row.u);
-                add_outer_product(&mut minimum.g_x, &row.x, weight, &row.u);
-                add_scaled(&mut minimum.g, &row.u, -pull);
-            }
-        }
-        Quantity::State(_) => {}
-    }
-}
-
-/// The costs of a stage's sides of states.
-fn add_states<T: Scalar, const NX: usize>(sides: &[BoundSide<T>], cost: &mut CostToGo<T, NX>) {
-    for side in sides {
-        if let Quantity::State(j) = side.bound.quantity {
-            let (weight, pull) = weight_and_pull(side);
-            cost.quadratic[(j, j)] += weight;
-            cost.linear[j] -= pull;
-        }
-    }
-}
-
-/// The parts of the costs of a stage's rows that have to do with the state alone.
-fn add_rows<T: Scalar, const NX: usize, const NU: usize>(
-    ocp: &Ocp<T, NX, NU>,
-    sides: &[BoundSide<T>],
+    bounds: &[W],
     cost: &mut CostToGo<T, NX>,
 ) {
-    if ocp.rows_per_stage == 0 {
-        return;
-    }
-    for bound in by_bound(sides) {
-        let row = bound.first().map(|side| side.bound);
-        let row = row.and_then(|bound| match bound.quantity {
-            Quantity::Row(j) => ocp.row(bound.stage, j),
-            _ => None,
-        });
-        if let Some(row) = row {
-            let (weight, pull) = sum_of_weights_and_pulls(bound);
-            add_outer_product(&mut cost.quadratic, &row.x, weight, &row.x);
-            add_scaled(&mut cost.linear, &row.x, -pull);
+    for bound in bounds {
+        let (weight, pull) = bound.weight_and_pull();
+        match bound.quantity() {
+            Quantity::State(j) => {
+                cost.quadratic[(j, j)] += weight;
+                cost.linear[j] -= pull;
+            }
+            Quantity::Row(j) if weight != T::zero() || pull != T::zero() => {
+                if let Some(row) = ocp.row(bound.stage(), j) {
+                    add_outer_product(&mut cost.quadratic, &row.x, weight, &row.x);
+                    add_scaled(&mut cost.linear, &row.x, -pull);
+                }
+            }
+            _ => {}
         }
     }
-}
-
-/// The cost of a side is weight * value^2 / 2 - pull * value.
-#[inline(always)]
-fn weight_and_pull<T: Scalar>(side: &BoundSide<T>) -> (T, T) {
-    (
-        side.weight,
-        side.sign * side.base + side.weight * side.limit,
-    )
-}
-
-/// The same of all sides of a bound.
-#[inline(always)]
-fn sum_of_weights_and_pulls<T: Scalar>(sides: &[BoundSide<T>]) -> (T, T) {
-    let each = sides.iter().map(weight_and_pull);
-    each.fold((T::zero(), T::zero()), |sum, (weight, pull)| {
-        (sum.0 + weight, sum.1 + pull)
-    })
 }
 
 /// The trajectory of the factors' policies, and the distance of every side on it.
@@ -202,55 +163,60 @@ pub(super) fn measure<T: Scalar, const NX: usize, const NU: usize>(
     sides: &mut [BoundSide<T>],
     trajectory: &Trajectory<'_, T, NX, NU>,
 ) {
-    measure_each(span, sides, trajectory, |_| {});
+    for_each_value(span, sides, trajectory, |side, value| {
+        side.distance = side.distance_of(value);
+    });
 }
 
-/// The same, and what follows from it for `each` side.
+/// Calls `each` with every bound and the value of its quantity on a trajectory.
 #[inline(always)]
-pub(super) fn measure_each<T: Scalar, const NX: usize, const NU: usize>(
+pub(super) fn for_each_value<T: Scalar, W: Weighted<T>, const NX: usize, const NU: usize>(
     span: &Span<'_, T, NX, NU>,
-    sides: &mut [BoundSide<T>],
+    bounds: &mut [W],
     trajectory: &Trajectory<'_, T, NX, NU>,
-    mut each: impl FnMut(&mut BoundSide<T>),
+    mut each: impl FnMut(&mut W, T),
 ) {
     let ocp = span.ocp;
     let n = ocp.length();
     let input = |stage| trajectory.u.get(stage).filter(|_| stage < n);
     let (mut at, mut x, mut u) = (span.begin, &span.start, input(span.begin));
-    let mut value = T::zero();
-    for side in sides {
-        let stage = side.bound.stage;
+    for bound in bounds {
+        let stage = bound.stage();
         if stage != at {
             (at, x, u) = (stage, span.state(trajectory, stage), input(stage));
         }
-        if !side.is_second {
-            value = side.value(ocp, x, u);
-        }
-        side.distance = side.distance_of(value);
-        each(side);
+        let value = match bound.quantity() {
+            Quantity::State(j) => x[j],
+            Quantity::Input(j) => u.map_or(T::zero(), |u| u[j]),
+            Quantity::Row(j) => {
+                let row = ocp.row(stage, j);
+                row.map_or(T::zero(), |row| row.value(x, u))
+            }
+        };
+        each(bound, value);
     }
 }
 
-/// The derivative of the sides' part of the Lagrangian at a stage, in state and input, with these
-/// multipliers.
-pub(super) fn gradient<T: Scalar, const NX: usize, const NU: usize>(
+/// The derivative of a stage's part of the Lagrangian, in state and input, of bounds with these derivatives in their
+/// quantities.
+#[inline(always)]
+pub(super) fn gradient<T: Scalar, W: Weighted<T>, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
-    sides: &mut [BoundSide<T>],
-    mut multiplier: impl FnMut(&mut BoundSide<T>) -> T,
+    bounds: &mut [W],
+    mut slope: impl FnMut(&mut W) -> T,
 ) -> (SVector<T, NX>, SVector<T, NU>) {
     let mut sum = (SVector::zeros(), SVector::zeros());
-    for side in sides {
-        let multiplier = multiplier(side);
+    for bound in bounds {
+        let slope = slope(bound);
         // As a rule most sides are free.
-        if multiplier == T::zero() {
+        if slope == T::zero() {
             continue;
         }
-        let slope = -side.sign * multiplier;
-        match side.bound.quantity {
+        match bound.quantity() {
             Quantity::State(j) => sum.0[j] += slope,
             Quantity::Input(j) => sum.1[j] += slope,
             Quantity::Row(j) => {
-                if let Some(row) = ocp.row(side.bound.stage, j) {
+                if let Some(row) = ocp.row(bound.stage(), j) {
                     add_scaled(&mut sum.0, &row.x, slope);
                     add_scaled(&mut sum.1, &row.u, slope);
                 }
@@ -315,6 +281,7 @@ fn take_up<T: Scalar, const NX: usize, const NU: usize>(
 mod tests {
     use super::*;
     use crate::list::List;
+    use crate::many_bounds::side::Role;
     use crate::many_bounds::{residual, side};
     use crate::ocp::{GeneralRow, Penalty};
     use crate::solution::Side;
@@ -356,7 +323,7 @@ mod tests {
         assert_eq!(eliminated, Ok(()));
         let costs = Costs {
             ocp: &ocp,
-            sides: &sides,
+            bounds: &sides,
         };
         let eliminated = expected.eliminate_adjusted(stage, weights, &mut held, Some(&costs));
         assert_eq!(eliminated, Ok(()));

@@ -1,8 +1,9 @@
 //! What a trajectory is missing for a minimum of the program that the sides of the bounds make of the problem.
 
 use super::newton::{gradient, step_back};
-use super::side::{BoundSide, Role, are_inputs, split_off_mut};
+use super::side::{BoundSide, Role, are_inputs};
 use super::span::Span;
+use super::weighted::split_off_mut;
 use crate::model::Scalar;
 use crate::ocp::Common;
 use crate::riccati::StageFactor;
@@ -51,7 +52,7 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
     };
     let rounding = T::default_epsilon().powf(convert(ROUNDING));
     let of_rows = |side: &mut BoundSide<T>| match side.input() {
-        None if side.role != Role::Free => side.multiplier_at(side.distance),
+        None if side.role != Role::Free => -side.sign * side.multiplier_at(side.distance),
         _ => T::zero(),
     };
     let mut before = sides;

@@ -212,17 +212,6 @@ pub(super) fn collect<T: Scalar, const NX: usize, const NU: usize>(
     Some(count)
 }
 
-/// The sides of a stage: first those of its states, then those of its inputs and rows.
-pub(super) fn split_states<T>(sides: &[BoundSide<T>]) -> (&[BoundSide<T>], &[BoundSide<T>]) {
-    let is_state = |side: &BoundSide<T>| matches!(side.bound.quantity, Quantity::State(_));
-    sides.split_at(sides.iter().take_while(|side| is_state(side)).count())
-}
-
-/// The sides, one or both of each bound together.
-pub(super) fn by_bound<T>(sides: &[BoundSide<T>]) -> impl Iterator<Item = &[BoundSide<T>]> {
-    sides.chunk_by(|_, next| next.is_second)
-}
-
 /// Whether one of them may be exceeded.
 pub(super) fn any_soft<T>(sides: &[BoundSide<T>]) -> bool {
     sides.iter().any(|side| side.soft.is_some())
@@ -238,36 +227,4 @@ pub(super) fn are_mixed<T>(sides: &[BoundSide<T>]) -> bool {
     let of_input = |side: &BoundSide<T>| matches!(side.bound.quantity, Quantity::Input(_));
     let of_state = |side: &BoundSide<T>| matches!(side.bound.quantity, Quantity::State(_));
     sides.iter().any(of_input) && sides.iter().any(of_state) && !any_soft(sides)
-}
-
-/// Takes the sides of the last stages, from `stage` on, off the list.
-pub(super) fn split_off<'a, T>(sides: &mut &'a [BoundSide<T>], stage: usize) -> &'a [BoundSide<T>] {
-    let before = sides.iter().rposition(|side| side.bound.stage < stage);
-    let (rest, here) = sides.split_at(before.map_or(0, |last| last + 1));
-    *sides = rest;
-    here
-}
-
-/// [`split_off`] for sides that are to change.
-pub(super) fn split_off_mut<'a, T>(
-    sides: &mut &'a mut [BoundSide<T>],
-    stage: usize,
-) -> &'a mut [BoundSide<T>] {
-    let before = sides.iter().rposition(|side| side.bound.stage < stage);
-    let whole = core::mem::take(sides);
-    let (rest, here) = whole.split_at_mut(before.map_or(0, |last| last + 1));
-    *sides = rest;
-    here
-}
-
-/// Takes the sides of the first stages, up to `stage`, off the list.
-pub(super) fn split_first_mut<'a, T>(
-    sides: &mut &'a mut [BoundSide<T>],
-    stage: usize,
-) -> &'a mut [BoundSide<T>] {
-    let whole = core::mem::take(sides);
-    let behind = whole.iter().position(|side| side.bound.stage > stage);
-    let (here, rest) = whole.split_at_mut(behind.unwrap_or(whole.len()));
-    *sides = rest;
-    here
 }

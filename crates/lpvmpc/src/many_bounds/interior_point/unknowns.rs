@@ -3,6 +3,7 @@
 
 use super::way::{Foretold, Left, Part, Sums};
 use crate::many_bounds::side::{BoundSide, Role};
+use crate::many_bounds::weighted::Weighted;
 use crate::model::Scalar;
 use crate::solution::{Quantity, Side};
 use nalgebra::convert;
@@ -46,7 +47,7 @@ impl<T: Scalar> Target<T> {
     }
 }
 
-/// What it costs to exceed a side: `linear` s + `quadratic` s^2 / 2. The first of a hard side is infinite.
+/// What it costs to exceed a side: `linear` s + `quadratic` s^2 / 2. The first of a side that is hard, or not there, is infinite.
 #[derive(Clone, Copy)]
 struct Price<T> {
     linear: T,
@@ -75,7 +76,7 @@ fn multiplier<T: Scalar, const SOFT: bool>(
     if !SOFT {
         return (base, weight);
     }
-    // Worked out for hard sides, too: a choice between two numbers is no branch.
+    // Worked out for a side that is not there, too: a choice between two numbers is no branch.
     let (base_of_rest, weight_of_rest) = of(inverse.excess, at.rest, target.excess);
     let rest = price.quadratic + weight_of_rest;
     let share = weight / (weight + rest);
@@ -125,8 +126,8 @@ fn step_to<T: Scalar, const SOFT: bool>(
 /// it is zero, and a step changes nothing.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoundUnknowns<T> {
-    pub stage: usize,
-    pub quantity: Quantity,
+    stage: usize,
+    quantity: Quantity,
     soft: bool,
     /// The roles that the last prediction foretells.
     role: [Role; 2],
@@ -154,6 +155,33 @@ pub(crate) struct BoundUnknowns<T> {
     inverse_rest: [T; 2],
     /// The same as `target`, of excess * rest.
     target_of_excess: [T; 2],
+}
+
+impl<T: Scalar> Weighted<T> for BoundUnknowns<T> {
+    #[inline(always)]
+    fn stage(&self) -> usize {
+        self.stage
+    }
+
+    #[inline(always)]
+    fn quantity(&self) -> Quantity {
+        self.quantity
+    }
+
+    #[inline(always)]
+    fn weight_and_pull(&self) -> (T, T) {
+        let ([lower, upper], [base, base_of_upper], [limit, limit_of_upper]) =
+            (self.weight, self.base, self.limit);
+        (
+            lower + upper,
+            (base + lower * limit) - (base_of_upper - upper * limit_of_upper),
+        )
+    }
+
+    #[inline(always)]
+    fn held_input(&self) -> Option<T> {
+        None
+    }
 }
 
 /// Calls the method for hard or for soft bounds.
@@ -244,17 +272,6 @@ impl<T: Scalar> BoundUnknowns<T> {
     /// Gives the sides the cost that they have in a Newton step towards complementarity zero.
     pub(super) fn weigh(&mut self) {
         by_kind!(self, weigh_as());
-    }
-
-    /// That cost, of the quantity z: weight z^2 / 2 - pull z.
-    #[inline(always)]
-    pub(super) fn weight_and_pull(&self) -> (T, T) {
-        let ([lower, upper], [base, base_of_upper], [limit, limit_of_upper]) =
-            (self.weight, self.base, self.limit);
-        (
-            lower + upper,
-            (base + lower * limit) - (base_of_upper - upper * limit_of_upper),
-        )
     }
 
     /// What becomes of the sides in a step towards complementarity zero that takes the quantity to `value`.

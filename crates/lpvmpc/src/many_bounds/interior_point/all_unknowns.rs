@@ -1,4 +1,4 @@
-//! The unknowns of all bounds, stage by stage.
+//! The unknowns of all bounds, in the order of their stages.
 
 use super::unknowns::{BoundUnknowns, Interior, Known};
 use crate::many_bounds::side::BoundSide;
@@ -69,11 +69,4 @@ impl<'a, T: Scalar> AllUnknowns<'a, T> {
     pub(super) fn bounds_mut(&mut self) -> &mut [BoundUnknowns<T>] {
         self.places.get_mut(..self.taken).unwrap_or_default()
     }
-}
-
-/// How many of the bounds belong to stages before this one, the last of all.
-#[inline(always)]
-pub(super) fn count_before<T>(bounds: &[BoundUnknowns<T>], stage: usize) -> usize {
-    let last = bounds.iter().rposition(|bound| bound.stage < stage);
-    last.map_or(0, |last| last + 1)
 }
