@@ -194,6 +194,19 @@ macro_rules! by_kind {
     };
 }
 
+/// Slack, multiplier, excess and rest of a side, out of those of both; of a hard one the last two are zero.
+#[inline(always)]
+fn of_side<T: Scalar, const SOFT: bool>(each: [&[T; 2]; 4], k: usize) -> Interior<T> {
+    let [slack, multiplier, excess, rest] = each.map(|both| both[k]);
+    let zero = T::zero();
+    Interior {
+        slack,
+        multiplier,
+        excess: if SOFT { excess } else { zero },
+        rest: if SOFT { rest } else { zero },
+    }
+}
+
 /// Where a bound has the unknowns of a side.
 fn place_of(side: Side) -> usize {
     match side {
@@ -312,25 +325,16 @@ impl<T: Scalar> BoundUnknowns<T> {
 
     #[inline(always)]
     fn at<const SOFT: bool>(&self, k: usize) -> Interior<T> {
-        let of_soft = |value: &[T; 2]| if SOFT { value[k] } else { T::zero() };
-        Interior {
-            slack: self.slack[k],
-            multiplier: self.multiplier[k],
-            excess: of_soft(&self.excess),
-            rest: of_soft(&self.rest),
-        }
+        let each = [&self.slack, &self.multiplier, &self.excess, &self.rest];
+        of_side::<T, SOFT>(each, k)
     }
 
     /// One divided by each of them.
     #[inline(always)]
     fn inverse<const SOFT: bool>(&self, k: usize) -> Interior<T> {
-        let of_soft = |value: &[T; 2]| if SOFT { value[k] } else { T::zero() };
-        Interior {
-            slack: self.inverse_slack[k],
-            multiplier: self.inverse_multiplier[k],
-            excess: of_soft(&self.inverse_excess),
-            rest: of_soft(&self.inverse_rest),
-        }
+        let (slack, multiplier) = (&self.inverse_slack, &self.inverse_multiplier);
+        let each = [slack, multiplier, &self.inverse_excess, &self.inverse_rest];
+        of_side::<T, SOFT>(each, k)
     }
 
     #[inline(always)]
