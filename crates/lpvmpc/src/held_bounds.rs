@@ -19,6 +19,7 @@ use crate::rows::{self, Trajectory};
 use crate::small_matrix::transposed_product;
 use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Solution, Status};
 use crate::solver::{Solver, Start};
+use crate::transposed::StageBothWays;
 
 /// Searches with held inputs; two are enough in `f64`, more than ten are rare in `f32`.
 const MOST_SEARCHES: usize = 20;
@@ -216,7 +217,12 @@ pub(crate) fn eliminate_held<T: Scalar, const NX: usize, const NU: usize>(
         return factor.hold_state(data, j, value, cost_to_go);
     }
     let constants = Constants { held, common };
-    factor.eliminate_adjusted(data, common, cost_to_go, Some(&constants))?;
+    factor.eliminate_adjusted(
+        StageBothWays::new(data),
+        common,
+        cost_to_go,
+        Some(&constants),
+    )?;
     for (j, side) in held.iter().enumerate() {
         if *side != HeldBound::NOTHING {
             factor.inverse_factor[(j, j)] = T::zero();

@@ -111,6 +111,7 @@ mod solver_settings;
 mod steady_state;
 mod step_with;
 mod tracking;
+mod transposed;
 mod two_parts;
 mod working_set;
 mod workspace;

@@ -11,6 +11,7 @@
 //! contradict each other.
 
 mod answer;
+mod complete;
 mod exchange;
 mod expected;
 mod guess;
@@ -37,6 +38,7 @@ use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
 use crate::solution::{Solution, Status};
 use crate::solver::{Solver, trajectory};
+use crate::transposed::Transposed;
 use crate::working_set::{copy, first_mut};
 use answer::{list, report};
 use core::cell::Cell;
@@ -75,6 +77,8 @@ pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
     places: [ManyBoundsPlace<T, NX, NU>; 2],
     sides: List<BoundSide<T>>,
     unknowns: List<BoundUnknowns<T>>,
+    /// The matrices of the stages, where products are in vectors.
+    transposed: List<Transposed<T, NX, NU>>,
     retries: AllRetries,
     /// Whether its turn in this solve was put off.
     put_off: bool,
@@ -120,11 +124,13 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         places: [ManyBoundsPlace<T, NX, NU>; 2],
         sides: List<BoundSide<T>>,
         unknowns: List<BoundUnknowns<T>>,
+        transposed: List<Transposed<T, NX, NU>>,
     ) -> Self {
         Self {
             places,
             sides,
             unknowns,
+            transposed,
             retries: AllRetries::default(),
             put_off: false,
             in_turns: Solver::solve_in_turns,
@@ -184,7 +190,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             return AtOnce::Untried;
         };
         let sides = first_mut(&mut self.sides, count);
-        let whole = Span::whole(ocp);
+        for (transposed, stage) in self.transposed.iter_mut().zip(ocp.stages.iter()).take(n) {
+            *transposed = Transposed::of(stage);
+        }
+        let whole = Span::whole(ocp, &self.transposed);
         newton::measure(&whole, sides, &trajectory(solution));
         let tolerances = Tolerances::new(ocp, &trajectory(solution), solver.dual.tolerance);
         let least = match side::any_soft(sides) {
@@ -215,7 +224,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         let [place, spare] = &mut self.places;
         let mut program = Program {
             span: whole,
-            v: &mut solver.dual.v,
+            dual: &mut solver.dual,
             factors: &mut place.factors,
             u: &mut place.u,
             x: &mut place.x,
@@ -264,6 +273,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             Some(Ok(())) => report(&program, sides, solution).then_some(Ok(())),
             other => other,
         };
+        // What completed guesses.
+        let changes = left - solver.dual.changes_left();
+        spent.set(spent.get() + changes);
         self.put_off = outcome.is_none() && expected.many && expected.changes_first.is_some();
         let learns = match turn {
             Turn::First(_) => !(expected.saturated || self.put_off),

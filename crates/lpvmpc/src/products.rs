@@ -8,7 +8,28 @@ use crate::model::Scalar;
 use crate::small_matrix;
 use nalgebra::SMatrix;
 #[cfg(feature = "simd")]
-pub(crate) use vectors::{Vectors, in_widest};
+pub(crate) use vectors::{Vectors, dispatch};
+
+/// From so many states on, the machine's widest vectors pay.
+const WIDE: usize = 6;
+
+/// Whether products with columns of so many `states` are worked out in the machine's widest vectors.
+#[inline(always)]
+pub(crate) const fn are_in_vectors(states: usize) -> bool {
+    cfg!(feature = "simd") && states >= WIDE
+}
+
+/// Does the `work` of a pass along the horizon, compiled for vectors of 256 bits where they `pay` and the machine has them. It has
+/// to be `#[inline(always)]`, as all that it calls and that is to be compiled for them.
+#[inline(always)]
+pub(crate) fn in_vectors<O>(pay: bool, work: impl FnOnce() -> O) -> O {
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    if pay && let Some(simd) = pulp::x86::V3::try_new() {
+        return pulp::Simd::vectorize(simd, work);
+    }
+    let _ = pay;
+    work()
+}
 
 /// The products of a backward step.
 pub(crate) trait Products: Copy {

@@ -6,16 +6,22 @@
 //! v = L'(u - K x - k), the whole cost becomes `constant + sum |v_i|^2 / 2`: the horizon's
 //! Hessian is the identity, and a bound is a plain linear row in v.
 
+#[cfg(feature = "simd")]
+mod widest;
+
 use crate::model::Scalar;
 use crate::ocp::{Common, Stage};
 #[cfg(feature = "simd")]
-use crate::products::{self, Vectors};
+use crate::products;
 use crate::products::{Compiled, Products};
 use crate::small_matrix::{
     add_product, add_symmetric_product, mirror, product, transposed, transposed_product,
     transposed_times,
 };
+use crate::transposed::StageBothWays;
 use nalgebra::{SMatrix, SVector};
+#[cfg(feature = "simd")]
+use widest::{Elimination, Passage};
 
 /// Cost-to-go x'Px/2 + p'x.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,63 +82,6 @@ pub(crate) trait Adjustment<T, const NX: usize, const NU: usize> {
     fn adjust(&self, minimum: &mut StageMinimum<T, NX, NU>);
 }
 
-/// From so many states on, the machine's widest vectors pay.
-const WIDE: usize = 6;
-
-/// A backward step, as a piece of work that is compiled for several kinds of vectors.
-#[cfg(feature = "simd")]
-struct Elimination<'a, T, const NX: usize, const NU: usize> {
-    factor: &'a mut StageFactor<T, NX, NU>,
-    stage: &'a Stage<T, NX, NU>,
-    weights: &'a Common<T, NX, NU>,
-    cost_to_go: &'a mut CostToGo<T, NX>,
-    adjustment: Option<&'a dyn Adjustment<T, NX, NU>>,
-}
-
-#[cfg(feature = "simd")]
-impl<T: Scalar, const NX: usize, const NU: usize> pulp::WithSimd for Elimination<'_, T, NX, NU> {
-    type Output = Result<(), BadPivot<T>>;
-
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, simd: S) -> Self::Output {
-        let Self {
-            factor,
-            stage,
-            weights,
-            cost_to_go,
-            adjustment,
-        } = self;
-        factor.eliminate_here(stage, weights, cost_to_go, adjustment, Vectors(simd))
-    }
-}
-
-/// A backward step with a constant input, as a piece of work that is compiled for several kinds of vectors.
-#[cfg(feature = "simd")]
-struct Passage<'a, T, const NX: usize, const NU: usize> {
-    factor: &'a mut StageFactor<T, NX, NU>,
-    stage: &'a Stage<T, NX, NU>,
-    weights: &'a Common<T, NX, NU>,
-    cost_to_go: &'a mut CostToGo<T, NX>,
-    input: &'a SVector<T, NU>,
-}
-
-#[cfg(feature = "simd")]
-impl<T: Scalar, const NX: usize, const NU: usize> pulp::WithSimd for Passage<'_, T, NX, NU> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, simd: S) {
-        let Self {
-            factor,
-            stage,
-            weights,
-            cost_to_go,
-            input,
-        } = self;
-        factor.pass_here(stage, weights, cost_to_go, input, Vectors(simd));
-    }
-}
-
 /// R + B'PB is not positive definite: the pivot that is not positive (or not finite).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BadPivot<T>(pub T);
@@ -159,11 +108,22 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         weights: &Common<T, NX, NU>,
         cost_to_go: &mut CostToGo<T, NX>,
     ) -> Result<(), BadPivot<T>> {
+        let stage = StageBothWays::new(stage);
+        #[cfg(feature = "simd")]
+        if products::are_in_vectors(NX) {
+            return products::dispatch::<NX, _>(Elimination::<_, NX, NU, false> {
+                factor: self,
+                stage,
+                weights,
+                cost_to_go,
+                adjustment: None,
+            });
+        }
         // Where flash is scarce there is one piece of machine code for both.
-        if cfg!(feature = "simd") && NX >= WIDE || !cfg!(feature = "alloc") {
-            self.eliminate_adjusted(stage, weights, cost_to_go, None)
-        } else {
+        if cfg!(feature = "alloc") {
             self.eliminate_here(stage, weights, cost_to_go, None, Compiled)
+        } else {
+            self.eliminate_adjusted(stage, weights, cost_to_go, None)
         }
     }
 
@@ -171,14 +131,14 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     #[inline(never)]
     pub(crate) fn eliminate_adjusted(
         &mut self,
-        stage: &Stage<T, NX, NU>,
+        stage: StageBothWays<'_, T, NX, NU>,
         weights: &Common<T, NX, NU>,
         cost_to_go: &mut CostToGo<T, NX>,
         adjustment: Option<&dyn Adjustment<T, NX, NU>>,
     ) -> Result<(), BadPivot<T>> {
         #[cfg(feature = "simd")]
-        if NX >= WIDE {
-            return products::in_widest::<NX, _>(Elimination {
+        if products::are_in_vectors(NX) {
+            return products::dispatch::<NX, _>(Elimination::<_, NX, NU, true> {
                 factor: self,
                 stage,
                 weights,
@@ -192,33 +152,46 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     #[inline(always)]
     fn eliminate_here<M: Products>(
         &mut self,
-        stage: &Stage<T, NX, NU>,
+        stage: StageBothWays<'_, T, NX, NU>,
         weights: &Common<T, NX, NU>,
         cost_to_go: &mut CostToGo<T, NX>,
         adjustment: Option<&dyn Adjustment<T, NX, NU>>,
         by: M,
     ) -> Result<(), BadPivot<T>> {
-        let Stage { a, b, c, .. } = stage;
+        let Stage {
+            a,
+            b,
+            c,
+            linear_x,
+            linear_u,
+        } = &*stage;
         let CostToGo { quadratic, linear } = cost_to_go;
         // Begun as any matrix of its size: where registers are few, zeros would be stored first.
         let mut p_a = *quadratic;
         by.set_product(&mut p_a, quadratic, a);
         let p_b = by.product(quadratic, b);
         let p_next = *linear + product(quadratic, c);
-        let (a, b) = (transposed(a), transposed(b));
+        let (made_a, made_b);
+        let (a, b) = match stage.transposed() {
+            Some(kept) => (&kept.a, &kept.b),
+            None => {
+                (made_a, made_b) = (transposed(a), transposed(b));
+                (&made_a, &made_b)
+            }
+        };
 
         // Of several inputs, A'(PB) has the longer columns; of one, (B'(PA))' takes as long, and in f32 torques come out
         // a third nearer to those in f64.
         let g_x = if NU == 1 {
-            transposed(&(weights.s + by.product(&b, &p_a)))
+            transposed(&(weights.s + by.product(b, &p_a)))
         } else {
-            transposed(&weights.s) + by.product(&a, &p_b)
+            transposed(&weights.s) + by.product(a, &p_b)
         };
         let mut minimum = StageMinimum {
-            hessian: weights.r + by.product(&b, &p_b),
+            hessian: weights.r + by.product(b, &p_b),
             g_x,
-            g: stage.linear_u + product(&b, &p_next),
-            linear_x: stage.linear_x + product(&a, &p_next),
+            g: linear_u + product(b, &p_next),
+            linear_x: linear_x + product(a, &p_next),
         };
         if let Some(adjustment) = adjustment {
             adjustment.adjust(&mut minimum);
@@ -238,7 +211,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
 
         // A'P(A + BK) + Q + S'K, and the same for the linear part.
         *quadratic = weights.q;
-        by.add_symmetric_product(quadratic, &a, &p_a);
+        by.add_symmetric_product(quadratic, a, &p_a);
         by.add_symmetric_product(quadratic, &l_g_x, &transposed(&scaled_g_x));
         mirror(quadratic);
         *linear = minimum.linear_x + product(&l_g_x, &scaled_g);
@@ -249,14 +222,14 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     #[inline(never)]
     pub(crate) fn pass(
         &mut self,
-        stage: &Stage<T, NX, NU>,
+        stage: StageBothWays<'_, T, NX, NU>,
         weights: &Common<T, NX, NU>,
         cost_to_go: &mut CostToGo<T, NX>,
         input: &SVector<T, NU>,
     ) {
         #[cfg(feature = "simd")]
-        if NX >= WIDE {
-            return products::in_widest::<NX, _>(Passage {
+        if products::are_in_vectors(NX) {
+            return products::dispatch::<NX, _>(Passage {
                 factor: self,
                 stage,
                 weights,
@@ -270,20 +243,29 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     #[inline(always)]
     fn pass_here<M: Products>(
         &mut self,
-        stage: &Stage<T, NX, NU>,
+        stage: StageBothWays<'_, T, NX, NU>,
         weights: &Common<T, NX, NU>,
         cost_to_go: &mut CostToGo<T, NX>,
         input: &SVector<T, NU>,
         by: M,
     ) {
-        let Stage { a, b, c, .. } = stage;
+        let Stage {
+            a, b, c, linear_x, ..
+        } = &*stage;
         let CostToGo { quadratic, linear } = cost_to_go;
         let p_a = by.product(quadratic, a);
         let p_next = *linear + product(quadratic, &(c + product(b, input)));
-        let a = transposed(a);
-        *linear = stage.linear_x + product(&a, &p_next) + transposed_times(&weights.s, input);
+        let made;
+        let a = match stage.transposed() {
+            Some(kept) => &kept.a,
+            None => {
+                made = transposed(a);
+                &made
+            }
+        };
+        *linear = linear_x + product(a, &p_next) + transposed_times(&weights.s, input);
         *quadratic = weights.q;
-        by.add_symmetric_product(quadratic, &a, &p_a);
+        by.add_symmetric_product(quadratic, a, &p_a);
         mirror(quadratic);
         *self = Self {
             feedforward: *input,

@@ -3,6 +3,7 @@
 
 use crate::model::Scalar;
 use crate::ocp::{Bounds, Ocp, Penalty, SoftBounds, Stage, Terminal};
+use crate::products::{are_in_vectors, in_vectors};
 use crate::riccati::StageFactor;
 use crate::small_matrix::{add_product, product, transposed, transposed_times};
 use crate::solution::{ActiveRow, BoundId, Part, Quantity, Side};
@@ -339,10 +340,16 @@ pub(crate) fn form_row<T: Scalar, const NX: usize, const NU: usize>(
         costate += factor.feedback.tr_mul(&normal_u) * sign;
         row.support += 1;
     }
-    let stages = ocp.stages.iter().zip(factors).zip(row.alpha.iter_mut());
-    for ((stage, factor), alpha) in stages.take(bound.stage).rev() {
-        *alpha = step_back(stage, factor, &mut costate);
-    }
+    in_vectors(
+        are_in_vectors(NX),
+        #[inline(always)]
+        || {
+            let stages = ocp.stages.iter().zip(factors).zip(row.alpha.iter_mut());
+            for ((stage, factor), alpha) in stages.take(bound.stage).rev() {
+                *alpha = step_back(stage, factor, &mut costate);
+            }
+        },
+    );
     let infinity: T = convert(f64::INFINITY);
     let (cap, compliance) = match (part, soft) {
         (Part::Linear, Some(penalty)) => (penalty.linear, T::zero()),
@@ -372,7 +379,12 @@ pub(crate) fn step_back<T: Scalar, const NX: usize, const NU: usize>(
 ) -> SVector<T, NU> {
     let input = transposed_times(&stage.b, costate);
     *costate = transposed_times(&stage.a, costate);
-    add_product(costate, &transposed(&factor.feedback), &input);
+    // In vectors a transposed matrix is gathered number by number.
+    if are_in_vectors(NX) {
+        *costate += transposed_times(&factor.feedback, &input);
+    } else {
+        add_product(costate, &transposed(&factor.feedback), &input);
+    }
     product(&factor.inverse_factor, &input)
 }
 

@@ -170,6 +170,21 @@ pub(crate) fn transposed_sizes<T: Scalar, const R: usize, const C: usize>(
     out
 }
 
+/// |A| |v|: the sizes of what adds up to A v.
+#[inline(always)]
+pub(crate) fn sizes_of_product<T: Scalar, const R: usize, const C: usize>(
+    a: &SMatrix<T, R, C>,
+    v: &SVector<T, C>,
+) -> SVector<T, R> {
+    let mut out = SVector::zeros();
+    for (a, v) in a.data.0.iter().zip(&v.data.0[0]) {
+        for (out, a) in out.data.0[0].iter_mut().zip(a) {
+            *out += (*a * *v).abs();
+        }
+    }
+    out
+}
+
 /// The size of the largest entry. nalgebra's own, with its `abs`, takes a tenth of the time of a guess with 16 states.
 #[inline(always)]
 pub(crate) fn largest<T: Scalar, const R: usize>(v: &SVector<T, R>) -> T {

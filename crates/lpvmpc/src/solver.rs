@@ -12,6 +12,7 @@ use crate::memory::Capacity;
 use crate::memory::SolverMemory;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
+use crate::products::{are_in_vectors, in_vectors};
 use crate::riccati::{CostToGo, StageFactor};
 use crate::rows::Trajectory;
 use crate::solution::{ActiveRow, ActiveSet, Quantity, Side, Solution, Status};
@@ -324,13 +325,20 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     ) -> Result<(), Status<T>> {
         let mut x = ocp.x0;
         let n = ocp.length();
-        let policy = first(&self.factors, n).iter().zip(first(&self.dual.v, n));
-        let places = solution.u.iter_mut().zip(solution.x.iter_mut());
-        for ((stage, (factor, v)), (u, x_next)) in ocp.stages.iter().zip(policy).zip(places) {
-            *u = factor.policy(&x, v);
-            x = stage.next(&x, u);
-            *x_next = x;
-        }
+        in_vectors(
+            are_in_vectors(NX),
+            #[inline(always)]
+            || {
+                let policy = first(&self.factors, n).iter().zip(first(&self.dual.v, n));
+                let places = solution.u.iter_mut().zip(solution.x.iter_mut());
+                for ((stage, (factor, v)), (u, x_next)) in ocp.stages.iter().zip(policy).zip(places)
+                {
+                    *u = factor.policy(&x, v);
+                    x = stage.next(&x, u);
+                    *x_next = x;
+                }
+            },
+        );
         // A number that is not finite anywhere spreads to the last state or its input.
         let finite = first(&solution.u, n).iter().all(is_finite) && is_finite(&x);
         if finite {

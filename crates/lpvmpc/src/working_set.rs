@@ -10,6 +10,7 @@
 
 use crate::list::List;
 use crate::model::Scalar;
+use crate::products::in_vectors;
 use crate::solution::ActiveRow;
 use nalgebra::{SVector, convert};
 
@@ -181,6 +182,7 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
     }
 
     /// The rows of Q in use, as far as they are not zero.
+    #[cfg_attr(feature = "simd", inline(always))]
     fn basis(&self) -> impl Iterator<Item = &[SVector<T, NU>]> {
         let lines = self.basis.chunks(self.stages.max(1));
         let rows = self.rows().iter().zip(lines);
@@ -230,6 +232,15 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
 
     /// Removes from `direction.primal` what the orthonormal rows span of it.
     fn orthogonalize(&self, compliance: T, direction: &mut Direction<T, NU>) {
+        in_vectors(
+            NU > 1,
+            #[inline(always)]
+            || self.orthogonalize_here(compliance, direction),
+        );
+    }
+
+    #[inline(always)]
+    fn orthogonalize_here(&self, compliance: T, direction: &mut Direction<T, NU>) {
         let support = direction.support;
         let Direction {
             primal,
@@ -356,6 +367,7 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
     }
 
     /// step += Q `v`
+    #[cfg_attr(feature = "simd", inline(always))]
     pub fn project(&self, v: &[SVector<T, NU>], step: &mut [T]) {
         for (s, q) in step.iter_mut().zip(self.basis()) {
             *s += dot(q, v);
@@ -363,6 +375,7 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
     }
 
     /// L^-1 in place on the first `len` entries.
+    #[cfg_attr(feature = "simd", inline(always))]
     pub fn solve_lower(&self, rhs: &mut [T]) {
         for (i, l) in self.factor().chunks(self.rows.len().max(1)).enumerate() {
             if let (Some((before, [entry, ..])), Some(pivot)) =
@@ -375,6 +388,7 @@ impl<T: Scalar, const NU: usize> WorkingSet<T, NU> {
     }
 
     /// L'^-1 in place on the first `len` entries.
+    #[cfg_attr(feature = "simd", inline(always))]
     pub fn solve_upper(&self, rhs: &mut [T]) {
         let lines = self.factor().rchunks(self.rows.len().max(1));
         for (i, l) in (0..self.len).rev().zip(lines) {
@@ -437,6 +451,7 @@ pub(crate) fn copy<V: Copy>(to: &mut [V], from: &[V]) {
 }
 
 /// a'b over the stages that both have, in sums that do not wait for each other.
+#[cfg_attr(feature = "simd", inline(always))]
 fn dot<T: Scalar, const NU: usize>(a: &[SVector<T, NU>], b: &[SVector<T, NU>]) -> T {
     let length = a.len().min(b.len());
     let (a, a_rest) = first(a, length).as_chunks::<LANES>();
@@ -463,6 +478,7 @@ fn add_products<T: Scalar, const NU: usize>(sum: &mut T, a: &SVector<T, NU>, b: 
 }
 
 /// v += factor * a over the stages that both have.
+#[cfg_attr(feature = "simd", inline(always))]
 fn add<T: Scalar, const NU: usize>(v: &mut [SVector<T, NU>], a: &[SVector<T, NU>], factor: T) {
     for (v, a) in v.iter_mut().zip(a) {
         *v += a * factor;

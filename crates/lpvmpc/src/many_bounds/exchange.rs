@@ -5,6 +5,7 @@
 //! large weight on their distance, and multipliers that take up what it leaves. The same passes that find
 //! the multipliers remove what rounding has left in the optimality conditions.
 
+use super::complete::complete;
 use super::guess;
 use super::interior_point::AllUnknowns;
 use super::newton;
@@ -14,6 +15,7 @@ use super::roles::{
 };
 use super::side::{self, BoundSide, Role};
 use super::span::Span;
+use crate::active_set::DualActiveSet;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
@@ -34,6 +36,10 @@ const SAME_RATIO: f64 = 0.02;
 const NEARLY_RIGHT: usize = 8;
 /// One that is right but for what is smaller than a loose tolerance is exchanged so many times more often.
 const MORE_GUESSES: usize = 4;
+/// A guess is completed so many times,
+const COMPLETIONS: usize = 6;
+/// where there are so many states and inputs that a factorisation takes many times as long as a row of the dual method.
+const LARGE: usize = 12;
 /// A guess with more wrong sides than so many times the fewest before has gone astray.
 const WORSE: usize = 3;
 /// Distances of held sides that are rounding, in units of the smallest number beside one.
@@ -106,7 +112,8 @@ fn largest_cost<T: Scalar, const NX: usize, const NU: usize>(
 /// What the search works on.
 pub(super) struct Program<'a, T: 'static, const NX: usize, const NU: usize> {
     pub span: Span<'a, T, NX, NU>,
-    pub v: &'a mut [SVector<T, NU>],
+    /// Its rows complete guesses; its deviations are anybody's in between.
+    pub dual: &'a mut DualActiveSet<T, NU>,
     pub factors: &'a mut [StageFactor<T, NX, NU>],
     pub u: &'a mut [SVector<T, NU>],
     pub x: &'a mut [SVector<T, NX>],
@@ -198,6 +205,11 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
     let (mut last, mut fewest) = (usize::MAX, usize::MAX);
     let closely = side::are_mixed(sides);
     let (mut nearly, mut one_by_one) = (false, false);
+    let mut completions = if NX + NU >= LARGE && closely {
+        COMPLETIONS
+    } else {
+        0
+    };
     // Of soft bounds the multipliers decide whether they hold or are exceeded. And rounding may have grown along the
     // horizon until what follows from a trajectory as it is goes in circles.
     let mut careful = side::any_soft(sides);
@@ -217,7 +229,7 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
         if newton::factorize(&program.span, sides, program.factors).is_err() {
             return false;
         }
-        newton::roll_out(&program.span, program.factors, (program.u, program.x));
+        newton::roll_out(&program.span, program.factors, &[], (program.u, program.x));
         measure(program, sides, rounding());
         for side in sides.iter_mut().filter(|side| side.is_weighted()) {
             side.base = side.multiplier_at(side.distance);
@@ -227,6 +239,15 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
             refine(program, sides, &mut residual, tolerances, (loose, loose));
         }
         let mut wrong = reassign(sides, loose, loose * residual.largest);
+        let misses = |side: &BoundSide<T>| side.role == Role::Held && side.last_role == Role::Free;
+        if completions > 0 && !one_by_one && wrong < NX + NU && sides.iter().any(misses) {
+            if complete(program, sides, loose) {
+                completions -= 1;
+                (last, fewest) = (wrong, fewest.min(wrong));
+                continue;
+            }
+            completions = 0;
+        }
         let unexplained = residual.rest > loose * residual.largest;
         if closely && !careful && unexplained && (1..=NEARLY_RIGHT).contains(&wrong) {
             // What is as near may be right, and its multipliers not yet.
@@ -378,7 +399,7 @@ fn explain<T: Scalar, const NX: usize, const NU: usize>(
         program.factors,
         sides,
         &trajectory,
-        program.v,
+        &mut program.dual.v,
     )
 }
 
@@ -428,8 +449,19 @@ fn refine<T: Scalar, const NX: usize, const NU: usize>(
         (least, last_missed) = (least.min(worst), missed);
         left -= 1;
         let trajectory = (&mut *program.u, &mut *program.x);
-        residual::descend(&program.span, program.factors, residual.followed, program.v);
-        newton::deviate(&program.span, program.factors, program.v, trajectory, sides);
+        residual::descend(
+            &program.span,
+            program.factors,
+            residual.followed,
+            &mut program.dual.v,
+        );
+        newton::deviate(
+            &program.span,
+            program.factors,
+            &program.dual.v,
+            trajectory,
+            sides,
+        );
         measure(program, sides, rounding);
         missed = farthest(sides);
         let ratio = missed / last_missed;

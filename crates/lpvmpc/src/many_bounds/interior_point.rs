@@ -87,7 +87,7 @@ impl<T: Scalar> InteriorPoint<T> {
     ) -> Result<Foretold, BadPivot<T>> {
         let bounds = program.unknowns.bounds();
         newton::factorize(&program.span, bounds, program.factors)?;
-        newton::roll_out(&program.span, program.factors, (program.u, program.x));
+        newton::roll_out(&program.span, program.factors, &[], (program.u, program.x));
         let (prediction, foretold) = step::foretell(program);
         self.prediction = Some(prediction);
         Ok(foretold)
@@ -157,9 +157,11 @@ mod tests {
     use crate::list::List;
     use crate::many_bounds::side;
     use crate::many_bounds::span::Span;
+    use crate::memory::Capacity;
     use crate::ocp::{Bounds, GeneralRow, Ocp, Penalty};
     use crate::riccati::StageFactor;
     use crate::rows::Trajectory;
+    use crate::solver::Solver;
     use alloc::format;
     use alloc::string::String;
     use alloc::vec;
@@ -218,15 +220,18 @@ mod tests {
             )
         };
         let ((mut factors, mut u, mut x), mut spare) = (place(), place());
-        let mut v = u.clone();
-        let span = Span::whole(&ocp);
+        let mut solver = Solver::<f64, 2, 1>::allocate(Capacity {
+            stages: N,
+            ..Capacity::default()
+        });
+        let span = Span::whole(&ocp, &[]);
         assert!(newton::factorize(&span, &sides, &mut factors).is_ok());
-        newton::roll_out(&span, &factors, (&mut u, &mut x));
+        newton::roll_out(&span, &factors, &[], (&mut u, &mut x));
         newton::measure(&span, &mut sides, &Trajectory { x: &x, u: &u });
         let mut bounds = vec![BoundUnknowns::empty(); 8 * (N + 1)];
         let mut program = Program {
             span,
-            v: &mut v,
+            dual: &mut solver.dual,
             factors: &mut factors,
             u: &mut u,
             x: &mut x,

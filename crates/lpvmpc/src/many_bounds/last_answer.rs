@@ -9,7 +9,6 @@ use super::search::search;
 use super::side::{self, BoundSide};
 use super::span::Span;
 use crate::model::Scalar;
-use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
 use crate::rows::Trajectory;
 use crate::solution::ActiveSet;
@@ -75,7 +74,7 @@ impl LastAnswer {
         let whole = program.span;
         let n = whole.ocp.length();
         guess::tail(whole.ocp, factors, sides, (program.x, self.shift));
-        let end = self.end(whole.ocp, program.x);
+        let end = self.end(&whole, program.x);
         // Soft bounds are found anew in less time.
         if end.is_none() && self.shift > 0 && self.kind == Kind::Soft {
             return false;
@@ -118,10 +117,10 @@ impl LastAnswer {
     /// longer, as a rule, than what it saves.
     fn end<'a, T: Scalar, const NX: usize, const NU: usize>(
         &self,
-        ocp: &'a Ocp<T, NX, NU>,
+        whole: &Span<'a, T, NX, NU>,
         last: &[SVector<T, NX>],
     ) -> Option<Span<'a, T, NX, NU>> {
-        let n = ocp.length();
+        let n = whole.ocp.length();
         let length = match self.kind {
             Kind::Rows | Kind::Mixed => (n / TAIL).max(SHORTEST),
             Kind::Soft => (n / TAIL).max((n / TAIL_SOFT).min(LONGEST_SOFT)),
@@ -133,9 +132,9 @@ impl LastAnswer {
         }
         let begin = n - length;
         Some(Span {
-            ocp,
             begin,
             start: *last.get(begin + self.shift - 1)?,
+            ..*whole
         })
     }
 
@@ -150,7 +149,7 @@ impl LastAnswer {
         proof: &mut ActiveSet<T>,
         count: impl FnMut() -> bool,
     ) -> bool {
-        newton::roll_out(&program.span, factors, (program.u, program.x));
+        newton::roll_out(&program.span, factors, &[], (program.u, program.x));
         let (x, u) = (&*program.x, &*program.u);
         newton::measure(&program.span, sides, &Trajectory { x, u });
         let answer = search(program, sides, tolerances, self.trials, proof, count);
@@ -166,7 +165,7 @@ mod tests {
     use crate::many_bounds::interior_point::{AllUnknowns, BoundUnknowns};
     use crate::many_bounds::side::{self, Role};
     use crate::memory::Capacity;
-    use crate::ocp::{Bounds, GeneralRow};
+    use crate::ocp::{Bounds, GeneralRow, Ocp};
     use crate::solution::{BoundId, Solution};
     use crate::solver::Solver;
     use crate::solver_settings::SolverSettings;
@@ -246,6 +245,7 @@ mod tests {
                 ocp: &ocp,
                 begin: BEGIN,
                 start,
+                transposed: &[],
             };
             let place = || {
                 (
@@ -254,13 +254,13 @@ mod tests {
                     vec![Vector2::zeros(); N],
                 )
             };
-            let [free, mut one, mut other] = [place(), place(), place()];
-            let (mut factors, mut v) = (free.0, free.1);
+            let [mut free, mut one, mut other] = [place(), place(), place()];
+            let mut solver = Solver::<f64, 2, 1>::allocate(room);
             let mut unknowns = vec![BoundUnknowns::empty(); 8 * (N + 1)];
-            newton::factorize(&span, &sides[..0], &mut factors).unwrap();
+            newton::factorize(&span, &sides[..0], &mut free.0).unwrap();
             let mut program = Program {
                 span,
-                v: &mut v,
+                dual: &mut solver.dual,
                 factors: &mut one.0,
                 u: &mut one.1,
                 x: &mut one.2,
@@ -285,7 +285,7 @@ mod tests {
                 stages < 100 * N
             };
             assert!(
-                answer.solve(&mut program, end, &tolerances, &factors, &mut proof, count),
+                answer.solve(&mut program, end, &tolerances, &free.0, &mut proof, count),
                 "{seed}"
             );
             let held = || end.iter().filter(|side| side.role == Role::Held);

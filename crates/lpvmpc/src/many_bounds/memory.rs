@@ -8,7 +8,11 @@ use crate::list::List;
 use crate::memory::Capacity;
 use crate::memory::SolverMemory;
 use crate::model::Scalar;
+#[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
+use crate::products;
 use crate::riccati::StageFactor;
+#[cfg(all(feature = "alloc", not(target_arch = "wasm32")))]
+use crate::transposed::Transposed;
 use nalgebra::SVector;
 
 /// Memory with which problems with many active bounds are solved in less time, for `N` stages and `B` finite
@@ -54,6 +58,7 @@ impl<T: Scalar, const NX: usize, const NU: usize, const N: usize, const B: usize
                 core::array::from_fn(|_| ManyBoundsPlace::empty()),
                 List::empty(),
                 List::empty(),
+                List::empty(),
             )],
         }
     }
@@ -77,7 +82,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
             x: List::Static(x),
         });
         let (sides, unknowns) = (List::Static(sides), List::Static(unknowns));
-        *phase = [ManyBounds::new(places, sides, unknowns)];
+        *phase = [ManyBounds::new(places, sides, unknowns, List::empty())];
         Self {
             many_bounds: List::Static(phase),
             ..self
@@ -90,6 +95,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
     /// As much as is needed, on the heap.
     pub fn allocate(capacity: Capacity) -> Self {
         let stages = capacity.stages;
+        let transposed = if products::are_in_vectors(NX) {
+            stages
+        } else {
+            0
+        };
         let bounds = (stages + 1) * (NX + NU + capacity.general_rows);
         let place = || ManyBoundsPlace {
             factors: List::repeat(StageFactor::zeros(), stages),
@@ -100,6 +110,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             [place(), place()],
             List::repeat(BoundSide::empty(), 2 * bounds),
             List::repeat(BoundUnknowns::empty(), bounds),
+            List::repeat(Transposed::zeros(), transposed),
         )
     }
 }

@@ -5,13 +5,13 @@ use super::side::BoundSide;
 use super::span::Span;
 use super::weighted::{Weighted, split_first_mut, split_off};
 use crate::model::Scalar;
-use crate::ocp::{Ocp, Stage};
+use crate::ocp::Ocp;
+use crate::products::{are_in_vectors, in_vectors};
 use crate::riccati::{Adjustment, BadPivot, CostToGo, StageFactor, StageMinimum};
 use crate::rows::Trajectory;
-use crate::small_matrix::{
-    add_outer_product, add_scaled, product, transposed_product, transposed_times,
-};
+use crate::small_matrix::{add_outer_product, add_scaled, product, transposed_product};
 use crate::solution::Quantity;
+use crate::transposed::StageBothWays;
 use nalgebra::SVector;
 
 /// The factors of the problem with the costs of its bounds; inputs that are held are constants.
@@ -40,7 +40,7 @@ pub(super) fn factorize<T: Scalar, W: Weighted<T>, const NX: usize, const NU: us
 fn eliminate<T: Scalar, W: Weighted<T>, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
     i: usize,
-    stage: &Stage<T, NX, NU>,
+    stage: StageBothWays<'_, T, NX, NU>,
     bounds: &[W],
     factor: &mut StageFactor<T, NX, NU>,
     cost_to_go: &mut CostToGo<T, NX>,
@@ -140,21 +140,28 @@ fn add_to_cost_to_go<T: Scalar, W: Weighted<T>, const NX: usize, const NU: usize
     }
 }
 
-/// The trajectory of the factors' policies, and the distance of every side on it.
+/// The trajectory of the factors' policies with the deviations `v` from them, none where there are fewer.
 pub(super) fn roll_out<T: Scalar, const NX: usize, const NU: usize>(
     span: &Span<'_, T, NX, NU>,
     factors: &[StageFactor<T, NX, NU>],
+    v: &[SVector<T, NU>],
     (u, x): (&mut [SVector<T, NU>], &mut [SVector<T, NX>]),
 ) {
-    let at_rest = SVector::zeros();
-    let mut state = span.start;
-    let places = span.of_mut(u).iter_mut().zip(span.of_mut(x));
-    let stages = span.stages().zip(span.of(factors)).zip(places);
-    for (((_, stage), factor), (u, x)) in stages {
-        *u = factor.policy(&state, &at_rest);
-        state = stage.next(&state, u);
-        *x = state;
-    }
+    in_vectors(
+        are_in_vectors(NX),
+        #[inline(always)]
+        || {
+            let at_rest = SVector::zeros();
+            let mut state = span.start;
+            let places = span.of_mut(u).iter_mut().zip(span.of_mut(x));
+            let stages = span.stages().zip(span.of(factors)).zip(places);
+            for (((i, stage), factor), (u, x)) in stages {
+                *u = factor.policy(&state, v.get(i).unwrap_or(&at_rest));
+                state = stage.next(&state, u);
+                *x = state;
+            }
+        },
+    );
 }
 
 /// The distances of all sides on a trajectory.
@@ -230,13 +237,13 @@ pub(super) fn gradient<T: Scalar, W: Weighted<T>, const NX: usize, const NU: usi
 /// costate becomes that in front of the stage.
 #[inline(always)]
 pub(super) fn step_back<T: Scalar, const NX: usize, const NU: usize>(
-    stage: &Stage<T, NX, NU>,
+    stage: StageBothWays<'_, T, NX, NU>,
     factor: &StageFactor<T, NX, NU>,
     slope: &SVector<T, NU>,
     costate: &mut SVector<T, NX>,
 ) -> SVector<T, NU> {
-    let input = transposed_times(&stage.b, costate) + slope;
-    *costate = transposed_times(&stage.a, costate) + transposed_product(&factor.feedback, &input);
+    let input = stage.transposed_b_times(costate) + slope;
+    *costate = stage.transposed_a_times(costate) + transposed_product(&factor.feedback, &input);
     -product(&factor.inverse_factor, &input)
 }
 
@@ -251,18 +258,24 @@ pub(super) fn deviate<T: Scalar, const NX: usize, const NU: usize>(
     mut sides: &mut [BoundSide<T>],
 ) {
     let ocp = span.ocp;
-    let mut change = SVector::zeros();
-    let places = span.of_mut(u).iter_mut().zip(span.of_mut(x));
-    let stages = span.stages().zip(span.of(factors));
-    for ((((i, stage), factor), v), (u, x)) in stages.zip(span.of(v)).zip(places) {
-        let input =
-            product(&factor.feedback, &change) + transposed_product(&factor.inverse_factor, v);
-        take_up(ocp, split_first_mut(&mut sides, i), &change, Some(&input));
-        change = product(&stage.a, &change) + product(&stage.b, &input);
-        *u += input;
-        *x += change;
-    }
-    take_up(ocp, sides, &change, None);
+    in_vectors(
+        are_in_vectors(NX),
+        #[inline(always)]
+        || {
+            let mut change = SVector::zeros();
+            let places = span.of_mut(u).iter_mut().zip(span.of_mut(x));
+            let stages = span.stages().zip(span.of(factors));
+            for ((((i, stage), factor), v), (u, x)) in stages.zip(span.of(v)).zip(places) {
+                let input = product(&factor.feedback, &change)
+                    + transposed_product(&factor.inverse_factor, v);
+                take_up(ocp, split_first_mut(&mut sides, i), &change, Some(&input));
+                change = product(&stage.a, &change) + product(&stage.b, &input);
+                *u += input;
+                *x += change;
+            }
+            take_up(ocp, sides, &change, None);
+        },
+    );
 }
 
 fn take_up<T: Scalar, const NX: usize, const NU: usize>(
@@ -311,7 +324,7 @@ mod tests {
         for (j, pair) in sides.chunks_mut(2).enumerate() {
             pair[j % 2].role = Role::Held;
         }
-        let (stage, weights) = (&ocp.stages[1], ocp.common_at(1));
+        let (stage, weights) = (StageBothWays::new(&ocp.stages[1]), ocp.common_at(1));
         let root = SMatrix::<f64, NX, NX>::from_fn(|_, _| random.uniform(-1.0, 1.0));
         let before = CostToGo {
             quadratic: root.transpose() * root,
@@ -398,11 +411,11 @@ mod tests {
                 (side.base, side.weight) = (side.price(), side.curvature());
             }
         }
-        let span = Span::whole(&ocp);
+        let span = Span::whole(&ocp, &[]);
         let mut factors = vec![StageFactor::zeros(); N];
         let (mut u, mut x) = (vec![SVector::zeros(); N], vec![SVector::zeros(); N]);
         factorize(&span, &sides, &mut factors).unwrap();
-        roll_out(&span, &factors, (&mut u, &mut x));
+        roll_out(&span, &factors, &[], (&mut u, &mut x));
         let trajectory = Trajectory { x: &x, u: &u };
         measure(&span, &mut sides, &trajectory);
         for (i, u) in u.iter().enumerate() {

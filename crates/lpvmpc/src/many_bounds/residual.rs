@@ -6,11 +6,10 @@ use super::span::Span;
 use super::weighted::split_off_mut;
 use crate::model::Scalar;
 use crate::ocp::Common;
+use crate::products::{are_in_vectors, in_vectors};
 use crate::riccati::StageFactor;
 use crate::rows::{self, Trajectory};
-use crate::small_matrix::{
-    largest, product, transposed_product, transposed_sizes, transposed_times,
-};
+use crate::small_matrix::{largest, product, transposed_product, transposed_times};
 use nalgebra::{SVector, convert};
 
 /// What of the terms beside a multiplier is rounding, as a power of the smallest number beside one.
@@ -36,6 +35,21 @@ pub(super) struct Residual<T> {
 /// Where inputs alone are bounded, later ones follow the policies: at a minimum that makes no difference, and
 /// otherwise rounding would grow along the horizon as an unstable plant does.
 pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
+    span: &Span<'_, T, NX, NU>,
+    factors: &[StageFactor<T, NX, NU>],
+    sides: &mut [BoundSide<T>],
+    trajectory: &Trajectory<'_, T, NX, NU>,
+    slopes: &mut [SVector<T, NU>],
+) -> Residual<T> {
+    in_vectors(
+        are_in_vectors(NX),
+        #[inline(always)]
+        || explain_here(span, factors, sides, trajectory, slopes),
+    )
+}
+
+#[inline(always)]
+fn explain_here<T: Scalar, const NX: usize, const NU: usize>(
     span: &Span<'_, T, NX, NU>,
     factors: &[StageFactor<T, NX, NU>],
     sides: &mut [BoundSide<T>],
@@ -82,9 +96,9 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
         let (x, u) = (span.state(trajectory, i), trajectory.u.get(i));
         let u = u.copied().unwrap_or_else(SVector::zeros);
         let Common { q, r, s, .. } = ocp.common_at(i);
-        let through = transposed_times(&stage.b, &costate);
+        let through = stage.transposed_b_times(&costate);
         let mut slope = product(r, &u) + product(s, x) + stage.linear_u + through + slope_u;
-        let terms = transposed_sizes(&stage.b, &sizes);
+        let terms = stage.transposed_b_sizes(&sizes);
         residual.largest = residual.largest.max(largest(&terms)).max(largest(&slope_u));
         let mut most = T::zero();
         for side in here.iter_mut().filter(|side| side.role == Role::Held) {
@@ -95,7 +109,7 @@ pub(super) fn explain<T: Scalar, const NX: usize, const NU: usize>(
             most = most.max(side.excess());
         }
         residual.rest = residual.rest.max(largest(&slope));
-        costate = transposed_times(&stage.a, &costate)
+        costate = stage.transposed_a_times(&costate)
             + product(q, x)
             + transposed_times(s, &u)
             + stage.linear_x;
@@ -121,12 +135,18 @@ pub(super) fn descend<T: Scalar, const NX: usize, const NU: usize>(
     followed: bool,
     v: &mut [SVector<T, NU>],
 ) {
-    let mut costate = SVector::zeros();
-    let stages = span.stages().zip(span.of(factors)).zip(span.of_mut(v));
-    for (((_, stage), factor), v) in stages.rev() {
-        if followed {
-            costate = SVector::zeros();
-        }
-        *v = step_back(stage, factor, v, &mut costate);
-    }
+    in_vectors(
+        are_in_vectors(NX),
+        #[inline(always)]
+        || {
+            let mut costate = SVector::zeros();
+            let stages = span.stages().zip(span.of(factors)).zip(span.of_mut(v));
+            for (((_, stage), factor), v) in stages.rev() {
+                if followed {
+                    costate = SVector::zeros();
+                }
+                *v = step_back(stage, factor, v, &mut costate);
+            }
+        },
+    );
 }

@@ -2,12 +2,10 @@
 
 use super::side::BoundSide;
 use crate::model::Scalar;
-use crate::ocp::{Ocp, Stage};
+use crate::ocp::Ocp;
 use crate::rows::Trajectory;
 use crate::solution::{BoundId, Quantity};
-use core::iter::Zip;
-use core::ops::Range;
-use core::slice::Iter;
+use crate::transposed::{StageBothWays, Transposed};
 use nalgebra::SVector;
 
 /// The stages of the problem from one on, and the state that is given there. Factors, inputs and states keep their
@@ -17,23 +15,34 @@ pub(super) struct Span<'a, T: 'static, const NX: usize, const NU: usize> {
     pub ocp: &'a Ocp<T, NX, NU>,
     pub begin: usize,
     pub start: SVector<T, NX>,
+    /// The matrices of all stages transposed, of as many as there are places for.
+    pub transposed: &'a [Transposed<T, NX, NU>],
 }
 
 impl<'a, T: Scalar, const NX: usize, const NU: usize> Span<'a, T, NX, NU> {
     /// All of the horizon.
-    pub fn whole(ocp: &'a Ocp<T, NX, NU>) -> Self {
+    pub fn whole(ocp: &'a Ocp<T, NX, NU>, transposed: &'a [Transposed<T, NX, NU>]) -> Self {
         Self {
             ocp,
             begin: 0,
             start: ocp.x0,
+            transposed,
         }
     }
 
     /// Its stages, each with its number.
-    pub fn stages(&self) -> Zip<Range<usize>, Iter<'a, Stage<T, NX, NU>>> {
+    #[inline(always)]
+    pub fn stages(
+        &self,
+    ) -> impl DoubleEndedIterator<Item = (usize, StageBothWays<'a, T, NX, NU>)>
+    + ExactSizeIterator
+    + use<'a, T, NX, NU> {
         let numbers = self.begin..self.ocp.length();
         let stages = self.ocp.stages.get(numbers.clone());
-        numbers.zip(stages.unwrap_or_default())
+        let transposed = self.transposed;
+        numbers
+            .zip(stages.unwrap_or_default())
+            .map(move |(i, stage)| (i, StageBothWays::new(stage).with(transposed, i)))
     }
 
     /// What belongs to its stages, out of what belongs to all of them.

@@ -15,7 +15,7 @@ pub(crate) struct Vectors<S>(pub S);
 
 /// Does the `work` in the widest vectors of the machine that are good for columns of `R` numbers.
 #[inline(always)]
-pub(crate) fn in_widest<const R: usize, W: WithSimd>(work: W) -> W::Output {
+pub(crate) fn dispatch<const R: usize, W: WithSimd>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     if !R.is_multiple_of(WIDEST) {
         return match pulp::x86::V3::try_new() {
@@ -244,7 +244,7 @@ mod tests {
     }
 
     fn compare<const R: usize, const K: usize, const C: usize>() {
-        in_widest::<R, _>(Compare::<R, K, C>);
+        dispatch::<R, _>(Compare::<R, K, C>);
         Arch::new().dispatch(Compare::<R, K, C>);
         Arch::Scalar.dispatch(Compare::<R, K, C>);
     }

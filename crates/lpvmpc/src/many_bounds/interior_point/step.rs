@@ -6,6 +6,7 @@ use crate::many_bounds::exchange::Program;
 use crate::many_bounds::newton;
 use crate::many_bounds::weighted::split_off_mut;
 use crate::model::Scalar;
+use crate::products::{are_in_vectors, in_vectors};
 use crate::rows::Trajectory;
 
 /// What the step to the trajectory of the policies foretells, and what there is to know of the way there.
@@ -35,7 +36,7 @@ pub(super) fn aim<T: Scalar, const NX: usize, const NU: usize>(
 ) -> Part<T> {
     let Program {
         span,
-        v,
+        dual,
         factors,
         u,
         x,
@@ -43,17 +44,26 @@ pub(super) fn aim<T: Scalar, const NX: usize, const NU: usize>(
         ..
     } = program;
     let ocp = span.ocp;
-    let mut before = unknowns.bounds_mut();
-    let at_end = split_off_mut(&mut before, ocp.length());
-    let (mut costate, _) = newton::gradient(ocp, at_end, |bound| bound.aim(&target));
-    let stages = span.stages().zip(span.of(factors)).zip(span.of_mut(v));
-    for (((i, stage), factor), v) in stages.rev() {
-        let here = split_off_mut(&mut before, i);
-        let (slope_x, slope_u) = newton::gradient(ocp, here, |bound| bound.aim(&target));
-        *v = newton::step_back(stage, factor, &slope_u, &mut costate);
-        costate += slope_x;
-    }
-    newton::deviate(span, factors, v, (u, x), &mut []);
+    in_vectors(
+        are_in_vectors(NX),
+        #[inline(always)]
+        || {
+            let mut before = unknowns.bounds_mut();
+            let at_end = split_off_mut(&mut before, ocp.length());
+            let (mut costate, _) = newton::gradient(ocp, at_end, |bound| bound.aim(&target));
+            let stages = span
+                .stages()
+                .zip(span.of(factors))
+                .zip(span.of_mut(&mut dual.v));
+            for (((i, stage), factor), v) in stages.rev() {
+                let here = split_off_mut(&mut before, i);
+                let (slope_x, slope_u) = newton::gradient(ocp, here, |bound| bound.aim(&target));
+                *v = newton::step_back(stage, factor, &slope_u, &mut costate);
+                costate += slope_x;
+            }
+        },
+    );
+    newton::deviate(span, factors, &dual.v, (u, x), &mut []);
     let mut left = Left::begin();
     let bounds = unknowns.bounds_mut();
     newton::for_each_value(span, bounds, &Trajectory { x, u }, |bound, value| {
