@@ -86,6 +86,11 @@ pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
     pub in_turns: InTurns<T, NX, NU>,
 }
 
+/// Whether a plant has so many states and inputs that a factorisation takes many times as long as a row of the dual method.
+const fn is_large<const NX: usize, const NU: usize>() -> bool {
+    NX + NU >= 12
+}
+
 /// Places for the factors of the problem with the sides' costs, and for a trajectory.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Clone))]

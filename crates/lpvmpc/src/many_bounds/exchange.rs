@@ -8,6 +8,7 @@
 use super::complete::complete;
 use super::guess;
 use super::interior_point::AllUnknowns;
+use super::is_large;
 use super::newton;
 use super::residual::{self, Residual};
 use super::roles::{
@@ -36,10 +37,8 @@ const SAME_RATIO: f64 = 0.02;
 const NEARLY_RIGHT: usize = 8;
 /// One that is right but for what is smaller than a loose tolerance is exchanged so many times more often.
 const MORE_GUESSES: usize = 4;
-/// A guess is completed so many times,
+/// A guess of a large plant is completed so many times.
 const COMPLETIONS: usize = 6;
-/// where there are so many states and inputs that a factorisation takes many times as long as a row of the dual method.
-const LARGE: usize = 12;
 /// A guess with more wrong sides than so many times the fewest before has gone astray.
 const WORSE: usize = 3;
 /// Distances of held sides that are rounding, in units of the smallest number beside one.
@@ -205,11 +204,8 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
     let (mut last, mut fewest) = (usize::MAX, usize::MAX);
     let closely = side::are_mixed(sides);
     let (mut nearly, mut one_by_one) = (false, false);
-    let mut completions = if NX + NU >= LARGE && closely {
-        COMPLETIONS
-    } else {
-        0
-    };
+    let completed = is_large::<NX, NU>() && closely;
+    let mut completions = if completed { COMPLETIONS } else { 0 };
     // Of soft bounds the multipliers decide whether they hold or are exceeded. And rounding may have grown along the
     // horizon until what follows from a trajectory as it is goes in circles.
     let mut careful = side::any_soft(sides);

@@ -154,7 +154,8 @@ impl<T: Scalar> BoundSide<T> {
     }
 }
 
-/// Puts the finite sides of all bounds of the problem into `sides`, stage by stage; how many there are, or `None` where there are not enough places, or a bound is NaN.
+/// Puts the finite sides of all bounds of the problem into `sides`, stage by stage; how many there are, or `None` where there are not
+/// enough places, or a bound or a row is NaN.
 pub(super) fn collect<T: Scalar, const NX: usize, const NU: usize>(
     ocp: &Ocp<T, NX, NU>,
     sides: &mut [BoundSide<T>],
@@ -206,6 +207,10 @@ pub(super) fn collect<T: Scalar, const NX: usize, const NU: usize>(
             }
         }
         for (j, row) in ocp.rows_of(i).iter().enumerate() {
+            // Nor whether a row that is NaN is met, be it without limits.
+            if !row.x.iter().chain(row.u.iter()).all(|of| of.is_finite()) {
+                return None;
+            }
             add(i, Quantity::Row(j), (row.lower, row.upper), row.soft)?;
         }
     }

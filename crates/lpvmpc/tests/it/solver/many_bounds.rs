@@ -3,8 +3,8 @@
 use super::changes::saturated;
 use super::support::{agree, cold, solve};
 use lpvmpc::{
-    Bounds, Capacity, List, ManyBoundsArrays, Ocp, Solution, Solver, SolverArrays, SolverSettings,
-    Status, WarmStart, infeasibility_margin, kkt_residual,
+    Bounds, Capacity, GeneralRow, List, ManyBoundsArrays, Ocp, Solution, Solver, SolverArrays,
+    SolverSettings, Status, WarmStart, infeasibility_margin, kkt_residual,
 };
 use lpvmpc_sequences::{Kind, Recipe};
 use lpvmpc_testkit::problems::{Family, problem};
@@ -518,6 +518,13 @@ fn what_has_no_answer_has_none_at_once() {
     let mut broken = ocp.clone();
     broken.common.u.upper = SVector::repeat(f64::NAN);
     assert!(!solve(&broken).status.is_solved());
+    // A row that is NaN, be it without limits.
+    let mut broken = ocp.clone();
+    broken.rows_per_stage = 1;
+    broken.rows = List::repeat(GeneralRow::default(), 21);
+    assert!(solve(&broken).status.is_solved());
+    broken.rows[7].u[0] = f64::NAN;
+    assert_eq!(solve(&broken).status, Status::NotFinite);
     // Out of reach: it takes more than all inputs at their bounds.
     let mut broken = ocp;
     broken.common.x.lower[0] = solve(&broken).x[5][0].abs() * 10.0 + 1e6;
