@@ -14,6 +14,8 @@ mod answer;
 mod complete;
 mod exchange;
 mod expected;
+#[cfg(all(test, feature = "alloc"))]
+mod fixture;
 mod guess;
 mod interior_point;
 mod last_answer;

@@ -95,7 +95,8 @@ pub(crate) struct DualMemory<T: 'static, const NU: usize> {
 
 impl<T, const NX: usize, const NU: usize> SolverMemory<T, NX, NU> {
     /// Bytes that a capacity takes: to plan memory before there is any. As [`SolverArrays`] it may take a
-    /// few more, for the alignment of its parts; on the heap it takes those of [`ManyBoundsArrays`], too.
+    /// few more, for the alignment of its parts; on the heap it takes those of [`ManyBoundsArrays`], too, and
+    /// with the feature `simd` and six states or more A and B of every stage once more.
     pub const fn bytes(
         Capacity {
             stages,

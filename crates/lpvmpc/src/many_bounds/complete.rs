@@ -90,3 +90,106 @@ fn most_violated<T: Scalar, const NX: usize, const NU: usize>(
         rank: -least,
     })
 }
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use crate::many_bounds::fixture::{self, Fixture};
+    use crate::many_bounds::roles::reassign;
+    use crate::many_bounds::span::Span;
+    use crate::memory::Capacity;
+    use crate::ocp::Ocp;
+    use crate::solution::Solution;
+    use crate::solver::Solver;
+    use crate::solver_settings::SolverSettings;
+    use alloc::vec::Vec;
+    use lpvmpc_testkit::rng::Rng;
+    use nalgebra::{SMatrix, SVector};
+
+    const NX: usize = 4;
+    const NU: usize = 2;
+    const N: usize = 12;
+    const ROOM: Capacity = Capacity {
+        stages: N,
+        rows: N * NU,
+        active: N * NU,
+        own_stages: 0,
+        general_rows: 0,
+        second_plan: false,
+    };
+
+    /// A stable plant with limits of its inputs and of two states, which its trajectory without them exceeds.
+    fn problem(random: &mut Rng) -> Ocp<f64, NX, NU> {
+        let mut ocp = Ocp::<f64, NX, NU>::allocate(N);
+        let a = random.matrix::<NX, NX>();
+        for stage in ocp.stages.iter_mut() {
+            stage.a = a * (0.9 / a.norm());
+            stage.b = random.matrix();
+            stage.linear_x = SVector::from_fn(|_, _| random.uniform(-3.0, 3.0));
+        }
+        (ocp.common.q, ocp.common.r) = (SMatrix::identity(), SMatrix::identity());
+        ocp.terminal.p = SMatrix::identity();
+        ocp.x0 = SVector::from_fn(|_, _| random.uniform(-1.0, 1.0));
+        ocp.common.u.lower.fill(-1.2);
+        ocp.common.u.upper.fill(1.2);
+        for j in 0..2 {
+            (ocp.common.x.lower[j], ocp.common.x.upper[j]) = (-1.0, 1.0);
+        }
+        ocp
+    }
+
+    /// A guess that holds every second of the bounds that are active at the optimum misses the others: the dual method finds
+    /// them with their multipliers, as the solver, by itself, does. Where there are more than it may take, all stays.
+    #[test]
+    fn what_a_guess_misses_is_found() {
+        let (mut found, mut too_many) = (0, 0);
+        for seed in 0..200 {
+            let ocp = problem(&mut Rng::new(seed));
+            let mut expected = Solution::allocate(ROOM);
+            Solver::allocate(ROOM).solve(&ocp, &SolverSettings::default(), &mut expected);
+            if !expected.status.is_solved() {
+                continue;
+            }
+            let active: Vec<_> = expected.active.iter().collect();
+            for known in [2, usize::MAX] {
+                let mut sides = fixture::sides(&ocp);
+                for (k, row) in active.iter().enumerate() {
+                    let mut same = sides.iter_mut().filter(|side| side.bound == row.bound);
+                    let side = same.next().unwrap();
+                    if (k + 1).is_multiple_of(known) {
+                        (side.role, side.base) = (Role::Held, row.multiplier);
+                        side.weight = if side.input().is_none() { 1e6 } else { 0.0 };
+                    }
+                }
+                let mut fixture = Fixture::new(ROOM);
+                let span = Span::whole(&ocp, &[]);
+                let mut program = fixture.program(span);
+                newton::factorize(&span, &sides, program.factors).unwrap();
+                newton::roll_out(&span, program.factors, &[], (program.u, program.x));
+                let trajectory = Trajectory {
+                    x: program.x,
+                    u: program.u,
+                };
+                newton::measure(&span, &mut sides, &trajectory);
+                reassign(&mut sides, 1e-9, f64::INFINITY);
+                let before: Vec<_> = sides.iter().map(|side| side.role).collect();
+                if !complete(&mut program, &mut sides, 1e-9) {
+                    assert!(sides.iter().map(|side| side.role).eq(before), "{seed}");
+                    too_many += 1;
+                    continue;
+                }
+                let held = || sides.iter().filter(|side| side.role == Role::Held);
+                assert_eq!(held().count(), active.len(), "{seed}");
+                for side in held() {
+                    let row = active.iter().find(|row| row.bound == side.bound).unwrap();
+                    if side.last_role == Role::Free {
+                        let error = (side.estimate - row.multiplier).abs();
+                        assert!(error < 1e-7, "{seed}: {error:e}");
+                        found += 1;
+                    }
+                }
+            }
+        }
+        assert!(found > 200 && too_many > 20, "{found}, {too_many}");
+    }
+}

@@ -155,13 +155,11 @@ impl<T: Scalar> InteriorPoint<T> {
 mod tests {
     use super::*;
     use crate::list::List;
-    use crate::many_bounds::side;
+    use crate::many_bounds::fixture::{self, Fixture};
     use crate::many_bounds::span::Span;
     use crate::memory::Capacity;
     use crate::ocp::{Bounds, GeneralRow, Ocp, Penalty};
-    use crate::riccati::StageFactor;
     use crate::rows::Trajectory;
-    use crate::solver::Solver;
     use alloc::format;
     use alloc::string::String;
     use alloc::vec;
@@ -209,35 +207,20 @@ mod tests {
         test: impl FnOnce(&mut InteriorPoint<f64>, &mut Program<'_, f64, 2, 1>, &mut [BoundSide<f64>]),
     ) -> Option<()> {
         let ocp = problem();
-        let mut sides = vec![BoundSide::empty(); 8 * (N + 1)];
-        let count = side::collect(&ocp, &mut sides).unwrap_or_default();
-        sides.truncate(count);
-        let place = || {
-            (
-                vec![StageFactor::zeros(); N],
-                vec![Vector1::zeros(); N],
-                vec![Vector2::zeros(); N],
-            )
-        };
-        let ((mut factors, mut u, mut x), mut spare) = (place(), place());
-        let mut solver = Solver::<f64, 2, 1>::allocate(Capacity {
+        let mut sides = fixture::sides(&ocp);
+        let mut fixture = Fixture::new(Capacity {
             stages: N,
             ..Capacity::default()
         });
         let span = Span::whole(&ocp, &[]);
-        assert!(newton::factorize(&span, &sides, &mut factors).is_ok());
-        newton::roll_out(&span, &factors, &[], (&mut u, &mut x));
-        newton::measure(&span, &mut sides, &Trajectory { x: &x, u: &u });
-        let mut bounds = vec![BoundUnknowns::empty(); 8 * (N + 1)];
-        let mut program = Program {
-            span,
-            dual: &mut solver.dual,
-            factors: &mut factors,
-            u: &mut u,
-            x: &mut x,
-            spare: (&mut spare.0, &mut spare.1, &mut spare.2),
-            unknowns: AllUnknowns::new(&mut bounds),
+        let mut program = fixture.program(span);
+        assert!(newton::factorize(&span, &sides, program.factors).is_ok());
+        newton::roll_out(&span, program.factors, &[], (program.u, program.x));
+        let trajectory = Trajectory {
+            x: program.x,
+            u: program.u,
         };
+        newton::measure(&span, &mut sides, &trajectory);
         let mut method = InteriorPoint::new(&mut program, &sides, 1.0)?;
         test(&mut method, &mut program, &mut sides);
         Some(())

@@ -162,8 +162,8 @@ mod tests {
     use super::*;
     use crate::list::List;
     use crate::many_bounds::exchange::Tolerances;
-    use crate::many_bounds::interior_point::{AllUnknowns, BoundUnknowns};
-    use crate::many_bounds::side::{self, Role};
+    use crate::many_bounds::fixture::{self, Fixture};
+    use crate::many_bounds::side::Role;
     use crate::memory::Capacity;
     use crate::ocp::{Bounds, GeneralRow, Ocp};
     use crate::solution::{BoundId, Solution};
@@ -238,35 +238,17 @@ mod tests {
             let shorter = shorter(&ocp, start);
             Solver::allocate(room).solve(&shorter, &SolverSettings::default(), &mut expected);
             assert!(expected.status.is_solved(), "{seed}: {}", expected.status);
-            let mut sides = vec![BoundSide::empty(); 16 * (N + 1)];
-            let count = side::collect(&ocp, &mut sides).unwrap();
-            sides.truncate(count);
+            let mut sides = fixture::sides(&ocp);
             let span = Span {
                 ocp: &ocp,
                 begin: BEGIN,
                 start,
                 transposed: &[],
             };
-            let place = || {
-                (
-                    vec![StageFactor::zeros(); N],
-                    vec![Vector1::zeros(); N],
-                    vec![Vector2::zeros(); N],
-                )
-            };
-            let [mut free, mut one, mut other] = [place(), place(), place()];
-            let mut solver = Solver::<f64, 2, 1>::allocate(room);
-            let mut unknowns = vec![BoundUnknowns::empty(); 8 * (N + 1)];
-            newton::factorize(&span, &sides[..0], &mut free.0).unwrap();
-            let mut program = Program {
-                span,
-                dual: &mut solver.dual,
-                factors: &mut one.0,
-                u: &mut one.1,
-                x: &mut one.2,
-                spare: (&mut other.0, &mut other.1, &mut other.2),
-                unknowns: AllUnknowns::new(&mut unknowns),
-            };
+            let mut factors = vec![StageFactor::zeros(); N];
+            newton::factorize(&span, &sides[..0], &mut factors).unwrap();
+            let mut fixture = Fixture::new(room);
+            let mut program = fixture.program(span);
             let tolerances = Tolerances {
                 violation: 1e-10,
                 scale: 1.0,
@@ -285,7 +267,7 @@ mod tests {
                 stages < 100 * N
             };
             assert!(
-                answer.solve(&mut program, end, &tolerances, &free.0, &mut proof, count),
+                answer.solve(&mut program, end, &tolerances, &factors, &mut proof, count),
                 "{seed}"
             );
             let held = || end.iter().filter(|side| side.role == Role::Held);
