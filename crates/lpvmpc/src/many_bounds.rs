@@ -79,7 +79,7 @@ pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
     places: [ManyBoundsPlace<T, NX, NU>; 2],
     sides: List<BoundSide<T>>,
     unknowns: List<BoundUnknowns<T>>,
-    /// The matrices of the stages, where products are in vectors.
+    /// A' and B' of the stages, where products are in vectors.
     transposed: List<Transposed<T, NX, NU>>,
     retries: AllRetries,
     /// Whether its turn in this solve was put off.
@@ -88,9 +88,12 @@ pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
     pub in_turns: InTurns<T, NX, NU>,
 }
 
-/// Whether a plant has so many states and inputs that a factorisation takes many times as long as a row of the dual method.
+/// With so many states and inputs a factorisation takes many times as long as a row of the dual method: between 8x2, where that
+/// is not so yet, and 12x4.
+const LARGE: usize = 12;
+
 const fn is_large<const NX: usize, const NU: usize>() -> bool {
-    NX + NU >= 12
+    NX + NU >= LARGE
 }
 
 /// Places for the factors of the problem with the sides' costs, and for a trajectory.
@@ -220,7 +223,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         let cap = before + (factorisations * (NX + NU)).min(most);
         let mut factorised = 0;
         let mut count = |stages: usize| {
-            let with_these = before + ((NX + NU) * (factorised + stages)).div_ceil(n);
+            let changes = |stages: usize| ((NX + NU) * stages).div_ceil(n);
+            let with_these = spent.get() + changes(factorised + stages) - changes(factorised);
             let allowed = with_these <= cap;
             if allowed {
                 factorised += stages;
@@ -232,6 +236,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         let mut program = Program {
             span: whole,
             dual: &mut solver.dual,
+            spent,
+            most_spent: before + left,
             factors: &mut place.factors,
             u: &mut place.u,
             x: &mut place.x,
@@ -280,9 +286,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             Some(Ok(())) => report(&program, sides, solution).then_some(Ok(())),
             other => other,
         };
-        // What completed guesses.
-        let changes = left - solver.dual.changes_left();
-        spent.set(spent.get() + changes);
         self.put_off = outcome.is_none() && expected.many && expected.changes_first.is_some();
         let learns = match turn {
             Turn::First(_) => !(expected.saturated || self.put_off),

@@ -19,8 +19,8 @@ pub(crate) const fn are_in_vectors(states: usize) -> bool {
     cfg!(feature = "simd") && states >= WIDE
 }
 
-/// Does the `work` of a pass along the horizon, compiled for vectors of 256 bits where they `pay` and the machine has them. It has
-/// to be `#[inline(always)]`, as all that it calls and that is to be compiled for them.
+/// Does the `work`, such as a pass along the horizon, compiled for vectors of 256 bits where they `pay` and the machine has them.
+/// The closure, and whatever it calls that is to be compiled for them, must be `#[inline(always)]`.
 #[inline(always)]
 pub(crate) fn in_vectors<O>(pay: bool, work: impl FnOnce() -> O) -> O {
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]

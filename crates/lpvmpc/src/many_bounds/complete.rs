@@ -4,50 +4,34 @@
 //! one, such as the same speed limit two stages later, one exchange follows the other. The dual method finds all of them on
 //! the guess's own factors, a pass along the horizon for each.
 
-use super::exchange::Program;
+use super::exchange::{Program, measure, rounding};
 use super::newton;
 use super::side::{BoundSide, Role};
 use crate::model::Scalar;
-use crate::rows::{self, Candidate, Trajectory};
+use crate::rows::{self, Candidate};
 use crate::solution::Part;
 
 /// Holds, of the sides that are free in the guess, those that its trajectory needs: with them it violates none by more than the
 /// `violation` that counts as none. What is held stays, for whatever seems wrong with it may come from what is missing.
-/// Where that takes more changes than a factorisation is worth, or cannot be done, no role changes: `false`.
+/// Where that takes more changes than a factorisation is worth, or cannot be done, no role changes, and the trajectory is that of
+/// the guess's policies: `false`.
 #[inline(never)]
 pub(super) fn complete<T: Scalar, const NX: usize, const NU: usize>(
     program: &mut Program<'_, T, NX, NU>,
     sides: &mut [BoundSide<T>],
     violation: T,
 ) -> bool {
-    let span = program.span;
     // The rows of the dual method begin at the first stage.
-    if span.begin > 0 {
+    if program.span.begin > 0 {
         return false;
     }
-    program.dual.begin_again();
-    let mut complete = false;
-    for _ in 0..NX + NU {
-        let Some(candidate) = most_violated(program, sides, violation) else {
-            complete = true;
-            break;
-        };
-        let bound = candidate.bound;
-        let taken_in = program
-            .dual
-            .satisfy(span.ocp, program.factors, &candidate, None);
-        let newest = program.dual.working.rows().last();
-        if taken_in.is_err() || newest.is_none_or(|row| row.active.bound != bound) {
-            break;
-        }
-        let v = &program.dual.v;
-        newton::roll_out(&span, program.factors, v, (program.u, program.x));
-        let trajectory = Trajectory {
-            x: program.x,
-            u: program.u,
-        };
-        newton::measure(&span, sides, &trajectory);
-    }
+    let left = program.most_spent.saturating_sub(program.spent.get());
+    let tolerance = program.dual.tolerance;
+    program.dual.reset(tolerance, left.min(NX + NU));
+    let complete = take_in_violated(program, sides, violation);
+    program
+        .spent
+        .set(program.spent.get() + program.dual.changes);
     if complete {
         for side in sides.iter_mut() {
             side.role = side.last_role;
@@ -61,8 +45,47 @@ pub(super) fn complete<T: Scalar, const NX: usize, const NU: usize>(
             }
         }
     }
-    program.dual.begin_again();
+    program.dual.reset(tolerance, 0);
+    if !complete {
+        roll_out(program, sides);
+    }
     complete
+}
+
+/// Takes in one side after the other that is free in the guess and violated; whether none is left, before the changes run out.
+fn take_in_violated<T: Scalar, const NX: usize, const NU: usize>(
+    program: &mut Program<'_, T, NX, NU>,
+    sides: &mut [BoundSide<T>],
+    violation: T,
+) -> bool {
+    while let Some(candidate) = most_violated(program, sides, violation) {
+        let taken_in = program
+            .dual
+            .satisfy(program.span.ocp, program.factors, &candidate, None);
+        let newest = program.dual.working.rows().last();
+        if taken_in.is_err() || newest.is_none_or(|row| row.active.bound != candidate.bound) {
+            return false;
+        }
+        roll_out(program, sides);
+    }
+    true
+}
+
+/// The trajectory with the deviations of the dual method, and the distances of the sides on it.
+fn roll_out<T: Scalar, const NX: usize, const NU: usize>(
+    program: &mut Program<'_, T, NX, NU>,
+    sides: &mut [BoundSide<T>],
+) {
+    let Program {
+        span,
+        dual,
+        factors,
+        u,
+        x,
+        ..
+    } = program;
+    newton::roll_out(span, factors, &dual.v, (u, x));
+    measure(program, sides, rounding());
 }
 
 /// Of the sides that are free in the guess the one that is violated most beside its size.
@@ -99,6 +122,7 @@ mod tests {
     use crate::many_bounds::span::Span;
     use crate::memory::Capacity;
     use crate::ocp::Ocp;
+    use crate::rows::Trajectory;
     use crate::solution::Solution;
     use crate::solver::Solver;
     use crate::solver_settings::SolverSettings;
@@ -172,12 +196,16 @@ mod tests {
                 };
                 newton::measure(&span, &mut sides, &trajectory);
                 reassign(&mut sides, 1e-9, f64::INFINITY);
-                let before: Vec<_> = sides.iter().map(|side| side.role).collect();
+                let roles =
+                    |sides: &[BoundSide<f64>]| sides.iter().map(|s| s.role).collect::<Vec<_>>();
+                let before = (roles(&sides), program.u.to_vec(), program.x.to_vec());
                 if !complete(&mut program, &mut sides, 1e-9) {
-                    assert!(sides.iter().map(|side| side.role).eq(before), "{seed}");
+                    let after = (roles(&sides), program.u.to_vec(), program.x.to_vec());
+                    assert_eq!(after, before, "{seed}");
                     too_many += 1;
                     continue;
                 }
+                assert!(program.spent.get() <= NX + NU);
                 let held = || sides.iter().filter(|side| side.role == Role::Held);
                 assert_eq!(held().count(), active.len(), "{seed}");
                 for side in held() {

@@ -22,6 +22,7 @@ use crate::ocp::Ocp;
 use crate::riccati::StageFactor;
 use crate::rows::Trajectory;
 use crate::small_matrix::{largest, product};
+use core::cell::Cell;
 use core::mem::swap;
 use nalgebra::{SVector, convert};
 
@@ -111,8 +112,12 @@ fn largest_cost<T: Scalar, const NX: usize, const NU: usize>(
 /// What the search works on.
 pub(super) struct Program<'a, T: 'static, const NX: usize, const NU: usize> {
     pub span: Span<'a, T, NX, NU>,
-    /// Its rows complete guesses; its deviations are anybody's in between.
+    /// Completes guesses, for which it is at its start; in between `v` is scratch memory.
     pub dual: &'a mut DualActiveSet<T, NU>,
+    /// Changes of the active set so far,
+    pub spent: &'a Cell<usize>,
+    /// and how many there may be when a guess has been completed.
+    pub most_spent: usize,
     pub factors: &'a mut [StageFactor<T, NX, NU>],
     pub u: &'a mut [SVector<T, NU>],
     pub x: &'a mut [SVector<T, NX>],
@@ -243,6 +248,8 @@ pub(super) fn exchange<T: Scalar, const NX: usize, const NU: usize>(
                 continue;
             }
             completions = 0;
+            residual = explain(program, sides);
+            wrong = reassign(sides, loose, loose * residual.largest);
         }
         let unexplained = residual.rest > loose * residual.largest;
         if closely && !careful && unexplained && (1..=NEARLY_RIGHT).contains(&wrong) {
@@ -355,13 +362,13 @@ fn is_of_the_plant<T: Scalar, const NX: usize, const NU: usize>(
         })
 }
 
-fn rounding<T: Scalar>() -> T {
+pub(super) fn rounding<T: Scalar>() -> T {
     T::default_epsilon() * convert(ROUNDING)
 }
 
 /// Measures the sides on the trajectory. Of what is held, `rounding` is no distance: the weight would make
 /// much of it.
-fn measure<T: Scalar, const NX: usize, const NU: usize>(
+pub(super) fn measure<T: Scalar, const NX: usize, const NU: usize>(
     program: &Program<'_, T, NX, NU>,
     sides: &mut [BoundSide<T>],
     rounding: T,

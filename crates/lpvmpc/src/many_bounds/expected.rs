@@ -13,13 +13,15 @@ const MANY: usize = 24;
 /// So many where some are soft, which takes more factorisations, or those of a single input are known, with which the
 /// dual method begins.
 const MORE: usize = 32;
-/// So many of several inputs of which nothing is known.
+/// So many of several inputs where no bounds are known.
 const MANY_UNKNOWN: usize = 20;
-/// Of several inputs no fewer than so many beside one for each state and input: the more of these, the longer a factorisation
-/// takes beside a pass;
+/// Of several inputs all of these are at least so many more than there are states and inputs: the more of these, the longer a
+/// factorisation takes beside a pass;
 const BESIDE: usize = 10;
-/// where some are soft, so many.
+/// where some are soft, so many more.
 const BESIDE_SOFT: usize = 20;
+/// [`MANY_LIMITS`] of a large plant.
+const MANY_LIMITS_OF_LARGE: usize = 44;
 /// Where more states are bounded than there are inputs, as speeds and accelerations are beside a position, most of what is
 /// violated is not active in the answer: below so many, or as many of a single input as above, the dual method is given
 const MANY_LIMITS: usize = 56;
@@ -29,8 +31,6 @@ const CHANGES_FIRST: usize = 64;
 const CHANGES_OF_ONE: usize = 32;
 /// which it begins with in less time than the interior-point method finds them while they are fewer than these.
 const MANY_KNOWN: usize = 64;
-/// Of a large plant it is given them below so many.
-const MANY_LIMITS_OF_LARGE: usize = 44;
 /// So many soft ones of a single input, where all that can hold are violated: the dual method adds and drops them again.
 const ALL_SOFT: usize = 20;
 /// And so many inputs that the regulator saturates, where there is one of each stage.
@@ -109,13 +109,13 @@ impl Expected {
             soft,
         } = *violated;
         let takes_more = soft || NU == 1 && known > 0;
-        let entries = if NU > 1 { NX + NU } else { 0 };
+        let states_and_inputs = if NU > 1 { NX + NU } else { 0 };
         let enough = match (NU == 1 && soft, known) {
             (true, 0) => ocp.length().clamp(ALL_SOFT, MORE),
             (true, _) => ALL_SOFT,
-            (false, _) if takes_more => MORE.max(BESIDE_SOFT + entries),
-            (false, 0) if NU > 1 => MANY_UNKNOWN.max(BESIDE + entries),
-            (false, _) => MANY.max(BESIDE + entries),
+            (false, _) if takes_more => MORE.max(BESIDE_SOFT + states_and_inputs),
+            (false, 0) if NU > 1 => MANY_UNKNOWN.max(BESIDE + states_and_inputs),
+            (false, _) => MANY.max(BESIDE + states_and_inputs),
         };
         // Where several inputs act together, general rows that were active are taken over one by one in less time.
         let rows = NU > 1 && guess::mostly_rows(last);

@@ -12,6 +12,7 @@ use crate::riccati::StageFactor;
 use crate::solver::Solver;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::cell::Cell;
 use nalgebra::SVector;
 
 /// What a program works with, for as many stages and rows of the dual method as there is room for.
@@ -19,6 +20,7 @@ pub(super) struct Fixture<const NX: usize, const NU: usize> {
     solver: Solver<f64, NX, NU>,
     places: [ManyBoundsPlace<f64, NX, NU>; 2],
     unknowns: Vec<BoundUnknowns<f64>>,
+    spent: Cell<usize>,
 }
 
 impl<const NX: usize, const NU: usize> Fixture<NX, NU> {
@@ -32,6 +34,7 @@ impl<const NX: usize, const NU: usize> Fixture<NX, NU> {
             solver: Solver::allocate(room),
             places: [place(), place()],
             unknowns: vec![BoundUnknowns::empty(); 2 * (NX + NU) * (room.stages + 1)],
+            spent: Cell::new(0),
         }
     }
 
@@ -41,6 +44,8 @@ impl<const NX: usize, const NU: usize> Fixture<NX, NU> {
         Program {
             span,
             dual: &mut self.solver.dual,
+            spent: &self.spent,
+            most_spent: usize::MAX,
             factors: &mut place.factors,
             u: &mut place.u,
             x: &mut place.x,

@@ -298,6 +298,7 @@ mod tests {
     use crate::many_bounds::{residual, side};
     use crate::ocp::{GeneralRow, Penalty};
     use crate::solution::Side;
+    use crate::transposed::Transposed;
     use alloc::vec;
     use lpvmpc_testkit::rng::Rng;
     use nalgebra::SMatrix;
@@ -348,6 +349,26 @@ mod tests {
         let size = 1.0 + held.quadratic.amax() + held.linear.amax();
         assert!((passed.quadratic - held.quadratic).amax() < 1e-14 * size);
         assert!((passed.linear - held.linear).amax() < 1e-13 * size);
+        // What is kept transposed changes no step and no product.
+        let kept = [Transposed::of(&ocp.stages[1])];
+        let both_ways = stage.with(&kept, 0);
+        let (mut factor, mut cost) = (StageFactor::zeros(), before);
+        let eliminated = factor.eliminate_adjusted(both_ways, weights, &mut cost, None);
+        assert_eq!(eliminated, Ok(()));
+        let (mut same, mut same_cost) = (StageFactor::zeros(), before);
+        assert_eq!(same.eliminate(&stage, weights, &mut same_cost), Ok(()));
+        assert!((factor.feedback - same.feedback).amax() < 1e-12);
+        assert!((cost.quadratic - same_cost.quadratic).amax() < 1e-13 * size);
+        let mut cost = before;
+        factor.pass(both_ways, weights, &mut cost, &input);
+        assert!((cost.quadratic - passed.quadratic).amax() < 1e-14 * size);
+        assert!((cost.linear - passed.linear).amax() < 1e-13 * size);
+        let v = SVector::<f64, NX>::from_fn(|_, _| random.uniform(-1.0, 1.0));
+        let (a, b) = (ocp.stages[1].a.transpose(), ocp.stages[1].b.transpose());
+        assert!((both_ways.transposed_a_times(&v) - a * v).amax() < 1e-14 * NX as f64);
+        assert!((both_ways.transposed_b_times(&v) - b * v).amax() < 1e-14 * NX as f64);
+        let sizes = b.abs() * v.abs();
+        assert!((both_ways.transposed_b_sizes(&v) - sizes).amax() < 1e-14 * NX as f64);
         // One that is not held is left to the minimum, though another be held on both sides.
         for side in &mut sides {
             side.role = match side.input() {

@@ -207,8 +207,9 @@ pub(super) fn collect<T: Scalar, const NX: usize, const NU: usize>(
             }
         }
         for (j, row) in ocp.rows_of(i).iter().enumerate() {
-            // Nor whether a row that is NaN is met, be it without limits.
-            if !row.x.iter().chain(row.u.iter()).all(|of| of.is_finite()) {
+            // A row with a coefficient that is not finite is left to the dual method, which says so, be it without limits.
+            let of_input = row.u.iter().filter(|_| i < n);
+            if !row.x.iter().chain(of_input).all(|of| of.is_finite()) {
                 return None;
             }
             add(i, Quantity::Row(j), (row.lower, row.upper), row.soft)?;

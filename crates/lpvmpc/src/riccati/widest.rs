@@ -7,7 +7,8 @@ use crate::products::Vectors;
 use crate::transposed::StageBothWays;
 use nalgebra::SVector;
 
-/// A backward step; by itself for a stage of which nothing is `KEPT` transposed.
+/// A backward step. Whether something may be `KEPT` of the stage transposed is known to the compiler, which leaves out what is
+/// not needed.
 pub(super) struct Elimination<'a, T, const NX: usize, const NU: usize, const KEPT: bool> {
     pub factor: &'a mut StageFactor<T, NX, NU>,
     pub stage: StageBothWays<'a, T, NX, NU>,

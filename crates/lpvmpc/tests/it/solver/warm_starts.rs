@@ -1,8 +1,8 @@
 //! Sequences of problems as in a loop, each begun with the last answer: what it saves, and what it must not cost.
 
 use super::support::cold;
-use lpvmpc::{Capacity, Ocp, Solution, Solver, SolverSettings, WarmStart};
-use lpvmpc_sequences::{Kind, Recipe};
+use lpvmpc::{Capacity, Ocp, Solution, Solver, SolverSettings, Status, WarmStart};
+use lpvmpc_sequences::{Kind, Recipe, working_memory};
 
 /// A solver and its answer for sequences of up to `stages` stages.
 struct Loop<const NX: usize, const NU: usize> {
@@ -209,6 +209,34 @@ fn a_guess_that_misses_a_few_bounds_is_completed() {
     });
     println!("{with} for {without}");
     assert!(10 * with < 9 * without, "{with} for {without}");
+}
+
+/// What completes guesses counts: however few changes there may be, there are no more.
+#[test]
+fn completed_guesses_take_no_more_changes_than_there_may_be() {
+    let recipe = Recipe {
+        kind: Kind::Motion,
+        horizon: 20,
+        samples: 12,
+        share: 0.6,
+        seed: 3,
+    };
+    let problems = recipe.make::<16, 6>().unwrap().problems;
+    let room = working_memory(&problems);
+    let mut ended = 0;
+    for most in (20..600).step_by(20) {
+        let settings = SolverSettings {
+            max_changes: Some(most),
+            ..SolverSettings::default()
+        };
+        let (mut solver, mut solution) = (Solver::allocate(room), Solution::allocate(room));
+        for ocp in &problems {
+            solver.solve(ocp, &settings, &mut solution);
+            assert!(solution.changes <= most, "{} of {most}", solution.changes);
+            ended += usize::from(solution.status == Status::MaxChanges);
+        }
+    }
+    assert!(ended > 50, "{ended}");
 }
 
 /// What a guess of soft bounds has taken in vain says nothing of the interior-point method after it, and one that was almost
