@@ -122,7 +122,6 @@ mod tests {
     use crate::many_bounds::span::Span;
     use crate::memory::Capacity;
     use crate::ocp::Ocp;
-    use crate::rows::Trajectory;
     use crate::solution::Solution;
     use crate::solver::Solver;
     use crate::solver_settings::SolverSettings;
@@ -189,12 +188,7 @@ mod tests {
                 let span = Span::whole(&ocp, &[]);
                 let mut program = fixture.program(span);
                 newton::factorize(&span, &sides, program.factors).unwrap();
-                newton::roll_out(&span, program.factors, &[], (program.u, program.x));
-                let trajectory = Trajectory {
-                    x: program.x,
-                    u: program.u,
-                };
-                newton::measure(&span, &mut sides, &trajectory);
+                roll_out(&mut program, &mut sides);
                 reassign(&mut sides, 1e-9, f64::INFINITY);
                 let roles =
                     |sides: &[BoundSide<f64>]| sides.iter().map(|s| s.role).collect::<Vec<_>>();
