@@ -9,18 +9,20 @@ use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::rows::{self, Trajectory};
 use crate::solution::{ActiveRow, Part, Side, Solution, Status};
-use crate::solver::{DOUBT, Solver, Start, trajectory};
+use crate::solver::{Solver, Start, trajectory};
 use crate::solver_settings::{SolverSettings, WarmStart};
 use nalgebra::convert;
 
 /// Fewer bounds are as well rows.
 const FEWEST: usize = 3;
-/// More are for the phase for many bounds; what rounds along so many held states is no answer as a rule.
-const MOST: usize = 16;
 /// A guess that takes more changes is no good.
 const MOST_CHANGES: usize = 4;
 /// So many guesses, each from the answer to the one before.
 const MOST_GUESSES: usize = 2;
+/// Fewer bounds are found from nothing in less time than a second guess takes.
+const FEWEST_TWICE: usize = 8;
+/// A microcontroller has no flash for what saves time where bounds change all the time, or horizons are long.
+const THRIFTY: bool = cfg!(not(feature = "alloc"));
 /// A bound whose multiplier is less than this part of the largest may be gone, and is found at less cost than let go.
 const FADING: f64 = 1e-3;
 /// So many times the rounding of a number are the rounding of a pass along the horizon.
@@ -40,23 +42,32 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         shift: usize,
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), (usize, WarmStart)> {
-        let begun = &mut solution.active;
-        let wrong_lately = begun.doubted.max(begun.not_held) > 0;
-        begun.not_held = begun.not_held.saturating_sub(1);
-        if wrong_lately || !self.has_room(ocp, solution) || !self.hold_last(ocp, shift, solution) {
+        let active = &mut solution.active;
+        // A few that changed lately may have changed again.
+        let lasting = THRIFTY || active.doubted == 0 || active.len() >= FEWEST_TWICE;
+        if !(active.holds.are_due()
+            && lasting
+            && self.has_room(ocp, solution)
+            && self.hold_last(ocp, shift, solution))
+        {
             return Err((0, settings.warm_start));
+        }
+        if !THRIFTY && let Some(phase) = self.many_bounds.first_mut() {
+            phase.begin(Some(solution));
         }
         self.begin(ocp, settings);
         self.dual.allow_at_most(MOST_CHANGES);
         let (mut spent, mut begin_with) = (0, settings.warm_start);
-        let mut solved = false;
-        for _ in 0..MOST_GUESSES {
+        let (mut guesses, mut solved, mut rounded) = (0, false, false);
+        while guesses < MOST_GUESSES {
+            guesses += 1;
             let searched = self
                 .factorize(ocp)
                 .and_then(|()| self.roll_out(ocp, solution))
                 .and_then(|()| self.search(ocp, Start::Held, solution));
             spent += self.dual.changes;
-            if searched.is_err() {
+            if let Err(status) = searched {
+                rounded = !matches!(status, Status::MaxChanges);
                 break;
             }
             begin_with = WarmStart::Same;
@@ -68,7 +79,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 solved = self.is_answer(ocp, &verdict, solution);
                 break;
             }
-            solution.active.not_held = DOUBT;
             self.dual.begin_again();
             if !self.hold_last(ocp, 0, solution) {
                 break;
@@ -77,10 +87,23 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         self.held.release_all();
         solution.changes = spent;
         solution.status = Status::Solved;
+        let few = solution.active.len() < FEWEST_TWICE;
+        let holds = &mut solution.active.holds;
+        if rounded || THRIFTY && !solved {
+            // What grows along so many held states does so in the next samples, too.
+            holds.give_up();
+        } else if !THRIFTY {
+            holds.learn_of_dear(solved && (guesses == 1 || !few));
+        }
         if solved {
             return Ok(());
         }
-        solution.active.not_held = DOUBT;
+        if !THRIFTY
+            && begin_with == settings.warm_start
+            && let Some(phase) = self.many_bounds.first()
+        {
+            phase.restore(solution);
+        }
         Err((spent, begin_with))
     }
 
@@ -92,7 +115,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         solution: &Solution<T, NX, NU>,
     ) -> bool {
         let active = &solution.active;
-        if !(FEWEST..=MOST).contains(&active.len()) {
+        if active.len() < FEWEST {
             return false;
         }
         self.held.release_all();

@@ -98,6 +98,7 @@ mod products;
 
 mod ramp;
 mod regulator;
+mod retries;
 pub mod riccati;
 mod rows;
 mod settings;

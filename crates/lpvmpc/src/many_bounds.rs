@@ -22,7 +22,6 @@ mod last_answer;
 mod memory;
 mod newton;
 mod residual;
-mod retries;
 mod roles;
 mod search;
 mod side;
@@ -37,6 +36,7 @@ pub(crate) use turns::cap_with_later_turn;
 use crate::list::List;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
+use crate::retries::Retries;
 use crate::riccati::StageFactor;
 use crate::solution::{Solution, Status};
 use crate::solver::{Solver, trajectory};
@@ -49,7 +49,6 @@ use expected::{Expected, Violated};
 use interior_point::{AllUnknowns, BoundUnknowns};
 use last_answer::{Kind, LastAnswer};
 use nalgebra::SVector;
-use retries::AllRetries;
 use search::search;
 use side::{BoundSide, Role};
 use span::Span;
@@ -86,6 +85,19 @@ pub(crate) struct ManyBounds<T: 'static, const NX: usize, const NU: usize> {
     put_off: bool,
     /// The solver with it.
     pub in_turns: InTurns<T, NX, NU>,
+}
+
+/// What has come to nothing in the solves before.
+#[derive(Clone, Copy, Debug, Default)]
+struct AllRetries {
+    /// The last answer's bounds, once more.
+    repeats: Retries,
+    /// The same, without a solution of the end of the horizon by itself.
+    without_end: Retries,
+    /// The inputs that the regulator saturates.
+    saturations: Retries,
+    /// The phase as a whole.
+    turns: Retries,
 }
 
 /// With so many states and inputs a factorisation takes many times as long as a row of the dual method: between 8x2, where that
@@ -155,7 +167,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
 
     /// Takes down what a solve overwrites: the states of the last answer, if bounds are active in it, as long as nothing
     /// else needs the place. Without an answer to go on from, nothing is known of the solves before.
-    fn begin(&mut self, last: Option<&Solution<T, NX, NU>>) {
+    pub fn begin(&mut self, last: Option<&Solution<T, NX, NU>>) {
         match last {
             None => self.retries = AllRetries::default(),
             Some(last) if last.active.is_empty() => {}
@@ -164,6 +176,12 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
                 copy(&mut place.x, &last.x);
             }
         }
+    }
+
+    /// Puts back what was taken down.
+    pub fn restore(&self, solution: &mut Solution<T, NX, NU>) {
+        let [place, _] = &self.places;
+        copy(&mut solution.x, &place.x);
     }
 
     /// Solves the problem, or proves that it is infeasible; counts changes of the active set. A turn begins with the
@@ -245,25 +263,29 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             unknowns: AllUnknowns::new(&mut self.unknowns),
         };
         let mut found = false;
-        if let Some(shift) = shift.filter(|_| known > 0) {
+        let known_at = shift.filter(|_| known > 0);
+        let repeated =
+            known_at.filter(|_| expected.worth_repeating && self.retries.repeats.are_due());
+        if let Some(shift) = repeated {
             guess::again(sides, &solution.active, shift);
-            if expected.worth_repeating && self.retries.repeats.are_due() {
-                let last = LastAnswer {
-                    kind: Kind::new::<T, NU>(sides, expected.rows),
-                    shift,
-                    trials,
-                };
-                let found_by = (&*solver.factors, &mut solution.active);
-                let without_end = &mut self.retries.without_end;
-                found = last.repeat(
-                    &mut program,
-                    sides,
-                    &tolerances,
-                    found_by,
-                    without_end,
-                    &mut count,
-                );
-                self.retries.repeats.learn(found);
+            let last = LastAnswer {
+                kind: Kind::new::<T, NU>(sides, expected.rows),
+                shift,
+                trials,
+            };
+            let found_by = (&*solver.factors, &mut solution.active);
+            let without_end = &mut self.retries.without_end;
+            found = last.repeat(
+                &mut program,
+                sides,
+                &tolerances,
+                found_by,
+                without_end,
+                &mut count,
+            );
+            match is_large::<NX, NU>() {
+                true => self.retries.repeats.learn_of_dear(found),
+                false => self.retries.repeats.learn(found),
             }
         }
         if !found && expected.saturated {
@@ -273,10 +295,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             self.retries.saturations.learn(found);
         }
         let guessed = spent.get();
-        let outcome = if found {
-            Some(Ok(()))
-        } else if !expected.search_is_due() {
-            None
+        let searched = !found && expected.search_is_due();
+        let outcome = if !searched {
+            found.then_some(Ok(()))
         } else {
             newton::measure(&whole, sides, &trajectory(solution));
             let proof = &mut solution.active;
@@ -305,7 +326,13 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         solver.dual.reset(solver.dual.tolerance, left);
         // What it was made from was finite.
         solver.roll_out(ocp, solution).ok();
-        guess::known(sides);
+        match known_at {
+            // Nothing was made of them yet.
+            Some(shift) if repeated.is_none() && !(found || searched) => {
+                guess::again(sides, &solution.active, shift);
+            }
+            _ => guess::known(sides),
+        }
         list(sides, &mut solution.active);
         AtOnce::InVain(expected.changes_first.filter(|_| self.put_off))
     }

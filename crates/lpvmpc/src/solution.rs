@@ -6,6 +6,7 @@ use crate::list::List;
 use crate::memory::Capacity;
 use crate::model::Scalar;
 use crate::preview::PreviewError;
+use crate::retries::Retries;
 use crate::working_set::{copy, first};
 use core::fmt;
 use nalgebra::SVector;
@@ -109,8 +110,8 @@ pub struct ActiveSet<T: 'static> {
     len: usize,
     /// For so many solves more its rows are not expected to be active again unless they are violated.
     pub(crate) doubted: u8,
-    /// And for so many they are not held by the factorisation.
-    pub(crate) not_held: u8,
+    /// When they are held by the factorisation.
+    pub(crate) holds: Retries,
 }
 
 impl<T: Scalar> PartialEq for ActiveSet<T> {
@@ -193,7 +194,7 @@ impl<T: Scalar> ActiveSet<T> {
             rows,
             len: 0,
             doubted: 0,
-            not_held: 0,
+            holds: Retries::default(),
         }
     }
 
@@ -208,7 +209,7 @@ impl<T: Scalar> ActiveSet<T> {
         copy(&mut self.rows, &other.rows);
         self.len = other.len.min(self.rows.len());
         self.doubted = other.doubted;
-        self.not_held = other.not_held;
+        self.holds = other.holds;
     }
 
     /// The active rows, in no particular order.
@@ -431,7 +432,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solution<T, NX, NU> {
         self.status = Status::Solved;
         self.active.clear();
         self.active.doubted = 0;
-        self.active.not_held = 0;
+        self.active.holds = Retries::default();
         self.changes = 0;
     }
 

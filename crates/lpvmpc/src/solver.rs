@@ -13,6 +13,7 @@ use crate::memory::SolverMemory;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::products::{are_in_vectors, in_vectors};
+use crate::retries::Retries;
 use crate::riccati::{CostToGo, StageFactor};
 use crate::rows::Trajectory;
 use crate::solution::{ActiveRow, ActiveSet, Quantity, Side, Solution, Status};
@@ -23,7 +24,7 @@ use nalgebra::SVector;
 /// Up to one change in vain for so many known rows is few. After more of them the known rows are doubted
 const FEW_WASTED: usize = 4;
 /// for so many solves.
-pub(crate) const DOUBT: u8 = 8;
+const DOUBT: u8 = 8;
 
 /// What a search begins with.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -131,7 +132,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         let shift = shift_of_last(settings, solution);
         if shift.is_none() {
             // Nothing is known that could be doubted.
-            (solution.active.doubted, solution.active.not_held) = (0, 0);
+            solution.active.doubted = 0;
+            solution.active.holds = Retries::default();
         }
         let in_turns = self.many_bounds.first().map(|phase| phase.in_turns);
         let outcome = factorized.and_then(|()| match in_turns {

@@ -1,7 +1,6 @@
 //! How many bounds the answer may have, and whether that is worth the phase.
 
-use super::retries::AllRetries;
-use super::{guess, is_large};
+use super::{AllRetries, guess, is_large};
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::rows;
@@ -52,7 +51,7 @@ pub(super) struct Violated {
     /// How many of inputs.
     inputs: usize,
     /// Whether one is soft.
-    soft: bool,
+    pub soft: bool,
 }
 
 impl Violated {

@@ -4,11 +4,11 @@
 use super::exchange::{Patience, Program, Tolerances, exchange};
 use super::guess::{self, TAIL};
 use super::newton;
-use super::retries::Retries;
 use super::search::search;
 use super::side::{self, BoundSide};
 use super::span::Span;
 use crate::model::Scalar;
+use crate::retries::Retries;
 use crate::riccati::StageFactor;
 use crate::rows::Trajectory;
 use crate::solution::ActiveSet;
@@ -20,6 +20,15 @@ const TAIL_SOFT: usize = 4;
 const LONGEST_SOFT: usize = 24;
 /// So many stages at least are worth a solution of their own.
 const SHORTEST: usize = 6;
+
+/// Over fewer stages in all than have such an end, soft bounds of a sample before are of no use: they are found anew in less
+/// time.
+pub(super) const fn shortest_with_soft<const NU: usize>() -> usize {
+    match NU {
+        1 => TAIL * SHORTEST,
+        _ => TAIL_SOFT * SHORTEST,
+    }
+}
 
 /// What the bounds that were active have in common.
 #[derive(Clone, Copy, PartialEq, Eq)]

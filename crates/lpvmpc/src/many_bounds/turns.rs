@@ -1,6 +1,7 @@
 //! The phase for many bounds and the dual method in turns.
 
 use super::expected::Violated;
+use super::last_answer::shortest_with_soft;
 use super::{MOST_FACTORISATIONS, ManyBounds, SHARE};
 use crate::list::List;
 use crate::model::Scalar;
@@ -85,6 +86,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             true => kept_for_later_turn(self.dual.changes_left(), NX + NU),
             false => 0,
         };
+        if ocp.length() < shortest_with_soft::<NU>()
+            && violated.is_some_and(|violated| violated.soft)
+        {
+            shift = shift.filter(|&shift| shift == 0);
+        }
         let at_once = violated.map_or(AtOnce::Untried, |violated| {
             self.solve_at_once(ocp, shift, solution, (Turn::First(violated), spent))
         });

@@ -144,13 +144,17 @@ fn the_end_of_the_horizon_is_solved_by_itself() {
 }
 
 /// Over a short horizon, too, the last answer costs nothing: the end is worth a solution of its own for rows, and soft
-/// bounds are not guessed.
+/// bounds, which were found in up to 1.1 times as many changes with it as without, are found as from nothing.
 #[test]
 fn over_a_short_horizon_the_last_answer_costs_nothing() {
     let [with, without] = of_three::<12, 4>(Kind::Rows, 20);
     assert!(with < without, "{with} for {without}");
-    let [with, without] = of_three::<12, 4>(Kind::Soft, 20);
-    assert!(with <= without, "{with} for {without}");
+    for [with, without] in [
+        of_three::<12, 4>(Kind::Soft, 20),
+        of_three::<8, 2>(Kind::Soft, 20),
+    ] {
+        assert_eq!(with, without);
+    }
 }
 
 /// A few active bounds that change from sample to sample are begun with only where the trajectory without bounds
@@ -239,20 +243,25 @@ fn completed_guesses_take_no_more_changes_than_there_may_be() {
     assert!(ended > 50, "{ended}");
 }
 
-/// What a guess of soft bounds has taken in vain says nothing of the interior-point method after it, and one that was almost
-/// right is no better than another: where it was thought so, eight sequences took 1.07 times as many changes as from nothing.
+/// Soft bounds of a single input are guessed where the end of the horizon is worth a solution of its own, which saves a third of
+/// the changes. Where it is not, a guess made it 1.07 times as many as from nothing.
 #[test]
-fn soft_bounds_of_a_single_input_are_guessed_as_long_as_that_pays() {
-    let counts = (1..=8).map(|seed| {
-        changes::<4, 1>(Recipe {
-            kind: Kind::Soft,
-            horizon: 20,
-            samples: 24,
-            share: 0.8,
-            seed,
-        })
-    });
-    let [with, without] = counts.fold([0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
+fn soft_bounds_of_a_single_input_are_guessed_where_that_pays() {
+    let of_eight = |horizon| {
+        let counts = (1..=8).map(|seed| {
+            changes::<4, 1>(Recipe {
+                kind: Kind::Soft,
+                horizon,
+                samples: 24,
+                share: 0.8,
+                seed,
+            })
+        });
+        counts.fold([0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]])
+    };
+    let [with, without] = of_eight(48);
+    assert!(3 * with < 2 * without, "{with} for {without}");
+    let [with, without] = of_eight(20);
     assert!(with < without, "{with} for {without}");
 }
 
