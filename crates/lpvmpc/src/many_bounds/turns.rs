@@ -121,8 +121,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             self.factorize(ocp)?;
             self.roll_out(ocp, solution)?;
             let later = (Turn::Later, &mut *spent);
-            if let AtOnce::Done(outcome) = self.solve_at_once(ocp, shift, solution, later) {
-                return outcome;
+            match self.solve_at_once(ocp, shift, solution, later) {
+                AtOnce::Done(outcome) => return outcome,
+                AtOnce::InVain(_) => shift = Some(0),
+                AtOnce::Untried => {}
             }
             if !long {
                 return one_by_one;

@@ -409,3 +409,19 @@ fn bounds_that_bind_each_other_are_exchanged_while_that_helps() {
         .all(|(found, limit)| *found <= limit);
     assert!(within, "{found:?}");
 }
+
+/// Where rounding ends the interior-point method, the dual method begins with what is foretold, though bounds of the samples
+/// before did not hold again, and though it was begun late. That was not so once: without most of what was foretold, samples
+/// took 1000 to 1800 changes for 300 to 500 from nothing.
+#[test]
+fn what_is_foretold_is_begun_with_though_known_bounds_are_doubted() {
+    let recipe = Recipe {
+        kind: Kind::Motion,
+        horizon: 200,
+        samples: 20,
+        share: 0.8,
+        seed: 13,
+    };
+    let [with, without] = changes::<6, 1>(recipe);
+    assert!(2 * with < 3 * without, "{with} for {without}");
+}
