@@ -19,8 +19,10 @@ const FEWEST: usize = 3;
 const MOST_CHANGES: usize = 4;
 /// So many guesses, each from the answer to the one before.
 const MOST_GUESSES: usize = 2;
-/// Fewer bounds are found from nothing in less time than a second guess takes.
+/// Fewer bounds are found from nothing in less time than two guesses take.
 const FEWEST_TWICE: usize = 8;
+/// Fewer that changed lately are not held.
+const FEWEST_DOUBTED: usize = 8;
 /// A microcontroller has no flash for what saves time where bounds change all the time, or horizons are long.
 const THRIFTY: bool = cfg!(not(feature = "alloc"));
 /// A bound whose multiplier is less than this part of the largest may be gone, and is found at less cost than let go.
@@ -43,10 +45,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), (usize, WarmStart)> {
         let active = &mut solution.active;
-        // A few that changed lately may have changed again.
-        let lasting = THRIFTY || active.doubted == 0 || active.len() >= FEWEST_TWICE;
+        let doubted = active.doubted;
+        let too_few = !THRIFTY && doubted > 0 && active.len() < FEWEST_DOUBTED;
         if !(active.holds.are_due()
-            && lasting
+            && !too_few
             && self.has_room(ocp, solution)
             && self.hold_last(ocp, shift, solution))
         {
@@ -58,7 +60,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         self.begin(ocp, settings);
         self.dual.allow_at_most(MOST_CHANGES);
         let (mut spent, mut begin_with) = (0, settings.warm_start);
-        let (mut guesses, mut solved, mut rounded) = (0, false, false);
+        let (mut guesses, mut answered) = (0, false);
+        let (mut solved, mut rounded) = (false, false);
         while guesses < MOST_GUESSES {
             guesses += 1;
             let searched = self
@@ -67,16 +70,17 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 .and_then(|()| self.search(ocp, Start::Held, solution));
             spent += self.dual.changes;
             if let Err(status) = searched {
-                rounded = !matches!(status, Status::MaxChanges);
+                rounded = matches!(status, Status::NumericalFailure { .. } | Status::NotFinite);
                 break;
             }
-            begin_with = WarmStart::Same;
+            (answered, begin_with) = (true, WarmStart::Same);
             let Solution { x, u, active, .. } = solution;
             let point = Trajectory { x, u };
             let tolerance = self.dual.tolerance;
             let verdict = self.held.release(ocp, Some(&point), active, tolerance);
             if !verdict.released {
                 solved = self.is_answer(ocp, &verdict, solution);
+                rounded = !(THRIFTY || solved);
                 break;
             }
             self.dual.begin_again();
@@ -93,16 +97,17 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             // What grows along so many held states does so in the next samples, too.
             holds.give_up();
         } else if !THRIFTY {
-            holds.learn_of_dear(solved && (guesses == 1 || !few));
+            holds.learn_costly(solved && (guesses == 1 || !few));
         }
         if solved {
             return Ok(());
         }
-        if !THRIFTY
-            && begin_with == settings.warm_start
-            && let Some(phase) = self.many_bounds.first()
-        {
-            phase.restore(solution);
+        if !THRIFTY {
+            // What was found on the way is no reason to doubt less.
+            solution.active.doubted = doubted;
+            if !answered && let Some(phase) = self.many_bounds.first() {
+                phase.restore(solution);
+            }
         }
         Err((spent, begin_with))
     }

@@ -178,7 +178,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         }
     }
 
-    /// Puts back what was taken down.
+    /// Puts back what was taken down, after a guess in vain.
     pub fn restore(&self, solution: &mut Solution<T, NX, NU>) {
         let [place, _] = &self.places;
         copy(&mut solution.x, &place.x);
@@ -284,7 +284,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
                 &mut count,
             );
             match is_large::<NX, NU>() {
-                true => self.retries.repeats.learn_of_dear(found),
+                true => self.retries.repeats.learn_costly(found),
                 false => self.retries.repeats.learn(found),
             }
         }
@@ -294,10 +294,17 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
             found = exchange(&mut program, sides, &tolerances, Patience::FAR, || count(n));
             self.retries.saturations.learn(found);
         }
+        if !found
+            && repeated.is_none()
+            && let Some(shift) = known_at
+        {
+            guess::again(sides, &solution.active, shift);
+        }
         let guessed = spent.get();
-        let searched = !found && expected.search_is_due();
-        let outcome = if !searched {
-            found.then_some(Ok(()))
+        let outcome = if found {
+            Some(Ok(()))
+        } else if !expected.search_is_due() {
+            None
         } else {
             newton::measure(&whole, sides, &trajectory(solution));
             let proof = &mut solution.active;
@@ -326,13 +333,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         solver.dual.reset(solver.dual.tolerance, left);
         // What it was made from was finite.
         solver.roll_out(ocp, solution).ok();
-        match known_at {
-            // Nothing was made of them yet.
-            Some(shift) if repeated.is_none() && !(found || searched) => {
-                guess::again(sides, &solution.active, shift);
-            }
-            _ => guess::known(sides),
-        }
+        guess::known(sides);
         list(sides, &mut solution.active);
         AtOnce::InVain(expected.changes_first.filter(|_| self.put_off))
     }

@@ -1,21 +1,21 @@
 //! When something that saves time, if it comes to an answer, is worth a try: not each time, where it comes to nothing time
 //! and again.
 
-/// So many times in vain without an answer are no reason for a pause. After more of them it is tried after 1, 3, 7 and then
-/// 15 samples without.
-const FREE: u8 = 2;
-const MOST: u8 = FREE + 4;
+/// So many failures that no answer has made up for are no reason for a pause. After more of them it is tried after 1, 3, 7 and
+/// then 15 programs without.
+const WITHOUT_PAUSE: u8 = 2;
+const MOST_FAILURES: u8 = WITHOUT_PAUSE + 4;
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Retries {
-    /// How much more often it was in vain than not.
-    misses: u8,
-    /// For how many samples it is not tried.
+    /// Failures that no answer has made up for, up to [`MOST_FAILURES`].
+    failures: u8,
+    /// For how many programs it is not tried.
     pause: u8,
 }
 
 impl Retries {
-    /// Whether it is tried in this sample.
+    /// Whether it is tried now; asked once for each program.
     pub fn are_due(&mut self) -> bool {
         let due = self.pause == 0;
         self.pause = self.pause.saturating_sub(1);
@@ -25,24 +25,24 @@ impl Retries {
     /// Whether it, tried, has led to the answer, and not at too great a cost.
     pub fn learn(&mut self, found: bool) {
         if found {
-            self.misses = self.misses.saturating_sub(1);
+            self.failures = self.failures.saturating_sub(1);
         } else {
-            self.misses = (self.misses + 1).min(MOST);
-            self.pause = (1 << self.misses.saturating_sub(FREE)) - 1;
+            self.failures = (self.failures + 1).min(MOST_FAILURES);
+            self.pause = (1 << self.failures.saturating_sub(WITHOUT_PAUSE)) - 1;
         }
     }
 
-    /// The same of what takes as long in vain as it saves else: there is a pause after the first time.
-    pub fn learn_of_dear(&mut self, found: bool) {
+    /// The same of what costs as much in vain as it saves else: there is a pause after the first failure.
+    pub fn learn_costly(&mut self, found: bool) {
         if !found {
-            self.misses = self.misses.max(FREE);
+            self.failures = self.failures.max(WITHOUT_PAUSE);
         }
         self.learn(found);
     }
 
     /// It is as if it had been in vain time and again.
     pub fn give_up(&mut self) {
-        self.misses = MOST;
+        self.failures = MOST_FAILURES;
         self.learn(false);
     }
 }
@@ -51,7 +51,7 @@ impl Retries {
 mod tests {
     use super::*;
 
-    /// Samples without a try before the next one, of which is learnt.
+    /// Programs without a try before the next one, of which is learnt.
     fn pause(retries: &mut Retries, learn: impl FnOnce(&mut Retries)) -> usize {
         let pause = core::iter::repeat_with(|| retries.are_due()).take_while(|due| !due);
         let pause = pause.count();
@@ -65,7 +65,7 @@ mod tests {
         let pauses = [(); 8].map(|()| pause(&mut retries, |retries| retries.learn(false)));
         assert_eq!(pauses, [0, 0, 0, 1, 3, 7, 15, 15]);
         let mut retries = Retries::default();
-        let pauses = [(); 6].map(|()| pause(&mut retries, |retries| retries.learn_of_dear(false)));
+        let pauses = [(); 6].map(|()| pause(&mut retries, |retries| retries.learn_costly(false)));
         assert_eq!(pauses, [0, 1, 3, 7, 15, 15]);
         let mut retries = Retries::default();
         let pauses = [(); 3].map(|()| pause(&mut retries, Retries::give_up));

@@ -110,7 +110,7 @@ pub struct ActiveSet<T: 'static> {
     len: usize,
     /// For so many solves more its rows are not expected to be active again unless they are violated.
     pub(crate) doubted: u8,
-    /// When they are held by the factorisation.
+    /// When the next program is tried with them held by the factorisation.
     pub(crate) holds: Retries,
 }
 
@@ -455,7 +455,9 @@ mod tests {
     fn a_solution_of_nothing_yet_doubts_nothing() {
         let mut solution = Solution::<f64, 2, 1>::allocate(Capacity::default());
         solution.active.doubted = 3;
+        solution.active.holds.give_up();
         solution.clear();
         assert_eq!(solution.active.doubted, 0);
+        assert!(solution.active.holds.are_due());
     }
 }

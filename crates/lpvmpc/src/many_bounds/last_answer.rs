@@ -21,8 +21,7 @@ const LONGEST_SOFT: usize = 24;
 /// So many stages at least are worth a solution of their own.
 const SHORTEST: usize = 6;
 
-/// Over fewer stages in all than have such an end, soft bounds of a sample before are of no use: they are found anew in less
-/// time.
+/// A shorter horizon has no such end, and soft bounds of the sample before are of no use: they are found anew in less time.
 pub(super) const fn shortest_with_soft<const NU: usize>() -> usize {
     match NU {
         1 => TAIL * SHORTEST,
@@ -161,7 +160,10 @@ impl LastAnswer {
         newton::roll_out(&program.span, factors, &[], (program.u, program.x));
         let (x, u) = (&*program.x, &*program.u);
         newton::measure(&program.span, sides, &Trajectory { x, u });
+        let doubted = proof.doubted;
         let answer = search(program, sides, tolerances, self.trials, proof, count);
+        // Before the end all sides have the roles of the last answer.
+        proof.doubted = doubted;
         matches!(answer, Some(Ok(())))
     }
 }

@@ -91,7 +91,7 @@ pub(super) fn search<T: Scalar, const NX: usize, const NU: usize>(
             // Rounding decides now which of the last few sides hold; the dual method begins with what is foretold.
             let unknowns = &program.unknowns;
             unknowns.visit(sides, |side, known| side.known_role = known.role);
-            // It has not been wrong before.
+            // The doubt was about those of the last answer.
             proof.doubted = 0;
             return None;
         }

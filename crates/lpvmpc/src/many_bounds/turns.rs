@@ -6,7 +6,7 @@ use super::{MOST_FACTORISATIONS, ManyBounds, SHARE};
 use crate::list::List;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
-use crate::solution::{Solution, Status};
+use crate::solution::{Part, Solution, Status};
 use crate::solver::Solver;
 
 /// When it has its turn.
@@ -25,8 +25,9 @@ pub(super) enum AtOnce<T> {
     Untried,
     /// The solution, or the proof that there is none.
     Done(Result<(), Status<T>>),
-    /// Neither: the trajectory without bounds is in the solution, and the active rows are those to begin with: of the last
-    /// solution at their new stages, if they are to be begun with. It has a later turn after so many changes, if any.
+    /// Neither: the trajectory without bounds is in the solution, and the active rows are those to begin with: what is foretold,
+    /// or those of the last solution at their new stages, if they are to be begun with. It has a later turn after so many
+    /// changes, if any.
     InVain(Option<usize>),
 }
 
@@ -88,6 +89,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         };
         if ocp.length() < shortest_with_soft::<NU>()
             && violated.is_some_and(|violated| violated.soft)
+            && solution.active.iter().any(|row| row.part != Part::Hard)
         {
             shift = shift.filter(|&shift| shift == 0);
         }
@@ -123,6 +125,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             let later = (Turn::Later, &mut *spent);
             match self.solve_at_once(ocp, shift, solution, later) {
                 AtOnce::Done(outcome) => return outcome,
+                // Of a search that was long; one that rounding has ended is not begun again.
                 AtOnce::InVain(_) => shift = Some(0),
                 AtOnce::Untried => {}
             }

@@ -189,7 +189,7 @@ fn carts_at_their_limits_take_few_changes() {
                 solution.cost
             );
             assert!(kkt_residual(&ocp, &solution).largest() < 1e-12);
-            if (3..=16).contains(&solution.active.len()) {
+            if solution.active.len() >= 3 {
                 many += 1;
                 few += usize::from(solution.changes <= 1);
             }

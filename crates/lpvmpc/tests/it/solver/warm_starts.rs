@@ -308,7 +308,7 @@ fn guesses_in_vain_are_not_tried_each_time() {
     let mut both = Loop::new(N);
     let without = both.changes(WarmStart::Cold, &sequence.problems);
     let with = both.changes(WarmStart::Shifted, &sequence.problems);
-    // At worst every eighth sample takes two factorisations more; tried each time the guess makes it 1.23 times as many.
+    // At worst every sixteenth sample takes two factorisations more; tried each time the guess makes it 1.23 times as many.
     assert!(with < without + without / 10, "{with} for {without}");
     let last = &sequence.problems[59..];
     let again = [(); 3].map(|()| both.changes(WarmStart::Same, last));
