@@ -81,12 +81,12 @@ impl LastAnswer {
     ) -> bool {
         let whole = program.span;
         let n = whole.ocp.length();
-        guess::tail(whole.ocp, factors, sides, (program.x, self.shift));
         let end = self.end(&whole, program.x);
         // Soft bounds are found anew in less time.
         if end.is_none() && self.shift > 0 && self.kind == Kind::Soft {
             return false;
         }
+        guess::tail(whole.ocp, factors, sides, (program.x, self.shift));
         let patience = match self.kind {
             Kind::Simple if NU > 1 => Patience::KNOWN,
             Kind::Rows if NU > 1 && end.is_some() => Patience::KNOWN,

@@ -87,6 +87,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             true => kept_for_later_turn(self.dual.changes_left(), NX + NU),
             false => 0,
         };
+        // Soft bounds of the sample before are of no use over a short horizon.
         if ocp.length() < shortest_with_soft::<NU>()
             && violated.is_some_and(|violated| violated.soft)
             && solution.active.iter().any(|row| row.part != Part::Hard)
