@@ -15,14 +15,13 @@ use nalgebra::convert;
 
 /// Fewer bounds are as well rows.
 const FEWEST: usize = 3;
+/// Of an earlier sample, where a guess is wrong as often as not, so are fewer than half of the stages, up to so many: they are
+/// found from nothing in as little time as two guesses take.
+const FEWEST_OF_EARLIER: usize = 9;
 /// A guess that takes more changes is no good.
 const MOST_CHANGES: usize = 4;
 /// So many guesses, each from the answer to the one before.
 const MOST_GUESSES: usize = 2;
-/// Fewer bounds are found from nothing in less time than two guesses take.
-const FEWEST_TWICE: usize = 8;
-/// Fewer that changed lately are not held.
-const FEWEST_DOUBTED: usize = 8;
 /// A microcontroller has no flash for what saves time where bounds change all the time, or horizons are long.
 const THRIFTY: bool = cfg!(not(feature = "alloc"));
 /// A bound whose multiplier is less than this part of the largest may be gone, and is found at less cost than let go.
@@ -46,11 +45,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     ) -> Result<(), (usize, WarmStart)> {
         let active = &mut solution.active;
         let doubted = active.doubted;
-        let too_few = !THRIFTY && doubted > 0 && active.len() < FEWEST_DOUBTED;
+        let fewest = fewest(shift, ocp.length());
         if !(active.holds.are_due()
-            && !too_few
             && self.has_room(ocp, solution)
-            && self.hold_last(ocp, shift, solution))
+            && self.hold_last(ocp, (shift, fewest), solution))
         {
             return Err((0, settings.warm_start));
         }
@@ -84,20 +82,19 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 break;
             }
             self.dual.begin_again();
-            if !self.hold_last(ocp, 0, solution) {
+            if !self.hold_last(ocp, (0, fewest), solution) {
                 break;
             }
         }
         self.held.release_all();
         solution.changes = spent;
         solution.status = Status::Solved;
-        let few = solution.active.len() < FEWEST_TWICE;
         let holds = &mut solution.active.holds;
         if rounded || THRIFTY && !solved {
             // What grows along so many held states does so in the next samples, too.
             holds.give_up();
         } else if !THRIFTY {
-            holds.learn_costly(solved && (guesses == 1 || !few));
+            holds.learn_costly(solved);
         }
         if solved {
             return Ok(());
@@ -112,15 +109,15 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         Err((spent, begin_with))
     }
 
-    /// Holds what was active `shift` stages earlier and is not fading; whether that is worth it.
+    /// Holds what was active `shift` stages earlier and is not fading, if these are so many or more; whether that is worth it.
     fn hold_last(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
-        shift: usize,
+        (shift, fewest): (usize, usize),
         solution: &Solution<T, NX, NU>,
     ) -> bool {
         let active = &solution.active;
-        if active.len() < FEWEST {
+        if active.len() < fewest {
             return false;
         }
         self.held.release_all();
@@ -144,7 +141,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 other += 1;
             }
         }
-        let worth = held >= FEWEST && other <= MOST_CHANGES;
+        let worth = held >= fewest && other <= MOST_CHANGES;
         if !worth {
             self.held.release_all();
         }
@@ -168,5 +165,13 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                     && rows::slack(ocp, &point, &row.bound).abs()
                         <= tolerance * rows::size(ocp, &row.bound)
             })
+    }
+}
+
+/// How many bounds, `shift` samples earlier, are worth a guess over so many stages.
+fn fewest(shift: usize, stages: usize) -> usize {
+    match THRIFTY || shift == 0 {
+        true => FEWEST,
+        false => (stages / 2 + 1).clamp(FEWEST, FEWEST_OF_EARLIER),
     }
 }

@@ -45,7 +45,7 @@ use crate::working_set::{copy, first_mut};
 use answer::{list, report};
 use core::cell::Cell;
 use exchange::{Patience, Program, Tolerances, exchange};
-use expected::{Expected, Violated};
+use expected::{Expected, FEWEST_REPEATED, Violated};
 use interior_point::{AllUnknowns, BoundUnknowns};
 use last_answer::{Kind, LastAnswer};
 use nalgebra::SVector;
@@ -165,12 +165,12 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
         ocp.terminal.equality.is_none() && self.places.iter().all(fits)
     }
 
-    /// Takes down what a solve overwrites: the states of the last answer, if bounds are active in it, as long as nothing
+    /// Takes down what a solve overwrites: the states of the last answer, if its bounds may be tried again, as long as nothing
     /// else needs the place. Without an answer to go on from, nothing is known of the solves before.
     pub fn begin(&mut self, last: Option<&Solution<T, NX, NU>>) {
         match last {
             None => self.retries = AllRetries::default(),
-            Some(last) if last.active.is_empty() => {}
+            Some(last) if last.active.len() < FEWEST_REPEATED => {}
             Some(last) => {
                 let [place, _] = &mut self.places;
                 copy(&mut place.x, &last.x);
@@ -180,8 +180,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> ManyBounds<T, NX, NU> {
 
     /// Puts back what was taken down, after a guess in vain.
     pub fn restore(&self, solution: &mut Solution<T, NX, NU>) {
-        let [place, _] = &self.places;
-        copy(&mut solution.x, &place.x);
+        if solution.active.len() >= FEWEST_REPEATED {
+            let [place, _] = &self.places;
+            copy(&mut solution.x, &place.x);
+        }
     }
 
     /// Solves the problem, or proves that it is infeasible; counts changes of the active set. A turn begins with the

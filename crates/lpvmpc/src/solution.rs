@@ -110,6 +110,8 @@ pub struct ActiveSet<T: 'static> {
     len: usize,
     /// For so many solves more its rows are not expected to be active again unless they are violated.
     pub(crate) doubted: u8,
+    /// Whether the search for it went astray: it took up rows that it dropped again.
+    pub(crate) detours: bool,
     /// When the next program is tried with them held by the factorisation.
     pub(crate) holds: Retries,
 }
@@ -194,6 +196,7 @@ impl<T: Scalar> ActiveSet<T> {
             rows,
             len: 0,
             doubted: 0,
+            detours: false,
             holds: Retries::default(),
         }
     }
@@ -209,6 +212,7 @@ impl<T: Scalar> ActiveSet<T> {
         copy(&mut self.rows, &other.rows);
         self.len = other.len.min(self.rows.len());
         self.doubted = other.doubted;
+        self.detours = other.detours;
         self.holds = other.holds;
     }
 
@@ -432,6 +436,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solution<T, NX, NU> {
         self.status = Status::Solved;
         self.active.clear();
         self.active.doubted = 0;
+        self.active.detours = false;
         self.active.holds = Retries::default();
         self.changes = 0;
     }

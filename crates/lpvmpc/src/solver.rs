@@ -231,7 +231,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     pub(crate) fn search(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
-        start: Start,
+        mut start: Start,
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
         if ocp.terminal.equality.is_some() {
@@ -240,8 +240,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 .impose_terminal_equality(ocp, &self.factors, &x_n)?;
             self.roll_out(ocp, solution)?;
         }
-        if let Start::Last(shift) = start {
-            self.warm_start(ocp, shift, solution)?;
+        if let Start::Last(shift) = start
+            && !self.warm_start(ocp, shift, solution)?
+        {
+            start = Start::Nothing;
         }
 
         loop {
@@ -258,22 +260,22 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             #[cfg(feature = "alloc")]
             self.check_rounding(ocp)?;
         }
-        let known = match start {
-            Start::Last(_) => solution.active.len(),
-            _ => 0,
-        };
-        self.accept(ocp, known, solution)
+        self.accept(ocp, start, solution)
     }
 
     /// Takes the trajectory as the answer, with its inputs moved into their bounds; hands over its cost and the active rows, and
-    /// judges the `known` ones, so many, that the search began with.
+    /// judges those that the search began with.
     #[inline(never)]
     pub(crate) fn accept(
         &self,
         ocp: &Ocp<T, NX, NU>,
-        known: usize,
+        start: Start,
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
+        let known = match start {
+            Start::Last(_) => solution.active.len(),
+            _ => 0,
+        };
         // What the tolerance or rounding lets through is no input for an actuator.
         clip_inputs(ocp, solution);
         solution.cost = cost(ocp, solution);
@@ -285,6 +287,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         }
         // A row that had to go again counts twice.
         let wasted = self.dual.changes.saturating_sub(solution.active.len());
+        if cfg!(feature = "alloc") && start != Start::Held {
+            solution.active.detours = wasted > 0;
+        }
         let doubted = &mut solution.active.doubted;
         *doubted = match known > 0 && FEW_WASTED * wasted > known {
             true => DOUBT,
@@ -350,12 +355,13 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         }
     }
 
+    /// Moves to the minimiser over the known rows, if there is any reason to; whether it did.
     fn warm_start(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
         shift: usize,
         solution: &mut Solution<T, NX, NU>,
-    ) -> Result<(), Status<T>> {
+    ) -> Result<bool, Status<T>> {
         let before = (&solution.active, shift);
         let begun = self
             .dual
@@ -363,7 +369,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         if begun {
             self.roll_out(ocp, solution)?;
         }
-        Ok(())
+        Ok(begun)
     }
 }
 

@@ -7,6 +7,8 @@ use crate::rows;
 use crate::solution::{ActiveSet, Quantity, Solution};
 use crate::solver::trajectory;
 
+/// Fewer bounds of the last answer are not tried again.
+pub(super) const FEWEST_REPEATED: usize = 20;
 /// With so many violated bounds a few factorisations cost less than a pass for each bound.
 const MANY: usize = 24;
 /// So many where some are soft, which takes more factorisations, or those of a single input are known, with which the
@@ -42,6 +44,8 @@ const LITTLE: usize = 2;
 /// Of a single input a bound that is met keeps others: while a speed stays at its limit only half of what is violated
 /// becomes active.
 const LITTLE_OF_ONE: usize = 4;
+
+const _: () = assert!(FEWEST_REPEATED <= ALL_SOFT && FEWEST_REPEATED <= MANY);
 
 /// What the trajectory without bounds violates.
 #[derive(Clone, Copy, Debug)]
