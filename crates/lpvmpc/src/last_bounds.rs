@@ -8,15 +8,15 @@ use crate::held_bounds::Verdict;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::rows::{self, Trajectory};
-use crate::solution::{ActiveRow, Part, Side, Solution, Status};
+use crate::solution::{ActiveRow, ActiveSet, Part, Side, Solution, Status};
 use crate::solver::{Solver, Start, trajectory};
 use crate::solver_settings::{SolverSettings, WarmStart};
 use nalgebra::convert;
 
 /// Fewer bounds are as well rows.
 const FEWEST: usize = 3;
-/// Of an earlier sample, where a guess is wrong as often as not, so are fewer than half of the stages, up to so many: they are
-/// found from nothing in as little time as two guesses take.
+/// Of an earlier sample, unless those before them were active again, so are fewer than half of the stages, up to so many: they
+/// are found from nothing in as little time as two guesses take.
 const FEWEST_OF_EARLIER: usize = 9;
 /// A guess that takes more changes is no good.
 const MOST_CHANGES: usize = 4;
@@ -44,8 +44,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), (usize, WarmStart)> {
         let active = &mut solution.active;
-        let doubted = active.doubted;
-        let fewest = fewest(shift, ocp.length());
+        let (doubted, detours) = (active.doubted, active.detours);
+        let fewest = match THRIFTY || shift == 0 || active.lasting {
+            true => FEWEST,
+            false => (ocp.length() / 2 + 1).clamp(FEWEST, FEWEST_OF_EARLIER),
+        };
         if !(active.holds.are_due()
             && self.has_room(ocp, solution)
             && self.hold_last(ocp, (shift, fewest), solution))
@@ -95,6 +98,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             holds.give_up();
         } else if !THRIFTY {
             holds.learn_costly(solved);
+            // No search of rows told anything of these.
+            solution.active.detours = detours;
+            solution.active.lasting = guesses == 1;
         }
         if solved {
             return Ok(());
@@ -168,10 +174,19 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     }
 }
 
-/// How many bounds, `shift` samples earlier, are worth a guess over so many stages.
-fn fewest(shift: usize, stages: usize) -> usize {
-    match THRIFTY || shift == 0 {
-        true => FEWEST,
-        false => (stages / 2 + 1).clamp(FEWEST, FEWEST_OF_EARLIER),
+/// The stages of a few bounds, `shift` stages later, as bits; none of many.
+pub(crate) fn few_stages<T: Scalar>(active: &ActiveSet<T>, shift: usize) -> u64 {
+    if THRIFTY || active.len() >= FEWEST_OF_EARLIER {
+        return 0;
+    }
+    let stages = active.stages().filter_map(|stage| stage.checked_sub(shift));
+    stages.fold(0, |bits, stage| bits | 1 << (stage % 64))
+}
+
+/// Whether the bounds at the stages `known` are active again, or nothing speaks against it.
+pub(crate) fn are_lasting<T: Scalar>(known: u64, active: &ActiveSet<T>) -> bool {
+    match (known.count_ones() as usize) < FEWEST {
+        true => active.holds.have_never_failed(),
+        false => known & few_stages(active, 0) == known,
     }
 }

@@ -22,6 +22,11 @@ impl Retries {
         due
     }
 
+    /// Whether there was no failure that no answer has made up for.
+    pub fn have_never_failed(&self) -> bool {
+        self.failures == 0
+    }
+
     /// Whether it, tried, has led to the answer, and not at too great a cost.
     pub fn learn(&mut self, found: bool) {
         if found {
@@ -79,5 +84,11 @@ mod tests {
         let mut learn = |found| pause(&mut retries, |retries| retries.learn(found));
         let tries = [false, false, false, false, true, true, false, false];
         assert_eq!(tries.map(&mut learn), [0, 0, 0, 1, 3, 0, 0, 1]);
+        let mut retries = Retries::default();
+        let never = [true, false, true].map(|found| {
+            retries.learn(found);
+            retries.have_never_failed()
+        });
+        assert_eq!(never, [true, false, true]);
     }
 }

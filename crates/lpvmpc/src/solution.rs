@@ -112,6 +112,8 @@ pub struct ActiveSet<T: 'static> {
     pub(crate) doubted: u8,
     /// Whether the search for it went astray: it took up rows that it dropped again.
     pub(crate) detours: bool,
+    /// Whether it has all of the few rows that were known before.
+    pub(crate) lasting: bool,
     /// When the next program is tried with them held by the factorisation.
     pub(crate) holds: Retries,
 }
@@ -197,6 +199,7 @@ impl<T: Scalar> ActiveSet<T> {
             len: 0,
             doubted: 0,
             detours: false,
+            lasting: false,
             holds: Retries::default(),
         }
     }
@@ -213,6 +216,7 @@ impl<T: Scalar> ActiveSet<T> {
         self.len = other.len.min(self.rows.len());
         self.doubted = other.doubted;
         self.detours = other.detours;
+        self.lasting = other.lasting;
         self.holds = other.holds;
     }
 
@@ -437,6 +441,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solution<T, NX, NU> {
         self.active.clear();
         self.active.doubted = 0;
         self.active.detours = false;
+        self.active.lasting = false;
         self.active.holds = Retries::default();
         self.changes = 0;
     }

@@ -5,6 +5,7 @@ use crate::active_set::DualActiveSet;
 use crate::cost::cost;
 use crate::farkas::infeasibility_margin;
 use crate::held_bounds::{HeldBounds, eliminate_held};
+use crate::last_bounds::{are_lasting, few_stages};
 use crate::list::List;
 use crate::many_bounds::ManyBounds;
 #[cfg(feature = "alloc")]
@@ -85,10 +86,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         solution: &mut Solution<T, NX, NU>,
     ) {
         let mut settings = *settings;
-        let mut spent = 0;
+        let (mut spent, mut known) = (0, None);
         if NU == 1
             && let Some(shift) = shift_of_last(&settings, solution)
         {
+            known = Some(few_stages(&solution.active, shift));
             (spent, settings.warm_start) =
                 match self.solve_from_last(ocp, &settings, shift, solution) {
                     Ok(()) => return,
@@ -99,6 +101,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         }
         self.solve_for_factors(ocp, &settings, solution);
         solution.changes += spent;
+        if cfg!(feature = "alloc") {
+            let active = &mut solution.active;
+            active.lasting = known.is_some_and(|known| are_lasting(known, active));
+        }
     }
 
     /// The same for who needs the factors of the problem itself, too.
@@ -231,7 +237,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     pub(crate) fn search(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
-        mut start: Start,
+        start: Start,
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
         if ocp.terminal.equality.is_some() {
@@ -240,11 +246,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 .impose_terminal_equality(ocp, &self.factors, &x_n)?;
             self.roll_out(ocp, solution)?;
         }
-        if let Start::Last(shift) = start
-            && !self.warm_start(ocp, shift, solution)?
-        {
-            start = Start::Nothing;
-        }
+        let known = match start {
+            Start::Last(shift) => self.warm_start(ocp, shift, solution)?,
+            _ => 0,
+        };
 
         loop {
             let trajectory = trajectory(solution);
@@ -260,22 +265,18 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             #[cfg(feature = "alloc")]
             self.check_rounding(ocp)?;
         }
-        self.accept(ocp, start, solution)
+        self.accept(ocp, known, solution)
     }
 
     /// Takes the trajectory as the answer, with its inputs moved into their bounds; hands over its cost and the active rows, and
-    /// judges those that the search began with.
+    /// judges the `known` ones, so many, that the search began with.
     #[inline(never)]
     pub(crate) fn accept(
         &self,
         ocp: &Ocp<T, NX, NU>,
-        start: Start,
+        known: usize,
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), Status<T>> {
-        let known = match start {
-            Start::Last(_) => solution.active.len(),
-            _ => 0,
-        };
         // What the tolerance or rounding lets through is no input for an actuator.
         clip_inputs(ocp, solution);
         solution.cost = cost(ocp, solution);
@@ -287,7 +288,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         }
         // A row that had to go again counts twice.
         let wasted = self.dual.changes.saturating_sub(solution.active.len());
-        if cfg!(feature = "alloc") && start != Start::Held {
+        if cfg!(feature = "alloc") {
             solution.active.detours = wasted > 0;
         }
         let doubted = &mut solution.active.doubted;
@@ -355,21 +356,22 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         }
     }
 
-    /// Moves to the minimiser over the known rows, if there is any reason to; whether it did.
+    /// Moves to the minimiser over the known rows, if there is any reason to; of how many.
     fn warm_start(
         &mut self,
         ocp: &Ocp<T, NX, NU>,
         shift: usize,
         solution: &mut Solution<T, NX, NU>,
-    ) -> Result<bool, Status<T>> {
+    ) -> Result<usize, Status<T>> {
         let before = (&solution.active, shift);
         let begun = self
             .dual
             .warm_start(ocp, &self.factors, &trajectory(solution), before)?;
-        if begun {
-            self.roll_out(ocp, solution)?;
+        if !begun {
+            return Ok(0);
         }
-        Ok(begun)
+        self.roll_out(ocp, solution)?;
+        Ok(solution.active.len())
     }
 }
 

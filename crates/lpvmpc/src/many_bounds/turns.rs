@@ -7,7 +7,7 @@ use crate::list::List;
 use crate::model::Scalar;
 use crate::ocp::Ocp;
 use crate::solution::{Part, Solution, Status};
-use crate::solver::{Solver, Start};
+use crate::solver::Solver;
 
 /// When it has its turn.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +65,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         let violated = free.then(|| Violated::new(ocp, solution));
         if violated.is_some_and(|violated| violated.bounds == 0) {
             // Where no bound is violated, a cold cache has to fetch no machine code beyond this.
-            return self.accept(ocp, Start::Nothing, solution);
+            return self.accept(ocp, 0, solution);
         }
         self.take_turns(ocp, violated, shift, solution, spent)
     }
