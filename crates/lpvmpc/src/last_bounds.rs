@@ -15,8 +15,8 @@ use nalgebra::convert;
 
 /// Fewer bounds are as well rows.
 const FEWEST: usize = 3;
-/// Of an earlier sample, unless those before them were active again, so are fewer than half of the stages, up to so many: they
-/// are found from nothing in as little time as two guesses take.
+/// Of an earlier sample fewer than these, or no more than half of the stages, are found from nothing in as little time as two
+/// guesses take, unless those before them were active again.
 const FEWEST_OF_EARLIER: usize = 9;
 /// A guess that takes more changes is no good.
 const MOST_CHANGES: usize = 4;
@@ -44,7 +44,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         solution: &mut Solution<T, NX, NU>,
     ) -> Result<(), (usize, WarmStart)> {
         let active = &mut solution.active;
-        let (doubted, detours) = (active.doubted, active.detours);
+        let doubted = active.doubted;
         let fewest = match THRIFTY || shift == 0 || active.lasting {
             true => FEWEST,
             false => (ocp.length() / 2 + 1).clamp(FEWEST, FEWEST_OF_EARLIER),
@@ -98,9 +98,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             holds.give_up();
         } else if !THRIFTY {
             holds.learn_costly(solved);
-            // No search of rows told anything of these.
-            solution.active.detours = detours;
-            solution.active.lasting = guesses == 1;
+            if shift > 0 {
+                solution.active.lasting = guesses == 1;
+            }
         }
         if solved {
             return Ok(());
@@ -140,8 +140,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 continue;
             };
             row.bound.stage = stage;
-            let lasting = row.multiplier > least && rows::soft_price(ocp, &row.bound).is_none();
-            if lasting && self.held.hold(row.bound) {
+            let firm = row.multiplier > least && rows::soft_price(ocp, &row.bound).is_none();
+            if firm && self.held.hold(row.bound) {
                 held += 1;
             } else {
                 other += 1;
@@ -174,19 +174,33 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
     }
 }
 
-/// The stages of a few bounds, `shift` stages later, as bits; none of many.
-pub(crate) fn few_stages<T: Scalar>(active: &ActiveSet<T>, shift: usize) -> u64 {
-    if THRIFTY || active.len() >= FEWEST_OF_EARLIER {
-        return 0;
-    }
-    let stages = active.stages().filter_map(|stage| stage.checked_sub(shift));
-    stages.fold(0, |bits, stage| bits | 1 << (stage % 64))
-}
+/// The stages of a few bounds of an earlier sample, as bits.
+#[derive(Clone, Copy)]
+pub(crate) struct KnownStages(u64);
 
-/// Whether the bounds at the stages `known` are active again, or nothing speaks against it.
-pub(crate) fn are_lasting<T: Scalar>(known: u64, active: &ActiveSet<T>) -> bool {
-    match (known.count_ones() as usize) < FEWEST {
-        true => active.holds.have_never_failed(),
-        false => known & few_stages(active, 0) == known,
+impl KnownStages {
+    /// Of those `shift` stages earlier; none within a sample.
+    #[inline(always)]
+    pub fn of_earlier<T: Scalar>(active: &ActiveSet<T>, shift: usize) -> Option<Self> {
+        match active.len() < FEWEST_OF_EARLIER {
+            _ if THRIFTY || shift == 0 => None,
+            true => Some(Self::of(active, shift)),
+            false => Some(Self(0)),
+        }
+    }
+
+    /// Two stages that lie 64 apart count as the same.
+    fn of<T: Scalar>(active: &ActiveSet<T>, shift: usize) -> Self {
+        let stages = active.stages().filter_map(|stage| stage.checked_sub(shift));
+        Self(stages.fold(0, |bits, stage| bits | 1 << (stage % 64)))
+    }
+
+    /// Whether bounds are active at these stages again; of fewer than are worth a guess, or of many, whether nothing speaks
+    /// against it.
+    pub fn are_lasting<T: Scalar>(self, active: &ActiveSet<T>) -> bool {
+        match (self.0.count_ones() as usize) < FEWEST {
+            true => active.holds.no_failure_is_left(),
+            false => self.0 & Self::of(active, 0).0 == self.0,
+        }
     }
 }

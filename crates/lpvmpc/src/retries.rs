@@ -23,7 +23,7 @@ impl Retries {
     }
 
     /// Whether there was no failure that no answer has made up for.
-    pub fn have_never_failed(&self) -> bool {
+    pub fn no_failure_is_left(&self) -> bool {
         self.failures == 0
     }
 
@@ -85,10 +85,10 @@ mod tests {
         let tries = [false, false, false, false, true, true, false, false];
         assert_eq!(tries.map(&mut learn), [0, 0, 0, 1, 3, 0, 0, 1]);
         let mut retries = Retries::default();
-        let never = [true, false, true].map(|found| {
+        let none = [true, false, true].map(|found| {
             retries.learn(found);
-            retries.have_never_failed()
+            retries.no_failure_is_left()
         });
-        assert_eq!(never, [true, false, true]);
+        assert_eq!(none, [true, false, true]);
     }
 }

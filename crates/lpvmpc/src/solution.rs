@@ -110,9 +110,10 @@ pub struct ActiveSet<T: 'static> {
     len: usize,
     /// For so many solves more its rows are not expected to be active again unless they are violated.
     pub(crate) doubted: u8,
-    /// Whether the search for it went astray: it took up rows that it dropped again.
-    pub(crate) detours: bool,
-    /// Whether it has all of the few rows that were known before.
+    /// Whether even a few of its rows are worth beginning with: the search for them went astray, taking up others that it
+    /// dropped again, or the plan is followed.
+    pub(crate) trusted: bool,
+    /// Whether the few rows of an earlier sample were active again, as far as is known.
     pub(crate) lasting: bool,
     /// When the next program is tried with them held by the factorisation.
     pub(crate) holds: Retries,
@@ -198,7 +199,7 @@ impl<T: Scalar> ActiveSet<T> {
             rows,
             len: 0,
             doubted: 0,
-            detours: false,
+            trusted: false,
             lasting: false,
             holds: Retries::default(),
         }
@@ -215,7 +216,7 @@ impl<T: Scalar> ActiveSet<T> {
         copy(&mut self.rows, &other.rows);
         self.len = other.len.min(self.rows.len());
         self.doubted = other.doubted;
-        self.detours = other.detours;
+        self.trusted = other.trusted;
         self.lasting = other.lasting;
         self.holds = other.holds;
     }
@@ -440,7 +441,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solution<T, NX, NU> {
         self.status = Status::Solved;
         self.active.clear();
         self.active.doubted = 0;
-        self.active.detours = false;
+        self.active.trusted = false;
         self.active.lasting = false;
         self.active.holds = Retries::default();
         self.changes = 0;
@@ -465,9 +466,11 @@ mod tests {
     fn a_solution_of_nothing_yet_doubts_nothing() {
         let mut solution = Solution::<f64, 2, 1>::allocate(Capacity::default());
         solution.active.doubted = 3;
+        (solution.active.trusted, solution.active.lasting) = (true, true);
         solution.active.holds.give_up();
         solution.clear();
         assert_eq!(solution.active.doubted, 0);
+        assert!(!(solution.active.trusted || solution.active.lasting));
         assert!(solution.active.holds.are_due());
     }
 }

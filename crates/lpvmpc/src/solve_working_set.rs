@@ -35,13 +35,10 @@ impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
             before.iter().filter_map(known)
         };
         // A microcontroller has no flash for what saves little.
-        let straight = cfg!(feature = "alloc") && shift > 0 && !before.detours;
-        let (few, others) = (
-            straight && before.len() < FEW,
-            if straight { FEWEST_VIOLATED - 1 } else { 0 },
-        );
+        let few = cfg!(feature = "alloc") && shift > 0 && !before.trusted && before.len() < FEW;
+        let others = if few { FEWEST_VIOLATED - 1 } else { 0 };
         let mut violated = known().filter(|(_, violated)| *violated);
-        if straight && before.len() <= others || violated.nth(others).is_none() {
+        if few && before.len() <= others || violated.nth(others).is_none() {
             return Ok(false);
         }
         for (bound, violated) in known() {

@@ -5,7 +5,7 @@ use crate::active_set::DualActiveSet;
 use crate::cost::cost;
 use crate::farkas::infeasibility_margin;
 use crate::held_bounds::{HeldBounds, eliminate_held};
-use crate::last_bounds::{are_lasting, few_stages};
+use crate::last_bounds::KnownStages;
 use crate::list::List;
 use crate::many_bounds::ManyBounds;
 #[cfg(feature = "alloc")]
@@ -90,7 +90,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         if NU == 1
             && let Some(shift) = shift_of_last(&settings, solution)
         {
-            known = Some(few_stages(&solution.active, shift));
+            known = KnownStages::of_earlier(&solution.active, shift);
             (spent, settings.warm_start) =
                 match self.solve_from_last(ocp, &settings, shift, solution) {
                     Ok(()) => return,
@@ -101,9 +101,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         }
         self.solve_for_factors(ocp, &settings, solution);
         solution.changes += spent;
-        if cfg!(feature = "alloc") {
-            let active = &mut solution.active;
-            active.lasting = known.is_some_and(|known| are_lasting(known, active));
+        if cfg!(feature = "alloc")
+            && let Some(known) = known
+        {
+            solution.active.lasting = known.are_lasting(&solution.active);
         }
     }
 
@@ -139,6 +140,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         if shift.is_none() {
             // Nothing is known that could be doubted.
             solution.active.doubted = 0;
+            if cfg!(feature = "alloc") {
+                (solution.active.trusted, solution.active.lasting) = (false, false);
+            }
             solution.active.holds = Retries::default();
         }
         let in_turns = self.many_bounds.first().map(|phase| phase.in_turns);
@@ -265,7 +269,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             #[cfg(feature = "alloc")]
             self.check_rounding(ocp)?;
         }
-        self.accept(ocp, known, solution)
+        let accepted = self.accept(ocp, known, solution);
+        if cfg!(feature = "alloc") && !matches!(start, Start::Held | Start::Last(0)) {
+            solution.active.trusted = self.dual.changes > solution.active.len();
+        }
+        accepted
     }
 
     /// Takes the trajectory as the answer, with its inputs moved into their bounds; hands over its cost and the active rows, and
@@ -288,9 +296,6 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         }
         // A row that had to go again counts twice.
         let wasted = self.dual.changes.saturating_sub(solution.active.len());
-        if cfg!(feature = "alloc") {
-            solution.active.detours = wasted > 0;
-        }
         let doubted = &mut solution.active.doubted;
         *doubted = match known > 0 && FEW_WASTED * wasted > known {
             true => DOUBT,
@@ -356,7 +361,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
         }
     }
 
-    /// Moves to the minimiser over the known rows, if there is any reason to; of how many.
+    /// Moves to the minimiser over the known rows, if there is any reason to; how many are known then, else none.
     fn warm_start(
         &mut self,
         ocp: &Ocp<T, NX, NU>,

@@ -281,7 +281,8 @@ where
             ..self.settings.solver
         };
         // The plan is followed: what was active in it is active again.
-        workspace.solution.active.doubted = 0;
+        let active = &mut workspace.solution.active;
+        (active.doubted, active.trusted) = (0, true);
         workspace
             .solver
             .solve_for_factors(&workspace.ocp, &settings, &mut workspace.solution);

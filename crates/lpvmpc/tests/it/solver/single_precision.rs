@@ -9,9 +9,9 @@
 //! to 15 % are. No problem that is infeasible by more than rounding is called solved.
 //!
 //! Points whose derivatives are bounded, from nothing and from the last answer, relative to the bound of the
-//! input (on the way at a limit inputs are next to nothing), the first input alone: with two states 3e-5 at most,
-//! with four 1e-5 for 90 % and 2e-3 at most, with six 1e-2 for 90 % and 3e-2 at most; with six, up to a quarter
-//! over 20 samples is called inaccurate. Run with `--nocapture` for the figures.
+//! input (at a limit, inputs are next to nothing), the first input alone: with two states 5e-5 at most,
+//! with four 1e-4 for 95 % and 2e-3 at most, with six 1e-2 for 90 % and 5e-2 at most; with six, up to a quarter
+//! of the programs of 20 samples is called inaccurate. Run with `--nocapture` for the figures.
 
 use super::support::census::{Counts, Distribution};
 use super::support::precision::{double, single};
@@ -193,19 +193,21 @@ fn points<const NX: usize>(horizon: usize, share: f64) -> (Distribution, usize) 
         };
         let sequence = recipe.make::<NX, 1>().unwrap();
         let room = working_memory(&sequence.problems);
-        let mut solver = Solver::<f32, NX, 1>::allocate(room);
-        let mut answer = Solution::allocate(room);
+        let mut solvers = [WarmStart::Shifted, WarmStart::Cold].map(|warm_start| {
+            let solver = Solver::<f32, NX, 1>::allocate(room);
+            (warm_start, solver, Solution::allocate(room))
+        });
         for exact in &sequence.problems {
             let single = single(exact);
             let reference = solve(&double(&single));
             assert!(reference.status.is_solved());
             let largest = f64::from(single.common.u.upper[0]);
-            for warm_start in [WarmStart::Shifted, WarmStart::Cold] {
+            for (warm_start, solver, answer) in &mut solvers {
                 let settings = SolverSettings {
-                    warm_start,
+                    warm_start: *warm_start,
                     ..SolverSettings::default()
                 };
-                solver.solve(&single, &settings, &mut answer);
+                solver.solve(&single, &settings, answer);
                 if answer.status.is_solved() {
                     let error = f64::from(answer.u[0][0]) - reference.u[0][0];
                     errors.add(error.abs() / largest);
@@ -234,7 +236,7 @@ fn points_at_their_limits() {
         assert_eq!(unsolved, 0);
         assert!(errors.quantile(0.95) <= 1e-4 && errors.max() <= 2e-3);
         let (errors, unsolved) = points::<6>(horizon, share);
-        assert!(unsolved * 5 <= unsolved + errors.len());
-        assert!(errors.quantile(0.9) <= 1e-2 && errors.max() <= 3e-2);
+        assert!(unsolved * 4 <= unsolved + errors.len());
+        assert!(errors.quantile(0.9) <= 1e-2 && errors.max() <= 5e-2);
     }
 }

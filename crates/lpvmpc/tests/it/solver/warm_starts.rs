@@ -180,7 +180,7 @@ fn a_few_bounds_that_do_not_hold_again_are_not_begun_with() {
 
 /// A few bounds of an earlier sample save little, and cost time where they are wrong: fewer than three are not begun with,
 /// and fewer than nine are not held, which would take fewer changes than there are bounds, unless those of the sample before
-/// were active again.
+/// were active again, or nothing speaks against it.
 #[test]
 fn fewer_bounds_of_an_earlier_sample_than_pay_are_found_from_nothing() {
     let kinds = [Kind::Inputs, Kind::States];
@@ -220,7 +220,8 @@ fn fewer_bounds_of_an_earlier_sample_than_pay_are_found_from_nothing() {
                 .iter()
                 .filter_map(|stage: &usize| stage.checked_sub(1));
             let all = again.clone().all(|stage| stages.contains(&stage));
-            lasted = held || all || again.count() < 3;
+            // Of fewer than three, or of nine, nothing is known.
+            lasted = held || all || known.len() >= 9 || again.count() < 3;
             known = stages;
         }
     }
