@@ -98,11 +98,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             holds.give_up();
         } else if !THRIFTY {
             holds.learn_costly(solved);
-            if shift > 0 {
-                solution.active.lasting = guesses == 1;
-            }
         }
         if solved {
+            if !THRIFTY && shift > 0 {
+                solution.active.lasting = guesses == 1;
+            }
             return Ok(());
         }
         if !THRIFTY {

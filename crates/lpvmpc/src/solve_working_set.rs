@@ -10,12 +10,11 @@ use crate::solution::{ActiveRow, ActiveSet, BoundId, Part, Quantity, Side, Statu
 use crate::working_set::{Terms, copy};
 use nalgebra::convert;
 
-/// Fewer violated rows of an earlier sample are found from nothing in as little time, if the search for the last ones took no
-/// detours.
-const FEWEST_VIOLATED: usize = 3;
-/// Of fewer rows of an earlier sample most that the trajectory without bounds keeps are inactive; nearly all that it violates
-/// are active again.
+/// Of fewer rows of an earlier sample, if they are not trusted, most that the trajectory without bounds keeps are inactive;
+/// nearly all that it violates are active again,
 const FEW: usize = 12;
+/// and fewer of these are found from nothing in as little time.
+const FEWEST_VIOLATED: usize = 3;
 
 impl<T: Scalar, const NU: usize> DualActiveSet<T, NU> {
     /// Starts from the rows that were active before, `shift` stages earlier. Rows whose
