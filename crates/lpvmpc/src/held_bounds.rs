@@ -68,8 +68,8 @@ pub(crate) struct HeldBounds<const NU: usize> {
 
 /// What the multipliers of the held bounds say.
 pub(crate) struct Verdict<T> {
-    /// Bounds were let go.
-    pub released: bool,
+    /// So many bounds were let go.
+    pub released: usize,
     /// All others found a place among the active rows.
     pub listed: bool,
     /// What is left of the gradient in the inputs that hold nothing, relative to its largest term.
@@ -145,7 +145,7 @@ impl<const NU: usize> HeldBounds<NU> {
         tolerance: T,
     ) -> Verdict<T> {
         let (mut largest, mut rest) = (T::zero(), T::zero());
-        let (mut released, mut listed) = (false, true);
+        let (mut released, mut listed) = (0, true);
         let mut adjoint = Adjoint::new(ocp, trajectory, active);
         while let Some(at) = adjoint.step(active) {
             largest = largest.max(at.dynamics.amax()).max(at.rows.amax());
@@ -164,7 +164,7 @@ impl<const NU: usize> HeldBounds<NU> {
                 let multiplier = if side == Side::Upper { -slope } else { slope };
                 if multiplier < -tolerance * largest {
                     *place = HeldBound::NOTHING;
-                    released = true;
+                    released += 1;
                 } else {
                     listed &= active.push(ActiveRow {
                         bound: BoundId {
@@ -366,7 +366,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             let verdict = self
                 .held
                 .release(ocp, point, &mut solution.active, tolerance);
-            if outcome.is_ok() && !verdict.released {
+            if outcome.is_ok() && verdict.released == 0 {
                 if !verdict.listed {
                     outcome = Err(Status::WorkingSetFull);
                 } else if !(verdict.rest <= self.dual.loosest) {
@@ -375,7 +375,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 break;
             }
             let news = self.held.take_in(self.dual.active());
-            if !(verdict.released || news) {
+            if !(verdict.released > 0 || news) {
                 break;
             }
             outcome = inaccurate;

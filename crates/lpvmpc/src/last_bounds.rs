@@ -20,10 +20,12 @@ const FEWEST: usize = 3;
 const FEWEST_OF_EARLIER: usize = 9;
 /// A guess that takes more changes is no good.
 const MOST_CHANGES: usize = 4;
-/// So many guesses, each from the answer to the one before.
-const MOST_GUESSES: usize = 2;
+/// Where more bounds than these are wrong for each change that is left, the next guess is seldom right.
+const MOST_WRONG_PER_CHANGE: usize = 2;
 /// A microcontroller has no flash for what saves time where bounds change all the time, or horizons are long.
 const THRIFTY: bool = cfg!(not(feature = "alloc"));
+/// So many guesses, each from the answer to the one before.
+const MOST_GUESSES: usize = if THRIFTY { 2 } else { 3 };
 /// A bound whose multiplier is less than this part of the largest may be gone, and is found at less cost than let go.
 const FADING: f64 = 1e-3;
 /// So many times the rounding of a number are the rounding of a pass along the horizon.
@@ -79,13 +81,17 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
             let point = Trajectory { x, u };
             let tolerance = self.dual.tolerance;
             let verdict = self.held.release(ocp, Some(&point), active, tolerance);
-            if !verdict.released {
+            if verdict.released == 0 {
                 solved = self.is_answer(ocp, &verdict, solution);
                 rounded = !(THRIFTY || solved);
                 break;
             }
+            let changes_left = MOST_CHANGES.saturating_sub(spent);
+            if !THRIFTY && verdict.released > MOST_WRONG_PER_CHANGE * changes_left {
+                break;
+            }
             self.dual.begin_again();
-            if !self.hold_last(ocp, (0, fewest), solution) {
+            if !self.hold_last(ocp, (0, FEWEST), solution) {
                 break;
             }
         }
