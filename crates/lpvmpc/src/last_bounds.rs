@@ -86,8 +86,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> Solver<T, NX, NU> {
                 rounded = !(THRIFTY || solved);
                 break;
             }
-            let changes_left = MOST_CHANGES.saturating_sub(spent);
-            if !THRIFTY && verdict.released > MOST_WRONG_PER_CHANGE * changes_left {
+            let most_wrong = MOST_WRONG_PER_CHANGE * self.dual.changes_left();
+            if !THRIFTY && verdict.released > most_wrong {
                 break;
             }
             self.dual.begin_again();
