@@ -68,7 +68,7 @@ pub(crate) struct HeldBounds<const NU: usize> {
 
 /// What the multipliers of the held bounds say.
 pub(crate) struct Verdict<T> {
-    /// So many bounds were let go.
+    /// How many bounds were let go.
     pub released: usize,
     /// All others found a place among the active rows.
     pub listed: bool,

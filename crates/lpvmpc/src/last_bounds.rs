@@ -18,9 +18,9 @@ const FEWEST: usize = 3;
 /// Of an earlier sample fewer than these, or no more than half of the stages, are found from nothing in as little time as two
 /// guesses take, unless those before them were active again.
 const FEWEST_OF_EARLIER: usize = 9;
-/// A guess that takes more changes is no good.
+/// All guesses together may take so many changes, and so many active bounds may be rows beside what is held.
 const MOST_CHANGES: usize = 4;
-/// Where more bounds than these are wrong for each change that is left, the next guess is seldom right.
+/// If more bounds than these turn out wrong for each change that is left, the next guess is seldom right.
 const MOST_WRONG_PER_CHANGE: usize = 2;
 /// A microcontroller has no flash for what saves time where bounds change all the time, or horizons are long.
 const THRIFTY: bool = cfg!(not(feature = "alloc"));

@@ -381,8 +381,8 @@ fn known_saturated_inputs_save_a_fifth() {
 }
 
 /// The last bounds of a single input are held; a guess with few of them wrong is mended by two more, one with many is given up
-/// at once. A loop takes three fifths of the changes that it takes from nothing; with one more guess, whatever is wrong, it took
-/// 0.65.
+/// at once. Loops take less than three fifths of the changes that they take from nothing (0.57); with two guesses, whatever was
+/// wrong, they took 0.65.
 #[test]
 fn held_bounds_are_mended_where_few_are_wrong() {
     let (mut with, mut without) = (0, 0);
@@ -404,6 +404,7 @@ fn held_bounds_are_mended_where_few_are_wrong() {
             without += cold;
         }
     }
+    println!("held bounds: {with} for {without}");
     assert!(5 * with < 3 * without, "{with} for {without}");
 }
 
