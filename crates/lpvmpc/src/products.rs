@@ -53,13 +53,14 @@ pub(crate) trait Products: Copy {
         out
     }
 
-    /// out += A B, a product that is symmetric: above the diagonal it may be left as it is, see
+    /// out = `begin` + A B + C D, a sum that is symmetric: above the diagonal it may be left as it is, see
     /// [`mirror`](small_matrix::mirror).
-    fn add_symmetric_product<T: Scalar, const R: usize, const K: usize>(
+    fn set_symmetric_sum<T: Scalar, const R: usize, const K: usize, const L: usize>(
         self,
         out: &mut SMatrix<T, R, R>,
-        a: &SMatrix<T, R, K>,
-        b: &SMatrix<T, K, R>,
+        begin: &SMatrix<T, R, R>,
+        one: (&SMatrix<T, R, K>, &SMatrix<T, K, R>),
+        other: (&SMatrix<T, R, L>, &SMatrix<T, L, R>),
     );
 }
 
@@ -79,12 +80,15 @@ impl Products for Compiled {
     }
 
     #[inline(always)]
-    fn add_symmetric_product<T: Scalar, const R: usize, const K: usize>(
+    fn set_symmetric_sum<T: Scalar, const R: usize, const K: usize, const L: usize>(
         self,
         out: &mut SMatrix<T, R, R>,
-        a: &SMatrix<T, R, K>,
-        b: &SMatrix<T, K, R>,
+        begin: &SMatrix<T, R, R>,
+        (a, b): (&SMatrix<T, R, K>, &SMatrix<T, K, R>),
+        (c, d): (&SMatrix<T, R, L>, &SMatrix<T, L, R>),
     ) {
+        *out = *begin;
         small_matrix::add_symmetric_product(out, a, b);
+        small_matrix::add_symmetric_product(out, c, d);
     }
 }

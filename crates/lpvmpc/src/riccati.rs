@@ -11,14 +11,12 @@ mod widest;
 
 use crate::model::Scalar;
 use crate::ocp::{Common, Stage};
-#[cfg(feature = "simd")]
-use crate::products;
-use crate::products::{Compiled, Products};
+use crate::products::{self, Compiled, Products};
 use crate::small_matrix::{
     add_product, add_symmetric_product, mirror, product, transposed, transposed_product,
     transposed_times,
 };
-use crate::transposed::StageBothWays;
+use crate::transposed::{StageBothWays, Transposed};
 use nalgebra::{SMatrix, SVector};
 #[cfg(feature = "simd")]
 use widest::{Elimination, Passage};
@@ -109,15 +107,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         cost_to_go: &mut CostToGo<T, NX>,
     ) -> Result<(), BadPivot<T>> {
         let stage = StageBothWays::new(stage);
-        #[cfg(feature = "simd")]
+        // Turned round here: in vectors, matrices of this size are gathered number by number.
         if products::are_in_vectors(NX) {
-            return products::dispatch::<NX, _>(Elimination::<_, NX, NU, false> {
-                factor: self,
-                stage,
-                weights,
-                cost_to_go,
-                adjustment: None,
-            });
+            let transposed = [Transposed::of(&stage)];
+            let stage = stage.with(&transposed, 0);
+            return self.eliminate_adjusted(stage, weights, cost_to_go, None);
         }
         // Where flash is scarce there is one piece of machine code for both.
         if cfg!(feature = "alloc") {
@@ -138,7 +132,7 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     ) -> Result<(), BadPivot<T>> {
         #[cfg(feature = "simd")]
         if products::are_in_vectors(NX) {
-            return products::dispatch::<NX, _>(Elimination::<_, NX, NU, true> {
+            return products::dispatch::<NX, _>(Elimination {
                 factor: self,
                 stage,
                 weights,
@@ -185,7 +179,9 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         let g_x = if NU == 1 {
             transposed(&(weights.s + by.product(b, &p_a)))
         } else {
-            transposed(&weights.s) + by.product(a, &p_b)
+            let mut g_x = by.product(a, &p_b);
+            add_cross_term(&mut g_x, &weights.s);
+            g_x
         };
         let mut minimum = StageMinimum {
             hessian: weights.r + by.product(b, &p_b),
@@ -210,9 +206,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         self.inverse_factor = scaled_rows(&inverse, &reciprocals.map(|d| d.sqrt()));
 
         // A'P(A + BK) + Q + S'K, and the same for the linear part.
-        *quadratic = weights.q;
-        by.add_symmetric_product(quadratic, a, &p_a);
-        by.add_symmetric_product(quadratic, &l_g_x, &transposed(&scaled_g_x));
+        let of_input = (&l_g_x, &transposed(&scaled_g_x));
+        by.set_symmetric_sum(quadratic, &weights.q, (a, &p_a), of_input);
         mirror(quadratic);
         *linear = minimum.linear_x + product(&l_g_x, &scaled_g);
         Ok(())
@@ -264,8 +259,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
             }
         };
         *linear = linear_x + product(a, &p_next) + transposed_times(&weights.s, input);
-        *quadratic = weights.q;
-        by.add_symmetric_product(quadratic, a, &p_a);
+        let nothing = (&SMatrix::<T, NX, 0>::zeros(), &SMatrix::<T, 0, NX>::zeros());
+        by.set_symmetric_sum(quadratic, &weights.q, (a, &p_a), nothing);
         mirror(quadratic);
         *self = Self {
             feedforward: *input,
@@ -319,6 +314,29 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     }
 }
 
+/// A matrix with more numbers than these takes longer to turn round than to look for one that is not zero.
+const FEW_NUMBERS: usize = 16;
+
+/// g_x += S', where there is a cross term.
+#[inline(always)]
+fn add_cross_term<T: Scalar, const NX: usize, const NU: usize>(
+    g_x: &mut SMatrix<T, NX, NU>,
+    s: &SMatrix<T, NU, NX>,
+) {
+    let is_zero = || {
+        let mut sizes = [T::zero(); NU];
+        for column in &s.data.0 {
+            for (size, s) in sizes.iter_mut().zip(column) {
+                *size += s.abs();
+            }
+        }
+        sizes.iter().all(|size| *size == T::zero())
+    };
+    if NX * NU <= FEW_NUMBERS || !is_zero() {
+        *g_x += transposed(s);
+    }
+}
+
 /// diag(`factors`) `m`
 #[inline(always)]
 fn scaled_rows<T: Scalar, const R: usize, const C: usize>(
@@ -356,9 +374,10 @@ struct UnitFactor<T, const K: usize> {
 }
 
 impl<T: Scalar, const K: usize> UnitFactor<T, K> {
-    #[inline(always)]
     /// Factorises the symmetric matrix `m`; its lower triangle is read.
+    #[inline(always)]
     fn new(m: &SMatrix<T, K, K>) -> Result<Self, BadPivot<T>> {
+        // Below the diagonal L, above it D L'.
         let mut l = *m;
         let mut pivots = SVector::<T, K>::zeros();
         let mut reciprocals = SVector::<T, K>::zeros();
@@ -375,8 +394,9 @@ impl<T: Scalar, const K: usize> UnitFactor<T, K> {
             for i in j + 1..K {
                 let mut entry = l[(i, j)];
                 for k in 0..j {
-                    entry -= l[(i, k)] * l[(j, k)] * pivots[k];
+                    entry -= l[(i, k)] * l[(k, j)];
                 }
+                l[(j, i)] = entry;
                 l[(i, j)] = entry * reciprocals[j];
             }
         }

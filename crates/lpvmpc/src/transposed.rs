@@ -60,13 +60,6 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> StageBothWays<'a, T, NX, N
         }
     }
 
-    /// The stage of which nothing is kept, as the compiler knows.
-    #[cfg(feature = "simd")]
-    #[inline(always)]
-    pub fn alone(self) -> Self {
-        Self::new(self.stage)
-    }
-
     /// Stage `i` of a horizon, with its part of what is kept, if that is so much.
     #[inline(always)]
     pub fn with(self, all: &'a [Transposed<T, NX, NU>], i: usize) -> Self {

@@ -1,8 +1,8 @@
 //! Products in vectors, block by block: the sums of a block stay in registers, and are so many that none waits
-//! for the one before it. A sum has the terms of [`small_matrix`] in the same order; where the machine multiplies and
-//! adds in one instruction, a term is rounded once, not twice.
+//! for the one before it. A product's sum has the terms of [`small_matrix`] in the same order; where the machine multiplies
+//! and adds in one instruction, a term is rounded once, not twice.
 
-use super::Products;
+use super::{Compiled, Products};
 use crate::model::Scalar;
 use crate::small_matrix;
 use core::any::Any;
@@ -47,55 +47,85 @@ impl<S: Simd> Products for Vectors<S> {
         a: &SMatrix<T, R, K>,
         b: &SMatrix<T, K, C>,
     ) {
-        if fills::<S>(R)
-            && C > TOO_FEW
-            && let Some((out, a, b)) = in_f64(out, a, b)
+        if C > TOO_FEW
+            && (fills_two::<S>(R) || fills_one::<S>(R))
+            && let Some((a, b)) = both_in_f64(a, b)
+            && let Some(out) = in_f64_mut(out)
         {
-            multiply(self.0, out, a, b);
+            if fills_two::<S>(R) {
+                multiply(self.0, out, a, b);
+            } else {
+                multiply_narrow(self.0, out, a, b);
+            }
         } else {
             small_matrix::set_product(out, a, b);
         }
     }
 
     #[inline(always)]
-    fn add_symmetric_product<T: Scalar, const R: usize, const K: usize>(
+    fn set_symmetric_sum<T: Scalar, const R: usize, const K: usize, const L: usize>(
         self,
         out: &mut SMatrix<T, R, R>,
-        a: &SMatrix<T, R, K>,
-        b: &SMatrix<T, K, R>,
+        begin: &SMatrix<T, R, R>,
+        (a, b): (&SMatrix<T, R, K>, &SMatrix<T, K, R>),
+        (c, d): (&SMatrix<T, R, L>, &SMatrix<T, L, R>),
     ) {
-        if fills::<S>(R)
+        if fills_two::<S>(R)
             && R.is_multiple_of(S::F64_LANES)
-            && let Some((out, a, b)) = in_f64(out, a, b)
+            && let Some(begin) = in_f64(begin)
+            && let Some(first) = both_in_f64(a, b)
+            && let Some(second) = both_in_f64(c, d)
+            && let Some(out) = in_f64_mut(out)
         {
-            add_below_diagonal(self.0, out, a, b);
+            set_below_diagonal(self.0, out, begin, first, second);
         } else {
-            small_matrix::add_symmetric_product(out, a, b);
+            Compiled.set_symmetric_sum(out, begin, (a, b), (c, d));
         }
     }
 }
 
 /// Whether columns of so many `rows` fill two vectors.
 #[inline(always)]
-fn fills<S: Simd>(rows: usize) -> bool {
+fn fills_two<S: Simd>(rows: usize) -> bool {
     S::F64_LANES >= LANES && rows >= 2 * S::F64_LANES
+}
+
+/// Whether they fill one, or more than half of it.
+#[inline(always)]
+fn fills_one<S: Simd>(rows: usize) -> bool {
+    rows >= LANES && rows <= S::F64_LANES && 2 * rows > S::F64_LANES
 }
 
 /// A matrix by columns.
 type Columns<const R: usize, const C: usize> = [[f64; R]; C];
 
-/// The three matrices where their numbers are `f64`, which the compiler knows.
+/// The matrix where its numbers are `f64`, which the compiler knows.
 #[inline(always)]
-fn in_f64<'a, T: Scalar, const R: usize, const K: usize, const C: usize>(
-    out: &'a mut SMatrix<T, R, C>,
+fn in_f64<T: Scalar, const R: usize, const C: usize>(
+    m: &SMatrix<T, R, C>,
+) -> Option<&Columns<R, C>> {
+    let m: &dyn Any = m;
+    Some(&m.downcast_ref::<SMatrix<f64, R, C>>()?.data.0)
+}
+
+#[inline(always)]
+fn in_f64_mut<T: Scalar, const R: usize, const C: usize>(
+    m: &mut SMatrix<T, R, C>,
+) -> Option<&mut Columns<R, C>> {
+    let m: &mut dyn Any = m;
+    Some(&mut m.downcast_mut::<SMatrix<f64, R, C>>()?.data.0)
+}
+
+/// The factors of a product.
+type Factors<'a, const R: usize, const K: usize, const C: usize> =
+    (&'a Columns<R, K>, &'a Columns<K, C>);
+
+#[inline(always)]
+fn both_in_f64<'a, T: Scalar, const R: usize, const K: usize, const C: usize>(
     a: &'a SMatrix<T, R, K>,
     b: &'a SMatrix<T, K, C>,
-) -> Option<(&'a mut Columns<R, C>, &'a Columns<R, K>, &'a Columns<K, C>)> {
-    let (out, a, b): (&mut dyn Any, &dyn Any, &dyn Any) = (out, a, b);
-    let out = &mut out.downcast_mut::<SMatrix<f64, R, C>>()?.data.0;
-    let a = &a.downcast_ref::<SMatrix<f64, R, K>>()?.data.0;
-    let b = &b.downcast_ref::<SMatrix<f64, K, C>>()?.data.0;
-    Some((out, a, b))
+) -> Option<Factors<'a, R, K, C>> {
+    Some((in_f64(a)?, in_f64(b)?))
 }
 
 /// out = A B
@@ -125,65 +155,99 @@ fn multiply_by<'a, S: Simd, const N: usize, const R: usize, const K: usize>(
 ) -> (&'a mut [[f64; R]], &'a [[f64; K]]) {
     let (out, out_rest) = out.as_chunks_mut::<N>();
     let (b, b_rest) = b.as_chunks::<N>();
-    let set = |out: &mut S::f64s, sum| *out = sum;
-    let whole = R / S::F64_LANES;
+    let (none, whole) = ((&[], &[[]; N]), R / S::F64_LANES);
     for (out, b) in out.iter_mut().zip(b) {
-        add_rows(simd, out, a, b, (0, whole), set);
+        set_rows(simd, out, None, (a, b), none, (0, whole));
         // Rows that fill no vector are part of one that begins before them.
         if !R.is_multiple_of(S::F64_LANES) {
-            add_block::<S, 1, N, R, K>(simd, out, a, b, (R - S::F64_LANES, 0), set);
+            let last = (R - S::F64_LANES, 0);
+            set_block::<S, 1, N, R, K, 0>(simd, out, None, (a, b), none, last);
         }
     }
     (out_rest, b_rest)
 }
 
-/// out += A B on the diagonal and below, whose vectors begin at or before it.
+/// out = `begin` + A B + C D on the diagonal and below, whose vectors begin at or before it.
 #[inline(always)]
-fn add_below_diagonal<S: Simd, const R: usize, const K: usize>(
+fn set_below_diagonal<S: Simd, const R: usize, const K: usize, const L: usize>(
     simd: S,
     out: &mut Columns<R, R>,
-    a: &Columns<R, K>,
-    b: &Columns<K, R>,
+    begin: &Columns<R, R>,
+    (a, b): Factors<'_, R, K, R>,
+    (c, d): Factors<'_, R, L, R>,
 ) {
     let columns = out.as_chunks_mut::<FEW>().0.iter_mut();
-    for (i, (out, b)) in columns.zip(b.as_chunks::<FEW>().0).enumerate() {
+    let columns = columns.zip(begin.as_chunks::<FEW>().0);
+    let factors = b.as_chunks::<FEW>().0.iter().zip(d.as_chunks::<FEW>().0);
+    for (i, ((out, begin), (b, d))) in columns.zip(factors).enumerate() {
         let rows = (i * FEW / S::F64_LANES, R / S::F64_LANES);
-        add_rows(simd, out, a, b, rows, |out, sum| {
-            *out = simd.add_f64s(*out, sum);
-        });
+        set_rows(simd, out, Some(begin), (a, b), (c, d), rows);
     }
 }
 
-/// A few columns of A B, added or set in the vectors `first` to `end` of `out`.
+/// A few columns of `begin` + A B + C D in the vectors `first` to `end` of `out`.
 #[inline(always)]
-fn add_rows<S: Simd, const N: usize, const R: usize, const K: usize>(
+fn set_rows<S: Simd, const N: usize, const R: usize, const K: usize, const L: usize>(
     simd: S,
     out: &mut Columns<R, N>,
-    a: &Columns<R, K>,
-    b: &Columns<K, N>,
+    begin: Option<&Columns<R, N>>,
+    one: Factors<'_, R, K, N>,
+    other: Factors<'_, R, L, N>,
     (mut first, end): (usize, usize),
-    add: impl Fn(&mut S::f64s, S::f64s) + Copy,
 ) {
     while first + 2 <= end {
-        add_block::<S, 2, N, R, K>(simd, out, a, b, (0, first), add);
+        set_block::<S, 2, N, R, K, L>(simd, out, begin, one, other, (0, first));
         first += 2;
     }
     if first < end {
-        add_block::<S, 1, N, R, K>(simd, out, a, b, (0, first), add);
+        set_block::<S, 1, N, R, K, L>(simd, out, begin, one, other, (0, first));
     }
 }
 
 /// The same for `M` vectors of each column, from the vector `first` behind `row` on.
 #[inline(always)]
-fn add_block<S: Simd, const M: usize, const N: usize, const R: usize, const K: usize>(
+fn set_block<
+    S: Simd,
+    const M: usize,
+    const N: usize,
+    const R: usize,
+    const K: usize,
+    const L: usize,
+>(
     simd: S,
     out: &mut Columns<R, N>,
-    a: &Columns<R, K>,
-    b: &Columns<K, N>,
+    begin: Option<&Columns<R, N>>,
+    one: Factors<'_, R, K, N>,
+    other: Factors<'_, R, L, N>,
     (row, first): (usize, usize),
-    add: impl Fn(&mut S::f64s, S::f64s),
 ) {
     let mut sums = [[simd.splat_f64s(0.0); M]; N];
+    for (sums, begin) in sums.iter_mut().zip(begin.into_iter().flatten()) {
+        let (begin, _) = S::as_simd_f64s(&begin[row..]);
+        let begin = begin.get(first..).unwrap_or_default();
+        for (sum, begin) in sums.iter_mut().zip(begin) {
+            *sum = *begin;
+        }
+    }
+    add_terms(simd, &mut sums, one, (row, first));
+    add_terms(simd, &mut sums, other, (row, first));
+    for (out, sums) in out.iter_mut().zip(&sums) {
+        let (out, _) = S::as_mut_simd_f64s(&mut out[row..]);
+        let out = out.get_mut(first..).unwrap_or_default();
+        for (out, sum) in out.iter_mut().zip(sums) {
+            *out = *sum;
+        }
+    }
+}
+
+/// Adds the terms of A B to the sums of a block.
+#[inline(always)]
+fn add_terms<S: Simd, const M: usize, const N: usize, const R: usize, const K: usize>(
+    simd: S,
+    sums: &mut [[S::f64s; M]; N],
+    (a, b): Factors<'_, R, K, N>,
+    (row, first): (usize, usize),
+) {
     for (k, a) in a.iter().enumerate() {
         let (a, _) = S::as_simd_f64s(&a[row..]);
         let Some(a) = a.get(first..).and_then(|a| a.first_chunk::<M>()) else {
@@ -196,12 +260,25 @@ fn add_block<S: Simd, const M: usize, const N: usize, const R: usize, const K: u
             }
         }
     }
-    for (out, sums) in out.iter_mut().zip(&sums) {
-        let (out, _) = S::as_mut_simd_f64s(&mut out[row..]);
-        let out = out.get_mut(first..).unwrap_or_default();
-        for (out, sum) in out.iter_mut().zip(sums) {
-            add(out, *sum);
+}
+
+/// out = A B, whose columns are one vector or a part of it.
+#[inline(always)]
+fn multiply_narrow<S: Simd, const R: usize, const K: usize, const C: usize>(
+    simd: S,
+    out: &mut Columns<R, C>,
+    a: &Columns<R, K>,
+    b: &Columns<K, C>,
+) {
+    let mut sums = [simd.splat_f64s(0.0); C];
+    for (k, a) in a.iter().enumerate() {
+        let a = simd.partial_load_f64s(a);
+        for (sum, b) in sums.iter_mut().zip(b) {
+            *sum = simd.mul_add_e_f64s(a, simd.splat_f64s(b[k]), *sum);
         }
+    }
+    for (out, sum) in out.iter_mut().zip(&sums) {
+        simd.partial_store_f64s(out, *sum);
     }
 }
 
@@ -231,15 +308,17 @@ mod tests {
                 small_matrix::product(&a_32, &b_32)
             );
 
-            let (mut found, mut expected) = (SMatrix::zeros(), SMatrix::zeros());
-            for _ in 0..2 {
-                Vectors(simd).add_symmetric_product(&mut found, &a, &a.transpose());
-                small_matrix::add_symmetric_product(&mut expected, &a, &a.transpose());
-            }
+            let c = SMatrix::<f64, R, C>::from_fn(|_, _| number());
+            let root = SMatrix::<f64, R, R>::from_fn(|_, _| number());
+            let begin = root + root.transpose();
+            let (a_transposed, c_transposed) = (a.transpose(), c.transpose());
+            let mut found = SMatrix::zeros();
+            let (first, second) = ((&a, &a_transposed), (&c, &c_transposed));
+            Vectors(simd).set_symmetric_sum(&mut found, &begin, first, second);
             small_matrix::mirror(&mut found);
-            small_matrix::mirror(&mut expected);
-            let rest = (found - expected).amax();
-            assert!(rest <= 4.0 * rounding, "{R} x {K} x {R}, symmetric: {rest}");
+            let rest = found - (begin + a * a_transposed + c * c_transposed);
+            let rounding = 4.0 * ((K + C + 1) * (K + C + 1)) as f64 * f64::EPSILON;
+            assert!(rest.amax() <= rounding, "{R}, {K} + {C}: {}", rest.amax());
         }
     }
 
@@ -252,7 +331,12 @@ mod tests {
     /// Whatever the machine's vectors, and however the columns fill them.
     #[test]
     fn they_are_those_of_the_compiler_but_for_rounding() {
+        compare::<3, 9, 3>();
+        compare::<4, 12, 4>();
+        compare::<5, 16, 5>();
+        compare::<6, 16, 6>();
         compare::<6, 6, 2>();
+        compare::<8, 16, 8>();
         compare::<8, 8, 2>();
         compare::<8, 8, 8>();
         compare::<8, 3, 7>();

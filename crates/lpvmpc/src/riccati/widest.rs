@@ -7,9 +7,8 @@ use crate::products::Vectors;
 use crate::transposed::StageBothWays;
 use nalgebra::SVector;
 
-/// A backward step. Whether something may be `KEPT` of the stage transposed is known to the compiler, which leaves out what is
-/// not needed.
-pub(super) struct Elimination<'a, T, const NX: usize, const NU: usize, const KEPT: bool> {
+/// A backward step.
+pub(super) struct Elimination<'a, T, const NX: usize, const NU: usize> {
     pub factor: &'a mut StageFactor<T, NX, NU>,
     pub stage: StageBothWays<'a, T, NX, NU>,
     pub weights: &'a Common<T, NX, NU>,
@@ -17,9 +16,7 @@ pub(super) struct Elimination<'a, T, const NX: usize, const NU: usize, const KEP
     pub adjustment: Option<&'a dyn Adjustment<T, NX, NU>>,
 }
 
-impl<T: Scalar, const NX: usize, const NU: usize, const KEPT: bool> pulp::WithSimd
-    for Elimination<'_, T, NX, NU, KEPT>
-{
+impl<T: Scalar, const NX: usize, const NU: usize> pulp::WithSimd for Elimination<'_, T, NX, NU> {
     type Output = Result<(), BadPivot<T>>;
 
     #[inline(always)]
@@ -31,7 +28,6 @@ impl<T: Scalar, const NX: usize, const NU: usize, const KEPT: bool> pulp::WithSi
             cost_to_go,
             adjustment,
         } = self;
-        let stage = if KEPT { stage } else { stage.alone() };
         factor.eliminate_here(stage, weights, cost_to_go, adjustment, Vectors(simd))
     }
 }
