@@ -53,14 +53,14 @@ pub(crate) trait Products: Copy {
         out
     }
 
-    /// out = `begin` + A B + C D, a sum that is symmetric: above the diagonal it may be left as it is, see
+    /// out = `addend` + A B + C D, a sum that is symmetric: what is above the diagonal may be left as it was, see
     /// [`mirror`](small_matrix::mirror).
     fn set_symmetric_sum<T: Scalar, const R: usize, const K: usize, const L: usize>(
         self,
         out: &mut SMatrix<T, R, R>,
-        begin: &SMatrix<T, R, R>,
-        one: (&SMatrix<T, R, K>, &SMatrix<T, K, R>),
-        other: (&SMatrix<T, R, L>, &SMatrix<T, L, R>),
+        addend: &SMatrix<T, R, R>,
+        first: (&SMatrix<T, R, K>, &SMatrix<T, K, R>),
+        second: (&SMatrix<T, R, L>, &SMatrix<T, L, R>),
     );
 }
 
@@ -83,11 +83,11 @@ impl Products for Compiled {
     fn set_symmetric_sum<T: Scalar, const R: usize, const K: usize, const L: usize>(
         self,
         out: &mut SMatrix<T, R, R>,
-        begin: &SMatrix<T, R, R>,
+        addend: &SMatrix<T, R, R>,
         (a, b): (&SMatrix<T, R, K>, &SMatrix<T, K, R>),
         (c, d): (&SMatrix<T, R, L>, &SMatrix<T, L, R>),
     ) {
-        *out = *begin;
+        *out = *addend;
         small_matrix::add_symmetric_product(out, a, b);
         small_matrix::add_symmetric_product(out, c, d);
     }

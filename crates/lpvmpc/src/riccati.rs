@@ -16,7 +16,7 @@ use crate::small_matrix::{
     add_product, add_symmetric_product, mirror, product, transposed, transposed_product,
     transposed_times,
 };
-use crate::transposed::{StageBothWays, Transposed};
+use crate::transposed::StageBothWays;
 use nalgebra::{SMatrix, SVector};
 #[cfg(feature = "simd")]
 use widest::{Elimination, Passage};
@@ -107,14 +107,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
         cost_to_go: &mut CostToGo<T, NX>,
     ) -> Result<(), BadPivot<T>> {
         let stage = StageBothWays::new(stage);
-        // Turned round here: in vectors, matrices of this size are gathered number by number.
-        if products::are_in_vectors(NX) {
-            let transposed = [Transposed::of(&stage)];
-            let stage = stage.with(&transposed, 0);
-            return self.eliminate_adjusted(stage, weights, cost_to_go, None);
-        }
-        // Where flash is scarce there is one piece of machine code for both.
-        if cfg!(feature = "alloc") {
+        // Where flash is scarce, and in vectors, there is one piece of machine code for both.
+        if cfg!(feature = "alloc") && !products::are_in_vectors(NX) {
             self.eliminate_here(stage, weights, cost_to_go, None, Compiled)
         } else {
             self.eliminate_adjusted(stage, weights, cost_to_go, None)
@@ -132,9 +126,11 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     ) -> Result<(), BadPivot<T>> {
         #[cfg(feature = "simd")]
         if products::are_in_vectors(NX) {
+            // Here, since code for the widest vectors gathers matrices of this size entry by entry.
+            let mut transposed = None;
             return products::dispatch::<NX, _>(Elimination {
                 factor: self,
-                stage,
+                stage: stage.or_transposed_in(&mut transposed),
                 weights,
                 cost_to_go,
                 adjustment,
@@ -224,9 +220,10 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     ) {
         #[cfg(feature = "simd")]
         if products::are_in_vectors(NX) {
+            let mut transposed = None;
             return products::dispatch::<NX, _>(Passage {
                 factor: self,
-                stage,
+                stage: stage.or_transposed_in(&mut transposed),
                 weights,
                 cost_to_go,
                 input,
@@ -314,8 +311,8 @@ impl<T: Scalar, const NX: usize, const NU: usize> StageFactor<T, NX, NU> {
     }
 }
 
-/// A matrix with more numbers than these takes longer to turn round than to look for one that is not zero.
-const FEW_NUMBERS: usize = 16;
+/// With more entries than these, to transpose a matrix takes longer than to see that it is zero.
+const FEW_ENTRIES: usize = 16;
 
 /// g_x += S', where there is a cross term.
 #[inline(always)]
@@ -323,6 +320,7 @@ fn add_cross_term<T: Scalar, const NX: usize, const NU: usize>(
     g_x: &mut SMatrix<T, NX, NU>,
     s: &SMatrix<T, NU, NX>,
 ) {
+    // Sums of sizes, which go in vectors; with NaN it is not zero.
     let is_zero = || {
         let mut sizes = [T::zero(); NU];
         for column in &s.data.0 {
@@ -332,7 +330,7 @@ fn add_cross_term<T: Scalar, const NX: usize, const NU: usize>(
         }
         sizes.iter().all(|size| *size == T::zero())
     };
-    if NX * NU <= FEW_NUMBERS || !is_zero() {
+    if NX * NU <= FEW_ENTRIES || !is_zero() {
         *g_x += transposed(s);
     }
 }

@@ -242,6 +242,12 @@ fn add_tile<T: Scalar, const R: usize, const K: usize>(
     let Some(columns) = columns else {
         return;
     };
+    let out = out.data.0.get_mut(column..).unwrap_or_default();
+    for (sums, out) in sums.iter_mut().zip(out.iter()) {
+        for (sum, out) in sums.iter_mut().zip(out.get(row..).unwrap_or_default()) {
+            *sum = *out;
+        }
+    }
     for (k, a) in a.data.0.iter().enumerate() {
         let Some(a) = a.get(row..).and_then(|a| a.first_chunk::<TILE>()) else {
             return;
@@ -252,11 +258,10 @@ fn add_tile<T: Scalar, const R: usize, const K: usize>(
             }
         }
     }
-    let out = out.data.0.get_mut(column..).unwrap_or_default();
     for (out, sums) in out.iter_mut().zip(&sums) {
         let out = out.get_mut(row..).unwrap_or_default();
         for (out, sum) in out.iter_mut().zip(sums) {
-            *out += *sum;
+            *out = *sum;
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The matrices of a stage transposed, kept where the stage is factorised again and again.
+//! The matrices of a stage transposed: kept where the stage is factorised again and again, else made for one backward step.
 
 use crate::model::Scalar;
 use crate::ocp::Stage;
@@ -69,6 +69,20 @@ impl<'a, T: Scalar, const NX: usize, const NU: usize> StageBothWays<'a, T, NX, N
             None
         };
         Self { transposed, ..self }
+    }
+
+    /// The stage with its matrices transposed, in `place` where they are not kept.
+    #[cfg(feature = "simd")]
+    #[inline(always)]
+    pub fn or_transposed_in(self, place: &'a mut Option<Transposed<T, NX, NU>>) -> Self {
+        let transposed = match self.transposed {
+            Some(kept) => kept,
+            None => place.insert(Transposed::of(self.stage)),
+        };
+        Self {
+            transposed: Some(transposed),
+            ..self
+        }
     }
 
     /// What is kept; nothing, as the compiler knows, where columns are too short for vectors.

@@ -356,7 +356,8 @@ mod tests {
         let eliminated = factor.eliminate_adjusted(both_ways, weights, &mut cost, None);
         assert_eq!(eliminated, Ok(()));
         let (mut same, mut same_cost) = (StageFactor::zeros(), before);
-        assert_eq!(same.eliminate(&stage, weights, &mut same_cost), Ok(()));
+        let eliminated = same.eliminate_adjusted(stage, weights, &mut same_cost, None);
+        assert_eq!(eliminated, Ok(()));
         assert!((factor.feedback - same.feedback).amax() < 1e-12);
         assert!((cost.quadratic - same_cost.quadratic).amax() < 1e-13 * size);
         let mut cost = before;

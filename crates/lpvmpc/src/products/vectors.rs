@@ -1,5 +1,5 @@
 //! Products in vectors, block by block: the sums of a block stay in registers, and are so many that none waits
-//! for the one before it. A product's sum has the terms of [`small_matrix`] in the same order; where the machine multiplies
+//! for the one before it. A sum has the terms of [`small_matrix`] in the same order; where the machine multiplies
 //! and adds in one instruction, a term is rounded once, not twice.
 
 use super::{Compiled, Products};
@@ -9,7 +9,8 @@ use core::any::Any;
 use nalgebra::SMatrix;
 use pulp::{Arch, Simd, WithSimd};
 
-/// In the vectors of `S`, of numbers in `f64`, where columns fill two of them; else as the compiler has them.
+/// In the vectors of `S`, of numbers in `f64`, where columns fill two of them or, of products, most of one; else as the compiler
+/// has them.
 #[derive(Clone, Copy)]
 pub(crate) struct Vectors<S>(pub S);
 
@@ -66,20 +67,20 @@ impl<S: Simd> Products for Vectors<S> {
     fn set_symmetric_sum<T: Scalar, const R: usize, const K: usize, const L: usize>(
         self,
         out: &mut SMatrix<T, R, R>,
-        begin: &SMatrix<T, R, R>,
+        addend: &SMatrix<T, R, R>,
         (a, b): (&SMatrix<T, R, K>, &SMatrix<T, K, R>),
         (c, d): (&SMatrix<T, R, L>, &SMatrix<T, L, R>),
     ) {
         if fills_two::<S>(R)
             && R.is_multiple_of(S::F64_LANES)
-            && let Some(begin) = in_f64(begin)
+            && let Some(addend) = in_f64(addend)
             && let Some(first) = both_in_f64(a, b)
             && let Some(second) = both_in_f64(c, d)
             && let Some(out) = in_f64_mut(out)
         {
-            set_below_diagonal(self.0, out, begin, first, second);
+            set_below_diagonal(self.0, out, addend, first, second);
         } else {
-            Compiled.set_symmetric_sum(out, begin, (a, b), (c, d));
+            Compiled.set_symmetric_sum(out, addend, (a, b), (c, d));
         }
     }
 }
@@ -90,7 +91,7 @@ fn fills_two<S: Simd>(rows: usize) -> bool {
     S::F64_LANES >= LANES && rows >= 2 * S::F64_LANES
 }
 
-/// Whether they fill one, or more than half of it.
+/// Whether columns of so many `rows`, four at least, fit into one vector and fill more than half of it.
 #[inline(always)]
 fn fills_one<S: Simd>(rows: usize) -> bool {
     rows >= LANES && rows <= S::F64_LANES && 2 * rows > S::F64_LANES
@@ -167,44 +168,44 @@ fn multiply_by<'a, S: Simd, const N: usize, const R: usize, const K: usize>(
     (out_rest, b_rest)
 }
 
-/// out = `begin` + A B + C D on the diagonal and below, whose vectors begin at or before it.
+/// out = `addend` + A B + C D on the diagonal and below, whose vectors begin at or before it.
 #[inline(always)]
 fn set_below_diagonal<S: Simd, const R: usize, const K: usize, const L: usize>(
     simd: S,
     out: &mut Columns<R, R>,
-    begin: &Columns<R, R>,
+    addend: &Columns<R, R>,
     (a, b): Factors<'_, R, K, R>,
     (c, d): Factors<'_, R, L, R>,
 ) {
     let columns = out.as_chunks_mut::<FEW>().0.iter_mut();
-    let columns = columns.zip(begin.as_chunks::<FEW>().0);
+    let columns = columns.zip(addend.as_chunks::<FEW>().0);
     let factors = b.as_chunks::<FEW>().0.iter().zip(d.as_chunks::<FEW>().0);
-    for (i, ((out, begin), (b, d))) in columns.zip(factors).enumerate() {
+    for (i, ((out, addend), (b, d))) in columns.zip(factors).enumerate() {
         let rows = (i * FEW / S::F64_LANES, R / S::F64_LANES);
-        set_rows(simd, out, Some(begin), (a, b), (c, d), rows);
+        set_rows(simd, out, Some(addend), (a, b), (c, d), rows);
     }
 }
 
-/// A few columns of `begin` + A B + C D in the vectors `first` to `end` of `out`.
+/// A few columns of `addend`, or zero, + A B + C D in the vectors `from` to `end` of `out`.
 #[inline(always)]
 fn set_rows<S: Simd, const N: usize, const R: usize, const K: usize, const L: usize>(
     simd: S,
     out: &mut Columns<R, N>,
-    begin: Option<&Columns<R, N>>,
-    one: Factors<'_, R, K, N>,
-    other: Factors<'_, R, L, N>,
-    (mut first, end): (usize, usize),
+    addend: Option<&Columns<R, N>>,
+    first: Factors<'_, R, K, N>,
+    second: Factors<'_, R, L, N>,
+    (mut from, end): (usize, usize),
 ) {
-    while first + 2 <= end {
-        set_block::<S, 2, N, R, K, L>(simd, out, begin, one, other, (0, first));
-        first += 2;
+    while from + 2 <= end {
+        set_block::<S, 2, N, R, K, L>(simd, out, addend, first, second, (0, from));
+        from += 2;
     }
-    if first < end {
-        set_block::<S, 1, N, R, K, L>(simd, out, begin, one, other, (0, first));
+    if from < end {
+        set_block::<S, 1, N, R, K, L>(simd, out, addend, first, second, (0, from));
     }
 }
 
-/// The same for `M` vectors of each column, from the vector `first` behind `row` on.
+/// The same for `M` vectors of each column, from the vector `from` behind `row` on.
 #[inline(always)]
 fn set_block<
     S: Simd,
@@ -216,24 +217,24 @@ fn set_block<
 >(
     simd: S,
     out: &mut Columns<R, N>,
-    begin: Option<&Columns<R, N>>,
-    one: Factors<'_, R, K, N>,
-    other: Factors<'_, R, L, N>,
-    (row, first): (usize, usize),
+    addend: Option<&Columns<R, N>>,
+    first: Factors<'_, R, K, N>,
+    second: Factors<'_, R, L, N>,
+    (row, from): (usize, usize),
 ) {
     let mut sums = [[simd.splat_f64s(0.0); M]; N];
-    for (sums, begin) in sums.iter_mut().zip(begin.into_iter().flatten()) {
-        let (begin, _) = S::as_simd_f64s(&begin[row..]);
-        let begin = begin.get(first..).unwrap_or_default();
-        for (sum, begin) in sums.iter_mut().zip(begin) {
-            *sum = *begin;
+    for (sums, addend) in sums.iter_mut().zip(addend.into_iter().flatten()) {
+        let (addend, _) = S::as_simd_f64s(&addend[row..]);
+        let addend = addend.get(from..).unwrap_or_default();
+        for (sum, addend) in sums.iter_mut().zip(addend) {
+            *sum = *addend;
         }
     }
-    add_terms(simd, &mut sums, one, (row, first));
-    add_terms(simd, &mut sums, other, (row, first));
+    add_terms(simd, &mut sums, first, (row, from));
+    add_terms(simd, &mut sums, second, (row, from));
     for (out, sums) in out.iter_mut().zip(&sums) {
         let (out, _) = S::as_mut_simd_f64s(&mut out[row..]);
-        let out = out.get_mut(first..).unwrap_or_default();
+        let out = out.get_mut(from..).unwrap_or_default();
         for (out, sum) in out.iter_mut().zip(sums) {
             *out = *sum;
         }
@@ -246,11 +247,11 @@ fn add_terms<S: Simd, const M: usize, const N: usize, const R: usize, const K: u
     simd: S,
     sums: &mut [[S::f64s; M]; N],
     (a, b): Factors<'_, R, K, N>,
-    (row, first): (usize, usize),
+    (row, from): (usize, usize),
 ) {
     for (k, a) in a.iter().enumerate() {
         let (a, _) = S::as_simd_f64s(&a[row..]);
-        let Some(a) = a.get(first..).and_then(|a| a.first_chunk::<M>()) else {
+        let Some(a) = a.get(from..).and_then(|a| a.first_chunk::<M>()) else {
             return;
         };
         for (sums, b) in sums.iter_mut().zip(b) {
@@ -271,14 +272,21 @@ fn multiply_narrow<S: Simd, const R: usize, const K: usize, const C: usize>(
     b: &Columns<K, C>,
 ) {
     let mut sums = [simd.splat_f64s(0.0); C];
+    // A part of a vector is loaded and stored by a jump into a table.
     for (k, a) in a.iter().enumerate() {
-        let a = simd.partial_load_f64s(a);
+        let a = match S::as_simd_f64s(a).0 {
+            [whole, ..] => *whole,
+            [] => simd.partial_load_f64s(a),
+        };
         for (sum, b) in sums.iter_mut().zip(b) {
             *sum = simd.mul_add_e_f64s(a, simd.splat_f64s(b[k]), *sum);
         }
     }
     for (out, sum) in out.iter_mut().zip(&sums) {
-        simd.partial_store_f64s(out, *sum);
+        match S::as_mut_simd_f64s(out).0 {
+            [whole, ..] => *whole = *sum,
+            [] => simd.partial_store_f64s(out, *sum),
+        }
     }
 }
 
@@ -298,10 +306,12 @@ mod tests {
             let mut number = || random.uniform(-2.0, 2.0);
             let a = SMatrix::<f64, R, K>::from_fn(|_, _| number());
             let b = SMatrix::<f64, K, C>::from_fn(|_, _| number());
-            // Each of K terms, of 4 at most, is rounded with the sum so far.
+            // Each of K terms, of 4 at most, is rounded with the sum so far. What stands in the answer's place is no part of it.
             let rounding = 4.0 * (K * K) as f64 * f64::EPSILON;
-            let rest = Vectors(simd).product(&a, &b) - small_matrix::product(&a, &b);
-            assert!(rest.amax() <= rounding, "{R} x {K} x {C}: {}", rest.amax());
+            let mut found = SMatrix::from_element(f64::NAN);
+            Vectors(simd).set_product(&mut found, &a, &b);
+            let rest = (found - a * b).amax();
+            assert!(rest <= rounding, "{R} x {K} x {C}: {rest}");
             let (a_32, b_32) = (a.map(|a| a as f32), b.map(|b| b as f32));
             assert_eq!(
                 Vectors(simd).product(&a_32, &b_32),
@@ -310,16 +320,43 @@ mod tests {
 
             let c = SMatrix::<f64, R, C>::from_fn(|_, _| number());
             let root = SMatrix::<f64, R, R>::from_fn(|_, _| number());
-            let begin = root + root.transpose();
-            let (a_transposed, c_transposed) = (a.transpose(), c.transpose());
-            let mut found = SMatrix::zeros();
-            let (first, second) = ((&a, &a_transposed), (&c, &c_transposed));
-            Vectors(simd).set_symmetric_sum(&mut found, &begin, first, second);
-            small_matrix::mirror(&mut found);
-            let rest = found - (begin + a * a_transposed + c * c_transposed);
+            let addend = root + root.transpose();
+            let rest = symmetric_sum(Vectors(simd), &addend, &a, &c)
+                - (addend + a * a.transpose() + c * c.transpose());
             let rounding = 4.0 * ((K + C + 1) * (K + C + 1)) as f64 * f64::EPSILON;
             assert!(rest.amax() <= rounding, "{R}, {K} + {C}: {}", rest.amax());
+            let nothing = SMatrix::<f64, R, 0>::zeros();
+            let rest =
+                symmetric_sum(Vectors(simd), &addend, &a, &nothing) - (addend + a * a.transpose());
+            assert!(rest.amax() <= rounding, "{R}, {K}: {}", rest.amax());
+            let (addend_32, c_32) = (addend.map(|a| a as f32), c.map(|c| c as f32));
+            assert_eq!(
+                symmetric_sum(Vectors(simd), &addend_32, &a_32, &c_32),
+                symmetric_sum(Compiled, &addend_32, &a_32, &c_32)
+            );
+
+            // Of small integers products are exact, and what is added to a large one tells the order of the terms.
+            let (a, c) = (a.map(f64::round), c.map(f64::round));
+            let large = SMatrix::from_element(2_f64.powi(53));
+            assert_eq!(
+                symmetric_sum(Vectors(simd), &large, &a, &c),
+                symmetric_sum(Compiled, &large, &a, &c)
+            );
         }
+    }
+
+    /// `addend` + A A' + C C'
+    fn symmetric_sum<M: Products, T: Scalar, const R: usize, const K: usize, const L: usize>(
+        by: M,
+        addend: &SMatrix<T, R, R>,
+        a: &SMatrix<T, R, K>,
+        c: &SMatrix<T, R, L>,
+    ) -> SMatrix<T, R, R> {
+        let mut out = SMatrix::from_element(T::one() / T::zero());
+        let (a_transposed, c_transposed) = (a.transpose(), c.transpose());
+        by.set_symmetric_sum(&mut out, addend, (a, &a_transposed), (c, &c_transposed));
+        small_matrix::mirror(&mut out);
+        out
     }
 
     fn compare<const R: usize, const K: usize, const C: usize>() {
@@ -336,6 +373,7 @@ mod tests {
         compare::<5, 16, 5>();
         compare::<6, 16, 6>();
         compare::<6, 6, 2>();
+        compare::<7, 16, 7>();
         compare::<8, 16, 8>();
         compare::<8, 8, 2>();
         compare::<8, 8, 8>();
