@@ -6,6 +6,7 @@
 //! v = L'(u - K x - k), the whole cost becomes `constant + sum |v_i|^2 / 2`: the horizon's
 //! Hessian is the identity, and a bound is a plain linear row in v.
 
+mod unit_factor;
 #[cfg(feature = "simd")]
 mod widest;
 
@@ -18,6 +19,7 @@ use crate::small_matrix::{
 };
 use crate::transposed::StageBothWays;
 use nalgebra::{SMatrix, SVector};
+use unit_factor::UnitFactor;
 #[cfg(feature = "simd")]
 use widest::{Elimination, Passage};
 
@@ -365,60 +367,81 @@ fn scaled_columns<T: Scalar, const R: usize, const C: usize>(
     out
 }
 
-/// L^-1 and D^-1 of the factorisation L D L' with unit lower triangular L.
-struct UnitFactor<T, const K: usize> {
-    inverse: SMatrix<T, K, K>,
-    reciprocals: SVector<T, K>,
-}
-
-impl<T: Scalar, const K: usize> UnitFactor<T, K> {
-    /// Factorises the symmetric matrix `m`; its lower triangle is read.
-    #[inline(always)]
-    fn new(m: &SMatrix<T, K, K>) -> Result<Self, BadPivot<T>> {
-        // Below the diagonal L, above it D L'.
-        let mut l = *m;
-        let mut pivots = SVector::<T, K>::zeros();
-        let mut reciprocals = SVector::<T, K>::zeros();
-        for j in 0..K {
-            let mut pivot = l[(j, j)];
-            for k in 0..j {
-                pivot -= l[(j, k)] * l[(j, k)] * pivots[k];
-            }
-            if !(pivot > T::zero() && pivot.is_finite()) {
-                return Err(BadPivot(pivot));
-            }
-            pivots[j] = pivot;
-            reciprocals[j] = T::one() / pivot;
-            for i in j + 1..K {
-                let mut entry = l[(i, j)];
-                for k in 0..j {
-                    entry -= l[(i, k)] * l[(k, j)];
-                }
-                l[(j, i)] = entry;
-                l[(i, j)] = entry * reciprocals[j];
-            }
-        }
-        let mut inverse = SMatrix::<T, K, K>::identity();
-        for j in 0..K {
-            for i in j + 1..K {
-                let mut entry = T::zero();
-                for k in j..i {
-                    entry -= l[(i, k)] * inverse[(k, j)];
-                }
-                inverse[(i, j)] = entry;
-            }
-        }
-        Ok(Self {
-            inverse,
-            reciprocals,
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use lpvmpc_testkit::rng::Rng;
     use nalgebra::{Matrix2, RowVector2, Vector2};
+
+    /// A random stage, with a cross term or without.
+    fn compare_with_textbook<const NX: usize, const NU: usize>(cross: f64) {
+        let mut random = Rng::new((100 * NX + NU) as u64);
+        let mut number = || random.uniform(-1.0, 1.0);
+        let stage = Stage::<f64, NX, NU> {
+            a: SMatrix::from_fn(|_, _| number()),
+            b: SMatrix::from_fn(|_, _| number()),
+            c: SVector::from_fn(|_, _| number()),
+            linear_x: SVector::from_fn(|_, _| number()),
+            linear_u: SVector::from_fn(|_, _| number()),
+        };
+        let root = SMatrix::<f64, NX, NX>::from_fn(|_, _| number());
+        let weights = Common::<f64, NX, NU> {
+            q: SMatrix::identity(),
+            r: SMatrix::identity(),
+            s: SMatrix::from_fn(|_, _| cross * number()),
+            ..Common::default()
+        };
+        let behind = CostToGo {
+            quadratic: root.transpose() * root,
+            linear: SVector::from_fn(|_, _| number()),
+        };
+        let mut factor = StageFactor::zeros();
+        let mut in_front = behind;
+        let eliminated = factor.eliminate(&stage, &weights, &mut in_front);
+        assert_eq!(eliminated, Ok(()));
+
+        let Stage {
+            a,
+            b,
+            c,
+            linear_x,
+            linear_u,
+        } = stage;
+        let p = behind.quadratic;
+        let hessian = weights.r + b.transpose() * p * b;
+        let g_x = weights.s + b.transpose() * p * a;
+        let p_next = behind.linear + p * c;
+        let g = linear_u + b.transpose() * p_next;
+        let inverse = hessian.try_inverse().unwrap();
+        let (feedback, feedforward) = (-inverse * g_x, -inverse * g);
+        let quadratic = weights.q + a.transpose() * p * a + g_x.transpose() * feedback;
+        let linear = linear_x + a.transpose() * p_next + g_x.transpose() * feedforward;
+        let tolerance = 1e-11 * p.amax() * (NX * NX) as f64;
+        assert!((factor.feedback - feedback).amax() < tolerance);
+        assert!((factor.feedforward - feedforward).amax() < tolerance);
+        assert!((in_front.quadratic - quadratic).amax() < tolerance);
+        assert_eq!(in_front.quadratic, in_front.quadratic.transpose());
+        assert!((in_front.linear - linear).amax() < tolerance);
+        let l = factor.inverse_factor;
+        assert!((l.transpose() * l - inverse).amax() < tolerance);
+    }
+
+    /// P = Q + A'PA - (S + B'PA)' (R + B'PB)^-1 (S + B'PA), whatever the size and however it fills the machine's vectors.
+    #[test]
+    fn a_backward_step_is_the_riccati_equation() {
+        for cross in [0.0, 0.1] {
+            compare_with_textbook::<2, 1>(cross);
+            compare_with_textbook::<4, 1>(cross);
+            compare_with_textbook::<6, 4>(cross);
+            compare_with_textbook::<7, 2>(cross);
+            compare_with_textbook::<8, 2>(cross);
+            compare_with_textbook::<9, 3>(cross);
+            compare_with_textbook::<12, 4>(cross);
+            compare_with_textbook::<16, 4>(cross);
+            compare_with_textbook::<16, 6>(cross);
+            compare_with_textbook::<16, 8>(cross);
+        }
+    }
 
     /// The cost-to-go in front of a stage whose input holds a state is the cost of the stage and of what comes behind it
     /// under the law that keeps that state where it is, from any state.
